@@ -1,0 +1,37 @@
+"""`new_goal`, `cancel_goal`: what an operator would do."""
+
+from simscen.actions.base import Action
+from simscen.core.navigation import Goal
+from simscen.core.stage import Stage
+from simscen.spec.base import Spec
+from simscen.spec.places import Name, PoseSpec
+from simscen.spec.quantities import PositiveDuration
+
+
+class NewGoal(Spec, Action):
+    """Send another goal; it preempts the one the robot is driving to, and the goals after it follow.
+
+    Example: `do: {new_goal: {name: detour, pose: {x: 1, y: 4}}}`
+    """
+
+    name: Name
+    """What the goal is called."""
+    pose: PoseSpec
+    """In the map frame."""
+    timeout: PositiveDuration | None = None
+    """Simulated time it may take."""
+
+    def perform(self, stage: Stage) -> None:
+        """Send it."""
+        stage.send_goal(Goal(self.name, self.pose.pose, timeout=self.timeout))
+
+
+class CancelGoal(Spec, Action):
+    """Cancel the goal the robot is driving to, as an action client would; the robot must stop.
+
+    Example: `do: {cancel_goal: {}}`
+    """
+
+    def perform(self, stage: Stage) -> None:
+        """Cancel it."""
+        stage.cancel_goal()

@@ -1,0 +1,75 @@
+"""`spawn`: put an object into the world."""
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from simscen.actions.base import Action
+from simscen.core.events import Event
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.navigation import Path
+from simscen.core.shapes import Body
+from simscen.core.stage import Stage
+from simscen.spec.objects import Shaped
+from simscen.spec.places import Name, PoseSpec
+from simscen.spec.quantities import Angle, Length, Mass, NonNegativeLength
+
+
+class Spawn(Shaped, Action):
+    """Put an object into the world: at a pose, relative to the robot, or on the plan it is following.
+
+    With `mass` the robot can push it; without, only the scenario moves it.
+
+    Example: `do: {spawn: {name: pallet, box: [1.2, 0.8, 0.3], on_plan: 1.5 m}}`
+    """
+
+    name: Name
+    """What it is called from now on."""
+    pose: PoseSpec | None = None
+    """In the world frame."""
+    ahead: Annotated[list[Length], Field(min_length=2, max_length=2)] | None = None
+    """In the robot's frame: [metres ahead, metres to the left]."""
+    on_plan: NonNegativeLength | None = None
+    """On the robot's plan, so far ahead along it, turned across it; at its end where the plan is shorter."""
+    yaw: Angle = 0.0
+    """Turn relative to the robot's heading or the plan's direction."""
+    mass: Mass = 0.0
+    """In kg; 0 = immovable for the robot."""
+
+    @model_validator(mode="after")
+    def _one_place(self) -> "Spawn":
+        if sum(place is not None for place in (self.pose, self.ahead, self.on_plan)) != 1:
+            raise ValueError("expected exactly one of: pose, ahead, on_plan")
+        return self
+
+    def perform(self, stage: Stage) -> None:
+        """Spawn it; without a plan to put it on, say so in the log and put it ahead of the robot."""
+        stage.spawn(Body(self.name, (self.solid(self.name),), Pose3.planar(self._place(stage)), self.mass))
+
+    def _place(self, stage: Stage) -> Pose2:
+        if self.pose is not None:
+            return self.pose.pose
+        if self.ahead is not None:
+            return stage.robot.compose(Pose2(self.ahead[0], self.ahead[1], self.yaw))
+        assert self.on_plan is not None
+        if stage.plan is None or len(stage.plan.points) < 2:
+            stage.note(
+                Event(0, "event.note", self.name, {"message": "no plan to spawn on; spawned ahead instead"})
+            )
+            return stage.robot.compose(Pose2(self.on_plan, 0.0, self.yaw))
+        return along(stage.plan, stage.robot, self.on_plan).compose(Pose2(0.0, 0.0, self.yaw))
+
+
+def along(plan: Path, robot: Pose2, ahead: float) -> Pose2:
+    """The pose on `plan` that is `ahead` metres further along it than its point nearest to the robot."""
+    points = plan.points[:, :2]
+    steps = np.hypot(*np.diff(points, axis=0).T)
+    travelled = np.concatenate(([0.0], np.cumsum(steps)))
+    nearest = int(np.argmin(np.hypot(points[:, 0] - robot.x, points[:, 1] - robot.y)))
+    target = min(travelled[nearest] + ahead, travelled[-1])
+    segment = min(int(np.searchsorted(travelled, target, side="right")) - 1, len(steps) - 1)
+    direction = points[segment + 1] - points[segment]
+    fraction = (target - travelled[segment]) / steps[segment] if steps[segment] else 0.0
+    x, y = points[segment] + fraction * direction
+    return Pose2(float(x), float(y), float(np.arctan2(direction[1], direction[0])))

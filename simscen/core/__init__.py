@@ -1,0 +1,1 @@
+"""The words every other part of simscen speaks: plain data, no pydantic, no files, no engine."""

@@ -1,0 +1,25 @@
+"""What a criterion may know of a scenario besides the trace."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from simscen.core.geometry import Pose2
+from simscen.core.navigation import Goal
+from simscen.core.world import Polygon
+
+
+@dataclass(frozen=True)
+class Case:
+    """The parts of a scenario that judging needs; travels in the log, so that a log alone can be judged.
+
+    `shortest` maps a goal's name to the length in metres of the shortest way that a disc of the robot's inscribed
+    radius has from the goal before it (the start for the first) through the static world; inf when there is none.
+    """
+
+    start: Pose2
+    goals: tuple[Goal, ...]
+    shortest: Mapping[str, float] = field(default_factory=dict)
+    regions: Mapping[str, Polygon] = field(default_factory=dict)
+    footprint: Polygon = ()
+    inscribed_radius: float = 0.0
+    time_limit: float = 0.0

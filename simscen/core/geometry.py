@@ -1,0 +1,141 @@
+"""Poses and rigid motions in the plane and in space. Metres and radians; frames as in ROS REP 103."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+def wrap(angle: float) -> float:
+    """The same angle in (-π, π]."""
+    wrapped = math.remainder(angle, 2 * math.pi)
+    return math.pi if wrapped == -math.pi else wrapped
+
+
+def wrap_array(angles: Array) -> Array:
+    """The same angles in [-π, π)."""
+    return (angles + np.pi) % (2 * np.pi) - np.pi
+
+
+class Pose2(NamedTuple):
+    """A position and heading in the plane; read `a_from_b` as the pose of frame b in frame a."""
+
+    x: float
+    y: float
+    yaw: float = 0.0
+
+    def compose(self, other: "Pose2") -> "Pose2":
+        """`a_from_b.compose(b_from_c)` is `a_from_c`."""
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        return Pose2(
+            self.x + c * other.x - s * other.y, self.y + s * other.x + c * other.y, wrap(self.yaw + other.yaw)
+        )
+
+    def inverse(self) -> "Pose2":
+        """`a_from_b.inverse()` is `b_from_a`."""
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        return Pose2(-c * self.x - s * self.y, s * self.x - c * self.y, wrap(-self.yaw))
+
+    def between(self, other: "Pose2") -> "Pose2":
+        """The pose `other` seen from this one; both given in the same frame."""
+        return self.inverse().compose(other)
+
+    def apply(self, points: Array) -> Array:
+        """Points (n, 2) of this pose's frame, expressed in its parent frame."""
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        rotated: Array = points @ np.array([[c, s], [-s, c]])
+        return rotated + (self.x, self.y)
+
+    def distance(self, other: "Pose2") -> float:
+        """Distance between the two positions in metres; headings do not count."""
+        return math.hypot(other.x - self.x, other.y - self.y)
+
+
+class Pose3(NamedTuple):
+    """A position and a unit quaternion (x, y, z, w) in space."""
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+    qx: float = 0.0
+    qy: float = 0.0
+    qz: float = 0.0
+    qw: float = 1.0
+
+    @classmethod
+    def from_rpy(cls, x: float, y: float, z: float, roll: float, pitch: float, yaw: float) -> "Pose3":
+        """Fixed-axis roll, pitch, yaw as in URDF and SDF."""
+        cr, sr = math.cos(roll / 2), math.sin(roll / 2)
+        cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
+        cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
+        return cls(
+            x, y, z,
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+            cr * cp * cy + sr * sp * sy,
+        )  # fmt: skip
+
+    @classmethod
+    def planar(cls, pose: Pose2, z: float = 0.0) -> "Pose3":
+        """A pose of the plane, lifted to height `z`."""
+        return cls(pose.x, pose.y, z, 0.0, 0.0, math.sin(pose.yaw / 2), math.cos(pose.yaw / 2))
+
+    @property
+    def position(self) -> tuple[float, float, float]:
+        """(x, y, z) in metres."""
+        return self.x, self.y, self.z
+
+    @property
+    def quaternion(self) -> tuple[float, float, float, float]:
+        """(x, y, z, w), the order of ROS and PyBullet."""
+        return self.qx, self.qy, self.qz, self.qw
+
+    def rotation(self) -> Array:
+        """The 3 x 3 rotation matrix."""
+        x, y, z, w = self.quaternion
+        return np.array(
+            [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+            ]
+        )
+
+    def apply(self, points: Array) -> Array:
+        """Points (n, 3) of this pose's frame, expressed in its parent frame."""
+        rotated: Array = points @ self.rotation().T
+        return rotated + self.position
+
+    def compose(self, other: "Pose3") -> "Pose3":
+        """`a_from_b.compose(b_from_c)` is `a_from_c`."""
+        x, y, z = self.apply(np.array([other.position]))[0].tolist()
+        ax, ay, az, aw = self.quaternion
+        bx, by, bz, bw = other.quaternion
+        return Pose3(
+            x, y, z,
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+            aw * bw - ax * bx - ay * by - az * bz,
+        )  # fmt: skip
+
+    def inverse(self) -> "Pose3":
+        """`a_from_b.inverse()` is `b_from_a`."""
+        turn = Pose3(0, 0, 0, -self.qx, -self.qy, -self.qz, self.qw)
+        x, y, z = (-turn.apply(np.array([self.position]))[0]).tolist()
+        return turn._replace(x=x, y=y, z=z)
+
+    @property
+    def yaw(self) -> float:
+        """Rotation about z in radians, in (-π, π]."""
+        x, y, z, w = self.quaternion
+        return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+
+    @property
+    def plane(self) -> Pose2:
+        """Its position and heading on the ground."""
+        return Pose2(self.x, self.y, self.yaw)

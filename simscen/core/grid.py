@@ -1,0 +1,50 @@
+"""Occupancy grids with the meaning of nav_msgs/OccupancyGrid."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.geometry import Array, Pose2
+
+FREE, OCCUPIED, UNKNOWN = 0, 100, -1
+
+
+@dataclass(frozen=True, eq=False)
+class OccupancyGrid:
+    """A map: `cells` (height, width) int8 with 0 free … 100 occupied, -1 unknown.
+
+    Row 0 is the lowest y of the grid's own frame. `resolution` in m per cell; `origin` is the corner of cell (0, 0)
+    in the map frame, its yaw turns the whole grid.
+    """
+
+    cells: npt.NDArray[np.int8]
+    resolution: float
+    origin: Pose2 = Pose2(0.0, 0.0, 0.0)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(height, width) in cells."""
+        return self.cells.shape[0], self.cells.shape[1]
+
+    def cell_of(self, points: Array) -> npt.NDArray[np.int64]:
+        """Cells (n, 2) as (row, column) of map points (n, 2); may lie outside the grid."""
+        local = self.origin.inverse().apply(points) / self.resolution
+        return np.floor(local[:, ::-1]).astype(np.int64)
+
+    def centre_of(self, cells: npt.NDArray[np.int64]) -> Array:
+        """Map points (n, 2) of the centres of cells (n, 2) given as (row, column)."""
+        return self.origin.apply((cells[:, ::-1] + 0.5) * self.resolution)
+
+    def inside(self, cells: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
+        """Which of the cells (n, 2) lie on the grid."""
+        result: npt.NDArray[np.bool_] = np.all((cells >= 0) & (cells < self.shape), axis=1)
+        return result
+
+    def values_at(self, points: Array) -> npt.NDArray[np.int8]:
+        """Cell values (n,) under map points (n, 2); points off the grid are UNKNOWN."""
+        cells = self.cell_of(points)
+        values = np.full(len(points), UNKNOWN, dtype=np.int8)
+        known = self.inside(cells)
+        values[known] = self.cells[cells[known, 0], cells[known, 1]]
+        return values

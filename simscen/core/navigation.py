@@ -1,0 +1,65 @@
+"""Goals, paths and results with the names and numbers of Nav2."""
+
+from dataclasses import dataclass, field
+from enum import Enum, IntEnum
+
+import numpy as np
+
+from simscen.core.geometry import Array, Pose2
+
+
+class ErrorCode(IntEnum):
+    """Nav2's error codes (nav2_msgs actions, 2026)."""
+
+    NONE = 0
+    FOLLOW_PATH_UNKNOWN = 100
+    TF_ERROR = 102
+    INVALID_PATH = 103
+    PATIENCE_EXCEEDED = 104
+    FAILED_TO_MAKE_PROGRESS = 105
+    NO_VALID_CONTROL = 106
+    CONTROLLER_TIMED_OUT = 107
+    PLANNER_UNKNOWN = 200
+    START_OUTSIDE_MAP = 203
+    GOAL_OUTSIDE_MAP = 204
+    START_OCCUPIED = 205
+    GOAL_OCCUPIED = 206
+    PLANNER_TIMEOUT = 207
+    NO_VALID_PATH = 208
+    SPIN_TIMEOUT = 701
+    SPIN_COLLISION_AHEAD = 703
+    BACKUP_COLLISION_AHEAD = 714
+    NAVIGATE_UNKNOWN = 9000
+    NAVIGATE_TIMEOUT = 9003
+
+
+class TaskResult(str, Enum):
+    """How a navigation task ended; nav2_simple_commander's names."""
+
+    UNKNOWN = "UNKNOWN"
+    SUCCEEDED = "SUCCEEDED"
+    CANCELED = "CANCELED"
+    FAILED = "FAILED"
+
+
+@dataclass(frozen=True)
+class Goal:
+    """A pose to reach in the map frame, within tolerances (m, rad), in at most `timeout` simulated seconds."""
+
+    name: str
+    pose: Pose2
+    xy_tolerance: float = 0.25
+    yaw_tolerance: float = 0.25
+    timeout: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """A planned path: `points` (n, 3) x, y, yaw in the map frame, made at `tick`."""
+
+    points: Array = field(default_factory=lambda: np.empty((0, 3)))
+    tick: int = 0
+
+    def length(self) -> float:
+        """Length in metres."""
+        return float(np.hypot(*np.diff(self.points[:, :2], axis=0).T).sum()) if len(self.points) > 1 else 0.0

@@ -1,0 +1,123 @@
+"""Solids in space: one list of them feeds physics, rays and map alike.
+
+Every shape is given about its own origin: boxes, cylinders, capsules and cones are centred, their axis is z.
+Sizes are in metres.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.geometry import Array, Pose2, Pose3
+
+
+@dataclass(frozen=True)
+class Box:
+    """A box with edge lengths (x, y, z)."""
+
+    size: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """A cylinder of `radius` and `length` along z."""
+
+    radius: float
+    length: float
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """A ball of `radius`."""
+
+    radius: float
+
+
+@dataclass(frozen=True)
+class Capsule:
+    """A cylinder of `length` along z with half balls of the same radius on both ends."""
+
+    radius: float
+    length: float
+
+
+@dataclass(frozen=True)
+class Ellipsoid:
+    """An ellipsoid with half-axes (x, y, z)."""
+
+    radii: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Cone:
+    """A cone with its base circle at -length/2 and its tip at +length/2."""
+
+    radius: float
+    length: float
+
+
+@dataclass(frozen=True)
+class Extrusion:
+    """A simple polygon, anticlockwise in the xy plane, pulled up from z = 0 to `height`."""
+
+    polygon: tuple[tuple[float, float], ...]
+    height: float
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles as they are, concave ones too: `vertices` (n, 3) in metres, `faces` (m, 3) anticlockwise."""
+
+    vertices: Array
+    faces: npt.NDArray[np.int32]
+
+
+Shape = Box | Cylinder | Sphere | Capsule | Ellipsoid | Cone | Extrusion | Mesh
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A shape at a place: `pose` is the shape's frame in the frame of whatever owns the solid."""
+
+    shape: Shape
+    pose: Pose3 = Pose3()
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Body:
+    """Something that can move as one piece.
+
+    `pose` is where it starts, `solids` are placed in its own frame. `mass` in kg; 0 means that nothing but the
+    scenario moves it. `path` scripts its motion.
+    """
+
+    name: str
+    solids: tuple[Solid, ...]
+    pose: Pose3 = Pose3()
+    mass: float = 0.0
+    path: "MotionPath | None" = None
+
+
+@dataclass(frozen=True)
+class MotionPath:
+    """A path through planar waypoints: after `start` seconds at `times[k]` it is at `poses[k]`, linear between.
+
+    `mode`: "once" stays at the end, "loop" starts over, "back_and_forth" turns around.
+    """
+
+    times: tuple[float, ...]
+    poses: tuple[Pose2, ...]
+    mode: str = "once"
+    start: float = 0.0
+
+
+@dataclass(frozen=True)
+class TriangleMesh:
+    """Many solids fused: `vertices` (n, 3), `faces` (m, 3) and, for each face, the index of its owner in `names`."""
+
+    vertices: Array
+    faces: npt.NDArray[np.int32]
+    owners: npt.NDArray[np.int32]
+    names: tuple[str, ...] = field(default=())

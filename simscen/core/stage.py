@@ -1,0 +1,99 @@
+"""What triggers may look at and what actions may touch while a scenario runs."""
+
+from typing import Protocol
+
+from simscen.core.belief import Belief
+from simscen.core.events import Event
+from simscen.core.geometry import Pose2
+from simscen.core.motion import Twist
+from simscen.core.navigation import Goal, Path
+from simscen.core.shapes import Body, MotionPath
+from simscen.core.world import Polygon
+
+
+class Situation(Protocol):
+    """The run as a trigger sees it at one beat; everything in the world frame."""
+
+    @property
+    def seconds(self) -> float:
+        """Simulated time."""
+        ...
+
+    @property
+    def robot(self) -> Pose2:
+        """The true pose of the robot."""
+        ...
+
+    @property
+    def twist(self) -> Twist:
+        """The true velocity of the robot in its own frame."""
+        ...
+
+    @property
+    def travelled(self) -> float:
+        """Metres driven so far."""
+        ...
+
+    @property
+    def belief(self) -> Belief | None:
+        """What the stack last said about its pose."""
+        ...
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """Everything that has happened so far, oldest first."""
+        ...
+
+    @property
+    def plan(self) -> Path | None:
+        """The plan the robot is following."""
+        ...
+
+    @property
+    def goal(self) -> Goal | None:
+        """The goal the robot is driving to."""
+        ...
+
+    def region(self, name: str) -> Polygon:
+        """A named region of the world."""
+        ...
+
+    def object(self, name: str) -> Pose2 | None:
+        """Where a named object is now; None when it is not there."""
+        ...
+
+
+class Stage(Situation, Protocol):
+    """The run as an action may change it."""
+
+    def spawn(self, body: Body) -> None:
+        """Put a new body into the world: physics, rays and picture see it from the next tick on."""
+        ...
+
+    def remove(self, name: str) -> None:
+        """Take a body out of the world; unknown names are ignored with an event."""
+        ...
+
+    def move(self, name: str, path: MotionPath) -> None:
+        """Let a body follow a path that begins now."""
+        ...
+
+    def place_robot(self, pose: Pose2) -> None:
+        """Set the robot down somewhere else, at rest; the stack is not told."""
+        ...
+
+    def push(self, impulse: tuple[float, float]) -> None:
+        """Push the robot: an impulse in N s in the world frame, at its centre."""
+        ...
+
+    def send_goal(self, goal: Goal) -> None:
+        """Preempt what the robot is doing with a new goal."""
+        ...
+
+    def cancel_goal(self) -> None:
+        """Cancel the current goal as an action client would."""
+        ...
+
+    def note(self, event: Event) -> None:
+        """Write an event to the log."""
+        ...

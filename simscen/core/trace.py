@@ -1,0 +1,115 @@
+"""What happened, on the lockstep clock: the only currency past the simulation.
+
+A run hands on one Moment per beat. The MCAP recorder and the TraceBuilder eat the same moments, and a log replayed
+gives the same Trace, so that a run can be judged years later without a simulator.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.belief import Belief
+from simscen.core.events import Event
+from simscen.core.geometry import Array, Pose3
+from simscen.core.motion import Twist
+from simscen.core.navigation import Path
+from simscen.core.sensing import Readings
+
+Ticks = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Truth:
+    """The robot as it really is: `pose` of its base in the world, `twist` in its own frame.
+
+    `clearance` is the distance in metres from the robot's hull to the nearest obstacle surface (negative when they
+    overlap, at most the range that was searched). `objects` are the poses of things that move.
+    """
+
+    pose: Pose3
+    twist: Twist
+    clearance: float
+    objects: Mapping[str, Pose3] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Decision:
+    """What the stack made of a beat: its `command`, and what it would publish. None means: nothing new."""
+
+    command: Twist
+    belief: Belief | None = None
+    plan: Path | None = None
+    local_plan: Path | None = None
+    events: tuple[Event, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """One beat of the lockstep: truth, what the robot was told (faults applied), what it decided, what happened.
+
+    `truth` is None on beats between two truth samples.
+    """
+
+    tick: int
+    truth: Truth | None
+    readings: Readings
+    decision: Decision
+    events: tuple[Event, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """A signal: `ticks` (n,) ascending, `values` (n, k)."""
+
+    ticks: Ticks
+    values: Array
+
+    def __len__(self) -> int:
+        return len(self.ticks)
+
+    def at(self, ticks: Ticks) -> Array:
+        """The newest value at each of `ticks` (sample and hold); the first value before the first sample."""
+        return self.values[np.maximum(np.searchsorted(self.ticks, ticks, side="right") - 1, 0)]
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """A whole run.
+
+    truth:      x, y, yaw in the world              (m, m, rad)
+    velocity:   vx, vy, wz in the base frame        (m/s, m/s, rad/s), at truth's ticks
+    clearance:  hull to nearest obstacle            (m), at truth's ticks
+    belief:     x, y, yaw in the map and the upper triangle of its covariance: xx, xy, xyaw, yy, yyaw, yawyaw
+    odometry:   x, y, yaw in the odom frame
+    command:    vx, vy, wz as sent to the wheels
+    objects:    name → x, y, yaw of moving things
+    scans:      ticks at which the stack received a scan
+    """
+
+    tick_rate: int
+    truth: Samples
+    velocity: Samples
+    clearance: Samples
+    belief: Samples
+    odometry: Samples
+    command: Samples
+    scans: Ticks
+    plans: tuple[Path, ...]
+    events: tuple[Event, ...]
+    objects: Mapping[str, Samples]
+    end: int
+
+    def seconds(self, tick: int) -> float:
+        """The simulated time of `tick` in seconds."""
+        return tick / self.tick_rate
+
+    def of_kind(self, *kinds: str) -> tuple[Event, ...]:
+        """The events of these kinds, in order."""
+        return tuple(event for event in self.events if event.kind in kinds)
+
+    def place(self, tick: int) -> tuple[float, float]:
+        """Where the robot really was at `tick`."""
+        x, y, _ = self.truth.at(np.array([tick]))[0]
+        return float(x), float(y)

@@ -1,0 +1,40 @@
+"""A world as everybody downstream gets it: solids, named places, and the map it came with, if any."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from simscen.core.geometry import Pose2
+from simscen.core.grid import OccupancyGrid
+from simscen.core.shapes import Body, Solid, TriangleMesh
+
+Polygon = tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class World:
+    """Everything that is there before the robot: `solids` never move, `bodies` may.
+
+    `bounds` is (min x, min y, max x, max y) in metres. `grid` is set when the world came with an occupancy map of its
+    own (a ROS map). `notes` are warnings of the importer, each a sentence that names file and element.
+    """
+
+    name: str
+    solids: tuple[Solid, ...]
+    bodies: tuple[Body, ...] = ()
+    places: Mapping[str, Pose2] = field(default_factory=dict)
+    regions: Mapping[str, Polygon] = field(default_factory=dict)
+    bounds: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    grid: OccupancyGrid | None = None
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class BuiltWorld:
+    """A world made ready once and shared by all its runs; numpy arrays only, so that it survives a fork.
+
+    `mesh` fuses all static solids; `map` is the occupancy grid a robot would have been given.
+    """
+
+    world: World
+    mesh: TriangleMesh
+    map: OccupancyGrid

@@ -1,0 +1,1 @@
+"""What passes: one file for each criterion, its specification and its meaning together."""

@@ -1,0 +1,19 @@
+"""What a criterion is."""
+
+from abc import ABC, abstractmethod
+
+from simscen.core.case import Case
+from simscen.core.trace import Trace
+from simscen.core.verdict import Finding
+
+
+class Criterion(ABC):
+    """A question about a trace with a yes or no for an answer.
+
+    *Given* the same trace and case *then* the same findings. It looks at nothing else, and every bound it checks
+    yields a finding, so that a criterion without findings has checked nothing.
+    """
+
+    @abstractmethod
+    def judge(self, trace: Trace, case: Case) -> list[Finding]:
+        """One finding for each bound, in the order of the specification."""

@@ -1,0 +1,50 @@
+"""What a fault is."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from simscen.core.motion import Twist
+from simscen.core.sensing import Reading
+
+
+@dataclass(frozen=True)
+class Wheels:
+    """What a fault may know of the drive: distance between left and right wheels in metres (0 = has none)."""
+
+    separation: float = 0.0
+
+
+class Disturbance:
+    """A fault at work, from its start to its end. The default changes nothing.
+
+    *Given* the same readings and generator *then* the same answers. It never changes a reading it was handed; it
+    answers with another one.
+    """
+
+    def reading(self, reading: Reading) -> Reading | None:
+        """What the stack gets instead of `reading`; None = it never arrives."""
+        return reading
+
+    def command(self, command: Twist) -> Twist:
+        """What the wheels do instead of `command`."""
+        return command
+
+    def end(self) -> "Disturbance | None":
+        """What stays when the fault is over; None = nothing."""
+        return None
+
+
+class Fault(ABC):
+    """A fault as specified in a scenario; `affects` are the kinds of instance it makes sense on.
+
+    Kinds are the class names of core.sensing readings ("Scan", "Odometry", …) and "Command" for cmd_vel.
+    """
+
+    affects: ClassVar[frozenset[str]]
+
+    @abstractmethod
+    def begin(self, chance: np.random.Generator, wheels: Wheels) -> Disturbance:
+        """Start it. `chance` is the fault's own stream."""

@@ -1,0 +1,37 @@
+"""`beam_dropout`: single lidar beams give no answer."""
+
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+
+from simscen.core.sensing import Reading, Scan
+from simscen.faults.base import Disturbance, Fault, Wheels
+from simscen.spec.base import Spec
+from simscen.spec.quantities import Probability
+
+
+class BeamDropout(Spec, Fault):
+    """Each beam of each scan gives no answer (nan) with a probability, as over dark or wet surfaces.
+
+    Example: `{sensor: lidar, beam_dropout: {probability: 40 %}}`
+    """
+
+    affects: ClassVar[frozenset[str]] = frozenset({"Scan"})
+    probability: Probability
+    """The chance that a beam gives no answer."""
+
+    def begin(self, chance: np.random.Generator, wheels: Wheels) -> Disturbance:
+        """Draw once for each beam."""
+        return _Holes(chance, self.probability)
+
+
+class _Holes(Disturbance):
+    def __init__(self, chance: np.random.Generator, probability: float) -> None:
+        self._chance, self._probability = chance, probability
+
+    def reading(self, reading: Reading) -> Reading | None:
+        if not isinstance(reading, Scan):
+            return reading
+        lost = self._chance.random(len(reading.ranges)) < self._probability
+        return replace(reading, ranges=np.where(lost, np.nan, reading.ranges))

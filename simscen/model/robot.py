@@ -1,0 +1,208 @@
+"""A robot as a user writes it (`*.robot.yaml`)."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from simscen.spec.base import Choice, Spec
+from simscen.spec.objects import Shaped
+from simscen.spec.places import Name, Point, PoseSpec
+from simscen.spec.quantities import (
+    Angle,
+    Frequency,
+    Length,
+    NonNegativeLength,
+    PositiveAcceleration,
+    PositiveAngle,
+    PositiveAngularAcceleration,
+    PositiveAngularSpeed,
+    PositiveLength,
+    PositiveMass,
+    PositiveSpeed,
+)
+
+JointNames = Annotated[list[Name], Field(min_length=1, max_length=20)]
+
+
+class Differential(Spec):
+    """Two driven wheels and casters."""
+
+    type: Literal["differential"]
+    wheel_radius: PositiveLength
+    wheel_separation: PositiveLength
+    """Between the middles of the two wheels."""
+    wheel_width: PositiveLength = 0.03
+    left: JointNames | None = None
+    """Wheel joints of the URDF; default: found by position."""
+    right: JointNames | None = None
+
+
+class SkidSteer(Spec):
+    """Fixed wheels on both sides that skid in turns."""
+
+    type: Literal["skid_steer"]
+    wheel_radius: PositiveLength
+    wheel_separation: PositiveLength
+    wheel_base: PositiveLength = 0.3
+    """Between the front and the rear axle."""
+    wheel_width: PositiveLength = 0.05
+    left: JointNames | None = None
+    right: JointNames | None = None
+    turning_scale: Annotated[float, Field(gt=0, le=10)] = 1.0
+    """Effective over geometric wheel separation; skidding makes it larger than 1 (Clearpath's jackal: 1.5)."""
+
+
+class Ackermann(Spec):
+    """A car: rear wheels drive, front wheels steer."""
+
+    type: Literal["ackermann"]
+    wheel_radius: PositiveLength
+    wheel_separation: PositiveLength
+    wheel_base: PositiveLength
+    wheel_width: PositiveLength = 0.04
+    max_steering: PositiveAngle
+    """Of the virtual middle wheel."""
+    left: JointNames | None = None
+    right: JointNames | None = None
+    steering: JointNames | None = None
+
+
+class Omnidirectional(Spec):
+    """Moves in any direction (mecanum or omni wheels, idealised as a planar drive)."""
+
+    type: Literal["omnidirectional"]
+
+
+Drive = Annotated[Differential | SkidSteer | Ackermann | Omnidirectional, Field(discriminator="type")]
+
+
+class Limits(Spec):
+    """What the base can do; commands beyond are clipped, as the firmware of a real base does."""
+
+    linear: PositiveSpeed
+    """Forward speed."""
+    reverse: PositiveSpeed | None = None
+    """Backward speed; default: as forward."""
+    lateral: PositiveSpeed | None = None
+    """Sideways speed of an omnidirectional base; default: as forward."""
+    angular: PositiveAngularSpeed
+    linear_acceleration: PositiveAcceleration
+    linear_deceleration: PositiveAcceleration | None = None
+    """Default: as acceleration."""
+    angular_acceleration: PositiveAngularAcceleration
+
+
+class Mount(Spec):
+    """Where a sensor sits in the robot's base frame (on the ground under the middle of the axle)."""
+
+    x: Length = 0.0
+    y: Length = 0.0
+    z: NonNegativeLength = 0.2
+    yaw: Angle = 0.0
+
+
+class Lidar(Spec):
+    """A planar lidar."""
+
+    rate: Frequency = 10.0
+    beams: Annotated[int, Field(ge=1, le=4096)] = 360
+    field_of_view: PositiveAngle = 6.283185307179586
+    """Centred on straight ahead."""
+    min_range: NonNegativeLength = 0.12
+    max_range: PositiveLength = 12.0
+    noise: NonNegativeLength = 0.01
+    """Standard deviation of a range."""
+    resolution: PositiveLength = 0.001
+    """Ranges are whole multiples of this."""
+    mount: Mount = Mount()
+
+
+class WheelOdometry(Spec):
+    """Dead reckoning from the wheels' encoders, with the error model of Thrun, Probabilistic Robotics, table 5.6."""
+
+    rate: Frequency = 40.0
+    translation_noise: NonNegativeLength = 0.01
+    """Standard deviation of the distance error after one metre driven; errors grow with the square root."""
+    rotation_noise: Annotated[float, Field(ge=0, le=1)] = 0.01
+    """Standard deviation of the heading error in rad after turning one radian."""
+    drift_noise: Annotated[float, Field(ge=0, le=1)] = 0.005
+    """Standard deviation of the heading error in rad after driving one metre straight."""
+
+
+class InertialUnit(Spec):
+    """Gyroscope and accelerometer."""
+
+    rate: Frequency = 60.0
+    gyro_noise: Annotated[float, Field(ge=0, le=10)] = 0.002
+    """Standard deviation in rad/s."""
+    gyro_bias: Annotated[float, Field(ge=0, le=1)] = 0.0005
+    """Standard deviation of the constant bias of a run, in rad/s."""
+    accelerometer_noise: Annotated[float, Field(ge=0, le=100)] = 0.02
+    """Standard deviation in m/s²."""
+
+
+class Bumper(Spec):
+    """Pressed while the base touches something."""
+
+    rate: Frequency = 40.0
+
+
+class Camera(Spec):
+    """A colour and depth camera."""
+
+    rate: Frequency = 5.0
+    width: Annotated[int, Field(ge=8, le=640)] = 64
+    height: Annotated[int, Field(ge=8, le=480)] = 48
+    field_of_view: PositiveAngle = 1.2
+    """Horizontal."""
+    max_range: PositiveLength = 10.0
+    mount: Mount = Mount()
+
+
+class Sensor(Choice):
+    """One sensor."""
+
+    lidar: Lidar | None = None
+    odometry: WheelOdometry | None = None
+    imu: InertialUnit | None = None
+    bumper: Bumper | None = None
+    camera: Camera | None = None
+
+
+class Part(Shaped):
+    """A piece of the robot's body; `pose` in the base frame."""
+
+    pose: PoseSpec = PoseSpec(x=0.0, y=0.0)
+
+
+class RobotSpec(Spec):
+    """A robot: shape, drive, limits, sensors. Its base frame is on the ground under the middle of its axle."""
+
+    simscen: Literal[1]
+    """Version of this language."""
+    name: Name
+    description: Annotated[str, Field(max_length=10_000)] = ""
+    urdf: Annotated[str, Field(min_length=1, max_length=4096)] | None = None
+    """A URDF (or xacro) file, relative to this one, instead of `body`."""
+    body: Annotated[list[Part], Field(min_length=1, max_length=50)] | None = None
+    """Simple shapes that make up the hull; wheels are added by the drive."""
+    mass: PositiveMass | None = None
+    """Of the whole robot; needed with `body`."""
+    radius: PositiveLength | None = None
+    """Of the footprint, for a round robot."""
+    footprint: Annotated[list[Point], Field(min_length=3, max_length=50)] | None = None
+    """Corners of the footprint in the base frame, for any other; default: from the shapes."""
+    drive: Drive
+    limits: Limits
+    sensors: dict[Name, Sensor]
+    """By instance name: what faults refer to."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "RobotSpec":
+        if (self.urdf is None) == (self.body is None):
+            raise ValueError("expected exactly one of: body, urdf")
+        if self.body is not None and self.mass is None:
+            raise ValueError("`mass` is missing; a robot with a `body` needs one")
+        if self.radius is not None and self.footprint is not None:
+            raise ValueError("only one of radius, footprint may be given")
+        return self

@@ -1,0 +1,27 @@
+"""A map as Nav2's map_server reads it."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from simscen.spec.base import Spec
+from simscen.spec.quantities import Length, PositiveLength, Probability
+
+
+class RosMapSpec(Spec):
+    """A ROS map: an image and what its greys mean (nav2_map_server, map_io.cpp)."""
+
+    image: Annotated[str, Field(min_length=1, max_length=4096)]
+    """The image file (pgm, png, bmp), relative to this file."""
+    resolution: PositiveLength
+    """Metres for each pixel."""
+    origin: Annotated[list[Length], Field(min_length=3, max_length=3)]
+    """Pose of the lowest-left corner of the lowest-left pixel: x, y, yaw."""
+    negate: Literal[0, 1] | bool = 0
+    """Whether black is free and white is occupied."""
+    occupied_thresh: Probability = 0.65
+    """A pixel at least this dark is occupied."""
+    free_thresh: Probability = 0.25
+    """A pixel at most this dark is free."""
+    mode: Literal["trinary", "scale", "raw"] = "trinary"
+    """How greys between the thresholds are read."""

@@ -1,0 +1,128 @@
+"""A scenario as a user writes it (`*.scenario.yaml`)."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Discriminator, Field, Tag
+
+from simscen.core.belief import Estimate
+from simscen.core.chance import LARGEST_SEED
+from simscen.core.geometry import Pose2
+from simscen.criteria.criterion import AnyCriterion
+from simscen.model.disturbance import EventEntry, FaultEntry
+from simscen.model.stack import StackSpec
+from simscen.model.world import WorldSpec
+from simscen.spec.base import Spec
+from simscen.spec.places import Name, PlaceName, PoseSpec
+from simscen.spec.quantities import (
+    Angle,
+    Frequency,
+    Length,
+    NonNegativeLength,
+    PositiveAngle,
+    PositiveDuration,
+    PositiveLength,
+)
+
+
+def _text_or_mapping(value: Any) -> str:
+    return "text" if isinstance(value, str) else "mapping"
+
+
+FilePath = Annotated[str, Field(min_length=1, max_length=4096)]
+PlaceOrPose = Annotated[
+    Annotated[PlaceName, Tag("text")] | Annotated[PoseSpec, Tag("mapping")], Discriminator(_text_or_mapping)
+]
+
+
+class InitialEstimate(Spec):
+    """What the localizer is told: a pose and how sure that is."""
+
+    x: Length
+    y: Length
+    yaw: Angle = 0.0
+    std: Annotated[list[NonNegativeLength], Field(min_length=3, max_length=3)] = [0.5, 0.5, 0.2618]
+    """Standard deviations of x, y (m) and yaw (rad); Nav2's default covariance."""
+
+
+class RobotEntry(Spec):
+    """The robot, where it truly starts, and where it thinks it starts."""
+
+    model: FilePath = "turtlebot"
+    """A shipped robot (turtlebot, amr, …) or a `*.robot.yaml` or `.urdf` file."""
+    pose: PlaceOrPose
+    """Where it truly stands: a pose or a place of the world."""
+    initial_estimate: InitialEstimate | Literal["unknown"] | None = None
+    """Default: the true pose, with Nav2's default covariance; `unknown`: anywhere on the map."""
+
+
+class GoalEntry(Spec):
+    """A pose to drive to."""
+
+    name: Name | None = None
+    """What reports call it; default: the place's name, or goal-1, goal-2, …"""
+    pose: PlaceOrPose
+    """In the map frame: a pose or a place of the world."""
+    timeout: PositiveDuration | None = None
+    """Simulated time this goal may take; then it fails with NAVIGATE_TIMEOUT."""
+    xy_tolerance: PositiveLength | None = None
+    """Default: the stack's goal checker."""
+    yaw_tolerance: PositiveAngle | None = None
+
+
+class Physics(Spec):
+    """How the world is stepped."""
+
+    tick_rate: Annotated[int, Field(ge=60, le=2000)] = 240
+    """Physics steps for each simulated second."""
+    solver_iterations: Annotated[int, Field(ge=1, le=1000)] = 10
+    truth_rate: Frequency = 40.0
+    """How often the truth is recorded and judged."""
+
+
+class ScenarioSpec(Spec):
+    """One navigation test: a world, a robot, goals, disturbances, and what must hold."""
+
+    simscen: Literal[1]
+    """Version of this language."""
+    name: Name | None = None
+    """For people; default: the file's name."""
+    description: Annotated[str, Field(max_length=10_000)] = ""
+    """What is tested and why."""
+    tags: Annotated[list[PlaceName], Field(max_length=50)] = []
+    """For `--tag`."""
+    seed: Annotated[int, Field(ge=1, le=LARGEST_SEED)] = 1
+    """The root of all chance in a run."""
+    world: Annotated[
+        Annotated[FilePath, Tag("text")] | Annotated[WorldSpec, Tag("mapping")],
+        Discriminator(_text_or_mapping),
+    ]
+    """A `*.world.yaml`, a ROS map `.yaml`, a Gazebo `.sdf`/`.world`, or the world itself."""
+    map: FilePath | None = None
+    """The map the robot gets, if it is not that of the world; `none` = no map, odometry only."""
+    robot: RobotEntry
+    stack: StackSpec = StackSpec()
+    goals: Annotated[list[GoalEntry], Field(max_length=1000)] = []
+    """In this order."""
+    on_goal_failure: Literal["stop", "continue"] = "stop"
+    """After a goal that failed: end, or drive to the next one (FollowWaypoints' stop_on_failure)."""
+    time_limit: Annotated[PositiveDuration, Field(le=8000)] = 300.0
+    """Simulated time after which the run ends, whatever happens."""
+    linger: Annotated[float, Field(ge=0, le=3600)] = 0.5
+    """Simulated seconds that the run goes on after the last goal, to see that the robot stays where it is."""
+    events: Annotated[list[EventEntry], Field(max_length=500)] = []
+    faults: Annotated[list[FaultEntry], Field(max_length=500)] = []
+    physics: Physics = Physics()
+    pass_: Annotated[list[AnyCriterion], Field(min_length=1, max_length=200, alias="pass")]
+    """All of these must hold."""
+
+
+def estimate_of(entry: RobotEntry, truth: Pose2) -> Estimate:
+    """What the localizer is told, given where the robot truly is."""
+    match entry.initial_estimate:
+        case None:
+            return Estimate(truth)
+        case "unknown":
+            return Estimate(None)
+        case InitialEstimate() as told:
+            return Estimate(Pose2(told.x, told.y, told.yaw), (told.std[0], told.std[1], told.std[2]))
+    raise AssertionError(entry.initial_estimate)

@@ -1,0 +1,271 @@
+"""The navigation stack's parameters, with Nav2's names and defaults."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from simscen.spec.base import Spec
+from simscen.spec.quantities import (
+    Angle,
+    Duration,
+    Frequency,
+    Length,
+    NonNegativeLength,
+    PositiveAcceleration,
+    PositiveAngle,
+    PositiveAngularAcceleration,
+    PositiveAngularSpeed,
+    PositiveDuration,
+    PositiveLength,
+    PositiveSpeed,
+    Probability,
+)
+
+Noise = Annotated[float, Field(ge=0, le=100)]
+Iterations = Annotated[int, Field(ge=1, le=1_000_000)]
+
+
+class Amcl(Spec):
+    """Particle-filter localisation: nav2_amcl's parameters (Thrun et al., Probabilistic Robotics, ch. 8)."""
+
+    type: Literal["amcl"] = "amcl"
+    robot_model: Literal["differential", "omni"] | None = None
+    """Motion model; default: as the robot's drive."""
+    alpha1: Noise = 0.2
+    """Rotation noise from rotation."""
+    alpha2: Noise = 0.2
+    """Rotation noise from translation."""
+    alpha3: Noise = 0.2
+    """Translation noise from translation."""
+    alpha4: Noise = 0.2
+    """Translation noise from rotation."""
+    alpha5: Noise = 0.2
+    """Strafing noise of the omni model."""
+    min_particles: Annotated[int, Field(ge=10, le=50_000)] = 500
+    max_particles: Annotated[int, Field(ge=10, le=50_000)] = 2000
+    pf_err: Annotated[float, Field(gt=0, lt=1)] = 0.05
+    """KLD: greatest distance between the true and the sampled distribution."""
+    pf_z: Annotated[float, Field(gt=0, lt=1)] = 0.99
+    """KLD: probability that the distance is kept."""
+    update_min_d: NonNegativeLength = 0.25
+    update_min_a: Annotated[float, Field(ge=0, le=6.3)] = 0.2
+    resample_interval: Annotated[int, Field(ge=1, le=100)] = 1
+    max_beams: Annotated[int, Field(ge=2, le=4096)] = 60
+    laser_model_type: Literal["likelihood_field", "likelihood_field_prob", "beam"] = "likelihood_field"
+    z_hit: Probability = 0.5
+    z_short: Probability = 0.05
+    z_max: Probability = 0.05
+    z_rand: Probability = 0.5
+    sigma_hit: PositiveLength = 0.2
+    lambda_short: Annotated[float, Field(gt=0, le=100)] = 0.1
+    laser_likelihood_max_dist: PositiveLength = 2.0
+    laser_min_range: Length = -1.0
+    """-1 = the lidar's own."""
+    laser_max_range: Length = 100.0
+    recovery_alpha_slow: Probability = 0.0
+    recovery_alpha_fast: Probability = 0.0
+    selective_resampling: bool = False
+    do_beamskip: bool = False
+    beam_skip_distance: PositiveLength = 0.5
+    beam_skip_threshold: Probability = 0.3
+    beam_skip_error_threshold: Probability = 0.9
+
+
+class Ekf(Spec):
+    """Odometry and gyroscope in an extended Kalman filter; no map, so it drifts."""
+
+    type: Literal["ekf"]
+    translation_noise: Noise = 0.02
+    """Standard deviation in m after one metre."""
+    rotation_noise: Noise = 0.02
+    """Standard deviation in rad after one rad or one metre."""
+    gyro_noise: Noise = 0.005
+    """Standard deviation of the turn rate in rad/s."""
+
+
+class GroundTruth(Spec):
+    """The true pose, to tell faults of localisation from faults of navigation."""
+
+    type: Literal["ground_truth"]
+
+
+class OdometryOnly(Spec):
+    """Dead reckoning from the start pose."""
+
+    type: Literal["odometry"]
+
+
+Localizer = Annotated[Amcl | Ekf | GroundTruth | OdometryOnly, Field(discriminator="type")]
+
+
+class Costmap(Spec):
+    """nav2_costmap_2d: static, obstacle and inflation layers."""
+
+    resolution: PositiveLength = 0.05
+    inflation_radius: NonNegativeLength = 0.70
+    cost_scaling_factor: Annotated[float, Field(gt=0, le=100)] = 3.0
+    update_frequency: Frequency = 5.0
+    obstacle_max_range: PositiveLength = 2.5
+    obstacle_min_range: NonNegativeLength = 0.0
+    raytrace_max_range: PositiveLength = 3.0
+    raytrace_min_range: NonNegativeLength = 0.0
+    track_unknown_space: bool = True
+    rolling_size: PositiveLength = 24.0
+    """Edge of the rolling window when driving without a map."""
+
+
+class Planner(Spec):
+    """A planner of OMPL on the costmap."""
+
+    type: Literal["rrt_connect", "rrt_star", "informed_rrt_star", "bit_star", "aorrtc", "kpiece"] = (
+        "rrt_connect"
+    )
+    tolerance: NonNegativeLength = 0.5
+    """How far from an unreachable goal the plan may end."""
+    allow_unknown: bool = True
+    max_iterations: Iterations = 20_000
+    """Iterations before NO_VALID_PATH; never seconds."""
+    simplify: bool = True
+    state_space: Literal["auto", "holonomic", "se2", "dubins", "reeds_shepp"] = "auto"
+    """auto: Reeds-Shepp for an Ackermann drive, se2 for a long footprint, else holonomic."""
+    replanning: Literal["on_invalid", "rate"] = "on_invalid"
+    """Replan when the plan is blocked or clearly worse than a new one, or at a rate."""
+    replanning_rate: Frequency = 1.0
+
+
+class RegulatedPurePursuit(Spec):
+    """nav2_regulated_pure_pursuit_controller (Macenski et al. 2023)."""
+
+    type: Literal["regulated_pure_pursuit"] = "regulated_pure_pursuit"
+    desired_linear_vel: PositiveSpeed | None = None
+    """Default: 0.5 m/s, or what the robot can do if that is less."""
+    lookahead_dist: PositiveLength = 0.6
+    min_lookahead_dist: PositiveLength = 0.3
+    max_lookahead_dist: PositiveLength = 0.9
+    lookahead_time: PositiveDuration = 1.5
+    use_velocity_scaled_lookahead_dist: bool = True
+    rotate_to_heading_angular_vel: PositiveAngularSpeed = 1.8
+    rotate_to_heading_min_angle: PositiveAngle = 0.785
+    use_rotate_to_heading: bool = True
+    min_approach_linear_velocity: PositiveSpeed = 0.05
+    approach_velocity_scaling_dist: PositiveLength = 0.6
+    use_collision_detection: bool = True
+    max_allowed_time_to_collision_up_to_carrot: PositiveDuration = 1.0
+    use_regulated_linear_velocity_scaling: bool = True
+    regulated_linear_scaling_min_radius: PositiveLength = 0.9
+    regulated_linear_scaling_min_speed: PositiveSpeed = 0.25
+    use_cost_regulated_linear_velocity_scaling: bool = True
+    cost_scaling_dist: PositiveLength = 0.6
+    cost_scaling_gain: Annotated[float, Field(gt=0, le=1)] = 1.0
+    max_angular_accel: PositiveAngularAcceleration = 3.2
+    allow_reversing: bool = False
+
+
+class DynamicWindow(Spec):
+    """A dynamic-window controller with DWB's critics (Fox et al. 1997; nav2_dwb_controller)."""
+
+    type: Literal["dwb"]
+    max_vel_x: PositiveSpeed | None = None
+    min_vel_x: Annotated[float, Field(ge=-10, le=0)] = 0.0
+    max_vel_theta: PositiveAngularSpeed = 1.0
+    vx_samples: Annotated[int, Field(ge=2, le=200)] = 20
+    vy_samples: Annotated[int, Field(ge=1, le=200)] = 5
+    vtheta_samples: Annotated[int, Field(ge=2, le=200)] = 20
+    sim_time: PositiveDuration = 1.7
+    base_obstacle_scale: Noise = 0.02
+    path_align_scale: Noise = 32.0
+    path_dist_scale: Noise = 32.0
+    goal_align_scale: Noise = 24.0
+    goal_dist_scale: Noise = 24.0
+    rotate_to_goal_scale: Noise = 32.0
+    forward_point_distance: NonNegativeLength = 0.1
+
+
+class Mppi(Spec):
+    """Model predictive path integral control (Williams et al. 2017; nav2_mppi_controller)."""
+
+    type: Literal["mppi"]
+    time_steps: Annotated[int, Field(ge=5, le=200)] = 56
+    model_dt: PositiveDuration = 0.05
+    batch_size: Annotated[int, Field(ge=50, le=10_000)] = 1000
+    vx_max: PositiveSpeed | None = None
+    vx_min: Annotated[float, Field(ge=-10, le=0)] = -0.35
+    wz_max: PositiveAngularSpeed = 1.9
+    vx_std: PositiveSpeed = 0.2
+    wz_std: PositiveAngularSpeed = 0.4
+    temperature: Annotated[float, Field(gt=0, le=100)] = 0.3
+    gamma: Annotated[float, Field(ge=0, le=10)] = 0.015
+
+
+Controller = Annotated[RegulatedPurePursuit | DynamicWindow | Mppi, Field(discriminator="type")]
+
+
+class GoalChecker(Spec):
+    """nav2_controller::SimpleGoalChecker."""
+
+    xy_goal_tolerance: PositiveLength = 0.25
+    yaw_goal_tolerance: PositiveAngle = 0.25
+    stateful: bool = True
+
+
+class ProgressChecker(Spec):
+    """nav2_controller::SimpleProgressChecker, or PoseProgressChecker when an angle is given."""
+
+    required_movement_radius: PositiveLength = 0.5
+    required_movement_angle: Angle | None = None
+    movement_time_allowance: PositiveDuration = 10.0
+
+
+class Recovery(Spec):
+    """Behaviours of Nav2's default tree, taken in turn when planning or control fails."""
+
+    number_of_retries: Annotated[int, Field(ge=0, le=100)] = 6
+    behaviors: Annotated[list[Literal["clear_costmap", "spin", "wait", "backup"]], Field(max_length=20)] = [
+        "clear_costmap",
+        "spin",
+        "wait",
+        "backup",
+    ]
+    spin_dist: Angle = 1.57
+    wait_duration: Duration = 5.0
+    backup_dist: NonNegativeLength = 0.30
+    backup_speed: PositiveSpeed = 0.15
+    simulate_ahead_time: PositiveDuration = 2.0
+    max_rotational_vel: PositiveAngularSpeed = 1.0
+
+
+class VelocitySmoother(Spec):
+    """nav2_velocity_smoother: limits accelerations of what is sent to the base."""
+
+    enabled: bool = True
+    max_accel: PositiveAcceleration | None = None
+    """Default: the robot's own limit."""
+    max_angular_accel: PositiveAngularAcceleration | None = None
+
+
+class CollisionMonitor(Spec):
+    """nav2_collision_monitor: the last word before the base."""
+
+    enabled: bool = True
+    source_timeout: PositiveDuration = 0.3
+    """A lidar that is silent this long stops the robot (Nav2's default is 1 s)."""
+    time_before_collision: PositiveDuration = 0.5
+    """APPROACH: slow down so that a collision is at least this far off."""
+    stop_margin: NonNegativeLength = 0.02
+    """STOP: nothing may be nearer to the footprint than this, in the direction of travel."""
+
+
+class StackSpec(Spec):
+    """The navigation stack under test: Nav2 in miniature."""
+
+    type: Literal["reference"] = "reference"
+    controller_frequency: Frequency = 20.0
+    localizer: Localizer = Amcl()
+    costmap: Costmap = Costmap()
+    planner: Planner = Planner()
+    controller: Controller = RegulatedPurePursuit()
+    goal_checker: GoalChecker = GoalChecker()
+    progress_checker: ProgressChecker = ProgressChecker()
+    recovery: Recovery = Recovery()
+    velocity_smoother: VelocitySmoother = VelocitySmoother()
+    collision_monitor: CollisionMonitor = CollisionMonitor()

@@ -1,0 +1,102 @@
+"""A world as a user writes it (`*.world.yaml`)."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from simscen.spec.base import Spec
+from simscen.spec.objects import Shaped
+from simscen.spec.places import Name, PlaceName, Point, PoseSpec
+from simscen.spec.quantities import Duration, Mass, PositiveLength, PositiveSpeed
+
+
+class Wall(Spec):
+    """A wall along a polyline."""
+
+    name: Name = "wall"
+    """What a collision with it is reported as."""
+    points: Annotated[list[Point], Field(min_length=2, max_length=10_000)]
+    """Corners [x, y] of its centre line; repeat the first one at the end to close it."""
+    thickness: PositiveLength = 0.1
+    """Across the centre line."""
+    height: PositiveLength = 1.0
+    """From the ground."""
+
+
+class Obstacle(Shaped):
+    """Something that stands in the world and never moves."""
+
+    name: Name
+    """What a collision with it is reported as."""
+    pose: PoseSpec
+    """Where it stands."""
+
+
+class Travel(Spec):
+    """Motion along straight lines through waypoints."""
+
+    through: Annotated[list[Point], Field(min_length=1, max_length=1000)]
+    """Waypoints [x, y]."""
+    speed: PositiveSpeed
+    """Along the lines."""
+    repeat: Literal["once", "loop", "back_and_forth"] = "once"
+    """At the last waypoint: stay, start over, or turn around."""
+    start: Duration = 0.0
+    """When it begins."""
+
+
+class Movable(Obstacle):
+    """Something that can move: pushed by the robot if it has a mass, or by itself along waypoints."""
+
+    mass: Mass = 0.0
+    """In kg; 0 = the robot cannot push it."""
+    move: Travel | None = None
+    """How it moves by itself."""
+
+
+class Door(Spec):
+    """A door: a panel in a doorway that a scenario can open and close."""
+
+    name: Name
+    """What `open` and `close` call it."""
+    points: Annotated[list[Point], Field(min_length=2, max_length=2)]
+    """The two door posts; the hinge is at the first."""
+    closed: bool = False
+    """Whether it is closed at the start."""
+    thickness: PositiveLength = 0.05
+    """Of the panel."""
+    height: PositiveLength = 1.0
+    """Of the panel."""
+
+
+class WorldSpec(Spec):
+    """Walls, obstacles, things that move, named places and regions. Metres, in the map frame."""
+
+    simscen: Literal[1]
+    """Version of this language."""
+    name: Name | None = None
+    """Default: the file's name."""
+    description: Annotated[str, Field(max_length=10_000)] = ""
+    """For people."""
+    map: Annotated[str, Field(min_length=1, max_length=4096)] | None = None
+    """A ROS map (yaml) whose occupied cells become walls `map_height` tall."""
+    map_height: PositiveLength = 1.0
+    """Height of the walls made from `map`."""
+    sdf: Annotated[str, Field(min_length=1, max_length=4096)] | None = None
+    """A Gazebo world to add things to."""
+    walls: Annotated[list[Wall], Field(max_length=2000)] = []
+    obstacles: Annotated[list[Obstacle], Field(max_length=2000)] = []
+    objects: Annotated[list[Movable], Field(max_length=200)] = []
+    doors: Annotated[list[Door], Field(max_length=200)] = []
+    places: dict[PlaceName, PoseSpec] = {}
+    """Named poses for goals and starts."""
+    regions: dict[PlaceName, Annotated[list[Point], Field(min_length=3, max_length=200)]] = {}
+    """Named areas: polygons over their corners."""
+
+    @model_validator(mode="after")
+    def _names_differ(self) -> "WorldSpec":
+        names = [thing.name for thing in (*self.objects, *self.doors)]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise ValueError(f"two objects are called `{twice[0]}`")
+        return self

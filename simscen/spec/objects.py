@@ -1,0 +1,44 @@
+"""Things that stand or move in a world, as a user writes them."""
+
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from simscen.core.geometry import Pose3
+from simscen.core.shapes import Box, Cylinder, Extrusion, Shape, Solid
+from simscen.spec.base import Spec
+from simscen.spec.places import Point
+from simscen.spec.quantities import NonNegativeLength, PositiveLength
+
+
+class Shaped(Spec):
+    """Something with one simple shape that stands on the ground, or `z` above it."""
+
+    box: Annotated[list[PositiveLength], Field(min_length=3, max_length=3)] | None = None
+    """A box: length along x, width along y, height."""
+    cylinder: Annotated[list[PositiveLength], Field(min_length=2, max_length=2)] | None = None
+    """An upright cylinder: radius, height."""
+    polygon: Annotated[list[Point], Field(min_length=3, max_length=200)] | None = None
+    """An upright prism over these corners, `height` tall."""
+    height: PositiveLength = 1.0
+    """Height of the prism over `polygon`."""
+    z: NonNegativeLength = 0.0
+    """How far its underside is above the ground."""
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> "Shaped":
+        if sum(shape is not None for shape in (self.box, self.cylinder, self.polygon)) != 1:
+            raise ValueError("expected exactly one of: box, cylinder, polygon")
+        return self
+
+    def solid(self, name: str) -> Solid:
+        """The shape in the object's own frame, which is on the ground below it."""
+        shape: Shape
+        if self.box is not None:
+            shape, middle = Box((self.box[0], self.box[1], self.box[2])), self.box[2] / 2
+        elif self.cylinder is not None:
+            shape, middle = Cylinder(self.cylinder[0], self.cylinder[1]), self.cylinder[1] / 2
+        else:
+            assert self.polygon is not None
+            shape, middle = Extrusion(tuple((x, y) for x, y in self.polygon), self.height), 0.0
+        return Solid(shape, Pose3(z=self.z + middle), name)

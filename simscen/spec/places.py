@@ -1,0 +1,31 @@
+"""Points and poses as a user writes them."""
+
+from typing import Annotated
+
+from pydantic import Field, StringConstraints
+
+from simscen.core.geometry import Pose2
+from simscen.spec.base import Spec
+from simscen.spec.quantities import Angle, Length
+
+Name = Annotated[
+    str,
+    StringConstraints(
+        min_length=1, max_length=120, pattern=r"^[^\x00-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]*$"
+    ),
+]
+PlaceName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][\w .-]{0,119}$")]
+Point = Annotated[list[Length], Field(min_length=2, max_length=2)]
+
+
+class PoseSpec(Spec):
+    """A position in metres and a heading in radians, in the map frame."""
+
+    x: Length
+    y: Length
+    yaw: Angle = 0.0
+
+    @property
+    def pose(self) -> Pose2:
+        """As plain data."""
+        return Pose2(self.x, self.y, self.yaw)

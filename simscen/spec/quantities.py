@@ -1,0 +1,96 @@
+"""Numbers with units. A bare number is SI; a string carries a unit that is checked for its dimension."""
+
+import math
+import re
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+_METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0}
+_SECONDS = {"s": 1.0, "ms": 0.001, "min": 60.0, "h": 3600.0}
+_RADIANS = {"rad": 1.0, "deg": math.pi / 180}
+_NUMBER_AND_UNIT = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\s\d].*?)\s*")
+
+
+def _per(top: dict[str, float], bottom: dict[str, float], power: str = "") -> dict[str, float]:
+    return {f"{a}/{b}{power}": x / (y**2 if power else y) for a, x in top.items() for b, y in bottom.items()}
+
+
+UNITS: dict[str, dict[str, float]] = {
+    "length": _METRES,
+    "duration": _SECONDS,
+    "angle": _RADIANS,
+    "speed": _per(_METRES, {"s": 1.0, "h": 3600.0, "min": 60.0}),
+    "angular speed": _per(_RADIANS, {"s": 1.0}),
+    "acceleration": _per(_METRES, {"s": 1.0}, "^2"),
+    "angular acceleration": _per(_RADIANS, {"s": 1.0}, "^2"),
+    "mass": {"kg": 1.0, "g": 0.001, "t": 1000.0},
+    "frequency": {"Hz": 1.0, "kHz": 1000.0},
+    "impulse": {"N s": 1.0, "Ns": 1.0},
+    "ratio": {"%": 0.01},
+}
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Marks a float as a physical quantity of a dimension in UNITS."""
+
+    dimension: str
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_before_validator_function(self.parse, handler(source))
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        number = dict(handler(schema))
+        units = "|".join(re.escape(unit) for unit in UNITS[self.dimension])
+        text = {"type": "string", "pattern": rf"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*({units})\s*$"}
+        return {"anyOf": [number, text], "description": f"{self.dimension}, e.g. {self.example}"}
+
+    @property
+    def example(self) -> str:
+        """A value as a user would write it."""
+        return f"1.5 {next(iter(UNITS[self.dimension]))}"
+
+    def parse(self, value: Any) -> Any:
+        """Turn "90 deg" into radians; leave anything but text to pydantic."""
+        if not isinstance(value, str):
+            return value
+        units = UNITS[self.dimension]
+        match = _NUMBER_AND_UNIT.fullmatch(value)
+        if match and match[2] in units:
+            return float(match[1]) * units[match[2]]
+        if match and any(match[2] in others for others in UNITS.values()):
+            other = next(name for name, others in UNITS.items() if match[2] in others)
+            problem = f"`{match[2]}` is a unit of {other}, but this is a {self.dimension}"
+        elif match:
+            problem = f"unknown unit `{match[2]}` for a {self.dimension}"
+        else:
+            problem = f"expected a {self.dimension}, got the text `{value}`"
+        raise PydanticCustomError(
+            "quantity", "{problem}; units: {units}", {"problem": problem, "units": ", ".join(units)}
+        )
+
+
+Length = Annotated[float, Field(ge=-1e4, le=1e4), Quantity("length")]
+PositiveLength = Annotated[float, Field(gt=0, le=1e4), Quantity("length")]
+NonNegativeLength = Annotated[float, Field(ge=0, le=1e4), Quantity("length")]
+Duration = Annotated[float, Field(ge=0, le=86400), Quantity("duration")]
+PositiveDuration = Annotated[float, Field(gt=0, le=86400), Quantity("duration")]
+Angle = Annotated[float, Field(ge=-100, le=100), Quantity("angle")]
+PositiveAngle = Annotated[float, Field(gt=0, le=100), Quantity("angle")]
+Speed = Annotated[float, Field(ge=-100, le=100), Quantity("speed")]
+PositiveSpeed = Annotated[float, Field(gt=0, le=100), Quantity("speed")]
+AngularSpeed = Annotated[float, Field(ge=-100, le=100), Quantity("angular speed")]
+PositiveAngularSpeed = Annotated[float, Field(gt=0, le=100), Quantity("angular speed")]
+PositiveAcceleration = Annotated[float, Field(gt=0, le=1000), Quantity("acceleration")]
+PositiveAngularAcceleration = Annotated[float, Field(gt=0, le=1000), Quantity("angular acceleration")]
+Mass = Annotated[float, Field(ge=0, le=1e5), Quantity("mass")]
+PositiveMass = Annotated[float, Field(gt=0, le=1e5), Quantity("mass")]
+Frequency = Annotated[float, Field(gt=0, le=1000), Quantity("frequency")]
+Impulse = Annotated[float, Field(ge=-1e5, le=1e5), Quantity("impulse")]
+Ratio = Annotated[float, Field(ge=0), Quantity("ratio")]
+Probability = Annotated[float, Field(ge=0, le=1), Quantity("ratio")]

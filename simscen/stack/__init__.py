@@ -1,0 +1,1 @@
+"""The navigation stack under test. It cannot see the truth: nothing here imports the simulator."""

@@ -1,0 +1,213 @@
+"""The roles of a navigation stack and what each promises. Anybody's own component can take a place.
+
+Promises are written as *given … then …* and tested in tests/contracts on every implementation. Three hold for all:
+
+- *Given* the same calls with the same generators *then* bit-identical answers: no clock, no global chance.
+- *Given* data in a call *then* it is neither changed nor kept to be changed later.
+- *Given* a failure *then* a NavigationFailure with one of Nav2's codes, never another exception.
+"""
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.belief import Belief, Estimate
+from simscen.core.geometry import Pose2
+from simscen.core.grid import OccupancyGrid
+from simscen.core.motion import Twist
+from simscen.core.navigation import ErrorCode, Goal, Path
+from simscen.core.sensing import Imu, Odometry, Readings, Scan
+from simscen.core.trace import Decision
+from simscen.core.world import Polygon
+
+
+class NavigationFailure(Exception):
+    """A component cannot do what it was asked; `code` says why in Nav2's terms."""
+
+    def __init__(self, code: ErrorCode, message: str) -> None:
+        self.code = code
+        super().__init__(message)
+
+
+@dataclass(frozen=True)
+class RobotModel:
+    """What a stack knows of its own robot: a datasheet, in SI units.
+
+    `footprint` are the corners of the hull in the base frame, anticlockwise (a regular polygon for a round robot,
+    then `radius` is set). Speeds are limits of the base. `turning_radius` is 0 for a base that turns in place.
+    """
+
+    footprint: Polygon
+    radius: float | None
+    max_linear: float
+    max_reverse: float
+    max_lateral: float
+    max_angular: float
+    linear_acceleration: float
+    linear_deceleration: float
+    angular_acceleration: float
+    turning_radius: float = 0.0
+    holonomic: bool = False
+
+    @property
+    def inscribed_radius(self) -> float:
+        """The largest circle around the base's origin inside the footprint."""
+        corners = np.array(self.footprint)
+        ends = np.roll(corners, -1, axis=0)
+        normal = np.column_stack((ends[:, 1] - corners[:, 1], corners[:, 0] - ends[:, 0]))
+        distance = np.abs(np.sum(normal * corners, axis=1)) / np.hypot(*normal.T)
+        return self.radius if self.radius is not None else float(distance.min())
+
+    @property
+    def circumscribed_radius(self) -> float:
+        """The smallest circle around the base's origin that holds the footprint."""
+        return self.radius if self.radius is not None else float(np.hypot(*np.array(self.footprint).T).max())
+
+
+class Localizer(Protocol):
+    """Knows where the robot is on the map.
+
+    *Given* no motion and perfect readings *then* the belief does not wander off.
+    *Given* a sensor that is blind, lying or full of nan *then* the belief stays finite and its covariance symmetric
+    and positive semidefinite.
+    """
+
+    def reset(self, estimate: Estimate) -> None:
+        """Start over at an estimate; the next odometry is the new reference."""
+        ...
+
+    def on_odometry(self, odometry: Odometry) -> None:
+        """Take a step of dead reckoning."""
+        ...
+
+    def on_scan(self, scan: Scan) -> None:
+        """Correct with a lidar scan; may do nothing until the robot has moved enough."""
+        ...
+
+    def on_imu(self, imu: Imu) -> None:
+        """Take a turn rate."""
+        ...
+
+    @property
+    def belief(self) -> Belief:
+        """The estimate now: the last correction carried on by odometry."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class CostmapView:
+    """A costmap at a moment, in the map frame.
+
+    `costs` (height, width) uint8 with nav2_costmap_2d's values (0 free, 253 inscribed, 254 lethal, 255 unknown);
+    row 0 is the lowest y, `origin` is the corner of cell (0, 0), without rotation. `distance` (height, width) float32
+    is the distance in metres from each cell's centre to the nearest lethal cell's centre. `revision` grows with each
+    change.
+    """
+
+    costs: npt.NDArray[np.uint8]
+    distance: npt.NDArray[np.float32]
+    resolution: float
+    origin: tuple[float, float]
+    revision: int = 0
+
+
+class Planner(Protocol):
+    """Finds a path on a costmap.
+
+    *Given* a start or a goal off the map or in an obstacle *then* fails at once with its code.
+    *Given* no way *then* fails with NO_VALID_PATH after a bounded number of iterations.
+    *Given* success *then* the path begins at `start`, ends within `tolerance` of `goal`, and no point of it puts the
+    footprint on a lethal cell.
+    """
+
+    def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
+        """A path of poses in the map frame, at most 0.1 m apart."""
+        ...
+
+
+class Controller(Protocol):
+    """Follows a path.
+
+    *Given* limits *then* no command exceeds them. *Given* an obstacle on the arc it is about to drive *then* fails
+    with NO_VALID_CONTROL rather than drive into it.
+    """
+
+    def set_path(self, path: Path) -> None:
+        """Follow this path from now on."""
+        ...
+
+    def command(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> Twist:
+        """The velocity to drive now, given where the robot is and how it moves. Called at a fixed rate."""
+        ...
+
+    @property
+    def local_plan(self) -> Path | None:
+        """The arc it expects to drive, for the log."""
+        ...
+
+
+class Behavior(Protocol):
+    """A recovery behaviour such as spin: asked again and again until it is done."""
+
+    name: str
+
+    def start(self, pose: Pose2) -> None:
+        """Begin from this pose."""
+        ...
+
+    def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:
+        """The velocity to drive now, `seconds` after the start; None when done.
+
+        Raises NavigationFailure when it would hit something or takes too long.
+        """
+        ...
+
+
+class Stack(Protocol):
+    """A whole navigation stack: readings in, one command out, each beat.
+
+    *Given* no goal *then* it commands zero. *Given* a task that has ended *then* it commands zero from that beat on.
+    """
+
+    def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:
+        """Localise at the estimate, then drive to the goals in order."""
+        ...
+
+    def preempt(self, goal: Goal) -> None:
+        """Drive to this goal first, as a new action goal would make it."""
+        ...
+
+    def cancel(self) -> None:
+        """Cancel the current goal and all after it."""
+        ...
+
+    def decide(self, tick: int, readings: Readings) -> Decision:
+        """Take the readings of this beat and say what to drive."""
+        ...
+
+    @property
+    def plan(self) -> Path | None:
+        """The plan being followed."""
+        ...
+
+    @property
+    def goal(self) -> Goal | None:
+        """The goal being driven to; None when the task has ended."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """What a stack is installed with: its robot, its map (None = mapless) and the ticks a second.
+
+    `keepout` are polygons it must not enter, `speed_zones` polygons with a speed limit in m/s.
+    """
+
+    robot: RobotModel
+    map: OccupancyGrid | None
+    tick_rate: int
+    keepout: tuple[Polygon, ...] = ()
+    speed_zones: tuple[tuple[Polygon, float], ...] = ()
+    lidars: tuple[str, ...] = field(default=())

@@ -1,0 +1,16 @@
+"""What a trigger is."""
+
+from abc import ABC, abstractmethod
+
+from simscen.core.stage import Situation
+
+
+class Condition(ABC):
+    """A condition on the running scenario.
+
+    *Given* the same situation *then* the same answer: a condition keeps no state and draws no chance.
+    """
+
+    @abstractmethod
+    def holds(self, now: Situation) -> bool:
+        """Whether it is true at this beat."""

@@ -1,0 +1,29 @@
+"""`goal`: a goal was accepted, reached or failed."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from simscen.core.stage import Situation
+from simscen.spec.base import Spec
+from simscen.spec.places import Name
+from simscen.triggers.base import Condition
+
+
+class GoalStatus(Spec, Condition):
+    """True once a goal was accepted, reached or failed, as the robot reports it.
+
+    Example: `when: {goal: {name: shelf, status: reached}}`
+    """
+
+    status: Literal["accepted", "reached", "failed", "canceled"]
+    """What must have been reported."""
+    name: Name | None = None
+    """Of this goal; default: of any."""
+    count: Annotated[int, Field(ge=1, le=10_000)] = 1
+    """How often."""
+
+    def holds(self, now: Situation) -> bool:
+        """Enough such reports have come."""
+        seen = [e for e in now.events if e.kind == f"goal.{self.status}" and self.name in (None, e.name)]
+        return len(seen) >= self.count

@@ -1,0 +1,78 @@
+"""`event`, `replan`, `recovery`, `collision`: something was logged often enough."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from simscen.core.stage import Situation
+from simscen.spec.base import Spec
+from simscen.spec.places import Name
+from simscen.triggers.base import Condition
+
+Count = Annotated[int, Field(ge=1, le=10_000)]
+
+
+def _seen(now: Situation, kind: str, name: str | None) -> int:
+    return sum(e.kind == kind and name in (None, e.name) for e in now.events)
+
+
+class EventStatus(Spec, Condition):
+    """True once another event of this scenario has started or ended.
+
+    Example: `when: {event: {name: pallet falls, status: started}}`
+    """
+
+    name: Name
+    """The `name` of the event."""
+    status: Literal["started", "ended"] = "started"
+    """What it must have done."""
+
+    def holds(self, now: Situation) -> bool:
+        """It has."""
+        return _seen(now, f"event.{self.status}", self.name) > 0
+
+
+class Replan(Spec, Condition):
+    """True once the robot has replanned so often because its plan was blocked or outdated.
+
+    Example: `when: {replan: {count: 2}}`
+    """
+
+    count: Count = 1
+    """How many replans."""
+
+    def holds(self, now: Situation) -> bool:
+        """Plans beyond the first one of each goal."""
+        return sum(e.kind == "plan.made" and e.data.get("reason") != "goal" for e in now.events) >= self.count
+
+
+class RecoveryStatus(Spec, Condition):
+    """True once a recovery behaviour has started or ended so often.
+
+    Example: `when: {recovery: {status: started}}`
+    """
+
+    status: Literal["started", "ended"] = "started"
+    """What it must have done."""
+    name: Name | None = None
+    """spin, wait, backup or clear_costmap; default: any."""
+    count: Count = 1
+    """How often."""
+
+    def holds(self, now: Situation) -> bool:
+        """Often enough."""
+        return _seen(now, f"recovery.{self.status}", self.name) >= self.count
+
+
+class Collided(Spec, Condition):
+    """True once the robot has touched something.
+
+    Example: `when: {collision: {}}`
+    """
+
+    object: Name | None = Field(default=None, alias="with")
+    """By name; default: anything."""
+
+    def holds(self, now: Situation) -> bool:
+        """It has."""
+        return _seen(now, "collision.started", self.object) > 0

@@ -1,0 +1,21 @@
+"""`robot_in`: the robot is inside a region."""
+
+from simscen.core.polygons import distance_to_polygon
+from simscen.core.stage import Situation
+from simscen.spec.base import Spec
+from simscen.spec.places import Name
+from simscen.triggers.base import Condition
+
+
+class RobotIn(Spec, Condition):
+    """True while the robot's centre is inside a named region of the world.
+
+    Example: `when: {robot_in: {region: hall}}`
+    """
+
+    region: Name
+    """A region of the world, by name."""
+
+    def holds(self, now: Situation) -> bool:
+        """The robot's true centre is inside or on the edge."""
+        return distance_to_polygon(now.robot, now.region(self.region)) <= 0

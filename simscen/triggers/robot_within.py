@@ -1,0 +1,40 @@
+"""`robot_within`: the robot is near a point, an object or a region."""
+
+from pydantic import model_validator
+
+from simscen.core.geometry import Pose2
+from simscen.core.polygons import distance_to_polygon
+from simscen.core.stage import Situation
+from simscen.spec.base import Spec
+from simscen.spec.places import Name, Point
+from simscen.spec.quantities import NonNegativeLength
+from simscen.triggers.base import Condition
+
+
+class RobotWithin(Spec, Condition):
+    """True while the robot's centre is at most `distance` from a point, an object or a region.
+
+    Example: `when: {robot_within: {of: [2, 2], distance: 1.5 m}}`
+    """
+
+    of: Point | None = None
+    """A point [x, y] in the world."""
+    object: Name | None = None
+    """An object of the world or of the scenario's events, by name; false while it is not there."""
+    region: Name | None = None
+    """A region of the world, by name."""
+    distance: NonNegativeLength
+    """From the robot's centre."""
+
+    @model_validator(mode="after")
+    def _one_target(self) -> "RobotWithin":
+        if sum(target is not None for target in (self.of, self.object, self.region)) != 1:
+            raise ValueError("expected exactly one of: of, object, region")
+        return self
+
+    def holds(self, now: Situation) -> bool:
+        """The robot's true centre is near."""
+        if self.region is not None:
+            return distance_to_polygon(now.robot, now.region(self.region)) <= self.distance
+        target = Pose2(self.of[0], self.of[1]) if self.of else now.object(self.object or "")
+        return target is not None and now.robot.distance(target) <= self.distance

@@ -1,0 +1,18 @@
+"""`time`: the clock has reached a moment."""
+
+from pydantic import RootModel
+
+from simscen.core.stage import Situation
+from simscen.spec.quantities import Duration
+from simscen.triggers.base import Condition
+
+
+class Time(RootModel[Duration], Condition):
+    """True from this simulated time on.
+
+    Example: `when: {time: 10 s}`
+    """
+
+    def holds(self, now: Situation) -> bool:
+        """The clock, which counts whole ticks, has reached the time (to the nanosecond)."""
+        return now.seconds >= self.root - 1e-9

@@ -1,0 +1,18 @@
+"""`travelled`: the robot has driven a distance."""
+
+from pydantic import RootModel
+
+from simscen.core.stage import Situation
+from simscen.spec.quantities import NonNegativeLength
+from simscen.triggers.base import Condition
+
+
+class Travelled(RootModel[NonNegativeLength], Condition):
+    """True once the robot has truly driven this far since the start.
+
+    Example: `when: {travelled: 2.5 m}`
+    """
+
+    def holds(self, now: Situation) -> bool:
+        """The driven distance has reached the length."""
+        return now.travelled >= self.root
