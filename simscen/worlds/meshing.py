@@ -45,13 +45,9 @@ _BOX_FACES = np.array(
 
 
 def fuse(solids: Iterable[Solid]) -> TriangleMesh:
-    """All solids as one triangle mesh in the frame they are placed in; face owners index `names`, in given order."""
-    vertices, faces, owners, names = (
-        [np.empty((0, 3))],
-        [np.empty((0, 3), np.int32)],
-        [np.empty(0, np.int32)],
-        [],
-    )
+    """All solids as one triangle mesh in the frame they are placed in; face owners index `names`."""
+    vertices, faces = [np.empty((0, 3))], [np.empty((0, 3), np.int32)]
+    owners, names = [np.empty(0, np.int32)], []
     meshes: dict[Shape, Mesh] = {}
     count = 0
     for owner, solid in enumerate(solids):
