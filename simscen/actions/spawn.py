@@ -54,9 +54,7 @@ class Spawn(Shaped, Action):
             return stage.robot.compose(Pose2(self.ahead[0], self.ahead[1], self.yaw))
         assert self.on_plan is not None
         if stage.plan is None or len(stage.plan.points) < 2:
-            stage.note(
-                Event(0, "event.note", self.name, {"message": "no plan to spawn on; spawned ahead instead"})
-            )
+            stage.note(Event(0, "event.note", self.name, {"message": "no plan to spawn on; spawned ahead instead"}))
             return stage.robot.compose(Pose2(self.on_plan, 0.0, self.yaw))
         return along(stage.plan, stage.robot, self.on_plan).compose(Pose2(0.0, 0.0, self.yaw))
 

@@ -30,9 +30,7 @@ class Pose2(NamedTuple):
     def compose(self, other: "Pose2") -> "Pose2":
         """`a_from_b.compose(b_from_c)` is `a_from_c`."""
         c, s = math.cos(self.yaw), math.sin(self.yaw)
-        return Pose2(
-            self.x + c * other.x - s * other.y, self.y + s * other.x + c * other.y, wrap(self.yaw + other.yaw)
-        )
+        return Pose2(self.x + c * other.x - s * other.y, self.y + s * other.x + c * other.y, wrap(self.yaw + other.yaw))
 
     def inverse(self) -> "Pose2":
         """`a_from_b.inverse()` is `b_from_a`."""

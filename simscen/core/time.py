@@ -30,9 +30,7 @@ class Clock:
         period = self.rate / hertz if hertz > 0 else 0.0
         if period < 1 or abs(period - round(period)) > 1e-9:
             fitting = self.nearest_rate(hertz)
-            raise ValueError(
-                f"{hertz:g} Hz does not divide {self.rate} Hz; the nearest that does is {fitting:g} Hz"
-            )
+            raise ValueError(f"{hertz:g} Hz does not divide {self.rate} Hz; the nearest that does is {fitting:g} Hz")
         return round(period)
 
     def nearest_rate(self, hertz: float) -> float:

@@ -117,9 +117,7 @@ class Costmap(Spec):
 class Planner(Spec):
     """A planner of OMPL on the costmap."""
 
-    type: Literal["rrt_connect", "rrt_star", "informed_rrt_star", "bit_star", "aorrtc", "kpiece"] = (
-        "rrt_connect"
-    )
+    type: Literal["rrt_connect", "rrt_star", "informed_rrt_star", "bit_star", "aorrtc", "kpiece"] = "rrt_connect"
     tolerance: NonNegativeLength = 0.5
     """How far from an unreachable goal the plan may end."""
     allow_unknown: bool = True

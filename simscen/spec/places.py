@@ -10,9 +10,7 @@ from simscen.spec.quantities import Angle, Length
 
 Name = Annotated[
     str,
-    StringConstraints(
-        min_length=1, max_length=120, pattern=r"^[^\x00-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]*$"
-    ),
+    StringConstraints(min_length=1, max_length=120, pattern=r"^[^\x00-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]*$"),
 ]
 PlaceName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][\w .-]{0,119}$")]
 Point = Annotated[list[Length], Field(min_length=2, max_length=2)]
