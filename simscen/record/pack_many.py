@@ -1,0 +1,155 @@
+"""ROS 2 messages that hold many of something: numpy lays them out, no Python runs per beam, cell, pose or particle."""
+
+import struct
+
+import numpy as np
+
+from simscen.core.geometry import Array, Pose3
+from simscen.core.grid import OccupancyGrid
+from simscen.core.sensing import Scan
+from simscen.record.cdr import HEADER, Template
+from simscen.record.simtime import Stamp
+
+Link = tuple[str, str, Stamp, Pose3]
+
+
+def ground_quaternions(headings: Array) -> Array:
+    """(n, 4) quaternions x, y, z, w of headings (n,) in radians."""
+    halves = headings / 2
+    quaternions = np.zeros((len(halves), 4))
+    quaternions[:, 2] = np.sin(halves)
+    quaternions[:, 3] = np.cos(halves)
+    return quaternions
+
+
+def ground_poses(points: Array) -> Array:
+    """(n, 7) positions and quaternions of points (n, 3) x, y, yaw."""
+    poses = np.zeros((len(points), 7))
+    poses[:, :2] = points[:, :2]
+    poses[:, 3:] = ground_quaternions(points[:, 2])
+    return poses
+
+
+class LaserScanPacker:
+    """sensor_msgs/msg/LaserScan without intensities."""
+
+    def __init__(self, frame: str) -> None:
+        self._head = Template()
+        self._stamp = self._head.slot("iI")
+        self._head.string(frame)
+        self._numbers = self._head.slot("7f")
+        self._count = self._head.slot("I")
+
+    def __call__(self, stamp: Stamp, scan: Scan) -> bytes:
+        n = len(scan.ranges)
+        last = scan.angle_min + scan.angle_increment * (n - 1)
+        self._stamp(*stamp)
+        self._numbers(scan.angle_min, last, scan.angle_increment, 0.0, 0.0, scan.range_min, scan.range_max)
+        self._count(n)
+        return bytes(self._head) + scan.ranges.astype("<f4").tobytes() + b"\0\0\0\0"
+
+
+class PathPacker:
+    """nav_msgs/msg/Path; every pose carries the path's own header.
+
+    A pose ends on a multiple of eight bytes, so all but the first are laid out alike.
+    """
+
+    def __init__(self, frame: str) -> None:
+        self._head = Template()
+        self._stamp = self._head.slot("iI")
+        self._head.string(frame)
+        self._count = self._head.slot("I")
+        self._first = self._pose(frame, len(self._head) - len(HEADER))
+        self._next = self._pose(frame, 0)
+
+    @staticmethod
+    def _pose(frame: str, start: int) -> Template:
+        pose = Template(prefix=b"", start=start)
+        pose.put("iI", 0, 0)
+        pose.string(frame)
+        pose.align(8)
+        return pose
+
+    def __call__(self, stamp: Stamp, points: Array) -> bytes:
+        """`points` (n, 3) hold x, y, yaw in the packer's frame."""
+        self._stamp(*stamp)
+        self._count(len(points))
+        if not len(points):
+            return bytes(self._head)
+        poses, header = ground_poses(points).astype("<f8"), struct.pack("<iI", *stamp)
+        first, other = (header + bytes(t)[len(header) :] for t in (self._first, self._next))
+        rest = np.empty((len(points) - 1, len(other) + 56), dtype=np.uint8)
+        rest[:, : len(other)] = np.frombuffer(other, dtype=np.uint8)
+        rest[:, len(other) :] = poses[1:].view(np.uint8).reshape(-1, 56)
+        return b"".join((bytes(self._head), first, poses[0].tobytes(), rest.tobytes()))
+
+
+class ParticleCloudPacker:
+    """nav2_msgs/msg/ParticleCloud."""
+
+    def __init__(self, frame: str) -> None:
+        self._head = Template()
+        self._stamp = self._head.slot("iI")
+        self._head.string(frame)
+        self._count = self._head.slot("I")
+        self._head.align(8)
+
+    def __call__(self, stamp: Stamp, particles: Array) -> bytes:
+        """`particles` (n, 4) hold x, y, yaw, weight; n > 0."""
+        self._stamp(*stamp)
+        self._count(len(particles))
+        cloud = np.empty((len(particles), 8), dtype="<f8")
+        cloud[:, :7] = ground_poses(particles)
+        cloud[:, 7] = particles[:, 3]
+        return bytes(self._head) + cloud.tobytes()
+
+
+class TransformsPacker:
+    """tf2_msgs/msg/TFMessage. A transform ends on a multiple of eight bytes, so only the first is laid out apart."""
+
+    def __init__(self) -> None:
+        self._layouts: dict[tuple[str, str, int], _Transform] = {}
+
+    def __call__(self, links: list[Link]) -> bytes:
+        """Each link is (frame, child frame, stamp, pose of the child in the frame)."""
+        start = 4
+        parts = [HEADER, struct.pack("<I", len(links))]
+        for frame, child, stamp, pose in links:
+            key = (frame, child, start)
+            layout = self._layouts.get(key)
+            if layout is None:
+                layout = self._layouts[key] = _Transform(frame, child, start)
+            parts.append(layout(stamp, pose))
+            start = 0
+        return b"".join(parts)
+
+
+class _Transform:
+    """geometry_msgs/msg/TransformStamped inside a sequence, beginning `start` bytes after a multiple of eight."""
+
+    def __init__(self, frame: str, child: str, start: int) -> None:
+        self._message = message = Template(prefix=b"", start=start)
+        self._stamp = message.slot("iI")
+        message.string(frame)
+        message.string(child)
+        self._pose = message.slot("7d")
+
+    def __call__(self, stamp: Stamp, pose: Pose3) -> bytes:
+        self._stamp(*stamp)
+        self._pose(*pose)
+        return bytes(self._message)
+
+
+def occupancy_grid(frame: str, stamp: Stamp, grid: OccupancyGrid) -> bytes:
+    """nav_msgs/msg/OccupancyGrid."""
+    height, width = grid.shape
+    message = Template()
+    message.put("iI", *stamp)
+    message.string(frame)
+    message.put("iI", *stamp)
+    message.put("f", grid.resolution)
+    message.put("2I", width, height)
+    message.put("7d", *Pose3.planar(grid.origin))
+    message.put("I", grid.cells.size)
+    return bytes(message) + grid.cells.astype(np.int8).tobytes()

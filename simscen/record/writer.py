@@ -1,0 +1,190 @@
+"""Writes MCAP (https://mcap.dev/spec): chunked, compressed, indexed; the same calls give the same bytes.
+
+The records are the mcap library's. Only the way of a message into its chunk is ours: the library's takes 3–4 µs a
+message and fixes zstd's level at 3, which together is twice the time of all else in recording.
+"""
+
+import struct
+import zlib
+from collections.abc import Mapping
+from typing import Protocol
+
+import zstandard
+from mcap import records
+from mcap.data_stream import RecordBuilder
+from mcap.opcode import Opcode
+
+from simscen.record.schemas import MessageType
+
+MAGIC = b"\x89MCAP0\r\n"
+CHUNK_SIZE = 1 << 16  # what a SIGKILL can lose; 1 MiB, the library's default, would lose most runs whole
+_COMPRESSION_LEVEL = 1  # as small as level 3 on particles and scans, four times as fast
+_MESSAGE = struct.Struct("<BQHIQQ")
+
+
+class Sink(Protocol):
+    """Where the bytes go."""
+
+    def write(self, data: bytes, /) -> object:
+        """Take all of `data`."""
+        ...
+
+
+class McapWriter:
+    """An MCAP file in the making. Messages must come in the order of their time.
+
+    A chunk leaves as soon as it is full; `finish` writes the rest and the index. Nothing is buffered beside the chunk
+    in the making.
+    """
+
+    def __init__(self, sink: Sink, profile: str, library: str, chunk_size: int = CHUNK_SIZE) -> None:
+        self._sink = sink
+        self._written = 0
+        self._chunk = _Chunk()
+        self._chunk_size = chunk_size
+        self._compress = zstandard.ZstdCompressor(level=_COMPRESSION_LEVEL).compress
+        self._schemas: dict[str, records.Schema] = {}
+        self._channels: list[records.Channel] = []
+        self._counts: list[int] = []
+        self._chunks: list[records.ChunkIndex] = []
+        self._attachments: list[records.AttachmentIndex] = []
+        self._notes: list[records.MetadataIndex] = []
+        self._put(MAGIC)
+        self._put(_encoded(records.Header(profile, library)))
+
+    def channel(self, topic: str, kind: MessageType, metadata: Mapping[str, str]) -> int:
+        """Open a channel of CDR messages; the number is what `message` asks for."""
+        schema = self._schemas.get(kind.name)
+        if schema is None:
+            schema = records.Schema(len(self._schemas) + 1, kind.definition.encode(), "ros2msg", kind.name)
+            self._schemas[kind.name] = schema
+            self._chunk.put(_encoded(schema))
+        channel = records.Channel(len(self._channels) + 1, topic, "cdr", dict(metadata), schema.id)
+        self._channels.append(channel)
+        self._counts.append(0)
+        self._chunk.put(_encoded(channel))
+        return channel.id
+
+    def message(self, channel: int, time: int, data: bytes) -> None:
+        """Add a message at `time` nanoseconds."""
+        self._counts[channel - 1] += 1
+        if self._chunk.message(channel, time, data) > self._chunk_size:
+            self._finish_chunk()
+
+    def attach(self, name: str, media_type: str, data: bytes) -> None:
+        """Add a file."""
+        attachment = _encoded(records.Attachment(0, 0, name, media_type, data))
+        index = records.AttachmentIndex(self._written, len(attachment), 0, 0, len(data), name, media_type)
+        self._attachments.append(index)
+        self._put(attachment)
+
+    def note(self, name: str, values: Mapping[str, str]) -> None:
+        """Add a metadata record."""
+        note = _encoded(records.Metadata(name, dict(values)))
+        self._notes.append(records.MetadataIndex(self._written, len(note), name))
+        self._put(note)
+
+    def finish(self) -> None:
+        """Write what is left and the summary; the sink stays open."""
+        if self._chunk.parts:
+            self._finish_chunk()
+        self._put(_encoded(records.DataEnd(0)))
+        start = self._written
+        groups = [_encoded(*group) for group in self._summary()]
+        offsets = []
+        for group in groups:
+            if group:
+                offsets.append(_encoded(records.SummaryOffset(group[0], self._written, len(group))))
+                self._put(group)
+        offset_start = self._written
+        self._put(b"".join(offsets))
+        # The summary's checksum covers the footer up to the checksum itself.
+        head = struct.pack("<BQQQ", Opcode.FOOTER, 20, start, offset_start)
+        checksum = zlib.crc32(b"".join((*groups, *offsets, head)))
+        self._put(_encoded(records.Footer(start, offset_start, checksum)))
+        self._put(MAGIC)
+
+    def _summary(self) -> list[list[records.McapRecord]]:
+        statistics = records.Statistics(
+            attachment_count=len(self._attachments),
+            channel_count=len(self._channels),
+            channel_message_counts={c.id: n for c, n in zip(self._channels, self._counts, strict=True) if n},
+            chunk_count=len(self._chunks),
+            message_count=sum(self._counts),
+            message_end_time=max((c.message_end_time for c in self._chunks), default=0),
+            message_start_time=min((c.message_start_time for c in self._chunks), default=0),
+            metadata_count=len(self._notes),
+            schema_count=len(self._schemas),
+        )
+        groups = [self._schemas.values(), self._channels, [statistics], self._chunks, self._attachments, self._notes]
+        return [list(group) for group in groups]
+
+    def _finish_chunk(self) -> None:
+        chunk, self._chunk = self._chunk, _Chunk()
+        content = b"".join(chunk.parts)
+        packed = self._compress(content)
+        checksum = zlib.crc32(content)
+        record = _encoded(records.Chunk("zstd", packed, chunk.end, chunk.start, checksum, len(content)))
+        at, indices, offsets = self._written, [], {}
+        follow = at + len(record)
+        for channel, entries in chunk.index.items():
+            offsets[channel] = follow + sum(map(len, indices))
+            indices.append(_message_index(channel, entries))
+        index = b"".join(indices)
+        self._chunks.append(
+            records.ChunkIndex(
+                chunk_length=len(record),
+                chunk_start_offset=at,
+                compression="zstd",
+                compressed_size=len(packed),
+                message_end_time=chunk.end,
+                message_index_length=len(index),
+                message_index_offsets=offsets,
+                message_start_time=chunk.start,
+                uncompressed_size=len(content),
+            )
+        )
+        self._put(record + index)
+
+    def _put(self, data: bytes) -> None:
+        self._sink.write(data)
+        self._written += len(data)
+
+
+class _Chunk:
+    """Records on their way into one chunk; `index` holds times and offsets of each channel's messages in turn."""
+
+    def __init__(self) -> None:
+        self.parts: list[bytes] = []
+        self.size = 0
+        self.start = self.end = 0
+        self.index: dict[int, list[int]] = {}
+
+    def put(self, record: bytes) -> None:
+        self.parts.append(record)
+        self.size += len(record)
+
+    def message(self, channel: int, time: int, data: bytes) -> int:
+        """Add a message; returns the size of the chunk."""
+        if not self.index:
+            self.start = time
+        self.end = time
+        entries = self.index.get(channel)
+        if entries is None:
+            entries = self.index[channel] = []
+        entries += (time, self.size)
+        self.parts += (_MESSAGE.pack(Opcode.MESSAGE, 22 + len(data), channel, 0, time, time), data)
+        self.size += 31 + len(data)
+        return self.size
+
+
+def _message_index(channel: int, entries: list[int]) -> bytes:
+    size = 8 * len(entries)
+    return struct.pack(f"<BQHI{len(entries)}Q", Opcode.MESSAGE_INDEX, 6 + size, channel, size, *entries)
+
+
+def _encoded(*items: records.McapRecord) -> bytes:
+    builder = RecordBuilder()
+    for item in items:
+        item.write(builder)
+    return bytes(builder.end())

@@ -1,0 +1,59 @@
+"""Writes simscen/record/schemas.json anew: `python tests/unit/record/schemas_from_rosbags.py`.
+
+The texts and hashes are those of ROS 2 Humble as rosbags knows them, so that running simscen needs neither ROS nor
+rosbags.
+"""
+
+import json
+from pathlib import Path
+
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
+
+SCHEMAS = Path(__file__).parents[3] / "simscen" / "record" / "schemas.json"
+
+TYPES = (
+    "geometry_msgs/msg/PoseStamped",
+    "geometry_msgs/msg/PoseWithCovarianceStamped",
+    "geometry_msgs/msg/Twist",
+    "nav2_msgs/msg/ParticleCloud",
+    "nav_msgs/msg/OccupancyGrid",
+    "nav_msgs/msg/Odometry",
+    "nav_msgs/msg/Path",
+    "rcl_interfaces/msg/Log",
+    "rosgraph_msgs/msg/Clock",
+    "sensor_msgs/msg/Image",
+    "sensor_msgs/msg/Imu",
+    "sensor_msgs/msg/LaserScan",
+    "std_msgs/msg/Bool",
+    "std_msgs/msg/Float64",
+    "std_msgs/msg/String",
+    "tf2_msgs/msg/TFMessage",
+)
+
+# rosbags has no nav2_msgs; these are the files of navigation2's humble branch, without their comments.
+NAV2 = {
+    "nav2_msgs/msg/Particle": "geometry_msgs/Pose pose\nfloat64 weight\n",
+    "nav2_msgs/msg/ParticleCloud": "std_msgs/Header header\nnav2_msgs/Particle[] particles\n",
+}
+
+
+def humble() -> Typestore:
+    """ROS 2 Humble's message types and those of nav2_msgs that we write."""
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    for name, text in NAV2.items():
+        store.register(get_types_from_msg(text, name))
+    return store
+
+
+def expected() -> dict[str, dict[str, str]]:
+    """What schemas.json should hold."""
+    store = humble()
+    return {
+        name: {"hash": store.hash_rihs01(name), "definition": store.generate_msgdef(name, ros_version=2)[0]}
+        for name in TYPES
+    }
+
+
+if __name__ == "__main__":
+    SCHEMAS.write_text(json.dumps(expected(), indent=1) + "\n")
