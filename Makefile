@@ -1,0 +1,61 @@
+# simscen: every task of the project. `make help` prints this list.
+SHELL := /bin/bash
+.DEFAULT_GOAL := help
+VENV := .venv
+BIN := $(VENV)/bin
+PYTHON ?= $(shell for v in 3.11 3.10; do \
+	for p in python$$v $(HOME)/.pyenv/versions/$$v.*/bin/python $(HOME)/.local/share/uv/python/cpython-$$v.*/bin/python3; do \
+	if command -v $$p >/dev/null 2>&1 && $$p -c "import sys; sys.exit('%d.%d' % sys.version_info[:2] != '$$v')" 2>/dev/null; \
+	then echo $$p; exit; fi; done; done)
+STAMP := $(VENV)/.installed
+
+.PHONY: help setup run test check lint types layers schemas docs bench build clean
+
+help:  ## Print this list
+	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+setup: $(STAMP)  ## Make the virtual environment in .venv (the other targets do it when needed)
+
+$(STAMP): pyproject.toml
+	@test -n "$(PYTHON)" || { \
+	echo "simscen needs Python 3.10 or 3.11 (pybullet has no wheels for newer ones), and none was found."; \
+	echo "Get one without touching your system, then run make again:"; \
+	echo "    curl -LsSf https://astral.sh/uv/install.sh | sh && uv python install 3.11"; \
+	echo "or name one yourself:  make $(firstword $(MAKECMDGOALS)) PYTHON=/path/to/python3.11"; exit 1; }
+	@echo "Setting up $(VENV) with $(PYTHON) …"
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@$(BIN)/python -m pip install --quiet --upgrade "pip>=25.1"
+	@$(BIN)/python -m pip install --quiet --editable . --group dev
+	@touch $@
+
+run: setup  ## Run the scenarios that ship
+	@$(BIN)/simscen run scenarios/
+
+test: setup check  ## Run everything CI runs: checks, then the tests
+	@$(BIN)/python -m pytest
+
+check: lint types layers schemas  ## Lint, types, layers, drift of schemas and docs
+
+lint: setup
+	@$(BIN)/ruff check . && $(BIN)/ruff format --check --quiet .
+
+types: setup
+	@$(BIN)/mypy
+
+layers: setup
+	@$(BIN)/lint-imports --no-cache 2>&1 | tail -n 4; test $${PIPESTATUS[0]} -eq 0 || { $(BIN)/lint-imports --no-cache; exit 1; }
+
+schemas: setup  ## Check that schemas/ and docs/reference/ are what the code says
+	@$(BIN)/python -m simscen.cli.generate --check
+
+docs: setup  ## Write schemas/ and docs/reference/ anew
+	@$(BIN)/python -m simscen.cli.generate
+
+bench: setup  ## Measure speed (simscen bench)
+	@$(BIN)/simscen bench
+
+build: setup  ## Build the wheel into dist/
+	@$(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist .
+
+clean:  ## Remove what make made
+	rm -rf $(VENV) dist build simscen-out .mypy_cache .pytest_cache .ruff_cache
