@@ -47,14 +47,10 @@ class Bullet:
             flags=pybullet.GEOM_FORCE_CONCAVE_TRIMESH,
             physicsClientId=self.client,
         )
-        return pybullet.createMultiBody(
-            0, shape, -1, pose.position, pose.quaternion, physicsClientId=self.client
-        )
+        return pybullet.createMultiBody(0, shape, -1, pose.position, pose.quaternion, physicsClientId=self.client)
 
     def move(self, body, pose):
-        pybullet.resetBasePositionAndOrientation(
-            body, pose.position, pose.quaternion, physicsClientId=self.client
-        )
+        pybullet.resetBasePositionAndOrientation(body, pose.position, pose.quaternion, physicsClientId=self.client)
 
     def cast(self, origins, directions, reach=30.0):
         pybullet.performCollisionDetection(physicsClientId=self.client)

@@ -1,0 +1,103 @@
+"""The occupancy map of a world: what SLAM with a perfect lidar at one height would have drawn."""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.errors import InvalidInput
+from simscen.core.geometry import Array, Pose2
+from simscen.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from simscen.core.problems import Problem
+from simscen.core.shapes import TriangleMesh
+from simscen.core.world import World
+from simscen.worlds.raster import Cells, touched
+from simscen.worlds.section import Section, section
+
+MARGIN = 1.0
+"""Metres of map around everything there is, so that a robot outside of the last wall is still on the map."""
+MOST_CELLS = 16_000_000
+"""The limit for maps of every kind, drawn or read."""
+
+
+def map_of(world: World, mesh: TriangleMesh, height: float, resolution: float = 0.05) -> OccupancyGrid:
+    """The map a robot gets of a world whose static solids are `mesh`, cut at `height` in metres.
+
+    A cell is occupied if any part of a solid is in it at that height, hollow or not; unknown if it lies outside of
+    the building, where nobody ever went (see `_outside`); free otherwise. A world that came with a map of its own
+    keeps it, with what was added to the world drawn in. Raises InvalidInput beyond MOST_CELLS.
+    """
+    cut = section(mesh, height)
+    if world.grid is not None:
+        return _drawn_into(world.grid, cut)
+    grid = empty_grid(_bounds(world, cut.segments), resolution, world.name)
+    occupied = occupied_cells(grid, cut)
+    cells = np.where(occupied, np.int8(OCCUPIED), np.int8(FREE))
+    cells[_outside(occupied, _places(world, grid))] = UNKNOWN
+    return OccupancyGrid(cells, resolution, grid.origin)
+
+
+def occupied_cells(grid: OccupancyGrid, cut: Section) -> Cells:
+    """Which cells of the grid (rows, columns) share inner points with the solids of a section."""
+    flat = grid.origin.inverse().apply(cut.segments.reshape(-1, 2)) / grid.resolution
+    return touched(Section(flat.reshape(-1, 2, 2), cut.owners), grid.shape)
+
+
+def empty_grid(bounds: tuple[float, float, float, float], resolution: float, name: str) -> OccupancyGrid:
+    """A free grid over bounds (min x, min y, max x, max y) and MARGIN; its lines are multiples of `resolution`."""
+    low = [math.floor(round((edge - MARGIN) / resolution, 6)) for edge in bounds[:2]]
+    high = [math.ceil(round((edge + MARGIN) / resolution, 6)) for edge in bounds[2:]]
+    width, height = high[0] - low[0], high[1] - low[1]
+    if width * height > MOST_CELLS:
+        message = f"map too large: {width} x {height} cells of {resolution:g} m, more than {MOST_CELLS} cells"
+        raise InvalidInput([Problem(name, 0, 0, "SC330", message, "use a coarser resolution")])
+    cells = np.zeros((height, width), dtype=np.int8)
+    return OccupancyGrid(cells, resolution, Pose2(low[0] * resolution, low[1] * resolution))
+
+
+def _bounds(world: World, segments: Array) -> tuple[float, float, float, float]:
+    """The world's own bounds, or those of its section when it states none."""
+    x0, y0, x1, y1 = world.bounds
+    if x1 > x0 and y1 > y0:
+        return world.bounds
+    if not len(segments):
+        return (0.0, 0.0, 0.0, 0.0)
+    corners = segments.reshape(-1, 2)
+    (left, low), (right, high) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+    return left, low, right, high
+
+
+def _drawn_into(grid: OccupancyGrid, cut: Section) -> OccupancyGrid:
+    cells = grid.cells.copy()
+    cells[occupied_cells(grid, cut)] = OCCUPIED
+    return OccupancyGrid(cells, grid.resolution, grid.origin)
+
+
+def _places(world: World, grid: OccupancyGrid) -> npt.NDArray[np.int64]:
+    """The cells (n, 2) of the named places that lie on the grid."""
+    points = np.array([(pose.x, pose.y) for pose in world.places.values()]).reshape(-1, 2)
+    cells = grid.cell_of(points)
+    return cells[grid.inside(cells)]
+
+
+def _outside(occupied: Cells, places: npt.NDArray[np.int64]) -> Cells:
+    """The cells outside of a building: free, linked to the edge of the map, and not where robots are.
+
+    The surroundings count as outside when the rooms within the walls are larger than they are without MARGIN's
+    share, that is, than the open ground within the world's own extent; and never when a named place is there. An
+    open field with obstacles has hardly any ground that is walled off, so all of it stays free.
+    """
+    from scipy import ndimage
+
+    labels, _ = ndimage.label(~occupied)
+    edge = np.unique(np.concatenate((labels[0], labels[-1], labels[:, 0], labels[:, -1])))
+    open_ground = np.isin(labels, edge[edge > 0])
+    enclosed = ~occupied & ~open_ground
+    extent = np.zeros_like(occupied)
+    rows, columns = np.nonzero(occupied.any(axis=1))[0], np.nonzero(occupied.any(axis=0))[0]
+    if len(rows):
+        extent[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] = True
+    lived_in = bool(open_ground[places[:, 0], places[:, 1]].any())
+    if lived_in or enclosed.sum() <= (open_ground & extent).sum():
+        return np.zeros_like(occupied)
+    return open_ground
