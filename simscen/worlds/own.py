@@ -1,0 +1,98 @@
+"""From a `*.world.yaml` to a world: walls with clean corners, obstacles, things that move, doors."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from simscen.actions.move import route
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.grid import OccupancyGrid
+from simscen.core.shapes import Body, Box, MotionPath, Solid
+from simscen.core.world import World
+from simscen.model.world import Door, Movable, Obstacle, Wall, WorldSpec
+from simscen.worlds.extents import plan_extents
+from simscen.worlds.extrude import walls_of
+from simscen.worlds.walls import wall_solids
+
+
+def build_own(spec: WorldSpec, name: str, grid: OccupancyGrid | None = None, base: World | None = None) -> World:
+    """The world of a specification; `name` is used where it has none.
+
+    `grid` is the loaded `map`, which becomes walls `map_height` tall and stays the robot's map; `base` is the imported
+    `sdf`. What the specification adds comes after theirs, and its places and regions win over those of the base.
+    """
+    base = base or World(name, ())
+    solids = [*base.solids]
+    if grid is not None:
+        solids += walls_of(grid, spec.map_height)
+    for number, wall in enumerate(spec.walls, start=1):
+        solids += wall_solids(_corners(wall), wall.thickness, wall.height, _wall_name(wall, number))
+    solids += [_standing(obstacle) for obstacle in spec.obstacles]
+    bodies = (*base.bodies, *map(_movable, spec.objects), *map(_door, spec.doors))
+    places = {**base.places, **{key: place.pose for key, place in spec.places.items()}}
+    regions = {key: tuple((x, y) for x, y in corners) for key, corners in spec.regions.items()}
+    return replace(
+        base,
+        name=spec.name or name,
+        solids=tuple(solids),
+        bodies=bodies,
+        places=places,
+        regions={**base.regions, **regions},
+        bounds=_bounds(solids, bodies, places.values(), grid),
+        grid=grid or base.grid,
+    )
+
+
+def door_poses(hinge: tuple[float, float], post: tuple[float, float]) -> tuple[Pose2, Pose2]:
+    """Where the panel of a door is when closed and when open: it turns 90° anticlockwise about its hinge."""
+    yaw = math.atan2(post[1] - hinge[1], post[0] - hinge[0])
+    return Pose2(*hinge, yaw), Pose2(*hinge, yaw).compose(Pose2(0.0, 0.0, math.pi / 2))
+
+
+def _corners(wall: Wall) -> list[tuple[float, float]]:
+    return [(x, y) for x, y in wall.points]
+
+
+def _wall_name(wall: Wall, number: int) -> str:
+    """Its own name, or `wall_3` for the third wall of the file."""
+    return wall.name if "name" in wall.model_fields_set else f"wall_{number}"
+
+
+def _standing(obstacle: Obstacle) -> Solid:
+    solid = obstacle.solid(obstacle.name)
+    return replace(solid, pose=Pose3.planar(obstacle.pose.pose).compose(solid.pose))
+
+
+def _movable(thing: Movable) -> Body:
+    path: MotionPath | None = None
+    if thing.move is not None:
+        path = route(thing.pose.pose, thing.move.through, thing.move.speed, thing.move.repeat)
+        path = replace(path, start=thing.move.start)
+    return Body(thing.name, (thing.solid(thing.name),), Pose3.planar(thing.pose.pose), thing.mass, path)
+
+
+def _door(door: Door) -> Body:
+    (hinge_x, hinge_y), (post_x, post_y) = door.points
+    closed, opened = door_poses((hinge_x, hinge_y), (post_x, post_y))
+    width = math.hypot(post_x - hinge_x, post_y - hinge_y)
+    panel = Solid(Box((width, door.thickness, door.height)), Pose3(x=width / 2, z=door.height / 2), door.name)
+    return Body(door.name, (panel,), Pose3.planar(closed if door.closed else opened))
+
+
+def _bounds(
+    solids: Iterable[Solid], bodies: Iterable[Body], places: Iterable[Pose2], grid: OccupancyGrid | None
+) -> tuple[float, float, float, float]:
+    """What holds all there is, as (min x, min y, max x, max y); zeros for nothing at all."""
+    corners = [np.array([(place.x, place.y) for place in places]).reshape(-1, 2)]
+    corners += [plan_extents(solid) for solid in solids]
+    corners += [plan_extents(solid, body.pose) for body in bodies for solid in body.solids]
+    if grid is not None:
+        height, width = (cells * grid.resolution for cells in grid.shape)
+        corners.append(grid.origin.apply(np.array([[0, 0], [width, 0], [width, height], [0, height]])))
+    points = np.concatenate(corners)
+    if not len(points):
+        return (0.0, 0.0, 0.0, 0.0)
+    (left, low), (right, high) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+    return left, low, right, high
