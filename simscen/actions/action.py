@@ -1,6 +1,7 @@
 """The list of actions: a new one is one file and one line here."""
 
 from simscen.actions.base import Action
+from simscen.actions.doors import CloseDoor, OpenDoor
 from simscen.actions.goals import CancelGoal, NewGoal
 from simscen.actions.move import Move
 from simscen.actions.remove import Remove
@@ -16,6 +17,8 @@ class AnyAction(Choice):
     spawn: Spawn | None = None
     remove: Remove | None = None
     move: Move | None = None
+    open: OpenDoor | None = None
+    close: CloseDoor | None = None
     kidnap: Kidnap | None = None
     push: Push | None = None
     new_goal: NewGoal | None = None

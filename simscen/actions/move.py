@@ -1,5 +1,6 @@
 """`move`: let an object follow waypoints."""
 
+import itertools
 import math
 from typing import Annotated, Literal
 
@@ -47,7 +48,7 @@ def route(start: Pose2, through: list[list[float]], speed: float, repeat: str) -
     if repeat == "loop":
         corners.append((start.x, start.y))
     times, poses = [0.0], [start]
-    for (ax, ay), (bx, by) in zip(corners, corners[1:], strict=False):
+    for (ax, ay), (bx, by) in itertools.pairwise(corners):
         length = math.hypot(bx - ax, by - ay)
         if length > 0:
             heading = math.atan2(by - ay, bx - ax)

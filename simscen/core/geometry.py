@@ -44,8 +44,7 @@ class Pose2(NamedTuple):
     def apply(self, points: Array) -> Array:
         """Points (n, 2) of this pose's frame, expressed in its parent frame."""
         c, s = math.cos(self.yaw), math.sin(self.yaw)
-        rotated: Array = points @ np.array([[c, s], [-s, c]])
-        return rotated + (self.x, self.y)
+        return points @ np.array([[c, s], [-s, c]]) + np.array([self.x, self.y])
 
     def distance(self, other: "Pose2") -> float:
         """Distance between the two positions in metres; headings do not count."""
@@ -105,8 +104,7 @@ class Pose3(NamedTuple):
 
     def apply(self, points: Array) -> Array:
         """Points (n, 3) of this pose's frame, expressed in its parent frame."""
-        rotated: Array = points @ self.rotation().T
-        return rotated + self.position
+        return points @ self.rotation().T + np.array(self.position)
 
     def compose(self, other: "Pose3") -> "Pose3":
         """`a_from_b.compose(b_from_c)` is `a_from_c`."""

@@ -34,7 +34,7 @@ class OccupancyGrid:
 
     def centre_of(self, cells: npt.NDArray[np.int64]) -> Array:
         """Map points (n, 2) of the centres of cells (n, 2) given as (row, column)."""
-        return self.origin.apply((cells[:, ::-1] + 0.5) * self.resolution)
+        return self.origin.apply((cells[:, ::-1].astype(np.float64) + 0.5) * self.resolution)
 
     def inside(self, cells: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
         """Which of the cells (n, 2) lie on the grid."""

@@ -28,7 +28,7 @@ class Scan:
 
     def angles(self) -> Array:
         """Beam directions (n,) in the lidar's frame, in radians."""
-        return self.angle_min + self.angle_increment * np.arange(len(self.ranges))
+        return self.angle_min + self.angle_increment * np.arange(len(self.ranges), dtype=np.float64)
 
     def points(self) -> Array:
         """The hits (m, 2) in the robot's base frame; beams without a hit are left out."""

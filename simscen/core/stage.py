@@ -74,6 +74,10 @@ class Stage(Situation, Protocol):
         """Take a body out of the world; unknown names are ignored with an event."""
         ...
 
+    def door(self, name: str) -> tuple[Pose2, Pose2]:
+        """The poses of a door's panel when closed and when open."""
+        ...
+
     def move(self, name: str, path: MotionPath) -> None:
         """Let a body follow a path that begins now."""
         ...

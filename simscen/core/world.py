@@ -14,7 +14,7 @@ Polygon = tuple[tuple[float, float], ...]
 class World:
     """Everything that is there before the robot: `solids` never move, `bodies` may.
 
-    `bounds` is (min x, min y, max x, max y) in metres. `grid` is set when the world came with an occupancy map of its
+    `doors` maps a door's name, which is also its body's, to that body's pose when closed and when open. `bounds` is (min x, min y, max x, max y) in metres. `grid` is set when the world came with an occupancy map of its
     own (a ROS map). `notes` are warnings of the importer, each a sentence that names file and element.
     """
 
@@ -23,6 +23,7 @@ class World:
     bodies: tuple[Body, ...] = ()
     places: Mapping[str, Pose2] = field(default_factory=dict)
     regions: Mapping[str, Polygon] = field(default_factory=dict)
+    doors: Mapping[str, tuple[Pose2, Pose2]] = field(default_factory=dict)
     bounds: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     grid: OccupancyGrid | None = None
     notes: tuple[str, ...] = ()

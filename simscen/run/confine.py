@@ -1,0 +1,41 @@
+"""What a run's process may do: bounded in memory, files and life."""
+
+import ctypes
+import os
+import resource
+import signal
+
+MEMORY_BYTES = 4 << 30
+FILE_BYTES = 2 << 30
+OPEN_FILES = 256
+_PR_SET_PDEATHSIG = 1
+
+
+def die_with_parent(parent: int) -> None:
+    """Be killed when the process `parent` ends, even if it is killed itself.
+
+    The request is lost when the parent ended before it was made, so that is checked afterwards.
+    """
+    ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+    if os.getppid() != parent:
+        os._exit(1)
+
+
+def limit_resources() -> None:
+    """Bound memory, file sizes and open files of this process; no core dumps."""
+    for what, most in (
+        (resource.RLIMIT_AS, MEMORY_BYTES),
+        (resource.RLIMIT_FSIZE, FILE_BYTES),
+        (resource.RLIMIT_NOFILE, OPEN_FILES),
+        (resource.RLIMIT_CORE, 0),
+    ):
+        hard = resource.getrlimit(what)[1]
+        bound = most if hard == resource.RLIM_INFINITY else min(most, hard)
+        resource.setrlimit(what, (bound, bound))
+
+
+def environment() -> dict[str, str]:
+    """The environment of the processes that run scenarios: nothing secret, one BLAS thread, no hash seed."""
+    kept = {k: v for k, v in os.environ.items() if k in {"PATH", "HOME", "LANG", "TMPDIR"} or k.startswith("LC_")}
+    one_thread = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMEXPR", "TBB")}
+    return {**kept, **one_thread, "PYTHONHASHSEED": "0"}

@@ -1,0 +1,59 @@
+"""The director watches the triggers of a scenario and lets its events and faults happen."""
+
+from simscen.core.chance import Streams
+from simscen.core.events import Event
+from simscen.model.disturbance import EventEntry, FaultEntry
+from simscen.run.faultrig import FaultRig
+from simscen.run.firing import Firing
+from simscen.run.live import LiveStage
+from simscen.triggers.time import Time
+from simscen.triggers.trigger import Trigger
+
+_AT_THE_START = Trigger(time=Time(0.0))
+
+
+class Director:
+    """Directs one run: first events, then faults, each in the order of the scenario."""
+
+    def __init__(
+        self, events: list[EventEntry], faults: list[FaultEntry], streams: Streams, stage: LiveStage, rig: FaultRig
+    ) -> None:
+        self._stage, self._rig, self._faults = stage, rig, faults
+        self._events = [
+            (entry.name or f"event-{number}", entry, Firing(entry.when, streams.generator(f"event#{number}")))
+            for number, entry in enumerate(events, start=1)
+        ]
+        self._starts = [
+            Firing(entry.when or _AT_THE_START, streams.generator(f"fault-start#{number}"))
+            for number, entry in enumerate(faults, start=1)
+        ]
+        self._ends: dict[int, float] = {}
+
+    def direct(self) -> None:
+        """Let happen what is due at this beat; the stage keeps the record."""
+        for name, entry, firing in self._events:
+            for _ in range(0 if firing.spent else firing.fires(self._stage)):
+                self._perform(name, entry)
+        self._end_faults()
+        for index, firing in enumerate(self._starts):
+            if not firing.spent and firing.fires(self._stage) and index not in self._ends:
+                self._begin_fault(index)
+
+    def _perform(self, name: str, entry: EventEntry) -> None:
+        self._stage.note(Event(0, "event.started", name, {"actions": [action.kind for action in entry.actions]}))
+        for action in entry.actions:
+            action.perform(self._stage)
+        self._stage.note(Event(0, "event.ended", name))
+
+    def _begin_fault(self, index: int) -> None:
+        entry = self._faults[index]
+        self._rig.begin(index)
+        self._ends[index] = self._stage.seconds + entry.for_ if entry.for_ is not None else float("inf")
+        self._stage.note(Event(0, "fault.started", entry.label, {"sensor": entry.sensor, "fault": entry.kind}))
+
+    def _end_faults(self) -> None:
+        for index, end in sorted(self._ends.items()):
+            if self._stage.seconds >= end - 1e-9:
+                del self._ends[index]
+                self._rig.end(index)
+                self._stage.note(Event(0, "fault.ended", self._faults[index].label))

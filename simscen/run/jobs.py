@@ -1,0 +1,61 @@
+"""What the supervisor asks the warm process for, and what it hears back."""
+
+import json
+import pickle
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from simscen.loading.scenario import LoadedScenario
+
+_LENGTH = struct.Struct("<I")
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run: a scenario that has been validated, a seed, and the folder its files go to."""
+
+    number: int
+    scenario: LoadedScenario
+    seed: int
+    folder: Path
+    wall_limit: float
+
+
+@dataclass(frozen=True)
+class Exit:
+    """How the process of a job ended. `end` is the worker's own last word, None when it had none."""
+
+    number: int
+    code: int | None
+    signal: int | None
+    killed_for: str | None
+    end: dict[str, Any] | None
+    wall: float
+    cpu: float
+    peak_bytes: int
+    left_processes: bool
+
+
+def send_job(stream: BinaryIO, job: Job) -> None:
+    """Write one job; the other side is our own process, so pickle is safe."""
+    data = pickle.dumps(job)
+    stream.write(_LENGTH.pack(len(data)) + data)
+    stream.flush()
+
+
+def receive_job(stream: BinaryIO) -> Job | None:
+    """Read one job; None at the end of the stream."""
+    head = stream.read(_LENGTH.size)
+    if len(head) < _LENGTH.size:
+        return None
+    (length,) = _LENGTH.unpack(head)
+    job = pickle.loads(stream.read(length))
+    assert isinstance(job, Job)
+    return job
+
+
+def line(message: dict[str, Any]) -> bytes:
+    """A message as one line of JSON."""
+    return json.dumps(message, separators=(",", ":")).encode() + b"\n"

@@ -1,0 +1,168 @@
+"""The running world as triggers see it and as actions change it."""
+
+import math
+from dataclasses import replace
+
+from simscen.core.belief import Belief
+from simscen.core.events import Event, Value
+from simscen.core.geometry import Pose2
+from simscen.core.motion import Twist
+from simscen.core.navigation import Goal, Path
+from simscen.core.shapes import Body, Box, Capsule, Cone, Cylinder, Extrusion, MotionPath, Shape, Sphere
+from simscen.core.time import Clock
+from simscen.core.trace import Decision, Truth
+from simscen.core.world import Polygon, World
+from simscen.sim.simulation import Simulation
+from simscen.stack.protocols import Stack
+
+
+class LiveStage:
+    """Implements core.stage.Stage on the simulation and the stack, and keeps the events of the run."""
+
+    def __init__(self, world: World, simulation: Simulation, stack: Stack, clock: Clock) -> None:
+        self._world, self._simulation, self._stack, self._clock = world, simulation, stack, clock
+        self._truth = simulation.truth()
+        self._belief: Belief | None = None
+        self._travelled = 0.0
+        self._history: tuple[Event, ...] = ()
+        self._fresh: list[Event] = []
+
+    # what the lockstep tells it
+
+    def saw(self, truth: Truth) -> None:
+        """A new truth sample."""
+        before, self._truth = self._truth, truth
+        self._travelled += math.hypot(truth.pose.x - before.pose.x, truth.pose.y - before.pose.y)
+
+    def heard(self, decision: Decision) -> None:
+        """What the stack decided and published."""
+        self._belief = decision.belief or self._belief
+        self._history += decision.events
+
+    def take_events(self) -> tuple[Event, ...]:
+        """What has been noted since this was last asked."""
+        fresh = tuple(sorted(self._fresh, key=lambda event: event.tick))
+        self._fresh.clear()
+        return fresh
+
+    # what triggers see
+
+    @property
+    def seconds(self) -> float:
+        """Simulated time."""
+        return self._clock.seconds(self._simulation.tick)
+
+    @property
+    def robot(self) -> Pose2:
+        """The true pose of the robot."""
+        return self._truth.pose.plane
+
+    @property
+    def twist(self) -> Twist:
+        """The true velocity of the robot in its own frame."""
+        return self._truth.twist
+
+    @property
+    def travelled(self) -> float:
+        """Metres driven so far."""
+        return self._travelled
+
+    @property
+    def belief(self) -> Belief | None:
+        """What the stack last said about its pose."""
+        return self._belief
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """Everything that has happened so far."""
+        return self._history
+
+    @property
+    def plan(self) -> Path | None:
+        """The plan the robot is following."""
+        return self._stack.plan
+
+    @property
+    def goal(self) -> Goal | None:
+        """The goal the robot is driving to."""
+        return self._stack.goal
+
+    def region(self, name: str) -> Polygon:
+        """A named region of the world."""
+        return self._world.regions[name]
+
+    def object(self, name: str) -> Pose2 | None:
+        """Where a named object is now."""
+        pose = self._simulation.object_pose(name)
+        return pose.plane if pose else None
+
+    # what actions change
+
+    def spawn(self, body: Body) -> None:
+        """Put a body into the world; one of the same name is replaced."""
+        if self._simulation.object_pose(body.name):
+            self.remove(body.name)
+        self._simulation.spawn(body)
+        self.note(Event(0, "object.spawned", body.name, described(body)))
+
+    def remove(self, name: str) -> None:
+        """Take a body out of the world."""
+        if self._simulation.object_pose(name) is None:
+            self.note(Event(0, "event.note", name, {"message": "nothing of this name to remove"}))
+            return
+        self._simulation.remove(name)
+        self.note(Event(0, "object.removed", name))
+
+    def door(self, name: str) -> tuple[Pose2, Pose2]:
+        """The poses of a door's panel when closed and when open."""
+        return self._world.doors[name]
+
+    def move(self, name: str, path: MotionPath) -> None:
+        """Let a body follow a path that begins now."""
+        self._simulation.move(name, path)
+        self.note(Event(0, "object.moved", name, {"waypoints": [[p.x, p.y] for p in path.poses]}))
+
+    def place_robot(self, pose: Pose2) -> None:
+        """Set the robot down somewhere else."""
+        self._simulation.place_robot(pose)
+        self.note(Event(0, "robot.placed", "", {"x": pose.x, "y": pose.y, "yaw": pose.yaw}))
+
+    def push(self, impulse: tuple[float, float]) -> None:
+        """Push the robot."""
+        self._simulation.push(impulse)
+        self.note(Event(0, "robot.pushed", "", {"impulse": list(impulse)}))
+
+    def send_goal(self, goal: Goal) -> None:
+        """Preempt with a new goal."""
+        self._stack.preempt(goal)
+
+    def cancel_goal(self) -> None:
+        """Cancel what the robot is doing."""
+        self._stack.cancel()
+
+    def note(self, event: Event) -> None:
+        """Write an event to the log; one without a tick happened now."""
+        stamped = event if event.tick else replace(event, tick=self._simulation.tick)
+        self._fresh.append(stamped)
+        self._history += (stamped,)
+
+
+def described(body: Body) -> dict[str, Value]:
+    """Pose and first shape of a body, as event data for pictures and logs."""
+    pose = body.pose.plane
+    place: dict[str, Value] = {"x": pose.x, "y": pose.y, "yaw": pose.yaw, "mass": body.mass}
+    return {**place, **_outline(body.solids[0].shape)}
+
+
+def _outline(shape: Shape) -> dict[str, Value]:
+    match shape:
+        case Box(size):
+            return {"shape": "box", "size": list(size)}
+        case Cylinder(radius, length) | Capsule(radius, length) | Cone(radius, length):
+            return {"shape": "cylinder", "size": [radius, length]}
+        case Sphere(radius):
+            return {"shape": "cylinder", "size": [radius, 2 * radius]}
+        case Extrusion(polygon, height):
+            return {"shape": "polygon", "points": [list(corner) for corner in polygon], "size": [height]}
+        case _:
+            return {"shape": "mesh", "size": []}
