@@ -21,6 +21,7 @@ class ClockPacker:
         self._clock = self._message.slot("iI")
 
     def __call__(self, stamp: Stamp) -> bytes:
+        """The message for simulated time `stamp`."""
         self._clock(*stamp)
         return bytes(self._message)
 
@@ -33,6 +34,7 @@ class Float64Packer:
         self._data = self._message.slot("d")
 
     def __call__(self, value: float) -> bytes:
+        """The message for `value`."""
         self._data(value)
         return bytes(self._message)
 
@@ -45,6 +47,7 @@ class TwistPacker:
         self._twist = self._message.slot("6d")
 
     def __call__(self, twist: Twist) -> bytes:
+        """The message for a velocity of the ground."""
         vx, vy, wz = twist
         self._twist(vx, vy, 0.0, 0.0, 0.0, wz)
         return bytes(self._message)
@@ -64,6 +67,7 @@ class OdometryPacker:
         message.put("36d", *[0.0] * 36)
 
     def __call__(self, stamp: Stamp, pose: Pose3, twist: Twist) -> bytes:
+        """The message for a pose and a velocity of the ground, measured at `stamp`."""
         vx, vy, wz = twist
         self._stamp(*stamp)
         self._pose(*pose)
@@ -86,6 +90,7 @@ class ImuPacker:
         message.put("9d", *[0.0] * 9)
 
     def __call__(self, stamp: Stamp, imu: Imu) -> bytes:
+        """The message for a reading that was taken at `stamp`."""
         self._stamp(*stamp)
         self._turn(*imu.angular_velocity)
         self._force(*imu.linear_acceleration)
@@ -122,6 +127,7 @@ class PoseStampedPacker:
         self._pose = message.slot("7d")
 
     def __call__(self, stamp: Stamp, pose: Pose3) -> bytes:
+        """The message for a pose at `stamp`."""
         self._stamp(*stamp)
         self._pose(*pose)
         return bytes(self._message)

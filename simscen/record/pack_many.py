@@ -41,6 +41,7 @@ class LaserScanPacker:
         self._count = self._head.slot("I")
 
     def __call__(self, stamp: Stamp, scan: Scan) -> bytes:
+        """The message for a scan that was taken at `stamp`."""
         n = len(scan.ranges)
         last = scan.angle_min + scan.angle_increment * (n - 1)
         self._stamp(*stamp)

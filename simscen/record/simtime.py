@@ -12,6 +12,11 @@ class Stamp(NamedTuple):
     sec: int
     nanosec: int
 
+    @property
+    def nanoseconds(self) -> int:
+        """The same as a whole number of nanoseconds."""
+        return self.sec * SECOND + self.nanosec
+
 
 @dataclass(frozen=True)
 class SimTime:

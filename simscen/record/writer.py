@@ -86,7 +86,7 @@ class McapWriter:
 
     def finish(self) -> None:
         """Write what is left and the summary; the sink stays open."""
-        if self._chunk.parts:
+        if self._chunk.index:
             self._finish_chunk()
         self._put(_encoded(records.DataEnd(0)))
         start = self._written
@@ -125,12 +125,11 @@ class McapWriter:
         packed = self._compress(content)
         checksum = zlib.crc32(content)
         record = _encoded(records.Chunk("zstd", packed, chunk.end, chunk.start, checksum, len(content)))
-        at, indices, offsets = self._written, [], {}
-        follow = at + len(record)
+        at, index = self._written, bytearray()
+        offsets = {}
         for channel, entries in chunk.index.items():
-            offsets[channel] = follow + sum(map(len, indices))
-            indices.append(_message_index(channel, entries))
-        index = b"".join(indices)
+            offsets[channel] = at + len(record) + len(index)
+            index += _message_index(channel, entries)
         self._chunks.append(
             records.ChunkIndex(
                 chunk_length=len(record),
@@ -144,7 +143,7 @@ class McapWriter:
                 uncompressed_size=len(content),
             )
         )
-        self._put(record + index)
+        self._put(record + bytes(index))
 
     def _put(self, data: bytes) -> None:
         self._sink.write(data)
@@ -187,4 +186,5 @@ def _encoded(*items: records.McapRecord) -> bytes:
     builder = RecordBuilder()
     for item in items:
         item.write(builder)
-    return bytes(builder.end())
+    data: bytes = builder.end()  # type: ignore[no-untyped-call]
+    return data

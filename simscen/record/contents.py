@@ -1,0 +1,150 @@
+"""The records of a log, sorted into what a Log is made of."""
+
+import json
+from collections.abc import Callable
+
+from mcap import records
+
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.grid import OccupancyGrid
+from simscen.core.trace import Trace
+from simscen.record import event_text, frames, header, topics, unpack
+from simscen.record.header import LogHeader
+from simscen.record.rows import Rows
+from simscen.record.simtime import SimTime
+
+Handler = Callable[[int, bytes], None]
+
+
+class Foreign(ValueError):
+    """A sound MCAP file, but none of simscen's."""
+
+
+class Contents:
+    """Takes a log's records in the order of the file. Raises ValueError, KeyError or struct.error on a wrong one."""
+
+    def __init__(self) -> None:
+        self.end: int | None = None
+        self._facts: dict[str, str] = {}
+        self._files: dict[str, bytes] = {}
+        self._rows = Rows()
+        self._last = 0
+        self._time = SimTime(1)
+        self._map: OccupancyGrid | None = None
+        self._robot_description = ""
+        self._frames: dict[str, Pose3] = {}
+        self._types: dict[int, str] = {}
+        self._handlers: dict[int, Handler] = {}
+
+    def take(self, record: records.McapRecord) -> None:
+        """Take in one record."""
+        match record:
+            case records.Message():
+                self._message(record)
+            case records.Metadata(name="simscen"):
+                self._begin(record.metadata)
+            case records.Metadata(name="simscen.end"):
+                self.end = int(record.metadata["tick"])
+            case records.Attachment():
+                self._files[record.name] = record.data
+            case records.Schema():
+                self._types[record.id] = record.name
+            case records.Channel():
+                self._open(record)
+            case _:
+                pass  # indices and statistics say nothing new
+
+    def header(self) -> LogHeader:
+        """How the run was ordered. Raises Foreign when the log does not say."""
+        if not self._facts or header.CASE not in self._files:
+            raise Foreign("it does not say which run it is of")
+        return LogHeader(
+            name=self._facts["scenario"],
+            seed=int(self._facts["seed"]),
+            case=header.case_from_json(self._files[header.CASE]),
+            scenario=str(self._files.get(header.SCENARIO, b""), "utf-8"),
+            map=self._map,
+            robot_description=self._robot_description,
+            frames=self._frames,
+            files={name: data for name, data in self._files.items() if name not in header.OWN_FILES},
+            facts=header.extra_facts(self._facts),
+        )
+
+    def trace(self) -> Trace:
+        """What happened, until the end of the run or else the last message."""
+        return self._rows.trace(self._time.rate, self._last if self.end is None else self.end)
+
+    def result(self) -> str:
+        """The result of the run; "" when there is none."""
+        return str(self._files.get(header.RESULT, b""), "utf-8")
+
+    def _begin(self, facts: dict[str, str]) -> None:
+        if facts.get("format") != header.FORMAT:
+            raise Foreign(f"its format is {facts.get('format')}, this simscen reads {header.FORMAT}")
+        self._facts = facts
+        self._time = SimTime(int(facts["tick_rate"]))
+
+    def _message(self, message: records.Message) -> None:
+        if not self._facts:
+            raise Foreign("it has no metadata record `simscen`")
+        self._last = self._time.tick(message.log_time)
+        handler = self._handlers.get(message.channel_id)
+        if handler is not None:
+            handler(self._last, message.data)
+
+    def _open(self, channel: records.Channel) -> None:
+        kind = self._types.get(channel.schema_id, "")
+        by_topic: dict[tuple[str, str], Handler] = {
+            topics.TRUTH[:2]: self._truth,
+            topics.CLEARANCE[:2]: lambda tick, data: self._rows.clearance.add(tick, unpack.float64(data)),
+            topics.BELIEF[:2]: self._belief,
+            topics.COMMAND[:2]: lambda tick, data: self._rows.command.add(tick, unpack.twist(data)),
+            topics.PLAN[:2]: self._plan,
+            topics.EVENTS[:2]: self._event,
+            topics.TF[:2]: self._transforms,
+            topics.TF_STATIC[:2]: self._mounts,
+            topics.MAP[:2]: self._grid,
+            topics.ROBOT_DESCRIPTION[:2]: self._describe,
+            ("/odom", topics.ODOMETRY_TYPE): self._odometry,
+        }
+        handler = by_topic.get((channel.topic, kind))
+        if kind == topics.SCAN_TYPE:
+            handler = self._scan
+        if handler is not None:
+            self._handlers[channel.id] = handler
+
+    def _truth(self, tick: int, data: bytes) -> None:
+        pose, twist = unpack.odometry(data)
+        self._rows.truth.add(tick, pose + twist)
+
+    def _odometry(self, tick: int, data: bytes) -> None:
+        self._rows.odometry.add(tick, unpack.odometry(data)[0])
+
+    def _belief(self, tick: int, data: bytes) -> None:
+        pose, covariance = unpack.pose_with_covariance(data)
+        self._rows.belief.add(tick, pose + covariance)
+
+    def _scan(self, tick: int, _: bytes) -> None:
+        self._rows.scans.append(tick)
+
+    def _plan(self, _: int, data: bytes) -> None:
+        stamp, poses = unpack.path(data)
+        self._rows.plans.append((self._time.tick(stamp.nanoseconds), poses))
+
+    def _event(self, _: int, data: bytes) -> None:
+        self._rows.events.append(event_text.from_json(unpack.string(data)))
+
+    def _transforms(self, tick: int, data: bytes) -> None:
+        for link in unpack.transforms(data):
+            if (name := frames.object_in(link.child)) is not None:
+                self._rows.object(name).add(tick, link.pose)
+
+    def _mounts(self, _: int, data: bytes) -> None:
+        self._frames = {link.child: Pose3(*link.pose) for link in unpack.transforms(data)}
+
+    def _grid(self, _: int, data: bytes) -> None:
+        origin = Pose2(*json.loads(self._facts["map.origin"]))
+        self._map = unpack.occupancy_grid(data, float(self._facts["map.resolution"]), origin)
+
+    def _describe(self, _: int, data: bytes) -> None:
+        self._robot_description = unpack.string(data)

@@ -1,0 +1,34 @@
+"""What happened once: /simscen/events, /rosout and /goal_pose."""
+
+from simscen.core.case import Case
+from simscen.core.events import Event
+from simscen.core.geometry import Pose2, Pose3
+from simscen.record import event_text, frames, pack_rare, topics
+from simscen.record.pack import PoseStampedPacker
+from simscen.record.simtime import SimTime
+from simscen.record.topics import Publisher
+
+
+class EventTopics:
+    """Writes events, for machines and for people; a goal that is accepted also as a pose."""
+
+    def __init__(self, out: Publisher, time: SimTime, case: Case) -> None:
+        self._out, self._time = out, time
+        self._goals = {goal.name: goal.pose for goal in case.goals}
+        self._goal = PoseStampedPacker(frames.MAP)
+
+    def write(self, now: int, event: Event) -> None:
+        """Write an event at `now` nanoseconds."""
+        stamp, line = self._time.stamp(event.tick), event_text.sentence(event)
+        self._out.publish(topics.EVENTS, now, pack_rare.string(event_text.to_json(event)))
+        self._out.publish(topics.ROSOUT, now, pack_rare.log(stamp, event_text.level(event), "simscen", line))
+        pose = self._pose(event) if event.kind == "goal.accepted" else None
+        if pose is not None:
+            self._out.publish(topics.GOAL, now, self._goal(stamp, Pose3.planar(pose)))
+
+    def _pose(self, event: Event) -> Pose2 | None:
+        """Where an accepted goal is: as the event says, else as the scenario does."""
+        x, y, yaw = (event.data.get(key) for key in ("x", "y", "yaw"))
+        if isinstance(x, float) and isinstance(y, float):
+            return Pose2(x, y, yaw if isinstance(yaw, float) else 0.0)
+        return self._goals.get(event.name)

@@ -1,0 +1,90 @@
+"""What a log says about its run besides what happened: enough to judge it and to run it again."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import PurePosixPath
+
+from pydantic import TypeAdapter, ValidationError
+from pydantic_core import to_jsonable_python
+
+from simscen.core.case import Case
+from simscen.core.geometry import Pose3
+from simscen.core.grid import OccupancyGrid
+from simscen.core.time import Clock
+
+FORMAT = "1"
+_FACT = "fact."
+OWN_FILES = CASE, SCENARIO, RESULT = "case.json", "scenario.yaml", "result.json"
+_MEDIA_TYPES = {
+    ".json": "application/json",
+    ".pgm": "image/x-portable-graymap",
+    ".png": "image/png",
+    ".txt": "text/plain",
+    ".yaml": "application/yaml",
+}
+_CASES = TypeAdapter(Case)
+
+
+@dataclass(frozen=True, eq=False)
+class LogHeader:
+    """A run as it was ordered.
+
+    `name` is the scenario's id, `scenario` its resolved YAML text. `map` is what the robot was given. `frames` are
+    where sensors sit on the robot's base; a lidar that is not among them is placed by its first scan.
+    `robot_description` is URDF. `files` travel along under their names, `facts` as metadata; neither may hold a wall
+    clock, a host or a process number, or equal runs would differ.
+    """
+
+    name: str
+    seed: int
+    case: Case
+    scenario: str = ""
+    map: OccupancyGrid | None = None
+    robot_description: str = ""
+    frames: Mapping[str, Pose3] = field(default_factory=dict)
+    files: Mapping[str, bytes] = field(default_factory=dict)
+    facts: Mapping[str, str] = field(default_factory=dict)
+
+
+def case_to_json(case: Case) -> str:
+    """A Case as strict JSON: infinity, which JSON lacks, is written as the text "Infinity"."""
+    return json.dumps(to_jsonable_python(case, inf_nan_mode="strings"), indent=1)
+
+
+def case_from_json(text: str | bytes) -> Case:
+    """The Case that `case_to_json` wrote. Raises ValueError when it is none."""
+    try:
+        return _CASES.validate_json(text)
+    except ValidationError as error:
+        raise ValueError(f"not a case: {error.errors(include_url=False)[0]['msg']}") from None
+
+
+def media_type(name: str) -> str:
+    """The media type of a file by its name, without asking the machine's own table, which would differ."""
+    return _MEDIA_TYPES.get(PurePosixPath(name).suffix, "application/octet-stream")
+
+
+def facts(about: LogHeader, clock: Clock) -> dict[str, str]:
+    """The metadata record "simscen". Numbers are written so that they are read back exactly."""
+    known = {"format": FORMAT, "scenario": about.name, "seed": str(about.seed), "tick_rate": str(clock.rate)}
+    if about.map is not None:
+        x, y, yaw = about.map.origin
+        known |= {"map.resolution": repr(float(about.map.resolution)), "map.origin": json.dumps([x, y, yaw])}
+    return known | {f"{_FACT}{name}": value for name, value in about.facts.items()}
+
+
+def extra_facts(facts: Mapping[str, str]) -> dict[str, str]:
+    """LogHeader.facts as `facts` wrote them."""
+    return {name[len(_FACT) :]: value for name, value in facts.items() if name.startswith(_FACT)}
+
+
+def attachments(about: LogHeader) -> dict[str, bytes]:
+    """The files in the log, by name."""
+    own = {CASE: case_to_json(about.case).encode()}
+    if about.scenario:
+        own[SCENARIO] = about.scenario.encode()
+    taken = sorted(set(about.files) & set(OWN_FILES))
+    if taken:
+        raise ValueError(f"a log has a file {taken[0]} of its own")
+    return own | dict(about.files)

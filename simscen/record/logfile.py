@@ -1,0 +1,50 @@
+"""The file of a log: under a partial name while it grows, under its own when it is whole."""
+
+import errno
+from pathlib import Path
+
+from simscen.core.errors import RunError
+
+PARTIAL_SUFFIX = ".partial.mcap"
+
+
+class LogFile:
+    """Writes `run.partial.mcap` and renames it to `run.mcap` on `finish`.
+
+    Nothing is buffered in the process: what was written survives its death. A full disk or the like is a
+    RunError of kind "output".
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.partial = path.with_suffix(PARTIAL_SUFFIX)
+        try:
+            self._raw = self.partial.open("wb", buffering=0)
+        except OSError as error:
+            raise self._failure(error) from error
+
+    def write(self, data: bytes, /) -> None:
+        """Write all of `data`; a raw write may take only a part."""
+        rest = memoryview(data)
+        try:
+            while rest:
+                rest = rest[self._raw.write(rest) :]
+        except OSError as error:
+            raise self._failure(error) from error
+
+    def finish(self) -> None:
+        """The log is whole: give it its name."""
+        try:
+            self._raw.close()
+            self.partial.replace(self.path)
+        except OSError as error:
+            raise self._failure(error) from error
+
+    def abandon(self) -> None:
+        """The run broke off: leave what there is under the partial name."""
+        self._raw.close()
+
+    def _failure(self, error: OSError) -> RunError:
+        if error.errno in (errno.ENOSPC, errno.EDQUOT):
+            return RunError("output", f"no space left writing {self.partial}")
+        return RunError("output", f"cannot write {self.partial}: {error.strerror}")

@@ -1,0 +1,92 @@
+"""The samples of a run as they are collected, and the Trace they make.
+
+The TraceBuilder fills rows from moments, the log reader from messages. Both hand in headings as the quaternions that
+the log stores, and one function turns them into yaw: so the two traces are equal to the last bit.
+"""
+
+from array import array
+from collections.abc import Iterable
+
+import numpy as np
+
+from simscen.core.events import Event
+from simscen.core.geometry import Array
+from simscen.core.navigation import Path
+from simscen.core.trace import Samples, Ticks, Trace
+
+
+class Series:
+    """A signal in the making: a tick and `width` numbers a row."""
+
+    def __init__(self, width: int) -> None:
+        self._width = width + 1
+        self._numbers = array("d")
+
+    def add(self, tick: int, values: Iterable[float]) -> None:
+        """Append a row. Ticks are exact in a double for a million years of simulated time."""
+        self._numbers.append(tick)
+        self._numbers.extend(values)
+
+    def columns(self) -> tuple[Ticks, Array]:
+        """Ticks (n,) and values (n, width)."""
+        table = np.array(self._numbers, dtype=np.float64).reshape(-1, self._width)
+        return table[:, 0].astype(np.int64), table[:, 1:]
+
+
+def yaw(quaternions: Array) -> Array:
+    """Rotations about z in [-π, π] of quaternions (n, 4) x, y, z, w."""
+    x, y, z, w = quaternions.T.copy()
+    angles: Array = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+    return angles
+
+
+def on_the_ground(poses: Array) -> Array:
+    """(n, 3) x, y, yaw of poses (n, 7): x, y, z and a quaternion."""
+    return np.column_stack((poses[:, :2], yaw(poses[:, 3:7])))
+
+
+class Rows:
+    """All signals of a run in the making. A pose is x, y, z and a quaternion x, y, z, w.
+
+    truth: pose, vx, vy, wz · clearance: metres · belief: pose, xx, xy, xyaw, yy, yyaw, yawyaw · odometry: pose ·
+    command: vx, vy, wz · objects: pose · plans: (tick made, poses (n, 7)).
+    """
+
+    def __init__(self) -> None:
+        self.truth = Series(10)
+        self.clearance = Series(1)
+        self.belief = Series(13)
+        self.odometry = Series(7)
+        self.command = Series(3)
+        self.objects: dict[str, Series] = {}
+        self.scans: list[int] = []
+        self.plans: list[tuple[int, Array]] = []
+        self.events: list[Event] = []
+
+    def object(self, name: str) -> Series:
+        """The rows of a moving thing."""
+        return self.objects.setdefault(name, Series(7))
+
+    def trace(self, tick_rate: int, end: int) -> Trace:
+        """What happened until `end`."""
+        truth_ticks, truth = self.truth.columns()
+        belief_ticks, belief = self.belief.columns()
+        return Trace(
+            tick_rate=tick_rate,
+            truth=Samples(truth_ticks, on_the_ground(truth)),
+            velocity=Samples(truth_ticks, truth[:, 7:]),
+            clearance=Samples(*self.clearance.columns()),
+            belief=Samples(belief_ticks, np.column_stack((on_the_ground(belief), belief[:, 7:]))),
+            odometry=_poses(self.odometry),
+            command=Samples(*self.command.columns()),
+            scans=np.unique(np.array(self.scans, dtype=np.int64)),
+            plans=tuple(Path(on_the_ground(poses), tick) for tick, poses in self.plans),
+            events=tuple(self.events),
+            objects={name: _poses(self.objects[name]) for name in sorted(self.objects)},
+            end=end,
+        )
+
+
+def _poses(series: Series) -> Samples:
+    ticks, poses = series.columns()
+    return Samples(ticks, on_the_ground(poses))

@@ -1,0 +1,63 @@
+"""What of a run is kept: the recorder and the TraceBuilder ask here, so that log and Trace hold the same samples."""
+
+from simscen.core.geometry import Pose3
+from simscen.core.motion import Twist
+from simscen.core.sensing import Odometry
+from simscen.core.trace import Truth
+
+COMMAND_RATE = 20
+STANDSTILL_RATE = 1
+
+
+class Selection:
+    """Drops what says nothing new, on a clock of `rate` ticks a second.
+
+    A command is kept when it differs from the last one, and else 20 times a second. The pose of a moving thing is
+    kept when it has changed, and else once a second. Of several odometries the first that speaks is the robot's.
+    """
+
+    def __init__(self, rate: int) -> None:
+        self._command_period = max(1, rate // COMMAND_RATE)
+        self._standstill_period = max(1, rate // STANDSTILL_RATE)
+        self._command: Twist | None = None
+        self._commanded = 0
+        self._objects: dict[str, tuple[int, Pose3]] = {}
+        self._odometry: str | None = None
+
+    def keeps_command(self, tick: int, command: Twist) -> bool:
+        """Whether the command of this beat is kept."""
+        if command == self._command and tick - self._commanded < self._command_period:
+            return False
+        self._command, self._commanded = command, tick
+        return True
+
+    def keeps_odometry(self, odometry: Odometry) -> bool:
+        """Whether this is the robot's own odometry."""
+        if self._odometry is None:
+            self._odometry = odometry.sensor
+        return odometry.sensor == self._odometry
+
+    def moved(self, tick: int, truth: Truth) -> list[tuple[str, Pose3]]:
+        """The moving things whose pose is kept at this tick, by name."""
+        kept = []
+        for name, pose in truth.objects.items():
+            last = self._objects.get(name)
+            if last is None or last[1] != pose or tick - last[0] >= self._standstill_period:
+                self._objects[name] = (tick, pose)
+                kept.append((name, pose))
+        return kept
+
+
+class Throttle:
+    """Lets pass what comes at least a period of `rate` hertz after what passed before."""
+
+    def __init__(self, ticks_per_second: int, rate: int) -> None:
+        self._period = max(1, ticks_per_second // rate)
+        self._next: int | None = None
+
+    def passes(self, tick: int) -> bool:
+        """Whether it is time."""
+        if self._next is not None and tick < self._next:
+            return False
+        self._next = tick + self._period
+        return True

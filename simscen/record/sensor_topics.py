@@ -1,0 +1,108 @@
+"""What the robot was told: /scan, /odom, /imu, bumpers and pictures."""
+
+import re
+from collections.abc import Mapping
+
+from typing_extensions import assert_never
+
+from simscen.core.geometry import Pose3
+from simscen.core.sensing import Bump, Image, Imu, Odometry, Readings, Scan
+from simscen.record import frames, pack_rare, topics
+from simscen.record.pack import ImuPacker, OdometryPacker
+from simscen.record.pack_many import LaserScanPacker, TransformsPacker
+from simscen.record.selection import Selection
+from simscen.record.simtime import SimTime, Stamp
+from simscen.record.topics import Publisher, Topic
+
+_START = Stamp(0, 0)
+
+
+class SensorTopics:
+    """Writes readings. The first sensor of a kind gets the plain topic, others theirs under their name.
+
+    Messages are written when the stack received them; their header's stamp is when they were measured.
+    """
+
+    def __init__(self, out: Publisher, time: SimTime, selection: Selection, mounts: Mapping[str, Pose3]) -> None:
+        self._out, self._time, self._selection = out, time, selection
+        self._topics: dict[tuple[str, str], Topic] = {}
+        self._plain: set[str] = set()
+        self._scans: dict[str, LaserScanPacker] = {}
+        self._odometry = OdometryPacker(frames.ODOM, frames.BASE)
+        self._imu = ImuPacker(frames.BASE)
+        self._transforms = TransformsPacker()
+        self._mounts = dict(mounts)
+        self._correction: Pose3 | None = None
+        self._publish_mounts(0)
+
+    def correct(self, map_from_odom: Pose3) -> None:
+        """What the localizer says: goes out on /tf with each odometry from now on."""
+        self._correction = map_from_odom
+
+    def write(self, now: int, readings: Readings) -> None:
+        """Write the readings of a beat at `now` nanoseconds."""
+        for reading in readings:
+            match reading:
+                case Odometry():
+                    self._write_odometry(now, reading)
+                case Scan():
+                    self._write_scan(now, reading)
+                case Imu():
+                    topic = self._topic(reading.sensor, "imu", topics.IMU_TYPE)
+                    self._out.publish(topic, now, self._imu(self._time.stamp(reading.tick), reading))
+                case Bump():
+                    topic = self._topic(reading.sensor, "bumper", topics.BUMPER_TYPE)
+                    self._out.publish(topic, now, pack_rare.boolean(reading.pressed))
+                case Image():
+                    self._write_image(now, reading)
+                case _:
+                    assert_never(reading)
+
+    def _write_odometry(self, now: int, odometry: Odometry) -> None:
+        stamp, pose = self._time.stamp(odometry.tick), Pose3.planar(odometry.pose)
+        topic = self._topic(odometry.sensor, "odom", topics.ODOMETRY_TYPE)
+        self._out.publish(topic, now, self._odometry(stamp, pose, odometry.twist))
+        if not self._selection.keeps_odometry(odometry):
+            return
+        links = [(frames.ODOM, frames.BASE, stamp, pose)]
+        if self._correction is not None:
+            links.append((frames.MAP, frames.ODOM, stamp, self._correction))
+        self._out.publish(topics.TF, now, self._transforms(links))
+
+    def _write_scan(self, now: int, scan: Scan) -> None:
+        packer = self._scans.get(scan.sensor)
+        if packer is None:
+            packer = self._scans[scan.sensor] = LaserScanPacker(frames.of_sensor(scan.sensor))
+        if scan.sensor not in self._mounts:
+            self._mounts[scan.sensor] = Pose3.planar(scan.mount)
+            self._publish_mounts(now)
+        topic = self._topic(scan.sensor, "scan", topics.SCAN_TYPE)
+        self._out.publish(topic, now, packer(self._time.stamp(scan.tick), scan))
+
+    def _write_image(self, now: int, image: Image) -> None:
+        frame, stamp = frames.of_sensor(image.sensor), self._time.stamp(image.tick)
+        root = f"/{_ros_name(image.sensor)}"
+        for name, pixels in (("image_raw", image.rgb), ("depth/image_raw", image.depth)):
+            if pixels.size:
+                topic = Topic(f"{root}/{name}", topics.IMAGE_TYPE)
+                self._out.publish(topic, now, pack_rare.image(frame, stamp, pixels))
+
+    def _publish_mounts(self, now: int) -> None:
+        """All static frames at once: a late subscriber gets only the last message."""
+        links = [(frames.BASE, frames.of_sensor(name), _START, pose) for name, pose in self._mounts.items()]
+        if links:
+            self._out.publish(topics.TF_STATIC, now, self._transforms(links))
+
+    def _topic(self, sensor: str, plain: str, kind: str) -> Topic:
+        topic = self._topics.get((sensor, plain))
+        if topic is None:
+            name = f"/{_ros_name(sensor)}/{plain}" if plain in self._plain else f"/{plain}"
+            self._plain.add(plain)
+            topic = self._topics[sensor, plain] = Topic(name, kind)
+        return topic
+
+
+def _ros_name(text: str) -> str:
+    """`text` as a part of a topic: ROS allows letters, digits and underscores, and no digit first."""
+    name = re.sub(r"[^A-Za-z0-9_]", "_", text)
+    return f"sensor_{name}" if name[:1].isdigit() or name in ("", "simscen", "ground_truth") else name

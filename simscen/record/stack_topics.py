@@ -1,0 +1,47 @@
+"""What the stack made of it: /amcl_pose, /particle_cloud, /plan, /local_plan and /cmd_vel."""
+
+from simscen.core.belief import Belief
+from simscen.core.geometry import Pose3
+from simscen.core.trace import Decision
+from simscen.record import frames, topics
+from simscen.record.pack import PoseWithCovariancePacker, TwistPacker
+from simscen.record.pack_many import ParticleCloudPacker, PathPacker
+from simscen.record.selection import Selection, Throttle
+from simscen.record.simtime import SimTime
+from simscen.record.topics import Publisher
+
+PARTICLE_RATE = 2  # a cloud of 2000 is 128 kB, as much as all other topics say in a second
+LOCAL_PLAN_RATE = 5  # only for the eye
+
+
+class StackTopics:
+    """Writes decisions."""
+
+    def __init__(self, out: Publisher, time: SimTime, selection: Selection) -> None:
+        self._out, self._time, self._selection = out, time, selection
+        self._belief = PoseWithCovariancePacker(frames.MAP)
+        self._particles = ParticleCloudPacker(frames.MAP)
+        self._path = PathPacker(frames.MAP)
+        self._command = TwistPacker()
+        self._particle_times = Throttle(time.rate, PARTICLE_RATE)
+        self._local_plan_times = Throttle(time.rate, LOCAL_PLAN_RATE)
+
+    def write(self, now: int, tick: int, decision: Decision) -> None:
+        """Write the decision of `tick`, which is at `now` nanoseconds."""
+        if decision.belief is not None:
+            self._write_belief(now, tick, decision.belief)
+        if decision.plan is not None:
+            stamp = self._time.stamp(decision.plan.tick)
+            self._out.publish(topics.PLAN, now, self._path(stamp, decision.plan.points))
+        if decision.local_plan is not None and self._local_plan_times.passes(tick):
+            stamp = self._time.stamp(tick)
+            self._out.publish(topics.LOCAL_PLAN, now, self._path(stamp, decision.local_plan.points))
+        if self._selection.keeps_command(tick, decision.command):
+            self._out.publish(topics.COMMAND, now, self._command(decision.command))
+
+    def _write_belief(self, now: int, tick: int, belief: Belief) -> None:
+        stamp = self._time.stamp(tick)
+        pose = Pose3.planar(belief.pose)
+        self._out.publish(topics.BELIEF, now, self._belief(stamp, pose, belief.covariance))
+        if len(belief.particles) and self._particle_times.passes(tick):
+            self._out.publish(topics.PARTICLES, now, self._particles(stamp, belief.particles))
