@@ -1,0 +1,120 @@
+"""The only door to the disk: everything an SDF file names must lie inside the folders the user allowed."""
+
+import errno
+import os
+import stat
+from collections.abc import Sequence
+from pathlib import Path
+
+from simscen.worlds.sdf.markup import Element
+from simscen.worlds.sdf.report import Place, Unusable
+
+LONGEST_PATH = 1000
+WORLD_BYTES = 20 * 2**20
+MESH_BYTES = 20 * 2**20
+SCHEMES = ("model://", "package://", "file://")
+
+
+class Trouble(Exception):
+    """Why a file cannot be had; never says anything about its content."""
+
+
+class Library:
+    """Finds and reads files inside `root` and the folders of `search`, symbolic links followed first."""
+
+    def __init__(self, root: Path, search: Sequence[Path]) -> None:
+        self.root = Path(os.path.realpath(root))
+        self.search = tuple(Path(os.path.realpath(folder)) for folder in search)
+
+    def shown(self, path: Path) -> str:
+        """The name of a file for users: relative to the root or to its search folder."""
+        for folder in (self.root, *self.search):
+            if path.is_relative_to(folder):
+                return path.relative_to(folder).as_posix()
+        return str(path)
+
+    def open(self, path: Path, limit: int) -> tuple[Path, bytes]:
+        """The real path and the bytes of a regular file of at most `limit` bytes; raises Trouble."""
+        real = self.resolve(path)
+        try:
+            status = real.stat()
+            if not stat.S_ISREG(status.st_mode):
+                raise Trouble("not a regular file")
+            if status.st_size > limit:
+                raise Trouble(f"larger than {limit // 2**20} MiB")
+            return real, real.read_bytes()
+        except OSError as error:
+            raise Trouble(_reason(error)) from error
+
+    def resolve(self, path: Path) -> Path:
+        """The real path of something that exists inside the allowed folders; raises Trouble."""
+        if len(str(path)) > LONGEST_PATH or "\0" in str(path):
+            raise Trouble("not a usable path")
+        # First by the letters alone, so that nothing outside is even asked whether it exists.
+        self._contain(Path(os.path.normpath(path)))
+        try:
+            real = Path(os.path.realpath(path, strict=True))
+        except OSError as error:
+            raise Trouble(_reason(error)) from error
+        self._contain(real)
+        return real
+
+    def _contain(self, path: Path) -> None:
+        if not any(path.is_relative_to(folder) for folder in (self.root, *self.search)):
+            raise Trouble("outside the scenario root and the world paths")
+
+    def locate(self, element: Element) -> Path:
+        """The real path of what a `<uri>` means; raises Unusable.
+
+        model:// and package:// are looked up in the search folders; file:// and bare paths beside the file that
+        names them, then in the search folders (as GZ_SIM_RESOURCE_PATH).
+        """
+        uri = element.text
+        if not uri or any(ord(letter) < 32 for letter in uri):
+            raise element.unusable("the uri is empty" if not uri else "control character in the uri")
+        if "://" in uri and not uri.startswith(SCHEMES):
+            raise element.unusable(f"{uri}: only model://, package://, file:// and relative paths are read",
+                                   "download it and name its folder with --world-path")  # fmt: skip
+        scheme = next((s for s in SCHEMES if uri.startswith(s)), "")
+        rest = uri.removeprefix(scheme)
+        local = scheme in ("", "file://")
+        folders = [*([Path(element.source.folder)] if local else []), *self.search]
+        if not local and rest.startswith("/"):
+            raise element.unusable(f"{uri}: the name of a model is missing")
+        for folder in folders:
+            candidate = folder / rest
+            try:
+                return self.resolve(candidate)
+            except Trouble as trouble:
+                if str(trouble) != _ABSENT:
+                    raise element.unusable(f"{uri}: {trouble}") from trouble
+        looked = ", ".join(self.shown(folder) or "." for folder in folders) or "no folder"
+        raise element.unusable(f"{uri}: {_ABSENT}", f"looked in {looked}; allow its folder with --world-path")
+
+    def read(self, path: Path, element: Element, limit: int) -> bytes:
+        """The bytes of a located file; raises Unusable at the element that asked for it."""
+        try:
+            return self.open(path, limit)[1]
+        except Trouble as trouble:
+            raise element.unusable(f"{self.shown(path)}: {trouble}") from trouble
+
+    def read_world(self, path: Path) -> tuple[Path, bytes]:
+        """Real path and bytes of the world itself; raises Unusable for the file as a whole."""
+        try:
+            return self.open(path.absolute(), WORLD_BYTES)
+        except Trouble as trouble:
+            raise Unusable(Place(path.name), str(trouble)) from trouble
+
+
+_ABSENT = "no such file or directory"
+
+
+def _reason(error: OSError) -> str:
+    reasons = {
+        errno.ENOENT: _ABSENT,
+        errno.ENOTDIR: _ABSENT,
+        errno.ELOOP: "symbolic link loop",
+        errno.EACCES: "permission denied",
+        errno.ENAMETOOLONG: "not a usable path",
+    }
+    return reasons.get(error.errno or 0, error.strerror or "cannot be read")

@@ -1,0 +1,62 @@
+"""Terrain from an image, as Gazebo reads it: the brightest pixel is `size` z high, black is 0."""
+
+import io
+import warnings
+
+import numpy as np
+
+from simscen.core.geometry import Array, Pose3
+from simscen.core.shapes import Mesh, Solid
+from simscen.worlds.sdf import values
+from simscen.worlds.sdf.files import MESH_BYTES, Library
+from simscen.worlds.sdf.markup import Element
+
+LARGEST = 513
+"""Pixels along an edge: Gazebo's terrains have 2^n + 1, so that 512 cells have 513 corners."""
+
+
+def read_heightmap(element: Element, library: Library) -> Solid:
+    """The terrain as a mesh centred on `pos`; raises Unusable. Source: gz-common, ImageHeightmap.cc."""
+    uri = element.child("uri")
+    if uri is None:
+        raise element.unusable("<uri> is missing")
+    x, y, z = values.sizes(element, "size", 3, default=(1.0, 1.0, 1.0))
+    pos = element.child("pos")
+    origin = values.numbers(pos, 3) if pos else (0.0, 0.0, 0.0)
+    return Solid(terrain(_heights(uri, library) * z, x, y), Pose3(*origin))
+
+
+def _heights(uri: Element, library: Library) -> Array:
+    """Heights (rows, columns) in 0 … 1, first row on top of the image."""
+    from PIL import Image
+
+    path = library.locate(uri)
+    data = library.read(path, uri, MESH_BYTES)
+    try:
+        # A bomb is recognised by its header below, Pillow's own warning would only say the same again.
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            image = Image.open(io.BytesIO(data), formats=("PNG", "BMP", "PPM", "JPEG"))
+        with image:
+            if max(image.size) > LARGEST or min(image.size) < 2:
+                raise uri.unusable(f"{library.shown(path)}: {image.size[0]} x {image.size[1]} pixels;"
+                                   f" 2 to {LARGEST} an edge are read")  # fmt: skip
+            grey = image if image.mode in ("L", "I", "I;16", "F") else image.convert("L")
+            pixels = np.asarray(grey, dtype=np.float64)
+    except Image.DecompressionBombError as error:
+        raise uri.unusable(f"{library.shown(path)}: image too large") from error
+    except (OSError, ValueError, SyntaxError) as error:
+        raise uri.unusable(f"{library.shown(path)}: not a readable image (PNG, BMP, PGM or JPEG)") from error
+    brightest = float(pixels.max())
+    return pixels / brightest if brightest > 0 else pixels
+
+
+def terrain(heights: Array, width: float, depth: float) -> Mesh:
+    """Two triangles for each cell between samples `heights` (rows, columns), first row at +y, centred on x and y."""
+    rows, columns = heights.shape
+    x, y = np.meshgrid(np.linspace(-width / 2, width / 2, columns), np.linspace(depth / 2, -depth / 2, rows))
+    vertices = np.column_stack([x.ravel(), y.ravel(), heights.ravel()])
+    index = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
+    nw, ne, sw, se = index[:-1, :-1], index[:-1, 1:], index[1:, :-1], index[1:, 1:]
+    faces = np.concatenate([np.stack([nw, sw, se], axis=-1), np.stack([nw, se, ne], axis=-1)], axis=2)
+    return Mesh(vertices, faces.reshape(-1, 3))

@@ -1,0 +1,118 @@
+"""What `<include>` brings in: model folders, single files, and the two models every Gazebo has."""
+
+import os
+from pathlib import Path
+
+from simscen.worlds.sdf import markup
+from simscen.worlds.sdf.files import WORLD_BYTES, Library
+from simscen.worlds.sdf.markup import Element
+from simscen.worlds.sdf.report import Unusable
+
+NEWEST = (1, 12)
+OLDEST = (1, 3)
+BUILT_IN = {
+    "model://sun": "<sdf version='1.6'><light name='sun' type='directional'/></sdf>",
+    "model://ground_plane": "<sdf version='1.6'><model name='ground_plane'><static>1</static><link name='link'>"
+    "<collision name='collision'><geometry><plane><normal>0 0 1</normal><size>100 100</size></plane></geometry>"
+    "</collision></link></model></sdf>",
+}
+"""Gazebo installs these two itself and nearly every world includes them; a user need not have them."""
+
+
+def version(element: Element) -> tuple[int, ...]:
+    """The version attribute as numbers; (0,) when it is missing or no version."""
+    return version_of(element.attributes.get("version", ""))
+
+
+def version_of(text: str) -> tuple[int, ...]:
+    """1.10 is newer than 1.9."""
+    words = text.strip().split(".")
+    return tuple(int(word) for word in words) if all(word.isdecimal() for word in words) else (0,)
+
+
+def check_root(root: Element) -> None:
+    """Raise Unusable unless this is the root of an SDF file of a version that is read."""
+    if root.tag == "robot":
+        raise root.unusable("this is a URDF, not an SDF", "use it as the model of a robot")
+    if root.tag != "sdf":
+        raise root.unusable(f"the root element is <{root.tag}>, expected <sdf>",
+                            "convert files from before SDF 1.3 with `gz sdf -k`" if root.tag == "gazebo" else "")  # fmt: skip
+    if not OLDEST <= version(root) <= (*NEWEST, 99):
+        shown = root.attributes.get("version", "none")[:20]
+        raise root.unusable(f"SDF version {shown} is not read, only 1.3 to 1.12")
+
+
+class Shelf:
+    """Opens included files once each and refuses circles."""
+
+    def __init__(self, library: Library) -> None:
+        self.library = library
+        self._roots: dict[str, Element] = {}
+        self._chain: list[str] = []
+
+    def open_world(self, path: Path) -> Element:
+        """The root of the world file itself."""
+        real, data = self.library.read_world(path)
+        self._chain = [str(real)]
+        root = markup.parse(data, self.library.shown(real), str(real.parent))
+        check_root(root)
+        return root
+
+    def enter(self, include: Element) -> Element:
+        """The root of what an `<include>` means; to be followed by `leave`. Raises Unusable."""
+        uri = include.child("uri")
+        if uri is None:
+            raise include.unusable("<uri> is missing")
+        path = self._file(uri)
+        if path in self._chain:
+            chain = [*self._chain[self._chain.index(path) :], path]
+            raise uri.unusable("include cycle: " + " → ".join(self.library.shown(Path(p)) for p in chain))
+        self._chain.append(path)
+        try:
+            return self._root(path, uri)
+        except BaseException:
+            self._chain.pop()
+            raise
+
+    def leave(self) -> None:
+        """The include that was entered last is done."""
+        self._chain.pop()
+
+    def _root(self, file: str, uri: Element) -> Element:
+        if file not in self._roots:
+            if file in BUILT_IN:
+                root = markup.parse(BUILT_IN[file].encode(), file, "")
+            else:
+                path = Path(file)
+                data = self.library.read(path, uri, WORLD_BYTES)
+                root = markup.parse(data, self.library.shown(path), str(path.parent))
+            check_root(root)
+            self._roots[file] = root
+        return self._roots[file]
+
+    def _file(self, uri: Element) -> str:
+        try:
+            found = self.library.locate(uri)
+        except Unusable:
+            if uri.text.rstrip("/") in BUILT_IN:
+                return uri.text.rstrip("/")
+            raise
+        return str(self._in_folder(found, uri) if found.is_dir() else found)
+
+    def _in_folder(self, folder: Path, uri: Element) -> Path:
+        config, plain = folder / "model.config", folder / "model.sdf"
+        if os.path.lexists(config):
+            root = markup.parse(self.library.read(config, uri, WORLD_BYTES), self.library.shown(config), str(folder))
+            return self.library.locate(best_version(root))
+        if not os.path.lexists(plain):
+            raise uri.unusable(f"{self.library.shown(folder)}: neither model.config nor model.sdf in this folder")
+        return plain
+
+
+def best_version(config: Element) -> Element:
+    """The `<sdf>` of a model.config with the newest version that is read, as sdformat chooses."""
+    offers = [sdf for sdf in config.all("sdf") if sdf.text]
+    fitting = [sdf for sdf in offers if version(sdf) <= (*NEWEST, 99)]
+    if not fitting:
+        raise config.unusable("no <sdf> of version 1.12 or older in this model.config")
+    return max(fitting, key=version)

@@ -1,0 +1,118 @@
+"""From an SDF file to a world."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from simscen.core.shapes import Body, Solid
+from simscen.core.world import World
+from simscen.worlds.sdf.actors import read_actor
+from simscen.worlds.sdf.bodies import distinct, split
+from simscen.worlds.sdf.extent import bounds
+from simscen.worlds.sdf.files import Library
+from simscen.worlds.sdf.includes import Shelf
+from simscen.worlds.sdf.links import read_link
+from simscen.worlds.sdf.markup import Element
+from simscen.worlds.sdf.placing import place
+from simscen.worlds.sdf.report import Report, Unusable
+from simscen.worlds.sdf.shapes import ShapeReader
+from simscen.worlds.sdf.state import WorldState, read_state
+from simscen.worlds.sdf.tree import Model, TreeReader
+
+
+def load_sdf(path: Path, *, search: Sequence[Path] = (), root: Path, lenient: bool = False) -> World:
+    """The world in a Gazebo `.sdf`, `.world` or model file of SDF 1.3 to 1.12.
+
+    Only collision geometry counts. Static models become solids, others bodies with their mass, whose frame is their
+    centre of mass; actors become bodies of mass 0 with a path. Everything is in the world's frame and in document
+    order. Files that it names are looked for beside it and in `search`, and must lie inside `root` or `search`.
+
+    Raises InvalidInput with everything that would change the geometry and cannot be used; with `lenient` that is
+    left out and told in the world's `notes`, and only a world file that cannot be read at all is an error.
+    """
+    report, library = Report(lenient=lenient), Library(root, search)
+    try:
+        world = _read(path, library, report)
+    except Unusable as error:
+        raise report.fatal(error) from error
+    report.raise_problems()
+    return world
+
+
+def _read(path: Path, library: Library, report: Report) -> World:
+    shelf = Shelf(library)
+    document = shelf.open_world(path)
+    try:
+        element = _top(document, report)
+        tree = TreeReader(shelf, report)
+        builder = _Builder(tree.world(element), ShapeReader(library, report), report)
+        return builder.build(read_state(element, report), tree)
+    except RecursionError as error:
+        raise document.unusable("includes, models or frames are nested too deeply") from error
+
+
+def _top(document: Element, report: Report) -> Element:
+    """The element to load: the first world (as Gazebo does), otherwise the file itself with its models."""
+    worlds = list(document.all("world"))
+    for other in worlds[1:]:
+        report.note(other.place, f"only the first world of a file is loaded, which is {worlds[0].name!r}")
+    if worlds:
+        return worlds[0]
+    if not any(document.all("model", "actor", "include")):
+        raise document.unusable("holds neither a world nor a model")
+    return document
+
+
+class _Builder:
+    """Collects the solids and bodies of one world."""
+
+    def __init__(self, whole: Model, shapes: ShapeReader, report: Report) -> None:
+        self.whole, self.shapes, self.report = whole, shapes, report
+        self.solids: list[Solid] = []
+        self.bodies: list[Body] = []
+
+    def build(self, state: WorldState, tree: TreeReader) -> World:
+        """The world after the saved `state` was applied to it."""
+        for element in state.inserted:
+            with self.report.skipping():
+                tree.nest(self.whole, tree.model(element, static=False))
+        for model in self.whole.parts:
+            if isinstance(model, Model) and model.name not in state.deleted:
+                with self.report.skipping():
+                    self._add(model, state)
+        for actor in self.whole.actors:
+            with self.report.skipping():
+                body = read_actor(actor, self.whole, self.shapes, self.report)
+                self.bodies += [body] if body else []
+        for joint in self.whole.joints:
+            self.report.note(joint.place, "a joint between models is ignored")
+        return self._world()
+
+    def _add(self, model: Model, state: WorldState) -> None:
+        pose = self.whole.scope.place(model.frame)
+        links = place(model, pose, self.report, state.models.get(model.name))
+        contents = [read_link(link, self.shapes, self.report) for link in links]
+        solids, bodies = split(model, contents, self.report)
+        self.solids += solids
+        self.bodies += bodies
+
+    def _world(self) -> World:
+        element = self.whole.element
+        with self.report.skipping():
+            if not self.solids and not self.bodies and not self.report.failed:
+                raise element.unusable(self._why_empty(), "load it leniently if an empty floor is meant")
+        bodies = distinct(self.bodies, self.report, element)
+        moved = [replace(s, pose=b.pose.compose(s.pose)) for b in bodies for s in b.solids]
+        name = element.name or Path(element.source.name).stem
+        return World(name, tuple(self.solids), bodies, bounds=bounds([*self.solids, *moved]), notes=self.report.notes)
+
+    def _why_empty(self) -> str:
+        models = [m for part in self.whole.parts if isinstance(part, Model) for m in part.models()]
+        links = [part for model in models for part in model.parts if not isinstance(part, Model)]
+        if not models:
+            return "no collision geometry in this world: it has no models"
+        if self.shapes.ground:
+            return "no collision geometry in this world but a ground plane"
+        if not links:
+            return "no collision geometry in this world: its models have no links"
+        return "no collision geometry in this world: its links have visuals at most"

@@ -1,0 +1,71 @@
+"""`<state>`: where Gazebo Classic last saw everything, which is where it puts it again.
+
+Classic applies the first `<state>` of a world after loading it: model, nested model and link poses in it are world
+poses and override what the models say (World::Load, Model::SetState). The new Gazebo ignores it, yet worlds that have
+a `<state>` were drawn in Classic.
+"""
+
+from dataclasses import dataclass, field
+
+from simscen.core.geometry import Pose3
+from simscen.worlds.sdf import values
+from simscen.worlds.sdf.markup import Element
+from simscen.worlds.sdf.report import Report
+
+
+@dataclass(frozen=True)
+class ModelState:
+    """Where a model, its links and nested models were, all in the world frame; None = nothing said."""
+
+    pose: Pose3 | None = None
+    links: dict[str, Pose3] = field(default_factory=dict)
+    models: "dict[str, ModelState]" = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class WorldState:
+    """The states of models by name, models that were `deleted`, and `inserted` ones as they were written."""
+
+    models: dict[str, ModelState] = field(default_factory=dict)
+    deleted: frozenset[str] = frozenset()
+    inserted: tuple[Element, ...] = ()
+
+
+def read_state(world: Element, report: Report) -> WorldState:
+    """The state of a `<world>`; empty when it has none."""
+    first, *others = [*world.all("state"), None]
+    if first is None:
+        return WorldState()
+    if others[0] is not None:
+        report.note(others[0].place, "only the first <state> of a world is applied")
+    deletions, insertions = first.child("deletions"), first.child("insertions")
+    return WorldState(
+        {model.name: _model(model, report) for model in first.all("model")},
+        frozenset(name.text for name in deletions.all("name")) if deletions else frozenset(),
+        tuple(insertions.all("model")) if insertions else (),
+    )
+
+
+def _model(element: Element, report: Report) -> ModelState:
+    links: dict[str, Pose3] = {}
+    models: dict[str, ModelState] = {}
+    pose = None
+    for child in element.children:
+        with report.skipping():
+            match child.tag:
+                case "pose":
+                    pose = values.pose(child)
+                case "link":
+                    if child.child("pose"):
+                        links[child.name] = values.pose(child.child("pose"))
+                case "model":
+                    models[child.name] = _model(child, report)
+                case "scale":
+                    _refuse_scale(child)
+    return ModelState(pose, links, models)
+
+
+def _refuse_scale(element: Element) -> None:
+    """A saved world holds the scaled sizes too, and Classic scales them again; so nobody knows what was meant."""
+    if any(abs(factor - 1) > 1e-6 for factor in values.numbers(element, 3)):
+        raise element.unusable(f"a model scaled by {element.text} is not supported", "give the size in its geometry")
