@@ -1,0 +1,149 @@
+"""Images of maps, read with suspicion: every size is checked before a pixel is decoded."""
+
+import io
+import re
+import stat
+import struct
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.errors import InvalidInput
+from simscen.core.problems import Problem
+
+if TYPE_CHECKING:
+    from PIL import Image
+
+Bytes8 = npt.NDArray[np.uint8]
+Quanta = npt.NDArray[np.uint16]
+
+MOST_PIXELS = 16 * 2**20
+MOST_BYTES = 64 * 2**20
+CODE = "SC320"
+
+_GAP = rb"(?:\s|#[^\r\n]*[\r\n])+"
+_PNM_HEADER = re.compile(rb"(P[25])" + _GAP + rb"(\d{1,10})" + _GAP + rb"(\d{1,10})" + _GAP + rb"(\d{1,10})\s")
+
+
+@dataclass(frozen=True, eq=False)
+class MapImage:
+    """Pixels as nav2_map_server gets them from GraphicsMagick: `grey` (h, w), top row first; `alpha` if it has one."""
+
+    grey: Bytes8
+    alpha: Bytes8 | None = None
+
+
+class BadImage(Exception):
+    """What is wrong with an image, as a sentence."""
+
+
+def read_image(path: Path) -> MapImage:
+    """Read a pgm (P2 or P5, 8 or 16 bit), png or bmp; raises InvalidInput for anything else or too large."""
+    try:
+        data = _bytes_of(path)
+        if data[:2] in (b"P2", b"P5"):
+            return MapImage(_eight_bits(_portable(data)))
+        return _compressed(data)
+    except BadImage as bad:
+        raise InvalidInput([Problem(str(path), 0, 0, CODE, str(bad))]) from None
+
+
+def _bytes_of(path: Path) -> bytes:
+    try:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):
+            raise BadImage("not a regular file")
+        if status.st_size > MOST_BYTES:
+            raise BadImage(f"map too large: {status.st_size} bytes, more than {MOST_BYTES}")
+        return path.read_bytes()
+    except OSError as error:
+        reason = (error.strerror or "cannot be read").lower()
+        raise BadImage(f"cannot read the map's image: {reason}") from None
+
+
+def _check_size(width: int, height: int) -> None:
+    if width < 1 or height < 1:
+        raise BadImage(f"the image has no pixels: {width} x {height}")
+    if width * height > MOST_PIXELS:
+        raise BadImage(f"map too large: {width} x {height} pixels, more than {MOST_PIXELS}")
+
+
+def _portable(data: bytes) -> Quanta:
+    """A PGM as 16-bit greys (h, w). Source: netpbm's pgm(5); larger samples are big-endian."""
+    match = _PNM_HEADER.match(data)
+    if match is None:
+        raise BadImage("the PGM header is damaged; expected width, height and maxval")
+    width, height, maximum = (int(text) for text in match.groups()[1:])
+    _check_size(width, height)
+    if not 1 <= maximum <= 65535:
+        raise BadImage(f"maxval must be between 1 and 65535, not {maximum}")
+    raster = data[match.end() :]
+    values = _ascii(raster) if match[1] == b"P2" else _binary(raster, width * height, maximum)
+    if len(values) < width * height:
+        raise BadImage(f"the PGM is truncated: {len(values)} of {width * height} pixels")
+    values = values[: width * height].reshape(height, width)
+    if values.max() > maximum:
+        raise BadImage(f"a pixel is {values.max()}, above the maxval of {maximum}")
+    scale = np.round(np.arange(maximum + 1) * (65535 / maximum)).astype(np.uint16)
+    quanta: Quanta = scale[values]
+    return quanta
+
+
+def _binary(raster: bytes, count: int, maximum: int) -> npt.NDArray[np.generic]:
+    sample = np.dtype(">u2" if maximum > 255 else "u1")
+    return np.frombuffer(raster, dtype=sample, count=min(count, len(raster) // sample.itemsize))
+
+
+def _ascii(raster: bytes) -> npt.NDArray[np.generic]:
+    text = re.sub(rb"#[^\r\n]*", b"", raster)
+    if re.search(rb"[^\d\s]", text):
+        raise BadImage("the PGM holds something that is not a number")
+    if len(text) > 0 and text.isspace():
+        return np.empty(0, dtype=np.int64)
+    return np.fromstring(text, dtype=np.int64, sep=" ")
+
+
+def _compressed(data: bytes) -> MapImage:
+    from PIL import Image
+
+    if data[:8] == b"\x89PNG\r\n\x1a\n" and len(data) >= 24:
+        kind, (width, height) = "PNG", struct.unpack(">II", data[16:24])
+    elif data[:2] == b"BM" and len(data) >= 26:
+        kind, (width, height) = "BMP", _bmp_size(data)
+    else:
+        raise BadImage("not a PGM (P2, P5), PNG or BMP image")
+    _check_size(width, height)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            image = Image.open(io.BytesIO(data), formats=[kind])
+            _check_size(*image.size)
+            image.load()
+    except (OSError, SyntaxError, ValueError, EOFError, Image.DecompressionBombError) as error:
+        raise BadImage(f"the {kind} cannot be decoded: {error}") from None
+    return _grey_and_alpha(image)
+
+
+def _bmp_size(data: bytes) -> tuple[int, int]:
+    (header,) = struct.unpack("<I", data[14:18])
+    width, height = struct.unpack("<HH" if header == 12 else "<ii", data[18 : 22 if header == 12 else 26])
+    return width, abs(height)
+
+
+def _grey_and_alpha(image: "Image.Image") -> MapImage:
+    """8-bit greys as GraphicsMagick makes them of colours: 0.299 R + 0.587 G + 0.114 B (Rec. 601), in integers."""
+    if image.mode.startswith("I"):
+        return MapImage(_eight_bits(np.clip(np.asarray(image), 0, 65535).astype(np.uint16)))
+    transparent = image.mode in ("LA", "PA", "RGBA") or "transparency" in image.info
+    red, green, blue, *alpha = np.moveaxis(np.asarray(image.convert("RGBA" if transparent else "RGB")), 2, 0)
+    quanta = [colour.astype(np.uint32) * 257 for colour in (red, green, blue)]
+    luma = (306 * quanta[0] + 601 * quanta[1] + 117 * quanta[2]) >> 10
+    return MapImage(_eight_bits(luma.astype(np.uint16)), alpha[0] if transparent else None)
+
+
+def _eight_bits(quanta: Quanta) -> Bytes8:
+    return (quanta // 257).astype(np.uint8)
