@@ -9,7 +9,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from simscen.core.geometry import Pose3
 from simscen.core.shapes import Body, Solid
 from simscen.worlds.sdf import values
 from simscen.worlds.sdf.links import LinkContent

@@ -35,8 +35,8 @@ def check_root(root: Element) -> None:
     if root.tag == "robot":
         raise root.unusable("this is a URDF, not an SDF", "use it as the model of a robot")
     if root.tag != "sdf":
-        raise root.unusable(f"the root element is <{root.tag}>, expected <sdf>",
-                            "convert files from before SDF 1.3 with `gz sdf -k`" if root.tag == "gazebo" else "")  # fmt: skip
+        hint = "a <gazebo> is SDF 1.2 or older; rewrite it as <sdf version='1.6'>" if root.tag == "gazebo" else ""
+        raise root.unusable(f"the root element is <{root.tag}>, expected <sdf>", hint)
     if not OLDEST <= version(root) <= (*NEWEST, 99):
         shown = root.attributes.get("version", "none")[:20]
         raise root.unusable(f"SDF version {shown} is not read, only 1.3 to 1.12")

@@ -91,10 +91,11 @@ def _weight(link: PlacedLink, solids: list[Solid], densities: list[float]) -> tu
     inertial = link.frame.element.child("inertial")
     if inertial is None:
         return 1.0, np.array(link.pose.position)
-    if values.truth_of(inertial.attributes.get("auto", "0"), inertial):
-        masses = np.array([d * weight.volume(s.shape) for d, s in zip(densities, solids, strict=True)])
+    if solids and values.truth_of(inertial.attributes.get("auto", "0"), inertial):
+        measured = [weight.volume_and_centre(solid.shape) for solid in solids]
+        masses = np.array([density * volume for density, (volume, _) in zip(densities, measured, strict=True)])
+        centres = np.array([s.pose.apply(c[None])[0] for s, (_, c) in zip(solids, measured, strict=True)])
         if masses.sum() > 0:
-            centres = np.array([s.pose.apply(weight.centre(s.shape)[None])[0] for s in solids])
             return float(masses.sum()), masses @ centres / masses.sum()
     mass = values.positive(inertial, "mass") if inertial.child("mass") else 1.0
     return mass, np.array(link.pose.compose(values.pose(inertial.child("pose"))).position)

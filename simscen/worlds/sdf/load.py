@@ -1,14 +1,16 @@
 """From an SDF file to a world."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
+from simscen.core.geometry import Array
 from simscen.core.shapes import Body, Solid
 from simscen.core.world import World
+from simscen.worlds.extents import plan_extents
 from simscen.worlds.sdf.actors import read_actor
 from simscen.worlds.sdf.bodies import distinct, split
-from simscen.worlds.sdf.extent import bounds
 from simscen.worlds.sdf.files import Library
 from simscen.worlds.sdf.includes import Shelf
 from simscen.worlds.sdf.links import read_link
@@ -98,13 +100,13 @@ class _Builder:
 
     def _world(self) -> World:
         element = self.whole.element
-        with self.report.skipping():
-            if not self.solids and not self.bodies and not self.report.failed:
-                raise element.unusable(self._why_empty(), "load it leniently if an empty floor is meant")
+        if not self.solids and not self.bodies and not self.report.failed:
+            self.report.unusable(element.unusable(self._why_empty(), "load it leniently if an empty floor is meant"))
         bodies = distinct(self.bodies, self.report, element)
-        moved = [replace(s, pose=b.pose.compose(s.pose)) for b in bodies for s in b.solids]
+        extents = [plan_extents(solid) for solid in self.solids]
+        extents += [plan_extents(solid, body.pose) for body in bodies for solid in body.solids]
         name = element.name or Path(element.source.name).stem
-        return World(name, tuple(self.solids), bodies, bounds=bounds([*self.solids, *moved]), notes=self.report.notes)
+        return World(name, tuple(self.solids), bodies, bounds=_around(extents), notes=self.report.notes)
 
     def _why_empty(self) -> str:
         models = [m for part in self.whole.parts if isinstance(part, Model) for m in part.models()]
@@ -116,3 +118,12 @@ class _Builder:
         if not links:
             return "no collision geometry in this world: its models have no links"
         return "no collision geometry in this world: its links have visuals at most"
+
+
+def _around(extents: list[Array]) -> tuple[float, float, float, float]:
+    """The rectangle around rectangles (2, 2); zeros when there is none."""
+    if not extents:
+        return 0.0, 0.0, 0.0, 0.0
+    low = np.min([corners[0] for corners in extents], axis=0)
+    high = np.max([corners[1] for corners in extents], axis=0)
+    return float(low[0]), float(low[1]), float(high[0]), float(high[1])

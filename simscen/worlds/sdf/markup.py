@@ -103,9 +103,15 @@ def parse(data: bytes, file: str, folder: str) -> Element:
         if len(open_elements) > DEEPEST:
             raise Unusable(Place(file, line, col), f"nested deeper than {DEEPEST}")
 
+    def end(_: str) -> None:
+        open_elements.pop()
+
+    def characters(text: str) -> None:
+        open_elements[-1].pieces.append(text)
+
     parser.StartElementHandler = start
-    parser.EndElementHandler = lambda _: open_elements.pop()
-    parser.CharacterDataHandler = lambda text: open_elements[-1].pieces.append(text)
+    parser.EndElementHandler = end
+    parser.CharacterDataHandler = characters
     _run(parser, data, source)
     return root[0]
 

@@ -57,10 +57,12 @@ class MeshShelf:
         factors = values.numbers(scale, 3) if scale else (1.0, 1.0, 1.0)
         if scale and 0.0 in factors:
             raise scale.unusable("a scale of zero")
-        name = submesh.child("name") if submesh else None
-        if submesh and (name is None or not name.text):
+        if submesh is None:
+            return _Wish(path, factors, "", centred=False)
+        name = submesh.child("name")
+        if name is None or not name.text:
             raise submesh.unusable("<name> is missing")
-        return _Wish(path, factors, name.text if name else "", bool(submesh) and values.truth(submesh.child("center")))
+        return _Wish(path, factors, name.text, values.truth(submesh.child("center")))
 
     def _open(self, path: Path, uri: Element) -> tuple[Part, ...]:
         if path not in self._parts:

@@ -80,7 +80,8 @@ def _band(a: Array, b: Array, low: float, high: float) -> list[Array]:
     start, along = a[through], (b - a)[through]
 
     def at(level: float) -> Array:
-        return start[:, 0] + (level - start[:, 1]) / along[:, 1] * along[:, 0]
+        x: Array = start[:, 0] + (level - start[:, 1]) / along[:, 1] * along[:, 0]
+        return x
 
     order = np.argsort(at(middle), kind="stable")
     bottom, top = at(low)[order], at(high)[order]

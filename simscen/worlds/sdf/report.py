@@ -61,7 +61,7 @@ class Report:
         """Tell something that does."""
         place = error.place
         if self.lenient:
-            self.note(place, f"{error.message}; skipped")
+            self.note(place, f"skipped: {error.message}")
             return
         message = f"{place.element}: {error.message}" if place.element else error.message
         problem = Problem(place.file, place.line, place.col, CODE, message, hint=error.hint, source=place.source)

@@ -33,11 +33,12 @@ class WorldState:
 
 def read_state(world: Element, report: Report) -> WorldState:
     """The state of a `<world>`; empty when it has none."""
-    first, *others = [*world.all("state"), None]
-    if first is None:
+    states = list(world.all("state"))
+    if not states:
         return WorldState()
-    if others[0] is not None:
-        report.note(others[0].place, "only the first <state> of a world is applied")
+    first = states[0]
+    if len(states) > 1:
+        report.note(states[1].place, "only the first <state> of a world is applied")
     deletions, insertions = first.child("deletions"), first.child("insertions")
     return WorldState(
         {model.name: _model(model, report) for model in first.all("model")},

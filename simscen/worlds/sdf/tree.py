@@ -100,7 +100,7 @@ class TreeReader:
         over = {child.tag: child for child in include.children} if include else {}
         renamed, stilled, placed = over.get("name"), over.get("static"), over.get("placement_frame")
         name = renamed.text if renamed and renamed.text else values.name_of(element)
-        merged = bool(include) and values.truth_of(include.attributes.get("merge", "0"), include)
+        merged = include is not None and _merges(include)
         own_static = values.truth(stilled if stilled else element.child("static"))
         placement = placed.text if placed else element.attributes.get("placement_frame", "")
         scope = Scope(MODEL)
@@ -124,16 +124,19 @@ class TreeReader:
         """Bring in the one model, actor or light of another file."""
         root = self.shelf.enter(include)
         try:
-            found = [child for child in root.all("model", "actor", "light", "world")]
+            found = list(root.all("model", "actor", "light", "world"))
             if not found or found[0].tag == "world":
                 raise include.unusable(f"{root.source.name} holds no model", "" if not found else "it holds a world")
             if len(found) > 1:
                 self.report.note(root.place, "holds more than one model; an include brings the first")
             first = found[0]
             if first.tag == "model":
-                merged = values.truth_of(include.attributes.get("merge", "0"), include)
-                self.nest(owner, self.model(first, owner.static, include), merged)
+                self.nest(owner, self.model(first, owner.static, include), _merges(include))
             elif first.tag == "actor":
                 owner.actors.append(self.actor(first, include))
         finally:
             self.shelf.leave()
+
+
+def _merges(include: Element) -> bool:
+    return values.truth_of(include.attributes.get("merge", "0"), include)
