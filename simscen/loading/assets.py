@@ -1,0 +1,145 @@
+"""The files a scenario names: worlds, maps, robots."""
+
+from dataclasses import dataclass, field
+from importlib import resources
+from pathlib import Path
+from typing import TypeVar
+
+from pydantic import BaseModel
+
+from simscen.core.problems import Problem
+from simscen.loading.check import check
+from simscen.loading.document import Library
+from simscen.loading.loaded import LoadedMap, LoadedRobot, LoadedWorld
+from simscen.loading.messages import quoted, suggestion
+from simscen.loading.paths import Refusal
+from simscen.loading.source import read_text
+from simscen.loading.tree import Fields, Leaf, Node, Place, value_place
+from simscen.model.robot import RobotSpec
+from simscen.model.rosmap import RosMapSpec
+from simscen.model.world import WorldSpec
+
+Model = TypeVar("Model", bound=BaseModel)
+
+GAZEBO = (".sdf", ".world")
+URDF = (".urdf", ".xacro")
+ROBOT = ".robot.yaml"
+
+
+@dataclass
+class Assets:
+    """Loads what a scenario names and collects what is wrong with it."""
+
+    library: Library
+    problems: list[Problem] = field(default_factory=list)
+
+    def world(self, written: Leaf) -> LoadedWorld | None:
+        """The world in the file that a scenario names."""
+        path = self._find(str(written.value), written.place)
+        return None if path is None else self.world_file(path)
+
+    def world_file(self, path: Path) -> LoadedWorld | None:
+        """The world in a file: SDF by suffix, a ROS map by its keys, else our own language."""
+        if path.suffix in GAZEBO:
+            return LoadedWorld(path.stem, path, sdf=path)
+        tree = self._tree(path)
+        if is_ros_map(tree):
+            loaded = self._ros_map(tree, path)
+            return LoadedWorld(path.stem, path, map=loaded) if loaded else None
+        spec = self._model(WorldSpec, tree)
+        return self.own_world(spec, tree, path) if spec and tree else None
+
+    def own_world(self, spec: WorldSpec, tree: Node, path: Path) -> LoadedWorld | None:
+        """A world in our own language, with the map or SDF that it builds on."""
+        before = len(self.problems)
+        loaded_map = sdf = None
+        if spec.map is not None:
+            place = value_place(tree, ("map",))
+            found = self._find(spec.map, place)
+            loaded_map = self.map_file(found) if found else None
+        if spec.sdf is not None:
+            sdf = self._find(spec.sdf, value_place(tree, ("sdf",)))
+        name = spec.name or path.name.split(".")[0]
+        return LoadedWorld(name, path, spec, loaded_map, sdf) if len(self.problems) == before else None
+
+    def map(self, written: Leaf) -> LoadedMap | None:
+        """The ROS map in the file that a scenario names."""
+        path = self._find(str(written.value), written.place)
+        return None if path is None else self.map_file(path)
+
+    def map_file(self, path: Path) -> LoadedMap | None:
+        """The ROS map in a file."""
+        return self._ros_map(self._tree(path), path)
+
+    def robot(self, written: str, place: Place) -> LoadedRobot | None:
+        """A robot that ships with simscen, by its bare name, or that of a file."""
+        if "/" in written or written.endswith((*URDF, ".yaml", ".yml")):
+            path = self._find(written, place)
+            return None if path is None else self.robot_file(path)
+        shipped = shipped_robots()
+        if written in shipped:
+            return self.robot_file(shipped[written], bundled=True)
+        hint = suggestion(written, shipped) + "; or give the path of a *.robot.yaml or .urdf file"
+        self._add(place, "SC023", f"no robot called {quoted(written)} ships with simscen", hint.lstrip("; "))
+        return None
+
+    def robot_file(self, path: Path, bundled: bool = False) -> LoadedRobot | None:
+        """The robot in a `*.robot.yaml` or `.urdf` file."""
+        name = path.name.split(".")[0]
+        if path.suffix in URDF:
+            text = read_text(path, self.library.fence.shown(path))
+            if isinstance(text, Problem) and text.message != "larger than 1 MiB":
+                self.problems.append(text)
+                return None
+            return LoadedRobot(name, path, urdf=path)
+        tree = self._tree(path)
+        spec = self._model(RobotSpec, tree)
+        if spec is None or tree is None:
+            return None
+        urdf = self._find(spec.urdf, value_place(tree, ("urdf",))) if spec.urdf else None
+        return LoadedRobot(name, path, spec, urdf, bundled) if urdf or not spec.urdf else None
+
+    def _ros_map(self, tree: Node | None, path: Path) -> LoadedMap | None:
+        spec = self._model(RosMapSpec, tree)
+        if spec is None or tree is None:
+            return None
+        image = self._find(spec.image, value_place(tree, ("image",)))
+        return LoadedMap(path, spec, image) if image else None
+
+    def _tree(self, path: Path) -> Node | None:
+        tree, problems = self.library.read(path)
+        self.problems += problems
+        return tree
+
+    def _model(self, model: type[Model], tree: Node | None) -> Model | None:
+        if tree is None:
+            return None
+        spec = check(model, tree)
+        if isinstance(spec, list):
+            self.problems += spec
+            return None
+        return spec
+
+    def _find(self, written: str, place: Place) -> Path | None:
+        found = self.library.fence.find(written, self.library.folder_of(place))
+        if isinstance(found, Refusal):
+            self._add(place, found.code, found.message, found.hint)
+            return None
+        if not found.is_file():
+            self._add(place, "SC001", f"not a regular file: {quoted(written)}")
+            return None
+        return found
+
+    def _add(self, place: Place, code: str, message: str, hint: str = "") -> None:
+        self.problems.append(Problem(*place, code=code, message=message, hint=hint))
+
+
+def is_ros_map(tree: Node | None) -> bool:
+    """Whether a YAML file is a map of map_server rather than a world of ours."""
+    return isinstance(tree, Fields) and "image" in tree.entries and "resolution" in tree.entries
+
+
+def shipped_robots() -> dict[str, Path]:
+    """The robots that ship with simscen, by name."""
+    folder = Path(str(resources.files("simscen"))) / "data" / "robots"
+    return {path.name.removesuffix(ROBOT): path for path in sorted(folder.glob(f"*{ROBOT}"))}

@@ -1,0 +1,108 @@
+"""Validate a tree against a model: the model, or every problem at the line and column to mend."""
+
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from simscen.core.problems import Problem
+from simscen.loading import messages
+from simscen.loading.grammar import keys_of, models_at, needs_nothing
+from simscen.loading.tree import Fields, Key, Leaf, Node, Place, at, child, dotted, key_place, real_keys, value_place
+from simscen.spec.base import Choice
+
+Model = TypeVar("Model", bound=BaseModel)
+VERSION = 1
+
+
+def check(model: type[Model], tree: Node) -> Model | list[Problem]:
+    """The specification that `tree` holds, or all that is wrong with it."""
+    if not isinstance(tree, Fields):
+        return [_problem(tree.place, "SC004", f"expected a mapping at top level, got {messages.found(tree)}")]
+    if problem := _other_version(tree):
+        return [problem]
+    try:
+        return model.model_validate(tree.plain)
+    except ValidationError as error:
+        found = [_translate(model, tree, dict(e)) for e in error.errors(include_input=False, include_url=False)]
+        return _merged(found)
+
+
+def _other_version(tree: Fields) -> Problem | None:
+    version = child(tree, "simscen")
+    if not isinstance(version, Leaf) or version.value == VERSION or isinstance(version.value, bool):
+        return None
+    if not isinstance(version.value, int):
+        return None
+    message = f"needs schema {version.value}; this version of simscen supports {VERSION}"
+    return _problem(version.place, "SC009", message)
+
+
+def _translate(model: type[BaseModel], tree: Node, error: dict[str, Any]) -> Problem:
+    loc: tuple[Key, ...] = error["loc"]
+    kind: str = error["type"]
+    if kind == "extra_forbidden":
+        return _unknown_key(model, tree, loc)
+    if kind == "missing":
+        return _missing_key(tree, loc)
+    if kind.startswith("union_tag"):
+        return _wrong_type(tree, loc, error)
+    if loc and loc[-1] == "[key]":
+        code, message, hint = messages.explain(kind, error.get("ctx", {}), Leaf(tree.place, str(loc[-2])), error["msg"])
+        return _problem(key_place(tree, loc), code, message, hint)
+    node = at(tree, loc)
+    if kind == "value_error" and (empty := _empty_choice(model, node, loc)):
+        return empty
+    code, message, hint = messages.explain(kind, error.get("ctx", {}), node, error["msg"])
+    return _problem(value_place(tree, loc), code, message, hint)
+
+
+def _unknown_key(model: type[BaseModel], tree: Node, loc: tuple[Key, ...]) -> Problem:
+    key = str(loc[-1])
+    holder = dotted(real_keys(tree, loc[:-1]))
+    where = f" in `{holder}`" if holder else ""
+    hint = messages.suggestion(key, keys_of(models_at(model, loc[:-1])))
+    return _problem(key_place(tree, loc), "SC012", f"unknown key {messages.quoted(key)}{where}", hint)
+
+
+def _missing_key(tree: Node, loc: tuple[Key, ...]) -> Problem:
+    holder = dotted(real_keys(tree, loc[:-1]))
+    where = f" in `{holder}`" if holder else ""
+    return _problem(key_place(tree, loc[:-1]), "SC010", f"missing key `{loc[-1]}`{where}")
+
+
+def _wrong_type(tree: Node, loc: tuple[Key, ...], error: dict[str, Any]) -> Problem:
+    """A union told apart by `type:` whose type is missing or unknown."""
+    context = error["ctx"]
+    holder = dotted(real_keys(tree, loc))
+    if error["type"] == "union_tag_not_found":
+        return _problem(key_place(tree, loc), "SC010", f"missing key `type` in `{holder}`")
+    choices = [choice.strip().strip("'") for choice in str(context["expected_tags"]).split(",")]
+    hint = messages.suggestion(str(context["tag"]), choices)
+    message = f"{messages.quoted(str(context['tag']))} is not one of the choices"
+    return _problem(value_place(tree, (*loc, "type")), "SC014", message, hint)
+
+
+def _empty_choice(model: type[BaseModel], node: Node, loc: tuple[Key, ...]) -> Problem | None:
+    """`off:` with nothing behind it, where `off: {}` was meant."""
+    if not isinstance(node, Fields):
+        return None
+    for choice in (kind for kind in models_at(model, loc) if issubclass(kind, Choice)):
+        for key in choice.choices():
+            entry = node.entries.get(key)
+            if entry is not None and isinstance(entry.value, Leaf) and entry.value.value is None:
+                below = models_at(choice, (key,))
+                hint = f"write `{key}: {{}}`" if below and needs_nothing(below[0]) else f"give `{key}` a value"
+                return _problem(entry.key, "SC011", f"`{key}` has no value", hint)
+    return None
+
+
+def _merged(problems: list[Problem]) -> list[Problem]:
+    """One problem a place: the members of a union each say what they expected."""
+    places: dict[tuple[str, int, int, str], list[Problem]] = {}
+    for problem in problems:
+        places.setdefault((problem.path, problem.line, problem.col, problem.code), []).append(problem)
+    return [group[0] for group in places.values()]
+
+
+def _problem(place: Place, code: str, message: str, hint: str = "") -> Problem:
+    return Problem(place.path, place.line, place.col, code, message, hint)

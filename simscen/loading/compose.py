@@ -1,0 +1,209 @@
+"""Compose a tree with positions from YAML events, within budgets.
+
+PyYAML's own constructors are not used: duplicate keys overwrite silently there, `!!int abc` and huge integers raise
+bare ValueErrors, alias bombs expand when they are walked, and libyaml's composer overflows the C stack at 30 000
+brackets. Its event parser has none of these: it is a state machine, and we stop reading at the first excess.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import yaml
+from yaml import events as ev
+
+from simscen.core.problems import Problem
+from simscen.loading.scalars import resolve
+from simscen.loading.tree import Entry, Fields, Items, Leaf, Node, Place
+
+DEEPEST = 40
+MOST_VALUES = 100_000
+
+_Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+
+class _Refused(Exception):
+    """Reading cannot go on; the problem says why."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+
+
+def compose(text: str, path: str) -> tuple[Node | None, list[Problem]]:
+    """The only document of `text` as a tree, and every problem found; the tree is None where there is none."""
+    composer = _Composer(path, text)
+    try:
+        root = composer.document()
+    except _Refused as refused:
+        return None, [*composer.problems, refused.problem]
+    return root, composer.problems
+
+
+@dataclass(frozen=True)
+class _Anchor:
+    """An anchored node with what it costs to repeat it."""
+
+    node: Node
+    values: int
+    depth: int
+
+
+@dataclass
+class _Composer:
+    path: str
+    text: str
+    problems: list[Problem] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._events = self._parse()
+        self._anchors: dict[str, _Anchor | None] = {}
+        self._values = 0
+
+    def document(self) -> Node | None:
+        """The first document; a second one is refused."""
+        next(self._events)  # the start of the stream
+        if isinstance(next(self._events), ev.StreamEndEvent):
+            raise _Refused(self._problem(None, "SC004", "the file is empty"))
+        start = next(self._events)
+        root, _ = self._node(start, 1)
+        next(self._events)  # the end of the document
+        after = next(self._events)
+        if not isinstance(after, ev.StreamEndEvent):
+            message = f"more than one YAML document (line {after.start_mark.line + 1})"
+            raise _Refused(self._problem(after, "SC004", message, "put each scenario into a file of its own"))
+        return root
+
+    def _parse(self) -> Iterator[ev.Event]:
+        try:
+            yield from yaml.parse(self.text, Loader=_Loader)
+        except yaml.MarkedYAMLError as error:
+            raise _Refused(self._syntax_problem(error)) from None
+        except yaml.YAMLError as error:
+            raise _Refused(self._problem(None, "SC003", str(error).splitlines()[0])) from None
+
+    def _node(self, event: ev.Event, depth: int) -> tuple[Node, int]:
+        """The node that begins with `event`, and how deep it is."""
+        if isinstance(event, ev.AliasEvent):
+            return self._alias(event, depth)
+        if depth > DEEPEST:
+            raise _Refused(self._problem(event, "SC006", f"nested deeper than {DEEPEST}"))
+        assert isinstance(event, ev.NodeEvent)
+        self._refuse_tag(event)
+        self._count(event, 1)
+        before = self._values
+        if event.anchor is not None:
+            self._anchors[event.anchor] = None
+        node, height = self._content(event, depth)
+        if event.anchor is not None:
+            self._anchors[event.anchor] = _Anchor(node, self._values - before + 1, height)
+        return node, height
+
+    def _content(self, event: ev.NodeEvent, depth: int) -> tuple[Node, int]:
+        if isinstance(event, ev.ScalarEvent):
+            return Leaf(self._place(event), self._scalar(event)), 0
+        if isinstance(event, ev.SequenceStartEvent):
+            return self._sequence(event, depth)
+        return self._mapping(event, depth)
+
+    def _scalar(self, event: ev.ScalarEvent) -> str | int | float | bool | None:
+        if not event.implicit[0]:
+            return str(event.value)
+        try:
+            return resolve(event.value)
+        except ValueError as error:
+            self.problems.append(self._problem(event, "SC008", str(error)))
+            return 0
+
+    def _sequence(self, start: ev.Event, depth: int) -> tuple[Node, int]:
+        items, height = [], 0
+        while not isinstance(event := next(self._events), ev.SequenceEndEvent):
+            item, below = self._node(event, depth + 1)
+            items.append(item)
+            height = max(height, below)
+        return Items(self._place(start), tuple(items)), height + 1
+
+    def _mapping(self, start: ev.Event, depth: int) -> tuple[Node, int]:
+        entries: dict[str, Entry] = {}
+        merged: list[Node] = []
+        height = 0
+        while not isinstance(event := next(self._events), ev.MappingEndEvent):
+            key = self._key(event)
+            value, below = self._node(next(self._events), depth + 1)
+            height = max(height, below)
+            if key == "<<" and isinstance(value, Fields | Items):
+                merged.extend(value.items if isinstance(value, Items) else [value])
+            elif key in entries:
+                self._duplicate(event, key, entries[key].key)
+            else:
+                entries[key] = Entry(self._place(event), value)
+        return Fields(self._place(start), self._merge(start, entries, merged)), height + 1
+
+    def _merge(self, start: ev.Event, entries: dict[str, Entry], merged: list[Node]) -> dict[str, Entry]:
+        """Add what `<<:` brings; keys of the mapping itself win, then those of earlier aliases."""
+        for other in merged:
+            if not isinstance(other, Fields):
+                self.problems.append(self._problem(start, "SC003", "`<<` expects a mapping or a list of mappings"))
+                continue
+            entries = {**other.entries, **entries} if other.entries.keys() - entries.keys() else entries
+        return entries
+
+    def _key(self, event: ev.Event) -> str:
+        if not isinstance(event, ev.ScalarEvent):
+            raise _Refused(self._problem(event, "SC003", "a key must be text, not a list, a mapping or an alias"))
+        self._refuse_tag(event)
+        self._count(event, 1)
+        return str(event.value)
+
+    def _alias(self, event: ev.AliasEvent, depth: int) -> tuple[Node, int]:
+        if event.anchor not in self._anchors:
+            raise _Refused(self._problem(event, "SC006", f"alias `*{event.anchor}` has no anchor before it"))
+        anchor = self._anchors[event.anchor]
+        if anchor is None:
+            raise _Refused(self._problem(event, "SC006", f"alias `*{event.anchor}` contains itself"))
+        if depth + anchor.depth > DEEPEST:
+            raise _Refused(self._problem(event, "SC006", f"nested deeper than {DEEPEST}"))
+        self._count(event, anchor.values)
+        return anchor.node, anchor.depth
+
+    def _count(self, event: ev.Event, values: int) -> None:
+        self._values += values
+        if self._values > MOST_VALUES:
+            what = "aliases expand to" if isinstance(event, ev.AliasEvent) else "the file holds"
+            raise _Refused(self._problem(event, "SC006", f"{what} more than {MOST_VALUES} values"))
+
+    def _refuse_tag(self, event: ev.Event) -> None:
+        tag = getattr(event, "tag", None)
+        if tag is not None:
+            short = tag.replace("tag:yaml.org,2002:", "!!", 1)
+            self.problems.append(
+                self._problem(event, "SC005", f"tag `{short}` is not allowed", "remove it; a scenario is plain data")
+            )
+
+    def _duplicate(self, event: ev.Event, key: str, first: Place) -> None:
+        hint = "remove one of the two"
+        message = f"duplicate key `{key}` (first at {first.line}:{first.col})"
+        self.problems.append(self._problem(event, "SC007", message, hint))
+
+    def _place(self, event: ev.Event) -> Place:
+        return Place(self.path, event.start_mark.line + 1, event.start_mark.column + 1)
+
+    def _problem(self, event: ev.Event | None, code: str, message: str, hint: str = "") -> Problem:
+        line, col = (event.start_mark.line + 1, event.start_mark.column + 1) if event is not None else (0, 0)
+        return Problem(self.path, line, col, code, message, hint)
+
+    def _syntax_problem(self, error: yaml.MarkedYAMLError) -> Problem:
+        mark = error.problem_mark or error.context_mark
+        if mark is None:
+            return self._problem(None, "SC003", error.problem or "cannot be read as YAML")
+        lines = self.text.split("\n")
+        line = lines[mark.line] if mark.line < len(lines) else ""
+        if line[mark.column : mark.column + 1] == "\t" or line[: len(line) - len(line.lstrip())].find("\t") >= 0:
+            col = line.find("\t") + 1
+            return Problem(self.path, mark.line + 1, col, "SC003", "tab character", "indent with spaces")
+        start = error.context_mark
+        if start is not None and mark.index >= len(self.text.rstrip()) and start.index < mark.index:
+            what = (error.context or "this").removeprefix("while parsing a ").removeprefix("while scanning a ")
+            return Problem(self.path, start.line + 1, start.column + 1, "SC003", f"this {what} never ends")
+        message = error.problem or "cannot be read as YAML"
+        if start is not None and error.context and start.index != mark.index:
+            message += f" ({error.context} that begins at {start.line + 1}:{start.column + 1})"
+        return Problem(self.path, mark.line + 1, mark.column + 1, "SC003", message)

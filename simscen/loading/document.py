@@ -1,0 +1,114 @@
+"""One YAML document out of several files: `extends:` and the `defaults.yaml` beside it."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from simscen.core.problems import Problem
+from simscen.loading.compose import compose
+from simscen.loading.paths import Fence, Refusal
+from simscen.loading.source import read_text
+from simscen.loading.tree import Entry, Fields, Leaf, Node, Place
+
+DEFAULTS = "defaults.yaml"
+EXTENDS = "extends"
+MOST_FILES = 32
+
+
+@dataclass
+class Library:
+    """Reads the files of one scenario and keeps their texts, so that problems can show their lines.
+
+    `texts` and `files` are by the name that problems use.
+    """
+
+    fence: Fence
+    texts: dict[str, str] = field(default_factory=dict)
+    files: dict[str, Path] = field(default_factory=dict)
+
+    def read(self, path: Path, defaults: bool = False) -> tuple[Node | None, list[Problem]]:
+        """The tree of `path` with what it extends, and with `defaults`, the `defaults.yaml` beside it, merged in."""
+        tree, problems = self._with_base(path, ())
+        beside = path.parent / DEFAULTS
+        if defaults and isinstance(tree, Fields) and beside.is_file() and path.name != DEFAULTS:
+            below, more = self._with_base(beside, ())
+            problems += more
+            if isinstance(below, Fields):
+                tree = merge(tree, below)
+            elif not more and below is not None:
+                problems.append(Problem(self.fence.shown(beside), 0, 0, "SC004", "expected a mapping at top level"))
+        return tree, problems
+
+    def folder_of(self, place: Place) -> Path:
+        """The folder of the file in which something stands: what paths there are relative to."""
+        return self.files[place.path].parent
+
+    def with_source(self, problems: list[Problem]) -> list[Problem]:
+        """The problems with the text of their lines."""
+        return [self._sourced(problem) for problem in problems]
+
+    def _sourced(self, problem: Problem) -> Problem:
+        from dataclasses import replace
+
+        lines = self.texts.get(problem.path, "").split("\n")
+        return replace(problem, source=lines[problem.line - 1]) if 0 < problem.line <= len(lines) else problem
+
+    def _with_base(self, path: Path, chain: tuple[Path, ...]) -> tuple[Node | None, list[Problem]]:
+        tree, problems = self._one(path)
+        if not isinstance(tree, Fields) or EXTENDS not in tree.entries:
+            return tree, problems
+        entry = tree.entries[EXTENDS]
+        own = Fields(tree.place, {key: value for key, value in tree.entries.items() if key != EXTENDS})
+        base = self._base(entry, path, (*chain, path))
+        if isinstance(base, Problem):
+            return own, [*problems, base]
+        below, more = self._with_base(base, (*chain, path))
+        if isinstance(below, Fields):
+            return merge(own, below), problems + more
+        return own, problems + more
+
+    def _one(self, path: Path) -> tuple[Node | None, list[Problem]]:
+        shown = self.fence.shown(path)
+        self.files[shown] = path
+        text = read_text(path, shown)
+        if isinstance(text, Problem):
+            return None, [text]
+        self.texts[shown] = text
+        return compose(text, shown)
+
+    def _base(self, entry: Entry, path: Path, chain: tuple[Path, ...]) -> Path | Problem:
+        place = entry.value.place
+        if not isinstance(entry.value, Leaf) or not isinstance(entry.value.value, str):
+            return Problem(*place, "SC011", f"`{EXTENDS}` expects the path of one file")
+        base = self.fence.find(entry.value.value, path.parent)
+        if isinstance(base, Refusal):
+            return Problem(*place, base.code, base.message, base.hint)
+        if base in chain:
+            names = " → ".join(self.fence.shown(file) for file in (*chain[chain.index(base) :], base))
+            return Problem(*place, "SC024", f"files extend each other in a circle: {names}")
+        if len(self.files) >= MOST_FILES:
+            return Problem(*place, "SC024", f"more than {MOST_FILES} files extend each other")
+        return base
+
+
+def merge(over: Fields, under: Fields) -> Fields:
+    """Keys of `over` win; mappings on both sides are merged, everything else is replaced as a whole.
+
+    Mappings whose `type` differs are different things and are replaced, too.
+    """
+    entries = dict(over.entries)
+    for key, below in under.entries.items():
+        above = entries.get(key)
+        if above is None:
+            entries[key] = below
+        elif isinstance(above.value, Fields) and isinstance(below.value, Fields) and _same_type(above, below):
+            entries[key] = Entry(above.key, merge(above.value, below.value))
+    return Fields(over.place, entries)
+
+
+def _same_type(above: Entry, below: Entry) -> bool:
+    types = [
+        entry.value.entries["type"].value.plain
+        for entry in (above, below)
+        if isinstance(entry.value, Fields) and "type" in entry.value.entries
+    ]
+    return len(types) < 2 or types[0] == types[1]

@@ -1,0 +1,98 @@
+"""What the models allow at a place: the keys that would have been right there.
+
+A pydantic `loc` mixes keys of the file with tags of unions. Both are followed here along the types, keeping every
+model that could be meant.
+"""
+
+from collections.abc import Iterable, Sequence
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel, RootModel, Tag
+
+from simscen.loading.tree import Key
+from simscen.spec.base import Choice
+
+
+def models_at(model: type[BaseModel], loc: Sequence[Key]) -> list[type[BaseModel]]:
+    """The models that a mapping at `loc` below `model` may be written for."""
+    candidates: list[Any] = [model]
+    for part in loc:
+        options = [option for candidate in candidates for option in _options(candidate)]
+        below = [kind for option in options for kind in _below(option, part)]
+        narrowed = [option for option in options if part in _tags(option)]
+        candidates = below or narrowed or candidates
+    found = [_bare(option) for candidate in candidates for option in _options(candidate)]
+    return list(dict.fromkeys(kind for kind in found if _is_model(kind) and not issubclass(kind, RootModel)))
+
+
+def keys_of(models: Iterable[type[BaseModel]]) -> list[str]:
+    """The keys that these models know, as they are written in YAML."""
+    keys = [field.alias or name for model in models for name, field in model.model_fields.items()]
+    return list(dict.fromkeys(keys))
+
+
+def needs_nothing(model: type[BaseModel]) -> bool:
+    """Whether `{}` is a complete specification."""
+    return not issubclass(model, RootModel | Choice) and not any(f.is_required() for f in model.model_fields.values())
+
+
+def field_type(model: type[BaseModel], key: str) -> Any:
+    """The declared type of the field that is written as `key`, with its constraints."""
+    for name, field in model.model_fields.items():
+        if key in (field.alias, name):
+            return Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
+    return None
+
+
+def _options(kind: Any) -> list[Any]:
+    """The members of a union, tagged or not; any other type is its own only option."""
+    bare = _bare(kind)
+    if get_origin(bare) in (Union, UnionType):
+        return [option for member in get_args(bare) if member is not NoneType for option in _options(member)]
+    if _is_model(bare) and issubclass(bare, RootModel):
+        return _options(bare.model_fields["root"].annotation) if _is_model(_inner(bare)) else [kind]
+    return [kind]
+
+
+def _inner(model: Any) -> Any:
+    return _bare(model.model_fields["root"].annotation)
+
+
+def _below(kind: Any, part: Key) -> list[Any]:
+    bare = _bare(kind)
+    if _is_model(bare) and isinstance(part, str):
+        below = field_type(bare, part)
+        return [] if below is None else [below]
+    if get_origin(bare) is list and isinstance(part, int):
+        return [get_args(bare)[0]]
+    if get_origin(bare) is dict and part not in _tags(kind):
+        return [get_args(bare)[1]]
+    return []
+
+
+def _tags(option: Any) -> set[str]:
+    """What pydantic may call this member of a union in a `loc`."""
+    tags = {meta.tag for meta in _metadata(option) if isinstance(meta, Tag)}
+    bare = _bare(option)
+    if _is_model(bare):
+        tags.add(bare.__name__)
+        for name in ("type",):
+            field = bare.model_fields.get(name)
+            if field is not None and get_origin(field.annotation) is Literal:
+                tags |= {str(value) for value in get_args(field.annotation)}
+    return tags
+
+
+def _metadata(kind: Any) -> tuple[Any, ...]:
+    return tuple(get_args(kind)[1:]) if get_origin(kind) is Annotated else ()
+
+
+def _bare(kind: Any) -> Any:
+    while get_origin(kind) is Annotated:
+        kind = get_args(kind)[0]
+    return kind
+
+
+def _is_model(kind: Any) -> bool:
+    return isinstance(kind, type) and issubclass(kind, BaseModel)

@@ -1,0 +1,91 @@
+"""What loading yields: validated specifications, and the files they came from."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from simscen.core.problems import Problem
+from simscen.loading.tree import Fields, Key, Place, key_place, value_place
+from simscen.model.robot import RobotSpec
+from simscen.model.rosmap import RosMapSpec
+from simscen.model.scenario import ScenarioSpec
+from simscen.model.world import WorldSpec
+
+
+@dataclass(frozen=True)
+class LoadedMap:
+    """A ROS map: `path` of its yaml, `image` of its pixels."""
+
+    path: Path
+    spec: RosMapSpec
+    image: Path
+
+
+@dataclass(frozen=True)
+class LoadedWorld:
+    """A world: own (`spec`, perhaps on top of a `map` or an `sdf`), a ROS map alone, or an SDF file alone.
+
+    `path` is the file that says so; the scenario's own for an inline world.
+    """
+
+    name: str
+    path: Path
+    spec: WorldSpec | None = None
+    map: LoadedMap | None = None
+    sdf: Path | None = None
+
+
+@dataclass(frozen=True)
+class LoadedRobot:
+    """A robot: `spec` from a `*.robot.yaml`, `urdf` where it is built on one. A bare `.urdf` has no `spec`.
+
+    `path` is the file the scenario named; `bundled` tells that simscen ships it.
+    """
+
+    name: str
+    path: Path
+    spec: RobotSpec | None = None
+    urdf: Path | None = None
+    bundled: bool = False
+
+
+@dataclass(frozen=True)
+class LoadedScenario:
+    """A scenario that is right as far as can be told without building its world.
+
+    `id` is its path without suffix relative to the root; `file` is absolute, `path` is `file` relative to the root as
+    problems show it. `text` is the file as it was read. `map` is the map the robot gets: a ROS map, "none" for mapless
+    driving, or None = what the world gives. `sources` holds the texts of all files read, by shown path, and `files`
+    their absolute paths. `notes` are warnings.
+    """
+
+    id: str
+    path: str
+    file: Path
+    root: Path
+    world_path: tuple[Path, ...]
+    text: str
+    spec: ScenarioSpec
+    world: LoadedWorld
+    map: LoadedMap | Literal["none"] | None
+    robot: LoadedRobot
+    tree: Fields = field(repr=False)
+    sources: Mapping[str, str] = field(repr=False, default_factory=dict)
+    files: Mapping[str, Path] = field(default_factory=dict)
+    notes: tuple[Problem, ...] = ()
+
+    def place_of(self, *keys: Key) -> Place:
+        """Where the value at `keys` stands in its file, e.g. `place_of("goals", 0, "pose")`."""
+        return value_place(self.tree, keys)
+
+    def key_place_of(self, *keys: Key) -> Place:
+        """Where the last of `keys` stands."""
+        return key_place(self.tree, keys)
+
+    def problem(self, keys: tuple[Key, ...], code: str, message: str, hint: str = "") -> Problem:
+        """A problem at the value of `keys`, with the text of its line."""
+        place = self.place_of(*keys)
+        lines = self.sources.get(place.path, "").split("\n")
+        source = lines[place.line - 1] if 0 < place.line <= len(lines) else ""
+        return Problem(*place, code=code, message=message, hint=hint, source=source)

@@ -1,0 +1,130 @@
+"""What pydantic found wrong, in the words of somebody who writes YAML."""
+
+import difflib
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from simscen.loading.tree import Fields, Items, Leaf, Node
+
+_KINDS = {
+    "model_type": "a mapping",
+    "model_attributes_type": "a mapping",
+    "dict_type": "a mapping",
+    "list_type": "a list",
+    "string_type": "text",
+    "int_type": "an integer",
+    "int_from_float": "an integer",
+    "float_type": "a number",
+    "bool_type": "true or false",
+}
+_BOUNDS = {
+    "greater_than": ("greater than", "gt"),
+    "greater_than_equal": ("at least", "ge"),
+    "less_than": ("less than", "lt"),
+    "less_than_equal": ("at most", "le"),
+}
+
+
+def found(node: Node) -> str:
+    """What stands there, as a message calls it."""
+    if isinstance(node, Fields):
+        return "a mapping"
+    if isinstance(node, Items):
+        return "a list"
+    value = node.value
+    if value is None:
+        return "nothing"
+    if isinstance(value, bool):
+        return f"the truth value {str(value).lower()}"
+    if isinstance(value, str):
+        return f"the text {quoted(value)}"
+    return f"the {'integer' if isinstance(value, int) else 'number'} {value}"
+
+
+def quoted(text: str, most: int = 60) -> str:
+    """User text inside a message: on one line, printable, not too long."""
+    shown = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+    return f"`{shown if len(shown) <= most else shown[: most - 1] + '…'}`"
+
+
+def suggestion(word: str, known: Iterable[str]) -> str:
+    """ "did you mean …" when something known is near; else a list of what is known."""
+    choices = list(known)
+    lowered = {choice.lower(): choice for choice in reversed(choices)}
+    near = difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)
+    if near:
+        return f"did you mean `{lowered[near[0]]}`?"
+    return f"expected one of: {', '.join(choices)}" if choices else ""
+
+
+def explain(kind: str, context: Mapping[str, Any], node: Node, text: str) -> tuple[str, str, str]:
+    """The code, message and hint for pydantic's error type `kind` on the value `node`; `text` is its own message."""
+    if kind in _KINDS:
+        return "SC011", f"expected {_KINDS[kind]}, got {found(node)}", _unquote_hint(kind, node)
+    if kind in _BOUNDS:
+        words, key = _BOUNDS[kind]
+        return "SC013", f"must be {words} {_number(context[key])}, got {_shown(node)}", ""
+    match kind:
+        case "finite_number":
+            return "SC013", "must be a finite number", ""
+        case "literal_error" | "enum":
+            choices = _choices(str(context["expected"]))
+            word = str(node.value) if isinstance(node, Leaf) else ""
+            return "SC014", f"{_shown(node)} is not one of the choices", suggestion(word, choices)
+        case "quantity":
+            return "SC015", str(context["problem"]), f"units: {context['units']}; a bare number is SI"
+        case "too_short" | "too_long":
+            return "SC017", _length(kind, context), ""
+        case "string_too_short":
+            return "SC017", "must not be empty", ""
+        case "string_too_long":
+            return "SC017", f"longer than {context['max_length']} characters", ""
+        case "string_pattern_mismatch":
+            return "SC017", *_pattern(node)
+        case "value_error":
+            return "SC016", str(context["error"]), ""
+    return "SC011", text[:1].lower() + text[1:], ""
+
+
+def _unquote_hint(kind: str, node: Node) -> str:
+    if not isinstance(node, Leaf) or not isinstance(node.value, str):
+        return ""
+    number = node.value.strip().lstrip("+-").replace(".", "", 1)
+    if kind in ("int_type", "float_type") and number.isdigit():
+        leading_zero = len(number) > 1 and number[0] == "0"
+        return "remove the leading zero" if leading_zero else "remove the quotes"
+    if kind == "bool_type" and node.value.lower() in ("yes", "no", "on", "off", "y", "n"):
+        return f"write {'true' if node.value.lower() in ('yes', 'on', 'y') else 'false'}"
+    return ""
+
+
+def _shown(node: Node) -> str:
+    if isinstance(node, Leaf) and node.value is not None:
+        return quoted(str(node.value).lower() if isinstance(node.value, bool) else str(node.value))
+    return found(node)
+
+
+def _number(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _choices(expected: str) -> list[str]:
+    """Pydantic lists choices as "'a', 'b' or 'c'"."""
+    return [part.strip().strip("'") for part in expected.replace(" or ", ", ").split(",")]
+
+
+def _length(kind: str, context: Mapping[str, Any]) -> str:
+    least, most, actual = context.get("min_length"), context.get("max_length"), context.get("actual_length")
+    bound = f"at least {least}" if kind == "too_short" else f"at most {most}"
+    return f"expected {bound} values, got {actual}"
+
+
+def _pattern(node: Node) -> tuple[str, str]:
+    value = node.value if isinstance(node, Leaf) and isinstance(node.value, str) else ""
+    control = next((c for c in value if not c.isprintable() and c != "\u3000"), None)
+    if control is not None:
+        return f"control character U+{ord(control):04X} in {quoted(value)}", "remove it"
+    return (
+        f"{quoted(value)} cannot be a name here",
+        "begin with a letter or `_`, then letters, digits, spaces, `_`, `.` and `-`",
+    )

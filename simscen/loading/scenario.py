@@ -1,0 +1,94 @@
+"""Load a scenario with everything it names, or say all that is wrong with it."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal
+
+from simscen.core.errors import InvalidInput
+from simscen.core.problems import Problem
+from simscen.loading.assets import Assets
+from simscen.loading.check import check
+from simscen.loading.document import Library
+from simscen.loading.loaded import LoadedMap, LoadedScenario, LoadedWorld
+from simscen.loading.paths import Fence
+from simscen.loading.tree import Fields, Leaf, at, value_place
+from simscen.model.scenario import ScenarioSpec
+from simscen.model.world import WorldSpec
+
+SUFFIXES = (".scenario.yaml", ".scenario.yml", ".yaml", ".yml")
+
+
+def load_scenario(path: Path, root: Path, world_path: Sequence[Path] = ()) -> LoadedScenario:
+    """The scenario in the file `path`; paths in it stay inside `root` and the folders of `world_path`.
+
+    Raises InvalidInput with every problem of the scenario and of the files it names.
+    """
+    loaded = try_scenario(path, root, world_path)
+    if isinstance(loaded, list):
+        raise InvalidInput(loaded)
+    return loaded
+
+
+def try_scenario(path: Path, root: Path, world_path: Sequence[Path] = ()) -> LoadedScenario | list[Problem]:
+    """As load_scenario, but returns the problems."""
+    fence = Fence.around(root, world_path)
+    library = Library(fence)
+    file = path.absolute()
+    if not fence.holds(file):
+        return [Problem(str(path), 0, 0, "SC020", "the file is outside the scenario root", "choose one with --root")]
+    file = fence.root / file.relative_to(root.absolute()) if file.is_relative_to(root.absolute()) else file
+    tree, problems = library.read(file, defaults=True)
+    if not problems and tree is not None:
+        spec = check(ScenarioSpec, tree)
+        if isinstance(spec, list):
+            problems = spec
+        elif isinstance(tree, Fields):
+            return _with_assets(spec, tree, library, file)
+    return library.with_source(sorted(problems))
+
+
+def _with_assets(spec: ScenarioSpec, tree: Fields, library: Library, file: Path) -> LoadedScenario | list[Problem]:
+    assets = Assets(library)
+    world = _world(spec, tree, assets, file)
+    robot_map = _map(spec, tree, assets)
+    robot = assets.robot(spec.robot.model, value_place(tree, ("robot", "model")))
+    if world is None or robot is None or assets.problems:
+        return library.with_source(sorted(assets.problems))
+    fence, shown = library.fence, library.fence.shown(file)
+    loaded = LoadedScenario(
+        id=scenario_id(file, fence.root),
+        path=shown,
+        file=file,
+        root=fence.root,
+        world_path=fence.world_path,
+        text=library.texts[shown],
+        spec=spec,
+        world=world,
+        map=robot_map,
+        robot=robot,
+        tree=tree,
+        sources=dict(library.texts),
+        files=dict(library.files),
+    )
+    return replace(loaded)
+
+
+def _world(spec: ScenarioSpec, tree: Fields, assets: Assets, file: Path) -> LoadedWorld | None:
+    node = at(tree, ("world",))
+    if isinstance(spec.world, WorldSpec):
+        return assets.own_world(spec.world, node, file)
+    return assets.world(node) if isinstance(node, Leaf) else None
+
+
+def _map(spec: ScenarioSpec, tree: Fields, assets: Assets) -> LoadedMap | Literal["none"] | None:
+    node = at(tree, ("map",))
+    if spec.map is None or spec.map == "none" or not isinstance(node, Leaf):
+        return "none" if spec.map == "none" else None
+    return assets.map(node)
+
+
+def scenario_id(file: Path, root: Path) -> str:
+    """The path of a scenario relative to the root, without its suffix."""
+    shown = file.relative_to(root).as_posix() if file.is_relative_to(root) else file.name
+    return next((shown.removesuffix(suffix) for suffix in SUFFIXES if shown.endswith(suffix)), shown)
