@@ -88,6 +88,7 @@ class RunFinished:
     `path` and `line` are where the scenario is written (line from 1). `lines` holds the line of each criterion, in the
     order of `verdicts`; empty or 0 = unknown. `ended` is why the simulation stopped. `metrics` are numbers by name.
     `error` is set exactly when the outcome is ERROR. `again` is the command that repeats this run.
+    `tick_rate` turns the findings' ticks into seconds.
     """
 
     key: RunKey
@@ -103,6 +104,7 @@ class RunFinished:
     artifacts: Artifacts = field(default_factory=Artifacts)
     error: RunFailure | None = None
     again: str = ""
+    tick_rate: int = 240
 
 
 @dataclass(frozen=True)
