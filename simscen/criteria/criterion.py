@@ -2,7 +2,19 @@
 
 from typing import ClassVar, Literal
 
+from simscen.criteria.clearance import Clearance
+from simscen.criteria.collisions import Collisions
 from simscen.criteria.goals_reached import GoalsReached
+from simscen.criteria.localization_error import LocalizationError
+from simscen.criteria.no_false_success import NoFalseSuccess
+from simscen.criteria.path_length import PathLength
+from simscen.criteria.recoveries import Recoveries
+from simscen.criteria.relocalized_within import RelocalizedWithin
+from simscen.criteria.replans import Replans
+from simscen.criteria.result import ErrorCodeIs, Result
+from simscen.criteria.speed import Speed
+from simscen.criteria.stopped_within import StoppedWithin
+from simscen.criteria.time_to_goal import TimeToGoal
 from simscen.spec.base import Choice
 from simscen.spec.places import Name
 
@@ -18,3 +30,16 @@ class AnyCriterion(Choice):
     """Whether a violation fails the run or is only reported."""
 
     goals_reached: GoalsReached | None = None
+    result: Result | None = None
+    error_code: ErrorCodeIs | None = None
+    no_false_success: NoFalseSuccess | None = None
+    collisions: Collisions | None = None
+    clearance: Clearance | None = None
+    time_to_goal: TimeToGoal | None = None
+    path_length: PathLength | None = None
+    speed: Speed | None = None
+    stopped_within: StoppedWithin | None = None
+    localization_error: LocalizationError | None = None
+    relocalized_within: RelocalizedWithin | None = None
+    replans: Replans | None = None
+    recoveries: Recoveries | None = None

@@ -1,15 +1,112 @@
 """`goals_reached`: the robot truly was where it was sent."""
 
+import math
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
 from simscen.core.case import Case
+from simscen.core.geometry import Pose2, wrap
 from simscen.core.trace import Trace
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
+from simscen.criteria.bounds import at_most, missed, undecided
+from simscen.criteria.moments import GoalStory, ending, finished, stories
+from simscen.criteria.signals import finite, truth
 from simscen.spec.base import Spec
+from simscen.spec.places import Name
+from simscen.spec.quantities import PositiveAngle, PositiveDuration, PositiveLength
 
 
 class GoalsReached(Spec, Criterion):
-    """placeholder"""
+    """Every goal was reached: the robot says so, and at that moment it truly was there.
+
+    What is measured: distance and heading error between the goal and the robot's true pose at the tick of the
+        robot's report, for each goal.
+    When it fails: a goal was not reported reached, or was reported while the true pose was out of tolerance, or later
+        than `within`.
+    Why this: the robot's own word is worth as much as its localization. Arena's metrics count the word alone, BARN's
+        the distance alone, so that neither sees a robot that is lost and content.
+    Source: Nav2's SimpleGoalChecker for the tolerances; BARN challenge, run.py, for judging by the truth.
+
+    Example: `goals_reached: {goals: [shelf], tolerance: 0.3 m, within: 60 s}`
+    """
+
+    goals: Annotated[list[Name], Field(min_length=1, max_length=1000)] | None = None
+    """Only these, by name; default: all."""
+    tolerance: PositiveLength | None = None
+    """How far the true position may be off; default: the goal's own tolerance."""
+    yaw_tolerance: PositiveAngle | None = None
+    """How far the true heading may be off; default: the goal's own tolerance."""
+    within: PositiveDuration | None = None
+    """Each goal at most this long after the robot accepted it."""
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """placeholder"""
+        """Distance, heading and, if asked for, time of each goal; one finding for a goal that was not reached."""
+        chosen = [story for story in stories(trace, case) if self.goals is None or story.goal.name in self.goals]
+        names = [goal.name for goal in case.goals]
+        findings = [
+            undecided(f"goal {name}", f"the scenario has no goal `{name}`", "reached", [f"goals: {', '.join(names)}"])
+            for name in self.goals or ()
+            if name not in names
+        ]
+        if not chosen and not findings:
+            return [undecided("goals", "the scenario has no goals", "reached")]
+        for story in chosen:
+            findings += self._reached(trace, story) if story.reached is not None else [_not_reached(trace, story)]
+        return findings
+
+    def _reached(self, trace: Trace, story: GoalStory) -> list[Finding]:
+        goal, tick = story.goal, story.reached
+        assert tick is not None
+        what, pose = f"goal {goal.name}", _true_pose(trace, tick)
+        believed = _believed(trace, story)
+        findings = [
+            at_most(
+                what,
+                pose.distance(goal.pose),
+                self.tolerance or goal.xy_tolerance,
+                "m",
+                at=(trace, tick),
+                context="from the goal when the robot said it was there",
+                detail=believed,
+            ),
+            at_most(
+                f"{what} heading",
+                abs(wrap(pose.yaw - goal.pose.yaw)),
+                self.yaw_tolerance or goal.yaw_tolerance,
+                "rad",
+                at=(trace, tick),
+                context="from the goal's heading when the robot said it was there",
+                detail=believed,
+            ),
+        ]
+        if self.within is not None:
+            taken = trace.seconds(tick - (story.accepted or 0))
+            findings.append(at_most(f"{what} time", taken, self.within, "s", at=(trace, tick)))
+        return findings
+
+
+def _not_reached(trace: Trace, story: GoalStory) -> Finding:
+    what = f"goal {story.goal.name}"
+    if story.end is None and not finished(trace):
+        return undecided(what, f"the log stops at t = {trace.seconds(trace.end):.2f} s, {story.fate}", "reached")
+    tick = trace.end if story.end is None else story.end.tick
+    away = _true_pose(trace, tick).distance(story.goal.pose)
+    why = f"the run ended at t = {trace.seconds(trace.end):.2f} s: {ending(trace)}"
+    details = [f"{away:.2f} m from the goal then", *([why] if story.end is None else [])]
+    return missed(what, f"{story.fate}, not reached", "reached", (trace, tick), details)
+
+
+def _true_pose(trace: Trace, tick: int) -> Pose2:
+    return Pose2(*truth(trace).at(np.array([tick]))[0].tolist())
+
+
+def _believed(trace: Trace, story: GoalStory) -> list[str]:
+    tick, goal = story.reached, story.goal.pose
+    if tick is None or not len(trace.belief):
         return []
+    x, y, yaw = finite(trace.belief, "the belief", trace).at(np.array([tick]))[0, :3].tolist()
+    off = math.degrees(abs(wrap(yaw - goal.yaw)))
+    return [f"it believed itself {math.hypot(x - goal.x, y - goal.y):.2f} m and {off:.0f}° from the goal"]

@@ -1,0 +1,99 @@
+"""`collisions`: what the robot touched, and how hard."""
+
+import math
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from simscen.core.case import Case
+from simscen.core.events import Event
+from simscen.core.trace import Trace
+from simscen.core.verdict import Finding
+from simscen.criteria.base import Criterion
+from simscen.criteria.bounds import BrokenTrace, at_most, counted
+from simscen.criteria.signals import speed, turn_rate
+from simscen.spec.base import Spec
+from simscen.spec.places import Name
+from simscen.spec.quantities import Impulse
+
+OWN_FAULT = 0.1
+"""m/s; a slower robot was run into (CARLA's CollisionTest draws the line here)."""
+
+LOOK_BACK = 0.1
+"""Seconds before the contact in which the robot's speed counts: at the contact itself it may be stopped already."""
+
+SHOWN = 5
+
+
+class Collisions(Spec, Criterion):
+    """The robot touched no more than it may.
+
+    What is measured: contacts between the robot's body and anything but the ground, each counted when it begins, and
+        the impulse of each.
+    When it fails: more contacts than `max`, or one with an impulse above `max_impulse`.
+    Why this: contacts come from the physics. Counting scans shorter than the robot's radius, as Arena does, misses
+        whatever the lidar does not see.
+    Source: Arena's get_collisions for counting rising edges; ScenarioRunner's CollisionTest for whose fault it was.
+
+    Example: `collisions: {max: 0}`
+    """
+
+    max: Annotated[int, Field(ge=0, le=100_000)] | None = None
+    """How many contacts are allowed; default: 0, or any number if `max_impulse` is given."""
+    max_impulse: Annotated[Impulse, Field(ge=0)] | None = None
+    """No contact may be harder than this, in N s."""
+    object: Name | None = Field(default=None, alias="with")
+    """Only contacts with this object, by name."""
+    caused_by_robot: bool = False
+    """Only contacts at which the robot itself was moving: not when something ran into it while it stood."""
+
+    def judge(self, trace: Trace, case: Case) -> list[Finding]:
+        """The count, then the hardest contact."""
+        hits = [event for event in trace.of_kind("collision.started") if self.object in (None, event.name)]
+        if self.caused_by_robot:
+            hits = [event for event in hits if _moving(trace, event, case)]
+        limit = 0 if self.max is None and self.max_impulse is None else self.max
+        told = [_told(trace, hit) for hit in hits[:SHOWN]]
+        if len(hits) > SHOWN:
+            told.append(f"and {len(hits) - SHOWN} more")
+        decisive = (trace, hits[min(limit or 0, len(hits) - 1)].tick) if hits else None
+        findings = counted("collisions", len(hits), "collision", None, limit, at=decisive, detail=told)
+        if self.max_impulse is not None:
+            findings.append(self._hardest(trace, hits))
+        return findings
+
+    def _hardest(self, trace: Trace, hits: list[Event]) -> Finding:
+        assert self.max_impulse is not None
+        worst = max(hits, key=_impulse, default=None)
+        value = 0.0 if worst is None else _impulse(worst)
+        at = None if worst is None else (trace, worst.tick)
+        told = [] if worst is None else [_told(trace, worst)]
+        return at_most("collision impulse", value, self.max_impulse, "N s", at=at, detail=told)
+
+
+def _impulse(hit: Event) -> float:
+    value = hit.data.get("impulse", 0.0)
+    if not isinstance(value, int | float) or math.isnan(value):
+        raise BrokenTrace(f"the impulse of the collision with {hit.name} is not a number")
+    return float(value)
+
+
+def _moving(trace: Trace, hit: Event, case: Case) -> bool:
+    """Whether any point of the robot's hull moved faster than OWN_FAULT just before."""
+    reach = max((math.hypot(x, y) for x, y in case.footprint), default=case.inscribed_radius)
+    linear, turning = speed(trace), turn_rate(trace)
+    since = hit.tick - LOOK_BACK * trace.tick_rate
+    window = (linear.ticks >= since) & (linear.ticks <= hit.tick)
+    fastest = linear.values[window] + reach * turning.values[window]
+    return bool(np.any(fastest > OWN_FAULT))
+
+
+def _told(trace: Trace, hit: Event) -> str:
+    text = f"t = {trace.seconds(hit.tick):.2f} s: touched {hit.name or 'something'}"
+    x, y, at, hard = (hit.data.get(key) for key in ("x", "y", "speed", "impulse"))
+    if isinstance(x, int | float) and isinstance(y, int | float):
+        text += f" at ({x:.2f}, {y:.2f})"
+    if isinstance(at, int | float):
+        text += f" at {at:.2f} m/s"
+    return f"{text}, {hard:.1f} N s" if isinstance(hard, int | float) else text

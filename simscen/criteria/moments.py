@@ -1,0 +1,87 @@
+"""When things happened that criteria refer to by name."""
+
+from dataclasses import dataclass
+from itertools import zip_longest
+
+from simscen.core.case import Case
+from simscen.core.events import Event
+from simscen.core.navigation import Goal
+from simscen.core.trace import Trace
+
+_STARTS = ("fault.started", "event.started")
+_ENDS = ("fault.ended", "event.ended")
+
+
+@dataclass(frozen=True)
+class Span:
+    """From `start` to `end` in ticks; `lasting` says that it has an end of its own, as a fault with `for` does."""
+
+    start: int
+    end: int
+    lasting: bool
+
+
+def spans(trace: Trace, label: str) -> list[Span]:
+    """Each time the fault or event `label` happened. What never ended, or takes no time, goes on to the run's end."""
+    starts = [event.tick for event in trace.of_kind(*_STARTS) if event.name == label]
+    ends = [event.tick for event in trace.of_kind(*_ENDS) if event.name == label]
+    pairs = zip_longest(starts, ends[: len(starts)])
+    return [Span(start, end, True) if end and end > start else Span(start, trace.end, False) for start, end in pairs]
+
+
+def never_started(trace: Trace, label: str) -> tuple[str, list[str]]:
+    """Why there is nothing to judge after `label`, and what there would have been."""
+    started = sorted({event.name for event in trace.of_kind(*_STARTS)})
+    names = ", ".join(f"`{name}`" for name in started) or "nothing"
+    return f"`{label}` never started; the run ended at t = {trace.seconds(trace.end):.2f} s ({ending(trace)})", [
+        f"started in this run: {names}"
+    ]
+
+
+def ending(trace: Trace) -> str:
+    """Why the run ended, in words."""
+    ends = trace.of_kind("run.ended")
+    return ends[-1].name if ends else "the log stops there"
+
+
+def finished(trace: Trace) -> bool:
+    """Whether the run came to its own end, be it the time limit; a log that was cut off did not."""
+    return bool(trace.of_kind("run.ended"))
+
+
+@dataclass(frozen=True)
+class GoalStory:
+    """What became of a goal, as the robot reported it: when it was accepted, and the event that ended it."""
+
+    goal: Goal
+    accepted: int | None
+    end: Event | None
+
+    @property
+    def reached(self) -> int | None:
+        """The tick at which the robot said that it was there."""
+        return self.end.tick if self.end is not None and self.end.kind == "goal.reached" else None
+
+    @property
+    def fate(self) -> str:
+        """In words, for a goal that was not reached."""
+        if self.end is None:
+            return "never accepted" if self.accepted is None else "still under way"
+        code = self.end.data.get("error_name") or self.end.data.get("error_code")
+        return self.end.kind.removeprefix("goal.") + (f" with {code}" if code else "")
+
+
+def stories(trace: Trace, case: Case) -> list[GoalStory]:
+    """The story of each goal of the scenario. The k-th goal of a name is the k-th one reported under that name."""
+    accepted = trace.of_kind("goal.accepted")
+    ended = trace.of_kind("goal.reached", "goal.failed", "goal.canceled")
+    seen: dict[str, int] = {}
+    found = []
+    for goal in case.goals:
+        k = seen[goal.name] = seen.get(goal.name, 0) + 1
+        starts = [event.tick for event in accepted if event.name == goal.name]
+        ends = [event for event in ended if event.name == goal.name]
+        found.append(
+            GoalStory(goal, starts[k - 1] if len(starts) >= k else None, ends[k - 1] if len(ends) >= k else None)
+        )
+    return found

@@ -1,0 +1,73 @@
+"""`path_length`: how far the robot drove."""
+
+import math
+
+import numpy as np
+from pydantic import model_validator
+
+from simscen.core.case import Case
+from simscen.core.trace import Trace
+from simscen.core.verdict import Finding
+from simscen.criteria.base import Criterion
+from simscen.criteria.bounds import at_most, undecided
+from simscen.criteria.moments import stories
+from simscen.criteria.signals import Drive, drive
+from simscen.spec.base import Spec
+from simscen.spec.quantities import PositiveLength, Ratio
+
+
+class PathLength(Spec, Criterion):
+    """The robot drove no further than it should.
+
+    What is measured: the length of the true way in the plane, in moves of at least 1 cm, over the whole run; its ratio
+        to the shortest way from the start through all goals that a disc of the robot's inscribed radius has.
+    When it fails: it is longer than `max`, or than `max_ratio` times the shortest way.
+    Why this: detours, swerving and search patterns cost battery and nerves while every goal is still reached.
+    Source: HuNavSim and bench-mr for the length; SEAN's "path efficiency" is this ratio. SPL (Anderson 2018) is its
+        inverse over many runs.
+
+    Example: `path_length: {max_ratio: 1.4}`
+    """
+
+    max: PositiveLength | None = None
+    """Metres."""
+    max_ratio: Ratio | None = None
+    """Times the shortest way; 1 is a perfect drive."""
+
+    @model_validator(mode="after")
+    def _some_bound(self) -> "PathLength":
+        if self.max is None and self.max_ratio is None:
+            raise ValueError("expected max or max_ratio")
+        return self
+
+    def judge(self, trace: Trace, case: Case) -> list[Finding]:
+        """The length, then the ratio; both in metres of margin."""
+        way = drive(trace)
+        findings = [] if self.max is None else [_bound(trace, way, "path_length", self.max)]
+        if self.max_ratio is not None:
+            findings.append(self._ratio(trace, case, way))
+        return findings
+
+    def _ratio(self, trace: Trace, case: Case, way: Drive) -> Finding:
+        assert self.max_ratio is not None
+        what = "path_length ratio"
+        lengths = [case.shortest.get(goal.name, math.nan) for goal in case.goals]
+        if not lengths or not all(math.isfinite(length) for length in lengths) or sum(lengths) <= 0:
+            without = [g.name for g in case.goals if not math.isfinite(case.shortest.get(g.name, math.nan))]
+            because = (
+                f"no shortest way to {', '.join(without)} is known" if without else "the shortest way has no length"
+            )
+            return undecided(what, because, f"≤ {self.max_ratio:g}")
+        limit = self.max_ratio * sum(lengths)
+        context = f"({self.max_ratio:g} times the shortest way of {sum(lengths):.2f} m)"
+        unreached = [story for story in stories(trace, case) if story.reached is None]
+        if unreached and way.length <= limit:
+            name = unreached[0].goal.name
+            return undecided(what, f"goal {name} was not reached, so there is no whole way to compare", context)
+        return _bound(trace, way, what, limit, context)
+
+
+def _bound(trace: Trace, way: Drive, what: str, limit: float, context: str = "") -> Finding:
+    over = int(np.argmax(way.travelled > limit)) if way.length > limit else len(way.ticks) - 1
+    at = (trace, int(way.ticks[over])) if len(way.ticks) else None
+    return at_most(what, way.length, limit, "m", at=at, context=context)

@@ -1,0 +1,87 @@
+"""`result` and `error_code`: how the navigation ended, in Nav2's words."""
+
+from typing import Literal
+
+from simscen.core.case import Case
+from simscen.core.events import Event
+from simscen.core.trace import Trace
+from simscen.core.verdict import Finding
+from simscen.criteria.base import Criterion
+from simscen.criteria.bounds import held, missed, undecided
+from simscen.criteria.codes import Code, code_of
+from simscen.criteria.moments import ending, finished
+from simscen.spec.base import Spec
+from simscen.spec.places import Name
+
+
+class Result(Spec, Criterion):
+    """Navigation ended the way it should: an expected failure is a pass.
+
+    What is measured: the result the robot reports at the end, and its error code.
+    When it fails: another result, another code, or none at all when the run ended.
+    Why this: that a robot refuses a goal inside an obstacle, and says why, is a thing to test like any other.
+    Source: nav2_simple_commander's TaskResult; the error codes of nav2_msgs' actions.
+
+    Example: `result: {status: FAILED, error_code: GOAL_OCCUPIED}`
+    """
+
+    status: Literal["SUCCEEDED", "FAILED", "CANCELED"]
+    """What it must report."""
+    error_code: Code | None = None
+    """Nav2's error code that it must give, by name or number."""
+
+    def judge(self, trace: Trace, case: Case) -> list[Finding]:
+        """One finding for the result, one for the code if it is asked for."""
+        end = _last(trace, "navigation.ended")
+        if end is None:
+            return [_no_answer(trace, "result", self.status)]
+        findings = [_compare(trace, end, "result", end.name, self.status)]
+        if self.error_code is not None:
+            findings.append(_compare(trace, end, "error code", code_of(end), self.error_code.name))
+        return findings
+
+
+class ErrorCodeIs(Spec, Criterion):
+    """The robot gave this error code, for a goal or for the navigation as a whole.
+
+    What is measured: the error code of the last report about the goal, or of the end of navigation.
+    When it fails: another code, or no report when the run ended.
+    Why this: with several goals the end of navigation tells only one of their codes.
+    Source: the error codes of nav2_msgs' actions.
+
+    Example: `error_code: {code: NO_VALID_PATH, goal: shelf}`
+    """
+
+    code: Code
+    """By name or number; NONE = no error."""
+    goal: Name | None = None
+    """Of this goal; default: of the navigation as a whole."""
+
+    def judge(self, trace: Trace, case: Case) -> list[Finding]:
+        """One finding."""
+        kinds = ["navigation.ended"] if self.goal is None else ["goal.reached", "goal.failed", "goal.canceled"]
+        what = "error code" if self.goal is None else f"error code of goal {self.goal}"
+        end = _last(trace, *kinds, name=self.goal)
+        if end is None:
+            return [_no_answer(trace, what, self.code.name)]
+        return [_compare(trace, end, what, code_of(end), self.code.name)]
+
+
+def _last(trace: Trace, *kinds: str, name: str | None = None) -> Event | None:
+    events = [event for event in trace.of_kind(*kinds) if name in (None, event.name)]
+    return events[-1] if events else None
+
+
+def _compare(trace: Trace, end: Event, what: str, got: str, expected: str) -> Finding:
+    if got == expected:
+        return held(what, got, expected, (trace, end.tick))
+    message = end.data.get("message")
+    details = [f"it ended with {end.name}, {code_of(end)}"] + ([str(message)] if message else [])
+    return missed(what, got, expected, (trace, end.tick), details)
+
+
+def _no_answer(trace: Trace, what: str, expected: str) -> Finding:
+    when = f"t = {trace.seconds(trace.end):.2f} s"
+    if finished(trace):
+        return missed(what, "no answer", expected, (trace, trace.end), [f"the run ended at {when}: {ending(trace)}"])
+    return undecided(what, f"the log stops at {when}, before navigation ended", expected)

@@ -1,0 +1,125 @@
+"""Signals that criteria read off a trace. All are checked to be finite: nan compares false and would hide a failure."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.geometry import Array, wrap_array
+from simscen.core.trace import Samples, Ticks, Trace
+from simscen.criteria.bounds import BrokenTrace
+
+Flags = npt.NDArray[np.bool_]
+
+SMALLEST_MOVE = 0.01
+"""Metres; shorter moves are the trembling of a body at rest and are not driven (METRICS: path_length)."""
+
+STALE_AFTER = 1.0
+"""Seconds; how long a pose estimate may be relied on (AMCL's transform_tolerance)."""
+
+
+def finite(samples: Samples, name: str, trace: Trace) -> Samples:
+    """The samples themselves. Raises BrokenTrace, naming signal and time, when one is nan or infinite."""
+    bad = ~np.isfinite(samples.values).all(axis=1)
+    if bad.any():
+        at = trace.seconds(int(samples.ticks[int(np.argmax(bad))]))
+        raise BrokenTrace(f"{name} is not finite at t = {at:.2f} s")
+    return samples
+
+
+def truth(trace: Trace) -> Samples:
+    """x, y, yaw of the robot in the world."""
+    return finite(trace.truth, "the true pose", trace)
+
+
+def speed(trace: Trace) -> Samples:
+    """True speed over ground (m/s), (n, 1)."""
+    velocity = finite(trace.velocity, "the true velocity", trace)
+    return Samples(velocity.ticks, np.hypot(velocity.values[:, 0], velocity.values[:, 1])[:, np.newaxis])
+
+
+def turn_rate(trace: Trace) -> Samples:
+    """True turn rate without its sign (rad/s), (n, 1)."""
+    velocity = finite(trace.velocity, "the true velocity", trace)
+    return Samples(velocity.ticks, np.abs(velocity.values[:, 2:3]))
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """The driven way: corner k was left behind at `ticks[k]` after `travelled[k]` metres."""
+
+    ticks: Ticks
+    travelled: Array
+
+    @property
+    def length(self) -> float:
+        """Metres in all."""
+        return float(self.travelled[-1]) if len(self.travelled) else 0.0
+
+    def until(self, tick: int) -> float:
+        """Metres driven up to `tick`."""
+        at = int(np.searchsorted(self.ticks, tick, side="right")) - 1
+        return float(self.travelled[at]) if at >= 0 else 0.0
+
+
+def drive(trace: Trace) -> Drive:
+    """The way the robot drove: in the plane, in moves of at least SMALLEST_MOVE; being set down elsewhere is no drive.
+
+    Yaw must not enter the norm (as it does in Arena's get_metrics.py, which so adds radians to metres).
+    """
+    poses = truth(trace)
+    placed = {event.tick for event in trace.of_kind("robot.placed")}
+    jumps = set(np.searchsorted(poses.ticks, sorted(placed), side="right").tolist())
+    kept, lengths = [0], [0.0]
+    xs, ys = poses.values[:, 0].tolist(), poses.values[:, 1].tolist()
+    for k in range(1, len(xs)):
+        step = float(np.hypot(xs[k] - xs[kept[-1]], ys[k] - ys[kept[-1]]))
+        if k in jumps:
+            kept.append(k)
+            lengths.append(0.0)
+        elif step >= SMALLEST_MOVE:
+            kept.append(k)
+            lengths.append(step)
+    if not xs:
+        return Drive(np.empty(0, dtype=np.int64), np.empty(0))
+    return Drive(poses.ticks[kept], np.cumsum(lengths))
+
+
+def pose_error(trace: Trace) -> Samples:
+    """How far the belief is off: distance (m) and heading (rad, without its sign), (n, 2).
+
+    Sampled whenever the belief is published, against the truth at that very tick; and at every truth sample while the
+    newest belief is older than STALE_AFTER, when the robot has nothing better than the old one. No alignment: a map
+    localizer answers in the map's frame, and an offset there is an error (evo would call it APE without --align).
+    """
+    belief, poses = finite(trace.belief, "the belief", trace), truth(trace)
+    if not len(belief) or not len(poses):
+        return Samples(np.empty(0, dtype=np.int64), np.empty((0, 2)))
+    ticks = np.union1d(belief.ticks, _stale(trace))
+    believed = belief.at(ticks)
+    x, y = (np.interp(ticks, poses.ticks, poses.values[:, axis]) for axis in (0, 1))
+    yaw = np.interp(ticks, poses.ticks, np.unwrap(poses.values[:, 2]))
+    off = np.hypot(believed[:, 0] - x, believed[:, 1] - y)
+    return Samples(ticks, np.column_stack((off, np.abs(wrap_array(believed[:, 2] - yaw)))))
+
+
+def _stale(trace: Trace) -> Ticks:
+    ticks = trace.truth.ticks[trace.truth.ticks >= trace.belief.ticks[0]]
+    newest = trace.belief.ticks[np.searchsorted(trace.belief.ticks, ticks, side="right") - 1]
+    old: Ticks = ticks[ticks - newest > STALE_AFTER * trace.tick_rate]
+    return old
+
+
+def first_lasting(ticks: Ticks, true: Flags, hold: int, end: int) -> tuple[int | None, bool]:
+    """The first of `ticks` from which `true` lasts for `hold` ticks, or up to `end`; and whether it lasted `hold`.
+
+    A stretch lasts until the next sample that is not true. (None, False) when there is no such stretch.
+    """
+    begins = np.flatnonzero(true & ~np.concatenate(([False], true[:-1])))
+    breaks = np.flatnonzero(~true & np.concatenate(([False], true[:-1])))
+    stops = np.full(len(begins), end, dtype=np.int64)
+    stops[: len(breaks)] = ticks[breaks]
+    lasting = stops - ticks[begins] >= hold
+    if lasting.any():
+        return int(ticks[begins[int(np.argmax(lasting))]]), True
+    return (int(ticks[begins[-1]]), False) if len(true) and true[-1] else (None, False)

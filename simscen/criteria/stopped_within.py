@@ -1,0 +1,116 @@
+"""`stopped_within`: how soon the robot stops after something happened."""
+
+import math
+
+import numpy as np
+
+from simscen.core.case import Case
+from simscen.core.trace import Trace
+from simscen.core.verdict import Finding
+from simscen.criteria.base import Criterion
+from simscen.criteria.bounds import at_most, held, missed, undecided
+from simscen.criteria.moments import Span, ending, never_started, spans
+from simscen.criteria.signals import Flags, drive, first_lasting, speed, turn_rate
+from simscen.spec.base import Spec
+from simscen.spec.places import Name
+from simscen.spec.quantities import PositiveAngularSpeed, PositiveDuration, PositiveSpeed
+
+OLD_SCAN = 0.2
+"""Seconds; a scan older than two periods of a 10 Hz lidar is worth a line."""
+
+
+class StoppedWithin(Spec, Criterion):
+    """The robot stopped in time after a fault or an event.
+
+    What is measured: time from the start of `after` until the robot's true speed and turn rate fall to rest and stay
+        there for `hold`; each time that it happens.
+    When it fails: that took longer than `time`; or, with `stay`, the robot moved again before the fault ended.
+    Why this: a robot that no longer sees must not drive. The command may be zero while the wheels still roll, so the
+        truth decides.
+    Source: Nav2's collision monitor (source_timeout); ISO 3691-4 for stopping on a failed personnel detection.
+
+    Inconclusive when it never happened, when the fault or the run was over before `time` was, or when the robot stood
+    already each time: then nothing was tested.
+
+    Example: `stopped_within: {time: 0.5 s, after: lidar.off}`
+    """
+
+    time: PositiveDuration
+    """Seconds after its start."""
+    after: Name
+    """The fault, e.g. `lidar.off`, or the event of the scenario, by name."""
+    speed: PositiveSpeed = 0.02
+    """What counts as standing, in m/s over ground."""
+    turn_rate: PositiveAngularSpeed = 0.05
+    """What counts as standing, in rad/s."""
+    hold: PositiveDuration = 0.2
+    """It must stand so long to count: changing direction is not stopping."""
+    stay: bool = False
+    """Must it also stand until the fault or event ends?"""
+
+    def judge(self, trace: Trace, case: Case) -> list[Finding]:
+        """One finding each time it happened, and one more with `stay`."""
+        happened = spans(trace, self.after)
+        if not happened:
+            because, detail = never_started(trace, self.after)
+            return [undecided("stopped", because, self._limit, detail)]
+        rest = self._rest(trace)
+        if all(_held(trace, rest, span.start) for span in happened):
+            because = f"the robot was not moving when `{self.after}` started, so nothing had to stop"
+            return [undecided("stopped", because, self._limit)]
+        return [finding for span in happened for finding in self._once(trace, span, rest)]
+
+    @property
+    def _limit(self) -> str:
+        return f"≤ {self.time:.2f} s after {self.after}"
+
+    def _rest(self, trace: Trace) -> Flags:
+        """Whether the robot stands, at each truth tick."""
+        slow = speed(trace).values[:, 0] <= self.speed
+        steady = turn_rate(trace).values[:, 0] <= self.turn_rate
+        return slow & steady
+
+    def _once(self, trace: Trace, span: Span, rest: Flags) -> list[Finding]:
+        ticks = trace.velocity.ticks
+        since = slice(max(int(np.searchsorted(ticks, span.start, side="right")) - 1, 0), None)
+        during = ticks[since] <= span.end
+        stop, _ = first_lasting(ticks[since][during], rest[since][during], round(self.hold * trace.tick_rate), span.end)
+        until = span.end if stop is None else max(stop, span.start)
+        elapsed = trace.seconds(until - span.start)
+        if stop is None and elapsed <= self.time:
+            over = f"`{self.after}`" if span.lasting else f"the run ({ending(trace)})"
+            because = f"{over} was over {elapsed:.2f} s after it started, with the robot still moving"
+            return [undecided("stopped", because, self._limit)]
+        detail = _explained(trace, span.start, until) + ([] if stop is not None else ["it never came to rest"])
+        context = f"after {self.after}"
+        found = at_most("stopped", elapsed, self.time, "s", at=(trace, until), context=context, detail=detail)
+        return [found, self._stayed(trace, span, until, rest)] if self.stay and stop is not None else [found]
+
+    def _stayed(self, trace: Trace, span: Span, stop: int, rest: Flags) -> Finding:
+        ticks = trace.velocity.ticks
+        again = ticks[~rest & (ticks > stop) & (ticks < span.end)]
+        expected = f"standing until {self.after} ends"
+        if not len(again):
+            return held("stayed", "stood still", expected)
+        late = trace.seconds(int(again[0]) - span.start)
+        return missed(
+            "stayed", f"moved again {late:.2f} s after {self.after} started", expected, (trace, int(again[0]))
+        )
+
+
+def _held(trace: Trace, flags: Flags, tick: int) -> bool:
+    """The newest flag at `tick`."""
+    return bool(flags[max(int(np.searchsorted(trace.velocity.ticks, tick, side="right")) - 1, 0)])
+
+
+def _explained(trace: Trace, start: int, end: int) -> list[str]:
+    """What the robot did between the two ticks."""
+    way, fast = drive(trace), speed(trace)
+    length, seconds = way.until(end) - way.until(start), trace.seconds(end - start)
+    seen = trace.scans[trace.scans <= end]
+    age = trace.seconds(end - int(seen[-1])) if len(seen) else math.inf
+    line = f"drove {length:.2f} m{' blind' if age > OLD_SCAN else ''} at {length / max(seconds, 1e-9):.2f} m/s"
+    if OLD_SCAN < age < math.inf:
+        line += f"; the newest scan was {age:.1f} s old"
+    top = float(fast.values[(fast.ticks >= start) & (fast.ticks <= end), 0].max(initial=0.0))
+    return [line, f"its top speed in that time was {top:.2f} m/s"]

@@ -1,0 +1,58 @@
+"""`time_to_goal`: how long the drive took."""
+
+from simscen.core.case import Case
+from simscen.core.trace import Trace
+from simscen.core.verdict import Finding
+from simscen.criteria.base import Criterion
+from simscen.criteria.bounds import at_most, missed, undecided
+from simscen.criteria.moments import GoalStory, finished, stories
+from simscen.spec.base import Spec
+from simscen.spec.places import Name
+from simscen.spec.quantities import PositiveDuration
+
+
+class TimeToGoal(Spec, Criterion):
+    """The robot was at its goal in time.
+
+    What is measured: simulated time from the first goal's acceptance to the report that the last one is reached; with
+        `goal`, from that goal's acceptance to the report that it is reached.
+    When it fails: it took longer, or the goal was never reached.
+    Why this: a robot that dithers arrives, too. That it truly arrived is what goals_reached asks.
+    Source: the time of the BARN challenge and of Nav2's own benchmarks (nav2#3239).
+
+    Example: `time_to_goal: {max: 45 s}`
+    """
+
+    max: PositiveDuration
+    """Seconds of simulated time."""
+    goal: Name | None = None
+    """Of this goal alone; default: of the whole tour."""
+
+    def judge(self, trace: Trace, case: Case) -> list[Finding]:
+        """One finding; one for each goal if several share the name."""
+        told = stories(trace, case)
+        if self.goal is not None:
+            named = [story for story in told if story.goal.name == self.goal]
+            if not named:
+                return [undecided(f"goal {self.goal}", f"the scenario has no goal `{self.goal}`")]
+            return [self._timed(trace, f"goal {self.goal}", story.accepted, story) for story in named]
+        if not told:
+            return [undecided("time to goal", "the scenario has no goals")]
+        start = next((story.accepted for story in told if story.accepted is not None), None)
+        unreached = [story for story in told if story.reached is None]
+        return [self._timed(trace, "time to goal", start, unreached[0] if unreached else told[-1])]
+
+    def _timed(self, trace: Trace, what: str, start: int | None, story: GoalStory) -> Finding:
+        begun = start or 0
+        if story.reached is not None:
+            return at_most(what, trace.seconds(story.reached - begun), self.max, "s", at=(trace, story.reached))
+        so_far = trace.seconds(trace.end - begun)
+        if story.end is None and so_far > self.max:
+            return at_most(
+                what, so_far, self.max, "s", at=(trace, trace.end), detail=[f"goal {story.goal.name}: {story.fate}"]
+            )
+        if story.end is None and not finished(trace):
+            return undecided(what, f"the log stops {so_far:.2f} s after the start, {story.fate}", f"≤ {self.max:.2f} s")
+        tick = trace.end if story.end is None else story.end.tick
+        fate = f"goal {story.goal.name}: {story.fate}"
+        return missed(what, "never reached", f"≤ {self.max:.2f} s", (trace, tick), [fate])
