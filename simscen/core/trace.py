@@ -49,7 +49,8 @@ class Decision:
 class Moment:
     """One beat of the lockstep: truth, what the robot was told (faults applied), what it decided, what happened.
 
-    `truth` is None on beats between two truth samples.
+    `truth` is None on beats between two truth samples. `events` are the world's and the scenario's; the stack's own
+    stay in `decision.events`. A trace holds both, in that order.
     """
 
     tick: int
@@ -76,15 +77,15 @@ class Samples:
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """A whole run.
+    """A whole run. A sample's tick is the beat it came with, even when a reading was measured earlier.
 
     truth:      x, y, yaw in the world              (m, m, rad)
     velocity:   vx, vy, wz in the base frame        (m/s, m/s, rad/s), at truth's ticks
     clearance:  hull to nearest obstacle            (m), at truth's ticks
     belief:     x, y, yaw in the map and the upper triangle of its covariance: xx, xy, xyaw, yy, yyaw, yawyaw
-    odometry:   x, y, yaw in the odom frame
-    command:    vx, vy, wz as sent to the wheels
-    objects:    name → x, y, yaw of moving things
+    odometry:   x, y, yaw in the odom frame, of the first odometry sensor that spoke
+    command:    vx, vy, wz as sent to the wheels, when it changes and at least 20 times a second
+    objects:    name → x, y, yaw of moving things, when it changes and at least once a second
     scans:      ticks at which the stack received a scan
     """
 

@@ -19,19 +19,20 @@ class Template:
 
     Fields are appended in the order of the message definition and aligned to their own width, counted from `start`
     bytes before the first field. `prefix` is what precedes the fields without counting: the encapsulation header.
+    `buffer` is the message as filled in last.
     """
 
     def __init__(self, prefix: bytes = HEADER, start: int = 0) -> None:
-        self._buffer = bytearray(prefix)
+        self.buffer = bytearray(prefix)
         self._shift = start - len(prefix)
 
     def slot(self, codes: str) -> Callable[..., None]:
         """Append room for values of one width, e.g. "iI" or "7d"; returns the function that fills it."""
-        self._align(struct.calcsize("<" + codes[-1]))
-        offset = len(self._buffer)
+        self.align(struct.calcsize("<" + codes[-1]))
+        offset = len(self.buffer)
         layout = struct.Struct("<" + codes)
-        self._buffer += bytes(layout.size)
-        return partial(layout.pack_into, self._buffer, offset)
+        self.buffer += bytes(layout.size)
+        return partial(layout.pack_into, self.buffer, offset)
 
     def put(self, codes: str, *values: float) -> None:
         """Append constants of one width."""
@@ -41,20 +42,11 @@ class Template:
         """Append a string: its length with the closing NUL, then its UTF-8 bytes."""
         encoded = text.encode() + b"\0"
         self.put("I", len(encoded))
-        self._buffer += encoded
+        self.buffer += encoded
 
     def align(self, width: int) -> None:
         """Pad to a multiple of `width` bytes."""
-        self._align(width)
-
-    def __len__(self) -> int:
-        return len(self._buffer)
-
-    def __bytes__(self) -> bytes:
-        return bytes(self._buffer)
-
-    def _align(self, width: int) -> None:
-        self._buffer += bytes(-(len(self._buffer) + self._shift) % width)
+        self.buffer += bytes(-(len(self.buffer) + self._shift) % width)
 
 
 class Cursor:

@@ -11,7 +11,7 @@ from simscen.core.trace import Trace
 from simscen.record import event_text, frames, header, topics, unpack
 from simscen.record.header import LogHeader
 from simscen.record.rows import Rows
-from simscen.record.simtime import SimTime
+from simscen.record.simtime import SECOND, SimTime
 
 Handler = Callable[[int, bytes], None]
 
@@ -128,8 +128,8 @@ class Contents:
         self._rows.scans.append(tick)
 
     def _plan(self, _: int, data: bytes) -> None:
-        stamp, poses = unpack.path(data)
-        self._rows.plans.append((self._time.tick(stamp.nanoseconds), poses))
+        (sec, nanosec), poses = unpack.path(data)
+        self._rows.plans.append((self._time.tick(sec * SECOND + nanosec), poses))
 
     def _event(self, _: int, data: bytes) -> None:
         self._rows.events.append(event_text.from_json(unpack.string(data)))

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 
 from pydantic import TypeAdapter, ValidationError
-from pydantic_core import to_jsonable_python
+from pydantic_core import to_json
 
 from simscen.core.case import Case
 from simscen.core.geometry import Pose3
@@ -49,7 +49,7 @@ class LogHeader:
 
 def case_to_json(case: Case) -> str:
     """A Case as strict JSON: infinity, which JSON lacks, is written as the text "Infinity"."""
-    return json.dumps(to_jsonable_python(case, inf_nan_mode="strings"), indent=1)
+    return str(to_json(case, inf_nan_mode="strings", indent=1), "utf-8")
 
 
 def case_from_json(text: str | bytes) -> Case:

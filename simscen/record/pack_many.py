@@ -47,7 +47,7 @@ class LaserScanPacker:
         self._stamp(*stamp)
         self._numbers(scan.angle_min, last, scan.angle_increment, 0.0, 0.0, scan.range_min, scan.range_max)
         self._count(n)
-        return bytes(self._head) + scan.ranges.astype("<f4").tobytes() + b"\0\0\0\0"
+        return bytes(self._head.buffer) + scan.ranges.astype("<f4").tobytes() + b"\0\0\0\0"
 
 
 class PathPacker:
@@ -61,7 +61,7 @@ class PathPacker:
         self._stamp = self._head.slot("iI")
         self._head.string(frame)
         self._count = self._head.slot("I")
-        self._first = self._pose(frame, len(self._head) - len(HEADER))
+        self._first = self._pose(frame, len(self._head.buffer) - len(HEADER))
         self._next = self._pose(frame, 0)
 
     @staticmethod
@@ -77,13 +77,13 @@ class PathPacker:
         self._stamp(*stamp)
         self._count(len(points))
         if not len(points):
-            return bytes(self._head)
+            return bytes(self._head.buffer)
         poses, header = ground_poses(points).astype("<f8"), struct.pack("<iI", *stamp)
-        first, other = (header + bytes(t)[len(header) :] for t in (self._first, self._next))
+        first, other = (header + bytes(t.buffer)[len(header) :] for t in (self._first, self._next))
         rest = np.empty((len(points) - 1, len(other) + 56), dtype=np.uint8)
         rest[:, : len(other)] = np.frombuffer(other, dtype=np.uint8)
         rest[:, len(other) :] = poses[1:].view(np.uint8).reshape(-1, 56)
-        return b"".join((bytes(self._head), first, poses[0].tobytes(), rest.tobytes()))
+        return b"".join((bytes(self._head.buffer), first, poses[0].tobytes(), rest.tobytes()))
 
 
 class ParticleCloudPacker:
@@ -103,7 +103,7 @@ class ParticleCloudPacker:
         cloud = np.empty((len(particles), 8), dtype="<f8")
         cloud[:, :7] = ground_poses(particles)
         cloud[:, 7] = particles[:, 3]
-        return bytes(self._head) + cloud.tobytes()
+        return bytes(self._head.buffer) + cloud.tobytes()
 
 
 class TransformsPacker:
@@ -130,16 +130,17 @@ class _Transform:
     """geometry_msgs/msg/TransformStamped inside a sequence, beginning `start` bytes after a multiple of eight."""
 
     def __init__(self, frame: str, child: str, start: int) -> None:
-        self._message = message = Template(prefix=b"", start=start)
+        message = Template(prefix=b"", start=start)
         self._stamp = message.slot("iI")
         message.string(frame)
         message.string(child)
         self._pose = message.slot("7d")
+        self._buffer = message.buffer
 
     def __call__(self, stamp: Stamp, pose: Pose3) -> bytes:
         self._stamp(*stamp)
         self._pose(*pose)
-        return bytes(self._message)
+        return bytes(self._buffer)
 
 
 def occupancy_grid(frame: str, stamp: Stamp, grid: OccupancyGrid) -> bytes:
@@ -153,4 +154,4 @@ def occupancy_grid(frame: str, stamp: Stamp, grid: OccupancyGrid) -> bytes:
     message.put("2I", width, height)
     message.put("7d", *Pose3.planar(grid.origin))
     message.put("I", grid.cells.size)
-    return bytes(message) + grid.cells.astype(np.int8).tobytes()
+    return bytes(message.buffer) + grid.cells.astype(np.int8).tobytes()

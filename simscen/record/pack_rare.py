@@ -11,14 +11,14 @@ def string(text: str) -> bytes:
     """std_msgs/msg/String."""
     message = Template()
     message.string(text)
-    return bytes(message)
+    return bytes(message.buffer)
 
 
 def boolean(value: bool) -> bytes:
     """std_msgs/msg/Bool."""
     message = Template()
     message.put("B", value)
-    return bytes(message)
+    return bytes(message.buffer)
 
 
 def log(stamp: Stamp, level: int, name: str, text: str) -> bytes:
@@ -29,7 +29,7 @@ def log(stamp: Stamp, level: int, name: str, text: str) -> bytes:
     for field in (name, text, "", ""):
         message.string(field)
     message.put("I", 0)
-    return bytes(message)
+    return bytes(message.buffer)
 
 
 def image(frame: str, stamp: Stamp, pixels: "npt.NDArray[np.uint8] | npt.NDArray[np.float32]") -> bytes:
@@ -44,4 +44,4 @@ def image(frame: str, stamp: Stamp, pixels: "npt.NDArray[np.uint8] | npt.NDArray
     message.string(encoding)
     message.put("B", 0)
     message.put("2I", len(content) // height if height else 0, len(content))
-    return bytes(message) + content
+    return bytes(message.buffer) + content

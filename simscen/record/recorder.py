@@ -12,7 +12,7 @@ from simscen.record.header import LogHeader
 from simscen.record.logfile import LogFile
 from simscen.record.selection import Selection
 from simscen.record.sensor_topics import SensorTopics
-from simscen.record.simtime import SimTime, Stamp
+from simscen.record.simtime import SimTime
 from simscen.record.stack_topics import StackTopics
 from simscen.record.topics import Publisher
 from simscen.record.truth_topics import TruthTopics
@@ -78,6 +78,6 @@ def _write_header(writer: McapWriter, out: Publisher, clock: Clock, about: LogHe
     for name, data in header.attachments(about).items():
         writer.attach(name, header.media_type(name), data)
     if about.map is not None:
-        out.publish(topics.MAP, 0, pack_many.occupancy_grid(frames.MAP, Stamp(0, 0), about.map))
+        out.publish(topics.MAP, 0, pack_many.occupancy_grid(frames.MAP, (0, 0), about.map))
     if about.robot_description:
         out.publish(topics.ROBOT_DESCRIPTION, 0, pack_rare.string(about.robot_description))

@@ -14,7 +14,7 @@ from simscen.record.selection import Selection
 from simscen.record.simtime import SimTime, Stamp
 from simscen.record.topics import Publisher, Topic
 
-_START = Stamp(0, 0)
+_START: Stamp = (0, 0)
 
 
 class SensorTopics:

@@ -1,21 +1,11 @@
 """Ticks as nanoseconds and back, in whole numbers."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 SECOND = 1_000_000_000
 
 
-class Stamp(NamedTuple):
-    """builtin_interfaces/Time: whole seconds and the nanoseconds beyond them."""
-
-    sec: int
-    nanosec: int
-
-    @property
-    def nanoseconds(self) -> int:
-        """The same as a whole number of nanoseconds."""
-        return self.sec * SECOND + self.nanosec
+Stamp = tuple[int, int]  # builtin_interfaces/Time: whole seconds and the nanoseconds beyond them
 
 
 @dataclass(frozen=True)
@@ -38,7 +28,7 @@ class SimTime:
 
     def stamp(self, tick: int) -> Stamp:
         """The same as a ROS time."""
-        return Stamp(*divmod(tick * SECOND // self.rate, SECOND))
+        return divmod(tick * SECOND // self.rate, SECOND)
 
     def tick(self, nanoseconds: int) -> int:
         """The tick that `nanoseconds` was written for."""

@@ -76,7 +76,7 @@ def path(data: bytes) -> tuple[Stamp, Array]:
         cursor.take("iI")
         cursor.string()
         row[:] = cursor.take("7d")
-    return Stamp(int(sec), int(nanosec)), poses
+    return (int(sec), int(nanosec)), poses
 
 
 def occupancy_grid(data: bytes, resolution: float, origin: Pose2) -> OccupancyGrid:

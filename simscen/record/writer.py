@@ -19,7 +19,8 @@ from simscen.record.schemas import MessageType
 MAGIC = b"\x89MCAP0\r\n"
 CHUNK_SIZE = 1 << 16  # what a SIGKILL can lose; 1 MiB, the library's default, would lose most runs whole
 _COMPRESSION_LEVEL = 1  # as small as level 3 on particles and scans, four times as fast
-_MESSAGE = struct.Struct("<BQHIQQ")
+_MESSAGE_CODE = int(Opcode.MESSAGE)
+_MESSAGE = struct.Struct("<BQHIQQ").pack
 
 
 class Sink(Protocol):
@@ -39,7 +40,7 @@ class McapWriter:
 
     def __init__(self, sink: Sink, profile: str, library: str, chunk_size: int = CHUNK_SIZE) -> None:
         self._sink = sink
-        self._written = 0
+        self._written = self._checksum = 0
         self._chunk = _Chunk()
         self._chunk_size = chunk_size
         self._compress = zstandard.ZstdCompressor(level=_COMPRESSION_LEVEL).compress
@@ -67,8 +68,15 @@ class McapWriter:
 
     def message(self, channel: int, time: int, data: bytes) -> None:
         """Add a message at `time` nanoseconds."""
-        self._counts[channel - 1] += 1
-        if self._chunk.message(channel, time, data) > self._chunk_size:
+        chunk = self._chunk
+        size = chunk.size
+        entries = chunk.index.get(channel)
+        if entries is None:
+            entries = chunk.index[channel] = []
+        entries += (time, size)
+        chunk.parts += (_MESSAGE(_MESSAGE_CODE, 22 + len(data), channel, 0, time, time), data)
+        chunk.size = size = size + 31 + len(data)
+        if size > self._chunk_size:
             self._finish_chunk()
 
     def attach(self, name: str, media_type: str, data: bytes) -> None:
@@ -88,7 +96,7 @@ class McapWriter:
         """Write what is left and the summary; the sink stays open."""
         if self._chunk.index:
             self._finish_chunk()
-        self._put(_encoded(records.DataEnd(0)))
+        self._put(_encoded(records.DataEnd(self._checksum)))
         start = self._written
         groups = [_encoded(*group) for group in self._summary()]
         offsets = []
@@ -124,22 +132,25 @@ class McapWriter:
         content = b"".join(chunk.parts)
         packed = self._compress(content)
         checksum = zlib.crc32(content)
-        record = _encoded(records.Chunk("zstd", packed, chunk.end, chunk.start, checksum, len(content)))
+        start = min(entries[0] for entries in chunk.index.values())
+        end = max(entries[-2] for entries in chunk.index.values())
+        record = _encoded(records.Chunk("zstd", packed, end, start, checksum, len(content)))
         at, index = self._written, bytearray()
         offsets = {}
         for channel, entries in chunk.index.items():
             offsets[channel] = at + len(record) + len(index)
             index += _message_index(channel, entries)
+            self._counts[channel - 1] += len(entries) // 2
         self._chunks.append(
             records.ChunkIndex(
                 chunk_length=len(record),
                 chunk_start_offset=at,
                 compression="zstd",
                 compressed_size=len(packed),
-                message_end_time=chunk.end,
+                message_end_time=end,
                 message_index_length=len(index),
                 message_index_offsets=offsets,
-                message_start_time=chunk.start,
+                message_start_time=start,
                 uncompressed_size=len(content),
             )
         )
@@ -148,33 +159,20 @@ class McapWriter:
     def _put(self, data: bytes) -> None:
         self._sink.write(data)
         self._written += len(data)
+        self._checksum = zlib.crc32(data, self._checksum)
 
 
 class _Chunk:
-    """Records on their way into one chunk; `index` holds times and offsets of each channel's messages in turn."""
+    """Records on their way into one chunk; `index` holds time, offset, time, offset … of each channel's messages."""
 
     def __init__(self) -> None:
         self.parts: list[bytes] = []
         self.size = 0
-        self.start = self.end = 0
         self.index: dict[int, list[int]] = {}
 
     def put(self, record: bytes) -> None:
         self.parts.append(record)
         self.size += len(record)
-
-    def message(self, channel: int, time: int, data: bytes) -> int:
-        """Add a message; returns the size of the chunk."""
-        if not self.index:
-            self.start = time
-        self.end = time
-        entries = self.index.get(channel)
-        if entries is None:
-            entries = self.index[channel] = []
-        entries += (time, self.size)
-        self.parts += (_MESSAGE.pack(Opcode.MESSAGE, 22 + len(data), channel, 0, time, time), data)
-        self.size += 31 + len(data)
-        return self.size
 
 
 def _message_index(channel: int, entries: list[int]) -> bytes:

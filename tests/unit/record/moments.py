@@ -60,7 +60,9 @@ def moments(
         if tick % 24 == 0:
             ranges = np.round(rng.uniform(0.1, 12.0, size=beams), 3)
             ranges[:: max(1, beams // 7)] = np.inf
-            readings.append(Scan("lidar", max(0, tick - 2), ranges, -np.pi, 2 * np.pi / beams, 0.1, 12.0, Pose2(0.1, 0.0)))
+            readings.append(
+                Scan("lidar", max(0, tick - 2), ranges, -np.pi, 2 * np.pi / beams, 0.1, 12.0, Pose2(0.1, 0.0))
+            )
             square = rng.normal(size=(3, 3))
             cloud = rng.normal(size=(particles, 4))
             belief = Belief(Pose2(x, y, yaw), square @ square.T, Pose2(0.1, 0.2, 0.3), cloud, tick)
@@ -69,7 +71,9 @@ def moments(
         plan = Path(rng.normal(size=(100, 3)), max(0, tick - 1)) if tick % 240 == 0 else None
         if extras and tick % 120 == 0:
             readings.append(Odometry("visual", tick, Pose2(9.0, 9.0, 9.0), Twist()))
-            readings.append(Scan("rear lidar", tick, np.array([1.0, np.nan]), 0.0, 0.1, 0.0, 9.0, Pose2(-0.2, 0.0, 3.0)))
+            readings.append(
+                Scan("rear lidar", tick, np.array([1.0, np.nan]), 0.0, 0.1, 0.0, 9.0, Pose2(-0.2, 0.0, 3.0))
+            )
             readings.append(Bump("bumper", tick, tick % 240 == 0))
             rgb = rng.integers(0, 256, size=(3, 4, 3), dtype=np.uint8)
             readings.append(Image("camera", tick, rgb, np.full((3, 4), np.inf, dtype=np.float32)))
@@ -83,4 +87,6 @@ def moments(
             {"cart": cart, "a box": Pose3(2.0, 3.0, 0.5)} if tick < 400 else {},
         )
         decision = Decision(command, belief, plan, local_plan, tuple(stack_events))
-        yield Moment(tick, truth if tick % 12 == 0 or tick % 6 == 0 else None, tuple(readings), decision, tuple(happened))
+        yield Moment(
+            tick, truth if tick % 12 == 0 or tick % 6 == 0 else None, tuple(readings), decision, tuple(happened)
+        )

@@ -1,21 +1,19 @@
 """A log gives back the very Trace that the moments gave."""
 
 import dataclasses
-import io
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from simscen.core.errors import InvalidInput
 from simscen.core.trace import Moment, Samples, Trace
 from simscen.record.recorder import Recorder
-from simscen.record.replay import Log, read_log
+from simscen.record.replay import read_log
 from simscen.record.trace import TraceBuilder
 
 sys.path.insert(0, str(Path(__file__).parent))
-from moments import CASE, CLOCK, about, moments
+from moments import CLOCK, about, moments
 
 
 def recorded(path: Path, run: "list[Moment]", end: int) -> Trace:

@@ -1,0 +1,62 @@
+"""Templates align as CDR asks, and cursors read what they wrote."""
+
+import struct
+
+import numpy as np
+import pytest
+
+from simscen.record.cdr import Cursor, Template
+
+
+def test_alignment_is_counted_after_the_header() -> None:
+    message = Template()
+    message.put("B", 1)
+    message.put("d", 1.0)
+    assert bytes(message.buffer) == b"\0\1\0\0" + b"\1" + bytes(7) + struct.pack("<d", 1.0)
+
+
+def test_a_string_carries_its_length_with_the_closing_nul() -> None:
+    message = Template()
+    message.string("añ")
+    assert bytes(message.buffer[4:]) == b"\4\0\0\0a\xc3\xb1\0"
+
+
+def test_a_slot_filled_again_leaves_the_constants_alone() -> None:
+    message = Template()
+    stamp = message.slot("iI")
+    message.string("map")
+    stamp(1, 2)
+    first = bytes(message.buffer)
+    stamp(3, 4)
+    assert first[:4] == bytes(message.buffer[:4])
+    assert first[12:] == bytes(message.buffer[12:])
+    assert Cursor(bytes(message.buffer)).take("iI") == (3, 4)
+
+
+def test_a_cursor_reads_what_a_template_wrote() -> None:
+    message = Template()
+    message.put("B", 7)
+    message.string("odom")
+    message.put("3d", 1.0, -0.0, 1e-300)
+    cursor = Cursor(bytes(message.buffer))
+    assert cursor.take("B") == (7,)
+    assert cursor.string() == "odom"
+    assert cursor.array("<f8", (3,)).tolist() == [1.0, 0.0, 1e-300]
+
+
+def test_a_message_that_ends_too_early_is_an_error() -> None:
+    message = Template()
+    message.put("I", 5)
+    data = bytes(message.buffer)
+    with pytest.raises(struct.error):
+        Cursor(data).take("d")
+    with pytest.raises(struct.error):
+        Cursor(data).string()
+    with pytest.raises(struct.error):
+        Cursor(data).array("i1", (9, 9))
+
+
+def test_arrays_are_read_without_a_copy() -> None:
+    cells = Cursor(b"\0\1\0\0" + bytes(range(6))).array("i1", (2, 3))
+    assert np.array_equal(cells, np.arange(6).reshape(2, 3))
+    assert not cells.flags.owndata

@@ -1,0 +1,25 @@
+"""Events as JSON and as lines."""
+
+from simscen.core.events import Event
+from simscen.record import event_text
+
+
+def test_an_event_is_read_back_equal() -> None:
+    event = Event(12, "collision.started", 'a "wall" ü', {"x": 1 / 3, "n": 2, "list": [None, True, {"a": 1e-320}]})
+    assert event_text.from_json(event_text.to_json(event)) == event
+
+
+def test_an_event_with_an_infinite_number_is_read_back_equal() -> None:
+    event = Event(0, "plan.failed", "", {"length": float("inf")})
+    assert event_text.from_json(event_text.to_json(event)) == event
+
+
+def test_an_event_reads_as_one_line() -> None:
+    event = Event(1, "goal.failed", "shelf", {"error_code": 208, "after": 1.23456789})
+    assert event_text.sentence(event) == "goal.failed shelf: error_code=208, after=1.235"
+    assert event_text.sentence(Event(1, "navigation.ended")) == "navigation.ended"
+
+
+def test_failures_stand_out_in_a_log_panel() -> None:
+    levels = [event_text.level(Event(0, kind)) for kind in ("goal.accepted", "recovery.started", "collision.started")]
+    assert levels == sorted(set(levels))

@@ -1,0 +1,22 @@
+"""The message definitions that ship are those of ROS 2 Humble."""
+
+import json
+import sys
+from pathlib import Path
+
+from simscen.record import topics
+from simscen.record.schemas import load
+from simscen.record.topics import Topic
+
+sys.path.insert(0, str(Path(__file__).parent))
+from schemas_from_rosbags import SCHEMAS, expected
+
+
+def test_schemas_have_not_drifted_from_rosbags() -> None:
+    assert json.loads(SCHEMAS.read_text()) == expected()
+
+
+def test_every_topic_has_a_message_type_that_ships() -> None:
+    types = {topic.type for topic in vars(topics).values() if isinstance(topic, Topic)}
+    types |= {value for name, value in vars(topics).items() if name.endswith("_TYPE")}
+    assert types == set(load())

@@ -1,0 +1,92 @@
+"""The files are sound MCAP: the mcap library reads them in every way it has, checksums included."""
+
+import io
+import random
+
+import pytest
+from mcap.reader import NonSeekingReader, make_reader
+from mcap.stream_reader import StreamReader
+from mcap.writer import CompressionType, Writer
+
+from simscen.record.schemas import load
+from simscen.record.writer import McapWriter
+
+TEXT = load()["std_msgs/msg/String"]
+MESSAGES = [(1 + i % 3, 1000 * (i // 2), random.Random(i).randbytes(300)) for i in range(2000)]
+
+
+def ours() -> bytes:
+    stream = io.BytesIO()
+    writer = McapWriter(stream, "ros2", "simscen")
+    for n in range(3):
+        writer.channel(f"/t{n}", TEXT, {"key": str(n)})
+    writer.attach("a.txt", "text/plain", b"hello")
+    writer.note("facts", {"seed": "7"})
+    for message in MESSAGES:
+        writer.message(*message)
+    writer.finish()
+    return stream.getvalue()
+
+
+def theirs() -> bytes:
+    """The same calls on the library's own writer."""
+    stream = io.BytesIO()
+    writer = Writer(stream, chunk_size=1 << 16, compression=CompressionType.ZSTD)
+    writer.start("ros2", "simscen")
+    schema = writer.register_schema(TEXT.name, "ros2msg", TEXT.definition.encode())
+    for n in range(3):
+        writer.register_channel(f"/t{n}", "cdr", schema, {"key": str(n)})
+    writer.add_attachment(0, 0, "a.txt", "text/plain", b"hello")
+    writer.add_metadata("facts", {"seed": "7"})
+    for channel, time, data in MESSAGES:
+        writer.add_message(channel, time, data, time)
+    writer.finish()
+    return stream.getvalue()
+
+
+def test_the_summary_is_the_one_that_the_library_writes() -> None:
+    mine, reference = (make_reader(io.BytesIO(data)).get_summary() for data in (ours(), theirs()))
+    assert mine is not None
+    assert reference is not None
+    assert mine.statistics == reference.statistics
+    assert mine.schemas == reference.schemas
+    assert mine.channels == reference.channels
+    assert len(mine.chunk_indexes) == len(reference.chunk_indexes)
+
+
+def test_messages_are_found_through_the_index() -> None:
+    reader = make_reader(io.BytesIO(ours()), validate_crcs=True)
+    found = [(c.id, m.log_time, m.data) for _, c, m in reader.iter_messages(topics=["/t1"], starting_at=500_000)]
+    assert found == [message for message in MESSAGES if message[0] == 2 and message[1] >= 500_000]
+
+
+def test_messages_stream_in_the_order_they_were_written() -> None:
+    reader = NonSeekingReader(io.BytesIO(ours()), validate_crcs=True)
+    read = [(c.id, m.log_time, m.data) for _, c, m in reader.iter_messages(log_time_order=False)]
+    assert read == MESSAGES
+
+
+def test_attachments_and_metadata_are_found_through_the_index() -> None:
+    reader = make_reader(io.BytesIO(ours()))
+    assert [(a.name, a.media_type, a.data) for a in reader.iter_attachments()] == [("a.txt", "text/plain", b"hello")]
+    assert [(m.name, m.metadata) for m in reader.iter_metadata()] == [("facts", {"seed": "7"})]
+
+
+def test_a_changed_byte_anywhere_in_the_data_is_noticed() -> None:
+    data = bytearray(ours())
+    data[data.index(b"hello")] ^= 1
+    with pytest.raises(ValueError, match="crc"):
+        list(StreamReader(io.BytesIO(data), validate_crcs=True).records)
+
+
+def test_a_file_without_messages_is_sound() -> None:
+    stream = io.BytesIO()
+    writer = McapWriter(stream, "ros2", "simscen")
+    writer.channel("/t", TEXT, {})
+    writer.finish()
+    stream.seek(0)
+    assert list(make_reader(stream, validate_crcs=True).iter_messages()) == []
+
+
+def test_the_same_calls_give_the_same_bytes() -> None:
+    assert ours() == ours()
