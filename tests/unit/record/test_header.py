@@ -30,7 +30,11 @@ def test_a_case_is_read_back_equal_with_infinite_distances() -> None:
 def test_numbers_of_a_case_are_read_back_exactly(shortest: float, x: float) -> None:
     case = Case(Pose2(x, 0.0), (), {"a": shortest}, time_limit=x)
     again = header.case_from_json(header.case_to_json(case))
-    assert (repr(again.start.x), repr(again.shortest["a"]), repr(again.time_limit)) == (repr(x), repr(shortest), repr(x))
+    assert (repr(again.start.x), repr(again.shortest["a"]), repr(again.time_limit)) == (
+        repr(x),
+        repr(shortest),
+        repr(x),
+    )
 
 
 def test_a_case_is_written_as_strict_json() -> None:

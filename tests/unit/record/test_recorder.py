@@ -1,0 +1,172 @@
+"""A log opens in other people's readers and says there what happened."""
+
+import hashlib
+import io
+import sys
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from rosbags.highlevel import AnyReader
+from rosbags.interfaces import QosDurability
+
+from simscen.core.errors import RunError
+from simscen.core.sensing import Scan
+from simscen.core.trace import Moment
+from simscen.record.recorder import Recorder
+
+sys.path.insert(0, str(Path(__file__).parent))
+from moments import CASE, CLOCK, about, moments
+from schemas_from_rosbags import humble
+
+RUN = list(moments(2.0))
+LATCHED = {"/map", "/tf_static", "/robot_description"}
+TOPICS = LATCHED | {
+    *("/clock", "/tf", "/scan", "/odom", "/imu", "/bumper", "/amcl_pose", "/particle_cloud", "/plan", "/local_plan"),
+    *("/cmd_vel", "/goal_pose", "/ground_truth/odom", "/rosout", "/simscen/events", "/simscen/clearance"),
+    *("/visual/odom", "/rear_lidar/scan", "/camera/image_raw", "/camera/depth/image_raw"),
+}
+
+
+def record(run: list[Moment], seed: int = 7) -> bytes:
+    stream = io.BytesIO()
+    recorder = Recorder(stream, CLOCK, about(seed))
+    for moment in run:
+        recorder.append(moment)
+    recorder.close(480, "{}")
+    return stream.getvalue()
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("log") / "run.mcap"
+    path.write_bytes(record(RUN))
+    return path
+
+
+@pytest.fixture(scope="module")
+def read(path: Path) -> dict[str, list[tuple[int, Any]]]:
+    """All messages by topic, with their times, as rosbags decodes them."""
+    found: dict[str, list[tuple[int, Any]]] = {}
+    with AnyReader([path], default_typestore=humble()) as reader:
+        for connection, time, data in reader.messages():
+            found.setdefault(connection.topic, []).append((time, reader.deserialize(data, connection.msgtype)))
+    return found
+
+
+def test_rosbags_decodes_every_topic(read: dict[str, list[tuple[int, Any]]]) -> None:
+    assert set(read) == TOPICS
+
+
+def test_mcap_ros2_decodes_every_message(path: Path) -> None:
+    with path.open("rb") as stream:
+        reader = make_reader(stream, decoder_factories=[DecoderFactory()], validate_crcs=True)
+        topics = Counter(channel.topic for _, channel, _, _ in reader.iter_decoded_messages())
+        summary = reader.get_summary()
+    assert set(topics) == TOPICS
+    assert summary is not None
+    assert summary.statistics is not None
+    assert summary.statistics.message_count == topics.total()
+
+
+def test_only_what_late_subscribers_need_is_latched(path: Path) -> None:
+    with AnyReader([path], default_typestore=humble()) as reader:
+        for connection in reader.connections:
+            (profile,) = connection.ext.offered_qos_profiles
+            expected = QosDurability.TRANSIENT_LOCAL if connection.topic in LATCHED else QosDurability.VOLATILE
+            assert profile.durability is expected
+
+
+def test_type_hashes_are_those_of_ros(path: Path) -> None:
+    store = humble()
+    with path.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    for channel in summary.channels.values():
+        name = summary.schemas[channel.schema_id].name
+        assert channel.metadata["topic_type_hash"] == store.hash_rihs01(name)
+
+
+def test_truth_is_in_the_log_to_the_last_bit(read: dict[str, list[tuple[int, Any]]]) -> None:
+    for (time, message), moment in zip(read["/ground_truth/odom"], RUN, strict=True):
+        assert moment.truth is not None
+        pose = message.pose.pose
+        assert time == moment.tick * 10**9 // 240
+        assert (message.header.frame_id, message.child_frame_id) == ("map", "base_link_truth")
+        assert (pose.position.x, pose.position.y, pose.orientation.w) == moment.truth.pose[:2] + moment.truth.pose[6:]
+        assert (message.twist.twist.linear.x, message.twist.twist.angular.z) == moment.truth.twist[::2]
+
+
+def test_scans_carry_ranges_frame_and_the_time_they_were_taken(read: dict[str, list[tuple[int, Any]]]) -> None:
+    scans = [r for m in RUN for r in m.readings if isinstance(r, Scan) and r.sensor == "lidar"]
+    for (_, message), scan in zip(read["/scan"], scans, strict=True):
+        assert np.array_equal(message.ranges, scan.ranges.astype(np.float32))
+        assert message.header.frame_id == "lidar"
+        assert message.header.stamp.sec * 10**9 + message.header.stamp.nanosec == scan.tick * 10**9 // 240
+
+
+def test_the_frames_form_one_tree_under_map(read: dict[str, list[tuple[int, Any]]]) -> None:
+    links = [t for topic in ("/tf", "/tf_static") for _, message in read[topic] for t in message.transforms]
+    parents = {t.child_frame_id: t.header.frame_id for t in links}
+    assert parents == {
+        "odom": "map",
+        "base_link": "odom",
+        **dict.fromkeys(("camera", "lidar", "rear lidar"), "base_link"),
+        **dict.fromkeys(("object/cart", "object/a box"), "map"),
+    }
+    assert {t.child_frame_id for t in read["/tf_static"][-1][1].transforms} == {"camera", "lidar", "rear lidar"}
+
+
+def test_the_map_is_the_one_the_robot_was_given(read: dict[str, list[tuple[int, Any]]]) -> None:
+    ((time, message),) = read["/map"]
+    given = about().map
+    assert given is not None
+    assert time == 0
+    assert (message.info.height, message.info.width) == given.shape
+    assert np.array_equal(message.data.reshape(given.shape), given.cells)
+
+
+def test_an_accepted_goal_is_shown_where_the_scenario_has_it(read: dict[str, list[tuple[int, Any]]]) -> None:
+    ((_, message),) = read["/goal_pose"]
+    assert (message.pose.position.x, message.pose.position.y) == CASE.goals[0].pose[:2]
+
+
+def test_particles_come_twice_a_second(read: dict[str, list[tuple[int, Any]]]) -> None:
+    assert [time for time, _ in read["/particle_cloud"]] == [n * 500_000_000 for n in range(5)]
+    assert len(read["/particle_cloud"][0][1].particles) == 500
+
+
+def test_equal_runs_give_equal_bytes() -> None:
+    digests = {hashlib.sha256(record(list(moments(1.0)))).hexdigest() for _ in range(3)}
+    assert len(digests) == 1
+
+
+def test_another_seed_gives_other_bytes() -> None:
+    assert record(RUN[:5], seed=7) != record(RUN[:5], seed=8)
+
+
+def test_a_log_has_its_name_only_when_it_is_whole(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "run.mcap", CLOCK, about()) as recorder:
+        recorder.append(RUN[0])
+        assert [p.name for p in tmp_path.iterdir()] == ["run.partial.mcap"]
+        recorder.close(0)
+    assert [p.name for p in tmp_path.iterdir()] == ["run.mcap"]
+
+
+def test_a_full_disk_is_told_as_such(tmp_path: Path) -> None:
+    full = Path("/dev/full")
+    if not full.exists():
+        pytest.skip("this system has no /dev/full")
+    (tmp_path / "run.partial.mcap").symlink_to(full)
+    with pytest.raises(RunError, match=r"no space left writing .*run\.partial\.mcap") as caught:
+        Recorder(tmp_path / "run.mcap", CLOCK, about())
+    assert caught.value.kind == "output"
+
+
+def test_a_folder_that_is_not_there_is_told_as_such(tmp_path: Path) -> None:
+    with pytest.raises(RunError, match=r"cannot write .*: No such file"):
+        Recorder(tmp_path / "no" / "run.mcap", CLOCK, about())

@@ -1,0 +1,97 @@
+"""The Trace holds what the moments said."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from simscen.core.events import Event
+from simscen.core.geometry import Pose3, wrap_array
+from simscen.core.motion import STOP
+from simscen.core.sensing import Odometry, Scan
+from simscen.core.trace import Decision, Moment, Trace, Truth
+from simscen.record.trace import TraceBuilder
+
+sys.path.insert(0, str(Path(__file__).parent))
+from moments import CLOCK, moments
+
+RUN = list(moments(2.0))
+
+
+def traced(run: list[Moment], end: int = 480) -> Trace:
+    builder = TraceBuilder(CLOCK)
+    for moment in run:
+        builder.append(moment)
+    return builder.finish(end)
+
+
+@pytest.fixture(scope="module")
+def trace() -> Trace:
+    return traced(RUN)
+
+
+def assert_poses(values: np.ndarray, expected: "list[tuple[float, ...]]") -> None:
+    """Positions to the last bit, headings to rounding."""
+    rows = np.array(expected)
+    assert np.array_equal(values[:, :2], rows[:, :2])
+    assert np.abs(wrap_array(values[:, 2] - rows[:, 2])).max() < 1e-14
+
+
+def test_truth_is_sampled_where_there_is_truth(trace: Trace) -> None:
+    true = [(m.tick, m.truth) for m in RUN if m.truth]
+    assert trace.truth.ticks.tolist() == trace.clearance.ticks.tolist() == [tick for tick, _ in true]
+    assert_poses(trace.truth.values, [truth.pose.plane for _, truth in true])
+    assert trace.velocity.values.tolist() == [list(truth.twist) for _, truth in true]
+    assert trace.clearance.values.ravel().tolist() == [truth.clearance for _, truth in true]
+
+
+def test_beliefs_carry_pose_and_upper_covariance(trace: Trace) -> None:
+    beliefs = [(m.tick, m.decision.belief) for m in RUN if m.decision.belief]
+    assert trace.belief.ticks.tolist() == [tick for tick, _ in beliefs]
+    assert_poses(trace.belief.values, [belief.pose for _, belief in beliefs])
+    upper = [belief.covariance[np.triu_indices(3)].tolist() for _, belief in beliefs]
+    assert trace.belief.values[:, 3:].tolist() == upper
+
+
+def test_odometry_is_that_of_the_first_sensor(trace: Trace) -> None:
+    wheels = [(m.tick, r.pose) for m in RUN for r in m.readings if isinstance(r, Odometry) and r.sensor == "wheels"]
+    assert trace.odometry.ticks.tolist() == [tick for tick, _ in wheels]
+    assert_poses(trace.odometry.values, [pose for _, pose in wheels])
+
+
+def test_the_command_at_any_beat_is_the_one_that_was_decided(trace: Trace) -> None:
+    held = trace.command.at(np.array([m.tick for m in RUN]))
+    assert held.tolist() == [list(m.decision.command) for m in RUN]
+
+
+def test_a_thing_at_any_beat_is_where_it_really_was(trace: Trace) -> None:
+    seen = [(m.tick, m.truth.objects) for m in RUN if m.truth and m.truth.objects]
+    assert list(trace.objects) == ["a box", "cart"]
+    for name, samples in trace.objects.items():
+        held = samples.at(np.array([tick for tick, _ in seen]))
+        assert_poses(held, [objects[name].plane for _, objects in seen])
+
+
+def test_scans_are_the_beats_at_which_any_lidar_spoke(trace: Trace) -> None:
+    assert trace.scans.tolist() == [m.tick for m in RUN if any(isinstance(r, Scan) for r in m.readings)]
+
+
+def test_plans_keep_their_tick_and_their_points(trace: Trace) -> None:
+    plans = [m.decision.plan for m in RUN if m.decision.plan]
+    assert [plan.tick for plan in trace.plans] == [plan.tick for plan in plans]
+    for ours, theirs in zip(trace.plans, plans, strict=True):
+        assert_poses(ours.points, theirs.points.tolist())
+
+
+def test_events_of_world_and_stack_are_kept_in_order() -> None:
+    world, stack = Event(0, "fault.started", "lidar.off"), Event(0, "goal.accepted", "shelf", {"index": 0})
+    moment = Moment(0, Truth(Pose3(), STOP, 1.0), (), Decision(STOP, events=(stack,)), (world,))
+    assert traced([moment]).events == (world, stack)
+
+
+def test_a_run_that_broke_off_at_once_has_an_empty_trace() -> None:
+    trace = traced([], end=0)
+    assert trace.truth.values.shape == (0, 3)
+    assert trace.belief.values.shape == (0, 9)
+    assert len(trace.scans) == len(trace.events) == trace.end == 0
