@@ -21,7 +21,7 @@ def check(model: type[Model], tree: Node) -> Model | list[Problem]:
     if problem := _other_version(tree):
         return [problem]
     try:
-        return model.model_validate(tree.plain)
+        return model.model_validate(tree.plain, by_alias=True, by_name=False)
     except ValidationError as error:
         found = [_translate(model, tree, dict(e)) for e in error.errors(include_input=False, include_url=False)]
         return _merged(found)
@@ -47,13 +47,12 @@ def _translate(model: type[BaseModel], tree: Node, error: dict[str, Any]) -> Pro
     if kind.startswith("union_tag"):
         return _wrong_type(tree, loc, error)
     if loc and loc[-1] == "[key]":
-        code, message, hint = messages.explain(kind, error.get("ctx", {}), Leaf(tree.place, str(loc[-2])), error["msg"])
-        return _problem(key_place(tree, loc), code, message, hint)
+        name = Leaf(tree.place, str(loc[-2]))
+        return _problem(key_place(tree, loc), *messages.explain(kind, error.get("ctx", {}), name, error["msg"]))
     node = at(tree, loc)
     if kind == "value_error" and (empty := _empty_choice(model, node, loc)):
         return empty
-    code, message, hint = messages.explain(kind, error.get("ctx", {}), node, error["msg"])
-    return _problem(value_place(tree, loc), code, message, hint)
+    return _problem(value_place(tree, loc), *messages.explain(kind, error.get("ctx", {}), node, error["msg"]))
 
 
 def _unknown_key(model: type[BaseModel], tree: Node, loc: tuple[Key, ...]) -> Problem:

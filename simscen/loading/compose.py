@@ -18,6 +18,7 @@ from simscen.loading.tree import Entry, Fields, Items, Leaf, Node, Place
 DEEPEST = 40
 MOST_VALUES = 100_000
 
+# libyaml where PyYAML was built with it: ten times faster, the same events.
 _Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
@@ -68,7 +69,7 @@ class _Composer:
         next(self._events)  # the end of the document
         after = next(self._events)
         if not isinstance(after, ev.StreamEndEvent):
-            message = f"more than one YAML document (line {after.start_mark.line + 1})"
+            message = f"more than one YAML document (line {self._place(after).line})"
             raise _Refused(self._problem(after, "SC004", message, "put each scenario into a file of its own"))
         return root
 
@@ -184,11 +185,13 @@ class _Composer:
         self.problems.append(self._problem(event, "SC007", message, hint))
 
     def _place(self, event: ev.Event) -> Place:
-        return Place(self.path, event.start_mark.line + 1, event.start_mark.column + 1)
+        mark = event.start_mark
+        assert mark is not None
+        return Place(self.path, mark.line + 1, mark.column + 1)
 
     def _problem(self, event: ev.Event | None, code: str, message: str, hint: str = "") -> Problem:
-        line, col = (event.start_mark.line + 1, event.start_mark.column + 1) if event is not None else (0, 0)
-        return Problem(self.path, line, col, code, message, hint)
+        place = self._place(event) if event is not None else Place(self.path, 0, 0)
+        return Problem(*place, code=code, message=message, hint=hint)
 
     def _syntax_problem(self, error: yaml.MarkedYAMLError) -> Problem:
         mark = error.problem_mark or error.context_mark

@@ -1,6 +1,6 @@
 """One YAML document out of several files: `extends:` and the `defaults.yaml` beside it."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from simscen.core.problems import Problem
@@ -47,8 +47,6 @@ class Library:
         return [self._sourced(problem) for problem in problems]
 
     def _sourced(self, problem: Problem) -> Problem:
-        from dataclasses import replace
-
         lines = self.texts.get(problem.path, "").split("\n")
         return replace(problem, source=lines[problem.line - 1]) if 0 < problem.line <= len(lines) else problem
 

@@ -38,10 +38,10 @@ def needs_nothing(model: type[BaseModel]) -> bool:
 
 
 def field_type(model: type[BaseModel], key: str) -> Any:
-    """The declared type of the field that is written as `key`, with its constraints."""
+    """The declared type of the field that is written as `key`."""
     for name, field in model.model_fields.items():
         if key in (field.alias, name):
-            return Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
+            return field.annotation
     return None
 
 

@@ -2,7 +2,7 @@
 
 import difflib
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 from simscen.loading.tree import Fields, Items, Leaf, Node
 
@@ -23,6 +23,22 @@ _BOUNDS = {
     "less_than": ("less than", "lt"),
     "less_than_equal": ("at most", "le"),
 }
+_TEXTS = {
+    "finite_number": ("SC013", "must be a finite number"),
+    "too_short": ("SC017", "expected at least {min_length} values, got {actual_length}"),
+    "too_long": ("SC017", "expected at most {max_length} values"),
+    "string_too_short": ("SC017", "must not be empty"),
+    "string_too_long": ("SC017", "longer than {max_length} characters"),
+    "value_error": ("SC016", "{error}"),
+}
+
+
+class Message(NamedTuple):
+    """A stable code, what is wrong, and how to mend it."""
+
+    code: str
+    text: str
+    hint: str = ""
 
 
 def found(node: Node) -> str:
@@ -57,36 +73,27 @@ def suggestion(word: str, known: Iterable[str]) -> str:
     return f"expected one of: {', '.join(choices)}" if choices else ""
 
 
-def explain(kind: str, context: Mapping[str, Any], node: Node, text: str) -> tuple[str, str, str]:
-    """The code, message and hint for pydantic's error type `kind` on the value `node`; `text` is its own message."""
+def explain(kind: str, context: Mapping[str, Any], node: Node, text: str) -> Message:
+    """What pydantic's error type `kind` on the value `node` means; `text` is pydantic's own message."""
     if kind in _KINDS:
-        return "SC011", f"expected {_KINDS[kind]}, got {found(node)}", _unquote_hint(kind, node)
+        return Message("SC011", f"expected {_KINDS[kind]}, got {found(node)}", _type_hint(kind, node))
     if kind in _BOUNDS:
         words, key = _BOUNDS[kind]
-        return "SC013", f"must be {words} {_number(context[key])}, got {_shown(node)}", ""
-    match kind:
-        case "finite_number":
-            return "SC013", "must be a finite number", ""
-        case "literal_error" | "enum":
-            choices = _choices(str(context["expected"]))
-            word = str(node.value) if isinstance(node, Leaf) else ""
-            return "SC014", f"{_shown(node)} is not one of the choices", suggestion(word, choices)
-        case "quantity":
-            return "SC015", str(context["problem"]), f"units: {context['units']}; a bare number is SI"
-        case "too_short" | "too_long":
-            return "SC017", _length(kind, context), ""
-        case "string_too_short":
-            return "SC017", "must not be empty", ""
-        case "string_too_long":
-            return "SC017", f"longer than {context['max_length']} characters", ""
-        case "string_pattern_mismatch":
-            return "SC017", *_pattern(node)
-        case "value_error":
-            return "SC016", str(context["error"]), ""
-    return "SC011", text[:1].lower() + text[1:], ""
+        return Message("SC013", f"must be {words} {_number(context[key])}, got {shown(node)}")
+    if kind in _TEXTS:
+        code, template = _TEXTS[kind]
+        return Message(code, template.format_map(context))
+    if kind == "literal_error":
+        word = str(node.value) if isinstance(node, Leaf) else ""
+        return Message(
+            "SC014", f"{shown(node)} is not one of the choices", suggestion(word, _choices(str(context["expected"])))
+        )
+    if kind == "quantity":
+        return Message("SC015", str(context["problem"]), f"units: {context['units']}; a bare number is SI")
+    return _bad_name(node) if kind == "string_pattern_mismatch" else Message("SC011", text[:1].lower() + text[1:])
 
 
-def _unquote_hint(kind: str, node: Node) -> str:
+def _type_hint(kind: str, node: Node) -> str:
     if not isinstance(node, Leaf) or not isinstance(node.value, str):
         return ""
     number = node.value.strip().lstrip("+-").replace(".", "", 1)
@@ -98,7 +105,8 @@ def _unquote_hint(kind: str, node: Node) -> str:
     return ""
 
 
-def _shown(node: Node) -> str:
+def shown(node: Node) -> str:
+    """The value that stands there, short."""
     if isinstance(node, Leaf) and node.value is not None:
         return quoted(str(node.value).lower() if isinstance(node.value, bool) else str(node.value))
     return found(node)
@@ -113,18 +121,10 @@ def _choices(expected: str) -> list[str]:
     return [part.strip().strip("'") for part in expected.replace(" or ", ", ").split(",")]
 
 
-def _length(kind: str, context: Mapping[str, Any]) -> str:
-    least, most, actual = context.get("min_length"), context.get("max_length"), context.get("actual_length")
-    bound = f"at least {least}" if kind == "too_short" else f"at most {most}"
-    return f"expected {bound} values, got {actual}"
-
-
-def _pattern(node: Node) -> tuple[str, str]:
+def _bad_name(node: Node) -> Message:
     value = node.value if isinstance(node, Leaf) and isinstance(node.value, str) else ""
-    control = next((c for c in value if not c.isprintable() and c != "\u3000"), None)
+    control = next((c for c in value if not c.isprintable()), None)
     if control is not None:
-        return f"control character U+{ord(control):04X} in {quoted(value)}", "remove it"
-    return (
-        f"{quoted(value)} cannot be a name here",
-        "begin with a letter or `_`, then letters, digits, spaces, `_`, `.` and `-`",
-    )
+        return Message("SC017", f"control character U+{ord(control):04X} in {quoted(value)}", "remove it")
+    hint = "begin with a letter or `_`, then letters, digits, spaces, `_`, `.` and `-`"
+    return Message("SC017", f"{quoted(value)} cannot be a name here", hint)

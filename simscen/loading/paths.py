@@ -1,5 +1,6 @@
 """Paths inside files: relative, and inside the root or the folders that the command line allows."""
 
+import errno
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -32,23 +33,17 @@ class Fence:
         if refusal := _refused_form(written):
             return refusal
         if written.startswith(MODEL):
-            return self._in_world_path(
-                written.removeprefix(MODEL), f"{quoted(written)} is in no folder of --world-path"
-            )
-        try:
-            inside = _real(folder / written)
-        except OSError as error:
-            return Refusal("SC022", f"{reason(error)}: {quoted(written)}")
-        contained = any(inside.is_relative_to(allowed) for allowed in (self.root, *self.world_path))
-        if contained and inside.exists():
-            return inside
-        elsewhere = self._in_world_path(written, "")
-        if isinstance(elsewhere, Path):
-            return elsewhere
-        if not contained:
-            hint = "choose the root with --root, or allow a folder with --world-path"
-            return Refusal("SC020", f"{quoted(written)} is outside the scenario root", hint)
-        return Refusal("SC023", f"no such file or directory: {quoted(written)}", _sibling(inside))
+            missing = Refusal("SC023", f"{quoted(written)} is in no folder of --world-path", _world_path_hint(self))
+            return self._in_world_path(written.removeprefix(MODEL)) or missing
+        inside = Path(os.path.realpath(folder / written))
+        if self.holds(inside):
+            try:
+                inside.stat()
+            except OSError as error:
+                refusal = _unusable(error, written, inside)
+            else:
+                return inside
+        return self._in_world_path(written) or refusal or _outside(written)
 
     def holds(self, path: Path) -> bool:
         """Whether a file, with symbolic links followed, is inside the root or an allowed folder."""
@@ -59,13 +54,11 @@ class Fence:
         """How messages name a file: relative to the root where it is inside."""
         return path.relative_to(self.root).as_posix() if path.is_relative_to(self.root) else str(path)
 
-    def _in_world_path(self, written: str, message: str) -> "Path | Refusal":
-        if ".." not in PurePosixPath(written).parts:
-            for folder in self.world_path:
-                found = Path(os.path.realpath(folder / written))
-                if found.is_relative_to(folder) and found.exists():
-                    return found
-        return Refusal("SC023", message)
+    def _in_world_path(self, written: str) -> Path | None:
+        if ".." in PurePosixPath(written).parts:
+            return None
+        candidates = ((folder, Path(os.path.realpath(folder / written))) for folder in self.world_path)
+        return next((found for folder, found in candidates if found.is_relative_to(folder) and found.exists()), None)
 
 
 @dataclass(frozen=True)
@@ -87,16 +80,18 @@ def _refused_form(written: str) -> Refusal | None:
     return None
 
 
-def _real(path: Path) -> Path:
-    """`path` with symbolic links followed. Raises OSError with ELOOP on a loop, ENAMETOOLONG on an impossible name."""
-    real = Path(os.path.realpath(path))
-    try:
-        real.stat()
-    except FileNotFoundError:
-        return real
-    except PermissionError:
-        return real
-    return real
+def _outside(written: str) -> Refusal:
+    hint = "choose the root with --root, or allow a folder with --world-path"
+    return Refusal("SC020", f"{quoted(written)} is outside the scenario root", hint)
+
+
+def _unusable(error: OSError, written: str, path: Path) -> Refusal:
+    code = "SC022" if error.errno == errno.ELOOP else "SC023"
+    return Refusal(code, f"{reason(error)}: {quoted(written)}", _sibling(path))
+
+
+def _world_path_hint(fence: Fence) -> str:
+    return "" if fence.world_path else "give the folder that holds it with --world-path"
 
 
 def _sibling(missing: Path) -> str:

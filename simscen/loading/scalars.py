@@ -10,31 +10,31 @@ from simscen.loading.tree import Scalar
 
 LONGEST_INTEGER = 19
 
-_NULL = frozenset({"", "~", "null", "Null", "NULL"})
-_BOOL = {t: v for v, word in ((True, "true"), (False, "false")) for t in (word, word.capitalize(), word.upper())}
-_INT = re.compile(r"[-+]?(0|[1-9][0-9]*)")
-_OCTAL = re.compile(r"0o[0-7]+")
-_HEX = re.compile(r"0x[0-9a-fA-F]+")
+_WORDS: dict[str, Scalar] = {
+    **dict.fromkeys(("", "~", "null", "Null", "NULL"), None),
+    **dict.fromkeys(("true", "True", "TRUE"), True),
+    **dict.fromkeys(("false", "False", "FALSE"), False),
+    **dict.fromkeys((".inf", ".Inf", ".INF", "+.inf", "+.Inf", "+.INF"), math.inf),
+    **dict.fromkeys(("-.inf", "-.Inf", "-.INF"), -math.inf),
+    **dict.fromkeys((".nan", ".NaN", ".NAN"), math.nan),
+}
+_INTEGERS = (
+    (re.compile(r"[-+]?(0|[1-9][0-9]*)"), 10),
+    (re.compile(r"0o[0-7]+"), 8),
+    (re.compile(r"0x[0-9a-fA-F]+"), 16),
+)
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|(0|[1-9][0-9]*)(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
-_INF = re.compile(r"[-+]?\.(inf|Inf|INF)")
-_NAN = frozenset({".nan", ".NaN", ".NAN"})
 
 
 def resolve(text: str) -> Scalar:
     """The value that a plain scalar stands for. Raises ValueError for an integer of more than 19 digits."""
-    if text in _NULL:
-        return None
-    if text in _BOOL:
-        return _BOOL[text]
+    if text in _WORDS:
+        return _WORDS[text]
     if text[0] not in "+-.0123456789":
         return text
-    for pattern, base in ((_INT, 10), (_OCTAL, 8), (_HEX, 16)):
-        if pattern.fullmatch(text):
-            if len(text) > LONGEST_INTEGER:
-                raise ValueError("integer too large")
-            return int(text, base)
-    if _FLOAT.fullmatch(text):
-        return float(text)
-    if _INF.fullmatch(text):
-        return -math.inf if text[0] == "-" else math.inf
-    return math.nan if text in _NAN else text
+    base = next((base for pattern, base in _INTEGERS if pattern.fullmatch(text)), None)
+    if base is not None and len(text) > LONGEST_INTEGER:
+        raise ValueError("integer too large")
+    if base is not None:
+        return int(text, 0 if base != 10 else 10)
+    return float(text) if _FLOAT.fullmatch(text) else text

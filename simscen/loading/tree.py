@@ -83,10 +83,7 @@ def real_keys(node: Node, loc: Sequence[Key]) -> tuple[Key, ...]:
 
 def key_place(node: Node, loc: Sequence[Key]) -> Place:
     """Where the last key of `loc` stands: the key of a mapping, the item of a sequence, else the node itself."""
-    place = node.place
-    for _, place in _walk(node, loc):
-        pass
-    return place
+    return [node.place, *(place for _, place in _walk(node, loc))][-1]
 
 
 def value_place(node: Node, loc: Sequence[Key]) -> Place:

@@ -2,7 +2,11 @@
 
 from typing import ClassVar
 
-from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, model_validator
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
+
+from simscen.spec.docs import field_docs
 
 
 class Spec(BaseModel):
@@ -13,9 +17,19 @@ class Spec(BaseModel):
         extra="forbid",
         frozen=True,
         allow_inf_nan=False,
-        use_attribute_docstrings=True,
         populate_by_name=True,
+        defer_build=True,  # a light command validates nothing; building every schema costs it 50 ms
     )
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """The schema with the docstring of each field as its description."""
+        schema = handler.resolve_ref_schema(handler(core))
+        docs = field_docs(cls)
+        for name, field in cls.model_fields.items():
+            if name in docs:
+                schema["properties"][field.alias or name]["description"] = docs[name]
+        return schema
 
 
 class Choice(Spec):
