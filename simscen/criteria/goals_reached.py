@@ -52,7 +52,7 @@ class GoalsReached(Spec, Criterion):
             if name not in names
         ]
         if not chosen and not findings:
-            return [undecided("goals", "the scenario has no goals", "reached")]
+            return [undecided("goals_reached", "the scenario has no goals", "reached")]
         for story in chosen:
             findings += self._reached(trace, story) if story.reached is not None else [_not_reached(trace, story)]
         return findings

@@ -47,12 +47,12 @@ class LocalizationError(Spec, Criterion):
         """One finding for each bound that is given."""
         error = pose_error(trace)
         if not len(error):
-            return [undecided("localization", "the robot never said where it believes to be")]
+            return [undecided("localization_error", "the robot never said where it believes to be")]
         counts = error.ticks >= self.after * trace.tick_rate
         if not counts.any():
             last = trace.seconds(int(error.ticks[-1]))
             because = f"the last belief is from t = {last:.2f} s, but judging begins at {self.after:.2f} s"
-            return [undecided("localization", because)]
+            return [undecided("localization_error", because)]
         return self._bounds(trace, Samples(error.ticks[counts], error.values[counts]))
 
     def _bounds(self, trace: Trace, error: Samples) -> list[Finding]:

@@ -42,11 +42,11 @@ class RelocalizedWithin(Spec, Criterion):
         """One finding each time it happened."""
         error = pose_error(trace)
         if not len(error):
-            return [undecided("relocalized", "the robot never said where it believes to be")]
+            return [undecided("relocalized_within", "the robot never said where it believes to be")]
         happened = [Span(0, trace.end, False)] if self.after is None else spans(trace, self.after)
         if not happened:
             because, detail = never_started(trace, str(self.after))
-            return [undecided("relocalized", because, self._limit, detail)]
+            return [undecided("relocalized_within", because, self._limit, detail)]
         return [self._once(trace, span.start, error) for span in happened]
 
     @property
@@ -62,15 +62,17 @@ class RelocalizedWithin(Spec, Criterion):
         ticks, off = error.ticks[later], error.values[later]
         right = (off[:, 0] <= self.tolerance) & (off[:, 1] <= self.yaw_tolerance)
         if right[ticks <= start + self.time * trace.tick_rate].all():
-            return undecided("relocalized", f"the robot was never lost {self._context}", self._limit)
+            return undecided("relocalized_within", f"the robot was never lost {self._context}", self._limit)
         found, lasted = first_lasting(ticks, right, round(self.hold * trace.tick_rate), trace.end)
         tick = trace.end if found is None else found
         elapsed = trace.seconds(tick - start)
         if not lasted and elapsed <= self.time:
             state = "still lost" if found is None else f"right for only {trace.seconds(trace.end - tick):.2f} s"
             because = f"the run was over at t = {trace.seconds(trace.end):.2f} s ({ending(trace)}), the belief {state}"
-            return undecided("relocalized", because, self._limit)
+            return undecided("relocalized_within", because, self._limit)
         detail = [f"its belief was off by {off[:, 0].max():.2f} m at worst and {off[-1, 0]:.2f} m at the end"]
         if found is None:
             detail.append("it never found itself again")
-        return at_most("relocalized", elapsed, self.time, "s", at=(trace, tick), context=self._context, detail=detail)
+        return at_most(
+            "relocalized_within", elapsed, self.time, "s", at=(trace, tick), context=self._context, detail=detail
+        )

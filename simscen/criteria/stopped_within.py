@@ -53,11 +53,11 @@ class StoppedWithin(Spec, Criterion):
         happened = spans(trace, self.after)
         if not happened:
             because, detail = never_started(trace, self.after)
-            return [undecided("stopped", because, self._limit, detail)]
+            return [undecided("stopped_within", because, self._limit, detail)]
         rest = self._rest(trace)
         if all(_held(trace, rest, span.start) for span in happened):
             because = f"the robot was not moving when `{self.after}` started, so nothing had to stop"
-            return [undecided("stopped", because, self._limit)]
+            return [undecided("stopped_within", because, self._limit)]
         return [finding for span in happened for finding in self._once(trace, span, rest)]
 
     @property
@@ -80,10 +80,10 @@ class StoppedWithin(Spec, Criterion):
         if stop is None and elapsed <= self.time:
             over = f"`{self.after}`" if span.lasting else f"the run ({ending(trace)})"
             because = f"{over} was over {elapsed:.2f} s after it started, with the robot still moving"
-            return [undecided("stopped", because, self._limit)]
+            return [undecided("stopped_within", because, self._limit)]
         detail = _explained(trace, span.start, until) + ([] if stop is not None else ["it never came to rest"])
         context = f"after {self.after}"
-        found = at_most("stopped", elapsed, self.time, "s", at=(trace, until), context=context, detail=detail)
+        found = at_most("stopped_within", elapsed, self.time, "s", at=(trace, until), context=context, detail=detail)
         return [found, self._stayed(trace, span, until, rest)] if self.stay and stop is not None else [found]
 
     def _stayed(self, trace: Trace, span: Span, stop: int, rest: Flags) -> Finding:

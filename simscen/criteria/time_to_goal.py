@@ -37,10 +37,10 @@ class TimeToGoal(Spec, Criterion):
                 return [undecided(f"goal {self.goal}", f"the scenario has no goal `{self.goal}`")]
             return [self._timed(trace, f"goal {self.goal}", story.accepted, story) for story in named]
         if not told:
-            return [undecided("time to goal", "the scenario has no goals")]
+            return [undecided("time_to_goal", "the scenario has no goals")]
         start = next((story.accepted for story in told if story.accepted is not None), None)
         unreached = [story for story in told if story.reached is None]
-        return [self._timed(trace, "time to goal", start, unreached[0] if unreached else told[-1])]
+        return [self._timed(trace, "time_to_goal", start, unreached[0] if unreached else told[-1])]
 
     def _timed(self, trace: Trace, what: str, start: int | None, story: GoalStory) -> Finding:
         begun = start or 0

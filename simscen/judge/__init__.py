@@ -1,0 +1,1 @@
+"""Criteria × trace → verdicts, metrics and the result of a run. Needs a log, never a simulator."""

@@ -1,0 +1,59 @@
+"""Every criterion answers, whatever happens to the others."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from simscen.core.case import Case
+from simscen.core.session import Outcome
+from simscen.core.trace import Trace
+from simscen.core.verdict import Finding, Status, Verdict
+from simscen.criteria.base import Criterion
+from simscen.criteria.criterion import AnyCriterion
+from simscen.criteria.moments import finished
+
+
+def judge(criteria: Sequence[AnyCriterion], trace: Trace, case: Case) -> tuple[Verdict, ...]:
+    """One verdict for each criterion, in order. An id that is given twice gets a number: speed, speed#2.
+
+    An exception inside a criterion is its verdict, an error that names it. On a log that was cut off nothing passes:
+    what came after might have failed.
+    """
+    seen: dict[str, int] = {}
+    verdicts = []
+    for entry in criteria:
+        name = entry.id or entry.kind
+        seen[name] = seen.get(name, 0) + 1
+        unique = name if seen[name] == 1 else f"{name}#{seen[name]}"
+        verdicts.append(Verdict(entry.kind, unique, entry.severity, _findings(entry, trace, case)))
+    return tuple(verdicts)
+
+
+def outcome(verdicts: Sequence[Verdict]) -> Outcome:
+    """The outcome of a run that came to its end.
+
+    Only severity `fail` can fail it, and inconclusive counts as failed. A criterion that broke down makes the run an
+    error whatever its severity, and so does a run that nothing judged: neither may look like a pass.
+    """
+    if not verdicts or any(verdict.status is Status.ERROR for verdict in verdicts):
+        return Outcome.ERROR
+    decisive = [verdict for verdict in verdicts if verdict.severity == "fail"]
+    return Outcome.PASSED if all(verdict.status is Status.PASS for verdict in decisive) else Outcome.FAILED
+
+
+def _findings(entry: AnyCriterion, trace: Trace, case: Case) -> tuple[Finding, ...]:
+    criterion = entry.chosen
+    assert isinstance(criterion, Criterion)
+    try:
+        findings = criterion.judge(trace, case)
+    except Exception as error:  # the boundary: one criterion must not silence the others
+        return (Finding(Status.ERROR, entry.kind, f"{type(error).__name__}: {error}", "a judgement"),)
+    if not findings:
+        return (Finding(Status.ERROR, entry.kind, "it checked nothing", "a judgement"),)
+    return tuple(findings) if finished(trace) else tuple(_reserved(finding, trace) for finding in findings)
+
+
+def _reserved(finding: Finding, trace: Trace) -> Finding:
+    if finding.status is not Status.PASS:
+        return finding
+    because = f"{finding.measured} so far, but the log stops at t = {trace.seconds(trace.end):.2f} s"
+    return replace(finding, status=Status.INCONCLUSIVE, measured=because)

@@ -1,0 +1,63 @@
+"""How findings are told: one way for the console, JUnit, JSON and pictures."""
+
+from collections.abc import Sequence
+
+from simscen.core.verdict import Finding, Status, Verdict
+
+_RELATIONS = {"≤ ": ("≤ ", "> "), "≥ ": ("≥ ", "< ")}
+
+
+def comparison(finding: Finding) -> str:
+    """What was measured against what, e.g. "0.84 s > 0.50 s after lidar.off"."""
+    if finding.status in (Status.INCONCLUSIVE, Status.ERROR):
+        return f"{finding.status.value}: {finding.measured}"
+    holds, violated = _RELATIONS.get(finding.limit[:2], ("", ""))
+    if holds:
+        relation = holds if finding.status is Status.PASS else violated
+        return f"{finding.measured} {relation}{finding.limit[2:]}"
+    return finding.measured if finding.status is Status.PASS else f"{finding.measured}; expected {finding.limit}"
+
+
+def spot(finding: Finding, tick_rate: int) -> str:
+    """When and where, e.g. "at t = 10.84 s, (2.10, 3.41)"; "" when unknown."""
+    if finding.tick is None:
+        return ""
+    when = f"at t = {finding.tick / tick_rate:.2f} s"
+    return when if finding.place is None else f"{when}, ({finding.place[0]:.2f}, {finding.place[1]:.2f})"
+
+
+def subject(verdict: Verdict, finding: Finding) -> str:
+    """The criterion and, where it checks several things, which: "goals_reached: goal shelf"."""
+    rest = finding.what.removeprefix(verdict.criterion).removeprefix(":").strip()
+    return f"{verdict.id}: {rest}" if rest else verdict.id
+
+
+def sentence(verdict: Verdict, finding: Finding, tick_rate: int) -> str:
+    """The whole line: "stopped_within: 0.84 s > 0.50 s after lidar.off, at t = 10.84 s, (2.10, 3.41)"."""
+    parts = (f"{subject(verdict, finding)}: {comparison(finding)}", spot(finding, tick_rate))
+    return ", ".join(part for part in parts if part)
+
+
+def violations(verdict: Verdict) -> tuple[Finding, ...]:
+    """The findings that keep the verdict from passing, in order."""
+    return tuple(finding for finding in verdict.findings if finding.status is not Status.PASS)
+
+
+def tightest(verdicts: Sequence[Verdict]) -> str:
+    """The bound that was nearest to being broken, relative to its limit: "path_length +0.14 m"; "" when none has one.
+
+    Numbers of events are left out as long as something measured is there: 0 of 0 collisions is no news.
+    """
+    findings = [(v, f) for v in verdicts for f in v.findings if f.status is Status.PASS and f.margin is not None]
+    measured = [(v, f) for v, f in findings if f.unit] or findings
+    if not measured:
+        return ""
+    verdict, finding = min(measured, key=lambda pair: _slack(pair[1]))
+    return f"{subject(verdict, finding)} {finding.margin:+.2f} {finding.unit}".rstrip()
+
+
+def _slack(finding: Finding) -> float:
+    """The margin as a share of the limit."""
+    margin, value = finding.margin or 0.0, finding.value or 0.0
+    limit = value - margin if finding.limit.startswith("≥") else value + margin
+    return margin / abs(limit) if limit else margin
