@@ -1,0 +1,69 @@
+"""How well a scan fits the map, judged by casting its beams through the map.
+
+The beam model of Thrun, Burgard & Fox, Probabilistic Robotics, section 6.3 and table 6.1, as in nav2_amcl's
+beam_model.cpp. Rays are marched through the distance field, as in Walsh & Karaman, CDDT: Fast Approximate 2D Ray
+Casting for Accelerated Localization (ICRA 2018), section II.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from simscen.core.geometry import Array
+from simscen.core.grid import FREE, OccupancyGrid
+from simscen.stack.localizers.beams import Beams
+from simscen.stack.localizers.distance_field import DistanceField
+
+
+def opaque_field(grid: OccupancyGrid, max_distance: float) -> DistanceField:
+    """Distances to what stops a ray: occupied and unknown cells and everything off the map, as in nav2_amcl."""
+    return DistanceField(grid, grid.cells != FREE, max_distance, 0.0)
+
+
+def cast_rays(field: DistanceField, poses: Array, beams: Beams) -> Array:
+    """Ranges (n, b) in m that `beams` would measure from robot `poses` (n, 3), to within half a cell."""
+    x, y, heading = (column[:, None].astype(np.float64) for column in field.coordinates(poses))
+    (forward, left), c, s, cell = beams.origin, np.cos(heading), np.sin(heading), field.resolution
+    angle = heading + beams.bearings
+    x = np.broadcast_to(x + (forward * c - left * s) / cell, angle.shape).ravel()
+    y = np.broadcast_to(y + (forward * s + left * c) / cell, angle.shape).ravel()
+    flown = _march(field, x, y, angle.ravel(), beams.range_max / cell)
+    ranges: Array = flown.reshape(angle.shape) * cell
+    return ranges
+
+
+def _march(field: DistanceField, x: Array, y: Array, angle: Array, limit: float) -> Array:
+    """How far rays (r,) get from x, y along `angle`, at most `limit`; all lengths in cells."""
+    cos, sin, flown, flying = np.cos(angle), np.sin(angle), np.zeros_like(x), np.arange(x.size)
+    while flying.size:
+        column = (x[flying] + cos[flying] * flown[flying]).astype(np.float32)
+        row = (y[flying] + sin[flying] * flown[flying]).astype(np.float32)
+        free = field.table.take(field.cells(column, row)) / field.resolution
+        flying, free = flying[free > 0], free[free > 0]
+        # Distances are between centres: both the ray and the obstacle may be half a diagonal nearer.
+        flown[flying] += np.maximum(free - np.sqrt(2), 0.5)
+        flying = flying[flown[flying] < limit]
+    return np.minimum(flown, limit)
+
+
+@dataclass(frozen=True, eq=False)
+class BeamModel:
+    """Each beam's range is a hit, something short before it, nothing, or chance; a particle weighs 1 + Σ p³."""
+
+    field: DistanceField
+    z_hit: float
+    z_short: float
+    z_max: float
+    z_rand: float
+    sigma_hit: float
+    lambda_short: float
+
+    def log_likelihood(self, poses: Array, beams: Beams, converged: bool) -> Array:
+        """Logarithms (n,) of 1 + Σ p³."""
+        expected, missed = cast_rays(self.field, poses, beams), beams.ranges >= beams.range_max
+        error = beams.ranges - expected
+        p = self.z_hit * np.exp(np.square(error) / (-2 * self.sigma_hit**2))
+        p += (error < 0) * (self.z_short * self.lambda_short * np.exp(-self.lambda_short * beams.ranges))
+        p += np.where(missed, self.z_max, self.z_rand / beams.range_max)
+        logarithm: Array = np.log1p((p * p * p).sum(axis=1))
+        return logarithm

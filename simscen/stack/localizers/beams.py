@@ -1,0 +1,45 @@
+"""The beams of a scan that a particle filter looks at."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from simscen.core.geometry import Array
+from simscen.core.sensing import Scan
+
+
+@dataclass(frozen=True, eq=False)
+class Beams:
+    """Beams that gave an answer.
+
+    `ranges` (b,) in m, at most `range_max`, which means that nothing was hit; `bearings` (b,) in the base frame in
+    rad; `origin` is the lidar's place in the base frame.
+    """
+
+    ranges: Array
+    bearings: Array
+    origin: tuple[float, float]
+    range_max: float
+
+    def ends(self) -> Array:
+        """Where the beams that hit something ended: points (m, 2) in the base frame."""
+        hit = self.ranges < self.range_max
+        ranges, bearings = self.ranges[hit], self.bearings[hit]
+        return np.column_stack((ranges * np.cos(bearings), ranges * np.sin(bearings))) + self.origin
+
+
+def select_beams(scan: Scan, count: int, least: float, most: float) -> Beams:
+    """Every k-th beam, so that there are at most `count`, without those that are nan.
+
+    Ranges are cut at `most` and the lidar's own maximum. Those not above `least` and the lidar's own minimum count as
+    maximal: nav2_amcl has no notion of too near either.
+    """
+    step = -(-len(scan.ranges) // count) or 1
+    ranges = scan.ranges[::step]
+    range_max, range_min = min(scan.range_max, most), max(scan.range_min, least)
+    answered = ~np.isnan(ranges)
+    with np.errstate(invalid="ignore"):
+        usable = (ranges > range_min) & (ranges < range_max)
+    ranges = np.where(usable, ranges, np.float64(range_max))
+    bearings = scan.mount.yaw + scan.angle_min + scan.angle_increment * step * np.arange(len(ranges))
+    return Beams(ranges[answered], bearings[answered], (scan.mount.x, scan.mount.y), range_max)

@@ -1,0 +1,53 @@
+"""How far each cell of a map is from the nearest obstacle: what likelihood fields and ray marching look up."""
+
+from typing import cast
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.geometry import Array
+from simscen.core.grid import OccupancyGrid
+
+Float32 = npt.NDArray[np.float32]
+Cells = npt.NDArray[np.intp]
+
+
+class DistanceField:
+    """Distances in m between cell centres, as a flat table with a border that stands for everything off the map.
+
+    The border makes a look-up off the map a look-up like any other: coordinates are clipped onto it.
+    """
+
+    def __init__(self, grid: OccupancyGrid, obstacles: npt.NDArray[np.bool_], limit: float, outside: float) -> None:
+        """`obstacles` (height, width); no distance is above `limit`; off the map it is `outside`."""
+        from scipy.ndimage import distance_transform_edt
+
+        distance = np.full(grid.shape, limit)
+        if obstacles.any():
+            exact = cast(Array, distance_transform_edt(~obstacles)) * grid.resolution
+            distance = np.minimum(exact, limit)
+        self.table: Float32 = np.pad(distance, 1, constant_values=outside).astype(np.float32).ravel()
+        self.resolution = grid.resolution
+        self._height, self._width = grid.shape
+        self._grid_from_map = grid.origin.inverse()
+
+    def coordinates(self, poses: Array) -> tuple[Float32, Float32, Float32]:
+        """Poses (n, 3) of the map frame as x, y in cells of the bordered table, and headings relative to it."""
+        local = self._grid_from_map.apply(poses[:, :2]) / self.resolution + 1
+        heading = poses[:, 2] + self._grid_from_map.yaw
+        return local[:, 0].astype(np.float32), local[:, 1].astype(np.float32), heading.astype(np.float32)
+
+    def cells(self, x: Float32, y: Float32) -> Cells:
+        """Indices into `table` of points given in cells; any finite point will do. Overwrites `x` and `y`."""
+        column = np.clip(x, 0, self._width + 1, out=x).astype(np.intp)
+        row = np.clip(y, 0, self._height + 1, out=y).astype(np.intp)
+        row *= self._width + 2
+        row += column
+        return row
+
+    def cells_seen(self, poses: Array, points: Array) -> Cells:
+        """Indices (n, b) into `table` of `points` (b, 2) in the base frame as seen from each of `poses` (n, 3)."""
+        x, y, heading = self.coordinates(poses)
+        c, s = np.cos(heading), np.sin(heading)
+        ends = np.vstack((points.T / self.resolution, np.ones(len(points)))).astype(np.float32)
+        return self.cells(np.stack((c, -s, x), axis=1) @ ends, np.stack((s, c, y), axis=1) @ ends)

@@ -1,0 +1,98 @@
+"""How well a scan fits the map, judged by how near its ends are to obstacles.
+
+Likelihood fields: Thrun, Burgard & Fox, Probabilistic Robotics, section 6.4 and table 6.3; nav2_amcl's
+likelihood_field_model.cpp and likelihood_field_model_prob.cpp. Beams that hit nothing say nothing.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.geometry import Array
+from simscen.core.grid import OCCUPIED, OccupancyGrid
+from simscen.stack.localizers.beams import Beams
+from simscen.stack.localizers.distance_field import Cells, DistanceField, Float32
+
+
+class SensorModel(Protocol):
+    """Judges particles by a scan."""
+
+    def log_likelihood(self, poses: Array, beams: Beams, converged: bool) -> Array:
+        """Logarithms (n,) of how likely the beams are at each of `poses` (n, 3); -inf for impossible, never nan.
+
+        `converged` says that the particles are one narrow group.
+        """
+        ...
+
+
+def obstacle_field(grid: OccupancyGrid, max_distance: float) -> DistanceField:
+    """Distances to occupied cells; off the map counts as far from everything, as in nav2_amcl."""
+    return DistanceField(grid, grid.cells == OCCUPIED, max_distance, max_distance)
+
+
+class LikelihoodField:
+    """Nav2's default: a particle weighs 1 + Σ p³ over its beams.
+
+    Not a product of probabilities: Nav2 calls it "an ad-hoc weighting scheme" that "works well". It forgives beams
+    that hit what is not on the map, and it never says that a pose is impossible.
+    """
+
+    def __init__(self, field: DistanceField, z_hit: float, z_rand: float, sigma_hit: float) -> None:
+        self._field, self._z_rand = field, np.float32(z_rand)
+        self._hit = _hit(field, z_hit, sigma_hit)
+
+    def log_likelihood(self, poses: Array, beams: Beams, converged: bool) -> Array:
+        """Logarithms (n,) of 1 + Σ p³."""
+        p = self._hit.take(self._field.cells_seen(poses, beams.ends()))
+        p += self._z_rand / np.float32(beams.range_max)
+        logarithm: Array = np.log1p(np.sum(p * p * p, axis=1, dtype=np.float64))
+        return logarithm
+
+
+@dataclass(frozen=True)
+class BeamSkipping:
+    """When converged, leave out beams that too few particles can explain: people, not the map.
+
+    A beam counts as explained by a particle when it ends less than `distance` m from an obstacle. It is left out
+    when at most the share `threshold` of the particles explain it, unless the share of beams to be left out reaches
+    `error_threshold`: then it is the pose that is wrong, and every beam counts.
+    """
+
+    distance: float
+    threshold: float
+    error_threshold: float
+
+
+class LikelihoodFieldProb:
+    """A particle weighs the product of its beams' probabilities (table 6.3), with optional beam skipping."""
+
+    def __init__(
+        self, field: DistanceField, z_hit: float, z_rand: float, sigma_hit: float, skipping: BeamSkipping | None = None
+    ) -> None:
+        self._field, self._z_rand, self._skipping = field, np.float32(z_rand), skipping
+        self._hit = _hit(field, z_hit, sigma_hit)
+
+    def log_likelihood(self, poses: Array, beams: Beams, converged: bool) -> Array:
+        """Logarithms (n,) of Π p."""
+        cells = self._field.cells_seen(poses, beams.ends())
+        if self._skipping is not None and converged:
+            cells = cells[:, self._kept(cells, self._skipping)]
+        p = self._hit.take(cells)
+        p += self._z_rand / np.float32(beams.range_max)
+        with np.errstate(divide="ignore"):
+            logarithm: Array = np.sum(np.log(p), axis=1, dtype=np.float64)
+        return logarithm
+
+    def _kept(self, cells: Cells, skipping: BeamSkipping) -> npt.NDArray[np.bool_] | slice:
+        near = self._field.table.take(cells) < skipping.distance
+        explained: npt.NDArray[np.bool_] = near.mean(axis=0) > skipping.threshold
+        misfit = np.count_nonzero(~explained) >= len(explained) * skipping.error_threshold
+        return slice(None) if misfit else explained
+
+
+def _hit(field: DistanceField, z_hit: float, sigma_hit: float) -> Float32:
+    """The part of a beam's probability that its end decides, for each cell of the field."""
+    hit: Float32 = np.float32(z_hit) * np.exp(np.square(field.table) / np.float32(-2 * sigma_hit**2))
+    return hit

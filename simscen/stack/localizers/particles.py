@@ -1,0 +1,60 @@
+"""A weighted set of poses, and the two ways to begin one: around a guess, or anywhere."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from simscen.core.belief import Estimate
+from simscen.core.geometry import Array, Pose2, wrap_array
+from simscen.core.grid import FREE, OccupancyGrid
+
+
+@dataclass(frozen=True, eq=False)
+class Particles:
+    """Poses (n, 3) x, y, yaw in the map frame and their weights (n,), which add up to one."""
+
+    poses: Array
+    weights: Array
+
+    @classmethod
+    def equal(cls, poses: Array) -> "Particles":
+        """All of these poses are equally likely."""
+        return cls(poses, np.full(len(poses), 1 / len(poses)))
+
+    @property
+    def effective(self) -> float:
+        """How many equally weighted particles would do as well: 1 / Σ w² (Liu 1996)."""
+        return float(1 / (self.weights @ self.weights))
+
+    def within(self, distance: float) -> bool:
+        """Whether every particle is at most this far from their mean, in x and in y."""
+        places = self.poses[:, :2]
+        return bool((np.abs(places - places.mean(axis=0)) <= distance).all())
+
+
+def around(pose: Pose2, std: tuple[float, float, float], count: int, chance: np.random.Generator) -> Array:
+    """Poses (count, 3) drawn from a normal distribution about `pose`, as nav2_amcl's pf_init does."""
+    poses: Array = chance.normal(pose, std, (count, 3))
+    poses[:, 2] = wrap_array(poses[:, 2])
+    return poses
+
+
+class FreeSpace:
+    """Draws poses uniformly over the free cells of a map; over all cells if none is free."""
+
+    def __init__(self, grid: OccupancyGrid) -> None:
+        free = np.argwhere(grid.cells == FREE)
+        self._cells = free if len(free) else np.argwhere(np.ones_like(grid.cells))
+        self._grid = grid
+
+    def draw(self, count: int, chance: np.random.Generator) -> Array:
+        """Poses (count, 3) in the map frame."""
+        cells = self._cells[chance.integers(len(self._cells), size=count)]
+        local = (cells[:, ::-1] + chance.random((count, 2))) * self._grid.resolution
+        return np.column_stack((self._grid.origin.apply(local), chance.uniform(-np.pi, np.pi, count)))
+
+    def begin(self, estimate: Estimate, count: int, chance: np.random.Generator) -> Particles:
+        """Particles for an estimate: around its pose, or anywhere when it has none."""
+        if estimate.pose is None:
+            return Particles.equal(self.draw(count, chance))
+        return Particles.equal(around(estimate.pose, estimate.std, count, chance))

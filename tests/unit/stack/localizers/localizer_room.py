@@ -1,0 +1,151 @@
+"""A room without symmetry, a robot that drives a round in it, and its noisy sensors: numpy only, no physics.
+
+The truth and the perfect scans of a drive are computed once; every seed only draws its own noise.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from simscen.core.belief import Belief, Estimate
+from simscen.core.geometry import Array, Pose2
+from simscen.core.grid import FREE, OCCUPIED, OccupancyGrid
+from simscen.core.motion import Twist
+from simscen.core.sensing import Imu, Odometry, Scan
+from simscen.model.stack import Localizer as LocalizerSpec
+from simscen.stack.localizers.build import build_localizer
+from simscen.stack.protocols import Localizer, RobotModel, Surroundings
+
+TICK_RATE, ODOMETRY_PERIOD, SCAN_PERIOD = 240, 6, 24
+RANGE_MAX, BEAMS = 12.0, 360
+# Boxes as (left, bottom, right, top) in m: four walls of different depth, then furniture.
+BOXES = np.array([
+    (-5.07, -4.03, 5.12, -3.87), (-5.07, 3.91, 5.12, 4.06), (-5.07, -4.03, -4.88, 4.06), (4.93, -4.03, 5.12, 4.06),
+    (-1.13, 1.62, -0.88, 4.06), (-5.07, -0.52, -3.31, -0.29), (2.21, -2.44, 3.02, -1.17), (1.37, 2.73, 2.96, 3.34),
+    (-2.52, -4.03, -1.49, -3.06), (3.58, 0.71, 4.93, 1.29), (-3.52, 2.18, -3.07, 2.61),
+])  # fmt: skip
+ROUND = ((-2.5, -1.8), (0.8, -2.9), (0.9, -0.4), (3.9, -0.2), (2.6, 1.7), (0.3, 2.4), (0.1, 0.6), (-2.2, 1.0),
+         (-2.0, 3.2), (-4.2, 3.0), (-4.1, 0.8), (-2.4, 0.2))  # fmt: skip
+ROBOT = RobotModel(((0.2, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.2, -0.2)), 0.2, 0.5, 0.2, 0.0, 1.5, 1, 1, 3)
+
+
+@cache
+def grid(resolution: float = 0.05) -> OccupancyGrid:
+    """The map of the room: a cell is occupied when its centre is."""
+    x = np.arange(-5.2 + resolution / 2, 5.2, resolution)
+    y = np.arange(-4.2 + resolution / 2, 4.2, resolution)[:, None]
+    solid = sum((x > b[0]) & (x < b[2]) & (y > b[1]) & (y < b[3]) for b in BOXES)
+    cells = np.where(np.asarray(solid) > 0, OCCUPIED, FREE).astype(np.int8)
+    return OccupancyGrid(cells, resolution, Pose2(-5.2, -4.2, 0.0))
+
+
+def cast(poses: Array, angles: Array) -> Array:
+    """Exact ranges (n, b) from `poses` (n, 3) along `angles` (b,) to the boxes, by the slab method."""
+    heading = poses[:, 2:] + angles
+    with np.errstate(divide="ignore"):
+        inverse = 1 / np.stack((np.cos(heading), np.sin(heading)), axis=-1)
+    nearest = np.full(heading.shape, np.inf)
+    for box in BOXES:
+        near, far = ((corner - poses[:, None, :2]) * inverse for corner in (box[:2], box[2:]))
+        enter, leave = np.minimum(near, far).max(axis=-1), np.maximum(near, far).min(axis=-1)
+        nearest = np.where((enter <= leave) & (enter > 0), np.minimum(nearest, enter), nearest)
+    return nearest
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """`truth` (k, 3) at 40 Hz, the first row at tick 0; `ranges` (k // 4, 360) perfect scans at 10 Hz."""
+
+    truth: Array
+    ranges: Array
+
+
+def record(truth: Array) -> Drive:
+    """A drive along these poses, with its scans."""
+    angles = -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS)
+    return Drive(truth, cast(truth[:: SCAN_PERIOD // ODOMETRY_PERIOD], angles))
+
+
+@cache
+def drive(seconds: float, first: int = 0) -> Drive:
+    """A drive around the room at up to 0.5 m/s and 1 rad/s, from the waypoint `first`."""
+    dt, pose, goal = ODOMETRY_PERIOD / TICK_RATE, Pose2(*ROUND[first], 0.0), first + 1
+    truth = [pose]
+    for _ in range(round(seconds / dt)):
+        place = Pose2(*ROUND[goal % len(ROUND)])
+        goal += pose.distance(place) < 0.3
+        x, y, _ = pose.between(place)
+        error = np.arctan2(y, x)
+        turn, ahead = np.clip(2 * error, -1, 1) * dt, 0.5 * max(0.0, np.cos(error)) ** 4 * dt
+        pose = pose.compose(Pose2(ahead * np.cos(turn / 2), ahead * np.sin(turn / 2), turn))
+        truth.append(pose)
+    return record(np.array(truth))
+
+
+def surroundings(room: OccupancyGrid | None = None) -> Surroundings:
+    """What a stack is told of the room."""
+    return Surroundings(ROBOT, grid() if room is None else room, TICK_RATE)
+
+
+def localizer(spec: LocalizerSpec, estimate: Estimate, seed: int) -> Localizer:
+    """A localizer in the room."""
+    return build_localizer(spec, surroundings(), estimate, np.random.default_rng((seed, 1)))
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Errors of the sensors, as in simscen.model.robot; odometry's grow with the square root of the way."""
+
+    lidar: float = 0.01
+    translation: float = 0.01
+    rotation: float = 0.01
+    drift: float = 0.005
+    gyro: float = 0.002
+    gyro_bias: float = 0.0005
+
+
+def run(subject: Localizer, drive: Drive, seed: int, noise: Noise = Noise(), *, imu: bool = False) -> list[Belief]:  # noqa: B008 frozen
+    """The beliefs (k) of a localizer, one for each row of the truth."""
+    chance, beliefs = np.random.default_rng((seed, 2)), []
+    ranges = drive.ranges + chance.normal(0, noise.lidar, drive.ranges.shape)
+    ranges = np.where(ranges < RANGE_MAX, np.round(ranges, 3), np.inf)
+    steps = _steps(drive.truth)
+    odometry, bias = Pose2(0, 0, 0), chance.normal(0, noise.gyro_bias)
+    for row, step in enumerate(steps):
+        tick, way = row * ODOMETRY_PERIOD, float(np.hypot(step[0], step[1]))
+        heading = np.sqrt(noise.rotation**2 * abs(step[2]) + noise.drift**2 * way)
+        stretched = 1 + chance.normal() * noise.translation * np.sqrt(way) / max(way, 1e-9)
+        odometry = odometry.compose(Pose2(step[0] * stretched, step[1] * stretched, step[2] + chance.normal() * heading))
+        if imu and row:
+            rate = step[2] * TICK_RATE / ODOMETRY_PERIOD + bias + chance.normal() * noise.gyro
+            subject.on_imu(Imu("imu", tick, (0.0, 0.0, rate), (0.0, 0.0, 9.81)))
+        subject.on_odometry(Odometry("odom", tick, odometry, Twist()))
+        if tick % SCAN_PERIOD == 0:
+            subject.on_scan(scan(ranges[tick // SCAN_PERIOD], tick))
+        beliefs.append(subject.belief)
+    return beliefs
+
+
+def scan(ranges: Array, tick: int = 0, **changes: object) -> Scan:
+    """A full-circle scan by the lidar in the middle of the robot."""
+    given = {"angle_min": -np.pi, "angle_increment": 2 * np.pi / len(ranges), "range_min": 0.05, "range_max": RANGE_MAX}
+    return Scan("lidar", tick, ranges, **(given | changes))  # type: ignore[arg-type]
+
+
+def errors(beliefs: list[Belief], truth: Array) -> Array:
+    """Errors (k, 3) of the beliefs in the map frame, headings wrapped."""
+    error: Array = np.array([belief.pose for belief in beliefs]) - truth
+    error[:, 2] = (error[:, 2] + np.pi) % (2 * np.pi) - np.pi
+    return error
+
+
+def nees(belief: Belief, error: Array) -> float:
+    """Normalised estimation error squared of one belief (Bar-Shalom et al. 2001, section 5.4)."""
+    return float(error @ np.linalg.solve(belief.covariance, error))
+
+
+def _steps(truth: Array) -> Array:
+    """Motions (k, 3) in the base frame that lead to each row of the truth; none to the first."""
+    poses = [Pose2(*row) for row in truth]
+    return np.array([Pose2(0, 0, 0), *(a.between(b) for a, b in zip(poses, poses[1:], strict=False))])
