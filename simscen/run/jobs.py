@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from simscen.loading.scenario import LoadedScenario
+from simscen.loading.loaded import LoadedScenario
 
 _LENGTH = struct.Struct("<I")
 
@@ -24,7 +24,7 @@ class Job:
 
 
 @dataclass(frozen=True)
-class Exit:
+class ProcessEnd:
     """How the process of a job ended. `end` is the worker's own last word, None when it had none."""
 
     number: int

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Any, BinaryIO
 
 from simscen.run.confine import environment
-from simscen.run.jobs import Exit, Job, send_job
+from simscen.run.jobs import ProcessEnd, Job, send_job
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Ended:
     """A job's process has ended; `exit` None = the warm process died under it."""
 
     job: Job
-    exit: Exit | None
+    exit: ProcessEnd | None
 
 
 class Interrupted(BaseException):
@@ -97,7 +97,7 @@ def _understood(message: dict[str, Any], running: dict[int, Job]) -> Happening:
     if "seconds" in message:
         return Advanced(running[message["job"]], message["seconds"])
     number = message.pop("exit")
-    return Ended(running.pop(number), Exit(number=number, **message))
+    return Ended(running.pop(number), ProcessEnd(number=number, **message))
 
 
 @contextmanager

@@ -1,0 +1,110 @@
+"""The composition root: the only place that builds engines, sensors and stacks."""
+
+from collections.abc import Mapping
+
+from simscen.core.chance import Streams
+from simscen.core.geometry import Array, Pose3
+from simscen.core.sensing import Odometry
+from simscen.core.shapes import TriangleMesh
+from simscen.core.time import Clock
+from simscen.faults.base import Wheels
+from simscen.model.stack import GroundTruth
+from simscen.run.director import Director
+from simscen.run.ending import Ending
+from simscen.run.faultrig import FaultRig
+from simscen.run.live import LiveStage, described
+from simscen.run.lockstep import Rig
+from simscen.run.prepare import Prepared
+from simscen.run.robotmodel import robot_model
+from simscen.run.senses import Senses
+from simscen.run.timetable import Timetable
+from simscen.core.events import Event
+from simscen.sensors.base import Sensor
+from simscen.sensors.build import build_sensors
+from simscen.sim.simulation import Simulation
+from simscen.stack.build import build_stack
+from simscen.stack.protocols import Surroundings
+from simscen.worlds.meshing import fuse
+from simscen.worlds.rays import RayScene
+
+
+def assemble(prepared: Prepared, seed: int) -> Rig:
+    """Build the rig of one run of a prepared scenario with this seed."""
+    spec, world = prepared.spec, prepared.built.world
+    clock, streams = Clock(spec.physics.tick_rate), Streams(seed)
+    simulation = Simulation(
+        prepared.built.mesh,
+        world.bodies,
+        prepared.body,
+        prepared.start,
+        tick_rate=clock.rate,
+        solver_iterations=spec.physics.solver_iterations,
+    )
+    rays = LiveRays(RayScene(prepared.built.mesh), simulation)
+    sensors: tuple[Sensor, ...] = build_sensors(prepared.robot, clock, streams, simulation, rays)
+    truth_period = clock.period(spec.physics.truth_rate)
+    if isinstance(prepared.stack.localizer, GroundTruth):
+        sensors = (TruthSensor(simulation, clock.period(prepared.stack.controller_frequency)), *sensors)
+    senses = Senses(sensors)
+
+    surroundings = Surroundings(
+        robot=robot_model(prepared.body),
+        map=prepared.map,
+        tick_rate=clock.rate,
+        lidars=tuple(name for name, sensor in prepared.robot.sensors.items() if sensor.lidar),
+    )
+    stack = build_stack(prepared.stack, surroundings, streams, clock, stop_on_failure=spec.on_goal_failure == "stop")
+    stack.start(prepared.estimate, prepared.case.goals)
+
+    faults = FaultRig(spec.faults, streams, Wheels(getattr(prepared.robot.drive, "wheel_separation", 0.0)))
+    stage = LiveStage(world, simulation, stack, clock)
+    for body in world.bodies:
+        stage.note(Event(0, "object.spawned", body.name, described(body)))
+    control_period = clock.period(prepared.stack.controller_frequency)
+    return Rig(
+        simulation=simulation,
+        senses=senses,
+        stack=stack,
+        faults=faults,
+        stage=stage,
+        director=Director(spec.events, spec.faults, streams, stage, faults),
+        ending=Ending(clock, spec.time_limit, spec.linger),
+        timetable=Timetable((truth_period, control_period, *senses.periods)),
+        truth_period=truth_period,
+    )
+
+
+class LiveRays:
+    """Rays against the static world and against everything that moves, where it is now."""
+
+    def __init__(self, scene: RayScene, simulation: Simulation) -> None:
+        self._scene, self._simulation = scene, simulation
+        self._meshes: dict[str, TriangleMesh] = {}
+
+    def cast(self, origins: Array, directions: Array) -> Array:
+        """See core.rays.RayCaster."""
+        self._scene.set_moving(self._placed())
+        return self._scene.cast(origins, directions)
+
+    def _placed(self) -> Mapping[str, tuple[TriangleMesh, Pose3]]:
+        moving = self._simulation.moving()
+        for name in self._meshes.keys() - moving.keys():
+            del self._meshes[name]
+        for name, (body, _) in moving.items():
+            if name not in self._meshes:
+                self._meshes[name] = fuse(body.solids)
+        return {name: (self._meshes[name], pose) for name, (_, pose) in moving.items()}
+
+
+class TruthSensor:
+    """Tells the `ground_truth` localizer the true pose, as an odometry that never errs and lives in the map frame."""
+
+    name = "ground_truth"
+
+    def __init__(self, simulation: Simulation, period: int) -> None:
+        self._simulation, self.period = simulation, period
+
+    def read(self, tick: int) -> Odometry:
+        """The true pose now."""
+        truth = self._simulation.truth()
+        return Odometry(self.name, tick, truth.pose.plane, truth.twist)

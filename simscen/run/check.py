@@ -1,0 +1,58 @@
+"""What only geometry can tell about a scenario before it runs: is the start free, can a goal be reached at all?
+
+Needs no engine: worlds of simple shapes are checked with numpy alone.
+"""
+
+from collections.abc import Iterator
+
+from simscen.core.geometry import Pose2
+from simscen.core.problems import Problem
+from simscen.core.world import World
+from simscen.criteria.result import Result
+from simscen.loading.loaded import LoadedScenario
+from simscen.model.scenario import ScenarioSpec
+from simscen.run.prepare import goals_of, pose_of
+from simscen.run.robotmodel import inscribed_radius
+from simscen.run.worldsource import load_robot, load_world
+from simscen.worlds.contain import blocking_solid
+
+NEAR_GROUND, ROBOT_HEIGHT = 0.02, 0.4
+"""Heights between which something is in a robot's way; the floor and door sills are below."""
+
+
+def check(loaded: LoadedScenario) -> list[Problem]:
+    """Every start and goal that cannot be, at the line it is written in. Raises InvalidInput for unusable files."""
+    world = load_world(loaded)
+    radius = inscribed_radius(load_robot(loaded)[1])
+    return [
+        loaded.problem(keys, "SC301", f"{what} ({pose.x:g}, {pose.y:g}) is {where}", hint)
+        for keys, what, pose, hint in _poses(loaded.spec, world)
+        if (where := _in_the_way(world, pose, radius))
+    ]
+
+
+def _poses(spec: ScenarioSpec, world: World) -> Iterator[tuple[tuple[str | int, ...], str, Pose2, str]]:
+    yield ("robot", "pose"), "the robot's start", pose_of(spec.robot.pose, world), "move it to free space"
+    if expects_unreachable_goal(spec):
+        return
+    hint = "move it, or expect the failure with `result: {status: FAILED, error_code: GOAL_OCCUPIED}`"
+    for index, goal in enumerate(goals_of(spec, world)):
+        yield ("goals", index, "pose"), f"goal `{goal.name}`", goal.pose, hint
+
+
+def expects_unreachable_goal(spec: ScenarioSpec) -> bool:
+    """Whether the scenario passes when the robot refuses its goal."""
+    return any(
+        isinstance(criterion, Result) and criterion.status == "FAILED" for criterion in (e.chosen for e in spec.pass_)
+    )
+
+
+def _in_the_way(world: World, pose: Pose2, radius: float) -> str | None:
+    left, bottom, right, top = world.bounds
+    if not (left <= pose.x <= right and bottom <= pose.y <= top):
+        return f"outside the world ({left:g} … {right:g}, {bottom:g} … {top:g})"
+    solid = blocking_solid(world, (pose.x, pose.y), 1e-6, (NEAR_GROUND, ROBOT_HEIGHT))
+    if solid:
+        return f'inside obstacle "{solid}"'
+    solid = blocking_solid(world, (pose.x, pose.y), radius, (NEAR_GROUND, ROBOT_HEIGHT))
+    return f'nearer to obstacle "{solid}" than the robot\'s radius of {radius:.2f} m' if solid else None

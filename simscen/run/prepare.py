@@ -1,0 +1,125 @@
+"""From a loaded scenario to all that its runs share: the built world, the robot's map, goals, the shortest ways.
+
+Plain data and numpy arrays only, so that it can be made once in the warm process and survive the fork.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from simscen.core.belief import Estimate
+from simscen.core.case import Case
+from simscen.core.geometry import Pose2
+from simscen.core.grid import OccupancyGrid
+from simscen.core.navigation import Goal
+from simscen.core.world import BuiltWorld, World
+from simscen.loading.loaded import LoadedScenario
+from simscen.model.robot import RobotSpec
+from simscen.model.scenario import GoalEntry, ScenarioSpec, estimate_of
+from simscen.model.stack import Amcl, OdometryOnly, StackSpec
+from simscen.run.robotmodel import inscribed_radius
+from simscen.run.worldsource import load_map, load_robot, load_world
+from simscen.sim.robot_body import RobotBody
+from simscen.spec.places import PoseSpec
+from simscen.worlds.build import build
+from simscen.worlds.shortest import shortest_lengths
+
+DEFAULT_LIDAR_HEIGHT = 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """Everything of a scenario but chance."""
+
+    loaded: LoadedScenario
+    built: BuiltWorld
+    map: OccupancyGrid | None
+    robot: RobotSpec
+    body: RobotBody
+    stack: StackSpec
+    start: Pose2
+    estimate: Estimate
+    case: Case
+
+    @property
+    def spec(self) -> ScenarioSpec:
+        """The scenario as written."""
+        return self.loaded.spec
+
+
+BuildWorld = Callable[[LoadedScenario, float], BuiltWorld]
+"""Gives the built world of a scenario, as a lidar at a height in metres maps it."""
+
+
+def build_world(loaded: LoadedScenario, height: float) -> BuiltWorld:
+    """Build it anew."""
+    return build(load_world(loaded), height)
+
+
+def prepare(loaded: LoadedScenario, world_of: BuildWorld = build_world) -> Prepared:
+    """Build what the runs of this scenario share. Raises InvalidInput for files that cannot be used."""
+    spec = loaded.spec
+    robot, body = load_robot(loaded)
+    built = world_of(loaded, lidar_height(robot))
+    world = built.world
+    start = pose_of(spec.robot.pose, world)
+    goals = goals_of(spec, world)
+    case = Case(
+        start=start,
+        goals=goals,
+        regions=world.regions,
+        footprint=body.footprint,
+        inscribed_radius=inscribed_radius(body),
+        time_limit=spec.time_limit,
+    )
+    return Prepared(
+        loaded=loaded,
+        built=built,
+        map=_robot_map(loaded, built),
+        robot=robot,
+        body=body,
+        stack=stack_of(spec),
+        start=start,
+        estimate=estimate_of(spec.robot, start),
+        case=replace(case, shortest=shortest_lengths(built.map, start, goals, case.inscribed_radius)),
+    )
+
+
+def _robot_map(loaded: LoadedScenario, built: BuiltWorld) -> OccupancyGrid | None:
+    if loaded.map == "none":
+        return None
+    return load_map(loaded.map) if loaded.map is not None else built.map
+
+
+def lidar_height(robot: RobotSpec) -> float:
+    """The height that the robot's map shows: that of its first lidar."""
+    heights = [sensor.lidar.mount.z for sensor in robot.sensors.values() if sensor.lidar]
+    return heights[0] if heights else DEFAULT_LIDAR_HEIGHT
+
+
+def pose_of(place: str | PoseSpec, world: World) -> Pose2:
+    """A pose as written, or that of a place of the world."""
+    return world.places[place] if isinstance(place, str) else place.pose
+
+
+def goals_of(spec: ScenarioSpec, world: World) -> tuple[Goal, ...]:
+    """The goals in order, named, with their tolerances."""
+    return tuple(_goal(number, entry, spec.stack, world) for number, entry in enumerate(spec.goals, start=1))
+
+
+def _goal(number: int, entry: GoalEntry, stack: StackSpec, world: World) -> Goal:
+    place = entry.pose if isinstance(entry.pose, str) else f"goal-{number}"
+    return Goal(
+        name=entry.name or place,
+        pose=pose_of(entry.pose, world),
+        xy_tolerance=entry.xy_tolerance or stack.goal_checker.xy_goal_tolerance,
+        yaw_tolerance=entry.yaw_tolerance or stack.goal_checker.yaw_goal_tolerance,
+        timeout=entry.timeout,
+    )
+
+
+def stack_of(spec: ScenarioSpec) -> StackSpec:
+    """The stack as written; without a map, AMCL cannot work, so dead reckoning is the default there."""
+    unwritten = "localizer" not in spec.stack.model_fields_set
+    if spec.map == "none" and unwritten and isinstance(spec.stack.localizer, Amcl):
+        return spec.stack.model_copy(update={"localizer": OdometryOnly(type="odometry")})
+    return spec.stack

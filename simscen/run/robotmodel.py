@@ -1,0 +1,35 @@
+"""What a stack is told of its robot: the datasheet of the body that the simulator drives."""
+
+import math
+
+from simscen.core.polygons import distance_to_segment
+from simscen.model.robot import Ackermann, Omnidirectional
+from simscen.sim.robot_body import RobotBody
+from simscen.stack.protocols import RobotModel
+
+
+def robot_model(body: RobotBody) -> RobotModel:
+    """The datasheet of a body."""
+    limits, drive = body.limits, body.drive
+    holonomic = isinstance(drive, Omnidirectional)
+    return RobotModel(
+        footprint=body.footprint,
+        radius=body.radius,
+        max_linear=limits.linear,
+        max_reverse=limits.reverse or limits.linear,
+        max_lateral=(limits.lateral or limits.linear) if holonomic else 0.0,
+        max_angular=limits.angular,
+        linear_acceleration=limits.linear_acceleration,
+        linear_deceleration=limits.linear_deceleration or limits.linear_acceleration,
+        angular_acceleration=limits.angular_acceleration,
+        turning_radius=drive.wheel_base / math.tan(drive.max_steering) if isinstance(drive, Ackermann) else 0.0,
+        holonomic=holonomic,
+    )
+
+
+def inscribed_radius(body: RobotBody) -> float:
+    """The largest circle about the base's origin inside the footprint, in metres."""
+    if body.radius is not None:
+        return body.radius
+    corners = body.footprint
+    return min(distance_to_segment(0.0, 0.0, a, b) for a, b in zip(corners, (*corners[1:], corners[0]), strict=True))

@@ -1,0 +1,28 @@
+"""Keeps what has been prepared, so that a world is built once for all the runs in it."""
+
+import hashlib
+import pickle
+
+from simscen.core.world import BuiltWorld
+from simscen.loading.loaded import LoadedScenario
+from simscen.run.prepare import Prepared, build_world, prepare
+
+
+class Workshop:
+    """Prepares scenarios; lives in the warm process, whose forks inherit what is here."""
+
+    def __init__(self) -> None:
+        self._worlds: dict[str, BuiltWorld] = {}
+        self._scenarios: dict[str, Prepared] = {}
+
+    def prepared(self, loaded: LoadedScenario) -> Prepared:
+        """The prepared scenario; the first one in a world builds it. Raises InvalidInput."""
+        if loaded.id not in self._scenarios:
+            self._scenarios[loaded.id] = prepare(loaded, self._world)
+        return self._scenarios[loaded.id]
+
+    def _world(self, loaded: LoadedScenario, height: float) -> BuiltWorld:
+        key = hashlib.sha256(pickle.dumps((loaded.world, height))).hexdigest()
+        if key not in self._worlds:
+            self._worlds[key] = build_world(loaded, height)
+        return self._worlds[key]

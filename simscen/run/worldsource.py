@@ -1,0 +1,53 @@
+"""Where a scenario's world, map and robot come from."""
+
+from pathlib import Path
+
+from simscen.core.errors import InvalidInput
+from simscen.core.grid import OccupancyGrid
+from simscen.core.problems import Problem
+from simscen.core.shapes import Mesh
+from simscen.core.world import World
+from simscen.loading.loaded import LoadedMap, LoadedScenario, LoadedWorld
+from simscen.model.robot import RobotSpec
+from simscen.model.world import WorldSpec
+from simscen.sim.robot_body import RobotBody, robot_body
+from simscen.worlds.own import build_own
+
+
+def load_world(loaded: LoadedScenario) -> World:
+    """The world of a scenario. Raises InvalidInput for a map image or an SDF file that cannot be used."""
+    source = loaded.world
+    spec = source.spec or WorldSpec(simscen=1)
+    grid = load_map(source.map) if source.map else None
+    return build_own(spec, source.name, grid, _sdf(source, loaded))
+
+
+def _sdf(source: LoadedWorld, loaded: LoadedScenario) -> World | None:
+    if source.sdf is None:
+        return None
+    from simscen.worlds.sdf import load_sdf
+
+    return load_sdf(source.sdf, search=loaded.world_path, root=loaded.root)
+
+
+def load_map(source: LoadedMap) -> OccupancyGrid:
+    """The grid of a ROS map."""
+    from simscen.worlds.rosmap import load_grid
+
+    return load_grid(source.spec, source.image)[0]
+
+
+def _read_mesh(path: Path) -> Mesh:
+    from simscen.worlds.sdf.meshes import read_mesh
+
+    return read_mesh(path)
+
+
+def load_robot(loaded: LoadedScenario) -> tuple[RobotSpec, RobotBody]:
+    """The robot as specified, and made ready for physics."""
+    robot = loaded.robot
+    if robot.spec is None:
+        hint = "write a short *.robot.yaml beside it that names its drive, limits and sensors: see `simscen explain robot`"
+        problem = Problem(str(robot.path), 0, 0, "SC201", "a URDF alone does not say how the robot drives", hint)
+        raise InvalidInput([problem])
+    return robot.spec, robot_body(robot.spec, robot.path, (loaded.root, *loaded.world_path), _read_mesh)
