@@ -1,0 +1,21 @@
+"""A colour and depth camera; its pictures come from the engine's renderer."""
+
+from simscen.core.geometry import Pose3
+from simscen.core.sensing import Image
+from simscen.model.robot import Camera
+from simscen.sensors.sensor import SensorView
+
+
+class CameraSensor:
+    """A pinhole without noise or distortion; costs milliseconds a picture, so robots have none unless asked."""
+
+    def __init__(self, name: str, spec: Camera, period: int, view: SensorView) -> None:
+        self.name, self.period, self._spec, self._view = name, period, spec, view
+        mount = spec.mount
+        self._mount = Pose3.from_rpy(mount.x, mount.y, mount.z, 0.0, 0.0, mount.yaw)
+
+    def read(self, tick: int) -> Image:
+        """Take a picture."""
+        spec = self._spec
+        rgb, depth = self._view.image(self._mount, spec.width, spec.height, spec.field_of_view, spec.max_range)
+        return Image(self.name, tick, rgb, depth)

@@ -1,0 +1,32 @@
+"""From what the encoders counted to how far the base moved, if nothing slipped."""
+
+from collections.abc import Callable
+
+from simscen.core.motion import Twist
+from simscen.model.robot import Drive, Omnidirectional, SkidSteer
+
+Rolled = tuple[float, ...]
+Kinematics = Callable[[Rolled], Twist]
+
+
+def kinematics_of(drive: Drive) -> Kinematics:
+    """Turns an increment of `SensorView.encoders` into a motion of the base in its own frame (m, m, rad).
+
+    Siegwart, Nourbakhsh and Scaramuzza, Introduction to Autonomous Mobile Robots, section 3.2.
+    """
+    if isinstance(drive, Omnidirectional):
+        return _omnidirectional
+    separation = drive.wheel_separation * (drive.turning_scale if isinstance(drive, SkidSteer) else 1.0)
+    return _sided(drive.wheel_radius, separation)
+
+
+def _sided(radius: float, separation: float) -> Kinematics:
+    def motion(rolled: Rolled) -> Twist:
+        left, right = rolled[0] * radius, rolled[1] * radius
+        return Twist((left + right) / 2, 0.0, (right - left) / separation)
+
+    return motion
+
+
+def _omnidirectional(rolled: Rolled) -> Twist:
+    return Twist(*rolled)

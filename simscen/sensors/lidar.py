@@ -1,0 +1,53 @@
+"""A planar lidar: rays, gaussian noise, ranges in whole steps. No work per beam in Python."""
+
+import math
+
+import numpy as np
+
+from simscen.core.geometry import Array, Pose2
+from simscen.core.rays import RayCaster
+from simscen.core.sensing import Scan
+from simscen.model.robot import Lidar
+from simscen.sensors.sensor import SensorView
+
+
+class LidarSensor:
+    """Measures along `spec.beams` directions at once; a scan is an instant, as in Gazebo.
+
+    A full circle has no beam twice; any other field of view has beams on both of its edges.
+    """
+
+    def __init__(
+        self, name: str, spec: Lidar, period: int, chance: np.random.Generator, view: SensorView, rays: RayCaster
+    ) -> None:
+        self.name, self.period = name, period
+        self._spec, self._chance, self._view, self._rays = spec, chance, view, rays
+        full = spec.field_of_view >= 2 * math.pi - 1e-9
+        self._increment = spec.field_of_view / max(1, spec.beams if full else spec.beams - 1)
+        self._first = -spec.field_of_view / 2 if spec.beams > 1 else 0.0
+        self._mount = Pose2(spec.mount.x, spec.mount.y, spec.mount.yaw)
+        self._directions = _directions(self._first + self._increment * np.arange(spec.beams) + spec.mount.yaw)
+        self._lens = np.array([[spec.mount.x, spec.mount.y, spec.mount.z]])
+
+    def read(self, tick: int) -> Scan:
+        """One scan. inf: nothing within range; nan: something nearer than the lidar can measure."""
+        pose = self._view.base_pose()
+        directions = self._directions @ pose.rotation().T
+        origins = np.repeat(pose.apply(self._lens), len(directions), axis=0)
+        ranges = self._measured(self._rays.cast(origins, directions))
+        spec = self._spec
+        return Scan(self.name, tick, ranges, self._first, self._increment, spec.min_range, spec.max_range, self._mount)
+
+    def _measured(self, distances: Array) -> Array:
+        """What the electronics make of true distances."""
+        spec = self._spec
+        if spec.noise > 0:
+            distances = distances + self._chance.normal(0.0, spec.noise, len(distances))
+        ranges = np.round(distances / spec.resolution) * spec.resolution
+        ranges[ranges > spec.max_range] = np.inf
+        ranges[ranges < spec.min_range] = np.nan
+        return ranges
+
+
+def _directions(angles: Array) -> Array:
+    return np.column_stack((np.cos(angles), np.sin(angles), np.zeros(len(angles))))

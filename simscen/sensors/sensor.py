@@ -1,0 +1,68 @@
+"""What a sensor is, and what it may look at."""
+
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.geometry import Pose3
+from simscen.core.sensing import Reading
+
+Vector = tuple[float, float, float]
+
+
+class SensorView(Protocol):
+    """The truth, as far as sensors may see it."""
+
+    def base_pose(self) -> Pose3:
+        """The robot's base frame in the world."""
+        ...
+
+    def base_velocity(self) -> tuple[Vector, Vector]:
+        """Linear (m/s) and angular (rad/s) velocity of the base frame along the world's axes."""
+        ...
+
+    def encoders(self) -> tuple[float, ...]:
+        """What has been rolled so far.
+
+        On wheels: the mean angle in rad of the driven wheels on the left, and of those on the right. Omnidirectional:
+        metres forward, metres to the left, and radians.
+        """
+        ...
+
+    def touching(self) -> bool:
+        """Whether the hull touches anything but the ground."""
+        ...
+
+    def image(
+        self, mount: Pose3, width: int, height: int, field_of_view: float, far: float
+    ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float32]]:
+        """Colours (h, w, 3) and depths (h, w) in metres along the optical axis, inf beyond `far`.
+
+        `mount` is where the camera is in the base frame; it looks along its x axis. `field_of_view` is horizontal,
+        in rad.
+        """
+        ...
+
+
+class Sensor(Protocol):
+    """Takes readings at a fixed rate.
+
+    *Given* the same world and generator *then* the same readings, bit for bit.
+    *Given* noise *then* no two readings of a robot at rest are equal; without noise all are.
+    *Given* a reading *then* nothing changes it later.
+    """
+
+    @property
+    def name(self) -> str:
+        """The instance, as faults call it."""
+        ...
+
+    @property
+    def period(self) -> int:
+        """Ticks between two readings."""
+        ...
+
+    def read(self, tick: int) -> Reading:
+        """Measure now, at `tick`. Called once every `period` ticks, in order."""
+        ...

@@ -1,0 +1,111 @@
+"""What the robot touches: one event when it begins, one when it is over."""
+
+import math
+from dataclasses import dataclass
+
+import pybullet
+
+from simscen.core.events import Event
+
+PATIENCE = 0.1
+"""Seconds without contact after which a collision is over; a bouncing robot collides once."""
+STANDING = 0.02
+"""A robot that moves towards a contact more slowly than this, in m/s, did not cause it."""
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Touch:
+    """The robot and something press on each other: `place` and unit `normal` towards the robot in the world frame.
+
+    `impulse` in N s during one tick.
+    """
+
+    name: str
+    place: Vector
+    normal: Vector
+    impulse: float
+
+
+@dataclass
+class _Ongoing:
+    started: int
+    last: int
+    impulse: float
+
+
+class Contacts:
+    """Turns touches of single ticks into collisions with a beginning and an end."""
+
+    def __init__(self, tick_rate: int) -> None:
+        self._patience = round(PATIENCE * tick_rate)
+        self._ongoing: dict[str, _Ongoing] = {}
+        self._events: list[Event] = []
+
+    @property
+    def touching(self) -> bool:
+        """Whether anything was touched lately."""
+        return bool(self._ongoing)
+
+    def note(self, tick: int, touches: list[Touch], velocity: tuple[Vector, Vector], origin: Vector) -> None:
+        """Take what was touched at `tick`, and how the robot's base moved just before."""
+        for touch in touches:
+            known = self._ongoing.get(touch.name)
+            if known is None:
+                self._ongoing[touch.name] = _Ongoing(tick, tick, touch.impulse)
+                self._events.append(_started(tick, touch, velocity, origin))
+            else:
+                known.last, known.impulse = tick, known.impulse + touch.impulse
+        self._end(tick)
+
+    def _end(self, tick: int) -> None:
+        for name in sorted(name for name, seen in self._ongoing.items() if tick - seen.last >= self._patience):
+            seen = self._ongoing.pop(name)
+            data = {"impulse": seen.impulse, "ticks": seen.last - seen.started + 1}
+            self._events.append(Event(tick, "collision.ended", name, data))
+
+    def take(self) -> tuple[Event, ...]:
+        """The events since last asked."""
+        events, self._events = tuple(self._events), []
+        return events
+
+
+def touches(client: int, robot: int, names: "dict[int, str | None]", owner: "Owner", seconds: float) -> list[Touch]:
+    """What presses on the robot now; `names` of bodies, None where the owner of the triangle is to be found."""
+    found: dict[str, Touch] = {}
+    for point in pybullet.getContactPoints(robot, physicsClientId=client):
+        other, place, normal, distance, force = point[2], point[6], point[7], point[8], point[9]
+        if other not in names or (force <= 0 and distance > 0):
+            continue
+        name = names[other] or owner(place)
+        known = found.get(name)
+        impulse = force * seconds + (known.impulse if known else 0.0)
+        found[name] = Touch(name, place, normal, impulse)
+    return [found[name] for name in sorted(found)]
+
+
+from collections.abc import Callable  # noqa: E402
+
+Owner = Callable[[Vector], str]
+
+
+def _started(tick: int, touch: Touch, velocity: tuple[Vector, Vector], origin: Vector) -> Event:
+    (vx, vy, vz), (wx, wy, wz) = velocity
+    x, y, z = (touch.place[i] - origin[i] for i in range(3))
+    at = (vx + wy * z - wz * y, vy + wz * x - wx * z, vz + wx * y - wy * x)
+    approach = -sum(v * n for v, n in zip(at, touch.normal, strict=True))
+    return Event(
+        tick,
+        "collision.started",
+        touch.name,
+        {
+            "x": touch.place[0],
+            "y": touch.place[1],
+            "impulse": touch.impulse,
+            "speed": max(0.0, approach),
+            "robot_speed": math.hypot(vx, vy),
+            "robot_caused": approach >= STANDING,
+            "robot_part": "hull",
+        },
+    )

@@ -1,0 +1,50 @@
+"""Where something on a scripted path is at a time."""
+
+import math
+from bisect import bisect_right
+
+from simscen.core.geometry import Pose2, wrap
+from simscen.core.shapes import MotionPath
+
+
+def pose_at(path: MotionPath, seconds: float) -> Pose2:
+    """The pose on the path, `seconds` after it was set off; linear between waypoints, turning the shorter way."""
+    local = min(max(_local(path, seconds - path.start), path.times[0]), path.times[-1])
+    if len(path.times) == 1:
+        return path.poses[0]
+    leg = min(bisect_right(path.times, local) - 1, len(path.times) - 2)
+    begin, end = path.poses[leg], path.poses[leg + 1]
+    lasts = path.times[leg + 1] - path.times[leg]
+    part = (local - path.times[leg]) / lasts if lasts > 0 else 1.0
+    return Pose2(
+        begin.x + part * (end.x - begin.x),
+        begin.y + part * (end.y - begin.y),
+        wrap(begin.yaw + part * wrap(end.yaw - begin.yaw)),
+    )
+
+
+def top_speed(path: MotionPath) -> float:
+    """The fastest it ever moves in m/s; inf where it jumps."""
+    stops = list(zip(path.times, path.poses, strict=True))
+    speeds = [_speed(a.distance(b), tb - ta) for (ta, a), (tb, b) in zip(stops, stops[1:], strict=False)]
+    if path.mode == "loop":
+        speeds.append(_speed(path.poses[-1].distance(path.poses[0]), 0.0))
+    return max(speeds, default=0.0)
+
+
+def _speed(metres: float, seconds: float) -> float:
+    if metres == 0:
+        return 0.0
+    return metres / seconds if seconds > 0 else math.inf
+
+
+def _local(path: MotionPath, seconds: float) -> float:
+    """The time along the path, on its own clock."""
+    first, lasts = path.times[0], path.times[-1] - path.times[0]
+    since = seconds - first
+    if lasts <= 0 or since <= 0 or path.mode == "once":
+        return seconds
+    if path.mode == "loop":
+        return first + math.fmod(since, lasts)
+    phase = math.fmod(since, 2 * lasts)
+    return first + (phase if phase <= lasts else 2 * lasts - phase)

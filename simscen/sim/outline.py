@@ -1,0 +1,78 @@
+"""What a robot covers of the ground."""
+
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from simscen.core.geometry import Array
+from simscen.core.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Shape, Solid, Sphere
+from simscen.core.world import Polygon
+
+_CIRCLE = 64
+"""Corners of a circle's outline: within 0.03 % of the radius."""
+
+
+def circle(radius: float, corners: int = 32) -> Polygon:
+    """A regular polygon with its corners on the circle, anticlockwise from straight ahead."""
+    angles = [2 * math.pi * k / corners for k in range(corners)]
+    return tuple((radius * math.cos(angle), radius * math.sin(angle)) for angle in angles)
+
+
+def footprint(solids: Iterable[Solid]) -> Polygon:
+    """The convex outline of solids seen from above, anticlockwise."""
+    return convex_hull(np.concatenate([solid.pose.apply(extremes(solid.shape))[:, :2] for solid in solids]))
+
+
+def extremes(shape: Shape) -> Array:
+    """Points (n, 3) whose convex hull is that of the shape; round ones within 0.1 % of the radius."""
+    match shape:
+        case Box(size):
+            return np.array([[x, y, z] for z in (-0.5, 0.5) for y in (-0.5, 0.5) for x in (-0.5, 0.5)]) * size
+        case Cylinder(radius, length):
+            return np.concatenate((_ring(radius, -length / 2), _ring(radius, length / 2)))
+        case Cone(radius, length):
+            return np.concatenate((_ring(radius, -length / 2), [[0.0, 0.0, length / 2]]))
+        case Sphere(radius):
+            return _ball((radius, radius, radius))
+        case Ellipsoid(radii):
+            return _ball(radii)
+        case Capsule(radius, length):
+            ball, up = _ball((radius, radius, radius)), np.array([0.0, 0.0, length / 2])
+            return np.concatenate((ball - up, ball + up))
+        case Extrusion(polygon, height):
+            return np.array([(x, y, z) for z in (0.0, height) for x, y in polygon])
+        case Mesh(vertices):
+            return vertices
+
+
+def convex_hull(points: Array) -> Polygon:
+    """The convex hull of points (n, 2), anticlockwise (Andrew's monotone chain, 1979)."""
+    ordered = sorted({(round(x, 9), round(y, 9)) for x, y in points.tolist()})
+    if len(ordered) < 3:
+        return tuple(ordered)
+    return (*_chain(ordered)[:-1], *_chain(ordered[::-1])[:-1])
+
+
+def _chain(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    chain: list[tuple[float, float]] = []
+    for x, y in points:
+        while len(chain) > 1:
+            (ax, ay), (bx, by) = chain[-2:]
+            if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 0:
+                break
+            chain.pop()
+        chain.append((x, y))
+    return chain
+
+
+def _ring(radius: float, z: float) -> Array:
+    angles = np.arange(_CIRCLE) * (2 * math.pi / _CIRCLE)
+    return np.column_stack((radius * np.cos(angles), radius * np.sin(angles), np.full(_CIRCLE, z)))
+
+
+def _ball(radii: tuple[float, float, float]) -> Array:
+    latitudes = np.linspace(-math.pi / 2, math.pi / 2, _CIRCLE // 2 + 1)
+    rings = [_ring(max(0.0, math.cos(latitude)), math.sin(latitude)) for latitude in latitudes]
+    result: Array = np.concatenate(rings) * radii
+    return result

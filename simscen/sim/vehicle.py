@@ -1,0 +1,129 @@
+"""A robot in the engine: its hull as base, its wheels as links, and where its base frame is."""
+
+import pybullet
+
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.motion import Twist
+from simscen.sim import engine
+from simscen.sim.robot_body import RobotBody, Wheel
+
+Vector = tuple[float, float, float]
+UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+
+
+class Vehicle:
+    """A robot on wheels, resting on the ground.
+
+    A wheel touches the ground as a ball of its radius: one point of contact in the wheel's middle plane, so that the
+    radius and the separation in the datasheet are those of the contact, and half the time of a cylinder's contact.
+    Only the hull touches obstacles.
+    """
+
+    def __init__(self, client: int, body: RobotBody, ground: int, pose: Pose2) -> None:
+        self._client = client
+        self._mass = body.mass
+        moments, self._base_from_centre = body.chassis.principal()
+        self._centre = self._base_from_centre.position
+        self._centre_from_base = self._base_from_centre.inverse()
+        self.id, self.joints = _build(client, body)
+        pybullet.changeDynamics(self.id, -1, localInertiaDiagonal=moments, physicsClientId=client)
+        for wheel, joint in zip(body.wheels, self.joints, strict=True):
+            self._set_up(wheel, joint, ground)
+        self.place(pose)
+
+    def _set_up(self, wheel: Wheel, joint: int, ground: int) -> None:
+        # A wheel turns about y and is round: its moments are its tensor's diagonal.
+        rolling = joint if not wheel.steered else joint + 1
+        pybullet.changeDynamics(self.id, rolling, lateralFriction=1.0, linearDamping=0, angularDamping=0,
+                                jointDamping=0, localInertiaDiagonal=wheel.inertia.tensor.diagonal().tolist(),
+                                physicsClientId=self._client)  # fmt: skip
+
+    def place(self, pose: Pose2) -> None:
+        """Set it down at rest, its base frame on the ground."""
+        centre = Pose3.planar(pose).compose(self._base_from_centre)
+        pybullet.resetBasePositionAndOrientation(
+            self.id, centre.position, centre.quaternion, physicsClientId=self._client
+        )
+        pybullet.resetBaseVelocity(self.id, (0, 0, 0), (0, 0, 0), physicsClientId=self._client)
+        for joint in range(pybullet.getNumJoints(self.id, physicsClientId=self._client)):
+            angle = pybullet.getJointState(self.id, joint, physicsClientId=self._client)[0]
+            pybullet.resetJointState(self.id, joint, angle, 0.0, physicsClientId=self._client)
+
+    def pose(self) -> Pose3:
+        """The base frame in the world."""
+        position, turn = pybullet.getBasePositionAndOrientation(self.id, physicsClientId=self._client)
+        if self._centre_from_base.quaternion != UPRIGHT:
+            return Pose3(*position, *turn).compose(self._centre_from_base)
+        x, y, z = rotated(turn, self._centre)
+        return Pose3(position[0] - x, position[1] - y, position[2] - z, *turn)
+
+    def velocity(self) -> tuple[Vector, Vector]:
+        """Linear velocity of the base frame's origin in m/s and angular velocity in rad/s, along the world's axes."""
+        (vx, vy, vz), (wx, wy, wz) = pybullet.getBaseVelocity(self.id, physicsClientId=self._client)
+        turn = pybullet.getBasePositionAndOrientation(self.id, physicsClientId=self._client)[1]
+        if self._centre_from_base.quaternion != UPRIGHT:
+            turn = Pose3(0, 0, 0, *turn).compose(self._centre_from_base).quaternion
+        x, y, z = rotated(turn, self._centre)
+        return (vx - (wy * z - wz * y), vy - (wz * x - wx * z), vz - (wx * y - wy * x)), (wx, wy, wz)
+
+    def push(self, impulse: tuple[float, float], seconds: float) -> None:
+        """Push its centre of mass during the next step, which lasts `seconds`."""
+        centre = pybullet.getBasePositionAndOrientation(self.id, physicsClientId=self._client)[0]
+        force = (impulse[0] / seconds, impulse[1] / seconds, 0.0)
+        pybullet.applyExternalForce(self.id, -1, force, centre, pybullet.WORLD_FRAME, physicsClientId=self._client)
+
+
+def rotated(turn: tuple[float, float, float, float], vector: Vector) -> Vector:
+    """A vector turned by a unit quaternion (x, y, z, w)."""
+    x, y, z, w = turn
+    a, b, c = vector
+    p, q, r = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
+    return a + w * p + y * r - z * q, b + w * q + z * p - x * r, c + w * r + x * q - y * p
+
+
+def base_twist(pose: Pose3, velocity: tuple[Vector, Vector]) -> Twist:
+    """A velocity along the world's axes as a twist in the base frame."""
+    back = (-pose.qx, -pose.qy, -pose.qz, pose.qw)
+    vx, vy, _ = rotated(back, velocity[0])
+    return Twist(vx, vy, rotated(back, velocity[1])[2])
+
+
+def _build(client: int, body: RobotBody) -> tuple[int, tuple[int, ...]]:
+    """The multibody and, for each wheel, its first joint (steering before rolling)."""
+    links: list[tuple[Wheel, bool]] = []
+    joints: list[int] = []
+    for wheel in body.wheels:
+        joints.append(len(links))
+        links += [(wheel, True), (wheel, False)] if wheel.steered else [(wheel, False)]
+    balls = {
+        w.radius: pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=w.radius, physicsClientId=client)
+        for w in body.wheels
+    }
+    _, centre = body.chassis.principal()
+    robot: int = pybullet.createMultiBody(
+        body.chassis.mass,
+        engine.compound_shape(client, (*body.hull, *body.casters)),
+        -1,
+        (0, 0, 0),
+        UPRIGHT,
+        baseInertialFramePosition=centre.position,
+        baseInertialFrameOrientation=centre.quaternion,
+        linkMasses=[KNUCKLE * w.inertia.mass if steering else w.inertia.mass for w, steering in links],
+        linkCollisionShapeIndices=[-1 if steering else balls[w.radius] for w, steering in links],
+        linkVisualShapeIndices=[-1] * len(links),
+        linkPositions=[(w.x, w.y, w.radius) if steering or not w.steered else (0, 0, 0) for w, steering in links],
+        linkOrientations=[UPRIGHT] * len(links),
+        linkInertialFramePositions=[(0, 0, 0)] * len(links),
+        linkInertialFrameOrientations=[UPRIGHT] * len(links),
+        linkParentIndices=[k if w.steered and not steering else 0 for k, (w, steering) in enumerate(links)],
+        linkJointTypes=[pybullet.JOINT_REVOLUTE] * len(links),
+        linkJointAxis=[(0, 0, 1) if steering else (0, 1, 0) for _, steering in links],
+        physicsClientId=client,
+    )
+    pybullet.changeDynamics(robot, -1, lateralFriction=0.0, restitution=0.0, linearDamping=0, angularDamping=0,
+                            physicsClientId=client)  # fmt: skip
+    return robot, tuple(joints)
+
+
+KNUCKLE = 0.2
+"""Mass of a steering knuckle over that of its wheel."""

@@ -1,0 +1,76 @@
+"""Wheels that drive and skid: differential drives and skid-steered ones."""
+
+from collections.abc import Sequence
+
+import pybullet
+
+from simscen.core.motion import Twist
+from simscen.model.robot import Differential, SkidSteer
+from simscen.sim.engine import GRAVITY
+from simscen.sim.ramp import Ramp
+from simscen.sim.robot_body import RobotBody
+from simscen.sim.vehicle import Vehicle
+
+TRACTION = 0.7
+"""Torque of the motors over what would spin all wheels at once: they stall against a wall rather than spin."""
+
+
+class SidedDrive:
+    """Wheels on the left turn alike, and so do those on the right."""
+
+    def __init__(self, client: int, vehicle: Vehicle, body: RobotBody, period: float) -> None:
+        drive = body.drive
+        assert isinstance(drive, Differential | SkidSteer)
+        self._client, self._vehicle = client, vehicle
+        self._ramp = Ramp(body.limits, period, holonomic=False)
+        self._radius = drive.wheel_radius
+        scale = drive.turning_scale if isinstance(drive, SkidSteer) else 1.0
+        self._half = drive.wheel_separation * scale / 2
+        self._left = [j for w, j in zip(body.wheels, vehicle.joints, strict=True) if w.left]
+        self._right = [j for w, j in zip(body.wheels, vehicle.joints, strict=True) if not w.left]
+        self._torques = [stall_torque(body)] * len(body.wheels)
+        self._turn()
+
+    def command(self, twist: Twist) -> None:
+        """Drive this from now on; it cannot go sideways."""
+        self._ramp.command(twist)
+
+    def advance(self) -> None:
+        """Set the wheels' speeds when they change."""
+        if self._ramp.advance():
+            self._turn()
+
+    def rest(self) -> None:
+        """Start again from standstill."""
+        self._ramp.rest()
+        self._turn()
+
+    def encoders(self) -> tuple[float, ...]:
+        """Mean angles in rad of the left and of the right wheels."""
+        return mean_angle(self._client, self._vehicle.id, self._left), mean_angle(
+            self._client, self._vehicle.id, self._right
+        )
+
+    def _turn(self) -> None:
+        vx, _, wz = self._ramp.velocity
+        left, right = (vx - wz * self._half) / self._radius, (vx + wz * self._half) / self._radius
+        pybullet.setJointMotorControlArray(
+            self._vehicle.id,
+            self._left + self._right,
+            pybullet.VELOCITY_CONTROL,
+            targetVelocities=[left] * len(self._left) + [right] * len(self._right),
+            forces=self._torques,
+            physicsClientId=self._client,
+        )
+
+
+def stall_torque(body: RobotBody) -> float:
+    """The most torque in N m of each driven wheel."""
+    driven = [wheel for wheel in body.wheels if wheel.driven]
+    return TRACTION * body.mass * GRAVITY * driven[0].radius / len(driven)
+
+
+def mean_angle(client: int, robot: int, joints: Sequence[int]) -> float:
+    """The mean angle in rad of some joints."""
+    angles = [pybullet.getJointState(robot, joint, physicsClientId=client)[0] for joint in joints]
+    return float(sum(angles) / len(angles))
