@@ -1,13 +1,12 @@
 """Every packer writes the very bytes that rosbags writes for the same content, and reads them back."""
 
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from schemas_from_rosbags import humble
 
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.grid import OccupancyGrid
@@ -15,9 +14,6 @@ from simscen.core.motion import Twist
 from simscen.core.sensing import Imu, Scan
 from simscen.record import pack, pack_many, pack_rare
 from simscen.record.simtime import Stamp
-
-sys.path.insert(0, str(Path(__file__).parent))
-from schemas_from_rosbags import humble
 
 STORE = humble()
 names = st.text(max_size=20)

@@ -2,7 +2,6 @@
 
 import hashlib
 import io
-import sys
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -11,17 +10,15 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
+from moments import CASE, CLOCK, about, moments
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability
+from schemas_from_rosbags import humble
 
 from simscen.core.errors import RunError
 from simscen.core.sensing import Scan
 from simscen.core.trace import Moment
 from simscen.record.recorder import Recorder
-
-sys.path.insert(0, str(Path(__file__).parent))
-from moments import CASE, CLOCK, about, moments
-from schemas_from_rosbags import humble
 
 RUN = list(moments(2.0))
 LATCHED = {"/map", "/tf_static", "/robot_description"}

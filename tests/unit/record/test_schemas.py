@@ -1,15 +1,12 @@
 """The message definitions that ship are those of ROS 2 Humble."""
 
 import json
-import sys
-from pathlib import Path
+
+from schemas_from_rosbags import SCHEMAS, expected
 
 from simscen.record import topics
 from simscen.record.schemas import load
 from simscen.record.topics import Topic
-
-sys.path.insert(0, str(Path(__file__).parent))
-from schemas_from_rosbags import SCHEMAS, expected
 
 
 def test_schemas_have_not_drifted_from_rosbags() -> None:

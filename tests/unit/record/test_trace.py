@@ -1,10 +1,8 @@
 """The Trace holds what the moments said."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
+from moments import CLOCK, moments
 
 from simscen.core.events import Event
 from simscen.core.geometry import Pose3, wrap_array
@@ -12,9 +10,6 @@ from simscen.core.motion import STOP
 from simscen.core.sensing import Odometry, Scan
 from simscen.core.trace import Decision, Moment, Trace, Truth
 from simscen.record.trace import TraceBuilder
-
-sys.path.insert(0, str(Path(__file__).parent))
-from moments import CLOCK, moments
 
 RUN = list(moments(2.0))
 

@@ -1,0 +1,151 @@
+"""A log that is not whole is read as far as it goes or refused by name: nothing but InvalidInput is raised."""
+
+import os
+import signal
+import struct
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from mcap.exceptions import EndOfFile
+from mcap.records import Message
+from mcap.stream_reader import StreamReader
+from mcap.writer import Writer
+
+from simscen.core.errors import InvalidInput
+from simscen.core.trace import Trace
+from simscen.record.recorder import Recorder
+from simscen.record.replay import Log, read_log
+from simscen.record.trace import TraceBuilder
+
+HERE = Path(__file__).parent
+from moments import CASE, CLOCK, about, moments
+
+
+def recorded(path: Path, seconds: float) -> Trace:
+    """A whole log, and the trace of its moments."""
+    builder, end = TraceBuilder(CLOCK), CLOCK.ticks(seconds)
+    with Recorder(path, CLOCK, about()) as recorder:
+        for moment in moments(seconds):
+            recorder.append(moment)
+            builder.append(moment)
+        recorder.close(end)
+    return builder.finish(end)
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("log") / "run.mcap"
+    recorded(path, 1.0)
+    return path
+
+
+def killed(folder: Path, seconds: float) -> Path:
+    """The log of a process that a SIGKILL ended after so many simulated seconds."""
+    code = f"""if True:
+        import os, signal, sys
+        sys.path.insert(0, {str(HERE)!r})
+        from moments import CLOCK, about, moments
+        from simscen.record.recorder import Recorder
+        recorder = Recorder({str(folder / "run.mcap")!r}, CLOCK, about())
+        for moment in moments({seconds}):
+            recorder.append(moment)
+        os.kill(os.getpid(), signal.SIGKILL)
+    """
+    process = subprocess.run([sys.executable, "-c", code], check=False, cwd=HERE.parents[2], env=dict(os.environ))
+    assert process.returncode == -signal.SIGKILL
+    return folder / "run.partial.mcap"
+
+
+def test_a_killed_log_keeps_95_percent_of_its_messages(tmp_path: Path) -> None:
+    partial = killed(tmp_path, 20.0)
+    whole = recorded(tmp_path / "whole.mcap", 20.0)
+    log = read_log(partial)
+    assert not log.complete
+    assert log.about.case == CASE
+    assert len(log.trace.truth) >= 0.95 * len(whole.truth)
+    assert log.trace.end >= 0.95 * whole.end
+    assert log.trace.odometry.values.tolist() == whole.odometry.values[: len(log.trace.odometry)].tolist()
+
+
+def test_the_mcap_library_streams_a_killed_log(tmp_path: Path) -> None:
+    count = 0
+    with killed(tmp_path, 5.0).open("rb") as stream, pytest.raises(EndOfFile):
+        for record in StreamReader(stream).records:
+            count += isinstance(record, Message)
+    assert count > 1000
+
+
+def problem(path: Path) -> str:
+    with pytest.raises(InvalidInput) as caught:
+        read_log(path)
+    (found,) = caught.value.problems
+    assert found.path == str(path)
+    return f"{found.code} {found.message}"
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (lambda data: b"", "SC801 not a log of simscen: it is not an MCAP file"),
+        (lambda data: b"name: goal\nworld: house\n", "SC801 not a log of simscen: it is not an MCAP file"),
+        (lambda data: data[:-1], "SC803 the log ends too early: its run broke off"),
+        (lambda data: data[: len(data) // 2], "SC803 the log ends too early: its run broke off"),
+        (lambda data: data[:9], "SC803 the log ends too early: its run broke off"),
+    ],
+)
+def test_a_wrong_file_is_told_as_such(
+    tmp_path: Path, log: Path, change: Callable[[bytes], bytes], expected: str
+) -> None:
+    path = tmp_path / "run.mcap"
+    path.write_bytes(change(log.read_bytes()))
+    assert problem(path) == expected
+
+
+def test_a_missing_file_is_told_as_such(tmp_path: Path) -> None:
+    assert problem(tmp_path / "run.mcap") == "SC800 cannot read the log: No such file or directory"
+
+
+def test_a_log_of_somebody_else_is_told_as_such(tmp_path: Path) -> None:
+    with Path(tmp_path / "run.mcap").open("wb") as stream:
+        writer = Writer(stream)
+        writer.start("ros2", "rosbag2")
+        schema = writer.register_schema("nav_msgs/msg/Odometry", "ros2msg", b"")
+        channel = writer.register_channel("/odom", "cdr", schema)
+        writer.add_message(channel, 0, b"", 0)
+        writer.finish()
+    assert problem(tmp_path / "run.mcap").startswith("SC801 not a log of simscen")
+
+
+def test_a_log_too_short_to_say_its_run_is_told_as_such(tmp_path: Path, log: Path) -> None:
+    path = tmp_path / "run.partial.mcap"
+    path.write_bytes(log.read_bytes()[:60])
+    assert problem(path).startswith("SC801 not a log of simscen")
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(place=st.floats(0, 1), bit=st.integers(0, 7))
+def test_a_flipped_bit_is_noticed(tmp_path: Path, log: Path, place: float, bit: int) -> None:
+    data = bytearray(log.read_bytes())
+    (summary,) = struct.unpack_from("<Q", data, len(data) - 28)  # the index after it is not read
+    data[int(place * (summary - 1))] ^= 1 << bit
+    path = tmp_path / "flipped.mcap"
+    path.write_bytes(data)
+    assert problem(path)
+
+
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(kept=st.floats(0, 1))
+def test_a_log_cut_anywhere_is_read_as_far_as_it_goes_or_refused(tmp_path: Path, log: Path, kept: float) -> None:
+    data = log.read_bytes()
+    path = tmp_path / "cut.partial.mcap"
+    path.write_bytes(data[: int(kept * len(data))])
+    try:
+        read: Log | None = read_log(path)
+    except InvalidInput:
+        read = None
+    assert read is None or len(read.trace.truth) <= 41
