@@ -40,6 +40,7 @@ def build_own(spec: WorldSpec, name: str, grid: OccupancyGrid | None = None, bas
         bodies=bodies,
         places=places,
         regions={**base.regions, **regions},
+        doors={door.name: _swing(door) for door in spec.doors},
         bounds=_bounds(solids, bodies, places.values(), grid),
         grid=grid or base.grid,
     )
@@ -49,6 +50,11 @@ def door_poses(hinge: tuple[float, float], post: tuple[float, float]) -> tuple[P
     """Where the panel of a door is when closed and when open: it turns 90° anticlockwise about its hinge."""
     yaw = math.atan2(post[1] - hinge[1], post[0] - hinge[0])
     return Pose2(*hinge, yaw), Pose2(*hinge, yaw).compose(Pose2(0.0, 0.0, math.pi / 2))
+
+
+def _swing(door: Door) -> tuple[Pose2, Pose2]:
+    (hx, hy), (px, py) = door.points
+    return door_poses((hx, hy), (px, py))
 
 
 def _corners(wall: Wall) -> list[tuple[float, float]]:

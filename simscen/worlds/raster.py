@@ -14,7 +14,7 @@ INWARDS = 1e-6
 
 def touched(cut: Section, shape: tuple[int, int]) -> Cells:
     """Which cells of a lattice (rows, columns) share inner points with the solids; outlines in cell units."""
-    cells = _filled(cut, shape)
+    cells = filled(cut, shape)
     rows, columns = _on_outline(cut.segments)
     inside = (rows >= 0) & (rows < shape[0]) & (columns >= 0) & (columns < shape[1])
     cells[rows[inside], columns[inside]] = True
@@ -29,7 +29,7 @@ def _on_outline(segments: Array) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.
     for axis in (0, 1):
         low, high = np.sort(segments[:, :, axis], axis=1).T
         first, last = np.floor(low).astype(np.int64) + 1, np.ceil(high).astype(np.int64) - 1
-        which, lines = _ranges(first, last + 1)
+        which, lines = ranges(first, last + 1)
         owner.append(which)
         along.append((lines - start[which, axis]) / step[which, axis])
     owners, cuts = np.concatenate(owner), np.concatenate(along)
@@ -46,7 +46,7 @@ def _on_outline(segments: Array) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.
     return cells[:, 1], cells[:, 0]
 
 
-def _filled(cut: Section, shape: tuple[int, int]) -> Cells:
+def filled(cut: Section, shape: tuple[int, int]) -> Cells:
     """The cells whose centre is inside: the winding number of the outlines about it is positive.
 
     Rows in which an owner's outline is not closed (meshes with holes) are left to its outline, and so are owners
@@ -68,7 +68,7 @@ def _crossings(
     (x0, y0), (x1, y1) = cut.segments[:, 0].T, cut.segments[:, 1].T
     first = np.clip(np.ceil(np.minimum(y0, y1) - 0.5), 0, shape[0]).astype(np.int64)
     last = np.clip(np.ceil(np.maximum(y0, y1) - 0.5), 0, shape[0]).astype(np.int64)
-    which, rows = _ranges(first, last)
+    which, rows = ranges(first, last)
     slope = (x1 - x0)[which] / (y1 - y0)[which]
     x = x0[which] + (rows + 0.5 - y0[which]) * slope
     # A solid is on the left of its outline: going up, what lies beyond (at larger x) is outside.
@@ -92,7 +92,7 @@ def _inside_out(cut: Section) -> Cells:
     return clockwise
 
 
-def _ranges(
+def ranges(
     first: npt.NDArray[np.int64], stop: npt.NDArray[np.int64]
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
     """All integers of the half-open ranges, one range after the other, and which range each is from."""

@@ -1,0 +1,103 @@
+"""The shortest way of a disc through the static world: what a driven path is measured against."""
+
+import math
+from collections.abc import Sequence
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from simscen.core.geometry import Array, Pose2
+from simscen.core.shapes import TriangleMesh
+from simscen.core.world import BuiltWorld
+from simscen.worlds.clearance import clearance_field
+from simscen.worlds.lattice import Lattice, Numbers
+from simscen.worlds.slicing import empty_grid
+from simscen.worlds.taut import is_clear, length, tighten
+
+Z_RANGE = (0.03, 0.4)
+"""What a robot may touch: above thresholds it rolls over, below what it passes under."""
+MOST_CELLS = 1_000_000
+"""Of the search; larger worlds are searched more coarsely."""
+
+
+class ShortestWays:
+    """Shortest ways for a disc of one radius in one world.
+
+    Given a path that exists, its length is within about 1 % of the true one; where two sides of an obstacle differ by
+    less than 3 %, the longer one may be taken. A gap must be wider than the disc by about a cell of the search (5 cm
+    in worlds of up to 50 x 50 m) to be passed for certain. The smallest radius is 0.7 cells. A house of 20 x 20 m
+    takes some 40 ms to prepare and 30 ms for each way around corners.
+    """
+
+    def __init__(
+        self,
+        mesh: TriangleMesh,
+        bounds: tuple[float, float, float, float],
+        radius: float,
+        z_range: tuple[float, float] = Z_RANGE,
+    ) -> None:
+        x0, y0, x1, y1 = bounds
+        room = 2 * radius  # all around the world, so that a way may lead around it
+        bounds = (x0 - room, y0 - room, x1 + room, y1 + room)
+        resolution = max(0.05, math.sqrt((x1 - x0 + 2 * room + 2) * (y1 - y0 + 2 * room + 2) / MOST_CELLS))
+        grid = empty_grid(bounds, resolution, "shortest way")
+        self._radius = max(radius, 0.71 * resolution)
+        self._field = clearance_field(mesh, grid, self._radius, z_range)
+
+    def length(self, start: Pose2, goal: Pose2) -> float:
+        """Metres of the shortest way between two positions; inf if there is none or the disc does not fit there."""
+        way = self.way(start, goal)
+        return math.inf if way is None else length(way)
+
+    def way(self, start: Pose2, goal: Pose2) -> Array | None:
+        """The corners (n, 2) of the shortest way, arcs as short chords; None if there is none."""
+        ends = np.array([start[:2], goal[:2]])
+        allowed = self._radius - 0.1 * self._field.grid.resolution
+        if np.any(self._field.at(ends) < allowed):
+            return None
+        if is_clear(ends[0], ends[1], self._field, allowed):
+            return ends
+        first, last = (self._free_cell(end) for end in ends)
+        cells = self._lattice.way(first, last) if first and last else None
+        if cells is None:
+            return None
+        inner = self._field.grid.centre_of(cells)
+        return tighten(np.concatenate((ends[:1], inner, ends[1:])), self._field, self._radius)
+
+    @cached_property
+    def _lattice(self) -> Lattice:
+        return Lattice(self._field.values >= self._radius)
+
+    def _free_cell(self, point: Array) -> tuple[int, int] | None:
+        """The free cell nearest to a point, which may itself lie in a cell whose centre is too near a wall."""
+        grid = self._field.grid
+        around = np.stack(np.meshgrid(np.arange(-2, 3), np.arange(-2, 3), indexing="ij"), axis=-1).reshape(-1, 2)
+        cells: Numbers = grid.cell_of(point[None]) + around
+        cells = cells[grid.inside(cells)]
+        cells = cells[self._lattice.is_free(cells)]
+        if not len(cells):
+            return None
+        row, column = cells[np.argmin(np.linalg.norm(grid.centre_of(cells) - point, axis=1))].tolist()
+        return row, column
+
+
+def shortest_lengths(
+    built: BuiltWorld, start: Pose2, goals: Sequence[Pose2], radius: float, z_range: tuple[float, float] = Z_RANGE
+) -> list[float]:
+    """Metres of the shortest way of a disc from each goal's predecessor (the start for the first) to that goal."""
+    stops = [start, *goals]
+    ways = ShortestWays(built.mesh, _around(built, stops), radius, z_range)
+    return [ways.length(a, b) for a, b in pairwise(stops)]
+
+
+def _around(built: BuiltWorld, stops: Sequence[Pose2]) -> tuple[float, float, float, float]:
+    """The world's bounds, or where it states none those of its map, widened to hold the stops."""
+    x0, y0, x1, y1 = built.world.bounds
+    corners = [(x0, y0), (x1, y1)]
+    if x0 >= x1 or y0 >= y1:
+        height, width = (cells * built.map.resolution for cells in built.map.shape)
+        corners = built.map.origin.apply(np.array([[0, 0], [width, 0], [0, height], [width, height]])).tolist()
+    points = np.array([*corners, *(stop[:2] for stop in stops)])
+    (left, low), (right, high) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+    return left, low, right, high

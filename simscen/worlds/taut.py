@@ -1,0 +1,70 @@
+"""Pulling a way tight: from a chain of cells to the shortest curve on the same side of every obstacle."""
+
+import math
+
+import numpy as np
+
+from simscen.core.geometry import Array
+from simscen.worlds.clearance import ClearanceField
+
+ROUNDS = 3
+"""Times the way is straightened and then let slide along the obstacles; a fourth changes less than 0.1 %."""
+SLIDES = 24
+"""Smoothing steps in each round; they reach about five points to either side, a corner's worth."""
+
+
+def tighten(way: Array, field: ClearanceField, radius: float) -> Array:
+    """The way (n, 2) pulled tight, so that it keeps `radius` metres from everything but for a tenth of a cell.
+
+    Straight legs come from string pulling; between them an elastic band (Quinlan and Khatib 1993) slides the way
+    onto the curves around obstacles, arcs of `radius`.
+    """
+    allowed = radius - 0.1 * field.grid.resolution
+    for _ in range(ROUNDS):
+        way = _slide(resample(_straighten(way, field, allowed), field.grid.resolution), field, radius)
+    return _straighten(way, field, allowed)
+
+
+def length(way: Array) -> float:
+    """Metres along a way (n, 2)."""
+    return float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
+
+
+def is_clear(a: Array, b: Array, field: ClearanceField, allowed: float) -> bool:
+    """Whether the straight line between two points keeps a clearance of `allowed` metres, seen twice in each cell."""
+    count = 2 + math.ceil(2 * math.dist(a, b) / field.grid.resolution)
+    line = a + np.linspace(0.0, 1.0, count)[:, None] * (b - a)
+    return bool(np.all(field.at(line) >= allowed))
+
+
+def resample(way: Array, spacing: float) -> Array:
+    """The same way with points at most `spacing` metres apart."""
+    steps = np.linalg.norm(np.diff(way, axis=0), axis=1)
+    along = np.concatenate(([0.0], np.cumsum(steps)))
+    wanted = np.linspace(0.0, along[-1], 1 + max(1, math.ceil(along[-1] / spacing)))
+    return np.column_stack((np.interp(wanted, along, way[:, 0]), np.interp(wanted, along, way[:, 1])))
+
+
+def _straighten(way: Array, field: ClearanceField, allowed: float) -> Array:
+    """Skip what can be skipped: from each point go straight to the farthest one found by doubling and halving."""
+    kept, last = [0], len(way) - 1
+    while kept[-1] < last:
+        here = kept[-1]
+        near, reach = here + 1, 2
+        while near < last and is_clear(way[here], way[min(here + reach, last)], field, allowed):
+            near, reach = min(here + reach, last), 2 * reach
+        far = min(here + reach, last)
+        while far - near > 1:
+            middle = (near + far) // 2
+            near, far = (middle, far) if is_clear(way[here], way[middle], field, allowed) else (near, middle)
+        kept.append(near)
+    return way[kept]
+
+
+def _slide(way: Array, field: ClearanceField, radius: float) -> Array:
+    way = way.copy()
+    for _ in range(SLIDES):
+        way[1:-1] = (way[:-2] + way[2:]) / 2
+        clearance, uphill = field.uphill(way[1:-1])
+        way[1:-1] += np.maximum(radius - clearance, 0.0)[:, None] * uphill
+    return way
