@@ -1,11 +1,36 @@
 """The program of the warm process: `python -I -m simscen.cli.zygote FD`. Not for people."""
 
 import sys
+from collections.abc import Callable
+from typing import Any
 
 import simscen.sim.simulation
-import simscen.stack.build  # noqa: F401 - imported so that the forks need not
-from simscen.report.picture import draw_run
+import simscen.stack.build  # noqa: F401 - engines are imported here so that the forks need not
+from simscen.report.picture import draw
+from simscen.run.jobs import Job
 from simscen.run.perform import Performed, perform
 from simscen.run.worker import Progress
 from simscen.run.workshop import Workshop
 from simscen.run.zygote import Zygote
+
+_WORKSHOP = Workshop()
+
+
+def main() -> None:
+    """Serve the supervisor until it closes its end."""
+    replies = int(sys.argv[1])
+    Zygote(sys.stdin.buffer, replies, lambda job: _WORKSHOP.prepared(job.scenario), _perform).serve()
+
+
+def _perform(job: Job, tell: Callable[[float], None]) -> dict[str, Any]:
+    prepared = _WORKSHOP.prepared(job.scenario)
+    progress = Progress(prepared.spec.physics.tick_rate, tell)
+    return perform(prepared, job.key, job.folder, (progress,), _finish)
+
+
+def _finish(run: Performed) -> None:
+    draw(run)
+
+
+if __name__ == "__main__":
+    main()

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 from simscen.core.chance import Streams
+from simscen.core.events import Event
 from simscen.core.geometry import Array, Pose3
 from simscen.core.sensing import Odometry
 from simscen.core.shapes import TriangleMesh
@@ -18,13 +19,12 @@ from simscen.run.prepare import Prepared
 from simscen.run.robotmodel import robot_model
 from simscen.run.senses import Senses
 from simscen.run.timetable import Timetable
-from simscen.core.events import Event
-from simscen.sensors.base import Sensor
 from simscen.sensors.build import build_sensors
+from simscen.sensors.sensor import Sensor
 from simscen.sim.simulation import Simulation
 from simscen.stack.build import build_stack
 from simscen.stack.protocols import Surroundings
-from simscen.worlds.meshing import fuse
+from simscen.worlds.meshing import fuse, triangulate
 from simscen.worlds.rays import RayScene
 
 
@@ -37,6 +37,7 @@ def assemble(prepared: Prepared, seed: int) -> Rig:
         world.bodies,
         prepared.body,
         prepared.start,
+        triangulate,
         tick_rate=clock.rate,
         solver_iterations=spec.physics.solver_iterations,
     )

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from simscen.core.session import RunKey
 from simscen.loading.loaded import LoadedScenario
 
 _LENGTH = struct.Struct("<I")
@@ -18,20 +19,20 @@ class Job:
 
     number: int
     scenario: LoadedScenario
-    seed: int
+    key: RunKey
     folder: Path
     wall_limit: float
 
 
 @dataclass(frozen=True)
 class ProcessEnd:
-    """How the process of a job ended. `end` is the worker's own last word, None when it had none."""
+    """How the process of a job ended. `last_word` is the worker's own, None when it had none."""
 
     number: int
     code: int | None
     signal: int | None
     killed_for: str | None
-    end: dict[str, Any] | None
+    last_word: dict[str, Any] | None
     wall: float
     cpu: float
     peak_bytes: int

@@ -6,10 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from simscen.core.geometry import Pose3
+from simscen.core.session import RunKey
 from simscen.core.time import Clock
 from simscen.core.trace import Trace
-from simscen.judge.judge import judge
-from simscen.judge.result import RunResult, run_result, to_json
+from simscen.judge.result import RunResult, conclude
+from simscen.judge.resultfile import to_json
+from simscen.model.robot import RobotSpec
 from simscen.record.header import LogHeader
 from simscen.record.recorder import Recorder
 from simscen.record.trace import TraceBuilder
@@ -32,7 +35,7 @@ Finish = Callable[[Performed], None]
 """What is made of a run besides its log and its result, e.g. a picture."""
 
 
-def perform(prepared: Prepared, seed: int, folder: Path, logs: tuple[Log, ...], finish: Finish) -> dict[str, Any]:
+def perform(prepared: Prepared, key: RunKey, folder: Path, logs: tuple[Log, ...], finish: Finish) -> dict[str, Any]:
     """Do the run and leave run.mcap, result.json, scenario.yaml and what `finish` makes in `folder`.
 
     Returns the end record: the outcome and the log's SHA-256, for the supervisor.
@@ -41,11 +44,11 @@ def perform(prepared: Prepared, seed: int, folder: Path, logs: tuple[Log, ...], 
     builder = TraceBuilder(clock)
     log = folder / "run.mcap"
     (folder / "scenario.yaml").write_text(prepared.loaded.text, encoding="utf-8")
-    with Recorder(log, clock, log_header(prepared, seed)) as recorder:
-        rig = assemble(prepared, seed)
+    with Recorder(log, clock, log_header(prepared, key.seed)) as recorder:
+        rig = assemble(prepared, key.seed)
         end = run_lockstep(rig, (builder, recorder, *logs))
         trace = builder.finish(end.tick)
-        result = judged(prepared, seed, trace)
+        result = judged(prepared, key, trace)
         recorder.close(end.tick, to_json(result))
     rig.simulation.close()
     (folder / "result.json").write_text(to_json(result), encoding="utf-8")
@@ -53,21 +56,35 @@ def perform(prepared: Prepared, seed: int, folder: Path, logs: tuple[Log, ...], 
     return {"outcome": result.outcome.value, "sha256": hashlib.sha256(log.read_bytes()).hexdigest()}
 
 
-def judged(prepared: Prepared, seed: int, trace: Trace) -> RunResult:
+def judged(prepared: Prepared, key: RunKey, trace: Trace) -> RunResult:
     """Verdicts and metrics of a trace."""
-    verdicts = judge(prepared.spec.pass_, trace, prepared.case)
-    return run_result(prepared.loaded.id, prepared.loaded.path, seed, verdicts, trace, prepared.case)
+    loaded = prepared.loaded
+    lines = tuple(loaded.place_of("pass", index).line for index in range(len(prepared.spec.pass_)))
+    again = f"simscen run {loaded.path} --seed {key.seed}"
+    # The second of two equal runs must say the same as the first, so the variation is not part of the result.
+    return conclude(
+        RunKey(key.scenario, key.seed), loaded.path, prepared.spec.pass_, trace, prepared.case, lines, again
+    )
 
 
 def log_header(prepared: Prepared, seed: int) -> LogHeader:
     """What the log says about the run."""
-    loaded = prepared.loaded
     return LogHeader(
-        name=loaded.id,
+        name=prepared.loaded.id,
         seed=seed,
         case=prepared.case,
-        scenario=loaded.text,
+        scenario=prepared.loaded.text,
         map=prepared.map,
         robot_description=prepared.body.urdf,
-        frames=sensor_frames(prepared.robot),
+        frames=_sensor_frames(prepared.robot),
     )
+
+
+def _sensor_frames(robot: RobotSpec) -> dict[str, Pose3]:
+    """Where lidars and cameras sit on the base."""
+    mounts = {name: (s.lidar or s.camera) for name, s in robot.sensors.items()}
+    return {
+        name: Pose3.from_rpy(sensor.mount.x, sensor.mount.y, sensor.mount.z, 0.0, 0.0, sensor.mount.yaw)
+        for name, sensor in mounts.items()
+        if sensor is not None
+    }

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from simscen.core.sensing import Reading, Readings
-from simscen.sensors.base import Sensor
+from simscen.sensors.sensor import Sensor
 
 
 class Senses:

@@ -11,12 +11,12 @@ import subprocess
 import sys
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any, BinaryIO
 
 from simscen.run.confine import environment
-from simscen.run.jobs import ProcessEnd, Job, send_job
+from simscen.run.jobs import Job, ProcessEnd, send_job
 
 
 @dataclass(frozen=True)
@@ -36,10 +36,10 @@ class Advanced:
 
 @dataclass(frozen=True)
 class Ended:
-    """A job's process has ended; `exit` None = the warm process died under it."""
+    """A job's process has ended; `end` None = the warm process died under it."""
 
     job: Job
-    exit: ProcessEnd | None
+    end: ProcessEnd | None
 
 
 class Interrupted(BaseException):
@@ -119,10 +119,8 @@ def _warm_process(entry: str) -> Iterator[tuple[BinaryIO, BinaryIO]]:
         with os.fdopen(replies_out, "rb") as hear:
             yield process.stdin, hear
     finally:
-        try:
+        with suppress(BrokenPipeError):  # it is dead already; that is what we wanted
             process.stdin.close()
-        except BrokenPipeError:
-            pass  # it is dead already; that is what we wanted
         try:
             process.wait(timeout=5)
         except subprocess.TimeoutExpired:

@@ -47,7 +47,9 @@ def load_robot(loaded: LoadedScenario) -> tuple[RobotSpec, RobotBody]:
     """The robot as specified, and made ready for physics."""
     robot = loaded.robot
     if robot.spec is None:
-        hint = "write a short *.robot.yaml beside it that names its drive, limits and sensors: see `simscen explain robot`"
+        hint = (
+            "write a short *.robot.yaml beside it that names its drive, limits and sensors: see `simscen explain robot`"
+        )
         problem = Problem(str(robot.path), 0, 0, "SC201", "a URDF alone does not say how the robot drives", hint)
         raise InvalidInput([problem])
     return robot.spec, robot_body(robot.spec, robot.path, (loaded.root, *loaded.world_path), _read_mesh)

@@ -4,12 +4,15 @@ It never creates a bullet client or an OMPL object, so that every fork starts fr
 with the supervisor over two pipes: jobs come in pickled, one line of JSON goes back for each thing that happens.
 """
 
+import contextlib
+import json
 import os
 import selectors
 import signal
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, BinaryIO
 
 from simscen.run.confine import die_with_parent
@@ -58,11 +61,9 @@ class Zygote:
         if job is None:
             return False
         self._tell({"started": job.number})
-        try:
+        # A mistake is met again in the run's own process, where it is reported as that run's error.
+        with contextlib.suppress(Exception):
             self._warm_up(job)
-        except Exception:
-            # The run itself meets the same mistake in its own process, where it is reported as that run's error.
-            pass
         self._fork(job)
         return True
 
@@ -104,8 +105,6 @@ class Zygote:
         return True
 
     def _hear(self, child: _Child, text: bytes) -> None:
-        import json
-
         message = json.loads(text)
         if "end" in message:
             child.end = message["end"]
@@ -128,7 +127,7 @@ class Zygote:
                 "code": os.WEXITSTATUS(status) if os.WIFEXITED(status) else None,
                 "signal": os.WTERMSIG(status) if os.WIFSIGNALED(status) else None,
                 "killed_for": child.killed_for,
-                "end": child.end,
+                "last_word": child.end,
                 "wall": time.monotonic() - child.started,
                 "cpu": usage.ru_utime + usage.ru_stime,
                 "peak_bytes": usage.ru_maxrss * 1024,
@@ -182,10 +181,9 @@ def _group_has_others(leader: int) -> bool:
     for entry in os.scandir("/proc"):
         if entry.name.isdigit() and int(entry.name) != leader:
             try:
-                with open(f"/proc/{entry.name}/stat") as stat:
-                    group = int(stat.read().rsplit(")", 1)[1].split()[2])
+                stat = Path(entry.path, "stat").read_text()
             except OSError:
-                continue
-            if group == leader:
+                continue  # it has ended meanwhile
+            if int(stat.rsplit(")", 1)[1].split()[2]) == leader:
                 return True
     return False
