@@ -59,18 +59,24 @@ def run_result(
 ) -> RunResult:
     """Sum up a run that came to its end: `scenario` is the id, `path` the file as the user would write it."""
     came_out = outcome(verdicts)
+    failure = _why(verdicts) if came_out is Outcome.ERROR else None
+    metrics: Mapping[str, float | None] = {}
+    try:
+        metrics = measure(trace, case)
+    except BrokenTrace as broken:  # whatever the criteria looked at, a run with such a signal is no run
+        came_out, failure = Outcome.ERROR, failure or RunFailure("invalid", str(broken))
     return RunResult(
         key=RunKey(scenario, seed, variation),
         path=path,
         outcome=came_out,
         verdicts=verdicts,
         lines=lines,
-        metrics=_measured(trace, case, came_out),
+        metrics=metrics,
         events=dict(sorted(Counter(event.kind for event in trace.events).items())),
         ended=ending(trace),
         simulated=trace.seconds(trace.end),
         tick_rate=trace.tick_rate,
-        error=_why(verdicts) if came_out is Outcome.ERROR else None,
+        error=failure,
     )
 
 
@@ -131,16 +137,6 @@ def from_data(data: dict[str, Any]) -> RunResult:
         tick_rate=data["tick_rate"],
         error=None if data["error"] is None else RunFailure(**data["error"]),
     )
-
-
-def _measured(trace: Trace, case: Case, came_out: Outcome) -> Mapping[str, float | None]:
-    """A trace that broke a criterion breaks the metrics too; that run is an error already."""
-    try:
-        return measure(trace, case)
-    except BrokenTrace:
-        if came_out is not Outcome.ERROR:
-            raise
-        return {}
 
 
 def _why(verdicts: tuple[Verdict, ...]) -> RunFailure:

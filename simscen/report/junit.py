@@ -1,0 +1,131 @@
+"""junit.xml: one testsuite for each scenario file, one testcase for each run.
+
+The elements are those that Jenkins, GitLab, GitHub actions and junitparser agree on. Family "xunit2" leaves out what
+Jenkins' junit-10.xsd forbids: `file` and `line` of a testcase, and its properties.
+"""
+
+import re
+from collections.abc import Sequence
+from typing import Literal
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
+
+from simscen.core.session import Outcome, RunFinished
+from simscen.judge.wording import subject
+from simscen.report.text import one_line, visible
+from simscen.report.wordsof import Complaint, complaints, failure, place
+
+Family = Literal["simscen", "xunit2"]
+
+
+def to_xml(runs: Sequence[RunFinished], family: Family = "simscen", name: str = "simscen") -> bytes:
+    """The whole document in UTF-8, runs sorted by file, scenario and seed; the order they ended in does not show."""
+    root = Element("testsuites", {"name": visible(name)})
+    ordered = sorted(runs, key=lambda run: (run.path, run.key))
+    for path in sorted({run.path for run in ordered}):
+        _suite(root, path, [run for run in ordered if run.path == path], family)
+    _count(root, ordered)
+    ElementTree.indent(root)
+    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="utf-8") + b"\n"
+
+
+def _suite(root: Element, path: str, runs: list[RunFinished], family: Family) -> None:
+    suite = SubElement(root, "testsuite", {"name": visible(path)})
+    _count(suite, runs)
+    suite.set("skipped", "0")
+    used: set[str] = set()
+    for run in runs:
+        _case(suite, run, _unique(_case_name(run), used), family)
+
+
+def _count(element: Element, runs: Sequence[RunFinished]) -> None:
+    element.set("tests", str(len(runs)))
+    element.set("failures", str(sum(run.outcome is Outcome.FAILED for run in runs)))
+    element.set("errors", str(sum(run.outcome is Outcome.ERROR for run in runs)))
+    element.set("time", f"{sum(run.wall for run in runs):.3f}")
+
+
+def _case(suite: Element, run: RunFinished, name: str, family: Family) -> None:
+    case = SubElement(suite, "testcase", {"classname": _classname(run), "name": name, "time": f"{run.wall:.3f}"})
+    if family == "simscen":
+        case.set("file", visible(run.path))
+        case.set("line", str(max(run.line, 1)))
+        _properties(case, run)
+    match run.outcome:
+        case Outcome.FAILED:
+            _failure(case, run)
+        case Outcome.ERROR:
+            _error(case, run)
+        case Outcome.PASSED:
+            pass
+    if output := _output(run):
+        SubElement(case, "system-out").text = output
+
+
+def _properties(case: Element, run: RunFinished) -> None:
+    properties = SubElement(case, "properties")
+    values = {
+        "seed": str(run.key.seed),
+        "simulated_seconds": f"{run.simulated:.3f}",
+        "ended": run.ended,
+        "again": run.again,
+    }
+    for verdict in run.verdicts:
+        values[f"status.{verdict.id}"] = verdict.status.value
+        for finding in verdict.findings:
+            if finding.margin is not None:
+                name = subject(verdict, finding).replace(": ", ".")
+                values[f"margin.{name}"] = f"{finding.margin:.6g} {finding.unit}".rstrip()
+    for key, value in values.items():
+        if value:
+            SubElement(properties, "property", {"name": one_line(key), "value": one_line(value)})
+
+
+def _failure(case: Element, run: RunFinished) -> None:
+    serious = [complaint for complaint in complaints(run) if not complaint.warning]
+    more = f" (and {len(serious) - 1} more)" if len(serious) > 1 else ""
+    element = SubElement(case, "failure")
+    element.set("type", visible(serious[0].verdict.criterion) if serious else "criterion")
+    element.set("message", (serious[0].message if serious else "failed") + more)
+    element.text = _told(run, serious)
+
+
+def _error(case: Element, run: RunFinished) -> None:
+    kind, message, tail = failure(run)
+    element = SubElement(case, "error", {"type": visible(kind), "message": message})
+    told = [f"{place(run)}: {message}", tail, _told(run, [c for c in complaints(run) if not c.warning])]
+    element.text = "\n".join(part for part in told if part)
+
+
+def _told(run: RunFinished, about: list[Complaint]) -> str:
+    lines = []
+    for complaint in about:
+        lines.append(f"{place(run, complaint.line)}: {complaint.message}")
+        lines += [f"    {text}" for text in complaint.detail]
+    return "\n".join([*lines, *([f"again: {one_line(run.again)}"] if run.again else [])])
+
+
+def _output(run: RunFinished) -> str:
+    """Warnings, then attachments as Jenkins and GitLab read them."""
+    warnings = [complaint for complaint in complaints(run) if complaint.warning]
+    lines = [f"{place(run, warning.line)}: warning: {warning.message}" for warning in warnings]
+    files = (run.artifacts.picture, run.artifacts.mcap, run.artifacts.result)
+    return "\n".join([*lines, *(f"[[ATTACHMENT|{one_line(file)}]]" for file in files if file)])
+
+
+def _classname(run: RunFinished) -> str:
+    parts = [re.sub(r"[.\s]+", "_", part) for part in run.key.scenario.split("/") if part not in ("", ".", "..")]
+    return visible(".".join(parts)) or "simscen"
+
+
+def _case_name(run: RunFinished) -> str:
+    variation = f", {run.key.variation}" if run.key.variation else ""
+    return one_line(f"{run.key.scenario.rpartition('/')[2]} [seed {run.key.seed}{variation}]")
+
+
+def _unique(name: str, used: set[str]) -> str:
+    candidate, number = name, 2
+    while candidate in used:
+        candidate, number = f"{name} #{number}", number + 1
+    used.add(candidate)
+    return candidate

@@ -1,0 +1,54 @@
+"""results.json: the session as data. No wall clock in it, so that two sessions can be compared."""
+
+import json
+from collections.abc import Sequence
+from pathlib import PurePath
+from typing import Any
+
+from simscen.core.session import Outcome, RunFinished
+from simscen.judge.result import RunResult, as_data
+
+FORMAT = 1
+
+
+def to_json(runs: Sequence[RunFinished], folder: str = "") -> str:
+    """The document; runs are sorted, artifacts are given relative to the session's `folder`."""
+    return json.dumps(as_document(runs, folder), sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def as_document(runs: Sequence[RunFinished], folder: str = "") -> dict[str, Any]:
+    """The same as plain data: counts, then one entry for each run in the form of its result.json."""
+    ordered = sorted(runs, key=lambda run: (run.path, run.key))
+    counts = {outcome.value: sum(run.outcome is outcome for run in runs) for outcome in Outcome}
+    return {
+        "format": FORMAT,
+        "total": len(runs),
+        **counts,
+        "simulated_seconds": sum(run.simulated for run in ordered),
+        "runs": [{**as_data(_result(run)), "artifacts": _artifacts(run, folder)} for run in ordered],
+    }
+
+
+def _result(run: RunFinished) -> RunResult:
+    return RunResult(
+        key=run.key,
+        path=run.path,
+        outcome=run.outcome,
+        verdicts=run.verdicts,
+        lines=run.lines,
+        metrics=dict(run.metrics),
+        ended=run.ended,
+        simulated=run.simulated,
+        tick_rate=run.tick_rate,
+        error=run.error,
+    )
+
+
+def _artifacts(run: RunFinished, folder: str) -> dict[str, str]:
+    files = {"mcap": run.artifacts.mcap, "picture": run.artifacts.picture, "result": run.artifacts.result}
+    return {name: _relative(path, folder) for name, path in files.items() if path}
+
+
+def _relative(path: str, folder: str) -> str:
+    inside = folder and PurePath(path).is_relative_to(folder)
+    return PurePath(path).relative_to(folder).as_posix() if inside else PurePath(path).as_posix()

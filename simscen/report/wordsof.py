@@ -1,0 +1,61 @@
+"""What reporters say of a finished run, as plain lines: the same facts for console, JUnit and annotations."""
+
+from dataclasses import dataclass
+
+from simscen.core.session import Outcome, RunFinished
+from simscen.core.verdict import Finding, Status, Verdict
+from simscen.judge.wording import sentence, violations
+from simscen.report.text import one_line, visible
+
+
+@dataclass(frozen=True)
+class Complaint:
+    """One violated bound: its line in the scenario (0 = unknown), what to say, and what explains it."""
+
+    verdict: Verdict
+    line: int
+    message: str
+    detail: tuple[str, ...]
+
+    @property
+    def warning(self) -> bool:
+        """Whether it is only reported; a criterion that broke down never is."""
+        return self.verdict.severity == "warn" and self.verdict.status is not Status.ERROR
+
+
+def complaints(run: RunFinished) -> list[Complaint]:
+    """Everything that did not pass, in the order of the scenario."""
+    lines = run.lines or (0,) * len(run.verdicts)
+    return [
+        _complaint(run, verdict, line, finding)
+        for verdict, line in zip(run.verdicts, lines, strict=True)
+        for finding in violations(verdict) or _nothing_checked(verdict)
+    ]
+
+
+def label(run: RunFinished, every_seed: bool = True) -> str:
+    """What a run is called in a list: the scenario's id, and the seed where there are several."""
+    extra = ", ".join(part for part in (f"seed {run.key.seed}" if every_seed else "", run.key.variation) if part)
+    return one_line(f"{run.key.scenario} ({extra})" if extra else run.key.scenario)
+
+
+def place(run: RunFinished, line: int = 0) -> str:
+    """path:line of a criterion, or of the scenario."""
+    return one_line(f"{run.path}:{line or run.line}" if line or run.line else run.path)
+
+
+def failure(run: RunFinished) -> tuple[str, str, str]:
+    """Kind, message and tail of a run that could not be completed."""
+    if run.error is not None:
+        return run.error.kind, one_line(run.error.message), visible(run.error.tail)
+    assert run.outcome is Outcome.ERROR
+    return "invalid", "; ".join(c.message for c in complaints(run)) or "nothing judged this run", ""
+
+
+def _complaint(run: RunFinished, verdict: Verdict, line: int, finding: Finding) -> Complaint:
+    detail = tuple(one_line(text) for text in finding.detail)
+    return Complaint(verdict, line, one_line(sentence(verdict, finding, run.tick_rate)), detail)
+
+
+def _nothing_checked(verdict: Verdict) -> tuple[Finding, ...]:
+    return () if verdict.findings else (Finding(Status.ERROR, verdict.criterion, "it checked nothing", ""),)
