@@ -26,7 +26,8 @@ class LidarSensor:
         self._increment = spec.field_of_view / max(1, spec.beams if full else spec.beams - 1)
         self._first = -spec.field_of_view / 2 if spec.beams > 1 else 0.0
         self._mount = Pose2(spec.mount.x, spec.mount.y, spec.mount.yaw)
-        self._directions = _directions(self._first + self._increment * np.arange(spec.beams) + spec.mount.yaw)
+        angles = self._first + self._increment * np.arange(spec.beams, dtype=np.float64)
+        self._directions = _directions(angles + spec.mount.yaw)
         self._lens = np.array([[spec.mount.x, spec.mount.y, spec.mount.z]])
 
     def read(self, tick: int) -> Scan:

@@ -1,6 +1,7 @@
 """What the robot touches: one event when it begins, one when it is over."""
 
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import pybullet
@@ -10,22 +11,27 @@ from simscen.core.events import Event
 PATIENCE = 0.1
 """Seconds without contact after which a collision is over; a bouncing robot collides once."""
 STANDING = 0.02
-"""A robot that moves towards a contact more slowly than this, in m/s, did not cause it."""
+"""A robot that moves more slowly than this, in m/s, towards what it touches did not cause the contact.
+
+What never moves is touched because the robot moves, in whatever direction: it may graze.
+"""
 
 Vector = tuple[float, float, float]
+Owner = Callable[[Vector], str]
 
 
 @dataclass(frozen=True)
 class Touch:
     """The robot and something press on each other: `place` and unit `normal` towards the robot in the world frame.
 
-    `impulse` in N s during one tick.
+    `impulse` in N s during one tick; `fixed`: it never moves.
     """
 
     name: str
     place: Vector
     normal: Vector
     impulse: float
+    fixed: bool
 
 
 @dataclass
@@ -71,7 +77,7 @@ class Contacts:
         return events
 
 
-def touches(client: int, robot: int, names: "dict[int, str | None]", owner: "Owner", seconds: float) -> list[Touch]:
+def touches(client: int, robot: int, names: Mapping[int, str | None], owner: Owner, seconds: float) -> list[Touch]:
     """What presses on the robot now; `names` of bodies, None where the owner of the triangle is to be found."""
     found: dict[str, Touch] = {}
     for point in pybullet.getContactPoints(robot, physicsClientId=client):
@@ -81,13 +87,8 @@ def touches(client: int, robot: int, names: "dict[int, str | None]", owner: "Own
         name = names[other] or owner(place)
         known = found.get(name)
         impulse = force * seconds + (known.impulse if known else 0.0)
-        found[name] = Touch(name, place, normal, impulse)
+        found[name] = Touch(name, place, normal, impulse, names[other] is None)
     return [found[name] for name in sorted(found)]
-
-
-from collections.abc import Callable  # noqa: E402
-
-Owner = Callable[[Vector], str]
 
 
 def _started(tick: int, touch: Touch, velocity: tuple[Vector, Vector], origin: Vector) -> Event:
@@ -105,7 +106,7 @@ def _started(tick: int, touch: Touch, velocity: tuple[Vector, Vector], origin: V
             "impulse": touch.impulse,
             "speed": max(0.0, approach),
             "robot_speed": math.hypot(vx, vy),
-            "robot_caused": approach >= STANDING,
+            "robot_caused": approach >= STANDING or (touch.fixed and math.hypot(*at) >= STANDING),
             "robot_part": "hull",
         },
     )

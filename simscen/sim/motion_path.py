@@ -2,6 +2,7 @@
 
 import math
 from bisect import bisect_right
+from itertools import pairwise
 
 from simscen.core.geometry import Pose2, wrap
 from simscen.core.shapes import MotionPath
@@ -26,7 +27,7 @@ def pose_at(path: MotionPath, seconds: float) -> Pose2:
 def top_speed(path: MotionPath) -> float:
     """The fastest it ever moves in m/s; inf where it jumps."""
     stops = list(zip(path.times, path.poses, strict=True))
-    speeds = [_speed(a.distance(b), tb - ta) for (ta, a), (tb, b) in zip(stops, stops[1:], strict=False)]
+    speeds = [_speed(a.distance(b), tb - ta) for (ta, a), (tb, b) in pairwise(stops)]
     if path.mode == "loop":
         speeds.append(_speed(path.poses[-1].distance(path.poses[0]), 0.0))
     return max(speeds, default=0.0)

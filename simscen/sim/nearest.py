@@ -21,7 +21,7 @@ class Owners:
         if not len(near):
             return ""
         distances = point_to_triangles(place, self._corners[near])
-        return self._mesh.names[self._mesh.owners[near[int(np.argmin(distances))]]]
+        return self._mesh.names[int(self._mesh.owners[near[int(np.argmin(distances))]])]
 
 
 def point_to_triangles(point: Array, corners: Array) -> Array:
@@ -35,7 +35,8 @@ def point_to_triangles(point: Array, corners: Array) -> Array:
     inside = flat.copy()
     for p, q in ((a, b), (b, c), (c, a)):
         inside &= np.sum(np.cross(q - p, point - p) * normal, axis=1) >= 0
-    return np.where(inside, height, edges)
+    result: Array = np.where(inside, height, edges)
+    return result
 
 
 def _to_segments(point: Array, start: Array, end: Array) -> Array:

@@ -54,23 +54,28 @@ class Simulation:
         self.tick = 0
         self._rate, self._body = tick_rate, robot
         self._client = engine.connect(tick_rate, solver_iterations)
-        ground = engine.ground(self._client)
+        engine.ground(self._client)
         self._static = engine.static_mesh(self._client, static)
         self._owners = Owners(static)
         self._actors = Actors(self._client, tick_rate, triangulate)
-        self._vehicle = Vehicle(self._client, robot, ground, pose)
+        self._vehicle = Vehicle(self._client, robot, pose)
         for body in sorted(bodies, key=lambda body: body.name):
             self._actors.add(body, 0)
         self._firmware = max(1, round(tick_rate / FIRMWARE_RATE))
         self._drive = make_drive(self._client, self._vehicle, robot, self._firmware / tick_rate)
         self._contacts = Contacts(tick_rate)
         self._names: dict[int, str | None] = {}
+        self._clearance, self._closing_speed = 0.0, 0.0
+        self._measured_at, self._no_contact_before = -1, 0
+        self._settle(pose)
         self._changed()
-        self._settle()
 
-    def _settle(self) -> None:
+    def _settle(self, pose: Pose2) -> None:
+        """Let everything sink onto the ground by the few micrometres that it takes."""
         for _ in range(SETTLING):
             pybullet.stepSimulation(self._client)
+        self._vehicle.place(pose)
+        self._drive.rest()
 
     def step(self, ticks: int) -> None:
         """Let `ticks` ticks pass."""
@@ -143,9 +148,9 @@ class Simulation:
 
     def _changed(self) -> None:
         """Something was put into or taken out of the world, or set down elsewhere."""
-        self._names = dict.fromkeys(self._static) | dict(self._actors.ids())
-        self._clearance, self._measured_at, self._no_contact_before = 0.0, -1, 0
-        self._closing_speed = 0.0
+        self._names = {**dict.fromkeys(self._static), **self._actors.ids()}
+        self._clearance, self._closing_speed = 0.0, 0.0
+        self._measured_at, self._no_contact_before = -1, 0
 
     def collisions(self) -> tuple[Event, ...]:
         """collision.started and collision.ended since last asked.

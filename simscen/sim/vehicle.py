@@ -5,7 +5,7 @@ import pybullet
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.motion import Twist
 from simscen.sim import engine
-from simscen.sim.robot_body import RobotBody, Wheel
+from simscen.sim.robot_body import ROTOR, RobotBody, Wheel
 
 Vector = tuple[float, float, float]
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
@@ -19,7 +19,7 @@ class Vehicle:
     Only the hull touches obstacles.
     """
 
-    def __init__(self, client: int, body: RobotBody, ground: int, pose: Pose2) -> None:
+    def __init__(self, client: int, body: RobotBody, pose: Pose2) -> None:
         self._client = client
         self._mass = body.mass
         moments, self._base_from_centre = body.chassis.principal()
@@ -28,15 +28,23 @@ class Vehicle:
         self.id, self.joints = _build(client, body)
         pybullet.changeDynamics(self.id, -1, localInertiaDiagonal=moments, physicsClientId=client)
         for wheel, joint in zip(body.wheels, self.joints, strict=True):
-            self._set_up(wheel, joint, ground)
+            self._set_up(wheel, joint)
         self.place(pose)
 
-    def _set_up(self, wheel: Wheel, joint: int, ground: int) -> None:
-        # A wheel turns about y and is round: its moments are its tensor's diagonal.
-        rolling = joint if not wheel.steered else joint + 1
-        pybullet.changeDynamics(self.id, rolling, lateralFriction=1.0, linearDamping=0, angularDamping=0,
-                                jointDamping=0, localInertiaDiagonal=wheel.inertia.tensor.diagonal().tolist(),
-                                physicsClientId=self._client)  # fmt: skip
+    def _set_up(self, wheel: Wheel, joint: int) -> None:
+        xx, yy, zz = wheel.inertia.tensor.diagonal().tolist()  # a wheel turns about y and is round
+        rotor = ROTOR * self._mass * wheel.radius**2 if wheel.driven else 0.0
+        pybullet.changeDynamics(
+            self.id,
+            joint + 1 if wheel.steered else joint,
+            lateralFriction=1.0,
+            restitution=0.0,
+            linearDamping=0,
+            angularDamping=0,
+            jointDamping=0,
+            localInertiaDiagonal=(xx, yy + rotor, zz),
+            physicsClientId=self._client,
+        )
 
     def place(self, pose: Pose2) -> None:
         """Set it down at rest, its base frame on the ground."""

@@ -53,6 +53,9 @@ class SidedDrive:
 
     def _turn(self) -> None:
         vx, _, wz = self._ramp.velocity
+        if vx == 0 and wz == 0:
+            hold(self._client, self._vehicle.id, self._left + self._right, self._torques)
+            return
         left, right = (vx - wz * self._half) / self._radius, (vx + wz * self._half) / self._radius
         pybullet.setJointMotorControlArray(
             self._vehicle.id,
@@ -62,6 +65,14 @@ class SidedDrive:
             forces=self._torques,
             physicsClientId=self._client,
         )
+
+
+def hold(client: int, robot: int, joints: Sequence[int], torques: Sequence[float]) -> None:
+    """Keep wheels where they are, as a servo at zero speed does; a velocity of zero alone would creep 0.1 mm/s."""
+    angles = [pybullet.getJointState(robot, joint, physicsClientId=client)[0] for joint in joints]
+    pybullet.setJointMotorControlArray(
+        robot, joints, pybullet.POSITION_CONTROL, targetPositions=angles, forces=torques, physicsClientId=client
+    )
 
 
 def stall_torque(body: RobotBody) -> float:
