@@ -7,8 +7,8 @@ from simscen.core.geometry import Pose2, wrap
 from simscen.core.shapes import MotionPath
 from simscen.core.stage import Stage
 from simscen.spec.base import Spec
-from simscen.spec.places import Name
 from simscen.spec.quantities import PositiveDuration
+from simscen.spec.references import DoorName
 
 STEPS = 16
 """A swing is cut into so many straight moves; the panel's edge then strays from its arc by less than 0.2 %."""
@@ -20,7 +20,7 @@ class OpenDoor(Spec, Action):
     Example: `do: {open: {name: door meeting room}}`
     """
 
-    name: Name
+    name: DoorName
     """A door of the world."""
     duration: PositiveDuration = 1.5
     """Of the swing."""
@@ -36,7 +36,7 @@ class CloseDoor(Spec, Action):
     Example: `do: {close: {name: door meeting room}}`
     """
 
-    name: Name
+    name: DoorName
     """A door of the world."""
     duration: PositiveDuration = 1.5
     """Of the swing."""

@@ -14,8 +14,8 @@ from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import BrokenTrace, at_most, counted
 from simscen.criteria.signals import speed, turn_rate
 from simscen.spec.base import Spec
-from simscen.spec.places import Name
 from simscen.spec.quantities import Impulse
+from simscen.spec.references import ObjectName
 
 OWN_FAULT = 0.1
 """m/s; a slower robot was run into (CARLA's CollisionTest draws the line here)."""
@@ -43,7 +43,7 @@ class Collisions(Spec, Criterion):
     """How many contacts are allowed; default: 0, or any number if `max_impulse` is given."""
     max_impulse: Annotated[Impulse, Field(ge=0)] | None = None
     """No contact may be harder than this, in N s."""
-    object: Name | None = Field(default=None, alias="with")
+    object: ObjectName | None = Field(default=None, alias="with")
     """Only contacts with this object, by name."""
     caused_by_robot: bool = False
     """Only contacts at which the robot itself was moving: not when something ran into it while it stood."""

@@ -15,8 +15,8 @@ from simscen.criteria.bounds import at_most, missed, undecided
 from simscen.criteria.moments import GoalStory, ending, finished, stories
 from simscen.criteria.signals import finite, truth
 from simscen.spec.base import Spec
-from simscen.spec.places import Name
 from simscen.spec.quantities import PositiveAngle, PositiveDuration, PositiveLength
+from simscen.spec.references import GoalName
 
 
 class GoalsReached(Spec, Criterion):
@@ -33,7 +33,7 @@ class GoalsReached(Spec, Criterion):
     Example: `goals_reached: {goals: [shelf], tolerance: 0.3 m, within: 60 s}`
     """
 
-    goals: Annotated[list[Name], Field(min_length=1, max_length=1000)] | None = None
+    goals: Annotated[list[GoalName], Field(min_length=1, max_length=1000)] | None = None
     """Only these, by name; default: all."""
     tolerance: PositiveLength | None = None
     """How far the true position may be off; default: the goal's own tolerance."""

@@ -8,8 +8,8 @@ from simscen.criteria.bounds import at_most, undecided
 from simscen.criteria.moments import Span, ending, never_started, spans
 from simscen.criteria.signals import first_lasting, pose_error
 from simscen.spec.base import Spec
-from simscen.spec.places import Name
 from simscen.spec.quantities import PositiveAngle, PositiveDuration, PositiveLength
+from simscen.spec.references import HappeningName
 
 
 class RelocalizedWithin(Spec, Criterion):
@@ -29,7 +29,7 @@ class RelocalizedWithin(Spec, Criterion):
 
     time: PositiveDuration
     """Seconds."""
-    after: Name | None = None
+    after: HappeningName | None = None
     """The event or fault that made it lose itself; default: the start of the run."""
     tolerance: PositiveLength = 0.25
     """How far the believed position may be off."""

@@ -11,7 +11,7 @@ from simscen.criteria.bounds import held, missed, undecided
 from simscen.criteria.codes import Code, code_of
 from simscen.criteria.moments import ending, finished
 from simscen.spec.base import Spec
-from simscen.spec.places import Name
+from simscen.spec.references import GoalName
 
 
 class Result(Spec, Criterion):
@@ -54,7 +54,7 @@ class ErrorCodeIs(Spec, Criterion):
 
     code: Code
     """By name or number; NONE = no error."""
-    goal: Name | None = None
+    goal: GoalName | None = None
     """Of this goal; default: of the navigation as a whole."""
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:

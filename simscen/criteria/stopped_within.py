@@ -12,8 +12,8 @@ from simscen.criteria.bounds import at_most, held, missed, undecided
 from simscen.criteria.moments import Span, ending, never_started, spans
 from simscen.criteria.signals import Flags, drive, first_lasting, speed, turn_rate
 from simscen.spec.base import Spec
-from simscen.spec.places import Name
 from simscen.spec.quantities import PositiveAngularSpeed, PositiveDuration, PositiveSpeed
+from simscen.spec.references import HappeningName
 
 OLD_SCAN = 0.2
 """Seconds; a scan older than two periods of a 10 Hz lidar is worth a line."""
@@ -37,7 +37,7 @@ class StoppedWithin(Spec, Criterion):
 
     time: PositiveDuration
     """Seconds after its start."""
-    after: Name
+    after: HappeningName
     """The fault, e.g. `lidar.off`, or the event of the scenario, by name."""
     speed: PositiveSpeed = 0.02
     """What counts as standing, in m/s over ground."""

@@ -7,8 +7,8 @@ from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import at_most, missed, undecided
 from simscen.criteria.moments import GoalStory, finished, stories
 from simscen.spec.base import Spec
-from simscen.spec.places import Name
 from simscen.spec.quantities import PositiveDuration
+from simscen.spec.references import GoalName
 
 
 class TimeToGoal(Spec, Criterion):
@@ -25,7 +25,7 @@ class TimeToGoal(Spec, Criterion):
 
     max: PositiveDuration
     """Seconds of simulated time."""
-    goal: Name | None = None
+    goal: GoalName | None = None
     """Of this goal alone; default: of the whole tour."""
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:

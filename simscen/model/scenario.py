@@ -22,6 +22,7 @@ from simscen.spec.quantities import (
     PositiveDuration,
     PositiveLength,
 )
+from simscen.spec.references import Refers
 
 
 def _text_or_mapping(value: Any) -> str:
@@ -30,7 +31,8 @@ def _text_or_mapping(value: Any) -> str:
 
 FilePath = Annotated[str, Field(min_length=1, max_length=4096)]
 PlaceOrPose = Annotated[
-    Annotated[PlaceName, Tag("text")] | Annotated[PoseSpec, Tag("mapping")], Discriminator(_text_or_mapping)
+    Annotated[PlaceName, Refers("place"), Tag("text")] | Annotated[PoseSpec, Tag("mapping")],
+    Discriminator(_text_or_mapping),
 ]
 
 
@@ -44,6 +46,12 @@ class InitialEstimate(Spec):
     """Standard deviations of x, y (m) and yaw (rad); Nav2's default covariance."""
 
 
+EstimateOrUnknown = Annotated[
+    Annotated[Literal["unknown"], Tag("text")] | Annotated[InitialEstimate, Tag("mapping")],
+    Discriminator(_text_or_mapping),
+]
+
+
 class RobotEntry(Spec):
     """The robot, where it truly starts, and where it thinks it starts."""
 
@@ -51,7 +59,7 @@ class RobotEntry(Spec):
     """A shipped robot (turtlebot, amr, …) or a `*.robot.yaml` or `.urdf` file."""
     pose: PlaceOrPose
     """Where it truly stands: a pose or a place of the world."""
-    initial_estimate: InitialEstimate | Literal["unknown"] | None = None
+    initial_estimate: EstimateOrUnknown | None = None
     """Default: the true pose, with Nav2's default covariance; `unknown`: anywhere on the map."""
 
 

@@ -2,9 +2,9 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Discriminator, Field, Tag
 
-from simscen.spec.base import Spec
+from simscen.spec.base import Spec, type_or
 from simscen.spec.quantities import (
     Angle,
     Duration,
@@ -95,7 +95,13 @@ class OdometryOnly(Spec):
     type: Literal["odometry"]
 
 
-Localizer = Annotated[Amcl | Ekf | GroundTruth | OdometryOnly, Field(discriminator="type")]
+Localizer = Annotated[
+    Annotated[Amcl, Tag("amcl")]
+    | Annotated[Ekf, Tag("ekf")]
+    | Annotated[GroundTruth, Tag("ground_truth")]
+    | Annotated[OdometryOnly, Tag("odometry")],
+    Discriminator(type_or("amcl")),
+]
 
 
 class Costmap(Spec):
@@ -195,7 +201,12 @@ class Mppi(Spec):
     gamma: Annotated[float, Field(ge=0, le=10)] = 0.015
 
 
-Controller = Annotated[RegulatedPurePursuit | DynamicWindow | Mppi, Field(discriminator="type")]
+Controller = Annotated[
+    Annotated[RegulatedPurePursuit, Tag("regulated_pure_pursuit")]
+    | Annotated[DynamicWindow, Tag("dwb")]
+    | Annotated[Mppi, Tag("mppi")],
+    Discriminator(type_or("regulated_pure_pursuit")),
+]
 
 
 class GoalChecker(Spec):

@@ -95,7 +95,7 @@ class WorldSpec(Spec):
 
     @model_validator(mode="after")
     def _names_differ(self) -> "WorldSpec":
-        names = [thing.name for thing in (*self.objects, *self.doors)]
+        names = [*(thing.name for thing in self.objects), *(door.name for door in self.doors)]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise ValueError(f"two objects are called `{twice[0]}`")

@@ -1,6 +1,7 @@
 """The base of everything a user writes in YAML."""
 
-from typing import ClassVar
+from collections.abc import Callable
+from typing import Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
@@ -69,3 +70,14 @@ class Choice(Spec):
         spec = getattr(self, self.choices()[self.kind])
         assert isinstance(spec, BaseModel)
         return spec
+
+
+def type_or(default: str) -> Callable[[Any], str | None]:
+    """Tells the members of a union apart by their `type`, which may be left out for the default one."""
+
+    def tag(value: Any) -> str | None:
+        if isinstance(value, dict):
+            return str(value.get("type", default))
+        return getattr(value, "type", None)
+
+    return tag

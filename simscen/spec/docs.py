@@ -7,7 +7,7 @@ parsing source for each class: 45 ms of start-up for every command. Only schema,
 import ast
 import inspect
 import sys
-from functools import lru_cache
+from functools import cache
 
 
 def field_docs(model: type) -> dict[str, str]:
@@ -19,7 +19,7 @@ def field_docs(model: type) -> dict[str, str]:
     return docs
 
 
-@lru_cache(maxsize=None)
+@cache
 def _of_module(module: str) -> dict[str, dict[str, str]]:
     tree = ast.parse(inspect.getsource(sys.modules[module]))
     return {node.name: _of_class(node) for node in tree.body if isinstance(node, ast.ClassDef)}

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from simscen.core.stage import Situation
 from simscen.spec.base import Spec
-from simscen.spec.places import Name
+from simscen.spec.references import GoalName
 from simscen.triggers.base import Condition
 
 
@@ -18,7 +18,7 @@ class GoalStatus(Spec, Condition):
 
     status: Literal["accepted", "reached", "failed", "canceled"]
     """What must have been reported."""
-    name: Name | None = None
+    name: GoalName | None = None
     """Of this goal; default: of any."""
     count: Annotated[int, Field(ge=1, le=10_000)] = 1
     """How often."""

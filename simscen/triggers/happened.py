@@ -7,6 +7,7 @@ from pydantic import Field
 from simscen.core.stage import Situation
 from simscen.spec.base import Spec
 from simscen.spec.places import Name
+from simscen.spec.references import EventName, ObjectName
 from simscen.triggers.base import Condition
 
 Count = Annotated[int, Field(ge=1, le=10_000)]
@@ -22,7 +23,7 @@ class EventStatus(Spec, Condition):
     Example: `when: {event: {name: pallet falls, status: started}}`
     """
 
-    name: Name
+    name: EventName
     """The `name` of the event."""
     status: Literal["started", "ended"] = "started"
     """What it must have done."""
@@ -70,7 +71,7 @@ class Collided(Spec, Condition):
     Example: `when: {collision: {}}`
     """
 
-    object: Name | None = Field(default=None, alias="with")
+    object: ObjectName | None = Field(default=None, alias="with")
     """By name; default: anything."""
 
     def holds(self, now: Situation) -> bool:

@@ -3,7 +3,7 @@
 from simscen.core.polygons import distance_to_polygon
 from simscen.core.stage import Situation
 from simscen.spec.base import Spec
-from simscen.spec.places import Name
+from simscen.spec.references import RegionName
 from simscen.triggers.base import Condition
 
 
@@ -13,7 +13,7 @@ class RobotIn(Spec, Condition):
     Example: `when: {robot_in: {region: hall}}`
     """
 
-    region: Name
+    region: RegionName
     """A region of the world, by name."""
 
     def holds(self, now: Situation) -> bool:

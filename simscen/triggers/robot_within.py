@@ -6,8 +6,9 @@ from simscen.core.geometry import Pose2
 from simscen.core.polygons import distance_to_polygon
 from simscen.core.stage import Situation
 from simscen.spec.base import Spec
-from simscen.spec.places import Name, Point
+from simscen.spec.places import Point
 from simscen.spec.quantities import NonNegativeLength
+from simscen.spec.references import ObjectName, RegionName
 from simscen.triggers.base import Condition
 
 
@@ -19,9 +20,9 @@ class RobotWithin(Spec, Condition):
 
     of: Point | None = None
     """A point [x, y] in the world."""
-    object: Name | None = None
+    object: ObjectName | None = None
     """An object of the world or of the scenario's events, by name; false while it is not there."""
-    region: Name | None = None
+    region: RegionName | None = None
     """A region of the world, by name."""
     distance: NonNegativeLength
     """From the robot's centre."""
