@@ -4,6 +4,7 @@ Building messages field by field costs ten times what writing them does, so a me
 Template, and only what moves is filled in for each message.
 """
 
+import math
 import struct
 from collections.abc import Callable
 from functools import partial
@@ -79,7 +80,7 @@ class Cursor:
         """The next numbers of one kind, e.g. "<f8", in that shape."""
         dtype = np.dtype(kind)
         self._align(dtype.itemsize)
-        size = int(np.prod(shape))
+        size = math.prod(shape)
         if self._offset + size * dtype.itemsize > len(self._data):
             raise struct.error(f"message ends before its {size} numbers do")
         values = np.frombuffer(self._data, dtype, size, self._offset).reshape(shape)

@@ -30,6 +30,7 @@ class LogFile:
             while rest:
                 rest = rest[self._raw.write(rest) :]
         except OSError as error:
+            self._raw.close()
             raise self._failure(error) from error
 
     def finish(self) -> None:

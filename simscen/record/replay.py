@@ -19,6 +19,19 @@ from simscen.record.writer import MAGIC
 
 LARGEST_RECORD = 1 << 28
 
+# What the libraries and our own readers raise on bytes that no Recorder wrote.
+_DAMAGE = (
+    McapError,
+    ZstdError,
+    struct.error,
+    ValueError,
+    TypeError,
+    LookupError,
+    ArithmeticError,
+    MemoryError,
+    RecursionError,
+)
+
 
 @dataclass(frozen=True, eq=False)
 class Log:
@@ -46,19 +59,16 @@ def read_log(path: "str | Path", partial: bool | None = None) -> Log:
     try:
         with path.open("rb") as stream:
             whole = _read(stream, contents)
+        about = contents.header()
         if not whole and not forgiving:
-            raise _invalid(
-                path,
-                "SC803",
-                "the log ends too early: its run broke off",
-                "to read what there is, name it *.partial.mcap",
-            )
-        return Log(contents.header(), contents.trace(), contents.result(), whole)
+            hint = "to read what there is, name it *.partial.mcap"
+            raise _invalid(path, "SC803", "the log ends too early: its run broke off", hint)
+        return Log(about, contents.trace(), contents.result(), whole)
     except OSError as error:
         raise _invalid(path, "SC800", f"cannot read the log: {error.strerror}") from error
     except Foreign as error:
         raise _invalid(path, "SC801", f"not a log of simscen: {error}") from error
-    except (McapError, ZstdError, struct.error, ValueError, KeyError, MemoryError) as error:
+    except _DAMAGE as error:
         raise _invalid(path, "SC802", f"the log is damaged: {error or type(error).__name__}") from error
 
 

@@ -4,8 +4,10 @@ The records are the mcap library's. Only the way of a message into its chunk is 
 message and fixes zstd's level at 3, which together is twice the time of all else in recording.
 """
 
+import itertools
 import struct
 import zlib
+from collections import Counter
 from collections.abc import Mapping
 from typing import Protocol
 
@@ -14,13 +16,12 @@ from mcap import records
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 
+from simscen.record.chunk import Chunk
 from simscen.record.schemas import MessageType
 
 MAGIC = b"\x89MCAP0\r\n"
 CHUNK_SIZE = 1 << 16  # what a SIGKILL can lose; 1 MiB, the library's default, would lose most runs whole
 _COMPRESSION_LEVEL = 1  # as small as level 3 on particles and scans, four times as fast
-_MESSAGE_CODE = int(Opcode.MESSAGE)
-_MESSAGE = struct.Struct("<BQHIQQ").pack
 
 
 class Sink(Protocol):
@@ -41,12 +42,12 @@ class McapWriter:
     def __init__(self, sink: Sink, profile: str, library: str, chunk_size: int = CHUNK_SIZE) -> None:
         self._sink = sink
         self._written = self._checksum = 0
-        self._chunk = _Chunk()
+        self._chunk = Chunk()
         self._chunk_size = chunk_size
         self._compress = zstandard.ZstdCompressor(level=_COMPRESSION_LEVEL).compress
         self._schemas: dict[str, records.Schema] = {}
         self._channels: list[records.Channel] = []
-        self._counts: list[int] = []
+        self._counts: Counter[int] = Counter()
         self._chunks: list[records.ChunkIndex] = []
         self._attachments: list[records.AttachmentIndex] = []
         self._notes: list[records.MetadataIndex] = []
@@ -62,21 +63,13 @@ class McapWriter:
             self._chunk.put(_encoded(schema))
         channel = records.Channel(len(self._channels) + 1, topic, "cdr", dict(metadata), schema.id)
         self._channels.append(channel)
-        self._counts.append(0)
         self._chunk.put(_encoded(channel))
         return channel.id
 
     def message(self, channel: int, time: int, data: bytes) -> None:
         """Add a message at `time` nanoseconds."""
-        chunk = self._chunk
-        size = chunk.size
-        entries = chunk.index.get(channel)
-        if entries is None:
-            entries = chunk.index[channel] = []
-        entries += (time, size)
-        chunk.parts += (_MESSAGE(_MESSAGE_CODE, 22 + len(data), channel, 0, time, time), data)
-        chunk.size = size = size + 31 + len(data)
-        if size > self._chunk_size:
+        self._chunk.message(channel, time, data)
+        if self._chunk.size > self._chunk_size:
             self._finish_chunk()
 
     def attach(self, name: str, media_type: str, data: bytes) -> None:
@@ -94,7 +87,7 @@ class McapWriter:
 
     def finish(self) -> None:
         """Write what is left and the summary; the sink stays open."""
-        if self._chunk.index:
+        if self._chunk:
             self._finish_chunk()
         self._put(_encoded(records.DataEnd(self._checksum)))
         start = self._written
@@ -116,9 +109,9 @@ class McapWriter:
         statistics = records.Statistics(
             attachment_count=len(self._attachments),
             channel_count=len(self._channels),
-            channel_message_counts={c.id: n for c, n in zip(self._channels, self._counts, strict=True) if n},
+            channel_message_counts=dict(sorted(self._counts.items())),
             chunk_count=len(self._chunks),
-            message_count=sum(self._counts),
+            message_count=self._counts.total(),
             message_end_time=max((c.message_end_time for c in self._chunks), default=0),
             message_start_time=min((c.message_start_time for c in self._chunks), default=0),
             metadata_count=len(self._notes),
@@ -128,19 +121,12 @@ class McapWriter:
         return [list(group) for group in groups]
 
     def _finish_chunk(self) -> None:
-        chunk, self._chunk = self._chunk, _Chunk()
-        content = b"".join(chunk.parts)
+        chunk, self._chunk = self._chunk, Chunk()
+        content, (start, end) = chunk.content(), chunk.span()
         packed = self._compress(content)
-        checksum = zlib.crc32(content)
-        start = min(entries[0] for entries in chunk.index.values())
-        end = max(entries[-2] for entries in chunk.index.values())
-        record = _encoded(records.Chunk("zstd", packed, end, start, checksum, len(content)))
-        at, index = self._written, bytearray()
-        offsets = {}
-        for channel, entries in chunk.index.items():
-            offsets[channel] = at + len(record) + len(index)
-            index += _message_index(channel, entries)
-            self._counts[channel - 1] += len(entries) // 2
+        record = _encoded(records.Chunk("zstd", packed, end, start, zlib.crc32(content), len(content)))
+        at, index = self._written, chunk.indices()
+        places = itertools.accumulate(map(len, index.values()), initial=at + len(record))
         self._chunks.append(
             records.ChunkIndex(
                 chunk_length=len(record),
@@ -148,36 +134,19 @@ class McapWriter:
                 compression="zstd",
                 compressed_size=len(packed),
                 message_end_time=end,
-                message_index_length=len(index),
-                message_index_offsets=offsets,
+                message_index_length=sum(map(len, index.values())),
+                message_index_offsets=dict(zip(index, places, strict=False)),
                 message_start_time=start,
                 uncompressed_size=len(content),
             )
         )
-        self._put(record + bytes(index))
+        self._counts.update(chunk.counts())
+        self._put(b"".join((record, *index.values())))
 
     def _put(self, data: bytes) -> None:
         self._sink.write(data)
         self._written += len(data)
         self._checksum = zlib.crc32(data, self._checksum)
-
-
-class _Chunk:
-    """Records on their way into one chunk; `index` holds time, offset, time, offset … of each channel's messages."""
-
-    def __init__(self) -> None:
-        self.parts: list[bytes] = []
-        self.size = 0
-        self.index: dict[int, list[int]] = {}
-
-    def put(self, record: bytes) -> None:
-        self.parts.append(record)
-        self.size += len(record)
-
-
-def _message_index(channel: int, entries: list[int]) -> bytes:
-    size = 8 * len(entries)
-    return struct.pack(f"<BQHI{len(entries)}Q", Opcode.MESSAGE_INDEX, 6 + size, channel, size, *entries)
 
 
 def _encoded(*items: records.McapRecord) -> bytes:
