@@ -78,7 +78,7 @@ def _near(solid: Solid, point: tuple[float, float], radius: float) -> bool:
     return math.hypot(solid.pose.x - point[0], solid.pose.y - point[1]) <= radius + _reach(solid.shape)
 
 
-def _reach(shape: Shape) -> float:  # noqa: PLR0911 - one return for each shape there is
+def _reach(shape: Shape) -> float:
     """The radius of a ball about the shape's origin that holds it."""
     match shape:
         case Box(size):

@@ -62,7 +62,7 @@ def fuse(solids: Iterable[Solid]) -> TriangleMesh:
     return TriangleMesh(np.concatenate(vertices), np.concatenate(faces), np.concatenate(owners), tuple(names))
 
 
-def triangulate(shape: Shape) -> Mesh:  # noqa: PLR0911 - one return for each shape there is
+def triangulate(shape: Shape) -> Mesh:
     """The surface of a shape about its own origin; round ones as inscribed facets, within SAGITTA."""
     match shape:
         case Box(size):
