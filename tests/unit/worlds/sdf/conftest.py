@@ -1,0 +1,48 @@
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from simscen.core.errors import InvalidInput
+from simscen.core.problems import Problem
+from simscen.core.world import World
+from simscen.worlds.sdf import load_sdf
+
+BOX = "<collision name='c'><geometry><box><size>1 1 1</size></box></geometry></collision>"
+LINK = f"<link name='a'>{BOX}</link>"
+
+Load = Callable[..., World]
+Refuse = Callable[..., list[Problem]]
+
+
+@pytest.fixture
+def data() -> Path:
+    folder = Path(__file__).parents[5] / "shared" / "data"
+    if not folder.is_dir():
+        pytest.skip("the shared data folder is not here")
+    return folder
+
+
+@pytest.fixture
+def load(tmp_path: Path) -> Load:
+    """Load the content of a `<world>` named w, of a `<model>` file, or of whole text."""
+
+    def _load(content: str, version: str = "1.9", lenient: bool = False, **options: object) -> World:
+        file = tmp_path / "shop.world"
+        whole = content.lstrip().startswith(("<?xml", "<sdf", "<!DOCTYPE"))
+        file.write_text(content if whole else f"<sdf version='{version}'><world name='w'>\n{content}</world></sdf>")
+        return load_sdf(file, root=tmp_path, lenient=lenient, **options)  # type: ignore[arg-type]
+
+    return _load
+
+
+@pytest.fixture
+def refuse(load: Load) -> Refuse:
+    """The problems that loading ends with."""
+
+    def _refuse(content: str, **options: object) -> list[Problem]:
+        with pytest.raises(InvalidInput) as caught:
+            load(content, **options)
+        return caught.value.problems
+
+    return _refuse

@@ -1,0 +1,131 @@
+import time
+from pathlib import Path
+
+import pytest
+
+from simscen.core.errors import InvalidInput
+from simscen.worlds.sdf import load_sdf
+
+BOX = "<collision name='c'><geometry><box><size>1 1 1</size></box></geometry></collision>"
+LINK = f"<link name='a'>{BOX}</link>"
+MODEL = f"<model name='m'><static>1</static>{LINK}</model>"
+
+BOMB = """<?xml version="1.0"?>
+<!DOCTYPE sdf [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;&a;">]>
+<sdf version="1.6"><world name="&b;"/></sdf>"""
+
+
+def test_a_doctype_is_refused(refuse):
+    (problem,) = refuse(BOMB)
+    assert (problem.path, problem.line, problem.message) == ("shop.world", 2, "DOCTYPE not allowed")
+
+
+@pytest.mark.parametrize(
+    ("content", "line", "message"),
+    [
+        ("<sdf version='1.6'>\n<world name='w'>\n<model", 3, "not well-formed XML: unclosed token"),
+        ("<?xml version='1.0'?>\n", 2, "not well-formed XML: no element found"),
+        ("<?xml version='1.0' encoding='klingon'?><sdf/>", 1, "cannot be read as XML"),
+        ("<?xml version='1.0'?>\n" + "<a>" * 200_000, 2, "nested deeper than 100"),
+        ("<sdf version='1.9'>\n</sdf>", 1, "holds neither a world nor a model"),
+        ("<sdf version='1.99'><world name='w'/></sdf>", 1, "SDF version 1.99 is not read"),
+    ],
+)
+def test_what_is_no_sdf_is_refused_with_a_line(refuse, content, line, message):
+    (problem,) = refuse(content)
+    assert problem.line == line
+    assert message in problem.message
+
+
+def test_binary_files_are_refused(tmp_path):
+    (tmp_path / "x.world").write_bytes(bytes(range(256)))
+    with pytest.raises(InvalidInput, match="not well-formed XML"):
+        load_sdf(tmp_path / "x.world", root=tmp_path)
+
+
+def test_files_beyond_20_mib_are_refused_at_once(tmp_path):
+    with (tmp_path / "x.world").open("wb") as file:
+        file.truncate(100 * 2**20)
+    start = time.process_time()
+    with pytest.raises(InvalidInput, match="larger than 20 MiB"):
+        load_sdf(tmp_path / "x.world", root=tmp_path)
+    assert time.process_time() - start < 0.5
+
+
+@pytest.mark.parametrize("make", [Path.mkdir, lambda path: path.symlink_to("/dev/zero")])
+def test_a_world_must_be_a_file_inside_the_root(tmp_path, make):
+    make(tmp_path / "x.world")
+    with pytest.raises(InvalidInput, match="not a regular file|outside the scenario root"):
+        load_sdf(tmp_path / "x.world", root=tmp_path)
+
+
+def test_a_missing_world_is_told(tmp_path):
+    with pytest.raises(InvalidInput, match=r"x\.world: no such file or directory"):
+        load_sdf(tmp_path / "x.world", root=tmp_path)
+
+
+def test_several_mistakes_are_told_at_once_in_file_order(refuse):
+    wrong = LINK.replace("1 1 1", "1 0 1")
+    problems = refuse(f"<model name='m'>{wrong}</model>\n<population name='p'/>\n<include/>\n{MODEL}")
+    assert [problem.line for problem in problems] == [2, 3, 4]
+
+
+@pytest.mark.parametrize(
+    ("world", "message", "hint"),
+    [
+        (MODEL.replace("collision", "colision"), "unknown element <colision>", "did you mean <collision>?"),
+        (f"<modle name='x'>{LINK}</modle>", "unknown element <modle>", "did you mean <model>?"),
+        (f"<group>{MODEL}</group>", "unknown element <group>", ""),
+        (MODEL.replace("box", "bocks"), "<bocks> is not a shape that is read", "one of box, cylinder"),
+        (f"<xacro:if value='$(arg x)'>{MODEL}</xacro:if>", "<xacro:if> is not expanded", "run xacro"),
+        ("<xacro:shelf x='1'/>", "<xacro:shelf> is not expanded", "run xacro"),
+    ],
+)
+def test_unknown_elements_that_may_hold_geometry_are_errors(refuse, world, message, hint):
+    problem = refuse(f"<sdf version='1.9' xmlns:xacro='x'><world name='w'>{MODEL}{world}</world></sdf>")[0]
+    assert message in problem.message
+    assert problem.hint.startswith(hint)
+
+
+def test_unknown_elements_without_geometry_leave_a_note(load):
+    world = load(f"<wheather>rain</wheather><scens/>{MODEL}")
+    assert world.notes == (
+        "shop.world: world[w]/wheather: unknown element <wheather> ignored",
+        "shop.world: world[w]/scens: unknown element <scens> ignored; did you mean <scene>?",
+    )
+
+
+def test_lights_plugins_extensions_and_definitions_of_xacro_are_passed_over(load):
+    harmless = (
+        "<light name='sun' type='directional'/><plugin name='p' filename='f'><model/></plugin><gz:extra/>"
+        "<xacro:property name='x' value='1'/><xacro:unless value='1'><plugin/></xacro:unless>"
+    )
+    world = load(f"<sdf version='1.9' xmlns:xacro='x' xmlns:gz='y'><world name='w'>{harmless}{MODEL}</world></sdf>")
+    assert len(world.solids) == 1
+    assert not world.notes
+
+
+def test_the_world_takes_its_name_and_bounds_from_the_file(load):
+    world = load(MODEL.replace("1 1 1", "2 4 1"))
+    assert world.name == "w"
+    assert world.bounds == pytest.approx((-1, -2, 1, 2))
+
+
+def test_a_file_of_models_only_is_a_world_of_its_own(load):
+    other = MODEL.replace("'m'", "'n'")
+    world = load(f"<sdf version='1.7'>{MODEL}{other}</sdf>")
+    assert (world.name, len(world.solids)) == ("shop", 2)
+
+
+def test_loading_twice_gives_the_same(load):
+    text = MODEL + MODEL.replace("'m'", "'n'").replace("<static>1</static>", "")
+    first, second = load(text), load(text)
+    assert (first.solids, first.bodies, first.notes) == (second.solids, second.bodies, second.notes)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [("", "<model> has no name"), ("x" * 121, "longer than 120"), ("a&#x1b;b", "not well-formed"), ("a&#x202e;b", "control character")],
+)
+def test_names_are_checked(refuse, name, message):
+    assert message in refuse(MODEL.replace("'m'", f"'{name}'"))[0].message

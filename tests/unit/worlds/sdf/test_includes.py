@@ -1,0 +1,226 @@
+import os
+
+import pytest
+
+from simscen.core.errors import InvalidInput
+from simscen.core.shapes import Box, Sphere
+from simscen.worlds.sdf import load_sdf
+
+CRATE = (
+    "<sdf version='{version}'><model name='crate'>{extra}<link name='a'><collision name='c'><geometry>{shape}"
+    "</geometry></collision></link></model></sdf>"
+)
+BOX = "<box><size>1 1 1</size></box>"
+BALL = "<sphere><radius>0.5</radius></sphere>"
+
+
+def write(folder, name="crate", files=("model.sdf",), config=None, shape=BOX, extra="<static>1</static>"):
+    place = folder / name
+    place.mkdir(parents=True, exist_ok=True)
+    for file in files:
+        (place / file).write_text(CRATE.format(version="1.6", shape=shape, extra=extra))
+    if config is not None:
+        (place / "model.config").write_text(f"<model><name>{name}</name>{config}</model>")
+    return place
+
+
+@pytest.fixture
+def models(tmp_path):
+    folder = tmp_path / "elsewhere" / "models"
+    write(folder)
+    return folder
+
+
+def include(uri, rest="", attributes=""):
+    return f"<include {attributes}><uri>{uri}</uri>{rest}</include>"
+
+
+def test_model_uris_are_looked_up_in_the_search_folders_in_order(load, models, tmp_path):
+    write(tmp_path / "other", shape=BALL)
+    world = load(include("model://crate"), search=[models, tmp_path / "other"])
+    assert world.solids[0].shape == Box((1, 1, 1))
+    world = load(include("model://crate"), search=[tmp_path / "other", models])
+    assert world.solids[0].shape == Sphere(0.5)
+
+
+@pytest.mark.parametrize("uri", ["elsewhere/models/crate", "file://elsewhere/models/crate",
+                                 "elsewhere/models/crate/model.sdf", "elsewhere/models/../models/crate"])  # fmt: skip
+def test_relative_paths_start_at_the_file_that_names_them(load, models, uri):
+    assert len(load(include(uri)).solids) == 1
+
+
+def test_absolute_paths_inside_the_root_are_read(load, models):
+    assert len(load(include(f"file://{models}/crate")).solids) == 1
+
+
+def test_an_include_overrides_name_pose_and_static(load, models):
+    over = "<name>left</name><pose>1 2 3 0 0 0</pose>"
+    (solid,) = load(include("model://crate", over), search=[models]).solids
+    assert solid.name == "left::a::c"
+    assert solid.pose.position == (1, 2, 3)
+    (body,) = load(include("model://crate", over + "<static>false</static>"), search=[models]).bodies
+    assert body.name == "left"
+
+
+def test_without_a_pose_of_its_own_an_include_keeps_that_of_the_model(load, tmp_path):
+    write(tmp_path / "m", extra="<static>1</static><pose>4 5 6 0 0 0</pose>")
+    assert load(include("m/crate")).solids[0].pose.position == (4, 5, 6)
+
+
+def test_a_placement_frame_of_an_include_is_what_its_pose_places(load, tmp_path):
+    write(tmp_path / "m", extra="<static>1</static><frame name='corner'><pose>1 1 0 0 0 0</pose></frame>")
+    world = load(include("m/crate", "<pose>0 0 0 0 0 0</pose><placement_frame>corner</placement_frame>"))
+    assert world.solids[0].pose.position == (-1, -1, 0)
+
+
+def test_the_pose_of_an_include_may_be_relative_to_a_frame_beside_it(load, models):
+    frame = "<frame name='f'><pose>10 0 0 0 0 0</pose></frame>"
+    world = load(frame + include("model://crate", "<pose relative_to='f'>1 0 0 0 0 0</pose>"), search=[models])
+    assert world.solids[0].pose.position == (11, 0, 0)
+
+
+def test_what_is_included_into_a_static_model_is_static(load, tmp_path):
+    write(tmp_path / "m", extra="")
+    inner = include("m/crate", "<pose>1 0 0 0 0 0</pose>")
+    world = load(f"<model name='shelf'><static>true</static><pose>0 2 0 0 0 0</pose>{inner}</model>")
+    assert world.solids[0].name == "shelf::crate::a::c"
+    assert world.solids[0].pose.position == (1, 2, 0)
+
+
+def test_a_merged_include_lends_its_names_and_takes_its_owners_static(load, tmp_path):
+    write(tmp_path / "m", extra="<static>1</static>")
+    on_top = f"<link name='b'><pose relative_to='a'>0 0 1 0 0 0</pose><collision name='c'><geometry>{BALL}</geometry></collision></link>"
+    merged = include("m/crate", "<pose>3 0 0 0 0 0</pose>", "merge='true'")
+    joint = "<joint name='j' type='fixed'><parent>a</parent><child>b</child></joint>"
+    (body,) = load(f"<model name='cart'>{merged}{on_top}{joint}</model>").bodies
+    assert (body.name, body.mass) == ("cart", 2.0)
+    assert body.pose.position == (3, 0, 0.5)
+
+
+def test_model_config_names_the_newest_version_that_is_read(load, tmp_path):
+    config = "<sdf version='1.9'>old.sdf</sdf><sdf version='1.10'>new.sdf</sdf><sdf version='2.0'>future.sdf</sdf>"
+    write(tmp_path / "m", files=("old.sdf", "future.sdf"), config=config)
+    write(tmp_path / "m", files=("new.sdf",), shape=BALL)
+    assert load(include("m/crate")).solids[0].shape == Sphere(0.5)
+
+
+def test_a_folder_without_a_model_is_refused(refuse, tmp_path):
+    (tmp_path / "m").mkdir()
+    assert "neither model.config nor model.sdf" in refuse(include("m"))[0].message
+
+
+def test_gazebos_own_sun_and_ground_need_not_be_there(load, models):
+    world = load(include("model://sun") + include("model://ground_plane") + include("model://crate"), search=[models])
+    assert len(world.solids) == 1
+    assert not world.notes
+
+
+def test_a_missing_model_says_where_it_was_looked_for(refuse, models):
+    (problem,) = refuse(f"\n  {include('model://crates')}", search=[models])
+    assert (problem.path, problem.line, problem.col) == ("shop.world", 3, 13)
+    assert "model://crates: no such file or directory" in problem.message
+    assert problem.hint == "looked in elsewhere/models; allow its folder with --world-path"
+
+
+def test_online_models_are_not_fetched(refuse):
+    (problem,) = refuse(include("https://fuel.gazebosim.org/1.0/OpenRobotics/models/Coke"))
+    assert "only model://, package://, file:// and relative paths are read" in problem.message
+
+
+def test_a_circle_of_includes_is_refused_with_its_chain(tmp_path, load, refuse):
+    for here, there in (("a", "b"), ("b", "a")):
+        write(tmp_path, here, extra=include(f"../{there}"))
+    (problem,) = refuse(include("a"))
+    assert problem.path == "b/model.sdf"
+    assert "include cycle: a/model.sdf → b/model.sdf → a/model.sdf" in problem.message
+
+
+def test_includes_that_unfold_without_end_are_refused_in_time(tmp_path, refuse):
+    for level in range(8):
+        inner = "".join(include(f"../l{level + 1}", f"<name>n{k}</name>") for k in range(10))
+        write(tmp_path, f"l{level}", extra=inner if level < 7 else "")
+    assert any("more than 20000 models" in problem.message for problem in refuse(include("l0")))
+
+
+def test_an_error_in_an_included_file_is_told_in_that_file(tmp_path, refuse):
+    write(tmp_path, "m", shape="<box><size>1 -1 1</size></box>")
+    (problem,) = refuse(include("m"))
+    assert (problem.path, problem.line) == ("m/model.sdf", 1)
+    assert problem.message.startswith("model[crate]/link[a]/collision[c]/geometry/box/size: must be positive")
+
+
+def test_a_broken_included_file_is_told_with_its_line(tmp_path, refuse):
+    write(tmp_path, "m")
+    (tmp_path / "m" / "model.sdf").write_text("<sdf version='1.6'>\n<model name='x'>\n</link>")
+    (problem,) = refuse(include("m"))
+    assert (problem.path, problem.line) == ("m/model.sdf", 3)
+    assert "not well-formed XML: mismatched tag" in problem.message
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("<sdf version='1.6'><world name='x'/></sdf>", "holds no model"),
+        ("<robot name='r'/>", "this is a URDF, not an SDF"),
+        ("<sdf version='1.13'><model name='x'/></sdf>", "SDF version 1.13 is not read"),
+        ("<sdf><model name='x'/></sdf>", "SDF version none is not read"),
+    ],
+)
+def test_only_sdf_models_are_included(tmp_path, refuse, content, message):
+    (tmp_path / "m.sdf").write_text(content)
+    assert message in refuse(include("m.sdf"))[0].message
+
+
+class TestContainment:
+    @pytest.fixture
+    def outside(self, tmp_path_factory):
+        folder = tmp_path_factory.mktemp("outside")
+        write(folder, shape="<box><size>7 7 7</size></box>")
+        return folder
+
+    def test_a_way_out_by_dots_is_refused(self, refuse, outside):
+        (problem,) = refuse(include(f"../{outside.name}/crate"))
+        assert "outside the scenario root" in problem.message
+
+    def test_an_absolute_way_out_is_refused_whether_or_not_it_exists(self, refuse, outside):
+        for uri in (f"file://{outside}/crate", str(outside / "nothing"), "/etc/passwd"):
+            assert "outside the scenario root" in refuse(include(uri))[0].message
+
+    def test_a_symbolic_link_out_is_refused(self, refuse, outside, tmp_path):
+        (tmp_path / "link").symlink_to(outside / "crate")
+        assert "outside the scenario root" in refuse(include("link"))[0].message
+        (tmp_path / "m").mkdir()
+        (tmp_path / "m" / "model.sdf").symlink_to(outside / "crate" / "model.sdf")
+        assert "outside the scenario root" in refuse(include("m"))[0].message
+
+    def test_model_uris_do_not_climb_either(self, refuse, outside, tmp_path):
+        (problem,) = refuse(include(f"model://../../{outside.name}/crate"), search=[tmp_path])
+        assert "outside" in problem.message
+
+    def test_a_folder_the_user_allows_is_inside(self, load, outside):
+        assert len(load(include("model://crate"), search=[outside]).solids) == 1
+
+    def test_the_world_itself_must_be_inside(self, outside, tmp_path):
+        with pytest.raises(InvalidInput, match="outside the scenario root"):
+            load_sdf(outside / "crate" / "model.sdf", root=tmp_path)
+
+    def test_a_loop_of_symbolic_links_is_named(self, refuse, tmp_path):
+        (tmp_path / "a").symlink_to(tmp_path / "b")
+        (tmp_path / "b").symlink_to(tmp_path / "a")
+        assert "symbolic link loop" in refuse(include("a"))[0].message
+
+    def test_a_pipe_is_refused_and_not_waited_for(self, refuse, tmp_path):
+        os.mkfifo(tmp_path / "pipe.sdf")
+        assert "not a regular file" in refuse(include("pipe.sdf"))[0].message
+
+    def test_names_with_nul_or_without_end_are_refused(self, refuse):
+        assert "not a usable path" in refuse(include("a" * 5000))[0].message
+        assert "not a usable path" in refuse(include("a" * 300))[0].message
+        assert "not well-formed XML" in refuse(include("a\0b"))[0].message
+
+    def test_an_unreadable_file_is_told(self, refuse, tmp_path):
+        write(tmp_path, "m")
+        (tmp_path / "m" / "model.sdf").chmod(0)
+        if os.access(tmp_path / "m" / "model.sdf", os.R_OK):
+            pytest.skip("running as root")
+        assert "permission denied" in refuse(include("m"))[0].message
