@@ -103,6 +103,9 @@ class SensorTopics:
 
 
 def _ros_name(text: str) -> str:
-    """`text` as a part of a topic: ROS allows letters, digits and underscores, and no digit first."""
+    """`text` as the root of a sensor's topic: ROS allows letters, digits and underscores, and no digit first.
+
+    A sensor called ground_truth must not speak on the truth's topic.
+    """
     name = re.sub(r"[^A-Za-z0-9_]", "_", text)
-    return f"sensor_{name}" if name[:1].isdigit() or name in ("", "simscen", "ground_truth") else name
+    return f"sensor_{name}" if name[:1].isdigit() or name in ("", "ground_truth") else name

@@ -2,6 +2,9 @@
 
 import hashlib
 import io
+import os
+import subprocess
+import sys
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -16,10 +19,13 @@ from rosbags.interfaces import QosDurability
 from schemas_from_rosbags import humble
 
 from simscen.core.errors import RunError
-from simscen.core.sensing import Scan
-from simscen.core.trace import Moment
+from simscen.core.geometry import Pose2
+from simscen.core.motion import STOP
+from simscen.core.sensing import Odometry, Scan
+from simscen.core.trace import Decision, Moment
 from simscen.record.recorder import Recorder
 
+HERE = Path(__file__).parent
 RUN = list(moments(2.0))
 LATCHED = {"/map", "/tf_static", "/robot_description"}
 TOPICS = LATCHED | {
@@ -140,6 +146,33 @@ def test_particles_come_twice_a_second(read: dict[str, list[tuple[int, Any]]]) -
 def test_equal_runs_give_equal_bytes() -> None:
     digests = {hashlib.sha256(record(list(moments(1.0)))).hexdigest() for _ in range(3)}
     assert len(digests) == 1
+
+
+def test_equal_runs_give_equal_bytes_in_any_process() -> None:
+    code = "import hashlib, test_recorder as t; print(hashlib.sha256(t.record(t.RUN)).hexdigest())"
+    digests = set()
+    for salt in ("1", "2"):
+        env = {**os.environ, "PYTHONHASHSEED": salt}
+        run = subprocess.run(
+            [sys.executable, "-c", code], check=True, cwd=HERE, env=env, capture_output=True, text=True
+        )
+        digests.add(run.stdout.strip())
+    assert digests == {hashlib.sha256(record(RUN)).hexdigest()}
+
+
+def test_a_sensor_cannot_speak_for_the_truth() -> None:
+    odometry = [Odometry(name, 0, Pose2(1.0, 2.0), STOP) for name in ("wheels", "ground_truth", "2nd wheels")]
+    summary = make_reader(io.BytesIO(record([Moment(0, None, tuple(odometry), Decision(STOP))]))).get_summary()
+    assert summary is not None
+    topics = {channel.topic for channel in summary.channels.values()}
+    assert {"/odom", "/sensor_ground_truth/odom", "/sensor_2nd_wheels/odom"} <= topics
+    assert "/ground_truth/odom" not in topics
+
+
+def test_the_reference_page_names_every_topic() -> None:
+    page = (HERE.parents[2] / "docs" / "reference" / "mcap.md").read_text()
+    for topic in TOPICS - {"/rear_lidar/scan", "/visual/odom"}:
+        assert f"`{topic.replace('/camera', '/NAME')}`" in page, topic
 
 
 def test_another_seed_gives_other_bytes() -> None:
