@@ -10,8 +10,8 @@ from simscen.core.geometry import Pose3
 from simscen.core.session import RunKey
 from simscen.core.time import Clock
 from simscen.core.trace import Trace
-from simscen.judge.result import RunResult, conclude
-from simscen.judge.resultfile import to_json
+from simscen.judge.judge import judge
+from simscen.judge.result import RunResult, run_result, to_json
 from simscen.model.robot import RobotSpec
 from simscen.record.header import LogHeader
 from simscen.record.recorder import Recorder
@@ -59,12 +59,10 @@ def perform(prepared: Prepared, key: RunKey, folder: Path, logs: tuple[Log, ...]
 def judged(prepared: Prepared, key: RunKey, trace: Trace) -> RunResult:
     """Verdicts and metrics of a trace."""
     loaded = prepared.loaded
-    lines = tuple(loaded.place_of("pass", index).line for index in range(len(prepared.spec.pass_)))
-    again = f"simscen run {loaded.path} --seed {key.seed}"
+    verdicts = judge(prepared.spec.pass_, trace, prepared.case)
+    lines = tuple(loaded.place_of("pass", index).line for index in range(len(verdicts)))
     # The second of two equal runs must say the same as the first, so the variation is not part of the result.
-    return conclude(
-        RunKey(key.scenario, key.seed), loaded.path, prepared.spec.pass_, trace, prepared.case, lines, again
-    )
+    return run_result(key.scenario, loaded.path, key.seed, verdicts, trace, prepared.case, lines=lines)
 
 
 def log_header(prepared: Prepared, seed: int) -> LogHeader:

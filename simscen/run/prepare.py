@@ -80,8 +80,13 @@ def prepare(loaded: LoadedScenario, world_of: BuildWorld = build_world) -> Prepa
         stack=stack_of(spec),
         start=start,
         estimate=estimate_of(spec.robot, start),
-        case=replace(case, shortest=shortest_lengths(built.map, start, goals, case.inscribed_radius)),
+        case=replace(case, shortest=_shortest(built, start, goals, case.inscribed_radius)),
     )
+
+
+def _shortest(built: BuiltWorld, start: Pose2, goals: tuple[Goal, ...], radius: float) -> dict[str, float]:
+    lengths = shortest_lengths(built, start, [goal.pose for goal in goals], radius)
+    return {goal.name: length for goal, length in zip(goals, lengths, strict=True)}
 
 
 def _robot_map(loaded: LoadedScenario, built: BuiltWorld) -> OccupancyGrid | None:

@@ -4,7 +4,7 @@ import signal
 from pathlib import Path
 
 from simscen.core.session import Artifacts, Outcome, RunFailure, RunFinished, RunKey
-from simscen.judge.resultfile import from_json
+from simscen.judge.result import from_json
 from simscen.loading.loaded import LoadedScenario
 from simscen.run.confine import MEMORY_BYTES
 from simscen.run.jobs import Job, ProcessEnd
