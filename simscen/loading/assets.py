@@ -97,7 +97,8 @@ class Assets:
         if spec is None or tree is None:
             return None
         urdf = self._find(spec.urdf, value_place(tree, ("urdf",))) if spec.urdf else None
-        return LoadedRobot(name, path, spec, urdf, bundled) if urdf or not spec.urdf else None
+        body = tree if isinstance(tree, Fields) else None
+        return LoadedRobot(name, path, spec, urdf, bundled, body) if urdf or not spec.urdf else None
 
     def _ros_map(self, tree: Node | None, path: Path) -> LoadedMap | None:
         spec = self._model(RosMapSpec, tree)

@@ -6,7 +6,7 @@ from pydantic import BaseModel, ValidationError
 
 from simscen.core.problems import Problem
 from simscen.loading import messages
-from simscen.loading.grammar import keys_of, models_at, needs_nothing
+from simscen.loading.grammar import keys_of, models_at, needs_nothing, types_at
 from simscen.loading.tree import Fields, Key, Leaf, Node, Place, at, child, dotted, key_place, real_keys, value_place
 from simscen.spec.base import Choice
 
@@ -24,7 +24,7 @@ def check(model: type[Model], tree: Node) -> Model | list[Problem]:
         return model.model_validate(tree.plain, by_alias=True, by_name=False)
     except ValidationError as error:
         found = [_translate(model, tree, dict(e)) for e in error.errors(include_input=False, include_url=False)]
-        return _merged(found)
+        return _distinct(found)
 
 
 def _other_version(tree: Fields) -> Problem | None:
@@ -45,7 +45,7 @@ def _translate(model: type[BaseModel], tree: Node, error: dict[str, Any]) -> Pro
     if kind == "missing":
         return _missing_key(tree, loc)
     if kind.startswith("union_tag"):
-        return _wrong_type(tree, loc, error)
+        return _wrong_type(model, tree, loc, error)
     if loc and loc[-1] == "[key]":
         name = Leaf(tree.place, str(loc[-2]))
         return _problem(key_place(tree, loc), *messages.explain(kind, error.get("ctx", {}), name, error["msg"]))
@@ -69,16 +69,17 @@ def _missing_key(tree: Node, loc: tuple[Key, ...]) -> Problem:
     return _problem(key_place(tree, loc[:-1]), "SC010", f"missing key `{loc[-1]}`{where}")
 
 
-def _wrong_type(tree: Node, loc: tuple[Key, ...], error: dict[str, Any]) -> Problem:
+def _wrong_type(model: type[BaseModel], tree: Node, loc: tuple[Key, ...], error: dict[str, Any]) -> Problem:
     """A union told apart by `type:` whose type is missing or unknown."""
-    context = error["ctx"]
-    holder = dotted(real_keys(tree, loc))
+    node, types = at(tree, loc), types_at(model, loc)
+    if not isinstance(node, Fields):
+        return _problem(value_place(tree, loc), "SC011", f"expected a mapping, got {messages.found(node)}")
     if error["type"] == "union_tag_not_found":
-        return _problem(key_place(tree, loc), "SC010", f"missing key `type` in `{holder}`")
-    choices = [choice.strip().strip("'") for choice in str(context["expected_tags"]).split(",")]
-    hint = messages.suggestion(str(context["tag"]), choices)
-    message = f"{messages.quoted(str(context['tag']))} is not one of the choices"
-    return _problem(value_place(tree, (*loc, "type")), "SC014", message, hint)
+        message = f"missing key `type` in `{dotted(real_keys(tree, loc))}`"
+        return _problem(key_place(tree, loc), "SC010", message, f"expected one of: {', '.join(types)}")
+    written = str(error["ctx"]["tag"])
+    message = f"{messages.quoted(written)} is not one of the choices"
+    return _problem(value_place(tree, (*loc, "type")), "SC014", message, messages.suggestion(written, types))
 
 
 def _empty_choice(model: type[BaseModel], node: Node, loc: tuple[Key, ...]) -> Problem | None:
@@ -95,12 +96,18 @@ def _empty_choice(model: type[BaseModel], node: Node, loc: tuple[Key, ...]) -> P
     return None
 
 
-def _merged(problems: list[Problem]) -> list[Problem]:
-    """One problem a place: the members of a union each say what they expected."""
-    places: dict[tuple[str, int, int, str], list[Problem]] = {}
+def _distinct(problems: list[Problem]) -> list[Problem]:
+    """One problem for one mistake: members of a union complain at one place, and a misspelt key is also missing."""
+    places: dict[tuple[str, int, int, str], Problem] = {}
     for problem in problems:
-        places.setdefault((problem.path, problem.line, problem.col, problem.code), []).append(problem)
-    return [group[0] for group in places.values()]
+        key = problem.code if problem.code == "SC010" else ""
+        places.setdefault((problem.path, problem.line, problem.col, key and problem.message), problem)
+    misspelt = {problem.hint for problem in problems if problem.code == "SC012"}
+    return [p for p in places.values() if not (p.code == "SC010" and p.hint == "" and _meant(p) in misspelt)]
+
+
+def _meant(missing: Problem) -> str:
+    return f"did you mean {missing.message.split()[2]}?"
 
 
 def _problem(place: Place, code: str, message: str, hint: str = "") -> Problem:

@@ -26,6 +26,11 @@ def models_at(model: type[BaseModel], loc: Sequence[Key]) -> list[type[BaseModel
     return list(dict.fromkeys(kind for kind in found if _is_model(kind) and not issubclass(kind, RootModel)))
 
 
+def types_at(model: type[BaseModel], loc: Sequence[Key]) -> list[str]:
+    """The values that `type` may have in a mapping at `loc`."""
+    return [str(value) for kind in models_at(model, loc) for value in _types(kind)]
+
+
 def keys_of(models: Iterable[type[BaseModel]]) -> list[str]:
     """The keys that these models know, as they are written in YAML."""
     keys = [field.alias or name for model in models for name, field in model.model_fields.items()]
@@ -76,12 +81,13 @@ def _tags(option: Any) -> set[str]:
     tags = {meta.tag for meta in _metadata(option) if isinstance(meta, Tag)}
     bare = _bare(option)
     if _is_model(bare):
-        tags.add(bare.__name__)
-        for name in ("type",):
-            field = bare.model_fields.get(name)
-            if field is not None and get_origin(field.annotation) is Literal:
-                tags |= {str(value) for value in get_args(field.annotation)}
+        tags |= {bare.__name__, *(str(value) for value in _types(bare))}
     return tags
+
+
+def _types(model: type[BaseModel]) -> tuple[Any, ...]:
+    field = model.model_fields.get("type")
+    return get_args(field.annotation) if field is not None and get_origin(field.annotation) is Literal else ()
 
 
 def _metadata(kind: Any) -> tuple[Any, ...]:

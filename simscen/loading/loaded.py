@@ -48,6 +48,7 @@ class LoadedRobot:
     spec: RobotSpec | None = None
     urdf: Path | None = None
     bundled: bool = False
+    tree: Fields | None = field(repr=False, default=None)
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,10 @@ class LoadedScenario:
 
     def problem(self, keys: tuple[Key, ...], code: str, message: str, hint: str = "") -> Problem:
         """A problem at the value of `keys`, with the text of its line."""
-        place = self.place_of(*keys)
+        return self.problem_at(self.place_of(*keys), code, message, hint)
+
+    def problem_at(self, place: Place, code: str, message: str, hint: str = "") -> Problem:
+        """A problem at a place in any of the files read, with the text of its line."""
         lines = self.sources.get(place.path, "").split("\n")
         source = lines[place.line - 1] if 0 < place.line <= len(lines) else ""
         return Problem(*place, code=code, message=message, hint=hint, source=source)

@@ -1,7 +1,6 @@
 """Load a scenario with everything it names, or say all that is wrong with it."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -9,10 +8,11 @@ from simscen.core.errors import InvalidInput
 from simscen.core.problems import Problem
 from simscen.loading.assets import Assets
 from simscen.loading.check import check
+from simscen.loading.consistency import inconsistencies
 from simscen.loading.document import Library
 from simscen.loading.loaded import LoadedMap, LoadedScenario, LoadedWorld
 from simscen.loading.paths import Fence
-from simscen.loading.tree import Fields, Leaf, at, value_place
+from simscen.loading.tree import Fields, Leaf, Node, at, child, value_place
 from simscen.model.scenario import ScenarioSpec
 from simscen.model.world import WorldSpec
 
@@ -41,11 +41,18 @@ def try_scenario(path: Path, root: Path, world_path: Sequence[Path] = ()) -> Loa
     tree, problems = library.read(file, defaults=True)
     if not problems and tree is not None:
         spec = check(ScenarioSpec, tree)
-        if isinstance(spec, list):
-            problems = spec
-        elif isinstance(tree, Fields):
+        if not isinstance(spec, list) and isinstance(tree, Fields):
             return _with_assets(spec, tree, library, file)
+        problems = [*(spec if isinstance(spec, list) else ()), *_problems_of_world(tree, library)]
     return library.with_source(sorted(problems))
+
+
+def _problems_of_world(tree: Node, library: Library) -> list[Problem]:
+    """What is wrong with the world file of a scenario that is wrong itself: better told at once than next time."""
+    assets, node = Assets(library), child(tree, "world")
+    if isinstance(node, Leaf) and isinstance(node.value, str):
+        assets.world(node)
+    return assets.problems
 
 
 def _with_assets(spec: ScenarioSpec, tree: Fields, library: Library, file: Path) -> LoadedScenario | list[Problem]:
@@ -71,7 +78,7 @@ def _with_assets(spec: ScenarioSpec, tree: Fields, library: Library, file: Path)
         sources=dict(library.texts),
         files=dict(library.files),
     )
-    return replace(loaded)
+    return sorted(inconsistencies(loaded)) or loaded
 
 
 def _world(spec: ScenarioSpec, tree: Fields, assets: Assets, file: Path) -> LoadedWorld | None:

@@ -1,0 +1,102 @@
+"""What only the whole scenario can tell: do the names exist, do faults fit their sensors, do rates fit the clock?"""
+
+from collections.abc import Iterator
+
+from simscen.core.problems import Problem
+from simscen.core.time import Clock
+from simscen.loading.loaded import LoadedScenario
+from simscen.loading.messages import quoted, suggestion
+from simscen.loading.names import ARTICLES, event_names, known_names
+from simscen.loading.references import references
+from simscen.loading.tree import Fields, Key, key_place, real_keys, value_place
+from simscen.model.robot import RobotSpec
+
+COMMAND = "cmd_vel"
+READINGS = {"lidar": "Scan", "odometry": "Odometry", "imu": "Imu", "bumper": "Bump", "camera": "Image"}
+"""What each kind of sensor says, by class name in core.sensing: the kinds that faults affect."""
+
+
+def inconsistencies(loaded: LoadedScenario) -> list[Problem]:
+    """Every contradiction within a scenario and the files it names."""
+    checks = (_unknown_names, _unfit_faults, _twice_named, _uneven_rates)
+    return [problem for check in checks for problem in check(loaded)]
+
+
+def _unknown_names(loaded: LoadedScenario) -> Iterator[Problem]:
+    known = known_names(loaded)
+    for reference in references(loaded.spec):
+        names = known.get(reference.to)
+        if names is None or reference.name in names:
+            continue
+        what = ARTICLES[reference.to]
+        hint = suggestion(reference.name, dict.fromkeys(names)) or f"there is no {what} here"
+        yield loaded.problem(reference.keys, "SC030", f"no {what} is called {quoted(reference.name)}", hint)
+
+
+def _unfit_faults(loaded: LoadedScenario) -> Iterator[Problem]:
+    if loaded.robot.spec is None:
+        return
+    says = {COMMAND: "Command", **{n: READINGS[s.kind] for n, s in loaded.robot.spec.sensors.items()}}
+    for index, entry in enumerate(loaded.spec.faults):
+        kind = says.get(entry.sensor)
+        if kind is None:
+            message = f"robot `{loaded.robot.name}` has no sensor called {quoted(entry.sensor)}"
+            yield loaded.problem(("faults", index, "sensor"), "SC031", message, suggestion(entry.sensor, says))
+        elif kind not in entry.fault.affects:
+            fitting = [name for name, said in says.items() if said in entry.fault.affects]
+            hint = f"it can happen to: {', '.join(fitting)}" if fitting else "this robot has nothing it can happen to"
+            message = f"fault `{entry.kind}` makes no sense on {_article(kind)} (`{entry.sensor}`)"
+            yield loaded.problem(("faults", index, entry.kind), "SC032", message, hint)
+
+
+def _article(reading: str) -> str:
+    kinds = {said: kind for kind, said in READINGS.items()} | {"Command": "velocity command"}
+    return f"an {kinds[reading]}" if kinds[reading][0] in "aeiou" else f"a {kinds[reading]}"
+
+
+def _twice_named(loaded: LoadedScenario) -> Iterator[Problem]:
+    lists: dict[str, list[str | None]] = {
+        "goals": [goal.name for goal in loaded.spec.goals],
+        "events": [event.name for event in loaded.spec.events],
+        "faults": [fault.name for fault in loaded.spec.faults],
+    }
+    for key, names in lists.items():
+        for index, name in enumerate(names):
+            if name is not None and name in names[:index]:
+                first = loaded.place_of(key, names.index(name), "name")
+                message = f"{key[:-1]} {quoted(name)} is there already (first at {first.line}:{first.col})"
+                yield loaded.problem((key, index, "name"), "SC033", message, "give it another name")
+    for index, fault in enumerate(loaded.spec.faults):
+        if fault.name is not None and fault.name in event_names(loaded):
+            message = f"an event is called {quoted(fault.name)}, too: criteria could not tell them apart"
+            yield loaded.problem(("faults", index, "name"), "SC033", message, "give one of them another name")
+
+
+def _uneven_rates(loaded: LoadedScenario) -> Iterator[Problem]:
+    clock = Clock(loaded.spec.physics.tick_rate)
+    own: list[tuple[tuple[Key, ...], float]] = [
+        (("stack", "controller_frequency"), loaded.spec.stack.controller_frequency),
+        (("physics", "truth_rate"), loaded.spec.physics.truth_rate),
+    ]
+    for keys, rate in own:
+        yield from _uneven(loaded, clock, loaded.tree, keys, rate)
+    if isinstance(loaded.robot.spec, RobotSpec) and loaded.robot.tree is not None:
+        for name, sensor in loaded.robot.spec.sensors.items():
+            keys = ("sensors", name, sensor.kind, "rate")
+            yield from _uneven(loaded, clock, loaded.robot.tree, keys, getattr(sensor.chosen, "rate", 1.0))
+
+
+def _uneven(
+    loaded: LoadedScenario, clock: Clock, tree: Fields, keys: tuple[Key, ...], rate: float
+) -> Iterator[Problem]:
+    """A rate that does not divide the ticks, told where it is written, or else where the tick rate is."""
+    try:
+        clock.period(rate)
+    except ValueError as error:
+        tick_rate = ("physics", "tick_rate")
+        if real_keys(loaded.tree, tick_rate) == tick_rate:
+            place = value_place(loaded.tree, tick_rate)
+        else:
+            place = value_place(tree, keys) if real_keys(tree, keys) == keys else key_place(tree, keys)
+        subject = ".".join(str(key) for key in keys)
+        yield loaded.problem_at(place, "SC034", f"{subject}: {error}")
