@@ -1,0 +1,127 @@
+import numpy as np
+import pytest
+
+BOX = "<collision name='c'><geometry><box><size>1 1 1</size></box></geometry></collision>"
+
+
+def link(name, x=0.0, mass=None, rest="", collision=BOX, com="0 0 0 0 0 0"):
+    inertial = f"<inertial><pose>{com}</pose><mass>{mass}</mass></inertial>" if mass is not None else ""
+    return f"<link name='{name}'><pose>{x} 0 0 0 0 0</pose>{inertial}{collision}{rest}</link>"
+
+
+def joint(parent, child, kind="revolute", name="j"):
+    return f"<joint name='{name}' type='{kind}'><parent>{parent}</parent><child>{child}</child></joint>"
+
+
+def model(content, name="cart", rest=""):
+    return f"<model name='{name}'>{rest}{content}</model>"
+
+
+def test_a_free_model_is_a_body_about_its_centre_of_mass(load):
+    world = load(model(link("a", 1, 3, com="0 0 -0.25 0 0 0"), rest="<pose>0 2 1 0 0 0</pose>"))
+    (body,) = world.bodies
+    assert (body.name, body.mass, body.path) == ("cart", 3, None)
+    assert body.pose.position == (1, 2, 0.75)
+    assert body.pose.compose(body.solids[0].pose).position == (1, 2, 1)
+
+
+def test_links_on_a_fixed_joint_are_one_body_with_both_masses(load):
+    (body,) = load(model(link("a", 0, 1) + link("b", 4, 3) + joint("a", "b", "fixed"))).bodies
+    assert body.mass == 4
+    assert body.pose.x == 3
+    assert [solid.pose.x for solid in body.solids] == [-3, 1]
+    assert not load(model(link("a") + link("b", 4) + joint("a", "b", "fixed"))).notes
+
+
+def test_movable_joints_are_held_rigid_with_a_note(load):
+    world = load(model(link("a") + link("b", 4) + joint("a", "b")))
+    assert len(world.bodies) == 1
+    assert world.notes == (
+        "shop.world: world[w]/model[cart]/joint[j]: a joint of type revolute is held rigid as it stands",
+    )
+
+
+def test_links_without_a_joint_are_bodies_of_their_own(load):
+    assert [body.name for body in load(model(link("a") + link("b", 4))).bodies] == ["cart::a", "cart::b"]
+
+
+def test_what_hangs_on_the_world_does_not_move(load):
+    door = link("frame") + link("panel", 1) + joint("world", "frame", "fixed", "f") + joint("frame", "panel")
+    world = load(model(door))
+    assert [solid.name for solid in world.solids] == ["cart::frame::c", "cart::panel::c"]
+    assert not world.bodies
+    assert "held rigid" in world.notes[0]
+
+
+def test_what_hangs_on_something_static_does_not_move(load):
+    nested = f"<model name='post'><static>1</static>{link('p')}</model>"
+    world = load(model(nested + link("a", 3) + joint("post::p", "a")))
+    assert (len(world.solids), len(world.bodies)) == (2, 0)
+
+
+def test_joints_may_name_frames_and_nested_models(load):
+    nested = f"<model name='arm'>{link('tip', 5)}</model><frame name='mount' attached_to='base'/>"
+    (body,) = load(model(link("base") + nested + joint("mount", "arm", "fixed"))).bodies
+    assert body.mass == 2
+
+
+def test_two_copies_of_one_file_are_not_confused(load, tmp_path):
+    (tmp_path / "wheel.sdf").write_text(f"<sdf version='1.9'><model name='wheel'>{link('hub')}</model></sdf>")
+    wheels = "".join(
+        f"<include><uri>wheel.sdf</uri><name>{name}</name><pose>{x} 0 0 0 0 0</pose></include>"
+        for name, x in (("left", 0), ("right", 3))
+    )
+    world = load(model(link("base", 9) + wheels + joint("base", "left::hub", "fixed")))
+    assert [(body.name, body.mass) for body in world.bodies] == [("cart::base", 2), ("cart::right::hub", 1)]
+
+
+def test_a_static_parent_keeps_everything_below_it(load):
+    inner = f"<model name='n'><static>false</static>{link('a')}</model>"
+    world = load(model(inner, rest="<static>TRUE</static>"))
+    assert (len(world.solids), len(world.bodies)) == (1, 0)
+
+
+def test_a_kinematic_link_is_moved_by_nothing_but_the_scenario(load):
+    assert load(model(link("a", rest="<kinematic>1</kinematic>"))).bodies[0].mass == 0
+
+
+def test_a_link_without_collision_adds_its_mass_only(load):
+    (body,) = load(model(link("a", 0, 1) + link("motor", 2, 1, collision="") + joint("a", "motor", "fixed"))).bodies
+    assert (body.mass, body.pose.x, len(body.solids)) == (2, 1, 1)
+
+
+def test_mass_from_density(load):
+    inertial = "<inertial auto='true'><density>500</density></inertial>"
+    (body,) = load(model(f"<link name='a'>{inertial}{BOX.replace('1 1 1', '1 2 3')}</link>")).bodies
+    assert body.mass == pytest.approx(3000)
+    cone = "<collision name='c'><density>1200</density><geometry><cone><radius>0.5</radius><length>2</length></cone></geometry></collision>"
+    (body,) = load(model(f"<link name='a'>{inertial}{cone}</link>")).bodies
+    assert body.mass == pytest.approx(1200 * np.pi * 0.25 * 2 / 3, rel=0.01)
+    assert body.pose.z == pytest.approx(-0.5)
+
+
+@pytest.mark.parametrize("mass", ["0", "-1", "nan", "heavy"])
+def test_a_mass_that_makes_no_sense_is_refused(refuse, mass):
+    (problem,) = refuse(model(link("a", 0, mass)))
+    assert "/inertial/mass: " in problem.message
+
+
+def test_joints_to_nowhere_are_refused(refuse):
+    assert "unknown link or frame 'b'" in refuse(model(link("a") + joint("a", "b")))[0].message
+    assert "<parent> is missing" in refuse(model(link("a") + "<joint name='j'><child>a</child></joint>"))[0].message
+
+
+def test_bodies_with_the_same_name_get_numbers(load):
+    world = load(model(link("a")) + model(link("a"), "Cart"))
+    assert [body.name for body in world.bodies] == ["cart", "Cart_1"]
+    assert "is taken" in world.notes[0]
+
+
+def test_more_than_2000_bodies_are_refused(refuse):
+    text = "".join(model(link("a", k), f"m{k}") for k in range(2001))
+    assert "more than 2000 bodies" in refuse(text)[0].message
+
+
+def test_order_is_that_of_the_document(load):
+    text = model(f"<model name='n'>{link('x')}</model>" + link("a", 3), rest="<static>1</static>") + model(link("z"), "b")
+    assert [solid.name for solid in load(text).solids] == ["cart::n::x::c", "cart::a::c"]

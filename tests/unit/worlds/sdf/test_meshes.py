@@ -1,0 +1,217 @@
+import struct
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from simscen.worlds.sdf.meshfile import UnusableMesh, read_parts
+
+DAE = """<?xml version="1.0"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+ <asset><created>2020-01-01T00:00:00</created><modified>2020-01-01T00:00:00</modified>{unit}<up_axis>{up}</up_axis></asset>
+ <library_geometries>{geometries}</library_geometries>
+ <library_visual_scenes><visual_scene id="s">{nodes}</visual_scene></library_visual_scenes>
+ <scene><instance_visual_scene url="#s"/></scene>
+</COLLADA>"""
+GEOMETRY = """<geometry id="{id}" name="{id}"><mesh>
+ <source id="{id}p"><float_array id="{id}a" count="{count}">{values}</float_array><technique_common>
+  <accessor source="#{id}a" count="{vertices}" stride="3"><param name="X" type="float"/><param name="Y" type="float"/>
+  <param name="Z" type="float"/></accessor></technique_common></source>
+ <vertices id="{id}v"><input semantic="POSITION" source="#{id}p"/></vertices>
+ {primitive}</mesh></geometry>"""
+TRIANGLES = """<triangles count="1"><input semantic="VERTEX" source="#{id}v" offset="0"/><p>0 1 2</p></triangles>"""
+QUAD = """<polylist count="1"><input semantic="VERTEX" source="#{id}v" offset="0"/><vcount>4</vcount><p>0 1 2 3</p></polylist>"""
+NODE = """<node id="{id}n" name="{name}">{transform}<instance_geometry url="#{id}"/>{inner}</node>"""
+
+
+def geometry(name, points=((0, 0, 0), (1, 0, 0), (0, 1, 0)), primitive=TRIANGLES):
+    values = " ".join(str(part) for point in points for part in point)
+    return GEOMETRY.format(
+        id=name, count=3 * len(points), vertices=len(points), values=values, primitive=primitive.format(id=name)
+    )
+
+
+def node(name, geometry_id="g", transform="", inner=""):
+    return NODE.format(id=geometry_id, name=name, transform=transform, inner=inner)
+
+
+def dae(geometries=None, nodes=None, unit='<unit meter="1"/>', up="Z_UP"):
+    return DAE.format(geometries=geometries or geometry("g"), nodes=nodes or node("part"), unit=unit, up=up)
+
+
+def world(uri, rest=""):
+    return (
+        "<model name='m'><static>1</static><link name='a'><collision name='c'><geometry>\n"
+        f"<mesh><uri>{uri}</uri>{rest}</mesh></geometry></collision></link></model>"
+    )
+
+
+@pytest.fixture
+def mesh(load, tmp_path):
+    def _mesh(content, rest="", name="x.dae"):
+        (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
+        return load(world(name, rest)).solids[0].shape
+
+    return _mesh
+
+
+@pytest.fixture
+def broken(refuse, tmp_path):
+    def _broken(content, rest="", name="x.dae"):
+        (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
+        (problem,) = refuse(world(name, rest))
+        assert problem.line == 3
+        return problem
+
+    return _broken
+
+
+def corners(mesh):
+    return mesh.vertices[mesh.faces[0]]
+
+
+class TestCollada:
+    def test_the_unit_scales_and_the_up_axis_does_not_turn(self, mesh):
+        shape = mesh(dae(geometry("g", [(0, 0, 0), (100, 0, 0), (0, 0, 50)]), unit='<unit meter="0.01"/>', up="Y_UP"))
+        np.testing.assert_allclose(corners(shape), [(0, 0, 0), (1, 0, 0), (0, 0, 0.5)], atol=1e-12)
+
+    def test_a_missing_unit_is_a_metre(self, mesh):
+        np.testing.assert_allclose(corners(mesh(dae(unit="")))[1], (1, 0, 0))
+
+    def test_nodes_move_what_they_hold(self, mesh):
+        inner = node("inner", transform="<translate>0 0 3</translate>")
+        outer = f"<node><rotate>0 0 1 90</rotate><translate>5 0 0</translate>{inner}</node>"
+        np.testing.assert_allclose(corners(mesh(dae(nodes=outer)))[1], (0, 6, 3), atol=1e-6)
+
+    def test_polygons_are_cut_into_triangles(self, mesh):
+        shape = mesh(dae(geometry("g", [(0, 0, 0), (2, 0, 0), (2, 1, 0), (0, 1, 0)], QUAD)))
+        a, b, c = (shape.vertices[shape.faces[:, k]] for k in range(3))
+        assert np.cross(b - a, c - a)[:, 2].sum() / 2 == pytest.approx(2)
+
+    def test_the_scale_of_the_world_applies_last(self, mesh):
+        np.testing.assert_allclose(corners(mesh(dae(), "<scale>2 3 4</scale>")), [(0, 0, 0), (2, 0, 0), (0, 3, 0)])
+
+    def test_a_mirrored_mesh_still_faces_outwards(self, mesh):
+        a, b, c = corners(mesh(dae(), "<scale>-1 1 1</scale>"))
+        assert np.cross(b - a, c - a)[2] > 0
+        a, b, c = corners(mesh(dae(nodes=node("part", transform="<scale>1 1 -1</scale>"))))
+        assert np.cross(b - a, c - a)[2] < 0
+
+    def test_a_submesh_is_chosen_by_the_name_of_its_node_and_centred(self, mesh):
+        nodes = node("left") + node("right", "h")
+        both = geometry("g") + geometry("h", [(10, 0, 0), (14, 0, 0), (10, 2, 0)])
+        chosen = mesh(dae(both, nodes), "<submesh><name>right</name></submesh>")
+        assert chosen.vertices[:, 0].min() == 10
+        centred = mesh(dae(both, nodes), "<submesh><name>right</name><center>true</center></submesh>")
+        np.testing.assert_allclose(centred.vertices.min(axis=0), (-2, -1, 0))
+        assert len(mesh(dae(both, nodes)).faces) == 2
+
+    def test_an_unknown_submesh_is_refused_with_those_there_are(self, broken):
+        problem = broken(dae(), "<submesh><name>door</name></submesh>")
+        assert "no submesh 'door' in x.dae" in problem.message
+        assert problem.hint == "it has part"
+
+    def test_a_doctype_is_refused(self, broken):
+        text = dae().replace("<COLLADA", '<!DOCTYPE x [<!ENTITY e SYSTEM "file:///etc/passwd">]>\n<COLLADA', 1)
+        assert "DOCTYPE not allowed" in broken(text).message
+
+    @pytest.mark.parametrize("content", ["", "<COLLADA/>", "not XML", dae()[:900], dae().replace("0 1 2", "0 1 9")])
+    def test_broken_files_are_refused(self, broken, content):
+        assert broken(content).message.startswith("world[w]/model[m]/link[a]/collision[c]/geometry/mesh/uri: x.dae: ")
+
+    def test_nodes_that_unfold_without_end_are_refused(self):
+        levels = "".join(
+            f'<node id="l{k}"><instance_node url="#l{k + 1}"/><instance_node url="#l{k + 1}"/></node>' for k in range(20)
+        )
+        library = f'<library_nodes><node id="l20"/>{levels}</library_nodes><library_visual_scenes>'
+        text = dae(nodes='<node><instance_node url="#l0"/></node>').replace("<library_visual_scenes>", library)
+        with pytest.raises(UnusableMesh):
+            read_parts(text.encode(), ".dae", "x.dae")
+
+
+def stl(count, triangles):
+    body = b"".join(struct.pack("<12fH", 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0) for _ in range(triangles))
+    return b"binary".ljust(80, b"\0") + struct.pack("<I", count) + body
+
+
+class TestStl:
+    def test_binary_files_are_read(self, mesh):
+        shape = mesh(stl(1, 1), name="x.stl")
+        np.testing.assert_allclose(corners(shape), [(0, 0, 0), (1, 0, 0), (0, 1, 0)])
+
+    def test_text_files_are_read(self, mesh):
+        text = "solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 2 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid x\n"
+        np.testing.assert_allclose(sorted(map(tuple, corners(mesh(text, name="x.STL")))), [(0, 0, 0), (0, 1, 0), (2, 0, 0)])
+
+    @pytest.mark.parametrize(("claimed", "held"), [(1000, 2), (1, 2), (4_000_000_000, 1)])
+    def test_a_false_count_is_refused(self, broken, claimed, held):
+        message = f"STL header says {claimed} triangles, file holds {held}"
+        assert message in broken(stl(claimed, held), name="x.stl").message
+
+    def test_an_empty_one_is_refused(self, broken):
+        assert "has no triangles" in broken(stl(0, 0), name="x.stl").message
+        assert "too short" in broken(b"solid", name="x.stl").message
+
+    def test_more_than_half_a_million_triangles_are_refused(self):
+        with pytest.raises(UnusableMesh, match="larger|more than 500000 triangles"):
+            read_parts(stl(500_001, 1)[:84] + bytes(50 * 500_001), ".stl", "x.stl")
+
+    def test_values_that_are_no_numbers_are_refused(self, broken):
+        assert "not a finite number" in broken(stl(1, 1).replace(struct.pack("<f", 1.0), struct.pack("<f", float("nan"))), name="x.stl").message  # fmt: skip
+
+
+OBJ = "mtllib ../../secret.mtl\no left\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\no right\nv 5 0 0\nv 6 0 0\nv 5 1 0\nf 4 5 6\n"
+
+
+class TestObj:
+    def test_all_objects_are_read_and_materials_are_not(self, mesh):
+        shape = mesh(OBJ, name="x.obj")
+        assert len(shape.faces) == 2
+        assert shape.vertices[:, 0].max() == 6
+
+    def test_a_submesh_is_an_object(self, mesh):
+        shape = mesh(OBJ, "<submesh><name>right</name></submesh>", name="x.obj")
+        assert (len(shape.faces), shape.vertices[:, 0].min()) == (1, 5)
+
+    def test_indices_out_of_range_are_refused(self, broken):
+        broken(OBJ.replace("f 1 2 3", "f 1 2 300"), name="x.obj")
+
+
+def test_other_formats_are_refused(broken):
+    assert ".ply meshes are not read, only DAE, STL and OBJ" in broken("ply", name="x.ply").message
+
+
+def test_a_scale_of_zero_is_refused(broken):
+    assert "a scale of zero" in broken(dae(), "\n<scale>1 0 1</scale>".replace("\n", "")).message
+
+
+def test_a_mesh_beyond_10_km_is_refused(broken):
+    assert "reaches farther than" in broken(dae(), "<scale>1e5 1 1</scale>").message
+
+
+def test_a_mesh_file_beyond_20_mib_is_refused_unread(refuse, tmp_path):
+    with (tmp_path / "x.stl").open("wb") as file:
+        file.truncate(200 * 2**20)
+    tracemalloc.start()
+    assert "larger than 20 MiB" in refuse(world("x.stl"))[0].message
+    assert tracemalloc.get_traced_memory()[1] < 2**20
+    tracemalloc.stop()
+
+
+def test_a_folder_as_mesh_is_refused(refuse, tmp_path):
+    (tmp_path / "x.dae").mkdir()
+    assert "not a regular file" in refuse(world("x.dae"))[0].message
+
+
+def test_equal_wishes_share_one_mesh_and_nobody_can_change_it(load, tmp_path):
+    (tmp_path / "x.dae").write_text(dae())
+    solids = load(world("x.dae") + world("x.dae").replace("'m'", "'n'")).solids
+    assert solids[0].shape is solids[1].shape
+    with pytest.raises(ValueError, match="read-only"):
+        solids[0].shape.vertices[0] = 1
+
+
+def test_convex_hulls_are_not_made_and_that_is_said(load, tmp_path):
+    (tmp_path / "x.dae").write_text(dae())
+    (note,) = load(world("x.dae").replace("<mesh>", "<mesh optimization='convex_hull'>")).notes
+    assert "the mesh is used as it is" in note

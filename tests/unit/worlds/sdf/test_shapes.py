@@ -1,0 +1,225 @@
+import math
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from PIL import Image
+
+from simscen.core.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Sphere
+from simscen.worlds.meshing import triangulate
+from simscen.worlds.sdf.polyline import trapezoids
+
+
+def shaped(geometry, pose="", static="<static>1</static>"):
+    return (
+        f"<model name='m'>{static}<link name='a'><collision name='c'>\n{pose}<geometry>{geometry}</geometry>"
+        "</collision></link></model>"
+    )
+
+
+@pytest.mark.parametrize(
+    ("geometry", "shape"),
+    [
+        ("<box><size>1 2 3</size></box>", Box((1, 2, 3))),
+        ("<cylinder><radius>1</radius><length>2</length></cylinder>", Cylinder(1, 2)),
+        ("<sphere><radius>1</radius></sphere>", Sphere(1)),
+        ("<capsule><radius>1</radius><length>2</length></capsule>", Capsule(1, 2)),
+        ("<ellipsoid><radii>1 2 3</radii></ellipsoid>", Ellipsoid((1, 2, 3))),
+        ("<cone><radius>1</radius><length>2</length></cone>", Cone(1, 2)),
+    ],
+)
+def test_primitive_shapes_keep_their_sizes(load, geometry, shape):
+    assert load(shaped(geometry)).solids[0].shape == shape
+
+
+@pytest.mark.parametrize(
+    ("geometry", "message"),
+    [
+        ("<box><size>1 2</size></box>", "box/size: expected 3 numbers, got 2"),
+        ("<box><size>1 -2 3</size></box>", "box/size: must be positive"),
+        ("<box><size>1 nan 3</size></box>", "box/size: must be a finite number"),
+        ("<box/>", "box: <size> is missing"),
+        ("<sphere><radius>0</radius></sphere>", "sphere/radius: must be positive"),
+        ("<sphere><radius>1e5</radius></sphere>", "sphere/radius: larger than 10000 m"),
+        ("<cylinder><radius>1_0</radius><length>1</length></cylinder>", "radius: must be a finite number"),
+        ("", "geometry: holds no shape"),
+        ("<empty/><sphere><radius>1</radius></sphere>", "holds more than one shape: empty, sphere"),
+        ("<image><uri>x.png</uri></image>", "<image> is not a shape that is read"),
+    ],
+)
+def test_sizes_that_make_no_sense_are_errors_at_their_line(refuse, geometry, message):
+    (problem,) = refuse(shaped(geometry))
+    assert problem.line == 3
+    assert message in problem.message
+
+
+def test_a_lenient_load_leaves_only_the_wrong_shape_out(load):
+    text = shaped("<box><size>1 1 1</size></box>") + shaped("<box/>").replace("'m'", "'n'")
+    world = load(text, lenient=True)
+    assert len(world.solids) == 1
+    assert world.notes == (
+        "shop.world: world[w]/model[n]/link[a]/collision[c]/geometry/box: skipped: <size> is missing",
+    )
+
+
+def plane(normal="0 0 1", size="<size>10 20</size>"):
+    return f"<plane><normal>{normal}</normal>{size}</plane>"
+
+
+BOX = shaped("<box><size>1 1 1</size></box>").replace("'m'", "'n'")
+
+
+class TestPlanes:
+    def test_the_ground_is_the_simulators_own(self, load):
+        world = load(shaped(plane()) + BOX)
+        assert [solid.name for solid in world.solids] == ["n::a::c"]
+        assert not world.notes
+
+    def test_a_level_plane_elsewhere_becomes_a_slab_below_it_with_a_note(self, load):
+        (slab,) = load(shaped(plane(), "<pose>1 0 0.5 0 0 0</pose>")).solids
+        assert isinstance(slab.shape, Box)
+        assert slab.shape.size[:2] == (10, 20)
+        assert slab.pose.z + slab.shape.size[2] / 2 == pytest.approx(0.5)
+        (note,) = load(shaped(plane(), "<pose>1 0 0.5 0 0 0</pose>")).notes
+        assert "level plane at z = 0.5 m" in note
+
+    @pytest.mark.parametrize("normal", ["1 0 0", "0 -1 0", "0 0 -1", "1 2 3", "-1 0 -0.2"])
+    def test_other_planes_face_along_their_normal(self, load, normal):
+        (slab,) = load(shaped(plane(normal), "<pose>0 0 3 0 0 0</pose>")).solids
+        expected = np.array([float(word) for word in normal.split()])
+        expected /= np.linalg.norm(expected)
+        np.testing.assert_allclose(slab.pose.rotation()[:, 2], expected, atol=1e-9)
+        face = slab.pose.apply(np.array([[0, 0, slab.shape.size[2] / 2]]))[0]
+        np.testing.assert_allclose(face, [0, 0, 3], atol=1e-12)
+
+    def test_a_floor_turned_upright_is_a_wall(self, load):
+        assert len(load(shaped(plane(), f"<pose>0 0 0 {math.pi / 2} 0 0</pose>")).solids) == 1
+
+    def test_a_normal_without_length_is_refused(self, refuse):
+        assert "the normal has no length" in refuse(shaped(plane("0 0 0")))[0].message
+
+
+def outline(points, height=2.0):
+    return f"<polyline>{''.join(f'<point>{x} {y}</point>' for x, y in points)}<height>{height}</height></polyline>"
+
+
+SQUARE = [(0, 0), (4, 0), (4, 4), (0, 4)]
+HOLE = [(1, 1), (1, 2), (2, 2), (2, 1)]
+
+
+def area(solids):
+    return shapely.unary_union([shapely.Polygon(solid.shape.polygon) for solid in solids])
+
+
+class TestPolylines:
+    def test_one_outline_is_one_solid_whichever_way_it_runs(self, load):
+        for points in (SQUARE, SQUARE[::-1], [*SQUARE, SQUARE[0]]):
+            (solid,) = load(shaped(outline(points))).solids
+            assert isinstance(solid.shape, Extrusion)
+            polygon = shapely.Polygon(solid.shape.polygon)
+            assert polygon.exterior.is_ccw
+            assert polygon.equals(shapely.Polygon(SQUARE))
+            assert solid.shape.height == 2
+
+    def test_an_outline_inside_another_is_a_hole(self, load):
+        solids = load(shaped(outline(SQUARE) + outline(HOLE))).solids
+        assert area(solids).symmetric_difference(shapely.Polygon(SQUARE, [HOLE])).area < 1e-9
+
+    def test_outlines_side_by_side_are_all_filled(self, load):
+        far = [(x + 10, y) for x, y in HOLE]
+        assert area(load(shaped(outline(SQUARE) + outline(far))).solids).area == pytest.approx(17)
+
+    def test_an_outline_that_crosses_itself_is_filled_on_both_sides(self, load):
+        solids = load(shaped(outline([(0, 0), (2, 2), (2, 0), (0, 2)]))).solids
+        assert area(solids).area == pytest.approx(2)
+
+    @pytest.mark.parametrize(
+        ("polylines", "message"),
+        [
+            (outline(SQUARE[:2]), "fewer than three points"),
+            (outline([(0, 0)] * 4), "fewer than three points"),
+            (outline([]), "fewer than three points"),
+            (outline(SQUARE, -1), "must be positive"),
+            (outline(SQUARE) + outline(HOLE, 1), "different heights"),
+            (outline([(k, k * k % 7) for k in range(1200)]), "more than 1000 points"),
+        ],
+    )
+    def test_degenerate_outlines_are_refused(self, refuse, polylines, message):
+        assert message in refuse(shaped(polylines))[0].message
+
+    coordinates = st.tuples(st.integers(-8, 8), st.integers(-8, 8))
+
+    @settings(max_examples=60, deadline=None)
+    @given(st.lists(st.lists(coordinates, min_size=3, max_size=6, unique=True), min_size=1, max_size=3))
+    def test_trapezoids_cover_the_odd_area_of_any_outlines_once(self, outlines):
+        expected = shapely.Polygon()
+        for points in outlines:
+            for triangle in _even_odd(points):
+                expected = expected.symmetric_difference(triangle)
+        pieces = [shapely.Polygon(piece) for piece in trapezoids([np.array(o, float) for o in outlines])]
+        assert shapely.unary_union(pieces).symmetric_difference(expected).area < 1e-6
+        assert sum(piece.area for piece in pieces) == pytest.approx(expected.area, abs=1e-6)
+        assert all(piece.exterior.is_ccw for piece in pieces)
+
+
+def _even_odd(points):
+    """The triangles of a fan: their symmetric difference is what a polygon fills by the even-odd rule."""
+    return [
+        shapely.Polygon([points[0], b, c])
+        for b, c in zip(points[1:-1], points[2:], strict=True)
+        if abs((b[0] - points[0][0]) * (c[1] - points[0][1]) - (b[1] - points[0][1]) * (c[0] - points[0][0])) > 0
+    ]
+
+
+def heightmap(rest="<size>10 20 3</size>"):
+    return f"<heightmap><uri>h.png</uri>{rest}</heightmap>"
+
+
+class TestHeightmaps:
+    def save(self, folder, pixels, mode="L"):
+        Image.fromarray(np.array(pixels, np.uint8 if mode == "L" else np.uint16)).save(folder / "h.png")
+
+    def test_the_brightest_pixel_is_the_full_height_and_the_first_row_lies_north(self, load, tmp_path):
+        self.save(tmp_path, [[0, 50], [0, 0], [100, 0]])
+        (solid,) = load(shaped(heightmap())).solids
+        assert isinstance(solid.shape, Mesh)
+        points = {(x, y): z for x, y, z in solid.shape.vertices.tolist()}
+        assert points == {(-5, 10): 0, (5, 10): 1.5, (-5, 0): 0, (5, 0): 0, (-5, -10): 3, (5, -10): 0}
+
+    def test_it_faces_up_everywhere_and_covers_its_size(self, load, tmp_path):
+        self.save(tmp_path, np.random.default_rng(0).integers(0, 255, (5, 5)))
+        mesh = triangulate(load(shaped(heightmap())).solids[0].shape)
+        a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+        upward = np.cross(b - a, c - a)[:, 2] / 2
+        assert (upward > 0).all()
+        assert upward.sum() == pytest.approx(200)
+
+    def test_sixteen_bits_are_read(self, load, tmp_path):
+        self.save(tmp_path, [[0, 65535], [32768, 0]], "I;16")
+        mesh = load(shaped(heightmap())).solids[0].shape
+        assert sorted(mesh.vertices[:, 2]) == pytest.approx([0, 0, 1.5, 3], abs=1e-3)
+
+    def test_pos_moves_it(self, load, tmp_path):
+        self.save(tmp_path, [[0, 0], [0, 0]])
+        (solid,) = load(shaped(heightmap("<size>1 1 1</size><pos>1 2 3</pos>"))).solids
+        assert solid.pose.position == (1, 2, 3)
+
+    def test_one_beyond_513_pixels_is_refused_before_it_is_decoded(self, refuse, tmp_path):
+        Image.new("L", (3000, 3000)).save(tmp_path / "h.png")
+        assert "3000 x 3000 pixels; 2 to 513" in refuse(shaped(heightmap()))[0].message
+
+    def test_a_bomb_is_refused(self, refuse, tmp_path):
+        Image.new("1", (14_000, 14_000)).save(tmp_path / "h.png")
+        assert "image too large" in refuse(shaped(heightmap()))[0].message
+
+    def test_no_image_is_refused(self, refuse, tmp_path):
+        (tmp_path / "h.png").write_bytes(b"GeoTIFF")
+        assert "not a readable image" in refuse(shaped(heightmap()))[0].message
+
+
+def test_masked_collisions_are_noted(load):
+    mask = "<surface><contact><collide_bitmask>0x00</collide_bitmask></contact></surface>"
+    world = load(shaped("<box><size>1 1 1</size></box>").replace("</collision>", f"{mask}</collision>"))
+    assert "collides with it all the same" in world.notes[0]

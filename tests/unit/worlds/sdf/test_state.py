@@ -1,0 +1,75 @@
+import pytest
+
+BOX = "<collision name='c'><geometry><box><size>1 1 1</size></box></geometry></collision>"
+
+
+def model(name="m", content=f"<link name='a'>{BOX}</link>", rest="<static>1</static>"):
+    return f"<model name='{name}'>{rest}<pose>1 0 0 0 0 0</pose>{content}</model>"
+
+
+def state(content):
+    return f"<state world_name='w'><sim_time>1 0</sim_time>{content}</state>"
+
+
+def xs(world):
+    return [round(solid.pose.x, 9) for solid in world.solids]
+
+
+def test_a_saved_model_pose_replaces_its_own(load):
+    assert xs(load(model() + state("<model name='m'><pose>7 0 0 0 0 0</pose></model>"))) == [7]
+
+
+def test_a_saved_link_pose_is_a_world_pose(load):
+    saved = "<model name='m'><pose>7 0 0 0 0 0</pose><link name='a'><pose>9 0 0 0 0 0</pose></link></model>"
+    assert xs(load(model() + state(saved))) == [9]
+
+
+def test_nested_models_are_saved_in_the_world_frame_too(load):
+    nested = model("n", f"<link name='a'>{BOX}</link><link name='b'>{BOX}</link>")
+    saved = "<model name='m'><pose>7 0 0 0 0 0</pose><model name='n'><pose>3 0 0 0 0 0</pose><link name='b'><pose>4 0 0 0 0 0</pose></link></model></model>"
+    assert xs(load(model("m", nested) + state(saved))) == [3, 4]
+    assert xs(load(model("m", nested) + state("<model name='m'><pose>7 0 0 0 0 0</pose></model>"))) == [8, 8]
+
+
+def test_older_worlds_name_links_of_nested_models_with_colons(load):
+    saved = "<model name='m'><link name='n::a'><pose>5 0 0 0 0 0</pose></link></model>"
+    assert xs(load(model("m", model("n")) + state(saved))) == [5]
+
+
+def test_included_models_are_moved_by_their_name(load, tmp_path):
+    (tmp_path / "crate.sdf").write_text(f"<sdf version='1.6'>{model('crate')}</sdf>")
+    include = "<include><uri>crate.sdf</uri><name>left</name></include>"
+    assert xs(load(include + state("<model name='left'><pose>6 0 0 0 0 0</pose></model>"))) == [6]
+
+
+def test_insertions_and_deletions_are_applied(load):
+    changes = f"<insertions>{model('new')}</insertions><deletions><name>m</name></deletions>"
+    world = load(model() + state(changes + "<model name='new'><pose>2 0 0 0 0 0</pose></model>"))
+    assert [(solid.name, solid.pose.x) for solid in world.solids] == [("new::a::c", 2)]
+
+
+def test_free_models_start_where_they_were_saved(load):
+    world = load(model(rest="") + state("<model name='m'><pose>7 0 0 0 0 0</pose></model>"))
+    assert world.bodies[0].pose.x == 7
+
+
+def test_states_of_unknown_models_do_no_harm(load):
+    assert xs(load(model() + state("<model name='gone'><pose>7 0 0 0 0 0</pose></model>"))) == [1]
+
+
+def test_only_the_first_state_counts(load):
+    text = "".join(state(f"<model name='m'><pose>{x} 0 0 0 0 0</pose></model>") for x in (2, 3))
+    world = load(model() + text)
+    assert xs(world) == [2]
+    assert "only the first <state>" in world.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("saved", "message"),
+    [
+        ("<model name='m'><scale>2 1 1</scale></model>", "a model scaled by 2 1 1 is not supported"),
+        ("<model name='m'><pose>x</pose></model>", "expected 6 numbers"),
+    ],
+)
+def test_what_cannot_be_applied_is_an_error(refuse, saved, message):
+    assert message in refuse(model() + state(saved))[0].message
