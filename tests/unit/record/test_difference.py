@@ -1,0 +1,71 @@
+"""Where two runs that should be equal part is told by tick and field."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from moments import CLOCK, moments
+
+from simscen.core.events import Event
+from simscen.core.trace import Samples, Trace
+from simscen.record.difference import first_difference
+from simscen.record.trace import TraceBuilder
+
+
+@pytest.fixture
+def trace() -> Trace:
+    builder = TraceBuilder(CLOCK)
+    for moment in moments(1.0):
+        builder.append(moment)
+    return builder.finish(240)
+
+
+def changed(samples: Samples, row: int, column: int, by: float) -> Samples:
+    values = samples.values.copy()
+    values[row, column] += by
+    return Samples(samples.ticks, values)
+
+
+def test_a_trace_does_not_differ_from_itself(trace: Trace) -> None:
+    assert first_difference(trace, trace) is None
+
+
+def test_one_bit_is_found_with_its_tick_and_field(trace: Trace) -> None:
+    values = trace.truth.values.copy()
+    values[4, 1] = np.nextafter(values[4, 1], 9)
+    other = dataclasses.replace(trace, truth=Samples(trace.truth.ticks, values))
+    was, now = float(trace.truth.values[4, 1]), float(values[4, 1])
+    assert first_difference(trace, other) == f"tick 24 (t = 0.100 s): truth.y: {was!r} against {now!r}"
+
+
+def test_the_earliest_difference_is_told(trace: Trace) -> None:
+    other = dataclasses.replace(
+        trace, truth=changed(trace.truth, 9, 0, 1.0), odometry=changed(trace.odometry, 3, 2, 1.0)
+    )
+    assert (first_difference(trace, other) or "").startswith("tick 18 (t = 0.075 s): odometry.yaw: ")
+
+
+def test_at_the_same_tick_the_cause_is_told(trace: Trace) -> None:
+    other = dataclasses.replace(trace, truth=changed(trace.truth, 4, 2, 1.0), belief=changed(trace.belief, 1, 0, 1.0))
+    assert "truth.yaw" in (first_difference(trace, other) or "")
+
+
+def test_nan_does_not_differ_from_nan(trace: Trace) -> None:
+    blind = dataclasses.replace(trace, odometry=changed(trace.odometry, 2, 0, float("nan")))
+    assert first_difference(blind, blind) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "expected"),
+    [
+        ("scans", np.array([0, 24, 72]), "tick 48 (t = 0.200 s): scan: at tick 48 against 72"),
+        ("events", (), "tick 0 (t = 0.000 s): event: 2 against 0"),
+        ("events", (Event(0, "a", "b"),) * 2, "tick 0 (t = 0.000 s): event: goal.accepted shelf against a b"),
+        ("plans", (), "tick 0 (t = 0.000 s): plan: 2 against 0"),
+        ("objects", {}, "tick 0 (t = 0.000 s): object a box: 2 against 0"),
+        ("end", 200, "tick 200 (t = 0.833 s): end of the run: tick 240 against 200"),
+        ("tick_rate", 120, "tick rate: 240 against 120 Hz"),
+    ],
+)
+def test_what_is_missing_or_else_is_told(trace: Trace, name: str, value: object, expected: str) -> None:
+    assert first_difference(trace, dataclasses.replace(trace, **{name: value})) == expected
