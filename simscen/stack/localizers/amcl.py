@@ -12,7 +12,7 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.sensing import Imu, Odometry, Scan
 from simscen.model.stack import Amcl
 from simscen.stack.localizers.beams import select_beams
-from simscen.stack.localizers.clusters import summarise
+from simscen.stack.localizers.clusters import spread, summarise
 from simscen.stack.localizers.kld import KldBound
 from simscen.stack.localizers.likelihood_field import SensorModel
 from simscen.stack.localizers.motion_models import MotionModel
@@ -120,32 +120,39 @@ class AmclLocalizer:
         if delta is not None:
             poses = self._motion.sample(poses, delta, self._chance)
         self._moved_to = odometry
-        informed = self._weigh(Particles(poses, self._particles.weights), scan)
-        self._correction = _Correction(*summarise(self._particles), odometry, scan.tick)
-        self._belief = None
-        if informed:
+        self._particles = Particles(poses, self._particles.weights)
+        if self._weigh(scan):
+            self._correction = _Correction(*summarise(self._particles), odometry, scan.tick)
             self._resample()
+        else:
+            carried = self._correction.map_from_odom.compose(odometry)
+            self._correction = _Correction(carried, spread(self._particles, carried), odometry, self._correction.tick)
+        self._belief = None
 
     def _moved_enough(self, delta: Pose2) -> bool:
         return bool(np.hypot(delta.x, delta.y) > self._spec.update_min_d or abs(delta.yaw) > self._spec.update_min_a)
 
-    def _weigh(self, particles: Particles, scan: Scan) -> bool:
+    def _weigh(self, scan: Scan) -> bool:
         """Weigh the particles by a scan; False when it says nothing about where the robot is.
 
         A scan that no particle can explain leaves them equally likely, as in nav2_amcl, and counts as likelihood zero
         for the recovery.
         """
-        spec = self._spec
+        spec, (poses, weights) = self._spec, (self._particles.poses, self._particles.weights)
         beams = select_beams(scan, spec.max_beams, spec.laser_min_range, spec.laser_max_range)
-        converged = spec.do_beamskip and particles.within(CONVERGED_WITHIN)
-        logarithm = self._sensor.log_likelihood(particles.poses, beams, converged)
-        best, self._particles = logarithm.max(), particles
-        if best == logarithm.min() and np.isfinite(best):
+        converged = spec.do_beamskip and self._particles.within(CONVERGED_WITHIN)
+        logarithm = self._sensor.log_likelihood(poses, beams, converged)
+        best = logarithm.max()
+        if best == -np.inf:
+            self._recovery.observe(0.0)
+            self._particles = Particles.equal(poses)
+            return True
+        if best == logarithm.min():
             return False
-        weights = particles.weights * np.exp(logarithm - best) if np.isfinite(best) else np.zeros(len(logarithm))
+        weights = weights * np.exp(logarithm - best)
         total = weights.sum()
-        self._recovery.observe(float(np.exp(best) * total) if np.isfinite(best) else 0.0)
-        self._particles = Particles(particles.poses, weights / total) if total > 0 else Particles.equal(particles.poses)
+        self._recovery.observe(float(np.exp(best) * total))
+        self._particles = Particles(poses, weights / total)
         return True
 
     def _resample(self) -> None:

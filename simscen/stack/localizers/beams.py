@@ -40,6 +40,6 @@ def select_beams(scan: Scan, count: int, least: float, most: float) -> Beams:
     answered = ~np.isnan(ranges)
     with np.errstate(invalid="ignore"):
         usable = (ranges > range_min) & (ranges < range_max)
-    ranges = np.where(usable, ranges, np.float64(range_max))
-    bearings = scan.mount.yaw + scan.angle_min + scan.angle_increment * step * np.arange(len(ranges))
+    ranges = np.where(usable, ranges, range_max)
+    bearings = scan.mount.yaw + scan.angles()[::step]
     return Beams(ranges[answered], bearings[answered], (scan.mount.x, scan.mount.y), range_max)

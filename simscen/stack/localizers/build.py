@@ -8,6 +8,8 @@ from simscen.core.grid import OccupancyGrid
 from simscen.model import stack as model
 from simscen.stack.localizers.amcl import AmclLocalizer
 from simscen.stack.localizers.beam_model import BeamModel, opaque_field
+from simscen.stack.localizers.dead_reckoning import DeadReckoning
+from simscen.stack.localizers.ground_truth import GroundTruthLocalizer
 from simscen.stack.localizers.likelihood_field import (
     BeamSkipping,
     LikelihoodField,
@@ -17,8 +19,6 @@ from simscen.stack.localizers.likelihood_field import (
 )
 from simscen.stack.localizers.motion_models import Differential, MotionModel, Omni
 from simscen.stack.localizers.particles import FreeSpace
-from simscen.stack.localizers.dead_reckoning import DeadReckoning
-from simscen.stack.localizers.ground_truth import GroundTruthLocalizer
 from simscen.stack.protocols import Localizer, Surroundings
 
 

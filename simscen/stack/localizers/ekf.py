@@ -12,8 +12,8 @@ from simscen.core.belief import Belief, Estimate
 from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.sensing import Imu, Odometry, Scan
 from simscen.model.stack import Ekf
-from simscen.stack.localizers.odometry_track import believable
 from simscen.stack.localizers.dead_reckoning import start_of
+from simscen.stack.localizers.odometry_track import believable
 
 X, Y, YAW, RATE, BIAS = range(5)
 # Before it is measured a turn rate may be anything: no robot turns at 100 rad/s.

@@ -28,8 +28,19 @@ class SensorModel(Protocol):
 
 
 def obstacle_field(grid: OccupancyGrid, max_distance: float) -> DistanceField:
-    """Distances to occupied cells; off the map counts as far from everything, as in nav2_amcl."""
-    return DistanceField(grid, grid.cells == OCCUPIED, max_distance, max_distance)
+    """Distances to the surfaces of what is occupied; off the map counts as far from everything, as in nav2_amcl.
+
+    A beam cannot end inside a solid. Nav2's maps come from SLAM, which draws surfaces only; a map that was rasterised
+    from a model is filled, and if the inside counted as near, particles would be drawn into what they look at.
+    """
+    return DistanceField(grid, surfaces(grid.cells == OCCUPIED), max_distance, max_distance)
+
+
+def surfaces(solid: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Solid cells (height, width) with a neighbour that is not; what is off the map does not count as one."""
+    padded = np.pad(solid, 1, constant_values=True)
+    inside = padded[:-2, 1:-1] & padded[2:, 1:-1] & padded[1:-1, :-2] & padded[1:-1, 2:]
+    return solid & ~inside
 
 
 class LikelihoodField:

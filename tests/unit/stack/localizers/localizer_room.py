@@ -5,6 +5,7 @@ The truth and the perfect scans of a drive are computed once; every seed only dr
 
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from simscen.stack.localizers.build import build_localizer
 from simscen.stack.protocols import Localizer, RobotModel, Surroundings
 
 TICK_RATE, ODOMETRY_PERIOD, SCAN_PERIOD = 240, 6, 24
+EACH = SCAN_PERIOD // ODOMETRY_PERIOD
 RANGE_MAX, BEAMS = 12.0, 360
 # Boxes as (left, bottom, right, top) in m: four walls of different depth, then furniture.
 BOXES = np.array([
@@ -32,10 +34,11 @@ ROBOT = RobotModel(((0.2, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.2, -0.2)), 0.2, 0.
 
 @cache
 def grid(resolution: float = 0.05) -> OccupancyGrid:
-    """The map of the room: a cell is occupied when its centre is."""
+    """The map of the room: a cell is occupied when anything solid is in it, as in a map from SLAM."""
     x = np.arange(-5.2 + resolution / 2, 5.2, resolution)
     y = np.arange(-4.2 + resolution / 2, 4.2, resolution)[:, None]
-    solid = sum((x > b[0]) & (x < b[2]) & (y > b[1]) & (y < b[3]) for b in BOXES)
+    half = resolution / 2
+    solid = sum((x + half > b[0]) & (x - half < b[2]) & (y + half > b[1]) & (y - half < b[3]) for b in BOXES)
     cells = np.where(np.asarray(solid) > 0, OCCUPIED, FREE).astype(np.int8)
     return OccupancyGrid(cells, resolution, Pose2(-5.2, -4.2, 0.0))
 
@@ -55,16 +58,31 @@ def cast(poses: Array, angles: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """`truth` (k, 3) at 40 Hz, the first row at tick 0; `ranges` (k // 4, 360) perfect scans at 10 Hz."""
+    """`truth` (k, 3) at 40 Hz, the first row at tick 0; `steps` (k, 3) that the wheels make to get to each row;
+    `ranges` (k / 4, 360) perfect scans at 10 Hz.
+    """
 
     truth: Array
+    steps: Array
     ranges: Array
 
 
 def record(truth: Array) -> Drive:
-    """A drive along these poses, with its scans."""
+    """A drive along these poses."""
+    poses = [Pose2(*row) for row in truth]
+    steps = np.array([Pose2(0, 0, 0), *(a.between(b) for a, b in pairwise(poses))])
     angles = -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS)
-    return Drive(truth, cast(truth[:: SCAN_PERIOD // ODOMETRY_PERIOD], angles))
+    return Drive(truth, steps, cast(truth[::EACH], angles))
+
+
+def kidnapped(before: Drive, after: Drive) -> Drive:
+    """The robot is carried from the end of one drive to the start of the next; its wheels do not notice."""
+    count = len(before.truth) // EACH * EACH
+    return Drive(
+        np.concatenate((before.truth[:count], after.truth)),
+        np.concatenate((before.steps[:count], after.steps)),
+        np.concatenate((before.ranges[: count // EACH], after.ranges)),
+    )
 
 
 @cache
@@ -105,18 +123,19 @@ class Noise:
     gyro_bias: float = 0.0005
 
 
-def run(subject: Localizer, drive: Drive, seed: int, noise: Noise = Noise(), *, imu: bool = False) -> list[Belief]:  # noqa: B008 frozen
+def run(subject: Localizer, drive: Drive, seed: int, noise: Noise = Noise(), *, imu: bool = False) -> list[Belief]:
     """The beliefs (k) of a localizer, one for each row of the truth."""
     chance, beliefs = np.random.default_rng((seed, 2)), []
     ranges = drive.ranges + chance.normal(0, noise.lidar, drive.ranges.shape)
     ranges = np.where(ranges < RANGE_MAX, np.round(ranges, 3), np.inf)
-    steps = _steps(drive.truth)
     odometry, bias = Pose2(0, 0, 0), chance.normal(0, noise.gyro_bias)
-    for row, step in enumerate(steps):
+    for row, step in enumerate(drive.steps):
         tick, way = row * ODOMETRY_PERIOD, float(np.hypot(step[0], step[1]))
         heading = np.sqrt(noise.rotation**2 * abs(step[2]) + noise.drift**2 * way)
         stretched = 1 + chance.normal() * noise.translation * np.sqrt(way) / max(way, 1e-9)
-        odometry = odometry.compose(Pose2(step[0] * stretched, step[1] * stretched, step[2] + chance.normal() * heading))
+        odometry = odometry.compose(
+            Pose2(step[0] * stretched, step[1] * stretched, step[2] + chance.normal() * heading)
+        )
         if imu and row:
             rate = step[2] * TICK_RATE / ODOMETRY_PERIOD + bias + chance.normal() * noise.gyro
             subject.on_imu(Imu("imu", tick, (0.0, 0.0, rate), (0.0, 0.0, 9.81)))
@@ -143,9 +162,3 @@ def errors(beliefs: list[Belief], truth: Array) -> Array:
 def nees(belief: Belief, error: Array) -> float:
     """Normalised estimation error squared of one belief (Bar-Shalom et al. 2001, section 5.4)."""
     return float(error @ np.linalg.solve(belief.covariance, error))
-
-
-def _steps(truth: Array) -> Array:
-    """Motions (k, 3) in the base frame that lead to each row of the truth; none to the first."""
-    poses = [Pose2(*row) for row in truth]
-    return np.array([Pose2(0, 0, 0), *(a.between(b) for a, b in zip(poses, poses[1:], strict=False))])
