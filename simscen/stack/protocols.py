@@ -103,7 +103,7 @@ class CostmapView:
     `costs` (height, width) uint8 with nav2_costmap_2d's values (0 free, 253 inscribed, 254 lethal, 255 unknown);
     row 0 is the lowest y, `origin` is the corner of cell (0, 0), without rotation. `distance` (height, width) float32
     is the distance in metres from each cell's centre to the nearest lethal cell's centre. `revision` grows with each
-    change.
+    change. The arrays may be windows on a costmap that goes on living: they hold until its next update.
     """
 
     costs: npt.NDArray[np.uint8]
@@ -136,6 +136,10 @@ class Controller(Protocol):
 
     def set_path(self, path: Path) -> None:
         """Follow this path from now on."""
+        ...
+
+    def set_speed_limit(self, limit: float | None) -> None:
+        """Drive no faster than this in m/s from now on; None lifts the limit (a speed zone was left)."""
         ...
 
     def command(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> Twist:

@@ -1,0 +1,1 @@
+"""What a robot does when it is stuck (nav2_behaviors)."""

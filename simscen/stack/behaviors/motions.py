@@ -1,0 +1,109 @@
+"""Recovery behaviours that move the robot or let it wait (nav2_behaviors)."""
+
+import math
+from collections.abc import Callable
+
+from simscen.core.geometry import Pose2, wrap
+from simscen.core.motion import STOP, Twist
+from simscen.core.navigation import ErrorCode
+from simscen.model.stack import Recovery as RecoverySpec
+from simscen.stack.footprint import Footprint
+from simscen.stack.lookahead import time_free
+from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
+
+TIME_ALLOWANCE = 10.0
+"""Nav2's default for every behaviour, in seconds."""
+MIN_ROTATIONAL_VEL = 0.4
+"""nav2_behaviors: min_rotational_vel in rad/s."""
+
+
+class Spin:
+    """Turn in place by `spin_dist`, to see what is around."""
+
+    name = "spin"
+
+    def __init__(self, spec: RecoverySpec, robot: RobotModel, footprint: Footprint) -> None:
+        self._spec, self._robot, self._footprint = spec, robot, footprint
+        self._turned, self._yaw = 0.0, 0.0
+
+    def start(self, pose: Pose2) -> None:
+        """Begin from this pose."""
+        self._turned, self._yaw = 0.0, pose.yaw
+
+    def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:
+        """Turn on; None when turned far enough. Raises SPIN_COLLISION_AHEAD, SPIN_TIMEOUT."""
+        self._turned += wrap(pose.yaw - self._yaw)
+        self._yaw = pose.yaw
+        left = abs(self._spec.spin_dist) - math.copysign(1.0, self._spec.spin_dist) * self._turned
+        if left <= 0.01 or self._robot.turning_radius > 0.0:
+            return None
+        if seconds > TIME_ALLOWANCE:
+            raise NavigationFailure(ErrorCode.SPIN_TIMEOUT, "spinning took too long")
+        stopping = math.sqrt(2.0 * self._robot.angular_acceleration * left)
+        fastest = min(self._spec.max_rotational_vel, self._robot.max_angular)
+        command = Twist(0.0, 0.0, math.copysign(min(max(stopping, MIN_ROTATIONAL_VEL), fastest), self._spec.spin_dist))
+        horizon = min(self._spec.simulate_ahead_time, left / abs(command.wz))
+        if time_free(self._footprint, costmap, pose, command, horizon) < horizon:
+            raise NavigationFailure(ErrorCode.SPIN_COLLISION_AHEAD, "no room to spin")
+        return command
+
+
+class BackUp:
+    """Drive straight back by `backup_dist`."""
+
+    name = "backup"
+
+    def __init__(self, spec: RecoverySpec, robot: RobotModel, footprint: Footprint) -> None:
+        self._spec, self._robot, self._footprint = spec, robot, footprint
+        self._from = Pose2(0.0, 0.0)
+
+    def start(self, pose: Pose2) -> None:
+        """Begin from this pose."""
+        self._from = pose
+
+    def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:
+        """Back on; None when far enough. Raises BACKUP_COLLISION_AHEAD."""
+        left = self._spec.backup_dist - self._from.distance(pose)
+        speed = min(self._spec.backup_speed, self._robot.max_reverse)
+        if left <= 0.0:
+            return None
+        if seconds > TIME_ALLOWANCE or speed <= 0.0:
+            raise NavigationFailure(ErrorCode.BACKUP_COLLISION_AHEAD, "backing up did not move the robot")
+        command = Twist(-speed, 0.0, 0.0)
+        horizon = min(self._spec.simulate_ahead_time, left / speed)
+        if time_free(self._footprint, costmap, pose, command, horizon) < horizon:
+            raise NavigationFailure(ErrorCode.BACKUP_COLLISION_AHEAD, "no room behind")
+        return command
+
+
+class Wait:
+    """Stand still for `wait_duration`: what is in the way may go by itself."""
+
+    name = "wait"
+
+    def __init__(self, spec: RecoverySpec) -> None:
+        self._duration = spec.wait_duration
+
+    def start(self, pose: Pose2) -> None:
+        """Begin."""
+
+    def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:
+        """Stand; None when the time is over."""
+        return STOP if seconds < self._duration else None
+
+
+class ClearCostmap:
+    """Forget live obstacles that are not seen any more."""
+
+    name = "clear_costmap"
+
+    def __init__(self, clear: Callable[[], None]) -> None:
+        self._clear = clear
+
+    def start(self, pose: Pose2) -> None:
+        """Clear."""
+        self._clear()
+
+    def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:
+        """Done at once."""
+        return None

@@ -1,0 +1,93 @@
+"""The last word before the base: nav2_collision_monitor on the raw scan, knowing nothing of map or costmap."""
+
+import math
+
+import numpy as np
+
+from simscen.core.geometry import Array, Pose2
+from simscen.core.motion import STOP, Twist
+from simscen.core.sensing import Scan
+from simscen.model.stack import CollisionMonitor as MonitorSpec
+from simscen.stack.arcs import poses_along
+from simscen.stack.protocols import RobotModel
+
+STEPS = 8
+"""Moments within the prediction at which the hull is compared with the scan."""
+
+
+class CollisionMonitor:
+    """Stops when a lidar is silent; slows down (APPROACH) or stops (STOP) before what the newest scan shows."""
+
+    def __init__(self, spec: MonitorSpec, robot: RobotModel, lidars: tuple[str, ...], tick_rate: int) -> None:
+        self._spec, self._robot = spec, robot
+        self._timeout = round(spec.source_timeout * tick_rate)
+        self._seen = dict.fromkeys(lidars, 0)
+        self._points: dict[str, Array] = {}
+        self._nearest: dict[str, float] = {}
+        self._odometry: dict[str, Pose2] = {}
+        corners = np.array(robot.footprint, dtype=np.float64)
+        ends = np.roll(corners, -1, axis=0)
+        normal = np.column_stack((ends[:, 1] - corners[:, 1], corners[:, 0] - ends[:, 0]))
+        self._normal = normal / np.hypot(normal[:, 0], normal[:, 1])[:, None]
+        self._offset = np.sum(self._normal * corners, axis=1)
+
+    def start(self, tick: int) -> None:
+        """Sources count as heard now."""
+        self._seen = dict.fromkeys(self._seen, tick)
+
+    def on_scan(self, scan: Scan, odometry: Pose2) -> None:
+        """A scan, and where odometry was when it came; one in which no beam answers is silence."""
+        if np.isnan(scan.ranges).all():
+            return
+        points = scan.points()
+        self._seen[scan.sensor] = scan.tick
+        self._points[scan.sensor], self._odometry[scan.sensor] = points, odometry
+        self._nearest[scan.sensor] = float(np.hypot(points[:, 0], points[:, 1]).min()) if len(points) else math.inf
+
+    def silent(self, tick: int) -> bool:
+        """Whether a lidar has not been heard for `source_timeout`."""
+        return self._spec.enabled and any(tick - seen > self._timeout for seen in self._seen.values())
+
+    def allow(self, wanted: Twist, odometry: Pose2) -> Twist:
+        """The command, slowed down so that the first contact is at least `time_before_collision` away."""
+        if not self._spec.enabled or wanted == STOP:
+            return wanted
+        horizon = self._spec.time_before_collision
+        scale = 1.0
+        for sensor in self._points:
+            scale = min(scale, self._time_free(sensor, wanted, odometry, horizon) / horizon)
+        if scale >= 1.0:
+            return wanted
+        return Twist(wanted.vx * scale, wanted.vy * scale, wanted.wz * scale) if scale > 0.0 else STOP
+
+    def _time_free(self, sensor: str, wanted: Twist, odometry: Pose2, horizon: float) -> float:
+        """Seconds until a point of the scan would be within the stop margin; points it moves away from are no harm."""
+        moved = self._odometry[sensor].between(odometry)
+        reach = self._robot.circumscribed_radius + self._spec.stop_margin
+        reach += math.hypot(wanted.vx, wanted.vy) * horizon
+        if self._nearest[sensor] - math.hypot(moved.x, moved.y) > reach:
+            return horizon
+        points = moved.inverse().apply(self._points[sensor])
+        points = points[np.hypot(points[:, 0], points[:, 1]) <= reach]
+        if not len(points):
+            return horizon
+        times = np.linspace(0.0, horizon, STEPS + 1)
+        gap = self._gaps(points, poses_along(Pose2(0.0, 0.0), wanted, times))
+        now, least = gap[0], self._spec.stop_margin
+        touched = (gap[1:] < least) & (gap[1:] < now - 1e-4)
+        when = touched.any(axis=1)
+        return float(times[int(when.argmax())]) if when.any() else horizon
+
+    def _gaps(self, points: Array, poses: Array) -> Array:
+        """Distance (poses, points) from the hull's edge at each pose to each point; negative inside.
+
+        For a polygon it is the distance to the farthest of its edge lines, which is never more than the true one.
+        """
+        dx = points[None, :, 0] - poses[:, None, 0]
+        dy = points[None, :, 1] - poses[:, None, 1]
+        if self._robot.radius is not None:
+            return np.hypot(dx, dy) - self._robot.radius
+        cosine, sine = np.cos(poses[:, None, 2]), np.sin(poses[:, None, 2])
+        body = np.stack((cosine * dx + sine * dy, cosine * dy - sine * dx), axis=-1)
+        gaps: Array = (body @ self._normal.T - self._offset).max(axis=-1)
+        return gaps

@@ -1,0 +1,149 @@
+"""Regulated pure pursuit (Macenski et al. 2023; nav2_regulated_pure_pursuit_controller)."""
+
+import math
+
+import numpy as np
+
+from simscen.core.geometry import Pose2, wrap
+from simscen.core.motion import STOP, Twist
+from simscen.core.navigation import ErrorCode, Goal, Path
+from simscen.model.stack import RegulatedPurePursuit as RppSpec
+from simscen.stack.arcs import poses_along
+from simscen.stack.controllers.tracking import PathTracker
+from simscen.stack.footprint import Footprint, distances
+from simscen.stack.lookahead import time_free
+from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
+
+DEFAULT_SPEED = 0.5
+"""Nav2's desired_linear_vel."""
+CREEP = 0.1
+"""m/s. When only slower than this would keep the time to collision, the way is blocked."""
+
+
+class RegulatedPurePursuit:
+    """Steers at a carrot on the path and regulates its speed by curvature, nearness of obstacles and of the goal."""
+
+    def __init__(self, spec: RppSpec, robot: RobotModel, footprint: Footprint, period: float) -> None:
+        self._spec, self._robot, self._footprint, self._period = spec, robot, footprint, period
+        self._desired = min(spec.desired_linear_vel or DEFAULT_SPEED, robot.max_linear)
+        self._turn = min(spec.rotate_to_heading_angular_vel, robot.max_angular)
+        self._limit: float | None = None
+        self._track: PathTracker | None = None
+        self._arc: tuple[Pose2, Twist] | None = None
+        self._at_goal = False
+
+    def set_path(self, path: Path) -> None:
+        """Follow this path from now on."""
+        if not len(path.points):
+            raise NavigationFailure(ErrorCode.INVALID_PATH, "the path has no points")
+        self._track, self._at_goal = PathTracker(path), False
+
+    def set_speed_limit(self, limit: float | None) -> None:
+        """Drive no faster than this in m/s; None lifts the limit."""
+        self._limit = limit
+
+    @property
+    def local_plan(self) -> Path | None:
+        """The arc it expects to drive in the next second and a half."""
+        if self._arc is None:
+            return None
+        return Path(poses_along(*self._arc, np.linspace(0.0, 1.5, 16)))
+
+    def command(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> Twist:
+        """The velocity to drive now. Raises NO_VALID_CONTROL when the arc to the carrot is blocked."""
+        if self._track is None:
+            raise NavigationFailure(ErrorCode.INVALID_PATH, "there is no path to follow")
+        track, spec = self._track, self._spec
+        track.locate(pose)
+        reach = self._lookahead(twist.vx)
+        x, y = track.carrot(pose, reach)
+        carrot = pose.inverse().apply(np.array([[x, y]]))[0].tolist()
+        to_goal = math.hypot(goal.pose.x - pose.x, goal.pose.y - pose.y)
+        if self._arrived(to_goal, carrot, goal):
+            command = self._rotate(wrap(goal.pose.yaw - pose.yaw), twist)
+        elif self._should_rotate(carrot):
+            command = self._rotate(math.atan2(carrot[1], carrot[0]), twist)
+        else:
+            command = self._drive(carrot, pose, costmap)
+        command = self._within_free_way(command, pose, costmap, math.hypot(*carrot))
+        self._arc = (pose, command)
+        return command
+
+    def _lookahead(self, speed: float) -> float:
+        spec = self._spec
+        if not spec.use_velocity_scaled_lookahead_dist:
+            return spec.lookahead_dist
+        return min(max(abs(speed) * spec.lookahead_time, spec.min_lookahead_dist), spec.max_lookahead_dist)
+
+    def _arrived(self, to_goal: float, carrot: list[float], goal: Goal) -> bool:
+        """Whether to stop driving and turn to the goal's heading: at the goal, or beside it with the goal behind."""
+        assert self._track is not None
+        near = to_goal <= 0.2 * goal.xy_tolerance
+        passed = to_goal <= 0.8 * goal.xy_tolerance and carrot[0] <= 0.0 and self._track.remaining() < 0.1
+        self._at_goal = to_goal <= goal.xy_tolerance and (self._at_goal or near or passed)
+        return self._at_goal and self._robot.turning_radius == 0.0
+
+    def _should_rotate(self, carrot: list[float]) -> bool:
+        if not self._spec.use_rotate_to_heading or self._robot.turning_radius > 0.0:
+            return False
+        return abs(math.atan2(carrot[1], carrot[0])) > self._spec.rotate_to_heading_min_angle
+
+    def _rotate(self, angle: float, twist: Twist) -> Twist:
+        """Turn in place by `angle`, no faster than it can stop at the end of it."""
+        stopping = math.sqrt(2.0 * self._spec.max_angular_accel * 0.8 * abs(angle))
+        speed = math.copysign(min(self._turn, stopping), angle)
+        change = self._spec.max_angular_accel * self._period
+        return Twist(0.0, 0.0, min(max(speed, twist.wz - change), twist.wz + change))
+
+    def _drive(self, carrot: list[float], pose: Pose2, costmap: CostmapView) -> Twist:
+        square = carrot[0] ** 2 + carrot[1] ** 2
+        curvature = 2.0 * carrot[1] / square if square > 1e-6 else 0.0
+        if self._robot.turning_radius > 0.0:
+            tightest = 1.0 / self._robot.turning_radius
+            curvature = min(max(curvature, -tightest), tightest)
+        speed = self._regulated(curvature, pose, costmap)
+        if abs(curvature) * speed > self._robot.max_angular:
+            speed = self._robot.max_angular / abs(curvature)
+        return Twist(speed, 0.0, speed * curvature)
+
+    def _regulated(self, curvature: float, pose: Pose2, costmap: CostmapView) -> float:
+        spec, speed = self._spec, self._desired
+        if self._limit is not None:
+            speed = min(speed, self._limit)
+        slow = speed
+        if spec.use_regulated_linear_velocity_scaling and abs(curvature) * spec.regulated_linear_scaling_min_radius > 1:
+            slow = min(slow, speed / (abs(curvature) * spec.regulated_linear_scaling_min_radius))
+        if spec.use_cost_regulated_linear_velocity_scaling:
+            near = float(distances(costmap, np.array([pose.x, pose.y])))
+            if near < spec.cost_scaling_dist:
+                slow = min(slow, speed * spec.cost_scaling_gain * near / spec.cost_scaling_dist)
+        speed = min(speed, max(slow, spec.regulated_linear_scaling_min_speed))
+        return self._approaching(speed)
+
+    def _approaching(self, speed: float) -> float:
+        """Slow down near the end of the path: by Nav2's ratio, and never faster than the brakes allow."""
+        assert self._track is not None
+        left, spec = self._track.remaining(), self._spec
+        if left < spec.approach_velocity_scaling_dist:
+            speed = min(
+                speed, max(speed * left / spec.approach_velocity_scaling_dist, spec.min_approach_linear_velocity)
+            )
+        braking = math.sqrt(1.6 * self._robot.linear_deceleration * left)
+        return min(speed, max(braking, spec.min_approach_linear_velocity))
+
+    def _within_free_way(self, command: Twist, pose: Pose2, costmap: CostmapView, carrot: float) -> Twist:
+        """Slow down, or fail, so that the time to collision on the arc up to the carrot is as long as demanded.
+
+        Nav2 fails at once; slowing first lets the planner find a way round before the robot stands before a wall.
+        """
+        if not self._spec.use_collision_detection or command == STOP:
+            return command
+        allowed = self._spec.max_allowed_time_to_collision_up_to_carrot
+        horizon = min(allowed, carrot / command.vx) if command.vx > 0 else allowed
+        free = time_free(self._footprint, costmap, pose, command, horizon)
+        if free >= horizon:
+            return command
+        scale = free / allowed
+        if command.vx * scale < CREEP:
+            raise NavigationFailure(ErrorCode.NO_VALID_CONTROL, f"collision ahead in {free:.2f} s")
+        return Twist(command.vx * scale, 0.0, command.wz * scale)

@@ -1,0 +1,45 @@
+"""Where the cells of a costmap are."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.geometry import Array
+
+Cells = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """An unrotated grid: `origin` is the corner of cell (0, 0) in the map frame, `shape` is (rows, columns)."""
+
+    origin: tuple[float, float]
+    resolution: float
+    shape: tuple[int, int]
+
+    def cells(self, points: Array) -> Cells:
+        """Cells (n, 2) as (row, column) under points (n, 2); may lie off the grid."""
+        local = (points - np.array(self.origin)) * (1.0 / self.resolution)
+        return np.floor(local[:, ::-1]).astype(np.int64)
+
+    def centres(self, cells: Cells) -> Array:
+        """Points (n, 2) of the centres of cells (n, 2)."""
+        return (cells[:, ::-1] + 0.5) * self.resolution + np.array(self.origin)
+
+    def inside(self, cells: Cells) -> npt.NDArray[np.bool_]:
+        """Which of the cells (n, 2) lie on the grid."""
+        rows, columns = cells[:, 0], cells[:, 1]
+        return (rows >= 0) & (columns >= 0) & (rows < self.shape[0]) & (columns < self.shape[1])
+
+    def covers(self, x: float, y: float) -> bool:
+        """Whether the point lies on the grid."""
+        column, row = (x - self.origin[0]) / self.resolution, (y - self.origin[1]) / self.resolution
+        return 0 <= row < self.shape[0] and 0 <= column < self.shape[1]
+
+    def window(self, low: tuple[int, int], high: tuple[int, int], margin: int) -> tuple[slice, slice]:
+        """The cells from `low` to `high` (inclusive) and `margin` more on each side, cut off at the grid's edge."""
+        return (
+            slice(max(0, low[0] - margin), max(0, min(self.shape[0], high[0] + 1 + margin))),
+            slice(max(0, low[1] - margin), max(0, min(self.shape[1], high[1] + 1 + margin))),
+        )

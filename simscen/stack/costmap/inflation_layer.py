@@ -1,0 +1,45 @@
+"""From distances to costs: nav2_costmap_2d's inflation layer.
+
+Distances are kept as squared whole cells (uint16), so that distance in metres and cost are one table look-up each.
+"""
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import distance_transform_edt
+
+FREE, MAX_NON_OBSTACLE, INSCRIBED, LETHAL, NO_INFORMATION = 0, 252, 253, 254, 255
+FAR = 65535
+"""The largest squared distance kept: 256 cells, 12.8 m at 5 cm."""
+
+Squared = npt.NDArray[np.uint16]
+
+
+def squared_distances(lethal: npt.NDArray[np.bool_]) -> Squared:
+    """For each cell the exact squared distance in cells to the nearest lethal cell's centre, at most FAR."""
+    if not lethal.any():
+        return np.full(lethal.shape, FAR, dtype=np.uint16)
+    distance = distance_transform_edt(~lethal)
+    return np.minimum(np.rint(distance * distance), FAR).astype(np.uint16)
+
+
+class Inflation:
+    """Tables over squared cell distances: `metres` and nav2's exponential `cost`.
+
+    cost = 252 · exp(-cost_scaling_factor · (distance - inscribed_radius)) between the inscribed and the inflation
+    radius (nav2_costmap_2d/inflation_layer.hpp, computeCost).
+    """
+
+    def __init__(self, resolution: float, inscribed: float, inflation_radius: float, scaling: float) -> None:
+        self.metres: npt.NDArray[np.float32] = (np.sqrt(np.arange(FAR + 1)) * resolution).astype(np.float32)
+        distance = self.metres.astype(np.float64)
+        decay = MAX_NON_OBSTACLE * np.exp(-scaling * np.maximum(distance - inscribed, 0.0))
+        cost = np.where(distance <= inscribed, INSCRIBED, decay)
+        cost = np.where(distance > inflation_radius, FREE, cost)
+        cost[0] = LETHAL
+        self.cost: npt.NDArray[np.uint8] = cost.astype(np.uint8)
+
+    def costs(self, squared: Squared, unknown: npt.NDArray[np.bool_]) -> npt.NDArray[np.uint8]:
+        """Costs of cells; unknown ones stay unknown unless an obstacle is within the inscribed radius."""
+        cost = self.cost[squared]
+        cost[unknown & (cost < INSCRIBED)] = NO_INFORMATION
+        return cost

@@ -1,0 +1,72 @@
+"""The map the robot was given, as an unrotated costmap, with keepout zones painted in."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.geometry import Array
+from simscen.core.grid import UNKNOWN, OccupancyGrid
+from simscen.core.world import Polygon
+from simscen.stack.costmap.frame import Frame
+
+Mask = npt.NDArray[np.bool_]
+OCCUPIED_FROM = 65
+"""nav2's lethal_cost_threshold is 100 on a trinary map; 65 also reads maps that were loaded in scale mode."""
+
+
+@dataclass(frozen=True, eq=False)
+class StaticLayer:
+    """What never changes: `lethal` and `unknown` cells (rows, columns) of `frame`."""
+
+    frame: Frame
+    lethal: Mask
+    unknown: Mask
+
+
+def static_layer(grid: OccupancyGrid, keepout: tuple[Polygon, ...]) -> StaticLayer:
+    """The layer of a map; a map with a turned origin is sampled into an unrotated frame of the same resolution."""
+    if abs(grid.origin.yaw) < 1e-9:
+        frame = Frame((grid.origin.x, grid.origin.y), grid.resolution, grid.shape)
+        cells = grid.cells
+    else:
+        frame = _bounding_frame(grid)
+        cells = grid.values_at(_all_centres(frame)).reshape(frame.shape)
+    lethal = np.ascontiguousarray(cells >= OCCUPIED_FROM)
+    for polygon in keepout:
+        lethal |= inside_polygon(frame, polygon)
+    return StaticLayer(frame, lethal, np.ascontiguousarray(cells == UNKNOWN) & ~lethal)
+
+
+def empty_layer(frame: Frame, keepout: tuple[Polygon, ...]) -> StaticLayer:
+    """The layer of a robot without a map: nothing but keepout zones."""
+    lethal = np.zeros(frame.shape, dtype=bool)
+    for polygon in keepout:
+        lethal |= inside_polygon(frame, polygon)
+    return StaticLayer(frame, lethal, np.zeros(frame.shape, dtype=bool))
+
+
+def inside_polygon(frame: Frame, polygon: Polygon) -> Mask:
+    """The cells whose centre lies inside the polygon (even-odd rule)."""
+    points = _all_centres(frame)
+    inside = np.zeros(len(points), dtype=bool)
+    for (ax, ay), (bx, by) in zip(polygon, (*polygon[1:], polygon[0]), strict=True):
+        if ay == by:
+            continue
+        crosses = (ay > points[:, 1]) != (by > points[:, 1])
+        inside ^= crosses & (points[:, 0] < ax + (points[:, 1] - ay) / (by - ay) * (bx - ax))
+    return inside.reshape(frame.shape)
+
+
+def _all_centres(frame: Frame) -> Array:
+    rows, columns = np.indices(frame.shape)
+    return frame.centres(np.column_stack((rows.ravel(), columns.ravel())))
+
+
+def _bounding_frame(grid: OccupancyGrid) -> Frame:
+    height, width = grid.shape
+    corners = np.array([[0, 0], [width, 0], [0, height], [width, height]]) * grid.resolution
+    corners = grid.origin.apply(corners)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    columns, rows = np.ceil((high - low) / grid.resolution).astype(int)
+    return Frame((float(low[0]), float(low[1])), grid.resolution, (int(rows), int(columns)))

@@ -1,0 +1,74 @@
+"""Whether the robot's hull fits where it is, on a costmap: the one check that planners and controllers share."""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.geometry import Array
+from simscen.stack.protocols import CostmapView, RobotModel
+
+Mask = npt.NDArray[np.bool_]
+
+
+def distances(costmap: CostmapView, points: Array) -> npt.NDArray[np.float32]:
+    """Distance in metres (…,) to the nearest lethal cell at points (…, 2); 0 off the costmap."""
+    cells = np.floor((points - np.array(costmap.origin)) * (1.0 / costmap.resolution)).astype(np.int64)
+    rows, columns = cells[..., 1], cells[..., 0]
+    height, width = costmap.distance.shape
+    inside = (rows >= 0) & (columns >= 0) & (rows < height) & (columns < width)
+    flat = np.where(inside, rows * width + columns, 0)
+    return np.where(inside, costmap.distance.reshape(-1)[flat], np.float32(0.0))
+
+
+class Footprint:
+    """Checks many poses at once.
+
+    A round robot collides where a lethal cell's centre is within its radius. Any other collides where one is within
+    the inscribed radius or under the hull's edge; far from everything (circumscribed radius) it never does. `reach` is
+    how far turning in place moves the hull: 0 when it is round.
+    """
+
+    def __init__(self, robot: RobotModel, resolution: float) -> None:
+        self._inscribed, self._circumscribed = robot.inscribed_radius, robot.circumscribed_radius
+        self._round = robot.radius is not None
+        self.reach = 0.0 if self._round else robot.circumscribed_radius
+        self._edge = _edge_points(np.array(robot.footprint, dtype=np.float64), resolution)
+
+    def free(self, costmap: CostmapView, poses: Array) -> Mask:
+        """Which of the poses (n, 3) hit nothing."""
+        distance = distances(costmap, poses[:, :2])
+        free: Mask = distance > np.float32(self._inscribed)
+        if self._round:
+            return free
+        unsure = np.flatnonzero(free & (distance <= self._circumscribed + costmap.resolution))
+        if len(unsure):
+            free[unsure] = self._edge_free(costmap, poses[unsure])
+        return free
+
+    def clearance(self, costmap: CostmapView, poses: Array) -> Array:
+        """About how far (n,) the hull's edge is from the nearest lethal cell in metres; negative in collision."""
+        if self._round:
+            return distances(costmap, poses[:, :2]).astype(np.float64) - self._inscribed
+        edge = distances(costmap, self._placed(poses)).min(axis=1).astype(np.float64)
+        middle = distances(costmap, poses[:, :2]).astype(np.float64) - self._inscribed
+        return np.minimum(edge, middle)
+
+    def _edge_free(self, costmap: CostmapView, poses: Array) -> Mask:
+        free: Mask = (distances(costmap, self._placed(poses)) > 0).all(axis=1)
+        return free
+
+    def _placed(self, poses: Array) -> Array:
+        cosine, sine = np.cos(poses[:, 2, None]), np.sin(poses[:, 2, None])
+        x = poses[:, 0, None] + cosine * self._edge[:, 0] - sine * self._edge[:, 1]
+        y = poses[:, 1, None] + sine * self._edge[:, 0] + cosine * self._edge[:, 1]
+        return np.stack((x, y), axis=-1)
+
+
+def _edge_points(corners: Array, resolution: float) -> Array:
+    """Points along the hull's edge, at most one cell apart."""
+    points = []
+    for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        count = max(1, math.ceil(float(np.hypot(*(b - a))) / resolution))
+        points.append(a + (b - a) * (np.arange(count) / count)[:, None])
+    return np.concatenate(points)

@@ -1,0 +1,34 @@
+"""When a goal is reached: nav2_controller::SimpleGoalChecker, a little stricter."""
+
+from simscen.core.geometry import Pose2, wrap
+from simscen.core.motion import Twist
+from simscen.core.navigation import Goal
+
+WELL_INSIDE = 0.5
+"""Part of the tolerance at which the goal counts as reached while still moving.
+
+Nav2 accepts at the very edge of the tolerance, which turns a localisation error of a centimetre into a false success.
+Here the robot goes on until it is well inside, or until it stands anywhere inside.
+"""
+STANDING = 0.02
+"""m/s and rad/s (times five) under which a robot stands."""
+
+
+class GoalChecker:
+    """Position first, heading then; a position once reached stays reached (`stateful`) while the robot turns."""
+
+    def __init__(self, stateful: bool) -> None:
+        self._stateful = stateful
+        self._there = False
+
+    def reset(self) -> None:
+        """A new goal."""
+        self._there = False
+
+    def reached(self, goal: Goal, pose: Pose2, twist: Twist) -> bool:
+        """Whether the robot, believed at `pose`, has reached the goal."""
+        standing = abs(twist.vx) + abs(twist.vy) < STANDING and abs(twist.wz) < 5 * STANDING
+        part = 1.0 if standing else WELL_INSIDE
+        there = goal.pose.distance(pose) <= part * goal.xy_tolerance
+        self._there = there or (self._stateful and self._there and goal.pose.distance(pose) <= goal.xy_tolerance)
+        return self._there and abs(wrap(goal.pose.yaw - pose.yaw)) <= part * goal.yaw_tolerance

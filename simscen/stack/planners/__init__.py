@@ -1,0 +1,1 @@
+"""Paths over the costmap, found by OMPL."""

@@ -1,0 +1,26 @@
+"""The recovery branch of Nav2's default tree: a round robin of behaviours, a limited number of times."""
+
+from collections.abc import Sequence
+
+from simscen.stack.protocols import Behavior
+
+
+class RoundRobin:
+    """Hands out behaviours in turn until `retries` have been used; a new goal gets a full number again."""
+
+    def __init__(self, behaviors: Sequence[Behavior], retries: int) -> None:
+        self._behaviors, self._retries = tuple(behaviors), retries
+        self._next, self._used = 0, 0
+
+    def reset(self) -> None:
+        """A new goal; the turn goes on where it was, as in Nav2."""
+        self._used = 0
+
+    def next(self) -> Behavior | None:
+        """The next behaviour; None when the retries are used up."""
+        if not self._behaviors or self._used >= self._retries:
+            return None
+        behavior = self._behaviors[self._next % len(self._behaviors)]
+        self._next += 1
+        self._used += 1
+        return behavior

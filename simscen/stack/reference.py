@@ -1,0 +1,189 @@
+"""The reference stack: readings in; localise, map, navigate, smooth, guard; one command out."""
+
+import math
+
+import numpy as np
+
+from simscen.core.belief import Belief, Estimate
+from simscen.core.events import Event
+from simscen.core.geometry import Pose2
+from simscen.core.motion import STOP, Twist
+from simscen.core.navigation import ErrorCode, Goal, Path
+from simscen.core.sensing import Imu, Odometry, Readings, Scan
+from simscen.core.trace import Decision
+from simscen.stack.collision_monitor import CollisionMonitor
+from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.navigator import Navigator
+from simscen.stack.protocols import Controller, Localizer, NavigationFailure, Surroundings
+from simscen.stack.tasks import Task
+from simscen.stack.velocity_smoother import VelocitySmoother
+from simscen.stack.zones import speed_limit
+
+
+class ReferenceStack:
+    """Nav2 in miniature. Decides at the controller's rate and repeats its command in between."""
+
+    def __init__(
+        self,
+        surroundings: Surroundings,
+        localizer: Localizer,
+        costmap: Costmap,
+        controller: Controller,
+        navigator: Navigator,
+        task: Task,
+        smoother: VelocitySmoother,
+        monitor: CollisionMonitor,
+        control_period: int,
+        costmap_period: int,
+        journal: list[Event],
+    ) -> None:
+        self._zones = surroundings.speed_zones
+        self._localizer, self._costmap, self._controller = localizer, costmap, controller
+        self._navigator, self._task, self._smoother, self._monitor = navigator, task, smoother, monitor
+        self._tick_rate = surroundings.tick_rate
+        self._control_period, self._costmap_period = control_period, costmap_period
+        self._belief_period = math.ceil(surroundings.tick_rate / 10)
+        self._local_plan_period = math.ceil(surroundings.tick_rate / 5)
+        self._journal = journal
+        self._tick = 0
+        self._twist, self._command = STOP, STOP
+        self._odometry = Pose2(0.0, 0.0)
+        self._scans: dict[str, Scan] = {}
+        self._mapped = -costmap_period
+        self._told = -self._belief_period
+        self._plan_told: Path | None = None
+        self._arc_told = 0
+        self._nothing = Decision(STOP)
+
+    def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:
+        """Localise at the estimate, then drive to the goals in order."""
+        self._localizer.reset(estimate)
+        self._monitor.start(self._tick)
+        self._navigator.stop()
+        self._task.start(goals)
+
+    def preempt(self, goal: Goal) -> None:
+        """Drive to this goal first; it takes the place of the current one."""
+        self._task.preempt(self._tick, goal)
+        self._navigator.stop()
+
+    def cancel(self) -> None:
+        """Cancel the current goal and all after it."""
+        self._task.cancel(self._tick)
+        self._navigator.stop()
+        self._command = STOP
+
+    @property
+    def plan(self) -> Path | None:
+        """The plan being followed."""
+        return self._navigator.plan.path if self._navigator.plan else None
+
+    @property
+    def goal(self) -> Goal | None:
+        """The goal being driven to; None when the task has ended."""
+        return self._task.goal
+
+    def decide(self, tick: int, readings: Readings) -> Decision:
+        """Take the readings of this beat and say what to drive."""
+        self._tick = tick
+        scanned = self._take(readings) if readings else False
+        controls = tick % self._control_period == 0
+        if not controls and not scanned and not readings:
+            return self._nothing
+        events: list[Event] = []
+        local_plan = None
+        if controls:
+            self._update_costmap(tick)
+            self._command = self._control(tick)
+            events, self._journal[:] = self._journal.copy(), []
+            local_plan = self._fresh_local_plan(tick)
+        self._nothing = Decision(self._command)
+        return Decision(self._command, self._fresh_belief(tick, scanned), self._fresh_plan(), local_plan, tuple(events))
+
+    def _take(self, readings: Readings) -> bool:
+        scanned = False
+        for reading in readings:
+            match reading:
+                case Odometry():
+                    self._localizer.on_odometry(reading)
+                    if all(map(math.isfinite, (*reading.pose, *reading.twist))):
+                        self._twist, self._odometry = reading.twist, reading.pose
+                case Imu():
+                    self._localizer.on_imu(reading)
+                case Scan():
+                    self._localizer.on_scan(reading)
+                    self._monitor.on_scan(reading, self._odometry)
+                    self._scans[reading.sensor] = reading
+                    scanned = True
+                case _:
+                    pass
+        return scanned
+
+    def _update_costmap(self, tick: int) -> None:
+        """Feed the newest scan of each lidar, not older than the costmap's own period."""
+        if not self._scans or tick - self._mapped < self._costmap_period:
+            return
+        self._mapped = tick
+        pose = self._localizer.belief.pose
+        for scan in self._scans.values():
+            if not np.isnan(scan.ranges).all():
+                self._costmap.update(pose, scan)
+        self._scans.clear()
+
+    def _control(self, tick: int) -> Twist:
+        goal = self._task.next(tick)
+        if goal is None:
+            self._smoother.reset(STOP)
+            return STOP
+        if self._navigator.goal is not goal:
+            self._navigator.pursue(goal)
+        if goal.timeout is not None and tick - self._task.since > goal.timeout * self._tick_rate:
+            return self._give_up(tick, NavigationFailure(ErrorCode.NAVIGATE_TIMEOUT, f"{goal.timeout:g} s are over"))
+        if self._monitor.silent(tick):
+            self._smoother.reset(STOP)
+            return STOP
+        pose = self._localizer.belief.pose
+        if self._zones:
+            self._controller.set_speed_limit(speed_limit(self._zones, pose))
+        try:
+            wanted, reached = self._navigator.step(tick, pose, self._twist)
+        except NavigationFailure as failure:
+            return self._give_up(tick, failure)
+        if reached:
+            self._task.reached(tick)
+            self._navigator.stop()
+            self._smoother.reset(STOP)
+            return STOP
+        return self._guarded(wanted)
+
+    def _guarded(self, wanted: Twist) -> Twist:
+        smooth = self._smoother.smooth(wanted)
+        allowed = self._monitor.allow(smooth, self._odometry)
+        if allowed is not smooth:
+            self._smoother.reset(allowed)
+        return allowed
+
+    def _give_up(self, tick: int, failure: NavigationFailure) -> Twist:
+        self._task.failed(tick, failure.code, str(failure))
+        self._navigator.stop()
+        self._smoother.reset(STOP)
+        return STOP
+
+    def _fresh_belief(self, tick: int, scanned: bool) -> Belief | None:
+        if not scanned and tick - self._told < self._belief_period:
+            return None
+        self._told = tick
+        return self._localizer.belief
+
+    def _fresh_plan(self) -> Path | None:
+        plan = self.plan
+        if plan is self._plan_told or plan is None:
+            return None
+        self._plan_told = plan
+        return plan
+
+    def _fresh_local_plan(self, tick: int) -> Path | None:
+        if self._navigator.plan is None or tick - self._arc_told < self._local_plan_period:
+            return None
+        self._arc_told = tick
+        return self._controller.local_plan

@@ -1,0 +1,45 @@
+"""When a plan that is being followed should be replaced."""
+
+import numpy as np
+
+from simscen.core.geometry import Array, Pose2
+from simscen.core.navigation import Path
+from simscen.stack.controllers.tracking import PathTracker
+from simscen.stack.footprint import distances
+from simscen.stack.protocols import CostmapView
+
+CLEARLY_SHORTER, AT_LEAST = 0.85, 0.5
+"""Hysteresis: another way must be this much shorter (ratio, and metres) before the robot changes its mind."""
+
+
+class PlanInForce:
+    """The plan being followed, and how far the robot has come on it."""
+
+    def __init__(self, path: Path, radius: float) -> None:
+        self.path, self._radius = path, radius
+        self._track = PathTracker(path)
+
+    def locate(self, pose: Pose2) -> None:
+        """Note where the robot is."""
+        self._track.locate(pose)
+
+    def remaining(self) -> float:
+        """Metres to go."""
+        return self._track.remaining()
+
+    def blocked(self, costmap: CostmapView) -> bool:
+        """Whether a point ahead has come to lie where the robot does not fit.
+
+        The first points may be too near an obstacle already: a robot that stands there has to get out.
+        """
+        ahead: Array = self._track.points[self._track.index :: 2, :2]
+        bad = distances(costmap, ahead) <= np.float32(self._radius)
+        if not bad.any():
+            return False
+        out = int((~bad).argmax())
+        return bool(bad[out:].any() or bad.all())
+
+    def worse_than(self, other: Path) -> bool:
+        """Whether another path is clearly shorter than what is left of this one."""
+        left, length = self.remaining(), other.length()
+        return length < CLEARLY_SHORTER * left and length < left - AT_LEAST

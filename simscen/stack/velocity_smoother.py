@@ -1,0 +1,40 @@
+"""Accelerations the base can follow: nav2_velocity_smoother, open loop."""
+
+from simscen.core.motion import Twist
+from simscen.model.stack import VelocitySmoother as SmootherSpec
+from simscen.stack.protocols import RobotModel
+
+
+class VelocitySmoother:
+    """Changes the command by no more than the limits allow in a period; slowing down uses the full deceleration."""
+
+    def __init__(self, spec: SmootherSpec, robot: RobotModel, period: float) -> None:
+        self._enabled = spec.enabled
+        faster = min(spec.max_accel or robot.linear_acceleration, robot.linear_acceleration)
+        self._faster, self._slower = faster * period, robot.linear_deceleration * period
+        turn = min(spec.max_angular_accel or robot.angular_acceleration, robot.angular_acceleration)
+        self._turn = turn * period
+        self._last = Twist()
+
+    def reset(self, twist: Twist) -> None:
+        """What the base is doing now, after somebody else decided."""
+        self._last = twist
+
+    def smooth(self, wanted: Twist) -> Twist:
+        """The velocity to send now."""
+        if not self._enabled:
+            return wanted
+        last = self._last
+        self._last = Twist(
+            self._towards(last.vx, wanted.vx), self._towards(last.vy, wanted.vy), self._turned(last.wz, wanted.wz)
+        )
+        return self._last
+
+    def _towards(self, now: float, wanted: float) -> float:
+        if now * wanted < 0.0:
+            wanted = 0.0
+        step = self._faster if abs(wanted) > abs(now) else self._slower
+        return min(max(wanted, now - step), now + step)
+
+    def _turned(self, now: float, wanted: float) -> float:
+        return min(max(wanted, now - self._turn), now + self._turn)

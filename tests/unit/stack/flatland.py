@@ -1,0 +1,213 @@
+"""A world of boxes and discs with a robot that does what it is told: just enough to drive a stack without physics.
+
+Ray casting and collision checks are closed forms, so they are also an independent truth.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from simscen.core.belief import Estimate
+from simscen.core.chance import Streams
+from simscen.core.events import Event
+from simscen.core.geometry import Array, Pose2
+from simscen.core.grid import OccupancyGrid
+from simscen.core.motion import Twist
+from simscen.core.navigation import Goal
+from simscen.core.sensing import Odometry, Scan
+from simscen.core.time import Clock
+from simscen.model.stack import GroundTruth, StackSpec
+from simscen.stack.protocols import RobotModel, Stack, Surroundings
+
+RATE = 240
+CONTROL, SCAN, ODOMETRY = 12, 24, 6
+
+
+def round_robot(radius: float = 0.22, speed: float = 0.5, **limits: float) -> RobotModel:
+    """Something like a TurtleBot."""
+    angles = np.linspace(0, 2 * math.pi, 16, endpoint=False)
+    corners = tuple((radius * math.cos(a), radius * math.sin(a)) for a in angles)
+    data = {"max_reverse": speed, "max_angular": 1.9, "linear_acceleration": 2.5, "linear_deceleration": 2.5}
+    return RobotModel(
+        corners, radius, max_linear=speed, max_lateral=0.0, angular_acceleration=3.2, **{**data, **limits}
+    )
+
+
+def box_robot(length: float = 0.42, width: float = 0.31, speed: float = 2.0) -> RobotModel:
+    """Something like a Jackal."""
+    a, b = length / 2, width / 2
+    return RobotModel(((a, b), (-a, b), (-a, -b), (a, -b)), None, speed, speed, 0.0, 2.0, 5.0, 5.0, 10.0)
+
+
+@dataclass
+class Flatland:
+    """Boxes (min x, min y, max x, max y) and discs (x, y, radius) in metres; both may change while driving."""
+
+    boxes: list[tuple[float, float, float, float]] = field(default_factory=list)
+    discs: list[tuple[float, float, float]] = field(default_factory=list)
+
+    def room(self, width: float, height: float, wall: float = 0.1) -> "Flatland":
+        """Put walls around (0, 0) … (width, height)."""
+        self.boxes += [
+            (-wall, -wall, width + wall, 0.0),
+            (-wall, height, width + wall, height + wall),
+            (-wall, 0.0, 0.0, height),
+            (width, 0.0, width + wall, height),
+        ]
+        return self
+
+    def grid(self, bounds: tuple[float, float, float, float], resolution: float = 0.05) -> OccupancyGrid:
+        """The occupancy map: a cell is occupied when its centre is inside something."""
+        columns, rows = (round((bounds[i + 2] - bounds[i]) / resolution) for i in (0, 1))
+        y, x = (np.indices((rows, columns)) + 0.5) * resolution
+        distance = self.distance(np.column_stack(((x + bounds[0]).ravel(), (y + bounds[1]).ravel())))
+        cells = np.where(distance.reshape(rows, columns) <= 0, 100, 0).astype(np.int8)
+        return OccupancyGrid(cells, resolution, Pose2(bounds[0], bounds[1]))
+
+    def distance(self, points: Array) -> Array:
+        """Signed distance (n,) from points (n, 2) to the nearest surface; negative inside something."""
+        result = np.full(len(points), np.inf)
+        for ax, ay, bx, by in self.boxes:
+            dx = np.maximum(ax - points[:, 0], points[:, 0] - bx)
+            dy = np.maximum(ay - points[:, 1], points[:, 1] - by)
+            outside = np.hypot(np.maximum(dx, 0), np.maximum(dy, 0))
+            result = np.minimum(result, outside + np.minimum(np.maximum(dx, dy), 0))
+        if self.discs:
+            discs = np.array(self.discs)
+            gaps = np.hypot(points[:, None, 0] - discs[:, 0], points[:, None, 1] - discs[:, 1]) - discs[:, 2]
+            result = np.minimum(result, gaps.min(axis=1))
+        return result
+
+    def cast(self, origin: tuple[float, float], angles: Array) -> Array:
+        """Distances (n,) along rays."""
+        c, s = np.cos(angles), np.sin(angles)
+        best = np.full(len(angles), np.inf)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            for ax, ay, bx, by in self.boxes:
+                tx = np.sort(np.stack(((ax - origin[0]) / c, (bx - origin[0]) / c)), axis=0)
+                ty = np.sort(np.stack(((ay - origin[1]) / s, (by - origin[1]) / s)), axis=0)
+                near, far = np.maximum(tx[0], ty[0]), np.minimum(tx[1], ty[1])
+                best = np.where((near <= far) & (far > 0), np.minimum(best, np.maximum(near, 0)), best)
+            for x, y, radius in self.discs:
+                dx, dy = x - origin[0], y - origin[1]
+                along, across = dx * c + dy * s, dx * s - dy * c
+                half = np.sqrt(radius**2 - across**2)
+                best = np.where((half >= 0) & (along > 0), np.minimum(best, along - half), best)
+        return best
+
+    def clearance(self, robot: RobotModel, pose: Pose2) -> float:
+        """Distance from the robot's hull to the nearest surface; not positive in contact."""
+        if robot.radius is not None:
+            return float(self.distance(np.array([[pose.x, pose.y]]))[0]) - robot.radius
+        corners = np.array(robot.footprint)
+        t = np.linspace(0, 1, 21)[:, None]
+        edge = np.concatenate([a + t * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)])
+        return float(self.distance(pose.apply(edge)).min())
+
+
+@dataclass
+class Drive:
+    """A robot driving under a stack; `log` keeps events, `least` the smallest clearance so far."""
+
+    world: Flatland
+    robot: RobotModel
+    stack: Stack
+    pose: Pose2
+    beams: int = 360
+    field_of_view: float = 2 * math.pi
+    noise: float = 0.01
+    range_max: float = 12.0
+    tick: int = 0
+    twist: Twist = Twist()
+    blind: bool = False
+
+    def __post_init__(self) -> None:
+        self.chance = np.random.default_rng(1)
+        self.log: list[Event] = []
+        self.track: list[Pose2] = [self.pose]
+        self.commands: list[Twist] = []
+        self.plans: list = []
+        self.least = math.inf
+
+    def run(self, seconds: float, until: str = "navigation.ended") -> "Drive":
+        """Drive on for so long, or until an event of this kind."""
+        end = self.tick + round(seconds * RATE)
+        while self.tick < end:
+            if any(event.kind == until for event in self.step()):
+                break
+        return self
+
+    def step(self) -> tuple[Event, ...]:
+        """One beat of 6 ticks."""
+        readings: list = []
+        if self.tick % ODOMETRY == 0:
+            readings += [Odometry(name, self.tick, self.pose, self.twist) for name in ("ground_truth", "odom")]
+        if self.tick % SCAN == 0 and not self.blind:
+            readings.append(self.scan())
+        decision = self.stack.decide(self.tick, tuple(readings))
+        self.log += decision.events
+        self.commands.append(decision.command)
+        if decision.plan is not None:
+            self.plans.append(decision.plan)
+        self._move(decision.command, ODOMETRY / RATE)
+        self.tick += ODOMETRY
+        return decision.events
+
+    def scan(self) -> Scan:
+        """What the lidar sees."""
+        full = self.field_of_view >= 2 * math.pi - 1e-9
+        step = self.field_of_view / (self.beams if full else self.beams - 1)
+        first = -self.field_of_view / 2
+        angles = first + step * np.arange(self.beams) + self.pose.yaw
+        ranges = self.world.cast((self.pose.x, self.pose.y), angles)
+        ranges = np.round(ranges + self.chance.normal(0, self.noise, len(ranges)), 3)
+        ranges[ranges > self.range_max] = np.inf
+        return Scan("lidar", self.tick, ranges, first, step, 0.05, self.range_max)
+
+    def _move(self, command: Twist, dt: float) -> None:
+        r = self.robot
+        slower = r.linear_deceleration if abs(command.vx) < abs(self.twist.vx) else r.linear_acceleration
+        vx = self.twist.vx + np.clip(command.vx - self.twist.vx, -slower * dt, slower * dt)
+        turn = r.angular_acceleration * dt
+        wz = self.twist.wz + np.clip(command.wz - self.twist.wz, -turn, turn)
+        self.twist = Twist(float(vx), 0.0, float(wz))
+        middle = self.pose.yaw + wz * dt / 2
+        self.pose = Pose2(
+            float(self.pose.x + vx * math.cos(middle) * dt),
+            float(self.pose.y + vx * math.sin(middle) * dt),
+            math.remainder(float(self.pose.yaw + wz * dt), 2 * math.pi),
+        )
+        self.track.append(self.pose)
+        self.least = min(self.least, self.world.clearance(self.robot, self.pose))
+
+    def kinds(self, kind: str) -> list[Event]:
+        """The events of a kind so far."""
+        return [event for event in self.log if event.kind == kind]
+
+    @property
+    def result(self) -> str:
+        """How navigation ended."""
+        return self.kinds("navigation.ended")[-1].name if self.kinds("navigation.ended") else ""
+
+
+def drive(
+    world: Flatland,
+    start: Pose2,
+    *goals: Goal,
+    robot: RobotModel | None = None,
+    grid: OccupancyGrid | None = None,
+    spec: StackSpec | None = None,
+    seed: int = 1,
+    stop_on_failure: bool = True,
+    **options: object,
+) -> Drive:
+    """A reference stack with true poses in a world; `grid` None drives without a map."""
+    from simscen.stack.build import build_stack
+
+    robot = robot or round_robot()
+    spec = spec or StackSpec(localizer=GroundTruth(type="ground_truth"))
+    surroundings = Surroundings(robot, grid, RATE, lidars=("lidar",))
+    stack = build_stack(spec, surroundings, Streams(seed), Clock(RATE), stop_on_failure=stop_on_failure)
+    stack.start(Estimate(start), goals)
+    return Drive(world, robot, stack, start, **options)
