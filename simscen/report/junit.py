@@ -26,7 +26,8 @@ def to_xml(runs: Sequence[RunFinished], family: Family = "simscen", name: str = 
         _suite(root, path, [run for run in ordered if run.path == path], family)
     _count(root, ordered)
     ElementTree.indent(root)
-    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="utf-8") + b"\n"
+    body: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
+    return body + b"\n"
 
 
 def _suite(root: Element, path: str, runs: list[RunFinished], family: Family) -> None:

@@ -1,0 +1,106 @@
+"""Traces from a few words: golden cases and documentation say with them what a criterion means."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from simscen.core.events import Event
+from simscen.core.geometry import Array, Pose2, wrap_array
+from simscen.core.navigation import Path
+from simscen.core.trace import Samples, Ticks, Trace
+
+TICK_RATE, TRUTH_PERIOD, SCAN_PERIOD, BELIEF_PERIOD = 240, 6, 24, 24
+
+
+def sketch(words: Mapping[str, Any]) -> Trace:
+    """A trace at the usual rates (240 Hz ticks, truth 40 Hz, scans and belief 10 Hz).
+
+    seconds: how long it is · truth: waypoints [t, x, y, yaw], driven straight at constant speed between them ·
+    belief: waypoints too, or {offset: [dx, dy, dyaw]} from the truth, or null for none · clearance: [t, metres] or one
+    number · scans: [from, to] stretches in which they arrive · events: [t, kind, name, {data}] · plans: [t, [[x, y],
+    …]] · objects: {name: waypoints} · ended: why the run ended; null for a log that was cut off.
+    """
+    end = round(words["seconds"] * TICK_RATE)
+    ticks = np.arange(0, end + 1, TRUTH_PERIOD, dtype=np.int64)
+    truth = _way(words["truth"], ticks)
+    return Trace(
+        tick_rate=TICK_RATE,
+        truth=truth,
+        velocity=Samples(ticks, _velocity(truth)),
+        clearance=_clearance(words.get("clearance", 1.0), ticks),
+        belief=_belief(words.get("belief", {"offset": [0, 0, 0]}), words["truth"], end),
+        odometry=truth,
+        command=Samples(ticks, _velocity(truth)),
+        scans=_scans(words.get("scans", [[0, words["seconds"]]]), end),
+        plans=tuple(Path(_lifted(points), round(t * TICK_RATE)) for t, points in words.get("plans", [])),
+        events=_events(words, end),
+        objects={name: _way(way, ticks) for name, way in sorted(words.get("objects", {}).items())},
+        end=end,
+    )
+
+
+def _way(waypoints: Sequence[Sequence[float]], ticks: Ticks) -> Samples:
+    """x, y, yaw at `ticks`, linear between waypoints; headings take the shorter way."""
+    points = np.array([[*point, 0.0][:4] for point in waypoints], dtype=np.float64)
+    times = ticks / TICK_RATE
+    columns = [np.interp(times, points[:, 0], points[:, axis]) for axis in (1, 2)]
+    yaw = wrap_array(np.interp(times, points[:, 0], np.unwrap(points[:, 3])))
+    return Samples(ticks, np.column_stack((*columns, yaw)))
+
+
+def _velocity(truth: Samples) -> Array:
+    """vx, vy, wz in the base frame over the step that begins at each sample; the last one is at rest."""
+    step = np.diff(truth.ticks)[:, np.newaxis] / TICK_RATE
+    dx, dy, turn = (np.diff(truth.values, axis=0) / step).T if len(truth) > 1 else np.empty((3, 0))
+    turn = wrap_array(np.diff(truth.values[:, 2])) / step[:, 0] if len(truth) > 1 else turn
+    c, s = np.cos(truth.values[:-1, 2]), np.sin(truth.values[:-1, 2])
+    return np.vstack((np.column_stack((c * dx + s * dy, c * dy - s * dx, turn)), np.zeros((1, 3))))
+
+
+def _belief(words: Any, truth: Sequence[Sequence[float]], end: int) -> Samples:
+    if words is None:
+        return Samples(np.empty(0, dtype=np.int64), np.empty((0, 9)))
+    ticks = np.arange(0, end + 1, BELIEF_PERIOD, dtype=np.int64)
+    if isinstance(words, Mapping):
+        poses = _way(truth, ticks).values + np.array(words["offset"], dtype=np.float64)
+    else:
+        poses = _way(words, ticks).values
+    covariance = np.tile([0.01, 0.0, 0.0, 0.01, 0.0, 0.01], (len(ticks), 1))
+    return Samples(ticks, np.column_stack((poses, covariance)))
+
+
+def _clearance(words: Any, ticks: Ticks) -> Samples:
+    points = np.array([[0.0, words]] if isinstance(words, int | float) else words, dtype=np.float64)
+    return Samples(ticks, np.interp(ticks / TICK_RATE, points[:, 0], points[:, 1])[:, np.newaxis])
+
+
+def _scans(stretches: Sequence[Sequence[float]], end: int) -> Ticks:
+    ticks = np.arange(0, end + 1, SCAN_PERIOD, dtype=np.int64)
+    arrives = np.zeros(len(ticks), dtype=bool)
+    for begin, until in stretches:
+        arrives |= (ticks >= begin * TICK_RATE) & (ticks <= until * TICK_RATE)
+    return ticks[arrives]
+
+
+def _events(words: Mapping[str, Any], end: int) -> tuple[Event, ...]:
+    events = []
+    for at, kind, *rest in words.get("events", []):
+        name, data = [*rest, "", {}][:2] if len(rest) != 1 else (rest[0], {})
+        events.append(Event(round(at * TICK_RATE), kind, name, data))
+    ended = words.get("ended", "navigation ended")
+    return (*events, *([] if ended is None else [Event(end, "run.ended", ended)]))
+
+
+def _lifted(points: Sequence[Sequence[float]]) -> Array:
+    """Path points with the heading of the way."""
+    xy = np.array(points, dtype=np.float64)[:, :2]
+    steps = np.diff(xy, axis=0)
+    yaw = np.arctan2(steps[:, 1], steps[:, 0])
+    return np.column_stack((xy, np.append(yaw, yaw[-1:])))
+
+
+def pose(words: Sequence[float]) -> Pose2:
+    """[x, y] or [x, y, yaw]."""
+    x, y, yaw = [*words, 0.0][:3]
+    return Pose2(float(x), float(y), float(yaw))

@@ -1,0 +1,61 @@
+"""The map under a picture, and which part of it is worth showing."""
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image
+
+from simscen.core.geometry import Array
+from simscen.core.grid import OCCUPIED, UNKNOWN, OccupancyGrid
+from simscen.report.picture import palette
+from simscen.report.picture.canvas import SAMPLES, Bounds, Canvas
+
+MARGIN = 0.4
+"""Metres around what is shown."""
+
+
+def extent(grid: OccupancyGrid, points: Array) -> Bounds:
+    """The rectangle that holds every known cell of the map and all `points` (n, 2)."""
+    rows, columns = np.nonzero(grid.cells != UNKNOWN)
+    if len(rows):
+        corners = np.array([(r, c) for r in (rows.min(), rows.max() + 1) for c in (columns.min(), columns.max() + 1)])
+        known = grid.origin.apply(corners[:, ::-1].astype(np.float64) * grid.resolution)
+        points = np.vstack((points, known))
+    if not len(points):
+        return -1.0, -1.0, 1.0, 1.0
+    (x0, y0), (x1, y1) = points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN
+    return float(x0), float(y0), float(x1), float(y1)
+
+
+def lay(canvas: Canvas, grid: OccupancyGrid) -> None:
+    """Paint the map: cells become pixels by one affine transform, whatever the map's origin and yaw."""
+    image, resolution = _coloured(grid, 1 / (canvas.scale * SAMPLES))
+    per_pixel = 1 / (canvas.scale * SAMPLES)
+    x0, _, _, y1 = canvas.bounds
+    corners = np.array([[x0, y1], [x0 + per_pixel, y1], [x0, y1 - per_pixel]])
+    at, right, down = grid.origin.inverse().apply(corners) / resolution
+    affine = (right[0] - at[0], down[0] - at[0], at[0], right[1] - at[1], down[1] - at[1], at[1])
+    canvas.paste(
+        image.transform(canvas.samples, Image.Transform.AFFINE, tuple(map(float, affine)), fillcolor=palette.UNKNOWN)
+    )
+
+
+def _coloured(grid: OccupancyGrid, pixel: float) -> tuple[Image.Image, float]:
+    """The map in colours, and its metres per cell: cells smaller than a pixel are merged, so that walls stay whole."""
+    cells, merge = grid.cells, max(1, int(pixel / grid.resolution))
+    if merge > 1:
+        cells = _merged(cells, merge)
+    table = np.empty((256, 3), dtype=np.uint8)
+    for value in range(256):
+        share = min(value, OCCUPIED) / OCCUPIED
+        table[value] = [round(f + share * (w - f)) for f, w in zip(palette.FREE, palette.WALL, strict=True)]
+    table[np.uint8(UNKNOWN % 256)] = palette.UNKNOWN
+    return Image.fromarray(table[cells.view(np.uint8)]), grid.resolution * merge
+
+
+def _merged(cells: npt.NDArray[np.int8], merge: int) -> npt.NDArray[np.int8]:
+    """The highest cost of each block of merge x merge cells."""
+    height, width = (-(-side // merge) * merge for side in cells.shape)
+    padded = np.full((height, width), UNKNOWN, dtype=np.int8)
+    padded[: cells.shape[0], : cells.shape[1]] = cells
+    blocks: npt.NDArray[np.int8] = padded.reshape(height // merge, merge, width // merge, merge).max(axis=(1, 3))
+    return blocks
