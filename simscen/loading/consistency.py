@@ -29,7 +29,7 @@ def _unknown_names(loaded: LoadedScenario) -> Iterator[Problem]:
         if names is None or reference.name in names:
             continue
         what = ARTICLES[reference.to]
-        hint = suggestion(reference.name, dict.fromkeys(names)) or f"there is no {what} here"
+        hint = suggestion(reference.name, dict.fromkeys(names)) or "there is none at all"
         yield loaded.problem(reference.keys, "SC030", f"no {what} is called {quoted(reference.name)}", hint)
 
 
@@ -46,7 +46,7 @@ def _unfit_faults(loaded: LoadedScenario) -> Iterator[Problem]:
             fitting = [name for name, said in says.items() if said in entry.fault.affects]
             hint = f"it can happen to: {', '.join(fitting)}" if fitting else "this robot has nothing it can happen to"
             message = f"fault `{entry.kind}` makes no sense on {_article(kind)} (`{entry.sensor}`)"
-            yield loaded.problem(("faults", index, entry.kind), "SC032", message, hint)
+            yield loaded.problem_at(loaded.key_place_of("faults", index, entry.kind), "SC032", message, hint)
 
 
 def _article(reading: str) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
+from simscen.core.problems import Problem
 from simscen.loading.messages import quoted, suggestion
 from simscen.loading.source import reason
 
@@ -44,6 +45,13 @@ class Fence:
             else:
                 return inside
         return self._in_world_path(written) or refusal or _outside(written)
+
+    def entered(self, path: Path) -> Path | Problem:
+        """The absolute path of a file that the command line names, with links in its folder followed, if inside."""
+        file = path.parent.resolve() / path.name
+        if self.holds(file):
+            return file
+        return Problem(str(path), 0, 0, "SC020", "the file is outside the scenario root", "choose one with --root")
 
     def holds(self, path: Path) -> bool:
         """Whether a file, with symbolic links followed, is inside the root or an allowed folder."""

@@ -34,10 +34,9 @@ def try_scenario(path: Path, root: Path, world_path: Sequence[Path] = ()) -> Loa
     """As load_scenario, but returns the problems."""
     fence = Fence.around(root, world_path)
     library = Library(fence)
-    file = path.absolute()
-    if not fence.holds(file):
-        return [Problem(str(path), 0, 0, "SC020", "the file is outside the scenario root", "choose one with --root")]
-    file = fence.root / file.relative_to(root.absolute()) if file.is_relative_to(root.absolute()) else file
+    file = fence.entered(path)
+    if isinstance(file, Problem):
+        return [file]
     tree, problems = library.read(file, defaults=True)
     if not problems and tree is not None:
         spec = check(ScenarioSpec, tree)

@@ -1,0 +1,123 @@
+"""Problems as people, editors and continuous integration read them."""
+
+import json
+import os
+import re
+import sys
+import unicodedata
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from itertools import groupby
+from pathlib import Path
+from typing import Any, TextIO
+
+from simscen.core.problems import Problem
+from simscen.report.text import ascii_only, one_line
+
+MOST_A_FILE = 50
+WIDEST = 100
+
+_TOKEN = re.compile(r"""'(?:[^']|'')*'|"(?:[^"\\]|\\.)*"|(?:[^\s,\]\}\[\{:#]|:(?=\S)|(?<=\S)#)+""")
+_WORKFLOW_COMMAND = re.compile(r"^(\s*):(?=:)", re.MULTILINE)
+
+
+def from_here(problems: Iterable[Problem], root: Path) -> list[Problem]:
+    """The problems with paths relative to the working folder, so that terminals and editors can open them."""
+    return [replace(problem, path=_from_here(problem.path, root)) for problem in problems]
+
+
+def as_text(problems: Sequence[Problem]) -> str:
+    """Each with its line, a caret below the place, and a hint; at most 50 of a file."""
+    blocks = []
+    for path, group in groupby(problems, key=lambda problem: problem.path):
+        found = list(group)
+        blocks += [_block(problem) for problem in found[:MOST_A_FILE]]
+        if len(found) > MOST_A_FILE:
+            blocks.append(f"{harmless(path)}: … and {len(found) - MOST_A_FILE} more")
+    return "\n".join(blocks)
+
+
+def as_json(problems: Iterable[Problem], **more: Any) -> str:
+    """One JSON object: `problems`, and whatever else is given."""
+    keys = ("path", "line", "col", "code", "severity", "message", "hint")
+    listed = [{key: getattr(problem, key) for key in keys} for problem in problems]
+    return json.dumps({**more, "problems": listed}, indent=2, ensure_ascii=False)
+
+
+def as_github(problems: Iterable[Problem]) -> str:
+    """Workflow commands that GitHub turns into annotations on the changed lines."""
+    return "\n".join(_annotation(problem) for problem in problems)
+
+
+def harmless(text: str) -> str:
+    """Foreign text on one line that no terminal and no CI system obeys.
+
+    GitHub runs `::command::` at the start of a line and `##[command]` anywhere in one; a backslash keeps it from that.
+    """
+    return _WORKFLOW_COMMAND.sub(r"\1:\\", one_line(text)).replace("##[", "##\\[")
+
+
+def print_text(text: str, stream: TextIO | None = None) -> None:
+    """Print on a stream of any encoding."""
+    out = sys.stdout if stream is None else stream
+    try:
+        text.encode(out.encoding or "ascii")
+    except UnicodeEncodeError:
+        text = ascii_only(text)
+    print(text, file=out)
+
+
+def _block(problem: Problem) -> str:
+    head = f"{harmless(problem.place)}: {problem.severity}[{problem.code}] {harmless(problem.message)}"
+    lines = [head, *(_excerpt(problem) if problem.source.strip() and problem.line else [])]
+    if problem.hint:
+        margin = " " * (len(str(problem.line)) + 5) if problem.source.strip() else "     "
+        lines.append(f"{margin}= {harmless(problem.hint)}")
+    return "\n".join(lines)
+
+
+def _excerpt(problem: Problem) -> list[str]:
+    """The line and a caret under the key or value; a long line is cut around it."""
+    source, start = problem.source.replace("\t", " "), max(problem.col - 1, 0)
+    token = _TOKEN.match(source, start)
+    width = len(token[0]) if token else 1
+    first = max(0, start - WIDEST // 2) if len(source) > WIDEST else 0
+    shown = source[first : first + WIDEST].rstrip()
+    width = max(1, min(width, len(shown) - (start - first)))
+    before, marked = shown[: start - first], shown[start - first : start - first + width]
+    gutter = " " * (len(str(problem.line)) + 4)
+    carets = " " * _columns(before) + "^" * max(1, _columns(marked))
+    return [f"    {problem.line} | {_kept(shown)}", f"{gutter} | {carets}"]
+
+
+def _kept(source: str) -> str:
+    """A line of the file with its spaces as they are; it follows a number and a bar, so it begins no line."""
+    return source.replace("##[", "##\\[")
+
+
+def _columns(text: str) -> int:
+    """How many columns of a terminal the text takes."""
+    return sum(0 if unicodedata.combining(c) else 2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text)
+
+
+def _annotation(problem: Problem) -> str:
+    level = "error" if problem.severity == "error" else "warning"
+    where = f"file={_property(problem.path)}"
+    if problem.line:
+        where += f",line={problem.line},col={problem.col}"
+    message = problem.message + (f"\n{problem.hint}" if problem.hint else "")
+    return f"::{level} {where},title={_property(f'simscen {problem.code}')}::{_data(message)}"
+
+
+def _data(text: str) -> str:
+    return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+
+
+def _property(text: str) -> str:
+    return _data(text).replace(":", "%3A").replace(",", "%2C")
+
+
+def _from_here(path: str, root: Path) -> str:
+    absolute = root / path
+    here = os.path.relpath(absolute)
+    return here if absolute.exists() and len(here) <= len(str(absolute)) else path

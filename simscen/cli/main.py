@@ -1,0 +1,127 @@
+"""`simscen`: finds the command, and is the one place where errors become exit codes."""
+
+import importlib.util
+import os
+import sys
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from simscen.core.errors import Exit, InvalidInput, SimscenError
+
+COMMANDS = {
+    "run": "Run scenarios and report what passed.",
+    "validate": "Check scenario, world and robot files without running anything.",
+    "list": "List the scenarios that a selection means.",
+    "judge": "Judge a recorded run again, without simulating it.",
+    "report": "Write the reports of an output folder anew.",
+    "plot": "Draw a recorded run.",
+    "new": "Write a commented scenario to start from.",
+    "explain": "Explain a trigger, action, fault, criterion, component or error code.",
+    "schema": "Print or write the JSON Schemas that editors use.",
+    "world": "Inspect, convert and export worlds.",
+    "bench": "Measure how fast simscen runs here.",
+    "doctor": "Check that this installation can run scenarios.",
+}
+"""Command → what it does. `simscen.cli.<command>` has a function `command`, or an `app` with commands of its own."""
+
+
+class Commands(TyperGroup):
+    """Imports a command's module when it is called: `validate` must not wait for pybullet."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Those that are there, in the order of COMMANDS."""
+        return [name for name in COMMANDS if importlib.util.find_spec(_module(name))]
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """The command itself; its module is imported now."""
+        if cmd_name not in self.list_commands(ctx):
+            return None
+        module = importlib.import_module(_module(cmd_name))
+        app = getattr(module, "app", None)
+        if app is None:
+            app = typer.Typer(rich_markup_mode=None, add_completion=False)
+            app.command(cmd_name)(module.command)
+        command: Any = typer.main.get_command(app)
+        command.name = cmd_name
+        return command
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """The table of `--help`, without importing any command."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, COMMANDS[name]) for name in self.list_commands(ctx)])
+
+
+app = typer.Typer(
+    cls=Commands,
+    name="simscen",
+    rich_markup_mode=None,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    no_args_is_help=True,
+)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"simscen {version('simscen')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _simscen(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print it.")
+    ] = False,
+) -> None:
+    """Declarative, deterministic scenario tests for mobile-robot navigation."""
+
+
+def main() -> None:
+    """Run the command line. Every foreseen error is told in words; its exit code says who can mend it."""
+    # Plug-ins of pydantic that happen to be installed could change what is valid; looking for them costs 12 ms, too.
+    os.environ["PYDANTIC_DISABLE_PLUGINS"] = "__all__"
+    try:
+        app()
+    except SimscenError as error:
+        sys.exit(_told(error))
+    except KeyboardInterrupt:
+        sys.exit(Exit.INTERRUPTED)
+    except BrokenPipeError:
+        # The reader of our output has gone (`simscen list | head`): nobody is left to tell. Keep the interpreter
+        # from failing on the same pipe when it flushes at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(Exit.INCOMPLETE)
+    except Exception:
+        sys.exit(_internal())
+
+
+def _told(error: SimscenError) -> Exit:
+    if isinstance(error, InvalidInput):
+        from simscen.cli.diagnostics import as_text, print_text
+
+        print_text(as_text(error.problems), sys.stderr)
+    else:
+        from simscen.cli.diagnostics import harmless, print_text
+
+        print_text(f"simscen: {harmless(str(error))}", sys.stderr)
+    return error.exit
+
+
+def _internal() -> Exit:
+    import traceback
+
+    traceback.print_exc()
+    print("simscen: internal error; this is a bug in simscen, please report it with the lines above", file=sys.stderr)
+    return Exit.INTERNAL
+
+
+def _module(command: str) -> str:
+    return f"simscen.cli.{command}"
+
+
+if __name__ == "__main__":
+    main()

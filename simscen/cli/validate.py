@@ -1,0 +1,91 @@
+"""`simscen validate`."""
+
+import sys
+from collections import Counter
+from dataclasses import dataclass, field
+from enum import Enum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from simscen.cli.diagnostics import as_github, as_json, as_text, from_here, print_text
+from simscen.core.errors import Exit
+from simscen.core.problems import Problem
+from simscen.loading.anyfile import problems_of
+from simscen.loading.discovery import ROBOT, SCENARIO, WORLD, default_root, discover
+
+
+class Format(str, Enum):
+    """How problems are printed."""
+
+    TEXT = "text"
+    JSON = "json"
+    GITHUB = "github"
+
+
+def command(
+    paths: Annotated[list[Path], typer.Argument(help="Files, or folders to search.".")],
+    format_: Annotated[Format, typer.Option("--format", help="How to print problems.")] = Format.TEXT,
+    root: Annotated[Path | None, typer.Option(help="Files inside scenarios stay in this folder.")] = None,
+    world_path: Annotated[list[Path] | None, typer.Option(help="Folder with worlds and models; repeatable.")] = None,
+) -> None:
+    """Check scenario, world and robot files without running anything.
+
+    Every problem of every file is listed with its line. Folders are searched for *.scenario.yaml, *.world.yaml and
+    *.robot.yaml. Exit code 0: all are valid; 2: some are not; 5: there are none.
+    """
+    home = root if root is not None else default_root(paths)
+    checked = _Checked()
+    for file in discover(paths, home, SCENARIO + WORLD + ROBOT):
+        kind, problems = problems_of(file, home, world_path or ())
+        checked.add(kind, from_here(problems, home))
+    _PRINT[format_](checked)
+    if checked.wrong:
+        sys.exit(Exit.USAGE)
+
+
+@dataclass
+class _Checked:
+    """How many files of each kind were read, and what was wrong."""
+
+    kinds: Counter[str] = field(default_factory=Counter)
+    problems: list[Problem] = field(default_factory=list)
+    wrong: int = 0
+
+    def add(self, kind: str, problems: list[Problem]) -> None:
+        self.kinds[kind] += 1
+        self.wrong += any(problem.severity == "error" for problem in problems)
+        self.problems += [problem for problem in problems if problem not in self.problems]
+
+    @property
+    def summary(self) -> str:
+        if self.wrong:
+            errors = sum(problem.severity == "error" for problem in self.problems)
+            return f"{_count(errors, 'problem')} in {self.wrong} of {_count(self.kinds.total(), 'file')}"
+        counts = [_count(number, kind) for kind, number in self.kinds.items()]
+        listed = " and ".join([", ".join(counts[:-1]), counts[-1]] if len(counts) > 1 else counts)
+        return f"{listed} {'is' if self.kinds.total() == 1 else 'are'} valid"
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+def _text(checked: _Checked) -> None:
+    if checked.problems:
+        print_text(as_text(checked.problems))
+    print_text(checked.summary)
+
+
+def _json(checked: _Checked) -> None:
+    print(as_json(checked.problems, valid=not checked.wrong, files=checked.kinds.total()))
+
+
+def _github(checked: _Checked) -> None:
+    if checked.problems:
+        print_text(as_github(checked.problems))
+    print_text(checked.summary)
+
+
+_PRINT = {Format.TEXT: _text, Format.JSON: _json, Format.GITHUB: _github}

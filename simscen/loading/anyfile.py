@@ -1,0 +1,49 @@
+"""Check a file of any kind that simscen reads."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from simscen.core.problems import Problem
+from simscen.loading.assets import GAZEBO, URDF, Assets, is_ros_map
+from simscen.loading.discovery import ROBOT, WORLD
+from simscen.loading.document import Library
+from simscen.loading.paths import Fence
+from simscen.loading.scenario import try_scenario
+from simscen.loading.tree import Fields
+
+_ONLY_ROBOTS = frozenset({"drive", "sensors", "limits", "body", "urdf"})
+_ONLY_WORLDS = frozenset({"walls", "obstacles", "objects", "doors", "places", "regions", "map_height", "sdf"})
+_ONLY_SCENARIOS = frozenset({"world", "robot", "goals", "pass", "events", "faults", "stack"})
+
+
+def problems_of(file: Path, root: Path, world_path: Sequence[Path] = ()) -> tuple[str, list[Problem]]:
+    """What kind of file it is ("scenario", "world", "robot" or "map"), and all that is wrong with it."""
+    kind = kind_of(file, root)
+    if kind == "scenario":
+        loaded = try_scenario(file, root, world_path)
+        return kind, loaded if isinstance(loaded, list) else list(loaded.notes)
+    library = Library(Fence.around(root, world_path))
+    if isinstance(path := library.fence.entered(file), Problem):
+        return kind, [path]
+    assets = Assets(library)
+    if kind == "world":
+        assets.world_file(path)
+    elif kind == "robot":
+        assets.robot_file(path)
+    else:
+        assets.map_file(path)
+    return kind, library.with_source(sorted(assets.problems))
+
+
+def kind_of(file: Path, root: Path) -> str:
+    """By its name where that tells, else by the keys that only one kind has."""
+    for kind, suffixes in (("world", (*WORLD, *GAZEBO)), ("robot", (*ROBOT, *URDF))):
+        if file.name.endswith(suffixes):
+            return kind
+    tree, _ = Library(Fence.around(root)).read(file.absolute())
+    if is_ros_map(tree):
+        return "map"
+    keys = set(tree.entries) if isinstance(tree, Fields) else set()
+    if keys & _ONLY_SCENARIOS:
+        return "scenario"
+    return "robot" if keys & _ONLY_ROBOTS else "world" if keys & _ONLY_WORLDS else "scenario"

@@ -1,0 +1,66 @@
+"""Which files the arguments of a command mean."""
+
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+
+from simscen.core.errors import InvalidInput, NothingSelected
+from simscen.core.problems import Problem
+from simscen.loading.messages import quoted
+from simscen.loading.scenario import scenario_id
+
+SCENARIO = (".scenario.yaml", ".scenario.yml")
+WORLD = (".world.yaml", ".world.yml")
+ROBOT = (".robot.yaml", ".robot.yml")
+
+
+def discover(paths: Sequence[Path], root: Path, suffixes: tuple[str, ...] = SCENARIO) -> list[Path]:
+    """The scenario files that `paths` mean: a file as it is, a folder searched for `*.scenario.yaml`, sorted.
+
+    Raises InvalidInput where a path is missing or two scenarios would have the same id but for case, NothingSelected
+    where there is nothing.
+    """
+    problems = [Problem(str(path), 0, 0, "SC001", "no such file or directory") for path in paths if not _there(path)]
+    if problems:
+        raise InvalidInput(problems)
+    found = dict.fromkeys(file.absolute() for path in paths for file in _files(path, suffixes))
+    if not found:
+        where = ", ".join(quoted(str(path)) for path in paths)
+        raise NothingSelected(f"no scenarios found in {where}; a folder is searched for *{suffixes[0]}")
+    files = sorted(found, key=lambda file: file.parts)
+    if problems := list(_same_ids(files, root.resolve())):
+        raise InvalidInput(problems)
+    return files
+
+
+def default_root(paths: Iterable[Path]) -> Path:
+    """The repository that holds all of `paths`, or else their common folder."""
+    folders = [path.resolve() if path.is_dir() else path.resolve().parent for path in paths]
+    common = Path(os.path.commonpath(folders)) if folders else Path.cwd()
+    return next((folder for folder in (common, *common.parents) if (folder / ".git").exists()), common)
+
+
+def _there(path: Path) -> bool:
+    return os.path.lexists(path)
+
+
+def _files(path: Path, suffixes: tuple[str, ...]) -> Iterator[Path]:
+    if not path.is_dir():
+        yield path
+        return
+    for folder, below, names in os.walk(path):
+        below[:] = sorted(name for name in below if not name.startswith("."))
+        yield from (Path(folder) / name for name in sorted(names) if name.endswith(suffixes))
+
+
+def _same_ids(files: list[Path], root: Path) -> Iterator[Problem]:
+    """Ids become folders of the output, and some file systems do not tell case apart."""
+    seen: dict[str, Path] = {}
+    for file in files:
+        other = seen.setdefault(scenario_id(file, root).casefold(), file)
+        if other != file:
+            message = (
+                f"its id is that of {quoted(str(other.relative_to(root)))}, but for upper and lower case or suffix"
+            )
+            shown = str(file.relative_to(root)) if file.is_relative_to(root) else str(file)
+            yield Problem(shown, 0, 0, "SC040", message, "rename one of them")

@@ -1,0 +1,109 @@
+"""Select scenarios by keyword and tag, as pytest's -k and -m do."""
+
+import re
+from collections.abc import Callable, Iterable, Sequence
+from typing import Protocol, TypeVar
+
+from simscen.core.errors import NothingSelected, UsageError
+from simscen.loading.messages import quoted, suggestion
+from simscen.model.scenario import ScenarioSpec
+
+_TOKEN = re.compile(r"[()]|[^\s()]+")
+DEEPEST = 50
+
+Matcher = Callable[[str], bool]
+
+
+class Selectable(Protocol):
+    """What has an id and tags: a loaded scenario."""
+
+    @property
+    def id(self) -> str:
+        """Path without suffix, relative to the root."""
+        ...
+
+    @property
+    def spec(self) -> ScenarioSpec:
+        """The scenario itself, with its tags."""
+        ...
+
+
+Item = TypeVar("Item", bound=Selectable)
+
+
+def select(scenarios: Iterable[Item], keyword: str = "", tags: Sequence[str] = ()) -> list[Item]:
+    """Those whose id matches `keyword` and that have at least one of `tags`, in order.
+
+    `keyword` is an expression like pytest's -k: parts of ids, case ignored, with `and`, `or`, `not` and brackets.
+    Raises UsageError for a broken expression, NothingSelected where nothing is left.
+    """
+    everything = list(scenarios)
+    matches = keyword_matcher(keyword) if keyword.strip() else lambda _: True
+    chosen = [s for s in everything if matches(s.id) and (not tags or not set(tags).isdisjoint(s.spec.tags))]
+    if not chosen:
+        raise NothingSelected(_nothing(everything, keyword, tags))
+    return chosen
+
+
+def keyword_matcher(expression: str) -> Matcher:
+    """The test for ids that an expression stands for. Raises UsageError where it cannot be read."""
+    reader = _Reader(_TOKEN.findall(expression), expression)
+    matcher = reader.either(0)
+    if reader.tokens:
+        raise reader.error(f"{quoted(reader.tokens[0])} is not expected there")
+    return matcher
+
+
+class _Reader:
+    """A recursive descent over or < and < not < brackets."""
+
+    def __init__(self, tokens: list[str], expression: str) -> None:
+        self.tokens, self._expression = tokens, expression
+
+    def either(self, depth: int) -> Matcher:
+        """Parts joined by `or`."""
+        options = [self._both(depth)]
+        while self._next_is("or"):
+            options.append(self._both(depth))
+        return lambda text: any(option(text) for option in options)
+
+    def _both(self, depth: int) -> Matcher:
+        parts = [self._one(depth)]
+        while self._next_is("and"):
+            parts.append(self._one(depth))
+        return lambda text: all(part(text) for part in parts)
+
+    def _one(self, depth: int) -> Matcher:
+        if depth > DEEPEST:
+            raise self.error(f"it is nested deeper than {DEEPEST}")
+        if self._next_is("not"):
+            inner = self._one(depth + 1)
+            return lambda text: not inner(text)
+        if self._next_is("("):
+            inner = self.either(depth + 1)
+            if not self._next_is(")"):
+                raise self.error("a bracket is not closed")
+            return inner
+        if not self.tokens or self.tokens[0] in ("and", "or", ")"):
+            raise self.error("a part of an id is missing")
+        word = self.tokens.pop(0).casefold()
+        return lambda text: word in text.casefold()
+
+    def _next_is(self, token: str) -> bool:
+        if self.tokens and self.tokens[0] == token:
+            self.tokens.pop(0)
+            return True
+        return False
+
+    def error(self, why: str) -> UsageError:
+        """The mistake, with the expression."""
+        return UsageError(f"cannot read -k {quoted(self._expression)}: {why}")
+
+
+def _nothing(everything: Sequence[Selectable], keyword: str, tags: Sequence[str]) -> str:
+    known = sorted({tag for scenario in everything for tag in scenario.spec.tags})
+    unknown = [tag for tag in tags if tag not in known]
+    if unknown:
+        return f"no scenario has the tag {quoted(unknown[0])}; {suggestion(unknown[0], known) or 'there are no tags'}"
+    wanted = " and ".join([*([f"-k {quoted(keyword)}"] if keyword.strip() else []), *(f"--tag {tag}" for tag in tags)])
+    return f"none of {len(everything)} scenarios matches {wanted}"
