@@ -4,6 +4,7 @@ Thrun, Burgard & Fox, Probabilistic Robotics, chapter 8; Fox, KLD-Sampling (IJRR
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -33,7 +34,7 @@ class _Correction:
     odometry: Pose2
     tick: int
 
-    @property
+    @cached_property
     def map_from_odom(self) -> Pose2:
         return self.pose.compose(self.odometry.inverse())
 
@@ -100,9 +101,8 @@ class AmclLocalizer:
         if self._belief is None:
             last, now = self._correction, self._track.newest or self._correction.odometry
             covariance = self._motion.carry(last.covariance, last.pose.yaw, last.odometry.between(now))
-            cloud = np.column_stack((self._particles.poses, self._particles.weights))
             pose = last.map_from_odom.compose(now)
-            self._belief = Belief(pose, covariance, last.map_from_odom, cloud, last.tick)
+            self._belief = Belief(pose, covariance, last.map_from_odom, self._particles.table, last.tick)
         return self._belief
 
     def _use(self, scan: Scan) -> None:

@@ -1,7 +1,6 @@
 """One pose and one covariance out of many particles."""
 
 import numpy as np
-import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2, wrap, wrap_array
 from simscen.stack.localizers.kld import BINS_OF_YAW, Keys, bins, join, split
@@ -10,26 +9,27 @@ from simscen.stack.localizers.particles import Particles
 # What "near the best particle" means: as wide as a bin of the histogram, and as a bin and its neighbours turn.
 NEAR_METRES, NEAR_RADIANS = 0.25, np.deg2rad(10)
 
-# Half of the 26 neighbours of a bin; the other half sees it from the other side.
-_AHEAD = np.array([(x, y, a) for x in (0, 1) for y in (-1, 0, 1) for a in (-1, 0, 1) if (x, y, a) > (0, 0, 0)])
+_AROUND = np.array([(x, y, a) for x in (-1, 0, 1) for y in (-1, 0, 1) for a in (-1, 0, 1)])
 
 
-def clusters(keys: Keys) -> npt.NDArray[np.int64]:
+def clusters(keys: Keys) -> Keys:
     """Labels (n,) of groups of particles whose bins touch, corners and the turn from 350° to 0° included.
 
-    `keys` (n,) are their histogram bins. As pf_kdtree_cluster of nav2_amcl, which overlooks the full turn.
+    `keys` (n,) are their histogram bins. As pf_kdtree_cluster of nav2_amcl, which overlooks the full turn. A label is
+    the rank of the lowest bin of its group. (scipy's connected_components takes 0.3 ms to answer for the few bins of
+    a robot that knows where it is, three times as long as all of this.)
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     occupied, bin_of = np.unique(keys, return_inverse=True)
     x, y, yaw = split(occupied)
-    ahead = join(x + _AHEAD[:, :1], y + _AHEAD[:, 1:2], (yaw + _AHEAD[:, 2:]) % BINS_OF_YAW)
-    found = np.minimum(np.searchsorted(occupied, ahead), len(occupied) - 1)
-    _, here = touching = np.nonzero(occupied[found] == ahead)
-    links = coo_array((np.ones(len(here)), (here, found[touching])), shape=(len(occupied), len(occupied)))
-    labels = connected_components(links, directed=False)[1].astype(np.int64)
-    return labels[bin_of]
+    wanted = join(x + _AROUND[:, :1], y + _AROUND[:, 1:2], (yaw + _AROUND[:, 2:]) % BINS_OF_YAW)
+    found = np.minimum(np.searchsorted(occupied, wanted), len(occupied) - 1)
+    itself = np.arange(len(occupied))
+    neighbours, labels = np.where(occupied[found] == wanted, found, itself), itself
+    while True:
+        lowest = labels[neighbours].min(axis=0)
+        if np.array_equal(lowest, labels):
+            return labels[bin_of]
+        labels = lowest[lowest]
 
 
 def summarise(particles: Particles) -> tuple[Pose2, Array]:

@@ -1,6 +1,7 @@
 """A weighted set of poses, and the two ways to begin one: around a guess, or anywhere."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -25,6 +26,13 @@ class Particles:
     def effective(self) -> float:
         """How many equally weighted particles would do as well: 1 / Σ w² (Liu 1996)."""
         return float(1 / (self.weights @ self.weights))
+
+    @cached_property
+    def table(self) -> Array:
+        """Poses and weights as one array (n, 4) that nobody can write to."""
+        table = np.column_stack((self.poses, self.weights))
+        table.flags.writeable = False
+        return table
 
     def within(self, distance: float) -> bool:
         """Whether every particle is at most this far from their mean, in x and in y."""
