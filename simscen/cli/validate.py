@@ -25,7 +25,7 @@ class Format(str, Enum):
 
 
 def command(
-    paths: Annotated[list[Path], typer.Argument(help="Files, or folders to search.".")],
+    paths: Annotated[list[Path], typer.Argument(help="Files, or folders to search.")],
     format_: Annotated[Format, typer.Option("--format", help="How to print problems.")] = Format.TEXT,
     root: Annotated[Path | None, typer.Option(help="Files inside scenarios stay in this folder.")] = None,
     world_path: Annotated[list[Path] | None, typer.Option(help="Folder with worlds and models; repeatable.")] = None,
