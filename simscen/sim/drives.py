@@ -2,7 +2,39 @@
 
 from typing import Protocol
 
+from simscen.core.geometry import Pose2, Pose3
 from simscen.core.motion import Twist
+from simscen.model.robot import Ackermann, Differential, Omnidirectional, SkidSteer
+from simscen.sim.ackermann import AckermannDrive
+from simscen.sim.planar import OmnidirectionalDrive, PlanarBase
+from simscen.sim.robot_body import RobotBody
+from simscen.sim.vehicle import Vehicle
+from simscen.sim.wheels import SidedDrive
+
+Vector = tuple[float, float, float]
+
+
+class Base(Protocol):
+    """A robot in the engine: body `id`, of which the links `hull_links` touch obstacles."""
+
+    id: int
+    hull_links: tuple[int, ...]
+
+    def place(self, pose: Pose2) -> None:
+        """Set it down at rest, its base frame on the ground."""
+        ...
+
+    def pose(self) -> Pose3:
+        """The base frame in the world."""
+        ...
+
+    def velocity(self) -> tuple[Vector, Vector]:
+        """Linear velocity of the base frame's origin (m/s) and angular velocity (rad/s), along the world's axes."""
+        ...
+
+    def push(self, impulse: tuple[float, float], seconds: float) -> None:
+        """Push its centre of mass during the next step, which lasts `seconds`: N s along the world's x and y."""
+        ...
 
 
 class Drive(Protocol):
@@ -32,3 +64,17 @@ class Drive(Protocol):
         metres forward, metres to the left, and radians.
         """
         ...
+
+
+def build(client: int, body: RobotBody, pose: Pose2, period: float) -> tuple[Base, Drive]:
+    """A robot set down at `pose`, and its drive, whose firmware runs every `period` seconds."""
+    match body.drive:
+        case Omnidirectional():
+            base = PlanarBase(client, body, pose)
+            return base, OmnidirectionalDrive(base, body, period)
+        case Ackermann():
+            vehicle = Vehicle(client, body, pose)
+            return vehicle, AckermannDrive(client, vehicle, body, period)
+        case Differential() | SkidSteer():
+            vehicle = Vehicle(client, body, pose)
+            return vehicle, SidedDrive(client, vehicle, body, period)

@@ -16,7 +16,11 @@ FACES_AT_ONCE = 40_000
 FLOOR = 0.005
 """Faces that lie wholly below this height in m are left to the ground plane, on which wheels roll smoothly."""
 
+PRIMITIVES = (Box, Cylinder, Sphere, Capsule)
+"""What the engine knows as such."""
+
 Triangulate = Callable[[Shape], Mesh]
+Frame = tuple[tuple[float, float, float], Pose3]
 
 
 def connect(tick_rate: int, solver_iterations: int) -> int:
@@ -115,16 +119,52 @@ def hull_shape(client: int, solids: Iterable[Solid]) -> int:
     return _made(shape)
 
 
-def primitive(shape: Shape) -> bool:
-    """Whether the engine knows this kind of shape as such."""
-    return isinstance(shape, Box | Cylinder | Sphere | Capsule)
+def hull_shapes(client: int, solids: Sequence[Solid]) -> list[int]:
+    """A robot's hull: one shape of all primitives, then the convex hull of each other solid."""
+    primitives = [solid for solid in solids if isinstance(solid.shape, PRIMITIVES)]
+    others = [solid for solid in solids if not isinstance(solid.shape, PRIMITIVES)]
+    first = [compound_shape(client, primitives)] if primitives else []
+    return first + [hull_shape(client, [solid]) for solid in others]
 
 
-def fixed(client: int, shape: int, pose: Pose3 = Pose3()) -> int:
-    """A body that nothing pushes."""
-    body: int = pybullet.createMultiBody(0, shape, -1, pose.position, pose.quaternion, physicsClientId=client)
-    pybullet.changeDynamics(body, -1, lateralFriction=1.0, restitution=0.0, physicsClientId=client)
-    return body
+def body_shape(client: int, solids: Sequence[Solid], pushable: bool, triangulate: Triangulate) -> int:
+    """The collision shape of something that moves; concave where it is and nothing pushes it.
+
+    Bullet moves convex shapes only, so what it pushes and cannot build from primitives becomes its convex hull.
+    """
+    if all(isinstance(solid.shape, PRIMITIVES) for solid in solids):
+        return compound_shape(client, solids)
+    if pushable:
+        return hull_shape(client, solids)
+    meshes = [(triangulate(solid.shape), solid.pose) for solid in solids]
+    starts = np.cumsum([0, *(len(mesh.vertices) for mesh, _ in meshes)])
+    vertices = np.concatenate([pose.apply(mesh.vertices) for mesh, pose in meshes])
+    faces = [mesh.faces + np.int32(start) for (mesh, _), start in zip(meshes, starts, strict=False)]
+    return concave_shape(client, Mesh(vertices, np.concatenate(faces)))
+
+
+def body(client: int, mass: float, shape: int, pose: Pose3, frame: Frame, friction: float) -> int:
+    """A single rigid body; `frame` holds its principal moments and its centre of mass. Nothing pushes mass 0."""
+    moments, base_from_centre = frame
+    centre = pose.compose(base_from_centre)
+    number: int = pybullet.createMultiBody(
+        mass, shape, -1, pose.position, pose.quaternion,
+        baseInertialFramePosition=base_from_centre.position,
+        baseInertialFrameOrientation=base_from_centre.quaternion, physicsClientId=client,
+    )  # fmt: skip
+    pybullet.changeDynamics(
+        number, -1, lateralFriction=friction, restitution=0.0, linearDamping=0.0, angularDamping=0.0,
+        physicsClientId=client,
+    )  # fmt: skip
+    if mass > 0:
+        pybullet.changeDynamics(number, -1, localInertiaDiagonal=moments, physicsClientId=client)
+        pybullet.resetBasePositionAndOrientation(number, centre.position, centre.quaternion, physicsClientId=client)
+    return number
+
+
+def fixed(client: int, shape: int) -> int:
+    """A body that never moves."""
+    return body(client, 0.0, shape, Pose3(), ((0.0, 0.0, 0.0), Pose3()), 1.0)
 
 
 def _primitive(shape: Shape) -> tuple[int, Sequence[float], float, float]:

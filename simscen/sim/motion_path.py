@@ -24,16 +24,16 @@ def pose_at(path: MotionPath, seconds: float) -> Pose2:
     )
 
 
-def top_speed(path: MotionPath) -> float:
-    """The fastest it ever moves in m/s; inf where it jumps."""
+def top_speed(path: MotionPath, reach: float = 0.0) -> float:
+    """The fastest that anything within `reach` metres of its origin ever moves, in m/s; inf where it jumps."""
     stops = list(zip(path.times, path.poses, strict=True))
-    speeds = [_speed(a.distance(b), tb - ta) for (ta, a), (tb, b) in pairwise(stops)]
     if path.mode == "loop":
-        speeds.append(_speed(path.poses[-1].distance(path.poses[0]), 0.0))
-    return max(speeds, default=0.0)
+        stops.append((path.times[-1], path.poses[0]))
+    return max((_speed(a, b, tb - ta, reach) for (ta, a), (tb, b) in pairwise(stops)), default=0.0)
 
 
-def _speed(metres: float, seconds: float) -> float:
+def _speed(begin: Pose2, end: Pose2, seconds: float, reach: float) -> float:
+    metres = begin.distance(end) + reach * abs(wrap(end.yaw - begin.yaw))
     if metres == 0:
         return 0.0
     return metres / seconds if seconds > 0 else math.inf

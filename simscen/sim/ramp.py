@@ -13,13 +13,13 @@ class Ramp:
         self._speed_up = limits.linear_acceleration * period
         self._slow_down = (limits.linear_deceleration or limits.linear_acceleration) * period
         self._turn = limits.angular_acceleration * period
-        self._target = STOP
+        self.target = STOP
         self.velocity = STOP
 
     def command(self, twist: Twist) -> None:
         """What to drive from now on."""
         limits = self._limits
-        self._target = Twist(
+        self.target = Twist(
             min(limits.linear, max(-(limits.reverse or limits.linear), twist.vx)),
             min(self._lateral, max(-self._lateral, twist.vy)),
             min(limits.angular, max(-limits.angular, twist.wz)),
@@ -27,9 +27,9 @@ class Ramp:
 
     def advance(self) -> bool:
         """Take one step towards the command; whether there was one to take."""
-        if self.velocity == self._target:
+        if self.velocity == self.target:
             return False
-        now, target = self.velocity, self._target
+        now, target = self.velocity, self.target
         self.velocity = Twist(
             _towards(now.vx, target.vx, self._speed_up, self._slow_down),
             _towards(now.vy, target.vy, self._speed_up, self._slow_down),

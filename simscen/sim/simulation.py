@@ -17,10 +17,10 @@ from simscen.sim import engine
 from simscen.sim.actors import Actors
 from simscen.sim.camera import picture
 from simscen.sim.contacts import Contacts, touches
-from simscen.sim.drives import Drive
+from simscen.sim.drives import build
 from simscen.sim.nearest import Owners
 from simscen.sim.robot_body import RobotBody
-from simscen.sim.vehicle import Vehicle, base_twist
+from simscen.sim.vehicle import base_twist
 
 CLEARANCE_REACH = 2.0
 """How far in metres clearance is searched."""
@@ -58,11 +58,10 @@ class Simulation:
         self._static = engine.static_mesh(self._client, static)
         self._owners = Owners(static)
         self._actors = Actors(self._client, tick_rate, triangulate)
-        self._vehicle = Vehicle(self._client, robot, pose)
+        self._firmware = max(1, round(tick_rate / FIRMWARE_RATE))
+        self._base, self._drive = build(self._client, robot, pose, self._firmware / tick_rate)
         for body in sorted(bodies, key=lambda body: body.name):
             self._actors.add(body, 0)
-        self._firmware = max(1, round(tick_rate / FIRMWARE_RATE))
-        self._drive = make_drive(self._client, self._vehicle, robot, self._firmware / tick_rate)
         self._contacts = Contacts(tick_rate)
         self._names: dict[int, str | None] = {}
         self._clearance, self._closing_speed = 0.0, 0.0
@@ -74,7 +73,7 @@ class Simulation:
         """Let everything sink onto the ground by the few micrometres that it takes."""
         for _ in range(SETTLING):
             pybullet.stepSimulation(self._client)
-        self._vehicle.place(pose)
+        self._base.place(pose)
         self._drive.rest()
 
     def step(self, ticks: int) -> None:
@@ -83,25 +82,24 @@ class Simulation:
         while self.tick < until:
             if self.tick % self._firmware == 0:
                 self._drive.advance()
-            if self._actors.travelling:
-                self._actors.advance(self.tick + 1)
-            if self.tick < self._no_contact_before:
+            if self.tick < self._no_contact_before and not self._actors.pushing:
                 pybullet.stepSimulation(client)
                 self.tick += 1
             else:
                 self._careful_step()
 
     def _careful_step(self) -> None:
-        """A step in which the robot might touch something."""
-        if not self._contacts.touching and self._measure() > 0 and self.tick < self._no_contact_before:
-            pybullet.stepSimulation(self._client)
-            self.tick += 1
-            return
-        velocity, origin = self._vehicle.velocity(), self._vehicle.pose().position
+        """A step in which something might touch something; scripted bodies need to be in place only here."""
+        self._actors.begin(self.tick)
+        if not self._contacts.touching:
+            self._measure()
+        before = self._base.velocity(), self._base.pose().position
         pybullet.stepSimulation(self._client)
         self.tick += 1
-        touched = touches(self._client, self._vehicle.id, self._names, self._owners.name, 1 / self._rate)
-        self._contacts.note(self.tick, touched, velocity, origin)
+        if self._contacts.touching or self.tick > self._no_contact_before:
+            touched = touches(self._client, self._base.id, self._names, self._owners.name, 1 / self._rate)
+            self._contacts.note(self.tick, touched, *before)
+        self._actors.show(self.tick)
 
     def drive(self, command: Twist) -> None:
         """Command a velocity in the base frame; the base follows within its limits."""
@@ -109,15 +107,16 @@ class Simulation:
 
     def truth(self) -> Truth:
         """The robot as it really is. Raises RunError when the physics has diverged."""
-        pose, velocity = self._vehicle.pose(), self._vehicle.velocity()
+        pose, velocity = self._base.pose(), self._base.velocity()
         if not all(math.isfinite(value) for value in (*pose, *velocity[0], *velocity[1])):
             raise RunError("diverged", f"simulation diverged at t={self.tick / self._rate:.3f} s: the pose is {pose}")
-        return Truth(pose, base_twist(pose, velocity), self._measure(), self._actors.poses())
+        return Truth(pose, base_twist(pose, velocity), self._measure(), self._actors.poses(self.tick))
 
     def _measure(self) -> float:
         """Clearance in metres; also works out how long no contact is possible (conservative advancement)."""
         if self._measured_at == self.tick:
             return self._clearance
+        self._actors.show(self.tick)
         travelled = self._closing_speed * (self.tick - self._measured_at) / self._rate
         self._clearance = self._search(min(CLEARANCE_REACH, self._clearance + travelled + 0.01))
         self._measured_at = self.tick
@@ -128,20 +127,21 @@ class Simulation:
 
     def _search(self, reach: float) -> float:
         """The least distance of the hull to anything. Few triangles lie within a reach that just holds the nearest."""
-        robot, client = self._vehicle.id, self._client
+        robot, client = self._base.id, self._client
         while True:
             nearest = math.inf
             for other in self._names:
-                within = min(reach, nearest)
-                for point in pybullet.getClosestPoints(robot, other, within, -1, physicsClientId=client):
-                    nearest = min(nearest, point[8])
+                for link in self._base.hull_links:
+                    within = min(reach, nearest)
+                    points = pybullet.getClosestPoints(robot, other, within, link, physicsClientId=client)
+                    nearest = min((point[8] for point in points), default=nearest)
             if nearest <= reach or reach >= CLEARANCE_REACH:
                 return min(nearest, CLEARANCE_REACH)
             reach = min(2 * reach, CLEARANCE_REACH)
 
     def _fastest(self) -> float:
         """The greatest speed in m/s at which the hull and anything else can approach each other for a while."""
-        limits, (linear, angular) = self._body.limits, self._vehicle.velocity()
+        limits, (linear, angular) = self._body.limits, self._base.velocity()
         forward = max(limits.linear, limits.reverse or 0.0, limits.lateral or 0.0, math.hypot(*linear))
         turning = max(limits.angular, math.hypot(*angular)) * self._body.circumscribed_radius
         return 1.25 * (forward + turning) + self._actors.top_speed() + 0.1
@@ -176,34 +176,34 @@ class Simulation:
 
     def object_pose(self, name: str) -> Pose3 | None:
         """Where a body is now; None when it is not there."""
-        return self._actors.poses().get(name)
+        return self._actors.poses(self.tick).get(name)
 
     def objects(self) -> Mapping[str, Pose3]:
         """Where everything that may move is now."""
-        return self._actors.poses()
+        return self._actors.poses(self.tick)
 
     def moving(self) -> Mapping[str, tuple[Body, Pose3]]:
         """Everything that may move, and where it is, for a scene of rays."""
-        return self._actors.placed()
+        return self._actors.placed(self.tick)
 
     def place_robot(self, pose: Pose2) -> None:
         """Set the robot down somewhere else, at rest."""
-        self._vehicle.place(pose)
+        self._base.place(pose)
         self._drive.rest()
         self._changed()
 
     def push(self, impulse: tuple[float, float]) -> None:
         """Push the robot during the next tick: an impulse in N s in the world frame, at its centre of mass."""
-        self._vehicle.push(impulse, 1 / self._rate)
+        self._base.push(impulse, 1 / self._rate)
         self._changed()
 
     def base_pose(self) -> Pose3:
         """The robot's base frame in the world."""
-        return self._vehicle.pose()
+        return self._base.pose()
 
     def base_velocity(self) -> tuple[Vector, Vector]:
         """Linear (m/s) and angular (rad/s) velocity of the base frame along the world's axes."""
-        return self._vehicle.velocity()
+        return self._base.velocity()
 
     def encoders(self) -> tuple[float, ...]:
         """What the drive has rolled so far; see `drives.Drive.encoders`."""
@@ -217,15 +217,9 @@ class Simulation:
         self, mount: Pose3, width: int, height: int, field_of_view: float, far: float
     ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float32]]:
         """What a camera at `mount` in the base frame sees; see `camera.picture`."""
-        return picture(self._client, self._vehicle.pose().compose(mount), width, height, field_of_view, far)
+        self._actors.show(self.tick)
+        return picture(self._client, self._base.pose().compose(mount), width, height, field_of_view, far)
 
     def close(self) -> None:
         """Give the engine back."""
         pybullet.disconnect(self._client)
-
-
-def make_drive(client: int, vehicle: Vehicle, body: RobotBody, period: float) -> Drive:
-    """The drive that the robot's specification asks for."""
-    from simscen.sim.wheels import SidedDrive
-
-    return SidedDrive(client, vehicle, body, period)

@@ -1,5 +1,7 @@
 """A robot in the engine: its hull as base, its wheels as links, and where its base frame is."""
 
+from typing import NamedTuple
+
 import pybullet
 
 from simscen.core.geometry import Pose2, Pose3
@@ -9,6 +11,10 @@ from simscen.sim.robot_body import ROTOR, RobotBody, Wheel
 
 Vector = tuple[float, float, float]
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+KNUCKLE = 0.2
+"""Mass of a steering knuckle over that of its wheel."""
+HULL_PIECE = 0.001
+"""Mass in kg of a piece of the hull that the engine needs as a link; the chassis holds the true mass."""
 
 
 class Vehicle:
@@ -25,7 +31,7 @@ class Vehicle:
         moments, self._base_from_centre = body.chassis.principal()
         self._centre = self._base_from_centre.position
         self._centre_from_base = self._base_from_centre.inverse()
-        self.id, self.joints = _build(client, body)
+        self.id, self.joints, self.hull_links = _build(client, body)
         pybullet.changeDynamics(self.id, -1, localInertiaDiagonal=moments, physicsClientId=client)
         for wheel, joint in zip(body.wheels, self.joints, strict=True):
             self._set_up(wheel, joint)
@@ -96,42 +102,59 @@ def base_twist(pose: Pose3, velocity: tuple[Vector, Vector]) -> Twist:
     return Twist(vx, vy, rotated(back, velocity[1])[2])
 
 
-def _build(client: int, body: RobotBody) -> tuple[int, tuple[int, ...]]:
-    """The multibody and, for each wheel, its first joint (steering before rolling)."""
-    links: list[tuple[Wheel, bool]] = []
+def _build(client: int, body: RobotBody) -> tuple[int, tuple[int, ...], tuple[int, ...]]:
+    """The multibody; for each wheel its first joint, steering before rolling; and the links of the hull."""
+    links: list[_Link] = []
     joints: list[int] = []
     for wheel in body.wheels:
         joints.append(len(links))
-        links += [(wheel, True), (wheel, False)] if wheel.steered else [(wheel, False)]
-    balls = {
-        w.radius: pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=w.radius, physicsClientId=client)
-        for w in body.wheels
-    }
+        links += _links(client, wheel, len(links))
+    first, *others = engine.hull_shapes(client, (*body.casters, *body.hull))
+    hull = (-1, *range(len(links), len(links) + len(others)))
+    links += [_Link(HULL_PIECE, shape, (0.0, 0.0, 0.0), 0, pybullet.JOINT_FIXED, (0, 0, 1)) for shape in others]
     _, centre = body.chassis.principal()
     robot: int = pybullet.createMultiBody(
         body.chassis.mass,
-        engine.compound_shape(client, (*body.hull, *body.casters)),
-        -1,
-        (0, 0, 0),
-        UPRIGHT,
+        first,
         baseInertialFramePosition=centre.position,
         baseInertialFrameOrientation=centre.quaternion,
-        linkMasses=[KNUCKLE * w.inertia.mass if steering else w.inertia.mass for w, steering in links],
-        linkCollisionShapeIndices=[-1 if steering else balls[w.radius] for w, steering in links],
+        linkMasses=[link.mass for link in links],
+        linkCollisionShapeIndices=[link.shape for link in links],
         linkVisualShapeIndices=[-1] * len(links),
-        linkPositions=[(w.x, w.y, w.radius) if steering or not w.steered else (0, 0, 0) for w, steering in links],
+        linkPositions=[link.place for link in links],
         linkOrientations=[UPRIGHT] * len(links),
         linkInertialFramePositions=[(0, 0, 0)] * len(links),
         linkInertialFrameOrientations=[UPRIGHT] * len(links),
-        linkParentIndices=[k if w.steered and not steering else 0 for k, (w, steering) in enumerate(links)],
-        linkJointTypes=[pybullet.JOINT_REVOLUTE] * len(links),
-        linkJointAxis=[(0, 0, 1) if steering else (0, 1, 0) for _, steering in links],
+        linkParentIndices=[link.parent for link in links],
+        linkJointTypes=[link.joint for link in links],
+        linkJointAxis=[link.axis for link in links],
         physicsClientId=client,
     )
-    pybullet.changeDynamics(robot, -1, lateralFriction=0.0, restitution=0.0, linearDamping=0, angularDamping=0,
-                            physicsClientId=client)  # fmt: skip
-    return robot, tuple(joints)
+    for link in hull:
+        pybullet.changeDynamics(
+            robot, link, lateralFriction=0.0, restitution=0.0, linearDamping=0, angularDamping=0,
+            physicsClientId=client,
+        )  # fmt: skip
+    return robot, tuple(joints), hull
 
 
-KNUCKLE = 0.2
-"""Mass of a steering knuckle over that of its wheel."""
+class _Link(NamedTuple):
+    """A link as createMultiBody wants it; parent 0 is the base, k + 1 is link k."""
+
+    mass: float
+    shape: int
+    place: Vector
+    parent: int
+    joint: int
+    axis: tuple[int, int, int]
+
+
+def _links(client: int, wheel: Wheel, number: int) -> list[_Link]:
+    ball: int = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=wheel.radius, physicsClientId=client)
+    place = (wheel.x, wheel.y, wheel.radius)
+    if not wheel.steered:
+        return [_Link(wheel.inertia.mass, ball, place, 0, pybullet.JOINT_REVOLUTE, (0, 1, 0))]
+    return [
+        _Link(KNUCKLE * wheel.inertia.mass, -1, place, 0, pybullet.JOINT_REVOLUTE, (0, 0, 1)),
+        _Link(wheel.inertia.mass, ball, (0.0, 0.0, 0.0), number + 1, pybullet.JOINT_REVOLUTE, (0, 1, 0)),
+    ]

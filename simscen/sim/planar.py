@@ -1,0 +1,140 @@
+"""A base that moves in any direction: mecanum or omni wheels, idealised as a motor for each direction."""
+
+import math
+
+import pybullet
+
+from simscen.core.geometry import Pose2, Pose3, wrap
+from simscen.core.motion import STOP, Twist
+from simscen.sim import engine
+from simscen.sim.engine import GRAVITY
+from simscen.sim.ramp import Ramp
+from simscen.sim.robot_body import RobotBody
+from simscen.sim.wheels import TRACTION
+
+Vector = tuple[float, float, float]
+UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+SLED = 0.001
+"""Mass in kg of the two carriers between the world and the hull; the engine wants one."""
+
+
+class PlanarBase:
+    """A hull on three joints from the world: along x, along y, about z. It cannot tip, and has no wheels to slip."""
+
+    def __init__(self, client: int, body: RobotBody, pose: Pose2) -> None:
+        self._client = client
+        moments, base_from_centre = body.chassis.principal()
+        sleds = 2
+        hulls = engine.hull_shapes(client, (*body.hull, *body.casters))
+        extra = len(hulls) - 1
+        self.id: int = pybullet.createMultiBody(
+            0,
+            linkMasses=[SLED] * sleds + [body.chassis.mass] + [SLED] * extra,
+            linkCollisionShapeIndices=[-1] * sleds + hulls,
+            linkVisualShapeIndices=[-1] * (sleds + len(hulls)),
+            linkPositions=[(0, 0, 0)] * (sleds + len(hulls)),
+            linkOrientations=[UPRIGHT] * (sleds + len(hulls)),
+            linkInertialFramePositions=[(0, 0, 0)] * sleds + [base_from_centre.position] + [(0, 0, 0)] * extra,
+            linkInertialFrameOrientations=[UPRIGHT] * sleds + [base_from_centre.quaternion] + [UPRIGHT] * extra,
+            linkParentIndices=[0, 1, 2] + [3] * extra,
+            linkJointTypes=[pybullet.JOINT_PRISMATIC] * sleds
+            + [pybullet.JOINT_REVOLUTE]
+            + [pybullet.JOINT_FIXED] * extra,
+            linkJointAxis=[(1, 0, 0), (0, 1, 0), (0, 0, 1)] + [(0, 0, 1)] * extra,
+            physicsClientId=client,
+        )
+        self.joints = (0, 1, 2)
+        self.hull_links = tuple(range(2, 2 + len(hulls)))
+        pybullet.changeDynamics(self.id, 2, localInertiaDiagonal=moments, physicsClientId=client)
+        for link in range(2 + len(hulls)):
+            pybullet.changeDynamics(
+                self.id, link, lateralFriction=0.0, restitution=0.0, linearDamping=0, angularDamping=0, jointDamping=0,
+                physicsClientId=client,
+            )  # fmt: skip
+        self._mass = body.mass
+        self._radius = body.circumscribed_radius
+        self.place(pose)
+
+    def place(self, pose: Pose2) -> None:
+        """Set it down at rest."""
+        for joint, value in zip(self.joints, pose, strict=True):
+            pybullet.resetJointState(self.id, joint, value, 0.0, physicsClientId=self._client)
+
+    def pose(self) -> Pose3:
+        """The base frame in the world."""
+        return Pose3.planar(self.plane())
+
+    def plane(self) -> Pose2:
+        """Like `pose`; the heading counts full turns."""
+        states = pybullet.getJointStates(self.id, self.joints, physicsClientId=self._client)
+        return Pose2(*(state[0] for state in states))
+
+    def velocity(self) -> tuple[Vector, Vector]:
+        """Linear (m/s) and angular (rad/s) velocity along the world's axes."""
+        vx, vy, wz = (state[1] for state in pybullet.getJointStates(self.id, self.joints, physicsClientId=self._client))
+        return (vx, vy, 0.0), (0.0, 0.0, wz)
+
+    def push(self, impulse: tuple[float, float], seconds: float) -> None:
+        """Push its centre of mass during the next step, which lasts `seconds`."""
+        place = pybullet.getLinkState(self.id, 2, physicsClientId=self._client)[0]
+        force = (impulse[0] / seconds, impulse[1] / seconds, 0.0)
+        pybullet.applyExternalForce(self.id, 2, force, place, pybullet.WORLD_FRAME, physicsClientId=self._client)
+
+    def motors(self, velocity: Twist) -> None:
+        """Run the motors: a velocity along the world's axes, with no more force than wheels have grip."""
+        grip = TRACTION * self._mass * GRAVITY
+        pybullet.setJointMotorControlArray(
+            self.id,
+            self.joints,
+            pybullet.VELOCITY_CONTROL,
+            targetVelocities=velocity,
+            forces=(grip, grip, grip * self._radius),
+            physicsClientId=self._client,
+        )
+
+
+class OmnidirectionalDrive:
+    """Follows any twist; its encoders see every motion over the ground, in the base frame."""
+
+    def __init__(self, base: PlanarBase, body: RobotBody, period: float) -> None:
+        self._base, self._period = base, period
+        self._ramp = Ramp(body.limits, period, holonomic=True)
+        self._rolled = (0.0, 0.0, 0.0)
+        self._seen = base.plane()
+        base.motors(STOP)
+
+    def command(self, twist: Twist) -> None:
+        """Drive this from now on."""
+        self._ramp.command(twist)
+
+    def advance(self) -> None:
+        """Turn the motors' velocity with the base, half a period ahead, so that it drives arcs."""
+        changed = self._ramp.advance()
+        velocity = self._ramp.velocity
+        if not changed and velocity == STOP:
+            return
+        self._count()
+        heading = self._seen.yaw + velocity.wz * self._period / 2
+        c, s = math.cos(heading), math.sin(heading)
+        self._base.motors(Twist(c * velocity.vx - s * velocity.vy, s * velocity.vx + c * velocity.vy, velocity.wz))
+
+    def rest(self) -> None:
+        """Start again from standstill."""
+        self._ramp.rest()
+        self._seen = self._base.plane()
+        self._base.motors(STOP)
+
+    def encoders(self) -> tuple[float, ...]:
+        """Metres forward, metres to the left and radians so far."""
+        self._count()
+        return self._rolled
+
+    def _count(self) -> None:
+        """Add the motion since last counted, as the constant twist that leads there (the logarithm in SE(2))."""
+        now = self._base.plane()
+        step, turn = self._seen.between(now), wrap(now.yaw - self._seen.yaw)
+        self._seen = now
+        half = turn / 2
+        scale = half / math.tan(half) if abs(half) > 1e-9 else 1.0
+        forward, left = scale * step.x + half * step.y, scale * step.y - half * step.x
+        self._rolled = (self._rolled[0] + forward, self._rolled[1] + left, self._rolled[2] + turn)
