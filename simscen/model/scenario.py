@@ -17,6 +17,7 @@ from simscen.spec.quantities import (
     Angle,
     Frequency,
     Length,
+    NonNegativeAngle,
     NonNegativeLength,
     PositiveAngle,
     PositiveDuration,
@@ -42,7 +43,11 @@ class InitialEstimate(Spec):
     x: Length
     y: Length
     yaw: Angle = 0.0
-    std: Annotated[list[NonNegativeLength], Field(min_length=3, max_length=3)] = [0.5, 0.5, 0.2618]
+    std: Annotated[tuple[NonNegativeLength, NonNegativeLength, NonNegativeAngle], Field(strict=False)] = (
+        0.5,
+        0.5,
+        0.2618,
+    )
     """Standard deviations of x, y (m) and yaw (rad); Nav2's default covariance."""
 
 
@@ -132,5 +137,5 @@ def estimate_of(entry: RobotEntry, truth: Pose2) -> Estimate:
         case "unknown":
             return Estimate(None)
         case InitialEstimate() as told:
-            return Estimate(Pose2(told.x, told.y, told.yaw), (told.std[0], told.std[1], told.std[2]))
+            return Estimate(Pose2(told.x, told.y, told.yaw), told.std)
     raise AssertionError(entry.initial_estimate)

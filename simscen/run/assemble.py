@@ -45,7 +45,8 @@ def assemble(prepared: Prepared, seed: int) -> Rig:
     sensors: tuple[Sensor, ...] = build_sensors(prepared.robot, clock, streams, simulation, rays)
     truth_period = clock.period(spec.physics.truth_rate)
     if isinstance(prepared.stack.localizer, GroundTruth):
-        sensors = (TruthSensor(simulation, clock.period(prepared.stack.controller_frequency)), *sensors)
+        # Last, because the log takes the first odometry for the robot's own.
+        sensors = (*sensors, TruthSensor(simulation, clock.period(prepared.stack.controller_frequency)))
     senses = Senses(sensors)
 
     surroundings = Surroundings(

@@ -1,0 +1,63 @@
+"""The output folder of a session: made at the start, so that an unusable one is known before anything runs."""
+
+import os
+import secrets
+from contextlib import suppress
+from datetime import datetime, timezone
+from pathlib import Path
+
+from simscen.core.errors import UsageError
+
+DEFAULT = Path("simscen-out")
+
+
+def make_folder(out: Path | None) -> Path:
+    """The folder `out`, which must be new or empty, or simscen-out/<UTC time>-<4 hex>, to which `latest` then links.
+
+    Raises UsageError when it cannot be made or written to; what is in it is never touched.
+    """
+    folder = out or DEFAULT / f"{datetime.now(timezone.utc):%Y%m%dT%H%M%SZ}-{secrets.token_hex(2)}"
+    try:
+        if folder.is_dir() and any(folder.iterdir()):
+            raise UsageError(f"the output folder {folder} is not empty; nothing in it was touched")
+        folder.mkdir(parents=True, exist_ok=True)
+        probe_writable(folder / ".probe")
+    except OSError as error:
+        raise UsageError(f"cannot use the output folder {folder}: {error.strerror}") from error
+    if out is None:
+        _link_latest(folder)
+    return folder
+
+
+def probe_writable(path: Path) -> None:
+    """Raise OSError unless a file can be written at `path`; leaves no trace."""
+    existed = path.exists()
+    with path.open("ab"):
+        pass
+    if not existed:
+        path.unlink()
+
+
+def write_atomically(path: Path, data: bytes) -> None:
+    """Replace a file as a whole: whoever reads it sees the old one or the new one, even after a crash."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        with part.open("wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(path)
+    except OSError:
+        with suppress(OSError):
+            part.unlink()
+        raise
+
+
+def _link_latest(folder: Path) -> None:
+    """`latest` beside the folder; a file system without links does without."""
+    link = folder.parent / "latest"
+    part = folder.parent / f".latest.{os.getpid()}"
+    with suppress(OSError):
+        part.symlink_to(folder.name)
+        part.replace(link)
