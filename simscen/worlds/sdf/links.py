@@ -12,7 +12,7 @@ from simscen.worlds.sdf.markup import Element
 from simscen.worlds.sdf.placing import PlacedLink
 from simscen.worlds.sdf.report import Report
 from simscen.worlds.sdf.shapes import ShapeReader
-from simscen.worlds.sdf.vocabulary import judge_unknown
+from simscen.worlds.sdf.vocabulary import judge_children, judge_unknown
 
 WATER = 1000.0
 """kg/m³, the density SDF assumes for `<inertial auto="true">`."""
@@ -51,9 +51,7 @@ def read_link(link: PlacedLink, reader: ShapeReader, report: Report) -> LinkCont
 
 
 def _collision(element: Element, link: PlacedLink, reader: ShapeReader, report: Report) -> Iterator[Solid]:
-    for child in element.children:
-        if child.tag != "geometry":
-            judge_unknown(child, "collision", report)
+    judge_children(element, "collision", report)
     geometry = element.child("geometry")
     if geometry is None:
         raise element.unusable("<geometry> is missing")

@@ -11,6 +11,8 @@ from xml.parsers import expat
 from simscen.worlds.sdf.report import Place, Unusable
 
 DEEPEST = 100
+MOST_ELEMENTS = 500_000
+"""BARN's worlds have 13 000; twenty megabytes of `<a/>` would otherwise take gigabytes."""
 LONGEST_SHOWN_LINE = 300
 
 
@@ -28,7 +30,7 @@ class Source:
         return text.decode("utf-8", "replace").rstrip("\r") if len(text) <= LONGEST_SHOWN_LINE else ""
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, slots=True)
 class Element:
     """An element with its place in the file; `text` is stripped and joined, `children` keep document order."""
 
@@ -93,8 +95,11 @@ def parse(data: bytes, file: str, folder: str) -> Element:
     parser.buffer_text = True
     root: list[Element] = []
     open_elements: list[Element] = []
+    count = 0
 
     def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal count
+        count += 1
         parent = open_elements[-1] if open_elements else None
         line, col = parser.CurrentLineNumber, parser.CurrentColumnNumber + 1
         element = Element(tag, attributes, source, line, col, parent)
@@ -102,6 +107,8 @@ def parse(data: bytes, file: str, folder: str) -> Element:
         open_elements.append(element)
         if len(open_elements) > DEEPEST:
             raise Unusable(Place(file, line, col), f"nested deeper than {DEEPEST}")
+        if count > MOST_ELEMENTS:
+            raise Unusable(Place(file, line, col), f"more than {MOST_ELEMENTS} elements")
 
     def end(_: str) -> None:
         open_elements.pop()

@@ -12,6 +12,7 @@ from simscen.worlds.sdf.markup import Element
 from simscen.worlds.sdf.meshes import MeshShelf
 from simscen.worlds.sdf.polyline import read_polylines
 from simscen.worlds.sdf.report import Report
+from simscen.worlds.sdf.vocabulary import MATTERS, judge_children
 
 
 def _box(element: Element) -> Shape:
@@ -70,6 +71,9 @@ class ShapeReader:
         first = found[0]
         if any(child.tag != first.tag for child in found):
             raise geometry.unusable("holds more than one shape: " + ", ".join(child.tag for child in found))
+        for shape in found:
+            if shape.tag in MATTERS:
+                judge_children(shape, shape.tag, self.report)
         match first.tag:
             case tag if tag in PRIMITIVES:
                 return (Solid(PRIMITIVES[tag](first)),)

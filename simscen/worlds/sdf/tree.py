@@ -8,7 +8,7 @@ from simscen.worlds.sdf.frames import MODEL, WORLD, Frame, Scope
 from simscen.worlds.sdf.includes import Shelf
 from simscen.worlds.sdf.markup import Element
 from simscen.worlds.sdf.report import Report
-from simscen.worlds.sdf.vocabulary import judge_unknown
+from simscen.worlds.sdf.vocabulary import judge_children, judge_unknown
 
 MOST_MODELS = 20_000
 """Files that include each other tenfold at every level would otherwise unfold without end."""
@@ -122,6 +122,7 @@ class TreeReader:
 
     def include(self, owner: Model, include: Element) -> None:
         """Bring in the one model, actor or light of another file."""
+        judge_children(include, "include", self.report)
         root = self.shelf.enter(include)
         try:
             found = list(root.all("model", "actor", "light", "world"))

@@ -20,39 +20,76 @@ HARMLESS = {
     },
     "collision": {"laser_retro", "max_contacts", "density", "auto_inertia_params", "surface"},
     "actor": {"static", "skin", "animation", "script", "joint", "self_collide"},
+    "include": {"namespace"},
+    "heightmap": {"texture", "blend", "use_terrain_paging", "sampling", "use_terrain_splatting"},
+    "mesh": {"convex_decomposition"},
 }  # fmt: skip
 """What may stand in each element without adding a solid. Source: SDF specification 1.4 to 1.12, and its examples."""
 
-SOLID = {"world": {"model", "include", "actor", "population", "joint"},
-         "model": {"model", "include", "link", "joint"},
-         "link": {"collision"},
-         "collision": {"geometry"},
-         "actor": {"link"}}  # fmt: skip
-"""What may add a solid, or move one."""
+MATTERS = {
+    "world": {"model", "include", "actor", "population", "joint", "frame", "state"},
+    "model": {"model", "include", "link", "joint", "frame", "pose", "static"},
+    "link": {"collision", "pose", "inertial"},
+    "collision": {"geometry", "pose"},
+    "actor": {"link", "script", "pose"},
+    "include": {"uri", "name", "pose", "static", "placement_frame"},
+    "box": {"size"},
+    "cylinder": {"radius", "length"},
+    "sphere": {"radius"},
+    "capsule": {"radius", "length"},
+    "ellipsoid": {"radii"},
+    "cone": {"radius", "length"},
+    "plane": {"normal", "size"},
+    "polyline": {"point", "height"},
+    "heightmap": {"uri", "size", "pos"},
+    "mesh": {"uri", "scale", "submesh"},
+    "empty": set(),
+}
+"""What adds a solid or moves one: a misspelling of these must not go unseen."""
 
+SHAPES = {
+    "box",
+    "cylinder",
+    "sphere",
+    "capsule",
+    "ellipsoid",
+    "cone",
+    "plane",
+    "polyline",
+    "heightmap",
+    "mesh",
+    "empty",
+}
 _ADDING = {"model", "include", "actor", "population", "link", "collision", "geometry"}
 _XACRO_DEFINITIONS = ("xacro:arg", "xacro:property", "xacro:macro")
+_XACRO_CHOICES = ("xacro:if", "xacro:unless")
 
 
 def judge_unknown(element: Element, parent: str, report: Report) -> None:
     """Report an element in `parent` that the importer does not read; known harmless ones are passed over.
 
-    An unknown element changes the geometry if something solid stands in it or if its name is a misspelling of
-    something solid; otherwise it gets a note. Elements with a prefix of their own are extensions, as SDF allows.
+    An unknown element changes the geometry if something solid stands in it, if it stands in a shape, or if its name
+    is a misspelling of something that matters; otherwise it gets a note. Elements with a prefix of their own are
+    extensions, as SDF allows. Raises Unusable.
     """
     tag = element.tag
+    harmless = HARMLESS.get(parent, set()) | (set() if parent in SHAPES else _ANYWHERE)
+    if tag in harmless or tag in _XACRO_DEFINITIONS:
+        return
     adds = any(below.tag in _ADDING for below in element.descendants())
-    if tag in HARMLESS[parent] | _ANYWHERE or tag in _XACRO_DEFINITIONS:
-        return
-    if tag.startswith("xacro:"):
-        if adds or tag not in ("xacro:if", "xacro:unless"):
-            raise element.unusable(f"<{tag}> is not expanded", "run xacro on the file first")
-        return
+    if tag == "experimental:params" or (tag.startswith("xacro:") and (adds or tag not in _XACRO_CHOICES)):
+        raise element.unusable(f"<{tag}> is not expanded", "expand it first: run xacro, or `gz sdf -p`")
     if ":" in tag and not adds:
         return
-    known = sorted(SOLID[parent] | HARMLESS[parent] | _ANYWHERE)
-    close = difflib.get_close_matches(tag, known, n=1, cutoff=0.75)
+    close = difflib.get_close_matches(tag, sorted(MATTERS[parent] | harmless), n=1, cutoff=0.75)
     hint = f"did you mean <{close[0]}>?" if close else ""
-    if adds or (close and close[0] in SOLID[parent]):
+    if adds or parent in SHAPES or (close and close[0] in MATTERS[parent]):
         raise element.unusable(f"unknown element <{tag}>", hint)
     report.note(element.place, f"unknown element <{tag}> ignored" + (f"; {hint}" if hint else ""))
+
+
+def judge_children(element: Element, parent: str, report: Report) -> None:
+    """Report every child that the importer does not read, for an element whose children are asked for by name."""
+    for child in element.children:
+        if child.tag not in MATTERS[parent]:
+            judge_unknown(child, parent, report)

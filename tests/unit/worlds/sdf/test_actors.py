@@ -4,11 +4,16 @@ from simscen.core.geometry import Pose2
 from simscen.core.shapes import Cylinder
 
 SKIN = "<skin><filename>walk.dae</filename></skin>"
-BOX = "<link name='l'><collision name='c'><pose>0 0 0.5 0 0 0</pose><geometry><box><size>1 1 1</size></box></geometry></collision></link>"
+BOX = (
+    "<link name='l'><collision name='c'><pose>0 0 0.5 0 0 0</pose><geometry><box><size>1 1 1</size></box></geometry>"
+    "</collision></link>"
+)
 
 
 def trajectory(points, number=0):
-    waypoints = "".join(f"<waypoint><time>{t}</time><pose>{x} {y} {z} 0 0 {yaw}</pose></waypoint>" for t, x, y, z, yaw in points)
+    waypoints = "".join(
+        f"<waypoint><time>{t}</time><pose>{x} {y} {z} 0 0 {yaw}</pose></waypoint>" for t, x, y, z, yaw in points
+    )
     return f"<trajectory id='{number}' type='walking'>{waypoints}</trajectory>"
 
 

@@ -94,7 +94,8 @@ def test_mass_from_density(load):
     inertial = "<inertial auto='true'><density>500</density></inertial>"
     (body,) = load(model(f"<link name='a'>{inertial}{BOX.replace('1 1 1', '1 2 3')}</link>")).bodies
     assert body.mass == pytest.approx(3000)
-    cone = "<collision name='c'><density>1200</density><geometry><cone><radius>0.5</radius><length>2</length></cone></geometry></collision>"
+    shape = "<cone><radius>0.5</radius><length>2</length></cone>"
+    cone = f"<collision name='c'><density>1200</density><geometry>{shape}</geometry></collision>"
     (body,) = load(model(f"<link name='a'>{inertial}{cone}</link>")).bodies
     assert body.mass == pytest.approx(1200 * np.pi * 0.25 * 2 / 3, rel=0.01)
     assert body.pose.z == pytest.approx(-0.5)
@@ -123,5 +124,7 @@ def test_more_than_2000_bodies_are_refused(refuse):
 
 
 def test_order_is_that_of_the_document(load):
-    text = model(f"<model name='n'>{link('x')}</model>" + link("a", 3), rest="<static>1</static>") + model(link("z"), "b")
+    text = model(f"<model name='n'>{link('x')}</model>" + link("a", 3), rest="<static>1</static>") + model(
+        link("z"), "b"
+    )
     assert [solid.name for solid in load(text).solids] == ["cart::n::x::c", "cart::a::c"]

@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from simscen.core.errors import InvalidInput
-from simscen.worlds.sdf import load_sdf
+from simscen.worlds.sdf import load_sdf, markup
 
 BOX = "<collision name='c'><geometry><box><size>1 1 1</size></box></geometry></collision>"
 LINK = f"<link name='a'>{BOX}</link>"
@@ -43,6 +43,12 @@ def test_binary_files_are_refused(tmp_path):
         load_sdf(tmp_path / "x.world", root=tmp_path)
 
 
+def test_the_number_of_elements_is_limited(refuse, monkeypatch):
+    monkeypatch.setattr(markup, "MOST_ELEMENTS", 1000)
+    (problem,) = refuse("<sdf version='1.9'>" + "<a/>" * 1000)
+    assert "more than 1000 elements" in problem.message
+
+
 def test_files_beyond_20_mib_are_refused_at_once(tmp_path):
     with (tmp_path / "x.world").open("wb") as file:
         file.truncate(100 * 2**20)
@@ -55,7 +61,7 @@ def test_files_beyond_20_mib_are_refused_at_once(tmp_path):
 @pytest.mark.parametrize("make", [Path.mkdir, lambda path: path.symlink_to("/dev/zero")])
 def test_a_world_must_be_a_file_inside_the_root(tmp_path, make):
     make(tmp_path / "x.world")
-    with pytest.raises(InvalidInput, match="not a regular file|outside the scenario root"):
+    with pytest.raises(InvalidInput, match=r"not a regular file|outside the scenario root"):
         load_sdf(tmp_path / "x.world", root=tmp_path)
 
 
@@ -77,8 +83,11 @@ def test_several_mistakes_are_told_at_once_in_file_order(refuse):
         (f"<modle name='x'>{LINK}</modle>", "unknown element <modle>", "did you mean <model>?"),
         (f"<group>{MODEL}</group>", "unknown element <group>", ""),
         (MODEL.replace("box", "bocks"), "<bocks> is not a shape that is read", "one of box, cylinder"),
-        (f"<xacro:if value='$(arg x)'>{MODEL}</xacro:if>", "<xacro:if> is not expanded", "run xacro"),
-        ("<xacro:shelf x='1'/>", "<xacro:shelf> is not expanded", "run xacro"),
+        (f"<xacro:if value='$(arg x)'>{MODEL}</xacro:if>", "<xacro:if> is not expanded", "expand it"),
+        (MODEL.replace("static>", "statik>"), "unknown element <statik>", "did you mean <static>?"),
+        (MODEL.replace("</size>", "</size><pos>1 0 0</pos>"), "unknown element <pos>", ""),
+        (MODEL.replace("<geometry>", "<poze>1 0 0</poze><geometry>"), "unknown element <poze>", "did you mean <pose>?"),
+        ("<xacro:shelf x='1'/>", "<xacro:shelf> is not expanded", "expand it"),
     ],
 )
 def test_unknown_elements_that_may_hold_geometry_are_errors(refuse, world, message, hint):
@@ -125,7 +134,12 @@ def test_loading_twice_gives_the_same(load):
 
 @pytest.mark.parametrize(
     ("name", "message"),
-    [("", "<model> has no name"), ("x" * 121, "longer than 120"), ("a&#x1b;b", "not well-formed"), ("a&#x202e;b", "control character")],
+    [
+        ("", "<model> has no name"),
+        ("x" * 121, "longer than 120"),
+        ("a&#x1b;b", "not well-formed"),
+        ("a&#x202e;b", "control character"),
+    ],
 )
 def test_names_are_checked(refuse, name, message):
     assert message in refuse(MODEL.replace("'m'", f"'{name}'"))[0].message

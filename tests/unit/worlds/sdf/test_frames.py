@@ -86,7 +86,10 @@ def test_a_placement_frame_is_what_the_pose_places(load):
 
 def test_the_old_frame_attribute_means_relative_to(load):
     world = load(
-        model(f"<link name='a'><pose>2 0 0 0 0 0</pose></link><link name='b'><pose frame='a'>1 0 0 0 0 0</pose>{BOX}</link>"),
+        model(
+            "<link name='a'><pose>2 0 0 0 0 0</pose></link>"
+            f"<link name='b'><pose frame='a'>1 0 0 0 0 0</pose>{BOX}</link>"
+        ),
         version="1.5",
     )
     assert position(world) == pytest.approx((3, 0, 0))
@@ -117,7 +120,7 @@ poses = st.tuples(*[numbers] * 6)
 @given(st.lists(poses, min_size=1, max_size=5))
 def test_a_chain_of_frames_is_the_product_of_their_matrices(chain):
     text = "".join(
-        f"<frame name='f{k}'><pose relative_to='{'f%d' % (k - 1) if k else ''}'>{' '.join(map(str, p))}</pose></frame>"
+        f"<frame name='f{k}'><pose relative_to='{f'f{k - 1}' if k else ''}'>{' '.join(map(str, p))}</pose></frame>"
         for k, p in enumerate(chain)
     )
     root = parse(f"<m>{text}</m>".encode(), "x", ".")
@@ -169,5 +172,3 @@ def test_a_wrong_pose_is_an_error_at_its_line(refuse, pose, message):
     assert (problems[0].line, problems[0].col) == (4, 1)
     assert message in problems[0].message
     assert problems[0].message.startswith("world[w]/model[m]/link[a]/pose: ")
-
-

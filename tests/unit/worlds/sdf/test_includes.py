@@ -4,7 +4,7 @@ import pytest
 
 from simscen.core.errors import InvalidInput
 from simscen.core.shapes import Box, Sphere
-from simscen.worlds.sdf import load_sdf
+from simscen.worlds.sdf import load_sdf, tree
 
 CRATE = (
     "<sdf version='{version}'><model name='crate'>{extra}<link name='a'><collision name='c'><geometry>{shape}"
@@ -89,7 +89,8 @@ def test_what_is_included_into_a_static_model_is_static(load, tmp_path):
 
 def test_a_merged_include_lends_its_names_and_takes_its_owners_static(load, tmp_path):
     write(tmp_path / "m", extra="<static>1</static>")
-    on_top = f"<link name='b'><pose relative_to='a'>0 0 1 0 0 0</pose><collision name='c'><geometry>{BALL}</geometry></collision></link>"
+    ball = f"<collision name='c'><geometry>{BALL}</geometry></collision>"
+    on_top = f"<link name='b'><pose relative_to='a'>0 0 1 0 0 0</pose>{ball}</link>"
     merged = include("m/crate", "<pose>3 0 0 0 0 0</pose>", "merge='true'")
     joint = "<joint name='j' type='fixed'><parent>a</parent><child>b</child></joint>"
     (body,) = load(f"<model name='cart'>{merged}{on_top}{joint}</model>").bodies
@@ -122,6 +123,17 @@ def test_a_missing_model_says_where_it_was_looked_for(refuse, models):
     assert problem.hint == "looked in elsewhere/models; allow its folder with --world-path"
 
 
+@pytest.mark.parametrize(
+    ("tag", "message"), [("poes", "did you mean <pose>?"), ("experimental:params", "expand it first")]
+)
+def test_an_include_is_not_half_understood(refuse, models, tag, message):
+    text = include("model://crate", f"<{tag}>1 0 0 0 0 0</{tag}>")
+    (problem,) = refuse(
+        f"<sdf version='1.9' xmlns:experimental='x'><world name='w'>{text}</world></sdf>", search=[models]
+    )
+    assert problem.hint.startswith(message)
+
+
 def test_online_models_are_not_fetched(refuse):
     (problem,) = refuse(include("https://fuel.gazebosim.org/1.0/OpenRobotics/models/Coke"))
     assert "only model://, package://, file:// and relative paths are read" in problem.message
@@ -135,11 +147,12 @@ def test_a_circle_of_includes_is_refused_with_its_chain(tmp_path, load, refuse):
     assert "include cycle: a/model.sdf → b/model.sdf → a/model.sdf" in problem.message
 
 
-def test_includes_that_unfold_without_end_are_refused_in_time(tmp_path, refuse):
+def test_includes_that_unfold_without_end_are_refused_in_time(tmp_path, refuse, monkeypatch):
+    monkeypatch.setattr(tree, "MOST_MODELS", 1000)
     for level in range(8):
         inner = "".join(include(f"../l{level + 1}", f"<name>n{k}</name>") for k in range(10))
         write(tmp_path, f"l{level}", extra=inner if level < 7 else "")
-    assert any("more than 20000 models" in problem.message for problem in refuse(include("l0")))
+    assert any("more than 1000 models" in problem.message for problem in refuse(include("l0")))
 
 
 def test_an_error_in_an_included_file_is_told_in_that_file(tmp_path, refuse):

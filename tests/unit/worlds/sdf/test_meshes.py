@@ -20,7 +20,8 @@ GEOMETRY = """<geometry id="{id}" name="{id}"><mesh>
  <vertices id="{id}v"><input semantic="POSITION" source="#{id}p"/></vertices>
  {primitive}</mesh></geometry>"""
 TRIANGLES = """<triangles count="1"><input semantic="VERTEX" source="#{id}v" offset="0"/><p>0 1 2</p></triangles>"""
-QUAD = """<polylist count="1"><input semantic="VERTEX" source="#{id}v" offset="0"/><vcount>4</vcount><p>0 1 2 3</p></polylist>"""
+QUAD = """<polylist count="1"><input semantic="VERTEX" source="#{id}v" offset="0"/><vcount>4</vcount>
+ <p>0 1 2 3</p></polylist>"""
 NODE = """<node id="{id}n" name="{name}">{transform}<instance_geometry url="#{id}"/>{inner}</node>"""
 
 
@@ -121,7 +122,8 @@ class TestCollada:
 
     def test_nodes_that_unfold_without_end_are_refused(self):
         levels = "".join(
-            f'<node id="l{k}"><instance_node url="#l{k + 1}"/><instance_node url="#l{k + 1}"/></node>' for k in range(20)
+            f'<node id="l{k}"><instance_node url="#l{k + 1}"/><instance_node url="#l{k + 1}"/></node>'
+            for k in range(20)
         )
         library = f'<library_nodes><node id="l20"/>{levels}</library_nodes><library_visual_scenes>'
         text = dae(nodes='<node><instance_node url="#l0"/></node>').replace("<library_visual_scenes>", library)
@@ -140,8 +142,11 @@ class TestStl:
         np.testing.assert_allclose(corners(shape), [(0, 0, 0), (1, 0, 0), (0, 1, 0)])
 
     def test_text_files_are_read(self, mesh):
-        text = "solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 2 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid x\n"
-        np.testing.assert_allclose(sorted(map(tuple, corners(mesh(text, name="x.STL")))), [(0, 0, 0), (0, 1, 0), (2, 0, 0)])
+        loop = "outer loop\nvertex 0 0 0\nvertex 2 0 0\nvertex 0 1 0\nendloop\n"
+        text = f"solid x\nfacet normal 0 0 1\n{loop}endfacet\nendsolid x\n"
+        np.testing.assert_allclose(
+            sorted(map(tuple, corners(mesh(text, name="x.STL")))), [(0, 0, 0), (0, 1, 0), (2, 0, 0)]
+        )
 
     @pytest.mark.parametrize(("claimed", "held"), [(1000, 2), (1, 2), (4_000_000_000, 1)])
     def test_a_false_count_is_refused(self, broken, claimed, held):
@@ -153,14 +158,17 @@ class TestStl:
         assert "too short" in broken(b"solid", name="x.stl").message
 
     def test_more_than_half_a_million_triangles_are_refused(self):
-        with pytest.raises(UnusableMesh, match="larger|more than 500000 triangles"):
+        with pytest.raises(UnusableMesh, match="more than 500000 triangles"):
             read_parts(stl(500_001, 1)[:84] + bytes(50 * 500_001), ".stl", "x.stl")
 
     def test_values_that_are_no_numbers_are_refused(self, broken):
-        assert "not a finite number" in broken(stl(1, 1).replace(struct.pack("<f", 1.0), struct.pack("<f", float("nan"))), name="x.stl").message  # fmt: skip
+        content = stl(1, 1).replace(struct.pack("<f", 1.0), struct.pack("<f", float("nan")))
+        assert "not a finite number" in broken(content, name="x.stl").message
 
 
-OBJ = "mtllib ../../secret.mtl\no left\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\no right\nv 5 0 0\nv 6 0 0\nv 5 1 0\nf 4 5 6\n"
+OBJ = (
+    "mtllib ../../secret.mtl\no left\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\no right\nv 5 0 0\nv 6 0 0\nv 5 1 0\nf 4 5 6\n"
+)
 
 
 class TestObj:

@@ -15,6 +15,7 @@ from simscen.core.world import World
 from simscen.worlds.meshing import fuse
 from simscen.worlds.rays import RayScene
 from simscen.worlds.sdf import load_sdf
+from simscen.worlds.slicing import map_of
 
 BARN = ("world_1", "world_40", "world_55", "world_111", "world_217", "world_289")
 
@@ -71,6 +72,20 @@ def test_concave_walls_are_not_filled(data: Path) -> None:
     np.testing.assert_allclose(distances, [6.8514, 6.8614, 10.3208, 10.3208], atol=0.001)
 
 
+def test_the_warehouse_map_lies_on_the_warehouse(data: Path) -> None:
+    """Occupied cells of the map within 15 cm of the solids at lidar height, but for a shift of the whole map."""
+    folder = data / "aws_small_warehouse"
+    world = load_sdf(folder / "worlds/no_roof_small_warehouse.world", root=folder, search=[folder / "models"])
+    ours = map_of(world, fuse(world.solids), 0.2)
+    occupied, _ = _map(folder / "maps/005/map_rotated.png")
+    rows, columns = np.nonzero(occupied)
+    shift = (0.1, 0.15)  # best of a search over whole cells and quarter turns
+    points = np.column_stack([columns, rows]) * CELL + 0.025 + (-7, -10.5) + shift
+    cells = ours.cell_of(points)
+    away = distance_transform_edt(ours.cells != 100) * CELL
+    assert np.mean(away[cells[:, 0], cells[:, 1]] < 0.15) >= 0.95
+
+
 def test_units_are_honoured_and_up_axis_is_not_as_in_gazebo(data: Path) -> None:
     """The hexagon says inches and Y_UP and stands upright along z: 0.55 x 1.4 m wide, up to 1.4 m high."""
     world = _sandbox(data)
@@ -109,7 +124,7 @@ def _sandbox(data: Path) -> World:
 
 
 def _map(file: Path) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
-    darkness = (255 - np.asarray(Image.open(file), dtype=float)[::-1]) / 255
+    darkness = (255 - np.asarray(Image.open(file).convert("L"), dtype=float)[::-1]) / 255
     return darkness > 0.65, darkness < 0.196
 
 

@@ -1,4 +1,5 @@
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -168,7 +169,7 @@ def _even_odd(points):
     """The triangles of a fan: their symmetric difference is what a polygon fills by the even-odd rule."""
     return [
         shapely.Polygon([points[0], b, c])
-        for b, c in zip(points[1:-1], points[2:], strict=True)
+        for b, c in pairwise(points[1:])
         if abs((b[0] - points[0][0]) * (c[1] - points[0][1]) - (b[1] - points[0][1]) * (c[0] - points[0][0])) > 0
     ]
 

@@ -26,7 +26,8 @@ def test_a_saved_link_pose_is_a_world_pose(load):
 
 def test_nested_models_are_saved_in_the_world_frame_too(load):
     nested = model("n", f"<link name='a'>{BOX}</link><link name='b'>{BOX}</link>")
-    saved = "<model name='m'><pose>7 0 0 0 0 0</pose><model name='n'><pose>3 0 0 0 0 0</pose><link name='b'><pose>4 0 0 0 0 0</pose></link></model></model>"
+    inner = "<pose>3 0 0 0 0 0</pose><link name='b'><pose>4 0 0 0 0 0</pose></link>"
+    saved = f"<model name='m'><pose>7 0 0 0 0 0</pose><model name='n'>{inner}</model></model>"
     assert xs(load(model("m", nested) + state(saved))) == [3, 4]
     assert xs(load(model("m", nested) + state("<model name='m'><pose>7 0 0 0 0 0</pose></model>"))) == [8, 8]
 
