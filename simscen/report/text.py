@@ -26,6 +26,12 @@ def ascii_only(text: str) -> str:
     return text.translate(_ASCII).encode("ascii", "backslashreplace").decode("ascii")
 
 
+def no_command(line: str) -> str:
+    """A line of output that no CI takes for one of its commands (`::error::` on GitHub, `##[error]` on Azure)."""
+    defused = line.replace("##[", "#\\x23[")
+    return re.sub(r"^(\s*):(?=:)", r"\1\\x3a", defused)
+
+
 def _escaped(character: str) -> str:
     code = ord(character)
     return f"\\x{code:02x}" if code < 256 else f"\\u{code:04x}"

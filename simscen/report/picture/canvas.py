@@ -9,6 +9,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from simscen.core.geometry import Array
+from simscen.report.text import one_line
 
 Colour = tuple[int, int, int]
 Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
@@ -122,6 +123,11 @@ class Canvas:
         u = (points[:, 0] - self.bounds[0]) * self.scale * SAMPLES
         v = (self.bounds[3] - points[:, 1]) * self.scale * SAMPLES
         return list(zip(u.tolist(), v.tolist(), strict=True))
+
+
+def shown(text: str) -> str:
+    """Text on one line in signs that Pillow's own typeface has."""
+    return one_line(text).replace("≤", "<=").replace("≥", ">=")
 
 
 def write(draw: ImageDraw.ImageDraw, note: Note) -> None:

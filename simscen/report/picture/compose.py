@@ -7,10 +7,9 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from simscen.report.picture import ground, marks, palette
-from simscen.report.picture.canvas import Bounds, Canvas, Note, font, write
+from simscen.report.picture.canvas import Bounds, Canvas, Note, font, shown, write
 from simscen.report.picture.scene import Scene
 from simscen.report.picture.sidebar import WIDTH, sidebar
-from simscen.report.text import one_line
 
 HEADER = 66
 LARGEST = (1000, 800)
@@ -61,7 +60,9 @@ def _scale(bounds: Bounds) -> float:
 
 
 def _scale_bar(canvas: Canvas) -> None:
-    metres = marks.round_step(canvas.width / canvas.scale * 2)
+    most = canvas.width / canvas.scale / 4
+    power = 10.0 ** math.floor(math.log10(most))
+    metres = max(power * factor for factor in (1, 2, 5) if power * factor <= most)
     x0, y0, _, _ = canvas.bounds
     left, low = x0 + 14 / canvas.scale, y0 + 16 / canvas.scale
     tick = 4 / canvas.scale
@@ -78,7 +79,7 @@ def _header(image: Image.Image, scene: Scene) -> None:
     wide = math.ceil(font(16).getlength(word)) + 24
     pen.rounded_rectangle((16, 16, 16 + wide, 46), 6, fill=colour)
     write(pen, Note(16 + wide / 2, 31, word, 16, palette.PAGE, "mm"))
-    write(pen, Note(32 + wide, 23, one_line(result.key.scenario), 18, palette.INK))
+    write(pen, Note(32 + wide, 23, shown(result.key.scenario), 18, palette.INK))
     write(pen, Note(32 + wide, 45, _facts(scene), 13, palette.FAINT_INK))
     pen.line([(0, HEADER - 1), (image.width, HEADER - 1)], fill=palette.RULE)
 
@@ -87,5 +88,5 @@ def _facts(scene: Scene) -> str:
     result = scene.result
     length = result.metrics.get("path_length")
     facts = [f"seed {result.key.seed}", result.key.variation, f"{result.simulated:.1f} s simulated"]
-    facts += [f"{length:.1f} m driven" if length is not None else "", f"ended: {one_line(result.ended)}"]
+    facts += [f"{length:.1f} m driven" if length is not None else "", f"ended: {shown(result.ended)}"]
     return "   ·   ".join(fact for fact in facts if fact)

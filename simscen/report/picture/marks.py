@@ -9,12 +9,11 @@ from simscen.core.trace import Samples
 from simscen.core.verdict import Status
 from simscen.judge.wording import comparison, subject
 from simscen.report.picture import palette
-from simscen.report.picture.canvas import Canvas, Note, text_size
+from simscen.report.picture.canvas import Canvas, Note, shown, text_size
 from simscen.report.picture.outline import outlines, pose_of
 from simscen.report.picture.scene import Scene
-from simscen.report.text import one_line
 
-_STAR = [(r * math.cos(a), r * math.sin(a)) for k in range(16) for r, a in [((10, 4)[k % 2], k * math.pi / 8)]]
+_STAR = [(r * math.cos(a), r * math.sin(a)) for k in range(16) for r, a in [((16, 7)[k % 2], k * math.pi / 8)]]
 _CROSS = [(1.6, 0), (5.4, 3.8), (3.8, 5.4), (0, 1.6), (-3.8, 5.4), (-5.4, 3.8), (-1.6, 0)]
 _CROSS += [(-5.4, -3.8), (-3.8, -5.4), (0, -1.6), (3.8, -5.4), (5.4, -3.8)]
 _GHOSTS = 6
@@ -29,7 +28,7 @@ def draw_places(canvas: Canvas, scene: Scene) -> None:
             continue
         canvas.sign(pose.x, pose.y, [(0, -4), (4, 0), (0, 4), (-4, 0)], palette.PLACE)
         u, v = canvas.pixel(pose.x, pose.y)
-        canvas.note(Note(u + 8, v, one_line(name), 11, palette.FAINT_INK))
+        canvas.note(Note(u + 8, v, shown(name), 11, palette.FAINT_INK, box=palette.PAGE))
 
 
 def draw_plans(canvas: Canvas, scene: Scene) -> None:
@@ -56,7 +55,7 @@ def draw_objects(canvas: Canvas, scene: Scene) -> None:
         for pose in poses[-1:]:
             canvas.polygon(pose.apply(shapes[name]), (*palette.OBJECT, 150), palette.OBJECT)
             u, v = canvas.pixel(pose.x, pose.y)
-            canvas.note(Note(u, v, one_line(name), 11, palette.INK, "mm", palette.PAGE))
+            canvas.note(Note(u, v, shown(name), 11, palette.INK, "mm", palette.PAGE))
 
 
 def draw_belief(canvas: Canvas, scene: Scene) -> None:
@@ -96,7 +95,7 @@ def draw_goals(canvas: Canvas, scene: Scene) -> None:
         canvas.disc(x, y, 2.6, palette.GOAL)
         if told := names.pop((x, y), None):
             u, v = canvas.pixel(x, y)
-            canvas.note(Note(u, v - reach - 12, one_line(", ".join(told)), 13, palette.GOAL, "mm", palette.PAGE))
+            canvas.note(Note(u, v - reach - 12, shown(", ".join(told)), 13, palette.GOAL, "mm", palette.PAGE))
 
 
 def draw_robot(canvas: Canvas, scene: Scene) -> None:
@@ -135,7 +134,7 @@ def draw_violations(canvas: Canvas, scene: Scene) -> None:
         x, y = finding.place
         canvas.disc(x, y, 10, (255, 255, 255, 215), palette.RED, 2.0)
         canvas.sign(x, y, _CROSS, palette.RED)
-        text = _short(one_line(f"{subject(verdict, finding)}: {comparison(finding)}"))
+        text = _short(shown(f"{subject(verdict, finding)}: {comparison(finding)}"))
         u, v = _free_spot(canvas, canvas.pixel(x, y), text, taken)
         canvas.note(Note(u, v, text, 12, palette.PAGE, "lm", palette.RED))
 

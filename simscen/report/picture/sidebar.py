@@ -8,9 +8,8 @@ from PIL import Image, ImageDraw
 from simscen.core.verdict import Status
 from simscen.judge.wording import comparison, subject
 from simscen.report.picture import palette
-from simscen.report.picture.canvas import Colour, Note, font, write
+from simscen.report.picture.canvas import Colour, Note, font, shown, write
 from simscen.report.picture.scene import Scene
-from simscen.report.text import one_line
 
 WIDTH = 340
 _PAD = 18
@@ -41,10 +40,10 @@ def _criteria(scene: Scene) -> list[tuple[Colour, list[str]]]:
         warned = verdict.severity == "warn" and verdict.status is not Status.PASS
         colour = palette.AMBER if warned else palette.STATUSES[verdict.status]
         if finding is None:
-            rows.append((colour, [f"{one_line(verdict.id)}: checked nothing"]))
+            rows.append((colour, [f"{shown(verdict.id)}: checked nothing"]))
             continue
-        told = one_line(f"{subject(verdict, finding)}: {comparison(finding)}")
-        details = [one_line(text) for text in finding.detail[:2]] if verdict.status is not Status.PASS else []
+        told = shown(f"{subject(verdict, finding)}: {comparison(finding)}")
+        details = [shown(text) for text in finding.detail[:2]] if verdict.status is not Status.PASS else []
         rows.append((colour, [line for text in (told, *details) for line in _wrapped(text)]))
     return rows
 

@@ -1,0 +1,86 @@
+"""The console: plain lines when piped, colours and live progress on a terminal."""
+
+from types import TracebackType
+from typing import Protocol, TextIO
+
+from simscen.core.session import RunFinished, RunProgress, RunStarted, SessionEvent, SessionFinished, SessionStarted
+from simscen.report.lines import Line, closing, finished, opening, text_of
+from simscen.report.text import ascii_only, no_command
+
+
+class Reporter(Protocol):
+    """Listens to a session; a context, so that a terminal is left as it was whatever happens."""
+
+    def __call__(self, event: SessionEvent) -> None:
+        """Take one event."""
+        ...
+
+    def __enter__(self) -> "Reporter":
+        """Begin."""
+        ...
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Leave the terminal as it was."""
+        ...
+
+
+def text_reporter(out: TextIO, live: bool | None = None) -> Reporter:
+    """For people: live on a terminal, plain lines elsewhere. `live` overrides what `out` says it is."""
+    if not (out.isatty() if live is None else live):
+        return _Plain(out)
+    from simscen.report.live import LiveReporter  # rich, which lists and pipes need not wait for
+
+    return LiveReporter(out)
+
+
+def lines_of(event: SessionEvent, every_seed: bool) -> list[Line]:
+    """What an event is worth; `every_seed` tells runs of a scenario apart by their seeds."""
+    match event:
+        case SessionStarted():
+            return [opening(event)]
+        case RunFinished():
+            return list(finished(event, every_seed))
+        case SessionFinished():
+            return list(closing(event))
+        case RunStarted() | RunProgress():
+            return []
+
+
+def needs_seeds(started: SessionStarted) -> bool:
+    """Whether some scenario runs more than once."""
+    return started.total != started.scenarios
+
+
+class _Plain:
+    """Each line as it happens: no colour, no cursor movement, ASCII where the stream knows no more."""
+
+    def __init__(self, out: TextIO) -> None:
+        self._out, self._every_seed = out, False
+        self._ascii = not _can_encode(out)
+
+    def __enter__(self) -> "_Plain":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._out.flush()
+
+    def __call__(self, event: SessionEvent) -> None:
+        """Print what the event is worth."""
+        if isinstance(event, SessionStarted):
+            self._every_seed = needs_seeds(event)
+        for line in lines_of(event, self._every_seed):
+            text = no_command(text_of(line))
+            self._out.write(f"{ascii_only(text) if self._ascii else text}\n")
+        self._out.flush()
+
+
+def _can_encode(out: TextIO) -> bool:
+    try:
+        "✓✗·≤≥°".encode(getattr(out, "encoding", None) or "ascii")
+    except (UnicodeEncodeError, LookupError):
+        return False
+    return True

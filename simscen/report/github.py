@@ -1,0 +1,102 @@
+"""GitHub Actions: an annotation at the line of each violated criterion, and a summary of the job in Markdown."""
+
+from types import TracebackType
+from typing import TextIO
+
+from simscen.core.session import Outcome, RunFinished, SessionEvent, SessionFinished
+from simscen.judge.wording import tightest
+from simscen.report.console import Reporter, text_reporter
+from simscen.report.text import one_line
+from simscen.report.wordsof import complaints, failure, label
+
+
+def github_reporter(out: TextIO, summary: TextIO | None = None) -> Reporter:
+    """The plain lines, with annotations among them. `summary` is the file that $GITHUB_STEP_SUMMARY names."""
+    return _GitHub(out, summary)
+
+
+class _GitHub:
+    def __init__(self, out: TextIO, summary: TextIO | None) -> None:
+        self._out, self._summary = out, summary
+        self._plain = text_reporter(out, live=False)
+        self._runs: list[RunFinished] = []
+
+    def __enter__(self) -> "_GitHub":
+        self._plain.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._plain.__exit__(kind, error, trace)
+
+    def __call__(self, event: SessionEvent) -> None:
+        """Print, annotate, and sum up at the end."""
+        self._plain(event)
+        if isinstance(event, RunFinished):
+            self._runs.append(event)
+            for line in annotations(event):
+                self._out.write(f"{line}\n")
+            self._out.flush()
+        if isinstance(event, SessionFinished) and self._summary is not None:
+            self._summary.write(markdown(self._runs, event))
+            self._summary.flush()
+
+
+def annotations(run: RunFinished) -> list[str]:
+    """The workflow commands for one run."""
+    name = label(run)
+    lines = [
+        _command(
+            "warning" if found.warning else "error", run, found.line, name, "\n".join((found.message, *found.detail))
+        )
+        for found in complaints(run)
+    ]
+    if run.outcome is Outcome.ERROR:
+        kind, message, _ = failure(run)
+        lines.append(_command("error", run, 0, name, f"{kind}: {message}"))
+    return lines
+
+
+def markdown(runs: list[RunFinished], session: SessionFinished) -> str:
+    """A table of all runs, the ones that did not pass first."""
+    order = [Outcome.ERROR, Outcome.FAILED, Outcome.PASSED]
+    ordered = sorted(runs, key=lambda run: (order.index(run.outcome), run.path, run.key))
+    signs = {Outcome.PASSED: "✅", Outcome.FAILED: "❌", Outcome.ERROR: "⚠️"}
+    head = f"### simscen: {session.passed} passed, {session.failed} failed, {session.errors} errors"
+    rows = [
+        f"| {signs[run.outcome]} | {_cell(label(run))} | {run.simulated:.1f} s | {_cell(_why(run))} |"
+        for run in ordered
+    ]
+    return "\n".join([head, "", "| | scenario | simulated | |", "|---|---|---:|---|", *rows, "", ""])
+
+
+def _why(run: RunFinished) -> str:
+    if run.outcome is Outcome.ERROR:
+        kind, message, _ = failure(run)
+        return f"{kind}: {message}"
+    told = [complaint.message for complaint in complaints(run)]
+    return "; ".join(told) if told else f"tightest: {tightest(run.verdicts)}"
+
+
+def _command(level: str, run: RunFinished, line: int, title: str, message: str) -> str:
+    where = f"file={_property(run.path)},line={max(line or run.line, 1)},title={_property(title)}"
+    return f"::{level} {where}::{_data(message)}"
+
+
+def _data(text: str) -> str:
+    """Escaped as @actions/core escapes the message of a command."""
+    return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+
+
+def _property(text: str) -> str:
+    """Escaped as @actions/core escapes a property of a command."""
+    return _data(text).replace(":", "%3A").replace(",", "%2C")
+
+
+def _cell(text: str) -> str:
+    """Text that means nothing in a Markdown table or in HTML."""
+    escaped = one_line(text).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+    for sign in "\\`*_[]|~#@":
+        escaped = escaped.replace(sign, f"&#{ord(sign)};")
+    return escaped

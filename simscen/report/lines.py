@@ -1,0 +1,105 @@
+"""A session as lines of text: what the console prints, piece by piece with the role of each piece."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from simscen.core.session import Outcome, RunFinished, SessionFinished, SessionStarted
+from simscen.judge.wording import tightest
+from simscen.report.text import one_line
+from simscen.report.wordsof import complaints, failure, label, place
+
+Role = Literal["plain", "name", "good", "bad", "odd", "quiet"]
+
+NAME_WIDTH = 36
+SIGNS = {Outcome.PASSED: ("✓", "good"), Outcome.FAILED: ("✗", "bad"), Outcome.ERROR: ("!", "odd")}
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Text of one role; a reporter chooses how the role looks."""
+
+    text: str
+    role: Role = "plain"
+
+
+Line = tuple[Piece, ...]
+
+
+def opening(started: SessionStarted) -> Line:
+    """simscen 0.1.0 · 14 scenarios · 2 workers."""
+    runs = "" if started.total == started.scenarios else f" · {_count(started.total, 'run')}"
+    workers = _count(started.workers, "worker")
+    return (Piece(f"simscen {started.version} · {_count(started.scenarios, 'scenario')}{runs} · {workers}", "quiet"),)
+
+
+def finished(run: RunFinished, every_seed: bool) -> Iterator[Line]:
+    """One line for a run that passed; for the others also what was violated, where, and how to see it again."""
+    sign, role = SIGNS[run.outcome]
+    yield (
+        Piece("  "),
+        Piece(sign, _role(role)),
+        Piece(f" {label(run, every_seed):{NAME_WIDTH}} ", "name"),
+        *_summary(run),
+    )
+    if run.outcome is Outcome.ERROR:
+        yield from _broken(run)
+    for complaint in complaints(run):
+        role = "odd" if complaint.warning or complaint.verdict.status.value != "fail" else "bad"
+        word = "warning: " if complaint.warning else ""
+        yield (Piece("      "), Piece(f"{word}{complaint.message}", _role(role)))
+        yield from (((Piece(f"        {text}", "quiet")),) for text in complaint.detail)
+    if run.outcome is not Outcome.PASSED:
+        yield from _pointers(run)
+
+
+def closing(session: SessionFinished) -> Iterator[Line]:
+    """13 passed, 1 failed · 402 s simulated in 4.1 s (98x) · simscen-out/latest/junit.xml."""
+    counts = [(session.passed, "passed", "good"), (session.failed, "failed", "bad"), (session.errors, "errors", "odd")]
+    shown = [(number, word, role) for number, word, role in counts if number or word == "passed"]
+    pieces: list[Piece] = []
+    for number, word, role in shown:
+        pieces += [Piece(", ")] if pieces else []
+        pieces.append(Piece(f"{number} {'error' if word == 'errors' and number == 1 else word}", _role(role)))
+    speed = f" ({session.simulated / session.wall:.0f}x)" if session.wall > 0 else ""
+    facts = f" · {session.simulated:.0f} s simulated in {session.wall:.1f} s{speed}"
+    files = f" · {one_line(session.junit)}" if session.junit else ""
+    yield (*pieces, Piece(facts + files, "quiet"))
+    if session.interrupted:
+        yield (Piece("interrupted: the runs that are missing are listed as such in the reports", "odd"),)
+
+
+def text_of(line: Line) -> str:
+    """The line without its roles."""
+    return "".join(piece.text for piece in line).rstrip()
+
+
+def _summary(run: RunFinished) -> tuple[Piece, ...]:
+    if run.outcome is Outcome.ERROR and not run.simulated:
+        return (Piece(f"{failure(run)[0]} after {run.wall:.2f} s", "quiet"),)
+    times = f"{run.simulated:6.1f} s simulated in {run.wall:.2f} s"
+    nearest = tightest(run.verdicts) if run.outcome is Outcome.PASSED else ""
+    return (Piece(times, "quiet"), *((Piece(f"   tightest: {one_line(nearest)}", "quiet"),) if nearest else ()))
+
+
+def _broken(run: RunFinished) -> Iterator[Line]:
+    kind, message, tail = failure(run)
+    yield (Piece("      "), Piece(f"{kind}: {message}", "odd"))
+    yield from ((Piece(f"        | {line}", "quiet"),) for line in tail.splitlines()[-12:])
+
+
+def _pointers(run: RunFinished) -> Iterator[Line]:
+    first = next((complaint.line for complaint in complaints(run) if not complaint.warning), 0)
+    files = [("scenario", place(run, first)), ("picture", run.artifacts.picture), ("log", run.artifacts.mcap)]
+    for name, text in (*files[:2], *(() if run.artifacts.picture else files[2:]), ("again", run.again)):
+        if text:
+            yield (Piece(f"      {name:9} ", "quiet"), Piece(one_line(text)))
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+def _role(role: str) -> Role:
+    roles: dict[str, Role] = {"good": "good", "bad": "bad", "odd": "odd"}
+    return roles[role]
