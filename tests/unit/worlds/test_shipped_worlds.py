@@ -1,0 +1,84 @@
+"""Worlds and maps that others made of the same place must agree with each other in our hands."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from simscen.core.geometry import Pose2
+from simscen.core.grid import FREE, OCCUPIED
+from simscen.model.rosmap import RosMapSpec
+from simscen.worlds.build import build
+from simscen.worlds.meshing import fuse
+from simscen.worlds.rays import RayScene
+from simscen.worlds.rosmap import load_grid
+from simscen.worlds.sdf import load_sdf
+from simscen.worlds.shortest import shortest_lengths
+
+DATA = Path(__file__).parents[3].parent / "shared" / "data"
+needs_data = pytest.mark.skipif(not DATA.is_dir(), reason=f"needs {DATA.name}, which is not part of the project")
+LIDAR = 0.18
+
+
+def shipped_map(path):
+    spec = RosMapSpec.model_validate({"mode": "trinary", **yaml.safe_load(path.read_text())})
+    return load_grid(spec, path.parent / spec.image)[0]
+
+
+def free_poses(grid, count, seed):
+    from scipy import ndimage
+
+    roomy = ndimage.distance_transform_edt(grid.cells == FREE) * grid.resolution > 0.2
+    cells = np.argwhere(roomy)
+    return grid.centre_of(cells[np.random.default_rng(seed).choice(len(cells), count, replace=False)])
+
+
+def beams_from(places, count):
+    angles = np.arange(count) * (2 * math.pi / count)
+    directions = np.column_stack((np.cos(angles), np.sin(angles)))
+    return np.repeat(places, count, axis=0), np.tile(directions, (len(places), 1))
+
+
+def ranges_on_map(grid, starts, directions, reach=12.0):
+    """AMCL's map_calc_range: Bresenham from the middle of a cell to that of the first occupied one."""
+    first = grid.cell_of(starts)
+    step = directions[:, ::-1] / np.abs(directions).max(axis=1)[:, None]
+    cells = np.round(first[:, None] + np.arange(reach / grid.resolution)[:, None] * step[:, None]).astype(int)
+    hit = (grid.values_at(grid.centre_of(cells.reshape(-1, 2))) == OCCUPIED).reshape(cells.shape[:2])
+    last = cells[np.arange(len(cells)), np.argmax(hit, axis=1)]
+    return np.where(hit.any(axis=1), np.linalg.norm(last - first, axis=1) * grid.resolution, math.inf)
+
+
+@needs_data
+def test_rays_in_tb3_sandbox_agree_with_its_shipped_map():
+    home = DATA / "nav2_tb3_sandbox"
+    world = load_sdf(home / "worlds" / "tb3_sandbox.sdf.xacro", root=DATA, search=[home / "models"], lenient=True)
+    grid = shipped_map(home / "tb3_sandbox.yaml")
+    places = free_poses(grid, 60, seed=1)
+    starts, directions = beams_from(places, 90)
+    origins = np.column_stack((starts, np.full(len(starts), LIDAR)))
+    level = np.column_stack((directions, np.zeros(len(directions))))
+    ours = RayScene(fuse(world.solids)).cast(origins, level)
+    assert (np.abs(ours - ranges_on_map(grid, starts, directions)) < 0.15).mean() >= 0.92
+
+
+@needs_data
+def test_our_map_of_tb3_sandbox_agrees_with_the_shipped_one_where_a_robot_can_be():
+    home = DATA / "nav2_tb3_sandbox"
+    world = load_sdf(home / "worlds" / "tb3_sandbox.sdf.xacro", root=DATA, search=[home / "models"], lenient=True)
+    built = build(world, LIDAR)
+    theirs = shipped_map(home / "tb3_sandbox.yaml")
+    places = free_poses(theirs, 500, seed=2)
+    assert (built.map.values_at(places) == FREE).mean() > 0.98
+
+
+@needs_data
+def test_every_barn_world_admits_a_disc_of_37_cm_and_its_shortest_way_is_no_longer_than_the_reference():
+    rows = [line.split(",") for line in (DATA / "barn_sample" / "scenarios.csv").read_text().split()[1:]]
+    for number, reference in ((row[0], float(row[9])) for row in rows):
+        world = load_sdf(DATA / "barn_sample" / f"world_{number}.world", root=DATA, lenient=True)
+        built = build(world, 0.3)
+        (length,) = shortest_lengths(built, Pose2(-2.25, 3.0), [Pose2(-2.25, 13.0)], 0.37)
+        assert 9.99 < length < 1.3 * reference
