@@ -44,14 +44,20 @@ class Quantity:
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         number = dict(handler(schema))
-        units = "|".join(re.escape(unit) for unit in UNITS[self.dimension])
-        text = {"type": "string", "pattern": rf"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*({units})\s*$"}
-        return {"anyOf": [number, text], "description": f"{self.dimension}, e.g. {self.example}"}
+        units = "|".join(unit.replace("^", r"\^") for unit in UNITS[self.dimension])  # a pattern for JavaScript, too
+        pattern = rf"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*({units})\s*$"
+        # Bounds apply to numbers only and the pattern to text only, so both fit into one schema.
+        return {**number, "type": ["number", "string"], "pattern": pattern, "description": self.described}
 
     @property
     def example(self) -> str:
         """A value as a user would write it."""
         return f"1.5 {next(iter(UNITS[self.dimension]))}"
+
+    @property
+    def described(self) -> str:
+        """What an editor shows."""
+        return f"{self.dimension}, e.g. {self.example}"
 
     def parse(self, value: Any) -> Any:
         """Turn "90 deg" into radians; leave anything but text to pydantic."""

@@ -1,0 +1,129 @@
+"""JSON Schemas of the language, shaped for editors: completion, hover texts, and errors that name the mistake."""
+
+import json
+from typing import Any
+
+from pydantic import BaseModel, RootModel
+from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
+from pydantic_core import core_schema
+
+from simscen.model.robot import RobotSpec
+from simscen.model.scenario import ScenarioSpec
+from simscen.model.world import WorldSpec
+from simscen.spec.base import Choice
+
+Schema = dict[str, Any]
+
+MODELS: dict[str, type[BaseModel]] = {"scenario": ScenarioSpec, "world": WorldSpec, "robot": RobotSpec}
+DRAFT = "http://json-schema.org/draft-07/schema#"
+"""What yaml-language-server knows best; nothing newer is needed."""
+
+
+def schema_of(name: str) -> Schema:
+    """The JSON Schema of a "scenario", "world" or "robot" file."""
+    model = MODELS[name]
+    generated = model.model_json_schema(schema_generator=_Generator)
+    schema = _mended(
+        {**generated, "properties": {"extends": _EXTENDS, **generated["properties"]}}, generated.get("$defs", {})
+    )
+    # Any other key may come from the file it extends or from the defaults.yaml beside it.
+    return {"$schema": DRAFT, "title": f"simscen {name}", **schema, "required": ["simscen"]}
+
+
+def as_text(schema: Schema) -> str:
+    """As it is written to a file."""
+    return json.dumps(schema, indent=1, ensure_ascii=False) + "\n"
+
+
+_EXTENDS: Schema = {
+    "type": "string",
+    "description": "A file of the same kind, relative to this one: its keys hold where this file does not give them.",
+}
+
+
+class _Generator(GenerateJsonSchema):
+    """Pydantic's generator with what it cannot know: single-key choices, and the docstrings of bare values."""
+
+    def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
+        made, model = super().model_schema(schema), schema["cls"]
+        if issubclass(model, RootModel) and model.__doc__:
+            made["description"] = _joined(model.__doc__.strip(), made.get("description", ""))
+        if issubclass(model, Choice):
+            made.update(_exactly_one(model))
+        return made
+
+
+def _exactly_one(model: type[Choice]) -> Schema:
+    if not model.modifiers:
+        return {"minProperties": 1, "maxProperties": 1}
+    return {"oneOf": [{"required": [key]} for key in model.choices()]}
+
+
+def _mended(node: Any, definitions: Schema) -> Any:
+    """A schema without titles, nulls and bulky defaults, its unions told apart by `type` as if/then."""
+    if isinstance(node, list):
+        return [_mended(item, definitions) for item in node]
+    if not isinstance(node, dict):
+        return node
+    node = _without_noise(_without_null(node))
+    node = _by_json_type(_by_type(node, definitions))
+    return {
+        # Under these are names, not keywords: a property may be called `title`.
+        key: {name: _mended(schema, definitions) for name, schema in value.items()}
+        if key in ("properties", "$defs")
+        else _mended(value, definitions)
+        for key, value in node.items()
+    }
+
+
+def _by_type(node: Schema, definitions: Schema) -> Schema:
+    """A union told apart by `type`: an editor then completes and checks the one that is meant, not all of them."""
+    members = {
+        ref["$ref"]: definitions[ref["$ref"].rpartition("/")[2]] for ref in node.get("oneOf", []) if "$ref" in ref
+    }
+    types = {ref: member["properties"].get("type", {}).get("const") for ref, member in members.items()}
+    if len(members) < 2 or None in types.values():
+        return node
+    rest = {key: value for key, value in node.items() if key not in ("oneOf", "discriminator")}
+    cases = []
+    for ref, kind in types.items():
+        condition: Schema = {"properties": {"type": {"const": kind}}}
+        if "type" in members[ref].get("required", []):
+            condition["required"] = ["type"]
+        cases.append({"if": condition, "then": {"$ref": ref}})
+    needed = {"required": ["type"]} if all("required" in case["if"] for case in cases) else {}
+    return {**rest, "type": "object", "properties": {"type": {"enum": list(types.values())}}, **needed, "allOf": cases}
+
+
+def _by_json_type(node: Schema) -> Schema:
+    """A text or a mapping, one or a list: the mistake is told about the one that was written."""
+    options = node.get("oneOf", [])
+    plain = [option for option in options if option.get("type") in ("string", "array")]
+    if len(options) != 2 or len(plain) != 1:
+        return node
+    other = next(option for option in options if option is not plain[0])
+    rest = {key: value for key, value in node.items() if key != "oneOf"}
+    return {**rest, "if": {"type": plain[0]["type"]}, "then": plain[0], "else": other}
+
+
+def _without_null(node: Schema) -> Schema:
+    """An optional key is left out, never null."""
+    options = node.get("anyOf", [])
+    if {"type": "null"} not in options:
+        return node
+    rest = [option for option in options if option != {"type": "null"}]
+    outer = {key: value for key, value in node.items() if key not in ("anyOf", "default")}
+    inner: Schema = rest[0] if len(rest) == 1 else {"anyOf": rest}
+    texts = _joined(outer.get("description", ""), inner.get("description", ""))
+    return {**inner, **outer, **({"description": texts} if texts else {})}
+
+
+def _without_noise(node: Schema) -> Schema:
+    bulky = isinstance(node.get("default"), dict | list) or node.get("default", 0) is None
+    return {key: value for key, value in node.items() if key != "title" and not (key == "default" and bulky)}
+
+
+def _joined(text: str, more: str) -> str:
+    if text and more and text != more:
+        return f"{text}\n\n({more})"
+    return text or more

@@ -1,0 +1,39 @@
+"""`simscen list`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from simscen.cli.diagnostics import harmless, print_text
+from simscen.core.errors import InvalidInput
+from simscen.loading.discovery import default_root, discover
+from simscen.loading.loaded import LoadedScenario
+from simscen.loading.scenario import try_scenario
+from simscen.loading.selection import select
+
+
+def command(
+    paths: Annotated[list[Path], typer.Argument(help="Scenario files, or folders to search.")],
+    keyword: Annotated[str, typer.Option("-k", help="Parts of ids with and, or, not, as in pytest.")] = "",
+    tag: Annotated[list[str] | None, typer.Option(help="Only scenarios with this tag; repeatable.")] = None,
+    root: Annotated[Path | None, typer.Option(help="Files inside scenarios stay in this folder.")] = None,
+    world_path: Annotated[list[Path] | None, typer.Option(help="Folder with worlds and models; repeatable.")] = None,
+) -> None:
+    """List the scenarios that a selection means.
+
+    One line each: id, name and tags. Exit code 0; 2 if a scenario is invalid; 5 if nothing is selected.
+    """
+    home = root if root is not None else default_root(paths)
+    tried = [try_scenario(file, home, world_path or ()) for file in discover(paths, home)]
+    if problems := [problem for found in tried if isinstance(found, list) for problem in found]:
+        raise InvalidInput(problems)
+    chosen = select([found for found in tried if isinstance(found, LoadedScenario)], keyword, tag or ())
+    width = max(len(scenario.id) for scenario in chosen)
+    for scenario in chosen:
+        about = f"{scenario.spec.name or ''} {_tags(scenario)}"
+        print_text(f"{harmless(scenario.id):{width}}  {harmless(about)}".rstrip())
+
+
+def _tags(scenario: LoadedScenario) -> str:
+    return f"[{', '.join(scenario.spec.tags)}]" if scenario.spec.tags else ""
