@@ -6,11 +6,10 @@ import pybullet
 
 from simscen.core.motion import Twist
 from simscen.model.robot import Ackermann
-from simscen.sim.engine import GRAVITY
 from simscen.sim.ramp import Ramp
-from simscen.sim.robot_body import RobotBody
+from simscen.sim.robot_body import GRAVITY, RobotBody
 from simscen.sim.vehicle import Vehicle
-from simscen.sim.wheels import hold, mean_angle, stall_torque
+from simscen.sim.wheels import driven, hold, mean_angle
 
 STEERING_RATE = 3.2
 """rad/s: what the servo of an F1TENTH car does (f1tenth_gym, sv_max; O'Kelly et al. 2020)."""
@@ -32,11 +31,9 @@ class AckermannDrive:
         self._most = STEERING_RATE * period
         self._steering = 0.0
         wheels = list(zip(body.wheels, vehicle.joints, strict=True))
-        self._left = [joint for wheel, joint in wheels if wheel.driven and wheel.left]
-        self._right = [joint for wheel, joint in wheels if wheel.driven and not wheel.left]
+        self._left, self._right, self._torques = driven(body, vehicle)
         # The left before the right, as the angles in _steer.
         self._knuckles = [joint for wheel, joint in sorted(wheels, key=lambda w: -w[0].y) if wheel.steered]
-        self._torques = [stall_torque(body)] * len(self._left + self._right)
         self._servo = 0.5 * body.mass * GRAVITY * body.drive.wheel_radius
         rolling = [joint + 1 for joint in self._knuckles]
         pybullet.setJointMotorControlArray(

@@ -11,9 +11,11 @@ from simscen.sim import engine
 from simscen.sim.inertia import of_solids
 from simscen.sim.motion_path import pose_at, top_speed
 from simscen.sim.outline import footprint
+from simscen.sim.robot_body import GRAVITY
 
 FRICTION = 0.6
 """Of pushable things on the ground: about that of wood or cardboard on concrete."""
+Vector = tuple[float, float, float]
 JUMP = 50.0
 """A script that asks for more m/s than this sets its body down elsewhere, rather than hurl it through the world."""
 
@@ -92,13 +94,26 @@ class Actors:
         """Before the step that leads from `tick` to the next: scripted bodies in place and with their velocity."""
         self.show(tick)
         for actor in self._travelling:
-            here, there = actor.shown, self._pose(actor, tick + 1)
-            velocity = [(b - a) * self._rate for a, b in zip(here.position, there.position, strict=True)]
-            if any(velocity) or here.quaternion != there.quaternion:
-                if math.hypot(*velocity) > JUMP:
-                    continue
-                turning = (0.0, 0.0, wrap(there.yaw - here.yaw) * self._rate)
-                pybullet.resetBaseVelocity(actor.id, velocity, turning, physicsClientId=self._client)
+            velocity, turning = self._scripted(actor, tick)
+            if turning or any(velocity):
+                pybullet.resetBaseVelocity(actor.id, velocity, (0.0, 0.0, turning), physicsClientId=self._client)
+
+    def _scripted(self, actor: Actor, tick: int) -> tuple[Vector, float]:
+        """The velocity in m/s and rad/s that leads along the path to the next tick."""
+        here, there = self._pose(actor, tick), self._pose(actor, tick + 1)
+        vx, vy = (there.x - here.x) * self._rate, (there.y - here.y) * self._rate
+        if math.hypot(vx, vy) > JUMP:
+            return (0.0, 0.0, 0.0), 0.0
+        return (vx, vy, 0.0), wrap(there.yaw - here.yaw) * self._rate
+
+    def velocities(self, tick: int) -> dict[int, Vector]:
+        """How everything moves at `tick`, in m/s, by the engine's numbers."""
+        return {
+            actor.id: pybullet.getBaseVelocity(actor.id, physicsClientId=self._client)[0]
+            if actor.path is None
+            else self._scripted(actor, tick)[0]
+            for actor in self._actors.values()
+        }
 
     def show(self, tick: int) -> None:
         """Put the scripted bodies where they are at `tick`."""
@@ -139,7 +154,7 @@ class Actors:
             return actor.speed
         linear, angular = pybullet.getBaseVelocity(actor.id, physicsClientId=self._client)
         # What it may gain by falling for 0.1 s.
-        return math.hypot(*linear) + math.hypot(*angular) + 0.1 * engine.GRAVITY
+        return math.hypot(*linear) + math.hypot(*angular) + 0.1 * GRAVITY
 
 
 def _reach(body: Body) -> float:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import pybullet
 
@@ -24,14 +25,24 @@ Owner = Callable[[Vector], str]
 class Touch:
     """The robot and something press on each other: `place` and unit `normal` towards the robot in the world frame.
 
-    `impulse` in N s during one tick; `fixed`: it never moves.
+    `other` is the engine's number of what is touched, `impulse` in N s during one tick; `fixed`: it never moves.
     """
 
     name: str
+    other: int
     place: Vector
     normal: Vector
     impulse: float
     fixed: bool
+
+
+class Motion(NamedTuple):
+    """How the robot moves (base frame's origin, m/s and rad/s along the world's axes), and other bodies (m/s)."""
+
+    origin: Vector
+    linear: Vector
+    angular: Vector
+    others: Mapping[int, Vector]
 
 
 @dataclass
@@ -54,13 +65,13 @@ class Contacts:
         """Whether anything was touched lately."""
         return bool(self._ongoing)
 
-    def note(self, tick: int, touches: list[Touch], velocity: tuple[Vector, Vector], origin: Vector) -> None:
-        """Take what was touched at `tick`, and how the robot's base moved just before."""
+    def note(self, tick: int, touches: list[Touch], before: Motion) -> None:
+        """Take what was touched at `tick`, and how everything moved just before."""
         for touch in touches:
             known = self._ongoing.get(touch.name)
             if known is None:
                 self._ongoing[touch.name] = _Ongoing(tick, tick, touch.impulse)
-                self._events.append(_started(tick, touch, velocity, origin))
+                self._events.append(_started(tick, touch, before))
             else:
                 known.last, known.impulse = tick, known.impulse + touch.impulse
         self._end(tick)
@@ -87,15 +98,14 @@ def touches(client: int, robot: int, names: Mapping[int, str | None], owner: Own
         name = names[other] or owner(place)
         known = found.get(name)
         impulse = force * seconds + (known.impulse if known else 0.0)
-        found[name] = Touch(name, place, normal, impulse, names[other] is None)
+        found[name] = Touch(name, other, place, normal, impulse, names[other] is None)
     return [found[name] for name in sorted(found)]
 
 
-def _started(tick: int, touch: Touch, velocity: tuple[Vector, Vector], origin: Vector) -> Event:
-    (vx, vy, vz), (wx, wy, wz) = velocity
-    x, y, z = (touch.place[i] - origin[i] for i in range(3))
-    at = (vx + wy * z - wz * y, vy + wz * x - wx * z, vz + wx * y - wy * x)
-    approach = -sum(v * n for v, n in zip(at, touch.normal, strict=True))
+def _started(tick: int, touch: Touch, before: Motion) -> Event:
+    robot = _at(before, touch.place)
+    others = before.others.get(touch.other, (0.0, 0.0, 0.0))
+    approach = -_along(robot, touch.normal)
     return Event(
         tick,
         "collision.started",
@@ -104,9 +114,20 @@ def _started(tick: int, touch: Touch, velocity: tuple[Vector, Vector], origin: V
             "x": touch.place[0],
             "y": touch.place[1],
             "impulse": touch.impulse,
-            "speed": max(0.0, approach),
-            "robot_speed": math.hypot(vx, vy),
-            "robot_caused": approach >= STANDING or (touch.fixed and math.hypot(*at) >= STANDING),
+            "speed": max(0.0, approach + _along(others, touch.normal)),
+            "robot_speed": max(0.0, approach),
+            "robot_caused": approach >= STANDING or (touch.fixed and math.hypot(*robot) >= STANDING),
             "robot_part": "hull",
         },
     )
+
+
+def _at(motion: Motion, place: Vector) -> Vector:
+    """The robot's velocity at a place."""
+    (vx, vy, vz), (wx, wy, wz) = motion.linear, motion.angular
+    x, y, z = (place[i] - motion.origin[i] for i in range(3))
+    return vx + wy * z - wz * y, vy + wz * x - wx * z, vz + wx * y - wy * x
+
+
+def _along(velocity: Vector, normal: Vector) -> float:
+    return sum(v * n for v, n in zip(velocity, normal, strict=True))

@@ -8,9 +8,8 @@ import pybullet
 from simscen.core.geometry import Pose3
 from simscen.core.shapes import Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere, TriangleMesh
 from simscen.sim.outline import extremes
+from simscen.sim.robot_body import GRAVITY
 
-GRAVITY = 9.81
-"""m/s² down."""
 FACES_AT_ONCE = 40_000
 """Bullet's shared-memory commands hold at most 131072 vertices and 524288 indices."""
 FLOOR = 0.005

@@ -7,12 +7,12 @@ import pybullet
 from simscen.core.geometry import Pose2, Pose3, wrap
 from simscen.core.motion import STOP, Twist
 from simscen.sim import engine
-from simscen.sim.engine import GRAVITY
 from simscen.sim.ramp import Ramp
-from simscen.sim.robot_body import RobotBody
-from simscen.sim.wheels import TRACTION
+from simscen.sim.robot_body import GRAVITY, RobotBody
 
 Vector = tuple[float, float, float]
+GRIP = 0.7
+"""Most force of the motors over the robot's weight."""
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 SLED = 0.001
 """Mass in kg of the two carriers between the world and the hull; the engine wants one."""
@@ -82,7 +82,7 @@ class PlanarBase:
 
     def motors(self, velocity: Twist) -> None:
         """Run the motors: a velocity along the world's axes, with no more force than wheels have grip."""
-        grip = TRACTION * self._mass * GRAVITY
+        grip = GRIP * self._mass * GRAVITY
         pybullet.setJointMotorControlArray(
             self.id,
             self.joints,

@@ -16,7 +16,7 @@ from simscen.core.trace import Truth
 from simscen.sim import engine
 from simscen.sim.actors import Actors
 from simscen.sim.camera import picture
-from simscen.sim.contacts import Contacts, touches
+from simscen.sim.contacts import Contacts, Motion, touches
 from simscen.sim.drives import build
 from simscen.sim.nearest import Owners
 from simscen.sim.robot_body import RobotBody
@@ -93,12 +93,12 @@ class Simulation:
         self._actors.begin(self.tick)
         if not self._contacts.touching:
             self._measure()
-        before = self._base.velocity(), self._base.pose().position
+        before = Motion(self._base.pose().position, *self._base.velocity(), self._actors.velocities(self.tick))
         pybullet.stepSimulation(self._client)
         self.tick += 1
         if self._contacts.touching or self.tick > self._no_contact_before:
             touched = touches(self._client, self._base.id, self._names, self._owners.name, 1 / self._rate)
-            self._contacts.note(self.tick, touched, *before)
+            self._contacts.note(self.tick, touched, before)
         self._actors.show(self.tick)
 
     def drive(self, command: Twist) -> None:

@@ -7,7 +7,7 @@ import pybullet
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.motion import Twist
 from simscen.sim import engine
-from simscen.sim.robot_body import ROTOR, RobotBody, Wheel
+from simscen.sim.robot_body import RobotBody, Wheel
 
 Vector = tuple[float, float, float]
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
@@ -27,7 +27,6 @@ class Vehicle:
 
     def __init__(self, client: int, body: RobotBody, pose: Pose2) -> None:
         self._client = client
-        self._mass = body.mass
         moments, self._base_from_centre = body.chassis.principal()
         self._centre = self._base_from_centre.position
         self._centre_from_base = self._base_from_centre.inverse()
@@ -39,7 +38,6 @@ class Vehicle:
 
     def _set_up(self, wheel: Wheel, joint: int) -> None:
         xx, yy, zz = wheel.inertia.tensor.diagonal().tolist()  # a wheel turns about y and is round
-        rotor = ROTOR * self._mass * wheel.radius**2 if wheel.driven else 0.0
         pybullet.changeDynamics(
             self.id,
             joint + 1 if wheel.steered else joint,
@@ -48,7 +46,7 @@ class Vehicle:
             linearDamping=0,
             angularDamping=0,
             jointDamping=0,
-            localInertiaDiagonal=(xx, yy + rotor, zz),
+            localInertiaDiagonal=(xx, yy + wheel.rotor, zz),
             physicsClientId=self._client,
         )
 

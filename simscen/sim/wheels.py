@@ -6,13 +6,9 @@ import pybullet
 
 from simscen.core.motion import Twist
 from simscen.model.robot import Differential, SkidSteer
-from simscen.sim.engine import GRAVITY
 from simscen.sim.ramp import Ramp
 from simscen.sim.robot_body import RobotBody
 from simscen.sim.vehicle import Vehicle
-
-TRACTION = 0.7
-"""Torque of the motors over what would spin all wheels at once: they stall against a wall rather than spin."""
 
 
 class SidedDrive:
@@ -26,9 +22,7 @@ class SidedDrive:
         self._radius = drive.wheel_radius
         scale = drive.turning_scale if isinstance(drive, SkidSteer) else 1.0
         self._half = drive.wheel_separation * scale / 2
-        self._left = [j for w, j in zip(body.wheels, vehicle.joints, strict=True) if w.left]
-        self._right = [j for w, j in zip(body.wheels, vehicle.joints, strict=True) if not w.left]
-        self._torques = [stall_torque(body)] * len(body.wheels)
+        self._left, self._right, self._torques = driven(body, vehicle)
         self._turn()
 
     def command(self, twist: Twist) -> None:
@@ -67,18 +61,19 @@ class SidedDrive:
         )
 
 
+def driven(body: RobotBody, vehicle: Vehicle) -> tuple[list[int], list[int], list[float]]:
+    """Joints of the driven wheels on the left and on the right, and the stall torques in N m of both in that order."""
+    wheels = [(w, joint) for w, joint in zip(body.wheels, vehicle.joints, strict=True) if w.driven]
+    left, right = [pair for pair in wheels if pair[0].left], [pair for pair in wheels if not pair[0].left]
+    return [j for _, j in left], [j for _, j in right], [w.torque for w, _ in left + right]
+
+
 def hold(client: int, robot: int, joints: Sequence[int], torques: Sequence[float]) -> None:
     """Keep wheels where they are, as a servo at zero speed does; a velocity of zero alone would creep 0.1 mm/s."""
     angles = [pybullet.getJointState(robot, joint, physicsClientId=client)[0] for joint in joints]
     pybullet.setJointMotorControlArray(
         robot, joints, pybullet.POSITION_CONTROL, targetPositions=angles, forces=torques, physicsClientId=client
     )
-
-
-def stall_torque(body: RobotBody) -> float:
-    """The most torque in N m of each driven wheel."""
-    driven = [wheel for wheel in body.wheels if wheel.driven]
-    return TRACTION * body.mass * GRAVITY * driven[0].radius / len(driven)
 
 
 def mean_angle(client: int, robot: int, joints: Sequence[int]) -> float:
