@@ -6,7 +6,7 @@ from typing import Any
 
 import simscen.sim.simulation
 import simscen.stack.build  # noqa: F401 - engines are imported here so that the forks need not
-from simscen.report.picture import draw
+from simscen.report.picture import Scene, write_picture
 from simscen.run.jobs import Job
 from simscen.run.perform import Performed, perform
 from simscen.run.worker import Progress
@@ -29,7 +29,10 @@ def _perform(job: Job, tell: Callable[[float], None]) -> dict[str, Any]:
 
 
 def _finish(run: Performed) -> None:
-    draw(run)
+    prepared = run.prepared
+    world = prepared.built.world
+    scene = Scene(run.trace, prepared.case, prepared.built.map, run.result, world.places, world.bodies)
+    write_picture(scene, run.folder / "map.png")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
 """A session: many runs, each answered exactly once, told to whoever listens."""
 
+import filecmp
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from simscen.core.errors import Exit
@@ -64,7 +65,8 @@ def run_session(
                 case Advanced(seconds=seconds):
                     listen(RunProgress(job.key, seconds))
                 case Ended(end=end):
-                    answers[job.number] = told(job, end)
+                    twin = answers.get(job.number ^ 1) if options.twice else None
+                    answers[job.number] = compared(told(job, end), twin)
                     listen(answers[job.number])
     except Interrupted as interrupted:
         stopped = Exit(128 + interrupted.number)
@@ -73,6 +75,21 @@ def run_session(
             answers[job.number] = _not_done(job, job.number in begun, stopped)
             listen(answers[job.number])
     return list(answers.values()), stopped
+
+
+def compared(run: RunFinished, twin: RunFinished | None) -> RunFinished:
+    """The answer to the later of two runs that should be equal: an error that names where their logs part."""
+    if twin is None or not run.artifacts.mcap or not twin.artifacts.mcap:
+        return run
+    if filecmp.cmp(run.artifacts.mcap, twin.artifacts.mcap, shallow=False):
+        return run
+    from simscen.record.difference import first_difference
+    from simscen.record.replay import read_log
+
+    logs = [read_log(Path(path)).trace for path in (twin.artifacts.mcap, run.artifacts.mcap)]
+    where = first_difference(*logs) or "the logs differ in something that is not part of the trace"
+    failure = RunFailure("nondeterministic", f"two runs with the same seed differ: {where}")
+    return replace(run, outcome=Outcome.ERROR, error=failure)
 
 
 def _not_done(job: Job, begun: bool, stopped: Exit | None) -> RunFinished:

@@ -3,9 +3,8 @@
 import signal
 from pathlib import Path
 
-from simscen.core.session import Artifacts, Outcome, RunFailure, RunFinished, RunKey
+from simscen.core.session import Artifacts, Outcome, RunFailure, RunFinished
 from simscen.judge.result import from_json
-from simscen.loading.loaded import LoadedScenario
 from simscen.run.confine import MEMORY_BYTES
 from simscen.run.jobs import Job, ProcessEnd
 
@@ -27,7 +26,7 @@ def told(job: Job, end: ProcessEnd | None) -> RunFinished:
             wall=wall,
             artifacts=artifacts,
             error=failure,
-            again=again(key, scenario),
+            again=f"simscen run {scenario.path} --seed {key.seed}",
         )
     result = from_json((folder / "result.json").read_text(encoding="utf-8"))
     return RunFinished(
@@ -43,13 +42,9 @@ def told(job: Job, end: ProcessEnd | None) -> RunFinished:
         metrics=tuple(sorted(result.metrics.items())),
         error=result.error,
         artifacts=_artifacts(folder),
-        again=again(key, scenario),
+        again=result.again,
+        tick_rate=result.tick_rate,
     )
-
-
-def again(key: RunKey, scenario: LoadedScenario) -> str:
-    """The command that repeats a run."""
-    return f"simscen run {scenario.path} --seed {key.seed}"
 
 
 def _artifacts(folder: Path) -> Artifacts:
