@@ -17,7 +17,7 @@ from simscen.stack.localizers.distance_field import DistanceField
 
 def opaque_field(grid: OccupancyGrid, max_distance: float) -> DistanceField:
     """Distances to what stops a ray: occupied and unknown cells and everything off the map, as in nav2_amcl."""
-    return DistanceField(grid, grid.cells != FREE, max_distance, 0.0)
+    return DistanceField(grid, grid.cells != FREE, max_distance, walled=True)
 
 
 def cast_rays(field: DistanceField, poses: Array, beams: Beams) -> Array:

@@ -18,15 +18,20 @@ class DistanceField:
     The border makes a look-up off the map a look-up like any other: coordinates are clipped onto it.
     """
 
-    def __init__(self, grid: OccupancyGrid, obstacles: npt.NDArray[np.bool_], limit: float, outside: float) -> None:
-        """`obstacles` (height, width); no distance is above `limit`; off the map it is `outside`."""
+    def __init__(self, grid: OccupancyGrid, obstacles: npt.NDArray[np.bool_], limit: float, *, walled: bool) -> None:
+        """`obstacles` (height, width); no distance is above `limit`.
+
+        Everything off the map is an obstacle if `walled`, and `limit` from any obstacle if not.
+        """
         from scipy.ndimage import distance_transform_edt
 
-        distance = np.full(grid.shape, limit)
-        if obstacles.any():
-            exact = cast(Array, distance_transform_edt(~obstacles)) * grid.resolution
-            distance = np.minimum(exact, limit)
-        self.table: Float32 = np.pad(distance, 1, constant_values=outside).astype(np.float32).ravel()
+        bordered = np.pad(obstacles, 1, constant_values=walled)
+        distance = np.full(bordered.shape, limit)
+        if bordered.any():
+            distance = np.minimum(cast(Array, distance_transform_edt(~bordered)) * grid.resolution, limit)
+        if not walled:
+            distance[[0, -1], :] = distance[:, [0, -1]] = limit
+        self.table: Float32 = distance.astype(np.float32).ravel()
         self.resolution = grid.resolution
         self._height, self._width = grid.shape
         self._grid_from_map = grid.origin.inverse()

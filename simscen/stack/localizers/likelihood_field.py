@@ -33,7 +33,7 @@ def obstacle_field(grid: OccupancyGrid, max_distance: float) -> DistanceField:
     A beam cannot end inside a solid. Nav2's maps come from SLAM, which draws surfaces only; a map that was rasterised
     from a model is filled, and if the inside counted as near, particles would be drawn into what they look at.
     """
-    return DistanceField(grid, surfaces(grid.cells == OCCUPIED), max_distance, max_distance)
+    return DistanceField(grid, surfaces(grid.cells == OCCUPIED), max_distance, walled=False)
 
 
 def surfaces(solid: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:

@@ -1,0 +1,65 @@
+"""The beam model casts rays as exactly as its map allows, and weighs them by table 6.1."""
+
+import math
+
+import numpy as np
+import pytest
+from localizer_room import BEAMS, cast, drive, grid, scan
+
+from simscen.core.geometry import Pose2
+from simscen.core.grid import FREE, UNKNOWN, OccupancyGrid
+from simscen.stack.localizers.beam_model import BeamModel, cast_rays, opaque_field
+from simscen.stack.localizers.beams import select_beams
+
+MOUNT = Pose2(0.15, -0.1, 0.5)
+
+
+def stepped(room: OccupancyGrid, pose: Pose2, angle: float, limit: float) -> float:
+    """A ray followed in steps of a millimetre until its cell is not free."""
+    reach = np.arange(0, limit, 0.001)
+    points = np.column_stack((pose.x + reach * math.cos(angle), pose.y + reach * math.sin(angle)))
+    hit = np.flatnonzero(room.values_at(points) != FREE)
+    return float(reach[hit[0]]) if len(hit) else limit
+
+
+@pytest.mark.parametrize("limit", [12.0, 2.0])
+def test_rays_end_where_steps_of_a_millimetre_end(limit: float) -> None:
+    field = opaque_field(grid(), 100.0)
+    beams = select_beams(scan(np.full(BEAMS, 1.0), mount=MOUNT), 40, -1, limit)
+    poses = drive(60.0).truth[::400]
+    ranges = cast_rays(field, poses, beams)
+    for pose, row in zip(poses, ranges, strict=True):
+        lidar = Pose2(*pose).compose(MOUNT)
+        exact = [stepped(grid(), lidar, pose[2] + bearing, limit) for bearing in beams.bearings]
+        # A ray may graze a corner within half a cell and pass; nothing else may differ by more.
+        assert np.quantile(np.abs(row - exact), 0.97) <= 0.5 * 0.05 + 1e-3
+
+
+def test_unknown_cells_and_the_end_of_the_map_stop_a_ray() -> None:
+    cells = np.full((10, 20), FREE, dtype=np.int8)
+    cells[:, 15:] = UNKNOWN
+    field = opaque_field(OccupancyGrid(cells, 0.1), 100.0)
+    beams = select_beams(scan(np.full(4, 1.0)), 60, -1, 100)
+    backward, right, forward, left = cast_rays(field, np.array([[0.55, 0.35, 0.0]]), beams)[0]
+    assert [backward, right, forward, left] == pytest.approx([0.55, 0.35, 0.95, 0.65], abs=0.051)
+
+
+def test_a_particle_off_the_map_sees_nothing_but_the_end_of_its_nose() -> None:
+    beams = select_beams(scan(np.full(4, 1.0)), 60, -1, 100)
+    assert (cast_rays(opaque_field(grid(), 100.0), np.array([[50.0, 1e6, 0.0]]), beams) == 0).all()
+
+
+def test_weights_are_those_of_the_four_cases_worked_out_by_hand() -> None:
+    model = BeamModel(opaque_field(grid(), 100.0), 0.5, 0.05, 0.05, 0.5, 0.2, 0.1)
+    pose = np.array([[-2.5, -1.8, 0.6]])
+    ranges = cast(pose, -np.pi + np.pi / 180 * np.arange(BEAMS))[0]
+    ranges[::24], ranges[6::24], ranges[12::24] = np.inf, 0.3, np.nan
+    beams = select_beams(scan(ranges), 60, -1, 100)
+    total = 1.0
+    for measured, expected in zip(beams.ranges, cast_rays(model.field, pose, beams)[0], strict=True):
+        p = 0.5 * math.exp(-((measured - expected) ** 2) / (2 * 0.2**2))
+        p += 0.05 * 0.1 * math.exp(-0.1 * measured) if measured < expected else 0
+        p += 0.05 if measured == 12 else 0.5 / 12
+        total += p**3
+    assert len(beams.ranges) == 45
+    assert model.log_likelihood(pose, beams, False) == pytest.approx([math.log(total)])
