@@ -1,5 +1,6 @@
 """Validate a tree against a model: the model, or every problem at the line and column to mend."""
 
+from collections.abc import Iterator
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
@@ -7,8 +8,20 @@ from pydantic import BaseModel, ValidationError
 from simscen.core.problems import Problem
 from simscen.loading import messages
 from simscen.loading.grammar import keys_of, models_at, needs_nothing, types_at
-from simscen.loading.tree import Fields, Key, Leaf, Node, Place, at, child, dotted, key_place, real_keys, value_place
-from simscen.spec.base import Choice
+from simscen.loading.tree import (
+    Fields,
+    Items,
+    Key,
+    Leaf,
+    Node,
+    Place,
+    at,
+    child,
+    dotted,
+    key_place,
+    real_keys,
+    value_place,
+)
 
 Model = TypeVar("Model", bound=BaseModel)
 VERSION = 1
@@ -20,11 +33,14 @@ def check(model: type[Model], tree: Node) -> Model | list[Problem]:
         return [_problem(tree.place, "SC004", f"expected a mapping at top level, got {messages.found(tree)}")]
     if problem := _other_version(tree):
         return [problem]
+    empty = [_no_value(model, tree, loc) for loc in _empty(tree)]
     try:
-        return model.model_validate(tree.plain, by_alias=True, by_name=False)
+        spec = model.model_validate(tree.plain, by_alias=True, by_name=False)
     except ValidationError as error:
-        found = [_translate(model, tree, dict(e)) for e in error.errors(include_input=False, include_url=False)]
-        return _distinct(found)
+        told = error.errors(include_input=False, include_url=False)
+        found = [_translate(model, tree, dict(e)) for e in told if not _follows_from_empty(tree, dict(e))]
+        return _distinct([*empty, *found])
+    return empty or spec
 
 
 def _other_version(tree: Fields) -> Problem | None:
@@ -50,8 +66,6 @@ def _translate(model: type[BaseModel], tree: Node, error: dict[str, Any]) -> Pro
         name = Leaf(tree.place, str(loc[-2]))
         return _problem(key_place(tree, loc), *messages.explain(kind, error.get("ctx", {}), name, error["msg"]))
     node = at(tree, loc)
-    if kind == "value_error" and (empty := _empty_choice(model, node, loc)):
-        return empty
     return _problem(value_place(tree, loc), *messages.explain(kind, error.get("ctx", {}), node, error["msg"]))
 
 
@@ -82,18 +96,35 @@ def _wrong_type(model: type[BaseModel], tree: Node, loc: tuple[Key, ...], error:
     return _problem(value_place(tree, (*loc, "type")), "SC014", message, messages.suggestion(written, types))
 
 
-def _empty_choice(model: type[BaseModel], node: Node, loc: tuple[Key, ...]) -> Problem | None:
-    """`off:` with nothing behind it, where `off: {}` was meant."""
-    if not isinstance(node, Fields):
-        return None
-    for choice in (kind for kind in models_at(model, loc) if issubclass(kind, Choice)):
-        for key in choice.choices():
-            entry = node.entries.get(key)
-            if entry is not None and isinstance(entry.value, Leaf) and entry.value.value is None:
-                below = models_at(choice, (key,))
-                hint = f"write `{key}: {{}}`" if below and needs_nothing(below[0]) else f"give `{key}` a value"
-                return _problem(entry.key, "SC011", f"`{key}` has no value", hint)
-    return None
+def _empty(node: Node, loc: tuple[Key, ...] = ()) -> Iterator[tuple[Key, ...]]:
+    """Where nothing is written: `off:` where `off: {}` was meant, or a value that was forgotten."""
+    if isinstance(node, Fields):
+        for key, entry in node.entries.items():
+            yield from _empty(entry.value, (*loc, key))
+    elif isinstance(node, Items):
+        for index, item in enumerate(node.items):
+            yield from _empty(item, (*loc, index))
+    elif node.value is None:
+        yield loc
+
+
+def _no_value(model: type[BaseModel], tree: Node, loc: tuple[Key, ...]) -> Problem:
+    *holder, key = loc
+    if isinstance(key, int):
+        return _problem(key_place(tree, loc), "SC018", f"item {key + 1} of `{dotted(holder)}` is empty", "remove it")
+    models = models_at(model, loc)
+    complete = models and all(needs_nothing(option) for option in models)
+    hint = f"write `{key}: {{}}`" if complete else "give it a value or remove the key"
+    return _problem(key_place(tree, loc), "SC018", f"{messages.quoted(key)} has no value", hint)
+
+
+def _follows_from_empty(tree: Node, error: dict[str, Any]) -> bool:
+    """Whether pydantic only says in its way that something is empty."""
+    node = at(tree, error["loc"])
+    if isinstance(node, Leaf):
+        return node.value is None
+    holds_nothing = isinstance(node, Fields) and any(e.value.plain is None for e in node.entries.values())
+    return holds_nothing and error["type"] == "value_error"
 
 
 def _distinct(problems: list[Problem]) -> list[Problem]:

@@ -90,6 +90,9 @@ def explain(kind: str, context: Mapping[str, Any], node: Node, text: str) -> Mes
         )
     if kind == "quantity":
         return Message("SC015", str(context["problem"]), f"units: {context['units']}; a bare number is SI")
+    if "names" in context:
+        hint = suggestion(str(context["value"]), str(context["names"]).split(", "))
+        return Message("SC014", f"{shown(node)} is not one of the choices", hint)
     return _bad_name(node) if kind == "string_pattern_mismatch" else Message("SC011", text[:1].lower() + text[1:])
 
 
