@@ -27,7 +27,7 @@ def check(loaded: LoadedScenario) -> list[Problem]:
     return [
         loaded.problem(keys, "SC301", f"{what} ({pose.x:g}, {pose.y:g}) is {where}", hint)
         for keys, what, pose, hint in _poses(loaded.spec, world)
-        if (where := _in_the_way(world, pose, radius))
+        if (where := _outside(loaded, world, pose) or _in_the_way(world, pose, radius))
     ]
 
 
@@ -47,10 +47,15 @@ def expects_unreachable_goal(spec: ScenarioSpec) -> bool:
     )
 
 
-def _in_the_way(world: World, pose: Pose2, radius: float) -> str | None:
+def _outside(loaded: LoadedScenario, world: World, pose: Pose2) -> str | None:
+    """Without a map the ground goes on beyond the obstacles: BARN's goals lie there."""
     left, bottom, right, top = world.bounds
-    if not (left <= pose.x <= right and bottom <= pose.y <= top):
-        return f"outside the world ({left:g} … {right:g}, {bottom:g} … {top:g})"
+    if loaded.map == "none" or (left <= pose.x <= right and bottom <= pose.y <= top):
+        return None
+    return f"outside the world ({left:g} … {right:g}, {bottom:g} … {top:g})"
+
+
+def _in_the_way(world: World, pose: Pose2, radius: float) -> str | None:
     solid = blocking_solid(world, (pose.x, pose.y), 1e-6, (NEAR_GROUND, ROBOT_HEIGHT))
     if solid:
         return f'inside obstacle "{solid}"'
