@@ -7,8 +7,7 @@ everything that hangs on it static. Links without a joint between them are bodie
 
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
+from simscen.core.geometry import Pose3
 from simscen.core.shapes import Body, Solid
 from simscen.worlds.sdf import values
 from simscen.worlds.sdf.links import LinkContent
@@ -39,15 +38,20 @@ class Groups:
         self.parents[high] = low
 
 
-def split(model: Model, contents: list[LinkContent], report: Report) -> tuple[list[Solid], list[Body]]:
-    """The static solids and the bodies of one top-level model, in document order."""
+def split(model: Model, pose: Pose3, contents: list[LinkContent], report: Report) -> tuple[list[Solid], list[Body]]:
+    """The static solids and the bodies of one top-level model that stands at `pose`, in document order.
+
+    A model that is one body keeps its name and its frame, as in Gazebo; several bodies have those of their first link.
+    """
     groups = _groups(model, [content.link for content in contents], report)
     members: dict[int, list[LinkContent]] = {}
     for number, content in enumerate(contents):
         members.setdefault(groups.root(number), []).append(content)
     static = [solid for content in members.pop(-1, []) for solid in content.solids]
     moving = [group for group in members.values() if any(content.solids for content in group)]
-    return static, [_body(group, model.name if len(moving) == 1 else "", report) for group in moving]
+    if len(moving) == 1:
+        return static, [_body(model.name, pose, moving[0], report)]
+    return static, [_body(group[0].link.name, group[0].link.pose, group, report) for group in moving]
 
 
 def _groups(model: Model, links: list[PlacedLink], report: Report) -> Groups:
@@ -78,15 +82,11 @@ def _connect(owner: Model, joint: Element, numbers: dict[int, int], groups: Grou
     groups.join(*ends)
 
 
-def _body(group: list[LinkContent], name: str, report: Report) -> Body:
-    """One piece, whose frame sits in its centre of mass and is turned as its first link."""
-    first = group[0].link
-    masses = np.array([content.mass for content in group])
-    x, y, z = (masses @ np.array([content.centre for content in group]) / masses.sum()).tolist()
-    pose = first.pose._replace(x=x, y=y, z=z)
+def _body(name: str, pose: Pose3, group: list[LinkContent], report: Report) -> Body:
     inverse = pose.inverse()
     solids = tuple(replace(s, pose=inverse.compose(s.pose)) for content in group for s in content.solids)
-    return Body(name or first.name, solids, pose, 0.0 if _is_kinematic(group, report) else float(masses.sum()))
+    mass = 0.0 if _is_kinematic(group, report) else sum(content.mass for content in group)
+    return Body(name, solids, pose, mass)
 
 
 def _is_kinematic(group: list[LinkContent], report: Report) -> bool:

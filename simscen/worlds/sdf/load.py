@@ -18,15 +18,15 @@ from simscen.worlds.sdf.markup import Element
 from simscen.worlds.sdf.placing import place
 from simscen.worlds.sdf.report import Report, Unusable
 from simscen.worlds.sdf.shapes import ShapeReader
-from simscen.worlds.sdf.state import WorldState, read_state
+from simscen.worlds.sdf.state import ModelState, WorldState, read_state
 from simscen.worlds.sdf.tree import Model, TreeReader
 
 
 def load_sdf(path: Path, *, search: Sequence[Path] = (), root: Path, lenient: bool = False) -> World:
     """The world in a Gazebo `.sdf`, `.world` or model file of SDF 1.3 to 1.12.
 
-    Only collision geometry counts. Static models become solids, others bodies with their mass, whose frame is their
-    centre of mass; actors become bodies of mass 0 with a path. Everything is in the world's frame and in document
+    Only collision geometry counts. Static models become solids, others bodies with their mass; actors become bodies
+    of mass 0 with a path. Everything is in the world's frame and in document
     order. Files that it names are looked for beside it and in `search`, and must lie inside `root` or `search`.
 
     Raises InvalidInput with everything that would change the geometry and cannot be used; with `lenient` that is
@@ -91,10 +91,10 @@ class _Builder:
         return self._world()
 
     def _add(self, model: Model, state: WorldState) -> None:
-        pose = self.whole.scope.place(model.frame)
-        links = place(model, pose, self.report, state.models.get(model.name))
-        contents = [read_link(link, self.shapes, self.report) for link in links]
-        solids, bodies = split(model, contents, self.report)
+        saved = state.models.get(model.name, ModelState())
+        pose = saved.pose or self.whole.scope.place(model.frame)
+        contents = [read_link(link, self.shapes, self.report) for link in place(model, pose, self.report, saved)]
+        solids, bodies = split(model, pose, contents, self.report)
         self.solids += solids
         self.bodies += bodies
 

@@ -10,12 +10,14 @@ from pathlib import Path
 
 import numpy as np
 
+from simscen.core.errors import InvalidInput
+from simscen.core.problems import Problem
 from simscen.core.shapes import Mesh
 from simscen.worlds.sdf import values
-from simscen.worlds.sdf.files import MESH_BYTES, Library
+from simscen.worlds.sdf.files import MESH_BYTES, Library, Trouble
 from simscen.worlds.sdf.markup import Element
 from simscen.worlds.sdf.meshfile import Part, UnusableMesh, read_parts
-from simscen.worlds.sdf.report import Report
+from simscen.worlds.sdf.report import CODE, Report
 
 
 @dataclass(frozen=True)
@@ -81,6 +83,20 @@ class MeshShelf:
             hint = "it has " + ", ".join(known[:10]) if known else "it has no named parts"
             raise element.unusable(f"no submesh {wish.submesh[:80]!r} in {wish.path.name}", hint)
         return chosen
+
+
+def read_mesh(path: Path) -> Mesh:
+    """All triangles of a DAE, STL or OBJ file in metres, for a caller that knows that this file may be read.
+
+    Raises InvalidInput for the file as a whole: not a regular file, too large, broken, no triangles.
+    """
+    real = path.resolve()
+    try:
+        data = Library(real.parent, ()).open(real, MESH_BYTES)[1]
+        parts = read_parts(data, path.suffix.lower(), path.name)
+    except (Trouble, UnusableMesh) as error:
+        raise InvalidInput([Problem(str(path), 0, 0, CODE, str(error))]) from error
+    return _joined(parts, _Wish(path, (1.0, 1.0, 1.0), "", centred=False))
 
 
 def _joined(parts: tuple[Part, ...], wish: _Wish) -> Mesh:

@@ -1,6 +1,7 @@
 """Triangles out of mesh files, in metres, whatever the file claims about itself."""
 
 import io
+import logging
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -15,6 +16,9 @@ from simscen.worlds.sdf.values import FARTHEST
 MOST_FACES = 500_000
 MOST_NODES = 10_000
 STL_HEADER, STL_TRIANGLE = 84, 50
+
+# trimesh logs the tracebacks of what it tries first; without any handler Python would print them to stderr.
+logging.getLogger("trimesh").addHandler(logging.NullHandler())
 
 
 class UnusableMesh(Exception):

@@ -1,22 +1,42 @@
-"""Volumes and centres of volume, for `<inertial auto="true">` (SDF 1.11)."""
+"""What a link weighs."""
+
+from collections.abc import Sequence
 
 import numpy as np
 
-from simscen.core.geometry import Array
-from simscen.core.shapes import Shape
+from simscen.core.shapes import Shape, Solid
 from simscen.worlds.meshing import triangulate
+from simscen.worlds.sdf import values
+from simscen.worlds.sdf.markup import Element
+
+WATER = 1000.0
+"""kg/m³, the density SDF assumes for `<inertial auto="true">`."""
+DEFAULT_MASS = 1.0
+"""kg, SDF's default."""
 
 
-def volume_and_centre(shape: Shape) -> tuple[float, Array]:
-    """The volume in m³ inside a shape's triangles and its centre (3,) in the shape's frame.
+def mass_of(inertial: Element | None, collisions: Sequence[tuple[Element, Sequence[Solid]]]) -> float:
+    """The mass in kg that an `<inertial>` states or, if it is `auto`, that its collisions have by their densities."""
+    if inertial is None:
+        return DEFAULT_MASS
+    if values.truth_of(inertial.attributes.get("auto", "0"), inertial):
+        mass = sum(_density(element, inertial) * volume(s.shape) for element, solids in collisions for s in solids)
+        if mass > 0:
+            return mass
+    return values.positive(inertial, "mass") if inertial.child("mass") else DEFAULT_MASS
 
-    By the divergence theorem: signed tetrahedra between the origin and each triangle. An open mesh has no inside;
-    its volume is then what the tetrahedra happen to add up to, as in sdformat's own mesh calculator.
+
+def _density(collision: Element, inertial: Element) -> float:
+    stated = next((owner for owner in (collision, inertial) if owner.child("density")), None)
+    return values.positive(stated, "density") if stated else WATER
+
+
+def volume(shape: Shape) -> float:
+    """The volume in m³ inside a shape's triangles, by the divergence theorem.
+
+    An open mesh has no inside; its volume is then what the tetrahedra between the origin and each triangle happen to
+    add up to, as in sdformat's own calculation.
     """
     mesh = triangulate(shape)
     a, b, c = (mesh.vertices[mesh.faces[:, corner]] for corner in range(3))
-    volumes = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
-    total = float(volumes.sum())
-    if abs(total) < 1e-12:
-        return 0.0, mesh.vertices.mean(axis=0)
-    return abs(total), volumes @ (a + b + c) / 4 / total
+    return abs(float(np.einsum("ij,ij->", a, np.cross(b, c)))) / 6

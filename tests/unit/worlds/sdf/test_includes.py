@@ -95,7 +95,7 @@ def test_a_merged_include_lends_its_names_and_takes_its_owners_static(load, tmp_
     joint = "<joint name='j' type='fixed'><parent>a</parent><child>b</child></joint>"
     (body,) = load(f"<model name='cart'>{merged}{on_top}{joint}</model>").bodies
     assert (body.name, body.mass) == ("cart", 2.0)
-    assert body.pose.position == (3, 0, 0.5)
+    assert [solid.pose.position for solid in body.solids] == [(3, 0, 0), (3, 0, 1)]
 
 
 def test_model_config_names_the_newest_version_that_is_read(load, tmp_path):

@@ -4,6 +4,8 @@ import tracemalloc
 import numpy as np
 import pytest
 
+from simscen.core.errors import InvalidInput
+from simscen.worlds.sdf.meshes import read_mesh
 from simscen.worlds.sdf.meshfile import UnusableMesh, read_parts
 
 DAE = """<?xml version="1.0"?>
@@ -223,3 +225,13 @@ def test_convex_hulls_are_not_made_and_that_is_said(load, tmp_path):
     (tmp_path / "x.dae").write_text(dae())
     (note,) = load(world("x.dae").replace("<mesh>", "<mesh optimization='convex_hull'>")).notes
     assert "the mesh is used as it is" in note
+
+
+def test_a_mesh_may_be_read_by_itself(tmp_path):
+    (tmp_path / "x.dae").write_text(dae(unit='<unit meter="0.5"/>'))
+    np.testing.assert_allclose(read_mesh(tmp_path / "x.dae").vertices.max(axis=0), (0.5, 0.5, 0))
+    (tmp_path / "x.stl").write_bytes(stl(5, 1))
+    with pytest.raises(InvalidInput, match=r"x\.stl: STL header says 5 triangles, file holds 1"):
+        read_mesh(tmp_path / "x.stl")
+    with pytest.raises(InvalidInput, match=r"y\.stl: no such file"):
+        read_mesh(tmp_path / "y.stl")
