@@ -1,0 +1,207 @@
+"""Everything the language knows, by name, with its docstring, fields and example: for `explain` and the reference."""
+
+import inspect
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel, RootModel
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from simscen.actions.action import AnyAction
+from simscen.criteria.criterion import AnyCriterion
+from simscen.faults.fault import AnyFault
+from simscen.model import robot, scenario, stack, world
+from simscen.model.disturbance import EventEntry, FaultEntry
+from simscen.model.rosmap import RosMapSpec
+from simscen.spec.base import Choice
+from simscen.spec.docs import field_docs
+from simscen.spec.quantities import UNITS, Quantity
+from simscen.triggers.trigger import Test, Trigger
+
+_EXAMPLE = re.compile(r"^Example: `(.+)`$", re.MULTILINE)
+OPTIONAL = "–"
+_BOUNDS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
+
+
+@dataclass(frozen=True)
+class Field:
+    """A key, what may be written there, its default ("" = required), and what it means."""
+
+    key: str
+    kind: str
+    default: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Topic:
+    """One thing of the language: `name` as it is written, in a `group` such as "trigger"."""
+
+    group: str
+    name: str
+    model: type[BaseModel] | None
+    text: str
+    example: str = ""
+
+    @property
+    def fields(self) -> list[Field]:
+        """Its keys in order; none for a bare value."""
+        return fields_of(self.model) if self.model is not None and not issubclass(self.model, RootModel) else []
+
+    @property
+    def value(self) -> str:
+        """What is written behind the name, for a bare value."""
+        if self.model is not None and issubclass(self.model, RootModel):
+            return kind_of(self.model)
+        return ""
+
+
+def topics() -> list[Topic]:
+    """Every topic, group by group, in the order of the language."""
+    return [
+        *_choices("trigger", Test),
+        _topic("trigger", "when", Trigger),
+        *_choices("action", AnyAction),
+        *_choices("fault", AnyFault),
+        _topic("fault", "faults", FaultEntry),
+        *_choices("criterion", AnyCriterion),
+        _topic("criterion", "pass", AnyCriterion),
+        *(_topic("scenario", name, model) for name, model in _SCENARIO.items()),
+        *(_topic("stack", name, model) for name, model in _STACK.items()),
+        *(_topic("localizer", kind, model) for kind, model in by_type(stack.Localizer)),
+        *(_topic("controller", kind, model) for kind, model in by_type(stack.Controller)),
+        *(_topic("world", name, model) for name, model in _WORLD.items()),
+        *(_topic("robot", name, model) for name, model in _ROBOT.items()),
+        *(_topic("drive", kind, model) for kind, model in by_type(robot.Drive)),
+        *_choices("sensor", robot.Sensor),
+    ]
+
+
+_SCENARIO: dict[str, type[BaseModel]] = {
+    "scenario": scenario.ScenarioSpec,
+    "robot entry": scenario.RobotEntry,
+    "initial_estimate": scenario.InitialEstimate,
+    "goals": scenario.GoalEntry,
+    "events": EventEntry,
+    "physics": scenario.Physics,
+}
+_STACK: dict[str, type[BaseModel]] = {
+    "stack": stack.StackSpec,
+    "costmap": stack.Costmap,
+    "planner": stack.Planner,
+    "goal_checker": stack.GoalChecker,
+    "progress_checker": stack.ProgressChecker,
+    "recovery": stack.Recovery,
+    "velocity_smoother": stack.VelocitySmoother,
+    "collision_monitor": stack.CollisionMonitor,
+}
+_WORLD: dict[str, type[BaseModel]] = {
+    "world": world.WorldSpec,
+    "walls": world.Wall,
+    "obstacles": world.Obstacle,
+    "objects": world.Movable,
+    "move": world.Travel,
+    "doors": world.Door,
+    "ROS map": RosMapSpec,
+}
+_ROBOT: dict[str, type[BaseModel]] = {
+    "robot": robot.RobotSpec,
+    "body": robot.Part,
+    "limits": robot.Limits,
+    "mount": robot.Mount,
+}
+
+
+def fields_of(model: type[BaseModel]) -> list[Field]:
+    """The keys of a mapping, in the order of the model; of a choice only what may stand beside it."""
+    docs = field_docs(model)
+    shown = model.modifiers if issubclass(model, Choice) else model.model_fields.keys()
+    return [
+        Field(field.alias or name, kind_of(field), _default(field), docs.get(name, ""))
+        for name, field in model.model_fields.items()
+        if name in shown
+    ]
+
+
+def kind_of(kind: Any, metadata: tuple[Any, ...] = ()) -> str:
+    """A type in words, with unit and range: "length in m, ≥ 0"."""
+    if isinstance(kind, FieldInfo):
+        return kind_of(kind.annotation, tuple(kind.metadata))
+    if get_origin(kind) is Annotated:
+        return kind_of(get_args(kind)[0], (*get_args(kind)[1:], *metadata))
+    if get_origin(kind) in (Union, UnionType):
+        return " or ".join(dict.fromkeys(kind_of(member) for member in get_args(kind) if member is not NoneType))
+    if get_origin(kind) is Literal:
+        return " | ".join(f"`{value}`" for value in get_args(kind))
+    if get_origin(kind) is list:
+        return f"list of {kind_of(get_args(kind)[0])}"
+    if get_origin(kind) is dict:
+        return f"names, each with {kind_of(get_args(kind)[1])}"
+    if isinstance(kind, type) and issubclass(kind, RootModel):
+        return kind_of(kind.model_fields["root"])
+    return _plain(kind, metadata)
+
+
+def by_type(union: Any) -> Iterator[tuple[str, type[BaseModel]]]:
+    """The members of a union told apart by `type`."""
+    members = get_args(get_args(union)[0])
+    for member in members:
+        model = get_args(member)[0] if get_origin(member) is Annotated else member
+        yield get_args(model.model_fields["type"].annotation)[0], model
+
+
+def _plain(kind: Any, metadata: tuple[Any, ...]) -> str:
+    words = {int: "integer", float: "number", str: "text", bool: "true or false"}
+    quantity = next((mark for mark in _flat(metadata) if isinstance(mark, Quantity)), None)
+    if quantity is not None:
+        word = f"{quantity.dimension} in {next(iter(UNITS[quantity.dimension]))}"
+    else:
+        word = words.get(kind, "mapping" if isinstance(kind, type) and issubclass(kind, BaseModel) else "choice")
+    bounds = {
+        name: getattr(mark, name)
+        for mark in _flat(metadata)
+        for name in _BOUNDS
+        if getattr(mark, name, None) is not None
+    }
+    if bounds.keys() == {"ge", "le"}:
+        texts = [f"{bounds['ge']:g} … {bounds['le']:g}"]
+    else:
+        texts = [f"{_BOUNDS[name]} {bound:g}" for name, bound in bounds.items()]
+    return ", ".join([word.replace("ratio in %", "ratio"), *texts])
+
+
+def _flat(metadata: tuple[Any, ...]) -> Iterator[Any]:
+    """Annotations of pydantic's Field are nested in it."""
+    for mark in metadata:
+        yield from mark.metadata if isinstance(mark, FieldInfo) else [mark]
+
+
+def _default(field: FieldInfo) -> str:
+    if field.is_required():
+        return ""
+    value = field.get_default(call_default_factory=True)
+    if value in (PydanticUndefined, None, "") or isinstance(value, BaseModel | dict):
+        return OPTIONAL
+    if isinstance(value, list):
+        return f"[{', '.join(map(str, value))}]" if value else OPTIONAL
+    return str(value).lower() if isinstance(value, bool) else f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _choices(group: str, choice: type[Choice]) -> Iterator[Topic]:
+    docs = field_docs(choice)
+    for key, name in choice.choices().items():
+        models = [
+            m for m in get_args(choice.model_fields[name].annotation) if isinstance(m, type) and m is not NoneType
+        ]
+        model = models[0] if models and issubclass(models[0], BaseModel) and models[0] is not choice else None
+        yield _topic(group, key, model) if model is not None else Topic(group, key, None, docs.get(name, ""))
+
+
+def _topic(group: str, name: str, model: type[BaseModel]) -> Topic:
+    text = inspect.cleandoc(model.__doc__ or "")
+    example = _EXAMPLE.search(text)
+    return Topic(group, name, model, _EXAMPLE.sub("", text).strip(), example[1] if example else "")
