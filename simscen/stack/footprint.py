@@ -38,7 +38,7 @@ class Footprint:
     def free(self, costmap: CostmapView, poses: Array) -> Mask:
         """Which of the poses (n, 3) hit nothing."""
         distance = distances(costmap, poses[:, :2])
-        free: Mask = distance > np.float32(self._inscribed)
+        free: Mask = np.asarray(distance > np.float32(self._inscribed))
         if self._round:
             return free
         unsure = np.flatnonzero(free & (distance <= self._circumscribed + costmap.resolution))
@@ -49,14 +49,14 @@ class Footprint:
     def clearance(self, costmap: CostmapView, poses: Array) -> Array:
         """About how far (n,) the hull's edge is from the nearest lethal cell in metres; negative in collision."""
         if self._round:
-            return distances(costmap, poses[:, :2]).astype(np.float64) - self._inscribed
+            gap: Array = distances(costmap, poses[:, :2]).astype(np.float64) - self._inscribed
+            return gap
         edge = distances(costmap, self._placed(poses)).min(axis=1).astype(np.float64)
         middle = distances(costmap, poses[:, :2]).astype(np.float64) - self._inscribed
-        return np.minimum(edge, middle)
+        return np.asarray(np.minimum(edge, middle))
 
     def _edge_free(self, costmap: CostmapView, poses: Array) -> Mask:
-        free: Mask = (distances(costmap, self._placed(poses)) > 0).all(axis=1)
-        return free
+        return np.asarray((distances(costmap, self._placed(poses)) > 0).all(axis=1))
 
     def _placed(self, poses: Array) -> Array:
         cosine, sine = np.cos(poses[:, 2, None]), np.sin(poses[:, 2, None])

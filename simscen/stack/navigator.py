@@ -44,7 +44,7 @@ class Navigator:
         radius: float,
         journal: list[Event],
     ) -> None:
-        self._spec, self._planner, self._controller, self._recovery = spec, planner, controller, recovery
+        self._spec, self.planner, self._controller, self._recovery = spec, planner, controller, recovery
         self._goal_checker, self._progress, self._costmap = goal_checker, progress, costmap
         self._plan_seed, self._period, self._radius = plan_seed, period, radius
         self._events = journal
@@ -126,7 +126,7 @@ class Navigator:
 
     def _compute(self, tick: int, goal: Goal, pose: Pose2) -> Path:
         self._plans += 1
-        path = self._planner.plan(self._costmap.view, pose, goal.pose, self._plan_seed(self._plans))
+        path = self.planner.plan(self._costmap.view, pose, goal.pose, self._plan_seed(self._plans))
         x, y, yaw = path.points[-1].tolist()
         if goal.pose.distance(Pose2(x, y, yaw)) > goal.xy_tolerance:
             raise NavigationFailure(ErrorCode.GOAL_OCCUPIED, "the robot does not fit within the goal's tolerance")

@@ -1,6 +1,7 @@
 """The reference stack: readings in; localise, map, navigate, smooth, guard; one command out."""
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -82,6 +83,17 @@ class ReferenceStack:
     def goal(self) -> Goal | None:
         """The goal being driven to; None when the task has ended."""
         return self._task.goal
+
+    @property
+    def components(self) -> dict[str, tuple[Any, ...]]:
+        """What is worth measuring: name → the component and its methods that take time."""
+        return {
+            "localizer": (self._localizer, "on_odometry", "on_imu", "on_scan"),
+            "costmap": (self._costmap, "update"),
+            "planner": (self._navigator.planner, "plan"),
+            "controller": (self._controller, "command", "set_path"),
+            "collision monitor": (self._monitor, "allow", "on_scan"),
+        }
 
     def decide(self, tick: int, readings: Readings) -> Decision:
         """Take the readings of this beat and say what to drive."""

@@ -53,7 +53,7 @@ class RegulatedPurePursuit:
         """The velocity to drive now. Raises NO_VALID_CONTROL when the arc to the carrot is blocked."""
         if self._track is None:
             raise NavigationFailure(ErrorCode.INVALID_PATH, "there is no path to follow")
-        track, spec = self._track, self._spec
+        track = self._track
         track.locate(pose)
         reach = self._lookahead(twist.vx)
         x, y = track.carrot(pose, reach)

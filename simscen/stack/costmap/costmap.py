@@ -59,8 +59,9 @@ class Costmap:
         if self._rolling:
             self._follow(base)
         around = self._around(base)
+        corner = np.array((around[0].start, around[1].start))
         live = self._live[around]
-        seen = np.argwhere(live) + (around[0].start, around[1].start)
+        seen = np.argwhere(live) + corner
         before = live.copy()
         gone = seen[crossed(seen, self._frame, scan, base, self._spec)]
         self._live[gone[:, 0], gone[:, 1]] = False
@@ -68,7 +69,7 @@ class Costmap:
         self._live[marked[:, 0], marked[:, 1]] = True
         under = seen[self._under_footprint(seen, base)]
         self._live[under[:, 0], under[:, 1]] = False
-        changed = np.argwhere(before != live) + (around[0].start, around[1].start)
+        changed = np.argwhere(before != live) + corner
         if len(gone):
             self.gone += int(np.count_nonzero(~self._live[gone[:, 0], gone[:, 1]]))
         self._newest[scan.sensor] = (base, scan)
@@ -106,8 +107,7 @@ class Costmap:
 
     def _follow(self, base: Pose2) -> None:
         """Shift the rolling window when the robot has come an eighth of its size away from the middle."""
-        rows, columns = self._frame.shape
-        size = columns * self._frame.resolution
+        size = self._frame.shape[1] * self._frame.resolution
         middle = (self._frame.origin[0] + size / 2, self._frame.origin[1] + size / 2)
         if max(abs(base.x - middle[0]), abs(base.y - middle[1])) < size / 8:
             return
@@ -126,7 +126,8 @@ class Costmap:
 
     def _under_footprint(self, cells: Cells, base: Pose2) -> npt.NDArray[np.bool_]:
         offset = self._frame.centres(cells) - np.array([base.x, base.y])
-        return np.hypot(offset[:, 0], offset[:, 1]) < self._robot.inscribed_radius
+        inside: npt.NDArray[np.bool_] = np.hypot(offset[:, 0], offset[:, 1]) < self._robot.inscribed_radius
+        return inside
 
     def _marks(self, base: Pose2, scan: Scan) -> Cells:
         points = hits(scan, base, self._spec.obstacle_min_range, self._spec.obstacle_max_range)

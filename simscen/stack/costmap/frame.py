@@ -21,11 +21,13 @@ class Frame:
     def cells(self, points: Array) -> Cells:
         """Cells (n, 2) as (row, column) under points (n, 2); may lie off the grid."""
         local = (points - np.array(self.origin)) * (1.0 / self.resolution)
-        return np.floor(local[:, ::-1]).astype(np.int64)
+        cells: Cells = np.floor(local[:, ::-1]).astype(np.int64)
+        return cells
 
     def centres(self, cells: Cells) -> Array:
         """Points (n, 2) of the centres of cells (n, 2)."""
-        return (cells[:, ::-1] + 0.5) * self.resolution + np.array(self.origin)
+        points: Array = (cells[:, ::-1] + 0.5) * self.resolution + np.array(self.origin)
+        return points
 
     def inside(self, cells: Cells) -> npt.NDArray[np.bool_]:
         """Which of the cells (n, 2) lie on the grid."""

@@ -30,15 +30,14 @@ def free_lengths(scan: Scan, spec: CostmapSpec) -> Array:
     ranges = scan.ranges
     with np.errstate(invalid="ignore"):
         seen = np.where(ranges > scan.range_max, np.inf, ranges)
-        seen = np.where(seen >= scan.range_min, np.minimum(seen, spec.raytrace_max_range), 0.0)
-    return seen
+        return np.where(seen >= scan.range_min, np.minimum(seen, spec.raytrace_max_range), 0.0)
 
 
 def crossed(cells: Cells, frame: Frame, scan: Scan, base: Pose2, spec: CostmapSpec) -> npt.NDArray[np.bool_]:
     """Which of the cells (n, 2) a beam crosses before it hits anything.
 
     A line crosses a square of half-width h when its distance from the centre is at most h (|cos| + |sin|); each cell
-    is tested against the two beams next to its bearing, which decide unless beams are closer than cells (then any does).
+    is tested against the two beams next to its bearing, which are the nearest to its centre.
     """
     lidar = base.compose(scan.mount)
     offset = frame.centres(cells) - np.array([lidar.x, lidar.y])

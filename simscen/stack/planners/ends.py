@@ -85,7 +85,7 @@ def _nearest(field: Field, free: npt.NDArray[np.bool_], pose: Pose2, within: flo
         return pose.x, pose.y
     reach = math.ceil(within / field.resolution)
     top, left = max(0, row - reach), max(0, column - reach)
-    cells = np.argwhere(free[top : row + reach + 1, left : column + reach + 1]) + (top, left)
+    cells = np.argwhere(free[top : row + reach + 1, left : column + reach + 1]) + np.array((top, left))
     x = field.origin[0] + (cells[:, 1] + 0.5) * field.resolution
     y = field.origin[1] + (cells[:, 0] + 0.5) * field.resolution
     distance = np.hypot(x - pose.x, y - pose.y)

@@ -1,6 +1,7 @@
 """The distance field as planners ask it: one point or one segment at a time, thousands of times a plan."""
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -18,14 +19,15 @@ class Field:
         self.height, self.width = costmap.distance.shape
         self.origin = costmap.origin
         self._per_metre = 1.0 / costmap.resolution
-        self._look: memoryview[float] = memoryview(np.ascontiguousarray(costmap.distance).reshape(-1))  # type: ignore[arg-type, assignment] # ndarrays are buffers
+        flat: Any = np.ascontiguousarray(costmap.distance).reshape(-1)
+        self._look: Any = memoryview(flat)
 
     def at(self, x: float, y: float) -> float:
         """Distance in metres to the nearest lethal cell; -1 off the map."""
         column = math.floor((x - self.origin[0]) * self._per_metre)
         row = math.floor((y - self.origin[1]) * self._per_metre)
         if 0 <= row < self.height and 0 <= column < self.width:
-            return self._look[row * self.width + column]
+            return float(self._look[row * self.width + column])
         return -1.0
 
     def many(self, points: Array) -> Array:

@@ -10,20 +10,48 @@ from simscen.core.geometry import Array, Pose2
 from simscen.stack.planners.field import Field
 from simscen.stack.planners.search import Point
 
+ROUNDS, ENOUGH = 4, 0.999
+"""String pulling ends after this many rounds, or when one leaves more than this ratio of the length."""
+STRING = 0.2
+"""Metres between the points of a path that is being pulled tight."""
 SPACING = 0.05
 """Metres between the points of a finished path."""
 
 
 def pull_tight(field: Field, points: list[Point], radius: float) -> list[Point]:
-    """String pulling: from each kept point go straight to the farthest point that can be seen."""
-    pulled, at = [points[0]], 0
-    while at < len(points) - 1:
-        ahead = len(points) - 1
-        while ahead > at + 1 and not field.segment_free(*points[at], *points[ahead], radius):
-            ahead -= 1
-        pulled.append(points[ahead])
-        at = ahead
+    """String pulling, from one end and the other in turn, until that makes it no shorter."""
+    best = _pulled(field, points, radius)
+    for _ in range(ROUNDS):
+        before = length(best)
+        for _ in range(2):
+            best = _pulled(field, spaced(np.array(best), STRING).tolist()[::-1], radius)
+        if length(best) > ENOUGH * before:
+            break
+    return best
+
+
+def _pulled(field: Field, points: list[Point], radius: float) -> list[Point]:
+    """From each kept point straight on to the farthest point that can be seen, found by galloping and bisection."""
+    pulled, at, last = [points[0]], 0, len(points) - 1
+    while at < last:
+        here = points[at]
+        seen, step = at + 1, 1
+        while seen < last:
+            ahead = min(last, seen + step)
+            if field.segment_free(*here, *points[ahead], radius):
+                seen, step = ahead, step * 2
+            elif step == 1:
+                break
+            else:
+                step = max(1, step // 4)
+        pulled.append(points[seen])
+        at = seen
     return pulled
+
+
+def length(points: list[Point]) -> float:
+    """Length of a polyline in metres."""
+    return sum(math.hypot(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(points))
 
 
 def spaced(points: Array, spacing: float) -> Array:
@@ -50,7 +78,7 @@ def relaxed(field: Field, points: Array, radius: float, wanted: float, rounds: i
     if len(points) < 3:
         return points
     band = points.copy()
-    h = field.resolution
+    east, north = np.array((field.resolution, 0.0)), np.array((0.0, field.resolution))
     for _ in range(rounds):
         inner = band[1:-1]
         tension = 0.5 * (band[:-2] + band[2:]) - inner
@@ -58,10 +86,10 @@ def relaxed(field: Field, points: Array, radius: float, wanted: float, rounds: i
         push = np.clip(wanted - clearance, 0.0, None)[:, None]
         slope = np.column_stack(
             (
-                field.many(inner + (h, 0.0)) - field.many(inner - (h, 0.0)),
-                field.many(inner + (0.0, h)) - field.many(inner - (0.0, h)),
+                field.many(inner + east) - field.many(inner - east),
+                field.many(inner + north) - field.many(inner - north),
             )
-        ) / (2 * h)
+        ) / (2 * field.resolution)
         band[1:-1] = inner + 0.4 * tension + 0.3 * push * np.clip(slope, -1, 1)
     return _blended(field, band, points, radius)
 

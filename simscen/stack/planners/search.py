@@ -22,6 +22,8 @@ PLANNERS: dict[str, Callable[[Any], Any]] = {
     "aorrtc": og.AORRTC,
     "kpiece": og.KPIECE1,
 }
+RANGE = 1.0
+"""Metres that a tree grows at most in one step. OMPL's default, a fifth of the map, mostly ends in walls of a house."""
 ou.setLogLevel(ou.LOG_NONE)
 
 
@@ -64,6 +66,8 @@ def search(
     problem = ob.ProblemDefinition(information)
     problem.setStartAndGoalStates(_state(information, start), _state(information, goal))
     planner = PLANNERS[kind](information)
+    if hasattr(planner, "setRange"):
+        planner.setRange(RANGE)
     planner.setProblemDefinition(problem)
     planner.setup()
     planner.solve(ob.PlannerTerminationCondition(_after(iterations)))

@@ -13,7 +13,7 @@ from simscen.core.chance import Streams
 from simscen.core.events import Event
 from simscen.core.geometry import Array, Pose2
 from simscen.core.grid import OccupancyGrid
-from simscen.core.motion import Twist
+from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import Goal
 from simscen.core.sensing import Odometry, Scan
 from simscen.core.time import Clock
@@ -119,7 +119,7 @@ class Drive:
     noise: float = 0.01
     range_max: float = 12.0
     tick: int = 0
-    twist: Twist = Twist()
+    twist: Twist = STOP
     blind: bool = False
 
     def __post_init__(self) -> None:
