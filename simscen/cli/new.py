@@ -20,7 +20,7 @@ def command(
     It is valid and passes as it is. A file that is there already is never overwritten.
     """
     file = Path(name if name.endswith(SCENARIO) else f"{name}{SCENARIO[0]}")
-    starter = resources.files("simscen").joinpath("data", "starter.scenario.yaml").read_text(encoding="utf-8")
+    starter = (resources.files("simscen") / "data" / "starter.scenario.yaml").read_text(encoding="utf-8")
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         with file.open("x", encoding="utf-8") as out:
