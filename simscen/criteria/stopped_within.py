@@ -55,7 +55,7 @@ class StoppedWithin(Spec, Criterion):
             because, detail = never_started(trace, self.after)
             return [undecided("stopped_within", because, self._limit, detail)]
         rest = self._rest(trace)
-        if all(_held(trace, rest, span.start) for span in happened):
+        if all(_stood(trace, rest, span.start) for span in happened):
             because = f"the robot was not moving when `{self.after}` started, so nothing had to stop"
             return [undecided("stopped_within", because, self._limit)]
         return [finding for span in happened for finding in self._once(trace, span, rest)]
@@ -71,15 +71,16 @@ class StoppedWithin(Spec, Criterion):
         return slow & steady
 
     def _once(self, trace: Trace, span: Span, rest: Flags) -> list[Finding]:
-        ticks = trace.velocity.ticks
-        since = slice(max(int(np.searchsorted(ticks, span.start, side="right")) - 1, 0), None)
-        during = ticks[since] <= span.end
-        stop, _ = first_lasting(ticks[since][during], rest[since][during], round(self.hold * trace.tick_rate), span.end)
-        until = span.end if stop is None else max(stop, span.start)
+        first = max(int(np.searchsorted(trace.velocity.ticks, span.start, side="right")) - 1, 0)
+        hold = round(self.hold * trace.tick_rate)
+        stop, lasted = first_lasting(trace.velocity.ticks[first:], rest[first:], hold, trace.end)
+        stop = None if stop is None or stop > span.end else max(stop, span.start)
+        until = span.end if stop is None else stop
         elapsed = trace.seconds(until - span.start)
-        if stop is None and elapsed <= self.time:
-            over = f"`{self.after}`" if span.lasting else f"the run ({ending(trace)})"
-            because = f"{over} was over {elapsed:.2f} s after it started, with the robot still moving"
+        if elapsed <= self.time and not (stop is not None and lasted):
+            over = f"`{self.after}`" if span.lasting and stop is None else f"the run ({ending(trace)})"
+            state = "still moving" if stop is None else "hardly at rest"
+            because = f"{over} was over {elapsed:.2f} s after it started, with the robot {state}"
             return [undecided("stopped_within", because, self._limit)]
         detail = _explained(trace, span.start, until) + ([] if stop is not None else ["it never came to rest"])
         context = f"after {self.after}"
@@ -98,9 +99,9 @@ class StoppedWithin(Spec, Criterion):
         )
 
 
-def _held(trace: Trace, flags: Flags, tick: int) -> bool:
-    """The newest flag at `tick`."""
-    return bool(flags[max(int(np.searchsorted(trace.velocity.ticks, tick, side="right")) - 1, 0)])
+def _stood(trace: Trace, rest: Flags, tick: int) -> bool:
+    """Whether the robot stood just before `tick`."""
+    return bool(rest[max(int(np.searchsorted(trace.velocity.ticks, tick, side="left")) - 1, 0)])
 
 
 def _explained(trace: Trace, start: int, end: int) -> list[str]:

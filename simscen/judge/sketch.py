@@ -5,9 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from simscen.core.case import Case
 from simscen.core.events import Event
 from simscen.core.geometry import Array, Pose2, wrap_array
-from simscen.core.navigation import Path
+from simscen.core.navigation import Goal, Path
 from simscen.core.trace import Samples, Ticks, Trace
 
 TICK_RATE, TRUTH_PERIOD, SCAN_PERIOD, BELIEF_PERIOD = 240, 6, 24, 24
@@ -50,12 +51,15 @@ def _way(waypoints: Sequence[Sequence[float]], ticks: Ticks) -> Samples:
 
 
 def _velocity(truth: Samples) -> Array:
-    """vx, vy, wz in the base frame over the step that begins at each sample; the last one is at rest."""
-    step = np.diff(truth.ticks)[:, np.newaxis] / TICK_RATE
-    dx, dy, turn = (np.diff(truth.values, axis=0) / step).T if len(truth) > 1 else np.empty((3, 0))
-    turn = wrap_array(np.diff(truth.values[:, 2])) / step[:, 0] if len(truth) > 1 else turn
+    """vx, vy, wz in the base frame over the step that begins at each sample; the last one goes on as before."""
+    if len(truth) < 2:
+        return np.zeros((len(truth), 3))
+    step = np.diff(truth.ticks) / TICK_RATE
+    dx, dy, turn = np.diff(truth.values, axis=0).T / step
+    turn = wrap_array(turn * step) / step
     c, s = np.cos(truth.values[:-1, 2]), np.sin(truth.values[:-1, 2])
-    return np.vstack((np.column_stack((c * dx + s * dy, c * dy - s * dx, turn)), np.zeros((1, 3))))
+    moving = np.column_stack((c * dx + s * dy, c * dy - s * dx, turn))
+    return np.vstack((moving, moving[-1:]))
 
 
 def _belief(words: Any, truth: Sequence[Sequence[float]], end: int) -> Samples:
@@ -100,7 +104,19 @@ def _lifted(points: Sequence[Sequence[float]]) -> Array:
     return np.column_stack((xy, np.append(yaw, yaw[-1:])))
 
 
-def pose(words: Sequence[float]) -> Pose2:
-    """[x, y] or [x, y, yaw]."""
+def sketch_case(words: Mapping[str, Any]) -> Case:
+    """A case: start [x, y, yaw] · goals [{name, pose: [x, y, yaw], xy_tolerance, …}] · shortest {goal: metres} · …"""
+    goals = tuple(Goal(**{**goal, "pose": _pose(goal["pose"])}) for goal in words.get("goals", []))
+    return Case(
+        start=_pose(words.get("start", [0, 0])),
+        goals=goals,
+        shortest=words.get("shortest", {}),
+        footprint=tuple((x, y) for x, y in words.get("footprint", [])),
+        inscribed_radius=words.get("inscribed_radius", 0.2),
+        time_limit=words.get("time_limit", 60.0),
+    )
+
+
+def _pose(words: Sequence[float]) -> Pose2:
     x, y, yaw = [*words, 0.0][:3]
     return Pose2(float(x), float(y), float(yaw))

@@ -7,7 +7,9 @@ from simscen.core.session import Outcome, RunFinished, SessionEvent, SessionFini
 from simscen.judge.wording import tightest
 from simscen.report.console import Reporter, text_reporter
 from simscen.report.text import one_line
-from simscen.report.wordsof import complaints, failure, label
+from simscen.report.wordsof import broken, complaints, label
+
+_MEANINGFUL = {ord(sign): f"&#{ord(sign)};" for sign in "\\`*_[]|~#@&<>"}
 
 
 def github_reporter(out: TextIO, summary: TextIO | None = None) -> Reporter:
@@ -53,8 +55,7 @@ def annotations(run: RunFinished) -> list[str]:
         for found in complaints(run)
     ]
     if run.outcome is Outcome.ERROR:
-        kind, message, _ = failure(run)
-        lines.append(_command("error", run, 0, name, f"{kind}: {message}"))
+        lines.append(_command("error", run, 0, name, broken(run)))
     return lines
 
 
@@ -63,7 +64,8 @@ def markdown(runs: list[RunFinished], session: SessionFinished) -> str:
     order = [Outcome.ERROR, Outcome.FAILED, Outcome.PASSED]
     ordered = sorted(runs, key=lambda run: (order.index(run.outcome), run.path, run.key))
     signs = {Outcome.PASSED: "✅", Outcome.FAILED: "❌", Outcome.ERROR: "⚠️"}
-    head = f"### simscen: {session.passed} passed, {session.failed} failed, {session.errors} errors"
+    errors = "error" if session.errors == 1 else "errors"
+    head = f"### simscen: {session.passed} passed, {session.failed} failed, {session.errors} {errors}"
     rows = [
         f"| {signs[run.outcome]} | {_cell(label(run))} | {run.simulated:.1f} s | {_cell(_why(run))} |"
         for run in ordered
@@ -73,8 +75,7 @@ def markdown(runs: list[RunFinished], session: SessionFinished) -> str:
 
 def _why(run: RunFinished) -> str:
     if run.outcome is Outcome.ERROR:
-        kind, message, _ = failure(run)
-        return f"{kind}: {message}"
+        return broken(run)
     told = [complaint.message for complaint in complaints(run)]
     return "; ".join(told) if told else f"tightest: {tightest(run.verdicts)}"
 
@@ -96,7 +97,4 @@ def _property(text: str) -> str:
 
 def _cell(text: str) -> str:
     """Text that means nothing in a Markdown table or in HTML."""
-    escaped = one_line(text).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
-    for sign in "\\`*_[]|~#@":
-        escaped = escaped.replace(sign, f"&#{ord(sign)};")
-    return escaped
+    return one_line(text).translate(_MEANINGFUL)

@@ -7,11 +7,12 @@ from typing import Literal
 from simscen.core.session import Outcome, RunFinished, SessionFinished, SessionStarted
 from simscen.judge.wording import tightest
 from simscen.report.text import one_line
-from simscen.report.wordsof import complaints, failure, label, place
+from simscen.report.wordsof import broken, complaints, failure, label, place
 
 Role = Literal["plain", "name", "good", "bad", "odd", "quiet"]
 
 NAME_WIDTH = 36
+TAIL = 12
 SIGNS = {Outcome.PASSED: ("✓", "good"), Outcome.FAILED: ("✗", "bad"), Outcome.ERROR: ("!", "odd")}
 
 
@@ -83,9 +84,8 @@ def _summary(run: RunFinished) -> tuple[Piece, ...]:
 
 
 def _broken(run: RunFinished) -> Iterator[Line]:
-    kind, message, tail = failure(run)
-    yield (Piece("      "), Piece(f"{kind}: {message}", "odd"))
-    yield from ((Piece(f"        | {line}", "quiet"),) for line in tail.splitlines()[-12:])
+    yield (Piece("      "), Piece(broken(run), "odd"))
+    yield from ((Piece(f"        | {line}", "quiet"),) for line in failure(run)[2].splitlines()[-TAIL:])
 
 
 def _pointers(run: RunFinished) -> Iterator[Line]:

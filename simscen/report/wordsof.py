@@ -52,6 +52,12 @@ def failure(run: RunFinished) -> tuple[str, str, str]:
     return "invalid", "; ".join(c.message for c in complaints(run)) or "nothing judged this run", ""
 
 
+def broken(run: RunFinished) -> str:
+    """Kind and message of a run that could not be completed, in one line that does not say the kind twice."""
+    kind, message, _ = failure(run)
+    return message if message.startswith(kind) else f"{kind}: {message}"
+
+
 def _complaint(run: RunFinished, verdict: Verdict, line: int, finding: Finding) -> Complaint:
     detail = tuple(one_line(text) for text in finding.detail)
     return Complaint(verdict, line, one_line(sentence(verdict, finding, run.tick_rate)), detail)

@@ -1,0 +1,38 @@
+import pytest
+from pydantic import TypeAdapter, ValidationError
+
+from simscen.core.events import Event
+from simscen.core.navigation import ErrorCode
+from simscen.criteria.codes import Code, code_of
+
+ADAPTER = TypeAdapter(Code)
+
+
+@pytest.mark.parametrize("written", ["GOAL_OCCUPIED", 206, ErrorCode.GOAL_OCCUPIED])
+def test_a_code_may_be_written_by_name_or_number(written):
+    assert ADAPTER.validate_python(written) is ErrorCode.GOAL_OCCUPIED
+
+
+@pytest.mark.parametrize("written", ["GOAL_OCUPIED", 999, True, 206.0, None, "206"])
+def test_anything_else_is_refused_with_the_names(written):
+    with pytest.raises(ValidationError, match="GOAL_OCCUPIED"):
+        ADAPTER.validate_python(written)
+
+
+def test_its_schema_lists_names_and_numbers():
+    allowed = ADAPTER.json_schema()["enum"]
+    assert "GOAL_OCCUPIED" in allowed
+    assert 206 in allowed
+
+
+@pytest.mark.parametrize(
+    ("data", "name"),
+    [
+        ({}, "NONE"),
+        ({"error_code": 206}, "GOAL_OCCUPIED"),
+        ({"error_code": 4711}, "4711"),
+        ({"error_code": 206, "error_name": "GOAL_OCCUPIED"}, "GOAL_OCCUPIED"),
+    ],
+)
+def test_an_event_tells_its_code_by_name(data, name):
+    assert code_of(Event(1, "goal.failed", "a", data)) == name

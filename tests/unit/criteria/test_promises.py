@@ -1,0 +1,125 @@
+"""What holds for every criterion: its page in the reference, its margins, its honesty about broken traces."""
+
+import math
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from simscen.core.trace import Samples
+from simscen.core.verdict import Status
+from simscen.criteria.bounds import BrokenTrace, at_least, at_most, counted
+from simscen.criteria.criterion import AnyCriterion
+from simscen.judge.judge import judge
+from simscen.judge.sketch import sketch, sketch_case
+
+CHOICES = AnyCriterion.choices()
+HEADINGS = ["What is measured:", "When it fails:", "Why this:", "Source:", "Example:"]
+NUMBERS = st.floats(min_value=-1e6, max_value=1e6)
+
+DRIVE = {
+    "seconds": 8,
+    "truth": [[0, 0, 0], [4, 2, 0.5], [8, 2.5, 0.5]],
+    "events": [
+        [0.5, "goal.accepted", "shelf"],
+        [2, "fault.started", "lidar.off"],
+        [2, "event.started", "kidnapped"],
+        [3, "plan.made", "", {"reason": "blocked"}],
+        [4, "recovery.started", "spin"],
+        [5, "collision.started", "wall", {"x": 1.0, "y": 2.0, "impulse": 1.0, "speed": 0.2}],
+        [7, "goal.reached", "shelf"],
+        [7, "navigation.ended", "SUCCEEDED", {"error_code": 0}],
+    ],
+}
+CASE = {"goals": [{"name": "shelf", "pose": [2.5, 0.5, 0]}], "shortest": {"shelf": 2.5}}
+
+
+def specification(kind):
+    return AnyCriterion.model_fields[CHOICES[kind]].annotation.__args__[0]
+
+
+def example(kind):
+    text = re.search(r"Example: `(.+)`", specification(kind).__doc__)[1]
+    return AnyCriterion.model_validate(yaml.safe_load(text))
+
+
+@pytest.mark.parametrize("kind", CHOICES)
+def test_its_docstring_answers_the_four_questions_and_gives_an_example_that_loads(kind):
+    doc = specification(kind).__doc__
+    positions = [doc.find(heading) for heading in HEADINGS]
+    assert -1 not in positions
+    assert positions == sorted(positions)
+    assert example(kind).kind == kind
+
+
+@pytest.mark.parametrize("kind", CHOICES)
+def test_the_same_trace_gives_the_same_findings_and_at_least_one(kind):
+    criterion, trace, case = example(kind).chosen, sketch(DRIVE), sketch_case(CASE)
+    first, second = criterion.judge(trace, case), criterion.judge(trace, case)
+    assert first
+    assert first == second
+
+
+@pytest.mark.parametrize("kind", CHOICES)
+def test_a_margin_has_the_sign_of_the_status(kind):
+    for finding in example(kind).chosen.judge(sketch(DRIVE), sketch_case(CASE)):
+        if finding.margin is not None:
+            assert (finding.status is Status.PASS) == (finding.margin >= 0)
+
+
+@pytest.mark.parametrize("kind", CHOICES)
+def test_on_a_log_that_was_cut_off_nothing_passes(kind):
+    (verdict,) = judge([example(kind)], sketch({**DRIVE, "ended": None}), sketch_case(CASE))
+    assert verdict.status is not Status.PASS
+
+
+@pytest.mark.parametrize("kind", CHOICES)
+def test_an_empty_trace_is_never_a_pass_and_never_an_exception_that_escapes(kind):
+    trace = sketch({"seconds": 0, "truth": [[0, 0, 0]], "ended": None, "belief": None})
+    nothing = Samples(np.empty(0, dtype=np.int64), np.empty((0, 3)))
+    empty = replace(trace, truth=nothing, velocity=nothing, clearance=Samples(nothing.ticks, np.empty((0, 1))))
+    (verdict,) = judge([example(kind)], empty, sketch_case({}))
+    assert verdict.status is not Status.PASS
+
+
+@pytest.mark.parametrize("kind", ["path_length", "speed", "stopped_within", "localization_error", "goals_reached"])
+def test_a_nan_in_the_truth_is_an_error_that_names_the_time(kind):
+    truth = [[0, 0, 0], [4, 2, math.nan], [4.1, 2, 0.5], [8, 2.5, 0.5]]
+    (verdict,) = judge([example(kind)], sketch({**DRIVE, "truth": truth}), sketch_case(CASE))
+    assert verdict.status is Status.ERROR
+    assert re.search(r"not finite at t = [\d.]+ s", verdict.findings[0].measured)
+
+
+@given(NUMBERS, NUMBERS)
+def test_an_upper_bound_holds_exactly_when_its_margin_is_not_negative(value, limit):
+    finding = at_most("x", value, limit, "m")
+    assert (finding.status is Status.PASS) == (value <= limit) == (finding.margin >= 0)
+
+
+@given(NUMBERS, NUMBERS)
+def test_a_lower_bound_holds_exactly_when_its_margin_is_not_negative(value, limit):
+    finding = at_least("x", value, limit, "m")
+    assert (finding.status is Status.PASS) == (value >= limit) == (finding.margin >= 0)
+
+
+@given(NUMBERS, NUMBERS)
+def test_texts_of_two_different_numbers_differ(value, limit):
+    finding = at_most("x", value, limit, "m")
+    if abs(value - limit) > 1e-8:
+        assert finding.measured != finding.limit.removeprefix("≤ ")
+
+
+@given(st.integers(0, 50), st.integers(0, 50), st.integers(0, 50))
+def test_counts_are_bounded_on_both_sides(count, low, high):
+    below, above = counted("x", count, "thing", low, high)
+    assert (below.status is Status.PASS) == (count >= low)
+    assert (above.status is Status.PASS) == (count <= high)
+
+
+def test_a_nan_is_never_compared():
+    with pytest.raises(BrokenTrace, match="clearance is not a number"):
+        at_most("clearance", math.nan, 1.0, "m")

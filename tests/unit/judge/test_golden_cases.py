@@ -1,0 +1,54 @@
+"""The golden verdict cases of tests/cases: what each criterion answers to a sketched trace, and where that is from."""
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from simscen.core.verdict import Finding, Status
+from simscen.criteria.criterion import AnyCriterion
+from simscen.judge.judge import judge
+from simscen.judge.sketch import sketch, sketch_case
+
+FILES = sorted((Path(__file__).parents[2] / "cases").glob("*.yaml"))
+CASES = [(file.stem, case) for file in FILES for case in yaml.safe_load(file.read_text(encoding="utf-8"))]
+
+
+@pytest.mark.parametrize(("kind", "golden"), CASES, ids=[f"{kind}: {case['name']}" for kind, case in CASES])
+def test_a_criterion_answers_as_its_golden_case_says(kind, golden):
+    entry = AnyCriterion.model_validate(golden["criterion"])
+    assert entry.kind == kind
+    assert golden["origin"]
+    (verdict,) = judge([entry], sketch(golden["trace"]), sketch_case(golden.get("case", {})))
+    assert verdict.status is Status(golden["expect"]["status"]), verdict
+    expected = golden["expect"]["findings"]
+    assert len(verdict.findings) == len(expected), verdict.findings
+    for finding, wanted in zip(verdict.findings, expected, strict=True):
+        compare(finding, wanted)
+
+
+def compare(finding: Finding, wanted: dict) -> None:
+    tolerance = wanted.get("tolerance", 1e-6)
+    assert finding.status is Status(wanted["status"]), finding
+    for key in ("what", "measured", "limit"):
+        if key in wanted:
+            assert getattr(finding, key) == wanted[key], finding
+    for key in ("value", "margin"):
+        if key in wanted:
+            number = wanted[key]
+            assert getattr(finding, key) == (number if number is None else pytest.approx(number, abs=tolerance)), (
+                finding
+            )
+    if "t" in wanted:
+        assert finding.tick / 240 == pytest.approx(wanted["t"], abs=max(tolerance * 3, 1e-6)), finding
+    if "place" in wanted:
+        assert finding.place == pytest.approx(wanted["place"], abs=1e-6), finding
+    if "detail" in wanted:
+        assert list(finding.detail) == wanted["detail"], finding
+
+
+@pytest.mark.parametrize("kind", AnyCriterion.choices())
+def test_every_criterion_has_a_golden_case_that_passes_and_one_that_does_not(kind):
+    statuses = {case["expect"]["status"] for name, case in CASES if name == kind}
+    assert "pass" in statuses
+    assert "fail" in statuses
