@@ -5,7 +5,7 @@ import pickle
 import struct
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import IO, Any
 
 from simscen.core.session import RunKey
 from simscen.loading.loaded import LoadedScenario
@@ -39,14 +39,14 @@ class ProcessEnd:
     left_processes: bool
 
 
-def send_job(stream: BinaryIO, job: Job) -> None:
+def send_job(stream: IO[bytes], job: Job) -> None:
     """Write one job; the other side is our own process, so pickle is safe."""
     data = pickle.dumps(job)
     stream.write(_LENGTH.pack(len(data)) + data)
     stream.flush()
 
 
-def receive_job(stream: BinaryIO) -> Job | None:
+def receive_job(stream: IO[bytes]) -> Job | None:
     """Read one job; None at the end of the stream."""
     head = stream.read(_LENGTH.size)
     if len(head) < _LENGTH.size:

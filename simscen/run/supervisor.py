@@ -13,7 +13,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from typing import Any, BinaryIO
+from typing import IO, Any
 
 from simscen.run.confine import environment
 from simscen.run.jobs import Job, ProcessEnd, send_job
@@ -74,8 +74,8 @@ def _converse(
     waiting: deque[Job],
     running: dict[int, Job],
     workers: int,
-    send: BinaryIO,
-    hear: BinaryIO,
+    send: IO[bytes],
+    hear: IO[bytes],
     go_on: Callable[[], bool],
 ) -> Iterator[Happening]:
     while True:
@@ -101,7 +101,7 @@ def _understood(message: dict[str, Any], running: dict[int, Job]) -> Happening:
 
 
 @contextmanager
-def _warm_process(entry: str) -> Iterator[tuple[BinaryIO, BinaryIO]]:
+def _warm_process(entry: str) -> Iterator[tuple[IO[bytes], IO[bytes]]]:
     """Start it; at the end close its input, which makes it kill what is left, and wait for it."""
     replies_out, replies_in = os.pipe()
     process = subprocess.Popen(

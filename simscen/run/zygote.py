@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import IO, Any
 
 from simscen.run.confine import die_with_parent
 from simscen.run.jobs import Job, line, receive_job
@@ -39,7 +39,7 @@ class _Child:
 class Zygote:
     """Serves jobs until its input ends, then kills what is still running."""
 
-    def __init__(self, jobs: BinaryIO, replies: int, warm_up: Callable[[Job], None], perform: Perform) -> None:
+    def __init__(self, jobs: IO[bytes], replies: int, warm_up: Callable[[Job], object], perform: Perform) -> None:
         self._jobs, self._replies, self._warm_up, self._perform = jobs, replies, warm_up, perform
         self._selector = selectors.DefaultSelector()
         self._children: dict[int, _Child] = {}

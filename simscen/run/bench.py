@@ -1,0 +1,155 @@
+"""Speed, measured: a whole run, its parts, and PyBullet alone in the same world."""
+
+import gc
+import statistics
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.shapes import Cylinder, Solid
+from simscen.core.time import Clock
+from simscen.loading.scenario import load_scenario
+from simscen.record.recorder import Recorder
+from simscen.record.trace import TraceBuilder
+from simscen.run.assemble import assemble
+from simscen.run.lockstep import run_lockstep
+from simscen.run.perform import log_header
+from simscen.run.prepare import Prepared, lidar_height, prepare
+from simscen.run.stopwatch import Stopwatch
+from simscen.sim.bare import BareWorld
+from simscen.stack.reference import ReferenceStack
+from simscen.worlds.meshing import fuse, triangulate
+from simscen.worlds.rays import RayScene
+
+PATROL = Path(__file__).parent.parent / "data" / "bench" / "patrol.scenario.yaml"
+SEED = 1
+BEAMS = 720
+
+
+@dataclass(frozen=True)
+class Patrol:
+    """A run of `simulated` seconds: CPU seconds in all, by part, and for PyBullet alone to step and scan as often."""
+
+    simulated: float
+    cpu: float
+    parts: dict[str, float]
+    bare: float
+
+    @property
+    def factor(self) -> float:
+        """Simulated seconds for each second of one core."""
+        return self.simulated / self.cpu
+
+
+@dataclass(frozen=True)
+class Field:
+    """A field of obstacles: ms for a scan of 720 beams and µs for a step, in simscen and in PyBullet alone.
+
+    PyBullet alone has a body for each obstacle, as one would write it.
+    """
+
+    obstacles: int
+    scan_ms: float
+    step_us: float
+    bare_scan_ms: float
+    bare_step_us: float
+
+
+def measure_patrol(rounds: int) -> Patrol:
+    """The median of several runs of the patrol, recorded as always; then once more, taken apart."""
+    prepared = prepare(load_scenario(PATROL, PATROL.parent))
+    _run(prepared, Stopwatch(), False)  # the first run pays for imports and caches
+    runs = [_run(prepared, Stopwatch(), False) for _ in range(rounds)]
+    watch = Stopwatch()
+    simulated, whole = _run(prepared, watch, True)
+    cpu = statistics.median(cpu for _, cpu in runs)
+    # The stopwatch itself costs time: the parts are scaled to a run without it.
+    parts = {name: seconds * cpu / whole for name, seconds in watch.seconds.items()}
+    parts["the lockstep itself"] = max(0.0, cpu - sum(parts.values()))
+    return Patrol(simulated, cpu, parts, _bare_patrol(prepared, simulated))
+
+
+def _run(prepared: Prepared, watch: Stopwatch, apart: bool) -> tuple[float, float]:
+    """Simulated and CPU seconds of one run."""
+    clock = Clock(prepared.spec.physics.tick_rate)
+    gc.collect()
+    with TemporaryDirectory() as folder, Recorder(Path(folder, "run.mcap"), clock, log_header(prepared, SEED)) as log:
+        rig, trace = assemble(prepared, SEED), TraceBuilder(clock)
+        if apart:
+            watch.watch("physics", rig.simulation, "step", "drive")
+            watch.watch("truth and contacts", rig.simulation, "truth", "collisions")
+            watch.watch("sensors", rig.senses, "read")
+            if isinstance(rig.stack, ReferenceStack):
+                for name, (component, *methods) in rig.stack.components.items():
+                    watch.watch(name, component, *methods)
+            watch.watch("navigator", rig.stack, "decide")
+            watch.watch("log", log, "append")
+            watch.watch("trace", trace, "append")
+        begun = time.process_time()
+        end = run_lockstep(rig, (trace, log))
+        log.close(end.tick)
+        cpu = time.process_time() - begun
+        rig.simulation.close()
+    return clock.seconds(end.tick), cpu
+
+
+def _bare_patrol(prepared: Prepared, simulated: float) -> float:
+    """CPU seconds that PyBullet takes to step and scan as often in the same world, and nothing else."""
+    lidar = next(sensor.lidar for sensor in prepared.robot.sensors.values() if sensor.lidar)
+    bare = BareWorld(prepared.built.mesh, prepared.body, prepared.start, triangulate)
+    begun = time.process_time()
+    for _ in range(round(simulated * lidar.rate)):
+        bare.step(round(240 / lidar.rate))
+        bare.scan(lidar.beams, lidar.max_range, lidar_height(prepared.robot))
+    cpu = time.process_time() - begun
+    bare.close()
+    return cpu
+
+
+def measure_field(obstacles: int) -> Field:
+    """Scan and step in a field of cylinders as dense as a BARN world (0.9 of them to the square metre)."""
+    prepared = prepare(load_scenario(PATROL, PATROL.parent))
+    solids = cylinders(obstacles)
+    mesh, start, height = fuse(solids), Pose2(0.0, 0.0, 0.0), lidar_height(prepared.robot)
+    rays = RayScene(mesh)
+    angles = np.linspace(-np.pi, np.pi, BEAMS, endpoint=False)
+    directions = np.column_stack((np.cos(angles), np.sin(angles), np.zeros(BEAMS)))
+    origins = np.tile([0.0, 0.0, height], (BEAMS, 1))
+    fused = BareWorld(mesh, prepared.body, start, triangulate)
+    bare = BareWorld(solids, prepared.body, start, triangulate)
+    field = Field(
+        obstacles,
+        scan_ms=1e3 * _each(lambda: rays.cast(origins, directions), 200),
+        step_us=1e6 * _each(lambda: fused.step(1), 2000),
+        bare_scan_ms=1e3 * _each(lambda: bare.scan(BEAMS, 30.0, height), 10),
+        bare_step_us=1e6 * _each(lambda: bare.step(1), 500),
+    )
+    fused.close()
+    bare.close()
+    return field
+
+
+def cylinders(count: int) -> list[Solid]:
+    """So many cylinders of 7.5 cm radius, at random but for a free disc of 1 m about the origin."""
+    chance = np.random.default_rng(SEED)
+    edge = (count / 0.9) ** 0.5 / 2
+    places = chance.uniform(-edge, edge, (4 * count + 40, 2))
+    places = places[np.hypot(*places.T) > 1.0][:count]
+    return [Solid(Cylinder(0.075, 1.0), Pose3(x, y, 0.5), f"cylinder {k}") for k, (x, y) in enumerate(places.tolist())]
+
+
+def _each(what: Callable[[], Any], times: int) -> float:
+    """The median over five rounds of the CPU seconds for one call."""
+    rounds = []
+    for _ in range(5):
+        begun = time.process_time()
+        for _ in range(times):
+            what()
+        rounds.append((time.process_time() - begun) / times)
+    return statistics.median(rounds)

@@ -1,0 +1,51 @@
+"""PyBullet as one would use it without simscen: what a run is compared with in `simscen bench`."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import pybullet
+
+from simscen.core.geometry import Pose2
+from simscen.core.shapes import Solid, TriangleMesh
+from simscen.sim import engine
+from simscen.sim.robot_body import RobotBody
+from simscen.sim.vehicle import Vehicle
+
+
+class BareWorld:
+    """A robot at rest among static obstacles, stepped and scanned with nothing but PyBullet.
+
+    The obstacles are one fused mesh, or, given as solids, one body each.
+    """
+
+    def __init__(
+        self, static: TriangleMesh | Sequence[Solid], robot: RobotBody, pose: Pose2, triangulate: engine.Triangulate
+    ) -> None:
+        self._client = engine.connect(240, 10)
+        engine.ground(self._client)
+        if isinstance(static, TriangleMesh):
+            engine.static_mesh(self._client, static)
+        else:
+            for solid in static:
+                engine.fixed(self._client, engine.body_shape(self._client, [solid], False, triangulate))
+        Vehicle(self._client, robot, pose)
+        self._pose = pose
+
+    def step(self, ticks: int) -> None:
+        """Step and nothing else."""
+        for _ in range(ticks):
+            pybullet.stepSimulation(self._client)
+
+    def scan(self, beams: int, reach: float, height: float) -> None:
+        """Cast one full circle of rays."""
+        angles = np.linspace(-math.pi, math.pi, beams, endpoint=False)
+        start = [self._pose.x, self._pose.y, height]
+        ends = np.column_stack(
+            (start[0] + reach * np.cos(angles), start[1] + reach * np.sin(angles), np.full(beams, height))
+        )
+        pybullet.rayTestBatch([start] * beams, ends.tolist(), physicsClientId=self._client)
+
+    def close(self) -> None:
+        """Leave the engine."""
+        pybullet.disconnect(self._client)
