@@ -87,7 +87,11 @@ def of_shape(shape: Shape, mass: float) -> MassProperties:
         case Ellipsoid((a, b, c)):
             return _symmetric(mass, (b * b + c * c) / 5, (a * a + c * c) / 5, (a * a + b * b) / 5)
         case Capsule(radius, length):
-            return of_shape(Cylinder(radius, length + 4 / 3 * radius), mass)
+            balls = mass * 4 / 3 * radius / (length + 4 / 3 * radius)
+            tube = of_shape(Cylinder(radius, length), mass - balls)
+            across = 2 / 5 * radius**2 + length**2 / 4 + 3 / 8 * length * radius
+            halves = _symmetric(balls, across, across, 2 / 5 * radius**2)
+            return MassProperties(mass, np.zeros(3), tube.tensor + halves.tensor)
         case Cone(radius, length):
             across = 3 / 80 * (4 * radius**2 + length**2)
             cone = _symmetric(mass, across, across, 3 / 10 * radius**2)

@@ -108,7 +108,7 @@ def robot_body(
     meshes must lie in; `read_mesh` reads a mesh file. Raises InvalidInput when the URDF cannot be used.
     """
     if spec.urdf is not None:
-        from simscen.sim.urdf_body import body_of_urdf
+        from simscen.sim.urdf.body import body_of_urdf
 
         return body_of_urdf(spec, file, roots, read_mesh)
     return _of_shapes(spec)

@@ -1,0 +1,138 @@
+"""A robot's body from its URDF: everything rigid fused into one hull, wheels where its drive has them."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from simscen.core.errors import InvalidInput
+from simscen.core.geometry import Pose3
+from simscen.core.problems import Problem
+from simscen.core.shapes import Solid
+from simscen.model.robot import Omnidirectional, RobotSpec
+from simscen.sim.inertia import MassProperties, combined
+from simscen.sim.outline import extremes
+from simscen.sim.robot_body import RobotBody, Wheel, assemble, wheel_inertia
+from simscen.sim.urdf.elements import Meshes, MeshReader
+from simscen.sim.urdf.files import Folders, Trouble, read_urdf
+from simscen.sim.urdf.markup import CODE, parse
+from simscen.sim.urdf.tree import Tree, tree_of
+from simscen.sim.urdf.wheels import WheelJoint, chosen
+
+GROUND = 0.005
+"""m above the ground: whatever reaches lower is a caster, which the body has of its own."""
+CASTER = 0.35
+"""A caster is smaller than this fraction of the hull's length and width."""
+
+
+def body_of_urdf(spec: RobotSpec, file: Path | None, roots: Sequence[Path], read_mesh: MeshReader | None) -> RobotBody:
+    """The body that `spec.urdf`, relative to `file`, describes. Raises InvalidInput."""
+    assert spec.urdf is not None
+    folder = (file or Path()).resolve().parent
+    folders = Folders.of(roots or (folder,))
+    try:
+        path = folders.locate(spec.urdf, folder)
+    except Trouble as trouble:
+        shown = folders.shown(file.resolve()) if file else ""
+        raise InvalidInput([Problem(shown, 0, 0, CODE, f"urdf {spec.urdf[:200]!r}: {trouble}")]) from trouble
+    return body_of_tree(spec, read_tree(path, folders, read_mesh))
+
+
+def read_tree(path: Path, folders: Folders, read_mesh: MeshReader | None) -> Tree:
+    """The links and joints of a URDF or xacro file. Raises InvalidInput."""
+    return tree_of(parse(read_urdf(path, folders), folders.shown(path)), Meshes(path.parent, folders, read_mesh))
+
+
+def body_of_tree(spec: RobotSpec, tree: Tree) -> RobotBody:
+    """The robot: joints that are neither wheels nor steering stay at zero."""
+    joints = chosen(tree, spec.drive)
+    _check_wheels(spec, tree, joints)
+    rolling = {link for wheel in joints for link in tree.subtree(wheel.joint.child)}
+    fixed = [name for name in tree.links if name not in rolling]
+    solids = [
+        Solid(solid.shape, tree.poses[name].compose(solid.pose), name)
+        for name in fixed
+        for solid in tree.links[name].solids
+    ]
+    if not solids:
+        raise InvalidInput([tree.element.problem("no link has a <collision>, so there is nothing to bump into")])
+    base_from_root = _base(joints, solids)
+    hull = tuple(replace(solid, pose=base_from_root.compose(solid.pose)) for solid in solids)
+    scale = _scale(spec, tree)
+    wheels = tuple(_wheel(tree, joint, base_from_root, scale, spec) for joint in joints)
+    return assemble(spec, _off_the_ground(tree, hull), wheels, _weighed(tree, fixed, base_from_root, scale))
+
+
+def _check_wheels(spec: RobotSpec, tree: Tree, wheels: list[WheelJoint]) -> None:
+    if isinstance(spec.drive, Omnidirectional):
+        return
+    driven = [wheel for wheel in wheels if not wheel.steered]
+    sides = {wheel.place[1] > 0 for wheel in driven}
+    if len(sides) < 2:
+        hint = "name the wheel joints in the drive's `left` and `right`"
+        raise InvalidInput([tree.element.problem("no driven wheels found on both sides", hint)])
+    if spec.drive.type == "ackermann" and not any(wheel.steered for wheel in wheels):
+        hint = "name the steering joints in the drive's `steering`"
+        raise InvalidInput([tree.element.problem("no steered wheels found", hint)])
+
+
+def _base(wheels: list[WheelJoint], solids: Sequence[Solid]) -> Pose3:
+    """From the root's frame to the base frame: on the ground under the middle of the axle or axles that drive."""
+    if not wheels:
+        return Pose3(0.0, 0.0, -min(_lowest(solid) for solid in solids))
+    x, y, _ = np.mean([wheel.place for wheel in wheels if not wheel.steered], axis=0).tolist()
+    return Pose3(-x, -y, -min(wheel.place[2] - wheel.radius for wheel in wheels))
+
+
+def _lowest(solid: Solid) -> float:
+    return float(solid.pose.apply(extremes(solid.shape))[:, 2].min())
+
+
+def _scale(spec: RobotSpec, tree: Tree) -> float:
+    """What all masses are multiplied with, so that the robot weighs what its specification says."""
+    total = sum(link.mass.mass for link in tree.links.values() if link.mass is not None)
+    if total <= 0:
+        raise InvalidInput([tree.element.problem("no link has a mass", "give its <inertial> a <mass>")])
+    return spec.mass / total if spec.mass is not None else 1.0
+
+
+def _weighed(tree: Tree, links: Sequence[str], base_from_root: Pose3, scale: float) -> MassProperties:
+    masses = [(tree.poses[name], tree.links[name].mass) for name in links]
+    parts = [mass.placed(base_from_root.compose(pose)) for pose, mass in masses if mass is not None and mass.mass > 0]
+    if not parts:
+        raise InvalidInput([tree.element.problem("nothing but the wheels has a mass")])
+    whole = combined(parts)
+    return MassProperties(whole.mass * scale, whole.centre, whole.tensor * scale)
+
+
+def _wheel(tree: Tree, wheel: WheelJoint, base_from_root: Pose3, scale: float, spec: RobotSpec) -> Wheel:
+    x, y, _ = base_from_root.compose(Pose3(*wheel.place)).position
+    links = [(tree.poses[name], tree.links[name].mass) for name in tree.subtree(wheel.joint.child)]
+    parts = [mass.placed(pose) for pose, mass in links if mass is not None and mass.mass > 0]
+    mass = scale * sum(part.mass for part in parts)
+    inertia = wheel_inertia(mass, wheel.radius, wheel.width) if mass > 0 else None
+    if inertia is None:
+        problem = wheel.joint.element.problem(f"the wheel on joint {wheel.joint.name!r} has no mass")
+        raise InvalidInput([problem])
+    car = spec.drive.type == "ackermann"
+    return Wheel(
+        wheel.joint.name, x, y, wheel.radius, wheel.width, inertia, driven=not (car and wheel.steered),
+        steered=car and wheel.steered,
+    )  # fmt: skip
+
+
+def _off_the_ground(tree: Tree, hull: tuple[Solid, ...]) -> tuple[Solid, ...]:
+    """The hull without casters. Raises InvalidInput when the hull itself would drag over the ground."""
+    points = [solid.pose.apply(extremes(solid.shape)) for solid in hull]
+    whole = np.ptp(np.concatenate(points)[:, :2], axis=0)
+    kept = []
+    for solid, corners in zip(hull, points, strict=True):
+        if corners[:, 2].min() >= GROUND:
+            kept.append(solid)
+        elif (np.ptp(corners[:, :2], axis=0) > CASTER * whole).any():
+            depth = GROUND - corners[:, 2].min()
+            message = f"link {solid.name!r} reaches {depth:.3f} m too low: it would drag over the ground"
+            hint = "its wheels' collision shapes must reach lower than everything else"
+            raise InvalidInput([tree.links[solid.name].element.problem(message, hint)])
+    return tuple(kept)

@@ -1,0 +1,137 @@
+"""Links and joints of a URDF (wiki.ros.org/urdf/XML), without what is only for the eye."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from simscen.core.geometry import Pose3
+from simscen.core.shapes import Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere
+from simscen.sim.inertia import MassProperties
+from simscen.sim.urdf.files import MESH_BYTES, Folders, Trouble, check_regular
+from simscen.sim.urdf.markup import Element, Unusable
+
+MeshReader = Callable[[Path], Mesh]
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """A rigid piece: its collision shapes and its mass in its own frame; None = has no mass of its own."""
+
+    name: str
+    solids: tuple[Solid, ...]
+    mass: MassProperties | None
+    element: Element
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """The child's frame in the parent's, and the unit `axis` it turns about in its own frame."""
+
+    name: str
+    type: str
+    parent: str
+    child: str
+    pose: Pose3
+    axis: tuple[float, float, float]
+    element: Element
+
+
+@dataclass(frozen=True)
+class Meshes:
+    """Where meshes are looked for, and who reads them.
+
+    `read` gives the triangles of a file in metres, and raises ValueError with a sentence when it cannot.
+    """
+
+    folder: Path
+    folders: Folders
+    read: MeshReader | None
+
+    def mesh(self, element: Element) -> Mesh:
+        """The mesh a `<mesh>` element names; raises Unusable at its line."""
+        written = element.text("filename")
+        scale = element.numbers("scale", 3, (1.0, 1.0, 1.0))
+        try:
+            path = self.folders.locate(written, self.folder)
+            check_regular(path, MESH_BYTES)
+            if self.read is None:
+                raise Trouble("meshes cannot be read here")
+            mesh = self.read(path)
+        except (Trouble, ValueError) as error:
+            raise Unusable(element, f"mesh {written[:200]!r}: {error}") from error
+        return Mesh(mesh.vertices * np.array(scale), mesh.faces)
+
+
+def link_of(element: Element, meshes: Meshes) -> Link:
+    """A `<link>`; raises Unusable."""
+    collisions = tuple(
+        Solid(_shape(collision.needed("geometry"), meshes), _origin(collision), element.text("name"))
+        for collision in element.all("collision")
+    )
+    inertial = element.child("inertial")
+    return Link(element.text("name"), collisions, None if inertial is None else _mass(inertial), element)
+
+
+def joint_of(element: Element) -> Joint:
+    """A `<joint>`; raises Unusable."""
+    axis = (element.child("axis") or Element("axis", {}, "", 0, 0, "")).numbers("xyz", 3, (1.0, 0.0, 0.0))
+    length = math.hypot(*axis)
+    if length == 0:
+        raise Unusable(element, f"joint {element.name!r} turns about an axis of length 0")
+    return Joint(
+        element.text("name"),
+        element.text("type"),
+        element.needed("parent").text("link"),
+        element.needed("child").text("link"),
+        _origin(element),
+        (axis[0] / length, axis[1] / length, axis[2] / length),
+        element,
+    )
+
+
+def _origin(element: Element) -> Pose3:
+    origin = element.child("origin")
+    if origin is None:
+        return Pose3()
+    x, y, z = origin.numbers("xyz", 3, (0.0, 0.0, 0.0))
+    roll, pitch, yaw = origin.numbers("rpy", 3, (0.0, 0.0, 0.0))
+    return Pose3.from_rpy(x, y, z, roll, pitch, yaw)
+
+
+def _shape(geometry: Element, meshes: Meshes) -> Shape:
+    for element in geometry.children:
+        match element.tag:
+            case "box":
+                x, y, z = element.positive("size", 3)
+                return Box((x, y, z))
+            case "cylinder":
+                return Cylinder(element.positive("radius")[0], element.positive("length")[0])
+            case "capsule":
+                return Capsule(element.positive("radius")[0], element.positive("length")[0])
+            case "sphere":
+                return Sphere(element.positive("radius")[0])
+            case "mesh":
+                return meshes.mesh(element)
+            case other:
+                raise Unusable(
+                    element, f"unknown geometry <{other}>", "box, cylinder, sphere, capsule and mesh are read"
+                )
+    raise Unusable(geometry, "<geometry> is empty")
+
+
+def _mass(inertial: Element) -> MassProperties:
+    mass = inertial.needed("mass").numbers("value", 1)[0]
+    if mass < 0:
+        raise Unusable(inertial.needed("mass"), "a mass must not be negative")
+    tensor = inertial.child("inertia")
+    values = [0.0] * 6
+    if tensor is not None:
+        values = [tensor.numbers(key, 1, (0.0,))[0] for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")]
+        if min(values[0], values[3], values[5]) < 0:
+            raise Unusable(tensor, "a moment of inertia must not be negative")
+    xx, xy, xz, yy, yz, zz = values
+    own = MassProperties(mass, np.zeros(3), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    return own.placed(_origin(inertial))
