@@ -70,8 +70,10 @@ class Library:
         names them, then in the search folders (as GZ_SIM_RESOURCE_PATH).
         """
         uri = element.text
-        if not uri or any(ord(letter) < 32 for letter in uri):
-            raise element.unusable("the uri is empty" if not uri else "control character in the uri")
+        if not uri or not uri.isprintable():
+            raise element.unusable("control character in the uri" if uri else "the uri is empty")
+        if len(uri) > LONGEST_PATH:
+            raise element.unusable("not a usable path")
         if "://" in uri and not uri.startswith(SCHEMES):
             raise element.unusable(f"{uri}: only model://, package://, file:// and relative paths are read",
                                    "download it and name its folder with --world-path")  # fmt: skip
@@ -101,7 +103,8 @@ class Library:
     def read_world(self, path: Path) -> tuple[Path, bytes]:
         """Real path and bytes of the world itself; raises Unusable for the file as a whole."""
         try:
-            return self.open(path.absolute(), WORLD_BYTES)
+            # Links in the folder that the user typed are the user's; only the file itself must not lead out.
+            return self.open(Path(os.path.realpath(path.parent)) / path.name, WORLD_BYTES)
         except Trouble as trouble:
             raise Unusable(Place(path.name), str(trouble)) from trouble
 

@@ -26,8 +26,8 @@ def load_sdf(path: Path, *, search: Sequence[Path] = (), root: Path, lenient: bo
     """The world in a Gazebo `.sdf`, `.world` or model file of SDF 1.3 to 1.12.
 
     Only collision geometry counts. Static models become solids, others bodies with their mass; actors become bodies
-    of mass 0 with a path. Everything is in the world's frame and in document
-    order. Files that it names are looked for beside it and in `search`, and must lie inside `root` or `search`.
+    of mass 0 with a path. Everything is in the world's frame and in document order. Files that it names are looked for
+    beside it and in `search`, and must lie inside `root` or `search`.
 
     Raises InvalidInput with everything that would change the geometry and cannot be used; with `lenient` that is
     left out and told in the world's `notes`, and only a world file that cannot be read at all is an error.

@@ -13,7 +13,7 @@ from simscen.worlds.sdf.report import Place, Unusable
 DEEPEST = 100
 MOST_ELEMENTS = 500_000
 """BARN's worlds have 13 000; twenty megabytes of `<a/>` would otherwise take gigabytes."""
-LONGEST_SHOWN_LINE = 300
+LONGEST_SHOWN_LINE, LONGEST_SHOWN_NAME = 300, 120
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ class Element:
     @property
     def path(self) -> str:
         """Its path from the root, as world[default]/model[shelf]/link[link]."""
-        own = f"{self.tag}[{self.name}]" if self.name else self.tag
+        own = f"{_short(self.tag)}[{_short(self.name)}]" if self.name else _short(self.tag)
         return f"{self.parent.path}/{own}" if self.parent and self.parent.parent else own
 
     @property
@@ -81,6 +81,12 @@ class Element:
     def unusable(self, message: str, hint: str = "") -> Unusable:
         """The error that says so about this element."""
         return Unusable(self.place, message, hint)
+
+
+def _short(name: str) -> str:
+    """A name that is safe to print, whatever somebody put into it."""
+    shown = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in name)
+    return shown if len(shown) <= LONGEST_SHOWN_NAME else f"{shown[:LONGEST_SHOWN_NAME]}…"
 
 
 def refuse_doctype(data: bytes, file: str) -> None:

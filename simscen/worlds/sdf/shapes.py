@@ -12,7 +12,7 @@ from simscen.worlds.sdf.markup import Element
 from simscen.worlds.sdf.meshes import MeshShelf
 from simscen.worlds.sdf.polyline import read_polylines
 from simscen.worlds.sdf.report import Report
-from simscen.worlds.sdf.vocabulary import MATTERS, judge_children
+from simscen.worlds.sdf.vocabulary import SHAPES, judge_children
 
 
 def _box(element: Element) -> Shape:
@@ -49,7 +49,6 @@ PRIMITIVES: dict[str, Callable[[Element], Shape]] = {
     "ellipsoid": _ellipsoid,
     "cone": _cone,
 }
-OTHERS = ("plane", "polyline", "heightmap", "mesh", "empty")
 
 
 class ShapeReader:
@@ -70,9 +69,9 @@ class ShapeReader:
             raise geometry.unusable("holds no shape")
         first = found[0]
         if any(child.tag != first.tag for child in found):
-            raise geometry.unusable("holds more than one shape: " + ", ".join(child.tag for child in found))
+            raise geometry.unusable("holds more than one shape: " + ", ".join(child.tag[:60] for child in found[:5]))
         for shape in found:
-            if shape.tag in MATTERS:
+            if shape.tag in SHAPES:
                 judge_children(shape, shape.tag, self.report)
         match first.tag:
             case tag if tag in PRIMITIVES:
@@ -90,5 +89,4 @@ class ShapeReader:
             case "empty":
                 return ()
             case tag:
-                known = ", ".join((*PRIMITIVES, *OTHERS))
-                raise first.unusable(f"<{tag}> is not a shape that is read", f"one of {known}")
+                raise first.unusable(f"<{tag[:60]}> is not a shape that is read", f"one of {', '.join(SHAPES)}")

@@ -99,7 +99,7 @@ class TreeReader:
             raise element.unusable(f"more than {MOST_MODELS} models")
         over = {child.tag: child for child in include.children} if include else {}
         renamed, stilled, placed = over.get("name"), over.get("static"), over.get("placement_frame")
-        name = renamed.text if renamed and renamed.text else values.name_of(element)
+        name = values.name_of(renamed, renamed.text) if renamed else values.name_of(element)
         merged = include is not None and _merges(include)
         own_static = values.truth(stilled if stilled else element.child("static"))
         placement = placed.text if placed else element.attributes.get("placement_frame", "")
@@ -113,7 +113,7 @@ class TreeReader:
     def actor(self, element: Element, include: Element | None = None) -> Model:
         """An actor: a model whose motion is scripted."""
         renamed = include.child("name") if include else None
-        name = renamed.text if renamed and renamed.text else values.name_of(element)
+        name = values.name_of(renamed, renamed.text) if renamed else values.name_of(element)
         scope = Scope(MODEL)
         given = (include.child("pose") if include else None) or element.child("pose")
         actor = Model(name, element, Frame(name, element, given, inner=scope), scope)

@@ -83,9 +83,9 @@ def truth_of(word: str, element: Element) -> bool:
     return word in ("1", "true")
 
 
-def name_of(element: Element) -> str:
-    """The name of an element that must have one."""
-    name = element.name
+def name_of(element: Element, name: str | None = None) -> str:
+    """The name of an element that must have one: its attribute, or `name` where that stands elsewhere."""
+    name = element.name if name is None else name
     if not name:
         raise element.unusable(f"<{element.tag}> has no name")
     if len(name) > LONGEST_NAME:

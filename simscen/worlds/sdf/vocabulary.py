@@ -26,13 +26,7 @@ HARMLESS = {
 }  # fmt: skip
 """What may stand in each element without adding a solid. Source: SDF specification 1.4 to 1.12, and its examples."""
 
-MATTERS = {
-    "world": {"model", "include", "actor", "population", "joint", "frame", "state"},
-    "model": {"model", "include", "link", "joint", "frame", "pose", "static"},
-    "link": {"collision", "pose", "inertial"},
-    "collision": {"geometry", "pose"},
-    "actor": {"link", "script", "pose"},
-    "include": {"uri", "name", "pose", "static", "placement_frame"},
+SHAPES: dict[str, set[str]] = {
     "box": {"size"},
     "cylinder": {"radius", "length"},
     "sphere": {"radius"},
@@ -45,21 +39,18 @@ MATTERS = {
     "mesh": {"uri", "scale", "submesh"},
     "empty": set(),
 }
+"""The shapes and what is read of each."""
+
+MATTERS = SHAPES | {
+    "world": {"model", "include", "actor", "population", "joint", "frame", "state"},
+    "model": {"model", "include", "link", "joint", "frame", "pose", "static"},
+    "link": {"collision", "pose", "inertial"},
+    "collision": {"geometry", "pose"},
+    "actor": {"link", "script", "pose"},
+    "include": {"uri", "name", "pose", "static", "placement_frame"},
+}
 """What adds a solid or moves one: a misspelling of these must not go unseen."""
 
-SHAPES = {
-    "box",
-    "cylinder",
-    "sphere",
-    "capsule",
-    "ellipsoid",
-    "cone",
-    "plane",
-    "polyline",
-    "heightmap",
-    "mesh",
-    "empty",
-}
 _ADDING = {"model", "include", "actor", "population", "link", "collision", "geometry"}
 _XACRO_DEFINITIONS = ("xacro:arg", "xacro:property", "xacro:macro")
 _XACRO_CHOICES = ("xacro:if", "xacro:unless")
@@ -78,14 +69,14 @@ def judge_unknown(element: Element, parent: str, report: Report) -> None:
         return
     adds = any(below.tag in _ADDING for below in element.descendants())
     if tag == "experimental:params" or (tag.startswith("xacro:") and (adds or tag not in _XACRO_CHOICES)):
-        raise element.unusable(f"<{tag}> is not expanded", "expand it first: run xacro, or `gz sdf -p`")
+        raise element.unusable(f"<{tag[:60]}> is not expanded", "expand it first: run xacro, or `gz sdf -p`")
     if ":" in tag and not adds:
         return
     close = difflib.get_close_matches(tag, sorted(MATTERS[parent] | harmless), n=1, cutoff=0.75)
     hint = f"did you mean <{close[0]}>?" if close else ""
     if adds or parent in SHAPES or (close and close[0] in MATTERS[parent]):
-        raise element.unusable(f"unknown element <{tag}>", hint)
-    report.note(element.place, f"unknown element <{tag}> ignored" + (f"; {hint}" if hint else ""))
+        raise element.unusable(f"unknown element <{tag[:60]}>", hint)
+    report.note(element.place, f"unknown element <{tag[:60]}> ignored" + (f"; {hint}" if hint else ""))
 
 
 def judge_children(element: Element, parent: str, report: Report) -> None:

@@ -132,6 +132,13 @@ def test_loading_twice_gives_the_same(load):
     assert (first.solids, first.bodies, first.notes) == (second.solids, second.bodies, second.notes)
 
 
+def test_messages_show_no_control_characters_and_no_endless_names(refuse):
+    for name in ("a\u202eb", "x" * 100_000):
+        (problem,) = refuse(MODEL.replace("1 1 1", "1 1").replace("'c'", f"'{name}'"))
+        assert problem.message.isprintable()
+        assert len(problem.message) < 300
+
+
 @pytest.mark.parametrize(
     ("name", "message"),
     [

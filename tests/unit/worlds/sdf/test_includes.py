@@ -62,6 +62,13 @@ def test_an_include_overrides_name_pose_and_static(load, models):
     assert body.name == "left"
 
 
+@pytest.mark.parametrize(
+    ("name", "message"), [("", "has no name"), ("x" * 121, "longer than 120"), ("a\u202eb", "control")]
+)
+def test_the_new_name_is_checked_like_any_other(refuse, models, name, message):
+    assert message in refuse(include("model://crate", f"<name>{name}</name>"), search=[models])[0].message
+
+
 def test_without_a_pose_of_its_own_an_include_keeps_that_of_the_model(load, tmp_path):
     write(tmp_path / "m", extra="<static>1</static><pose>4 5 6 0 0 0</pose>")
     assert load(include("m/crate")).solids[0].pose.position == (4, 5, 6)
@@ -217,6 +224,13 @@ class TestContainment:
         with pytest.raises(InvalidInput, match="outside the scenario root"):
             load_sdf(outside / "crate" / "model.sdf", root=tmp_path)
 
+    def test_links_in_the_folder_that_the_user_named_are_followed(self, tmp_path):
+        (tmp_path / "real").mkdir()
+        write(tmp_path / "real")
+        (tmp_path / "alias").symlink_to(tmp_path / "real")
+        world = load_sdf(tmp_path / "alias" / "crate" / "model.sdf", root=tmp_path / "alias")
+        assert len(world.solids) == 1
+
     def test_a_loop_of_symbolic_links_is_named(self, refuse, tmp_path):
         (tmp_path / "a").symlink_to(tmp_path / "b")
         (tmp_path / "b").symlink_to(tmp_path / "a")
@@ -229,6 +243,7 @@ class TestContainment:
     def test_names_with_nul_or_without_end_are_refused(self, refuse):
         assert "not a usable path" in refuse(include("a" * 5000))[0].message
         assert "not a usable path" in refuse(include("a" * 300))[0].message
+        assert "control character" in refuse(include("a\u202eb"))[0].message
         assert "not well-formed XML" in refuse(include("a\0b"))[0].message
 
     def test_an_unreadable_file_is_told(self, refuse, tmp_path):
