@@ -1,6 +1,7 @@
-"""How far every place is from the nearest static solid, for the question where a disc of some radius may be."""
+"""Where a disc of some radius may be: the distance to the nearest static solid, exact where it matters."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -11,54 +12,77 @@ from simscen.core.shapes import TriangleMesh
 from simscen.worlds.raster import Cells, filled, ranges, touched
 from simscen.worlds.section import Section, section
 
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
+
 MOST_LEVELS = 12
 """Cuts through the robot's height; walls and boxes need one, whatever their number."""
 SPACING = 0.02
 """Metres between the points that stand for an outline: at 0.2 m, half of it away errs by 0.25 mm."""
-
 NOTHING = 1e6
-"""The clearance where there is no solid at all; finite, so that it can be interpolated."""
+"""The clearance in metres where there is no solid at all."""
+HALF_DIAGONAL = 0.7072
+"""Of a cell, in cells: how far anything in it may be from its middle."""
 
 
 @dataclass(frozen=True, eq=False)
 class ClearanceField:
-    """Clearance in metres at the centres of a grid's cells, negative inside of solids.
+    """The distance to the nearest solid, roughly for cells and exactly for points; negative inside of solids.
 
-    `values` (rows, columns) are exact to a millimetre within two cells of the clearance that was asked for, and good
-    to a cell elsewhere. `blocked` are the cells that a solid reaches into.
+    `rough` (rows, columns) are metres from the middle of a cell to that of the nearest cell that a solid reaches into:
+    the truth is at most HALF_DIAGONAL cells away from it. `inside` are the cells whose middle is in a solid.
     """
 
     grid: OccupancyGrid
-    values: Array
-    blocked: Cells
+    rough: Array
+    inside: Cells
+    outline: "cKDTree | None"
 
-    def at(self, points: Array) -> Array:
-        """Clearance (n,) at points (n, 2), interpolated between cells; points off the grid are taken to its edge."""
-        return self._blend(points)[0]
+    def exact(self, points: Array) -> Array:
+        """Clearance (n,) in metres at points (n, 2)."""
+        return self._nearest(points)[0]
 
-    def uphill(self, points: Array) -> tuple[Array, Array]:
+    def keeps(self, points: Array, distance: float) -> npt.NDArray[np.bool_]:
+        """Which of the points (n, 2) are at least `distance` metres away from every solid."""
+        rough = self.rough[self._cells(points)]
+        # Twice, as the point may be as far from the middle of its cell as the outline from that of its own.
+        answer: npt.NDArray[np.bool_] = rough >= distance + 2 * HALF_DIAGONAL * self.grid.resolution
+        unsure = ~answer
+        answer[unsure] = self.exact(points[unsure]) >= distance
+        return answer
+
+    def free_cells(self, distance: float) -> Cells:
+        """The cells whose middle is at least `distance` metres away from every solid."""
+        slack = HALF_DIAGONAL * self.grid.resolution
+        free: Cells = (self.rough >= distance + slack) & ~self.inside
+        unsure = (np.abs(self.rough - distance) < slack) & ~self.inside
+        free[unsure] = self.exact(self.grid.centre_of(np.argwhere(unsure))) >= distance
+        return free
+
+    def push(self, points: Array, distance: float) -> Array:
+        """How to move each of the points (n, 2) away from the solid nearest to it, to be `distance` metres off."""
+        moves = np.zeros_like(points)
+        near = self.rough[self._cells(points)] < distance + 2 * HALF_DIAGONAL * self.grid.resolution
+        clearance, away = self._nearest(points[near])
+        moves[near] = np.maximum(distance - clearance, 0.0)[:, None] * away
+        return moves
+
+    def _nearest(self, points: Array) -> tuple[Array, Array]:
         """Clearance (n,) and the unit direction (n, 2) in which it grows."""
-        values, slope = self._blend(points)
-        steepness = np.linalg.norm(slope, axis=1)[:, None]
-        return values, slope / np.where(steepness > 0, steepness, 1.0)
+        if self.outline is None:
+            return np.full(len(points), NOTHING), np.zeros_like(points)
+        distances, numbers = self.outline.query(points)
+        sign = np.where(self.inside[self._cells(points)], -1.0, 1.0)
+        apart = points - self.outline.data[numbers]
+        return sign * distances, apart * (sign / np.where(distances > 0, distances, 1.0))[:, None]
 
-    def _blend(self, points: Array) -> tuple[Array, Array]:
-        origin, resolution, (rows, columns) = self.grid.origin, self.grid.resolution, self.grid.shape
-        x = np.clip((points[:, 0] - origin.x) / resolution - 0.5, 0, columns - 1.001)
-        y = np.clip((points[:, 1] - origin.y) / resolution - 0.5, 0, rows - 1.001)
-        column, row = x.astype(np.int64), y.astype(np.int64)
-        u, v = x - column, y - row
-        a, b = self.values[row, column], self.values[row, column + 1]
-        c, d = self.values[row + 1, column], self.values[row + 1, column + 1]
-        low, high = a + u * (b - a), c + u * (d - c)
-        slope = np.column_stack(((1 - v) * (b - a) + v * (d - c), high - low))
-        return low + v * (high - low), slope
+    def _cells(self, points: Array) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+        rows, columns = self.grid.cell_of(points).T
+        return np.clip(rows, 0, self.grid.shape[0] - 1), np.clip(columns, 0, self.grid.shape[1] - 1)
 
 
-def clearance_field(
-    mesh: TriangleMesh, grid: OccupancyGrid, radius: float, z_range: tuple[float, float]
-) -> ClearanceField:
-    """The clearance from all of `mesh` between two heights, exact near `radius`; `grid` (no yaw) gives the lattice."""
+def clearance_field(mesh: TriangleMesh, grid: OccupancyGrid, z_range: tuple[float, float]) -> ClearanceField:
+    """The clearance from what `mesh` has between two heights; `grid` (without yaw) gives the lattice."""
     from scipy import ndimage, spatial
 
     cuts = standing_outlines(mesh, z_range)
@@ -69,12 +93,11 @@ def clearance_field(
         inside |= filled(local, grid.shape)
     samples = _along(np.concatenate([cut.segments for cut in cuts]))
     if not len(samples):
-        return ClearanceField(grid, np.full(grid.shape, NOTHING), blocked)
-    values = (ndimage.distance_transform_edt(~blocked) - 0.5) * grid.resolution
-    near = np.abs(values - radius) <= 2.5 * grid.resolution
-    centres = grid.centre_of(np.argwhere(near))
-    values[near] = spatial.cKDTree(samples).query(centres)[0]
-    return ClearanceField(grid, np.where(inside, -np.abs(values), values), blocked)
+        return ClearanceField(grid, np.full(grid.shape, NOTHING), inside, None)
+    rough = (
+        ndimage.distance_transform_edt(~blocked) * grid.resolution if blocked.any() else np.full(grid.shape, NOTHING)
+    )
+    return ClearanceField(grid, rough, inside, spatial.cKDTree(samples))
 
 
 def standing_outlines(mesh: TriangleMesh, z_range: tuple[float, float]) -> list[Section]:

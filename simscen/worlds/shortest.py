@@ -10,7 +10,7 @@ import numpy as np
 from simscen.core.geometry import Array, Pose2
 from simscen.core.shapes import TriangleMesh
 from simscen.core.world import BuiltWorld
-from simscen.worlds.clearance import clearance_field
+from simscen.worlds.clearance import HALF_DIAGONAL, clearance_field
 from simscen.worlds.lattice import Lattice, Numbers
 from simscen.worlds.slicing import empty_grid
 from simscen.worlds.taut import is_clear, length, tighten
@@ -24,10 +24,9 @@ MOST_CELLS = 1_000_000
 class ShortestWays:
     """Shortest ways for a disc of one radius in one world.
 
-    Given a path that exists, its length is within about 1 % of the true one; where two sides of an obstacle differ by
-    less than 3 %, the longer one may be taken. A gap must be wider than the disc by about a cell of the search (5 cm
-    in worlds of up to 50 x 50 m) to be passed for certain. The smallest radius is 0.7 cells. A house of 20 x 20 m
-    takes some 40 ms to prepare and 30 ms for each way around corners.
+    Lengths are within about 1 % of the truth; where two sides of an obstacle differ by less than 3 %, the longer one
+    may be taken. The smallest radius is 0.7 cells of the search, which are 5 cm in worlds of up to 50 x 50 m. A house
+    of 20 x 20 m takes some 30 ms to prepare and 30 ms for each way around corners.
     """
 
     def __init__(
@@ -43,7 +42,8 @@ class ShortestWays:
         resolution = max(0.05, math.sqrt((x1 - x0 + 2 * room + 2) * (y1 - y0 + 2 * room + 2) / MOST_CELLS))
         grid = empty_grid(bounds, resolution, "shortest way")
         self._radius = max(radius, 0.71 * resolution)
-        self._field = clearance_field(mesh, grid, self._radius, z_range)
+        self._field = clearance_field(mesh, grid, z_range)
+        self._allowed = self._radius - 0.1 * resolution
 
     def length(self, start: Pose2, goal: Pose2) -> float:
         """Metres of the shortest way between two positions; inf if there is none or the disc does not fit there."""
@@ -53,29 +53,43 @@ class ShortestWays:
     def way(self, start: Pose2, goal: Pose2) -> Array | None:
         """The corners (n, 2) of the shortest way, arcs as short chords; None if there is none."""
         ends = np.array([start[:2], goal[:2]])
-        allowed = self._radius - 0.1 * self._field.grid.resolution
-        if np.any(self._field.at(ends) < allowed):
+        if not self._field.keeps(ends, self._allowed).all():
             return None
-        if is_clear(ends[0], ends[1], self._field, allowed):
+        if is_clear(ends[0], ends[1], self._field, self._allowed):
             return ends
-        first, last = (self._free_cell(end) for end in ends)
-        cells = self._lattice.way(first, last) if first and last else None
+        bold = self._over(self._bold_lattice, ends)
+        if bold is None or self._is_clear(bold):
+            return bold
+        return self._over(self._strict_lattice, ends)
+
+    @cached_property
+    def _bold_lattice(self) -> Lattice:
+        """Every cell that the disc may pass, if not over its middle: no gap is missed, some are too narrow."""
+        return Lattice(self._field.free_cells(self._radius - HALF_DIAGONAL * self._field.grid.resolution))
+
+    @cached_property
+    def _strict_lattice(self) -> Lattice:
+        """The cells over whose middle the disc may pass: gaps less than a cell wider than the disc may be missed."""
+        return Lattice(self._field.free_cells(self._radius))
+
+    def _over(self, lattice: Lattice, ends: Array) -> Array | None:
+        first, last = (self._free_cell(lattice, end) for end in ends)
+        cells = lattice.way(first, last) if first and last else None
         if cells is None:
             return None
         inner = self._field.grid.centre_of(cells)
         return tighten(np.concatenate((ends[:1], inner, ends[1:])), self._field, self._radius)
 
-    @cached_property
-    def _lattice(self) -> Lattice:
-        return Lattice(self._field.values >= self._radius)
+    def _is_clear(self, way: Array) -> bool:
+        return all(is_clear(a, b, self._field, self._allowed) for a, b in pairwise(way))
 
-    def _free_cell(self, point: Array) -> tuple[int, int] | None:
-        """The free cell nearest to a point, which may itself lie in a cell whose centre is too near a wall."""
+    def _free_cell(self, lattice: Lattice, point: Array) -> tuple[int, int] | None:
+        """The free cell nearest to a point, which may itself lie in a cell whose middle is too near a wall."""
         grid = self._field.grid
         around = np.stack(np.meshgrid(np.arange(-2, 3), np.arange(-2, 3), indexing="ij"), axis=-1).reshape(-1, 2)
         cells: Numbers = grid.cell_of(point[None]) + around
         cells = cells[grid.inside(cells)]
-        cells = cells[self._lattice.is_free(cells)]
+        cells = cells[lattice.is_free(cells)]
         if not len(cells):
             return None
         row, column = cells[np.argmin(np.linalg.norm(grid.centre_of(cells) - point, axis=1))].tolist()

@@ -7,11 +7,9 @@ import shapely
 from simscen.core.errors import InvalidInput
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
-from simscen.core.shapes import Box, Capsule, Cone, Cylinder, Extrusion, Mesh, Solid, Sphere
+from simscen.core.shapes import Box, Cylinder, Extrusion, Mesh, Solid
 from simscen.core.world import World
-from simscen.worlds.build import build
 from simscen.worlds.meshing import fuse, triangulate
-from simscen.worlds.section import outlines, section
 from simscen.worlds.slicing import map_of
 
 ROOM = (
@@ -34,36 +32,6 @@ def by_shapely(grid, polygon):
     small = 1e-6
     squares = shapely.box(xs + small, ys + small, xs + grid.resolution - small, ys + grid.resolution - small)
     return shapely.intersects(squares, polygon)
-
-
-def test_a_sphere_is_cut_into_a_circle_of_the_right_radius():
-    segments = outlines(fuse([Solid(Sphere(0.5), Pose3(1, 2, 0.5))]), 0.8)
-    radii = np.hypot(*(segments.reshape(-1, 2) - (1, 2)).T)
-    assert radii == pytest.approx(0.4, abs=0.001)
-
-
-def test_sections_are_closed_loops_with_the_solid_on_the_left():
-    polygon = ((0, 0), (3, 0), (3, 1), (1, 1), (1, 2), (0, 2))
-    solids = [
-        Solid(Extrusion(polygon, 1.0), Pose3.from_rpy(4, 4, 0, 0, 0, 1.0)),
-        Solid(Cone(1.0, 2.0), Pose3.from_rpy(-3, 0, 0.5, 0.7, 0.2, 0)),
-        Solid(Capsule(0.3, 1.0), Pose3.from_rpy(0, -3, 0.4, 0, math.pi / 2, 0)),
-    ]
-    cut = section(fuse(solids), 0.4)
-    for owner in range(3):
-        segments = cut.segments[cut.owners == owner]
-        starts = {tuple(p) for p in segments[:, 0].tolist()}
-        assert starts == {tuple(p) for p in segments[:, 1].tolist()}
-        (x0, y0), (x1, y1) = segments[:, 0].T, segments[:, 1].T
-        assert np.sum(x0 * y1 - x1 * y0) > 0
-
-
-def test_a_box_is_cut_from_above_its_underside_up_to_its_top():
-    mesh = fuse([Solid(Box((1.0, 1.0, 1.0)), Pose3(z=1.0))])
-    assert len(outlines(mesh, 0.5)) == 0
-    assert len(outlines(mesh, 0.500001)) == 8
-    assert len(outlines(mesh, 1.5)) == 4
-    assert len(outlines(mesh, 1.500001)) == 0
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -147,9 +115,3 @@ def test_what_is_added_to_a_ros_map_is_drawn_into_it_under_its_yaw():
 def test_a_map_that_would_be_too_large_is_refused_with_its_size():
     with pytest.raises(InvalidInput, match="map too large: 400040 x 400040 cells"):
         grid_of(bounds=(-1e4, -1e4, 1e4, 1e4))
-
-
-def test_an_empty_world_is_a_small_free_map():
-    built = build(World("nothing", ()), 0.2)
-    assert built.map.shape == (40, 40)
-    assert not built.map.cells.any()
