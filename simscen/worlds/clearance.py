@@ -92,11 +92,9 @@ def clearance_field(mesh: TriangleMesh, grid: OccupancyGrid, z_range: tuple[floa
         blocked |= touched(local, grid.shape)
         inside |= filled(local, grid.shape)
     samples = _along(np.concatenate([cut.segments for cut in cuts]))
-    if not len(samples):
+    if not blocked.any():
         return ClearanceField(grid, np.full(grid.shape, NOTHING), inside, None)
-    rough = (
-        ndimage.distance_transform_edt(~blocked) * grid.resolution if blocked.any() else np.full(grid.shape, NOTHING)
-    )
+    rough = ndimage.distance_transform_edt(~blocked) * grid.resolution
     return ClearanceField(grid, rough, inside, spatial.cKDTree(samples))
 
 
