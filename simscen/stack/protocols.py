@@ -102,7 +102,8 @@ class CostmapView:
 
     `costs` (height, width) uint8 with nav2_costmap_2d's values (0 free, 253 inscribed, 254 lethal, 255 unknown);
     row 0 is the lowest y, `origin` is the corner of cell (0, 0), without rotation. `distance` (height, width) float32
-    is the distance in metres from each cell's centre to the nearest lethal cell's centre. `revision` grows with each
+    is the distance in metres from each cell's centre to the nearest lethal cell's centre; a costmap may cap it, at no
+    less than the inflation radius and half a metre beyond the hull. `revision` grows with each
     change. The arrays may be windows on a costmap that goes on living: they hold until its next update.
     """
 

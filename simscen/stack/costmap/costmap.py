@@ -24,7 +24,8 @@ class Costmap:
     """Keeps costs and distances up to date; `view` shows them.
 
     The distance field of the static map is computed once. A scan changes few cells, so distances to live obstacles
-    are computed again only around those, up to `reach` metres away: beyond, a live obstacle does not lower `distance`.
+    are computed again only around those. For that to suffice, distances end at a `reach` of the inflation radius, or
+    half a metre beyond the hull: farther away than that, nothing asks how far.
     """
 
     def __init__(self, spec: CostmapSpec, surroundings: Surroundings) -> None:
@@ -33,11 +34,11 @@ class Costmap:
         self._rolling = surroundings.map is None
         layer = self._layer(Pose2(0.0, 0.0))
         resolution = layer.frame.resolution
+        reach = max(spec.inflation_radius, self._robot.circumscribed_radius + 0.5)
         self._inflation = Inflation(
-            resolution, self._robot.inscribed_radius, spec.inflation_radius, spec.cost_scaling_factor
+            resolution, self._robot.inscribed_radius, spec.inflation_radius, spec.cost_scaling_factor, reach
         )
-        self.reach = max(spec.inflation_radius, self._robot.circumscribed_radius + 0.5)
-        self._margin = math.ceil(self.reach / resolution)
+        self._margin = math.ceil(reach / resolution)
         self._revision = 0
         self._newest: dict[str, tuple[Pose2, Scan]] = {}
         self.gone = 0

@@ -26,12 +26,14 @@ class Inflation:
     """Tables over squared cell distances: `metres` and nav2's exponential `cost`.
 
     cost = 252 · exp(-cost_scaling_factor · (distance - inscribed_radius)) between the inscribed and the inflation
-    radius (nav2_costmap_2d/inflation_layer.hpp, computeCost).
+    radius (nav2_costmap_2d/inflation_layer.hpp, computeCost). Metres end at `reach`.
     """
 
-    def __init__(self, resolution: float, inscribed: float, inflation_radius: float, scaling: float) -> None:
-        self.metres: npt.NDArray[np.float32] = (np.sqrt(np.arange(FAR + 1)) * resolution).astype(np.float32)
-        distance = self.metres.astype(np.float64)
+    def __init__(
+        self, resolution: float, inscribed: float, inflation_radius: float, scaling: float, reach: float
+    ) -> None:
+        distance = np.sqrt(np.arange(FAR + 1)) * resolution
+        self.metres: npt.NDArray[np.float32] = np.minimum(distance, reach).astype(np.float32)
         decay = MAX_NON_OBSTACLE * np.exp(-scaling * np.maximum(distance - inscribed, 0.0))
         cost = np.where(distance <= inscribed, INSCRIBED, decay)
         cost = np.where(distance > inflation_radius, FREE, cost)

@@ -60,7 +60,7 @@ class InformedSet:
     def _index(self, x: float, y: float) -> int:
         column = min(self._width - 1, max(0, int((x - self._origin[0]) / self._size)))
         row = min(self._height - 1, max(0, int((y - self._origin[1]) / self._size)))
-        return row * self._width + column
+        return int(row * self._width + column)
 
 
 def _pooled(free: npt.NDArray[np.bool_], factor: int) -> npt.NDArray[np.bool_]:
