@@ -31,7 +31,7 @@ class Family(str, Enum):
     XUNIT2 = "xunit2"
 
 
-ZYGOTE = "simscen.cli.zygote"
+ZYGOTE = ("-m", "simscen.cli.zygote")
 
 
 def command(

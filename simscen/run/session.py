@@ -42,7 +42,7 @@ def plan(scenarios: Sequence[LoadedScenario], options: Options, out: Path) -> li
 
 
 def run_session(
-    jobs: Sequence[Job], options: Options, entry: str, listen: Listener
+    jobs: Sequence[Job], options: Options, entry: Sequence[str], listen: Listener
 ) -> tuple[list[RunFinished], Exit | None]:
     """Do all jobs; every one of them is answered, in the order they finish, whatever happens.
 

@@ -10,7 +10,7 @@ import signal
 import subprocess
 import sys
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import IO, Any
@@ -53,10 +53,10 @@ class Interrupted(BaseException):
 Happening = Started | Advanced | Ended
 
 
-def supervise(jobs: Iterable[Job], workers: int, entry: str, go_on: Callable[[], bool]) -> Iterator[Happening]:
+def supervise(jobs: Iterable[Job], workers: int, entry: Sequence[str], go_on: Callable[[], bool]) -> Iterator[Happening]:
     """Run all jobs, `workers` at a time, yielding what happens as it happens.
 
-    `entry` is the module that runs the warm process. `go_on` is asked before each new job. When the consumer stops
+    `entry` is how Python is called to be the warm process, e.g. `-m module`. `go_on` is asked before each new job. When the consumer stops
     early (or an exception passes through), everything that still runs is killed.
     """
     waiting, running = deque(jobs), dict[int, Job]()
@@ -101,11 +101,11 @@ def _understood(message: dict[str, Any], running: dict[int, Job]) -> Happening:
 
 
 @contextmanager
-def _warm_process(entry: str) -> Iterator[tuple[IO[bytes], IO[bytes]]]:
+def _warm_process(entry: Sequence[str]) -> Iterator[tuple[IO[bytes], IO[bytes]]]:
     """Start it; at the end close its input, which makes it kill what is left, and wait for it."""
     replies_out, replies_in = os.pipe()
     process = subprocess.Popen(
-        [sys.executable, "-I", "-m", entry, str(replies_in)],
+        [sys.executable, "-I", *entry, str(replies_in)],
         stdin=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
