@@ -1,5 +1,6 @@
 """The planner of the reference stack: OMPL between checked ends, in the informed set, then polished."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,7 +8,7 @@ import numpy as np
 from simscen.core.geometry import Pose2
 from simscen.core.navigation import ErrorCode, Path
 from simscen.model.stack import Planner as PlannerSpec
-from simscen.stack.planners.ends import ESCAPE, Ends, find_ends, roomier_ends
+from simscen.stack.planners.ends import Ends, find_ends, roomier_ends
 from simscen.stack.planners.field import Field
 from simscen.stack.planners.informed_set import InformedSet
 from simscen.stack.planners.polish import SPACING, STRING, length, pull_tight, relaxed, spaced, with_headings
@@ -15,13 +16,17 @@ from simscen.stack.planners.search import Point, search
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
 
 COMFORT = 0.10
-"""Metres of room beyond the inscribed radius that a path keeps where there is room."""
+"""Metres of room around the robot that a path keeps where there is room."""
 LESS_COMFORT = 0.05
 """What it keeps where COMFORT would close the way or cost a detour."""
 DETOUR = 1.1
 """A roomier way may be this much longer than the tightest (ratio)."""
+DETOUR_TO_TURN = 1.3
+"""A way on which the robot can turn in place may be this much longer than one on which it could get stuck."""
 GOOD = 1.03
 """A path no longer than this (ratio to the coarse grid's shortest) is taken at once; else the next attempt is made."""
+WIDER = 0.10
+"""Metres beyond the radius searched with that the elastic band tries to keep."""
 BAND = 0.15
 """Metres between the points of the elastic band."""
 
@@ -55,27 +60,31 @@ class OmplPlanner:
 
     def __init__(self, spec: PlannerSpec, robot: RobotModel) -> None:
         self._spec = spec
-        self._radius = robot.inscribed_radius
+        self._radius, whole = robot.inscribed_radius, robot.circumscribed_radius
+        wishes = [(whole + COMFORT, DETOUR), (whole + LESS_COMFORT, DETOUR)]
+        if robot.radius is None:
+            wishes += [(whole, DETOUR_TO_TURN), (self._radius + LESS_COMFORT, DETOUR)]
+        self._wishes = tuple(wishes)
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
         """A path of poses in the map frame, 5 cm apart."""
         field = Field(costmap)
         tight = find_ends(field, start, goal, self._radius, self._spec.tolerance)
         points, radius = self._search(field, self._rooms(field, tight), seed)
-        band = relaxed(field, spaced(np.array(points), BAND), radius, self._radius + COMFORT + field.resolution)
+        band = relaxed(field, spaced(np.array(points), BAND), radius, radius + WIDER)
         whole = np.vstack(((start.x, start.y), tight.start, band, tight.goal))
         return Path(with_headings(spaced(whole, SPACING), goal))
 
     def _rooms(self, field: Field, tight: Ends) -> list[Room]:
         """The roomiest search that costs no great detour, and the tightest; they may be the same."""
         closest = Room(tight, self._radius, InformedSet(field, tight.start, tight.goal, self._radius))
-        for extra in (COMFORT, LESS_COMFORT):
-            radius = self._radius + extra
+        for radius, detour in self._wishes:
             ends = roomier_ends(field, tight, radius, self._radius)
             if ends is None:
                 continue
             room = Room(ends, radius, InformedSet(field, ends.start, ends.goal, radius))
-            if room.informed.length <= DETOUR * closest.informed.length + 2 * ESCAPE:
+            legs = math.dist(tight.start, ends.start) + math.dist(tight.goal, ends.goal)
+            if room.informed.length + legs <= detour * closest.informed.length + field.resolution:
                 return [room, closest]
         return [closest]
 
