@@ -1,0 +1,67 @@
+import pytest
+
+from simscen.core.session import Outcome
+from simscen.core.verdict import Finding, Status, Verdict
+from simscen.criteria.clearance import Clearance
+from simscen.criteria.criterion import AnyCriterion
+from simscen.judge.judge import judge, outcome
+from simscen.judge.sketch import sketch, sketch_case
+
+TRACE = sketch({"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]], "clearance": 0.5})
+CASE = sketch_case({})
+
+
+def criterion(**words):
+    return AnyCriterion.model_validate(words)
+
+
+def verdict(status, severity="fail"):
+    return Verdict("clearance", "clearance", severity, (Finding(status, "clearance", "", ""),))
+
+
+def test_every_criterion_is_answered_in_order_under_its_own_name():
+    verdicts = judge(
+        [
+            criterion(clearance={"min": 0.1}),
+            criterion(clearance={"min": 0.9}, id="far", severity="warn"),
+            criterion(clearance={"min": 0.2}),
+        ],
+        TRACE,
+        CASE,
+    )
+    assert [(v.id, v.severity, v.status) for v in verdicts] == [
+        ("clearance", "fail", Status.PASS),
+        ("far", "warn", Status.FAIL),
+        ("clearance#2", "fail", Status.PASS),
+    ]
+
+
+def test_an_exception_in_a_criterion_is_its_verdict_and_the_others_still_answer(monkeypatch):
+    monkeypatch.setattr(Clearance, "judge", lambda *_: 1 / 0)
+    broken, fine = judge([criterion(clearance={"min": 0.1}), criterion(collisions={})], TRACE, CASE)
+    assert broken.status is Status.ERROR
+    assert broken.findings[0].measured == "ZeroDivisionError: division by zero"
+    assert fine.status is Status.PASS
+
+
+def test_a_criterion_that_checked_nothing_is_an_error(monkeypatch):
+    monkeypatch.setattr(Clearance, "judge", lambda *_: [])
+    (empty,) = judge([criterion(clearance={"min": 0.1})], TRACE, CASE)
+    assert empty.status is Status.ERROR
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "expected"),
+    [
+        ([verdict(Status.PASS)], Outcome.PASSED),
+        ([verdict(Status.PASS), verdict(Status.FAIL)], Outcome.FAILED),
+        ([verdict(Status.PASS), verdict(Status.INCONCLUSIVE)], Outcome.FAILED),
+        ([verdict(Status.PASS), verdict(Status.FAIL, "warn")], Outcome.PASSED),
+        ([verdict(Status.PASS), verdict(Status.INCONCLUSIVE, "warn")], Outcome.PASSED),
+        ([verdict(Status.FAIL), verdict(Status.ERROR)], Outcome.ERROR),
+        ([verdict(Status.PASS), verdict(Status.ERROR, "warn")], Outcome.ERROR),
+        ([], Outcome.ERROR),
+    ],
+)
+def test_only_severity_fail_fails_a_run_but_a_broken_criterion_always_breaks_it(verdicts, expected):
+    assert outcome(verdicts) is expected

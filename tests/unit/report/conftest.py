@@ -1,0 +1,96 @@
+"""A session with one run of each kind, told with text that tries to break out."""
+
+import pytest
+
+from simscen.core.session import (
+    Artifacts,
+    Outcome,
+    RunFailure,
+    RunFinished,
+    RunKey,
+    RunProgress,
+    RunStarted,
+    SessionFinished,
+    SessionStarted,
+)
+from simscen.core.verdict import Finding, Status, Verdict
+
+PATH = "scenarios/faults/lidar_off.scenario.yaml"
+
+
+@pytest.fixture
+def passed():
+    finding = Finding(Status.PASS, "path_length", "9.86 m", "≤ 10.00 m", 0.14, "m", 9.86, 4320, (1.0, 2.0))
+    return RunFinished(
+        key=RunKey("navigation/goal", 1),
+        path="scenarios/navigation/goal.scenario.yaml",
+        line=1,
+        outcome=Outcome.PASSED,
+        verdicts=(Verdict("path_length", "path_length", "fail", (finding,)),),
+        lines=(20,),
+        simulated=18.2,
+        wall=0.21,
+        ended="navigation ended",
+        metrics=(("path_length", 9.86),),
+    )
+
+
+@pytest.fixture
+def failed():
+    late = Finding(
+        status=Status.FAIL,
+        what="stopped_within",
+        measured="0.84 s",
+        limit="≤ 0.50 s after lidar.off",
+        margin=-0.34,
+        unit="s",
+        value=0.84,
+        tick=2602,
+        place=(2.1, 3.41),
+        detail=("drove 0.31 m blind at 0.37 m/s; the newest scan was 0.9 s old",),
+    )
+    slow = Finding(Status.FAIL, "speed", "0.60 m/s", "≤ 0.50 m/s", -0.1, "m/s", 0.6, 240, (1.0, 1.0))
+    return RunFinished(
+        key=RunKey("faults/lidar_off", 7),
+        path=PATH,
+        line=3,
+        outcome=Outcome.FAILED,
+        verdicts=(
+            Verdict("stopped_within", "stopped_within", "fail", (late,)),
+            Verdict("speed", "speed", "warn", (slow,)),
+        ),
+        lines=(27, 28),
+        simulated=31.0,
+        wall=0.35,
+        ended="navigation ended",
+        artifacts=Artifacts("out/x", "out/x/run.mcap", "out/x/map.png", "out/x/result.json"),
+        again=f"simscen run {PATH} --seed 7",
+    )
+
+
+@pytest.fixture
+def crashed():
+    tail = "::error::owned\n##[error]x\n\x1b[31mred\x1b[0m ]]> <script>&\nSegmentation fault"
+    return RunFinished(
+        key=RunKey("evil/[red]::error::x", 1),
+        path="scenarios/evil/[red]::error::x.scenario.yaml",
+        line=1,
+        outcome=Outcome.ERROR,
+        wall=1.25,
+        error=RunFailure("crashed", "crashed: SIGSEGV", tail),
+        again="simscen run evil",
+    )
+
+
+@pytest.fixture
+def session(passed, failed, crashed):
+    return [
+        SessionStarted("0.1.0", 3, 3, 2, "out"),
+        RunStarted(passed.key, passed.path, 60.0),
+        RunProgress(passed.key, 3.5),
+        passed,
+        RunStarted(failed.key, failed.path, 60.0),
+        failed,
+        crashed,
+        SessionFinished(1, 1, 1, 49.2, 0.5, junit="out/junit.xml", folder="out"),
+    ]

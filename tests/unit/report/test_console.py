@@ -1,0 +1,150 @@
+import io
+import re
+from dataclasses import replace
+
+import pytest
+
+from simscen.core.session import RunKey, SessionStarted
+from simscen.report.console import text_reporter
+from simscen.report.github import annotations, github_reporter, markdown
+from simscen.report.machine import json_reporter
+from simscen.report.results import to_json
+
+EXPECTED = """\
+simscen 0.1.0 · 3 scenarios · 2 workers
+  ✓ navigation/goal                        18.2 s simulated in 0.21 s   tightest: path_length +0.14 m
+  ✗ faults/lidar_off                       31.0 s simulated in 0.35 s
+      stopped_within: 0.84 s > 0.50 s after lidar.off, at t = 10.84 s, (2.10, 3.41)
+        drove 0.31 m blind at 0.37 m/s; the newest scan was 0.9 s old
+      warning: speed: 0.60 m/s > 0.50 m/s, at t = 1.00 s, (1.00, 1.00)
+      scenario  scenarios/faults/lidar_off.scenario.yaml:27
+      picture   out/x/map.png
+      again     simscen run scenarios/faults/lidar_off.scenario.yaml --seed 7
+  ! evil/[red]::error::x                 crashed after 1.25 s
+      crashed: SIGSEGV
+        | ::error::owned
+        | #\\x23[error]x
+        | \\x1b[31mred\\x1b[0m ]]> <script>&
+        | Segmentation fault
+      scenario  scenarios/evil/[red]::error::x.scenario.yaml:1
+      again     simscen run evil
+1 passed, 1 failed, 1 error · 49 s simulated in 0.5 s (98x) · out/junit.xml
+"""
+
+
+def told(reporter, session):
+    with reporter as listen:
+        for event in session:
+            listen(event)
+
+
+def test_piped_output_is_exactly_this(session):
+    out = io.StringIO()
+    out.encoding_hint = "utf-8"
+    told(text_reporter(utf8(out)), session)
+    assert out.getvalue() == EXPECTED
+
+
+class utf8:
+    """A stream that says it is UTF-8, which StringIO does not."""
+
+    encoding = "utf-8"
+
+    def __init__(self, out):
+        self._out = out
+
+    def write(self, text):
+        return self._out.write(text)
+
+    def flush(self):
+        self._out.flush()
+
+    def isatty(self):
+        return False
+
+
+def test_a_stream_that_knows_only_ascii_gets_ascii(session):
+    raw = io.BytesIO()
+    out = io.TextIOWrapper(raw, encoding="ascii")
+    told(text_reporter(out), session)
+    out.flush()
+    text = raw.getvalue().decode("ascii")
+    assert "  + navigation/goal" in text
+    assert "  x faults/lidar_off" in text
+
+
+def test_a_terminal_gets_the_same_facts_in_colour_and_user_text_is_no_markup(session):
+    out = io.StringIO()
+    told(text_reporter(out, live=True), session)
+    plain = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", out.getvalue())
+    for line in EXPECTED.splitlines():
+        if "x23" not in line:
+            assert line.strip() in plain
+
+
+def test_runs_of_one_scenario_are_told_apart_by_their_seeds(passed):
+    out = io.StringIO()
+    other = replace(passed, key=RunKey("navigation/goal", 2))
+    told(text_reporter(utf8(out)), [SessionStarted("0.1.0", 2, 1, 1), passed, other])
+    assert "1 scenario · 2 runs · 1 worker\n" in out.getvalue()
+    assert "navigation/goal (seed 1) " in out.getvalue()
+    assert "navigation/goal (seed 2) " in out.getvalue()
+
+
+def test_no_line_of_plain_output_can_be_taken_for_a_command_of_a_ci(session, failed):
+    sly = replace(failed, key=RunKey("::set-output name=x::y", 1), again="::stop-commands::x\n##[group]x")
+    sly = replace(sly, verdicts=(replace(failed.verdicts[0], id="::error::y", criterion="::error::y"),), lines=(1,))
+    out = io.StringIO()
+    told(text_reporter(utf8(out)), [*session, sly])
+    assert not re.search(r"^\s*::|##\[", out.getvalue(), re.MULTILINE)
+
+
+def test_github_annotations_stand_at_the_line_of_the_criterion_and_are_escaped(failed, crashed):
+    error, warning = annotations(failed)
+    assert error == (
+        "::error file=scenarios/faults/lidar_off.scenario.yaml,line=27,title=faults/lidar_off (seed 7)::"
+        "stopped_within: 0.84 s > 0.50 s after lidar.off, at t = 10.84 s, (2.10, 3.41)"
+        "%0Adrove 0.31 m blind at 0.37 m/s; the newest scan was 0.9 s old"
+    )
+    assert warning.startswith("::warning file=scenarios/faults/lidar_off.scenario.yaml,line=28,")
+    sly = replace(crashed, error=replace(crashed.error, message="100 %, a:b\r\n::warning::x"))
+    (line,) = annotations(sly)
+    assert "\n" not in line
+    assert "file=scenarios/evil/[red]%3A%3Aerror%3A%3Ax.scenario.yaml,line=1," in line
+    assert "100 %25, a:b" in line
+
+
+def test_the_summary_of_a_github_job_lists_what_did_not_pass_first_and_holds_no_live_markup(session, passed, crashed):
+    summary = markdown([passed, crashed], session[-1])
+    rows = summary.splitlines()[4:]
+    assert "crashed: SIGSEGV" in rows[0]
+    assert "navigation/goal" in rows[1]
+    evil = replace(passed, key=RunKey("<script>|*x*[a](b)@me#1", 1))
+    (row,) = markdown([evil], session[-1]).splitlines()[4:5]
+    assert not re.search(r"<script|\*x\*|\[a\]|@me", row)
+    assert row.count("|") == 5
+
+
+def test_github_output_holds_the_plain_lines_too(session):
+    out, summary = io.StringIO(), io.StringIO()
+    told(github_reporter(utf8(out), summary), session)
+    lines = [line for line in out.getvalue().splitlines() if not line.startswith("::")]
+    assert "\n".join(lines) + "\n" == EXPECTED
+    assert summary.getvalue().startswith("### simscen: 1 passed, 1 failed, 1 error\n")
+
+
+def test_the_machine_format_is_the_results_file_and_nothing_else(session, passed, failed, crashed):
+    out = io.StringIO()
+    told(json_reporter(out), session)
+    assert out.getvalue() == to_json([passed, failed, crashed], "out")
+
+
+@pytest.mark.parametrize("live", [True, False])
+def test_a_session_that_breaks_off_leaves_the_terminal_as_it_was(session, live):
+    out = io.StringIO()
+    with pytest.raises(KeyboardInterrupt), text_reporter(out, live=live) as listen:
+        listen(session[0])
+        listen(session[1])
+        raise KeyboardInterrupt
+    hidden, shown = out.getvalue().count("\x1b[?25l"), out.getvalue().count("\x1b[?25h")
+    assert hidden == shown

@@ -1,0 +1,113 @@
+"""junit.xml as other tools read it."""
+
+import io
+import re
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import junitparser
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from simscen.core.session import Outcome, RunFailure, RunFinished, RunKey
+from simscen.report.junit import to_xml
+
+JENKINS = {  # attributes that Jenkins' junit-10.xsd allows
+    "testsuites": {"name", "time", "tests", "failures", "errors"},
+    "testsuite": {"name", "tests", "failures", "errors", "time", "skipped", "timestamp", "hostname", "id", "file"},
+    "testcase": {"name", "time", "classname", "group"},
+    "failure": {"type", "message"},
+    "error": {"type", "message"},
+    "system-out": set(),
+}
+
+
+def read(runs, **options):
+    return junitparser.JUnitXml.fromstring(to_xml(runs, **options))
+
+
+def cases(document):
+    return {case.name: case for suite in document for case in suite}
+
+
+def test_another_reader_sees_one_case_for_each_run(passed, failed, crashed):
+    document = read([failed, crashed, passed])
+    assert (document.tests, document.failures, document.errors) == (3, 1, 1)
+    assert [suite.name for suite in document] == sorted(run.path for run in (passed, failed, crashed))
+    found = cases(document)
+    assert found["goal [seed 1]"].is_passed
+    assert found["goal [seed 1]"].classname == "navigation.goal"
+    assert found["lidar_off [seed 7]"].result[0].type == "stopped_within"
+
+
+def test_a_failure_says_where_and_what_for_every_criterion(failed):
+    (element,) = ElementTree.fromstring(to_xml([failed])).iter("failure")
+    message = "stopped_within: 0.84 s > 0.50 s after lidar.off, at t = 10.84 s, (2.10, 3.41)"
+    assert element.get("message") == message
+    assert element.text.splitlines() == [
+        f"scenarios/faults/lidar_off.scenario.yaml:27: {message}",
+        "    drove 0.31 m blind at 0.37 m/s; the newest scan was 0.9 s old",
+        "again: simscen run scenarios/faults/lidar_off.scenario.yaml --seed 7",
+    ]
+
+
+def test_file_line_properties_and_attachments_are_there(failed):
+    (case,) = ElementTree.fromstring(to_xml([failed])).iter("testcase")
+    properties = {entry.get("name"): entry.get("value") for entry in case.iter("property")}
+    assert case.get("file") == failed.path
+    assert case.get("line") == "3"
+    assert case.get("time") == "0.350"
+    assert properties["simulated_seconds"] == "31.000"
+    assert properties["margin.stopped_within"] == "-0.34 s"
+    (output,) = case.iter("system-out")
+    assert output.text.splitlines() == [
+        "scenarios/faults/lidar_off.scenario.yaml:28: warning: speed: 0.60 m/s > 0.50 m/s, at t = 1.00 s, (1.00, 1.00)",
+        "[[ATTACHMENT|out/x/map.png]]",
+        "[[ATTACHMENT|out/x/run.mcap]]",
+        "[[ATTACHMENT|out/x/result.json]]",
+    ]
+
+
+def test_the_strict_family_keeps_to_what_jenkins_allows(passed, failed, crashed):
+    root = ElementTree.fromstring(to_xml([passed, failed, crashed], family="xunit2"))
+    for element in root.iter():
+        assert set(element.keys()) <= JENKINS[element.tag]
+        if (seconds := element.get("time")) is not None:
+            assert re.fullmatch(r"(([0-9]{0,3},)*[0-9]{3}|[0-9]{0,3})*(\.[0-9]{0,3})?", seconds)
+
+
+@pytest.mark.parametrize(
+    "kind", ["crashed", "timeout", "out-of-memory", "invalid", "interrupted", "not-run", "internal"]
+)
+def test_a_run_that_could_not_be_completed_is_an_error_of_its_kind(crashed, kind):
+    run = replace(crashed, error=RunFailure(kind, "why", "worker's last words"))
+    (element,) = ElementTree.fromstring(to_xml([run])).iter("error")
+    assert element.get("type") == kind
+    assert "worker's last words" in element.text
+
+
+def test_names_are_unique_even_when_runs_are_not(passed):
+    document = read([passed, passed, passed])
+    assert len(cases(document)) == 3
+
+
+def test_the_order_in_which_runs_end_does_not_show(passed, failed, crashed):
+    assert to_xml([passed, failed, crashed]) == to_xml([crashed, passed, failed])
+
+
+@settings(max_examples=60)
+@given(st.text(max_size=60), st.text(max_size=200), st.text(max_size=40))
+def test_whatever_the_text_the_document_is_well_formed_and_reads_back(name, tail, kind):
+    run = RunFinished(
+        RunKey(name, 1), name, 1, Outcome.ERROR, error=RunFailure(kind, tail, tail), ended=name, again=tail
+    )
+    root = ElementTree.parse(io.BytesIO(to_xml([run]))).getroot()
+    assert len(list(root.iter("testcase"))) == 1
+
+
+def test_escape_sequences_and_lone_surrogates_become_visible(crashed):
+    run = replace(crashed, error=RunFailure("crashed", "\x1b[31m \ud800 \u202e", "\x00"))
+    text = to_xml([run]).decode()
+    assert r"\x1b[31m \ud800 \u202e" in text
+    assert r"\x00" in text

@@ -1,0 +1,25 @@
+import json
+from dataclasses import replace
+
+from simscen.judge.result import from_data
+from simscen.report.results import to_json
+
+
+def test_every_run_is_in_it_once_with_its_result(passed, failed, crashed):
+    document = json.loads(to_json([failed, passed, crashed], "out"))
+    assert (document["total"], document["passed"], document["failed"], document["error"]) == (3, 1, 1, 1)
+    assert [run["scenario"] for run in document["runs"]] == [
+        "evil/[red]::error::x",
+        "faults/lidar_off",
+        "navigation/goal",
+    ]
+    assert from_data(document["runs"][1]).verdicts == failed.verdicts
+
+
+def test_artifacts_are_relative_to_the_session_so_that_the_folder_may_move(failed):
+    (run,) = json.loads(to_json([failed], "out"))["runs"]
+    assert run["artifacts"] == {"mcap": "x/run.mcap", "picture": "x/map.png", "result": "x/result.json"}
+
+
+def test_neither_wall_time_nor_order_shows(passed, failed):
+    assert to_json([passed, failed]) == to_json([replace(failed, wall=99.0), passed])
