@@ -16,7 +16,8 @@ from simscen.core.shapes import Mesh
 from simscen.worlds.sdf import values
 from simscen.worlds.sdf.files import MESH_BYTES, Library, Trouble
 from simscen.worlds.sdf.markup import Element
-from simscen.worlds.sdf.meshfile import Part, UnusableMesh, read_parts
+from simscen.worlds.sdf.meshfile import read_parts
+from simscen.worlds.sdf.meshpart import Part, UnusableMesh
 from simscen.worlds.sdf.report import CODE, Report
 
 

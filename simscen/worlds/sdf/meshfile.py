@@ -3,40 +3,21 @@
 import io
 import logging
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from simscen.core.geometry import Array
-from simscen.worlds.sdf import markup
-from simscen.worlds.sdf.report import Unusable
-from simscen.worlds.sdf.values import FARTHEST
+from simscen.worlds.sdf.dae import read_dae
+from simscen.worlds.sdf.meshpart import MOST_FACES, Part, UnusableMesh, limit
 
-MOST_FACES = 500_000
-MOST_NODES = 10_000
 STL_HEADER, STL_TRIANGLE = 84, 50
 
 # trimesh logs the tracebacks of what it tries first; without any handler Python would print them to stderr.
 logging.getLogger("trimesh").addHandler(logging.NullHandler())
 
 
-class UnusableMesh(Exception):
-    """Why a mesh file cannot be used."""
-
-
-@dataclass(frozen=True, eq=False)
-class Part:
-    """A named part of a mesh: `vertices` (n, 3) in metres, `faces` (m, 3); `names` is what a submesh may call it."""
-
-    names: tuple[str, ...]
-    vertices: Array
-    faces: npt.NDArray[np.int64]
-
-
 def read_parts(data: bytes, suffix: str, file: str) -> tuple[Part, ...]:
     """The parts of a .dae, .stl or .obj file; raises UnusableMesh."""
-    readers = {".dae": _collada, ".stl": _stl, ".obj": _obj}
+    readers = {".dae": read_dae, ".stl": _stl, ".obj": _obj}
     if suffix not in readers:
         raise UnusableMesh(f"{suffix or 'files without suffix'} meshes are not read, only DAE, STL and OBJ")
     parts = tuple(part for part in readers[suffix](data, file) if len(part.faces))
@@ -53,17 +34,12 @@ def _compact(part: Part) -> Part:
 
 
 def _check(parts: tuple[Part, ...]) -> None:
-    _limit(sum(len(part.faces) for part in parts))
+    limit(sum(len(part.faces) for part in parts))
     for part in parts:
         if part.faces.min() < 0 or part.faces.max() >= len(part.vertices):
             raise UnusableMesh("a triangle names a vertex that is not there")
         if not np.isfinite(part.vertices).all():
             raise UnusableMesh("a vertex is not a finite number")
-
-
-def _limit(faces: int) -> None:
-    if faces > MOST_FACES:
-        raise UnusableMesh(f"more than {MOST_FACES} triangles")
 
 
 def _stl(data: bytes, _: str) -> Iterator[Part]:
@@ -81,12 +57,12 @@ def _check_stl_header(data: bytes) -> None:
     held, rest = divmod(len(data) - STL_HEADER, STL_TRIANGLE)
     if claimed != held or rest:
         raise UnusableMesh(f"STL header says {claimed} triangles, file holds {held}")
-    _limit(claimed)
+    limit(claimed)
 
 
 def _obj(data: bytes, _: str) -> Iterator[Part]:
     if data.count(b"\nf") > MOST_FACES:
-        _limit(MOST_FACES + 1)
+        limit(MOST_FACES + 1)
     yield from _trimesh(data, "obj", skip_materials=True, split_objects=True, maintain_order=True)
 
 
@@ -101,60 +77,3 @@ def _trimesh(data: bytes, kind: str, **options: bool) -> Iterator[Part]:
         if isinstance(geometry, trimesh.Trimesh):
             named = str(geometry.metadata.get("name") or name)
             yield Part((named,), np.asarray(geometry.vertices, float), np.asarray(geometry.faces, np.int64))
-
-
-def _collada(data: bytes, file: str) -> Iterator[Part]:
-    """Read with pycollada and not through trimesh, which forgets the unit and the names of nodes."""
-    import collada
-
-    try:
-        markup.refuse_doctype(data, file)
-    except Unusable as error:
-        raise UnusableMesh(f"line {error.place.line}: {error.message}") from error
-    try:
-        document = collada.Collada(io.BytesIO(data), ignore=[collada.DaeError])
-        unit = float(document.assetInfo.unitmeter or 1.0)
-        nodes = document.scene.nodes if document.scene else []
-        parts = list(_nodes(nodes, np.eye(4), ""))
-    except UnusableMesh:
-        raise
-    except Exception as error:  # pycollada raises what its XML and array code happen to meet
-        raise UnusableMesh("not a readable COLLADA file") from error
-    if not 0 < unit < FARTHEST:
-        raise UnusableMesh(f"a unit of {unit:g} m")
-    for part in parts:
-        yield Part(part.names, part.vertices * unit, part.faces)
-
-
-def _nodes(nodes: list[object], matrix: Array, name: str) -> Iterator[Part]:
-    """The parts of a COLLADA scene, in its own unit; a part is called after the nearest named node above it."""
-    from collada.scene import GeometryNode, Node
-
-    waiting = [(node, matrix, name) for node in reversed(nodes)]
-    visited = faces = 0
-    while waiting:
-        node, parent, called = waiting.pop()
-        visited += 1
-        if visited > MOST_NODES:
-            raise UnusableMesh(f"more than {MOST_NODES} nodes")
-        if isinstance(node, GeometryNode):
-            for part in _primitives(node.geometry, parent, called):
-                faces += len(part.faces)
-                _limit(faces)
-                yield part
-        elif isinstance(node, Node):
-            own = node.xmlnode.get("name") or called
-            placed = parent @ np.asarray(node.matrix, float)
-            waiting.extend((child, placed, own) for child in reversed(node.children or []))
-
-
-def _primitives(geometry: object, matrix: Array, called: str) -> Iterator[Part]:
-    names = tuple(name for name in (called, geometry.name, geometry.id) if name)  # type: ignore[attr-defined]
-    for primitive in geometry.primitives:  # type: ignore[attr-defined]
-        triangles = primitive.triangleset() if hasattr(primitive, "triangleset") else primitive
-        if getattr(triangles, "vertex", None) is None or not hasattr(triangles, "ntriangles"):
-            continue  # lines, or an empty primitive
-        vertices = np.asarray(triangles.vertex, float) @ matrix[:3, :3].T + matrix[:3, 3]
-        faces = np.asarray(triangles.vertex_index, np.int64).reshape(-1, 3)
-        flip = np.linalg.det(matrix[:3, :3]) < 0
-        yield Part(names, vertices, faces[:, ::-1] if flip else faces)

@@ -6,7 +6,8 @@ import pytest
 
 from simscen.core.errors import InvalidInput
 from simscen.worlds.sdf.meshes import read_mesh
-from simscen.worlds.sdf.meshfile import UnusableMesh, read_parts
+from simscen.worlds.sdf.meshfile import read_parts
+from simscen.worlds.sdf.meshpart import UnusableMesh
 
 DAE = """<?xml version="1.0"?>
 <COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
@@ -121,6 +122,17 @@ class TestCollada:
     @pytest.mark.parametrize("content", ["", "<COLLADA/>", "not XML", dae()[:900], dae().replace("0 1 2", "0 1 9")])
     def test_broken_files_are_refused(self, broken, content):
         assert broken(content).message.startswith("world[w]/model[m]/link[a]/collision[c]/geometry/mesh/uri: x.dae: ")
+
+    def test_a_part_that_cannot_be_read_is_not_left_out_silently(self, broken):
+        both = geometry("g") + geometry("h", primitive=TRIANGLES.replace("triangles", "tristrips"))
+        assert "<tristrips> is not read" in broken(dae(both, node("a") + node("b", "h"))).message
+        assert "its geometry 'h' is missing" in broken(dae(nodes=node("a") + node("b", "h"))).message
+
+    def test_missing_materials_do_no_harm(self, mesh):
+        material = "<technique_common><instance_material symbol='s' target='#gone'/></technique_common>"
+        bound = f"<bind_material>{material}</bind_material>"
+        nodes = node("a").replace('url="#g"/>', f'url="#g">{bound}</instance_geometry>')
+        assert len(mesh(dae(nodes=nodes)).faces) == 1
 
     def test_nodes_that_unfold_without_end_are_refused(self):
         levels = "".join(
