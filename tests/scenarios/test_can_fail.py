@@ -1,0 +1,100 @@
+"""Each shipped scenario can fail: break the stack, take its disturbance away or tighten its bound, and it does.
+
+A change is a list of (path into the YAML, new value); the scenario must then fail by the criterion that is named.
+"""
+
+import copy
+import shutil
+from pathlib import Path
+
+import pytest
+import yaml
+
+from simscen.core.session import Outcome, RunKey
+from simscen.core.time import Clock
+from simscen.loading.scenario import load_scenario
+from simscen.record.trace import TraceBuilder
+from simscen.run.assemble import assemble
+from simscen.run.lockstep import run_lockstep
+from simscen.run.perform import judged
+from simscen.run.prepare import prepare
+
+ROOT = Path(__file__).parents[2]
+NO_LOCALIZER = ("stack.localizer", {"type": "odometry"})
+NO_RECOVERY = ("stack.recovery", {"number_of_retries": 0, "behaviors": []})
+
+CHANGES = {
+    "navigation/goal": [("clearance", [("pass.2.clearance.min", 1.0)])],
+    "navigation/patrol": [
+        ("localization_error", [NO_LOCALIZER, ("faults", [{"sensor": "odom", "bias": {"turn_per_metre": 0.05}}])]),
+        ("goals_reached", [("goals.0.timeout", 2.0)]),
+    ],
+    "navigation/path_length": [("path_length", [("pass.1.path_length.max_ratio", 1.0)])],
+    "navigation/time_bound": [("time_to_goal", [("pass.1.time_to_goal.max", 5.0)])],
+    "navigation/goal_occupied": [("result", [("goals.0.pose", {"x": 3.0, "y": 5.0})])],
+    "navigation/goal_outside_map": [("result", [("goals.0.pose", {"x": 3.0, "y": 5.0})])],
+    "recovery/corridor_blocked_then_opened": [
+        ("goals_reached", [NO_RECOVERY]),
+        ("recoveries", [("events", [])]),
+    ],
+    "recovery/blocked_for_good": [("result", [("events", [])])],
+    "obstacles/pallet_on_plan": [("replans", [("events", [])])],
+    "obstacles/cart_crossing": [("replans", [("events", [])])],
+    "obstacles/door_closes": [("replans", [("events", [])])],
+    "faults/lidar_off": [
+        ("stopped_within", [("stack.collision_monitor", {"enabled": False})]),
+        ("goals_reached", [("faults.0.for", 85.0)]),
+    ],
+    "faults/lidar_noise": [("localization_error", [("pass.1.localization_error.max", 0.01)])],
+    "faults/wheel_slip": [("localization_error", [NO_LOCALIZER])],
+    "localization/wrong_initial_estimate": [("localization_error", [NO_LOCALIZER])],
+}
+CASES = [(scenario, *change) for scenario, changes in CHANGES.items() for change in changes]
+
+
+def test_every_shipped_scenario_is_in_the_table():
+    shipped = {file.relative_to(ROOT / "scenarios").as_posix().removesuffix(".scenario.yaml")
+               for file in (ROOT / "scenarios").rglob("*.scenario.yaml")}  # fmt: skip
+    assert shipped - {name for name in shipped if name.startswith("corner_cases/")} == set(CHANGES)
+
+
+@pytest.mark.parametrize(("scenario", "criterion", "changes"), CASES, ids=[f"{case[0]}:{case[1]}" for case in CASES])
+def test_a_broken_scenario_fails_for_the_stated_reason(scenario, criterion, changes, tmp_path):
+    result = run(changed(scenario, changes), scenario, tmp_path)
+    assert result.outcome is Outcome.FAILED
+    assert criterion in [verdict.criterion for verdict in result.verdicts if verdict.status.value != "pass"]
+
+
+class Loader(yaml.SafeLoader):
+    """YAML 1.2 as far as scenarios need it: `off` is text."""
+
+
+Loader.yaml_implicit_resolvers = {
+    first: [(tag, pattern) for tag, pattern in resolvers if tag != "tag:yaml.org,2002:bool" or first in "tTfF"]
+    for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}
+
+
+def changed(scenario: str, changes) -> dict:
+    text = (ROOT / "scenarios" / f"{scenario}.scenario.yaml").read_text()
+    spec = copy.deepcopy(yaml.load(text, Loader))
+    for path, value in changes:
+        *keys, last = [int(key) if key.isdigit() else key for key in path.split(".")]
+        place = spec
+        for key in keys:
+            place = place[key] if isinstance(place, list) else place.setdefault(key, {})
+        place[last] = value
+    return spec
+
+
+def run(spec: dict, scenario: str, root: Path):
+    shutil.copytree(ROOT / "worlds", root / "worlds")
+    file = root / "scenarios" / f"{scenario}.scenario.yaml"
+    file.parent.mkdir(parents=True)
+    file.write_text(yaml.safe_dump(spec))
+    loaded = load_scenario(file, root)
+    prepared, seed = prepare(loaded), loaded.spec.seed
+    rig, builder = assemble(prepared, seed), TraceBuilder(Clock(loaded.spec.physics.tick_rate))
+    end = run_lockstep(rig, (builder,))
+    rig.simulation.close()
+    return judged(prepared, RunKey(loaded.id, seed), builder.finish(end.tick))
