@@ -18,8 +18,8 @@ def load_world(loaded: LoadedScenario) -> World:
     """The world of a scenario. Raises InvalidInput for a map image or an SDF file that cannot be used."""
     source = loaded.world
     spec = source.spec or WorldSpec(simscen=1)
-    grid = load_map(source.map) if source.map else None
-    return build_own(spec, source.name, grid, _sdf(source, loaded))
+    grid, notes = _map_and_notes(source.map) if source.map else (None, ())
+    return build_own(spec, source.name, grid, _sdf(source, loaded), notes)
 
 
 def _sdf(source: LoadedWorld, loaded: LoadedScenario) -> World | None:
@@ -32,9 +32,13 @@ def _sdf(source: LoadedWorld, loaded: LoadedScenario) -> World | None:
 
 def load_map(source: LoadedMap) -> OccupancyGrid:
     """The grid of a ROS map."""
+    return _map_and_notes(source)[0]
+
+
+def _map_and_notes(source: LoadedMap) -> tuple[OccupancyGrid, tuple[str, ...]]:
     from simscen.worlds.rosmap import load_grid
 
-    return load_grid(source.spec, source.image)[0]
+    return load_grid(source.spec, source.image)
 
 
 def _read_mesh(path: Path) -> Mesh:

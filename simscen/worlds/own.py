@@ -17,11 +17,18 @@ from simscen.worlds.extrude import walls_of
 from simscen.worlds.walls import wall_solids
 
 
-def build_own(spec: WorldSpec, name: str, grid: OccupancyGrid | None = None, base: World | None = None) -> World:
+def build_own(
+    spec: WorldSpec,
+    name: str,
+    grid: OccupancyGrid | None = None,
+    base: World | None = None,
+    notes: tuple[str, ...] = (),
+) -> World:
     """The world of a specification; `name` is used where it has none.
 
-    `grid` is the loaded `map`, which becomes walls `map_height` tall and stays the robot's map; `base` is the imported
-    `sdf`. What the specification adds comes after theirs, and its places and regions win over those of the base.
+    `grid` is the loaded `map`, which becomes walls `map_height` tall and stays the robot's map; `notes` are what its
+    loader had to say; `base` is the imported `sdf`. What the specification adds comes after theirs, and its places
+    and regions win over those of the base.
     """
     base = base or World(name, ())
     solids = [*base.solids]
@@ -43,6 +50,7 @@ def build_own(spec: WorldSpec, name: str, grid: OccupancyGrid | None = None, bas
         doors={door.name: _swing(door) for door in spec.doors},
         bounds=_bounds(solids, bodies, places.values(), grid),
         grid=grid or base.grid,
+        notes=(*base.notes, *notes),
     )
 
 

@@ -11,7 +11,7 @@ from simscen.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from simscen.core.problems import Problem
 from simscen.core.shapes import TriangleMesh
 from simscen.core.world import World
-from simscen.worlds.raster import Cells, touched
+from simscen.worlds.raster import Cells, filled, touched
 from simscen.worlds.section import Section, section
 
 MARGIN = 1.0
@@ -83,21 +83,29 @@ def _places(world: World, grid: OccupancyGrid) -> npt.NDArray[np.int64]:
 def _outside(occupied: Cells, places: npt.NDArray[np.int64]) -> Cells:
     """The cells outside of a building: free, linked to the edge of the map, and not where robots are.
 
-    The surroundings count as outside when the rooms within the walls are larger than they are without MARGIN's
-    share, that is, than the open ground within the world's own extent; and never when a named place is there. An
-    open field with obstacles has hardly any ground that is walled off, so all of it stays free.
+    A world is a building if more ground is walled off than lies open within the convex hull of all walls, and no named
+    place lies in the open. A field of obstacles has hardly any ground that is walled off, so all of it stays free.
     """
     from scipy import ndimage
 
     labels, _ = ndimage.label(~occupied)
     edge = np.unique(np.concatenate((labels[0], labels[-1], labels[:, 0], labels[:, -1])))
-    open_ground = np.isin(labels, edge[edge > 0])
-    enclosed = ~occupied & ~open_ground
-    extent = np.zeros_like(occupied)
-    rows, columns = np.nonzero(occupied.any(axis=1))[0], np.nonzero(occupied.any(axis=0))[0]
-    if len(rows):
-        extent[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] = True
+    open_ground: Cells = np.isin(labels, edge[edge > 0])
+    enclosed = np.count_nonzero(~occupied & ~open_ground)
     lived_in = bool(open_ground[places[:, 0], places[:, 1]].any())
-    if lived_in or enclosed.sum() <= (open_ground & extent).sum():
+    if not enclosed or lived_in or enclosed <= np.count_nonzero(open_ground & _hull(occupied)):
         return np.zeros_like(occupied)
     return open_ground
+
+
+def _hull(occupied: Cells) -> Cells:
+    """The cells whose middle is in the convex hull of the occupied ones; these must not all lie on one line."""
+    from scipy.spatial import ConvexHull
+
+    rows = np.flatnonzero(occupied.any(axis=1))
+    first = np.argmax(occupied[rows], axis=1)
+    last = occupied.shape[1] - 1 - np.argmax(occupied[rows, ::-1], axis=1)
+    ends = np.column_stack((np.concatenate((first, last)), np.concatenate((rows, rows)))) + 0.5
+    corners = ends[ConvexHull(ends).vertices]  # anticlockwise
+    segments = np.stack((corners, np.roll(corners, -1, axis=0)), axis=1)
+    return filled(Section(segments, np.zeros(len(segments), np.int32)), occupied.shape)

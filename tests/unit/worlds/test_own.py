@@ -68,7 +68,8 @@ def test_a_map_becomes_walls_and_stays_the_map():
     cells = np.zeros((20, 20), np.int8)
     cells[5, 5:15] = OCCUPIED
     grid = OccupancyGrid(cells, 0.1, Pose2(1.0, 1.0, 0.0))
-    world = build_own(spec(map="m.yaml", map_height=2.0), "w", grid=grid)
+    world = build_own(spec(map="m.yaml", map_height=2.0), "w", grid=grid, notes=("m.pgm: a doubt",))
+    assert world.notes == ("m.pgm: a doubt",)
     assert [solid.name for solid in world.solids] == ["map"]
     assert world.grid is grid
     assert world.bounds == pytest.approx((1.0, 1.0, 3.0, 3.0))

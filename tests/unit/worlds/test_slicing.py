@@ -11,6 +11,7 @@ from simscen.core.shapes import Box, Cylinder, Extrusion, Mesh, Solid
 from simscen.core.world import World
 from simscen.worlds.meshing import fuse, triangulate
 from simscen.worlds.slicing import map_of
+from simscen.worlds.walls import wall_solids
 
 ROOM = (
     Solid(Box((4.2, 0.1, 1.0)), Pose3(2, -0.05, 0.5), "south"),
@@ -83,6 +84,15 @@ def test_outside_stays_free_when_a_named_place_is_there_or_a_door_stands_open():
     open_door = grid_of(*ROOM[:3])
     for grid in (yard, open_door):
         assert not (grid.cells == UNKNOWN).any()
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.4, math.pi / 4])
+def test_neither_a_turn_nor_a_wing_makes_a_building_an_open_field(yaw):
+    plan = [(0, 0), (6, 0), (6, 2), (2, 2), (2, 6), (0, 6), (0, 0)]
+    turned = Pose2(0, 0, yaw).apply(np.array(plan, dtype=float)).tolist()
+    grid = grid_of(*wall_solids([(x, y) for x, y in turned], 0.1, 1.0, "w"))
+    inside, beyond, corner = grid.values_at(Pose2(0, 0, yaw).apply(np.array([[1, 1], [-0.5, 3], [4, 4]]))).tolist()
+    assert (inside, beyond, corner) == (FREE, UNKNOWN, UNKNOWN)
 
 
 def test_a_field_of_posts_is_free_all_over():
