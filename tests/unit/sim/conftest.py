@@ -1,0 +1,33 @@
+"""Simulations that are closed when a test is over."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from simscen.core.geometry import Pose2
+from simscen.core.motion import Twist
+from simscen.sim.robot_body import robot_body
+from simscen.sim.simulation import Simulation
+from simscen.worlds.meshing import fuse, triangulate
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from playground import shipped
+
+
+@pytest.fixture
+def simulate():
+    """Makes simulations and closes them."""
+    made = []
+
+    def make(robot="turtlebot", solids=(), bodies=(), pose=Pose2(0.0, 0.0, 0.0), drive=None, **physics):
+        body = robot_body(shipped(robot)) if isinstance(robot, str) else robot
+        made.append(Simulation(fuse(solids), bodies, body, pose, triangulate, **physics))
+        if drive:
+            made[-1].drive(Twist(*drive))
+        return made[-1]
+
+    yield make
+    for simulation in made:
+        simulation.close()

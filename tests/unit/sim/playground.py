@@ -1,0 +1,36 @@
+"""Robots and small worlds for tests of physics and sensors."""
+
+import math
+from pathlib import Path
+
+import yaml
+
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.shapes import Box, Solid
+from simscen.model.robot import RobotSpec
+
+ROBOTS = Path(__file__).parents[3] / "simscen/data/robots"
+
+
+def shipped(name):
+    """A shipped robot as specified."""
+    return RobotSpec.model_validate(yaml.safe_load((ROBOTS / f"{name}.robot.yaml").read_text()))
+
+
+def box(name, x, y, length, width, height=1.0, yaw=0.0):
+    """A box that stands on the ground."""
+    return Solid(Box((length, width, height)), Pose3.planar(Pose2(x, y, yaw), height / 2), name)
+
+
+def travelled(simulation, ticks, every=6):
+    """Run on; the heading turned in rad (full turns count) and the path driven in m."""
+    turned = length = 0.0
+    before = simulation.truth().pose.plane
+    for _ in range(ticks // every):
+        simulation.step(every)
+        now = simulation.truth().pose.plane
+        step = before.between(now)
+        turned += step.yaw
+        length += math.hypot(step.x, step.y)
+        before = now
+    return turned, length

@@ -1,0 +1,83 @@
+import math
+
+import pytest
+from playground import box
+
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.shapes import Body, Cylinder, Extrusion, MotionPath, Solid
+
+CRATE = (box("crate", 0, 0, 0.4, 0.4, 0.4),)
+
+
+def test_a_scripted_body_is_where_its_script_says(simulate):
+    path = MotionPath((0.0, 2.0), (Pose2(3, 0, 0), Pose2(3, 2, math.pi / 2)), start=1.0)
+    simulation = simulate(bodies=[Body("cart", CRATE, Pose3(3.0), path=path)])
+    simulation.step(480)
+    assert simulation.objects()["cart"].plane == pytest.approx(Pose2(3, 1, math.pi / 4))
+    simulation.step(480)
+    assert simulation.truth().objects["cart"].plane == pytest.approx(Pose2(3, 2, math.pi / 2))
+
+
+def test_move_begins_now_from_where_the_body_is(simulate):
+    simulation = simulate(bodies=[Body("cart", CRATE, Pose3(3.0))])
+    simulation.step(240)
+    simulation.move("cart", MotionPath((0.0, 1.0), (Pose2(3, 0), Pose2(3, 1))))
+    simulation.step(120)
+    assert simulation.object_pose("cart").plane == pytest.approx(Pose2(3, 0.5))
+
+
+def test_a_body_that_could_be_pushed_can_be_moved_by_a_script(simulate):
+    simulation = simulate(bodies=[Body("crate", CRATE, Pose3(3.0), mass=5.0)])
+    simulation.move("crate", MotionPath((0.0, 1.0), (Pose2(3, 0), Pose2(4, 0))))
+    simulation.step(240)
+    assert simulation.object_pose("crate").plane == pytest.approx(Pose2(4, 0))
+
+
+def test_spawned_bodies_are_there_and_removed_ones_are_gone(simulate):
+    simulation = simulate()
+    simulation.spawn(Body("crate", CRATE, Pose3(1.0, 2.0)))
+    assert simulation.object_pose("crate") == Pose3(1.0, 2.0)
+    assert list(simulation.moving()) == ["crate"]
+    simulation.remove("crate")
+    simulation.remove("no such thing")
+    assert simulation.object_pose("crate") is None
+    assert simulation.truth().objects == {}
+
+
+def test_spawning_a_name_again_replaces_it(simulate):
+    simulation = simulate(bodies=[Body("crate", CRATE, Pose3(1.0, 2.0))])
+    simulation.spawn(Body("crate", CRATE, Pose3(-2.0)))
+    assert dict(simulation.objects()) == {"crate": Pose3(-2.0)}
+
+
+def test_a_cart_pushes_a_crate_along(simulate):
+    path = MotionPath((0.0, 4.0), (Pose2(2, 0), Pose2(4, 0)))
+    crate = Body("crate", CRATE, Pose3(3.0), mass=10.0)
+    simulation = simulate(bodies=[Body("cart", CRATE, Pose3(2.0), path=path), crate])
+    simulation.step(960)
+    assert simulation.object_pose("crate").x == pytest.approx(4.4, abs=0.01)
+
+
+def test_a_pushed_crate_comes_to_rest_by_friction(simulate):
+    """v²/2µg with the friction of both: 0.6 on the ground's 1.0."""
+    import pybullet
+
+    simulation = simulate(bodies=[Body("crate", CRATE, Pose3(2.0), mass=10.0)])
+    (number,) = [k for k, name in simulation._names.items() if name == "crate"]
+    pybullet.resetBaseVelocity(number, (1.0, 0, 0), (0, 0, 0), physicsClientId=simulation._client)
+    simulation.step(480)
+    assert simulation.object_pose("crate").x - 2.0 == pytest.approx(1 / (2 * 0.6 * 9.81), rel=0.15)
+
+
+@pytest.mark.parametrize("mass", [0.0, 5.0])
+def test_bodies_of_any_shape_stand_where_they_were_put(simulate, mass):
+    corner = Solid(Extrusion(((0, 0), (0.4, 0), (0.4, 0.2), (0.2, 0.2), (0.2, 0.4), (0, 0.4)), 0.5))
+    drum = Solid(Cylinder(0.2, 0.5), Pose3(z=0.25))
+    bodies = [Body("corner", (corner,), Pose3(2, 0), mass), Body("drum", (drum,), Pose3(-2, 0), mass),
+              Body("both", (corner, drum), Pose3(0, 3), mass)]  # fmt: skip
+    simulation = simulate(bodies=bodies)
+    simulation.step(240)
+    for body in bodies:
+        pose = simulation.object_pose(body.name)
+        assert pose.position == pytest.approx(body.pose.position, abs=2e-3)
+        assert pose.yaw == pytest.approx(0.0, abs=5e-3)

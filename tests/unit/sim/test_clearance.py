@@ -1,0 +1,87 @@
+"""Clearance against closed forms."""
+
+import math
+
+import pytest
+from playground import box
+from shapely.geometry import Point, Polygon
+from shapely.geometry import box as rectangle
+from shapely.ops import unary_union
+
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.shapes import Body, Cylinder, Extrusion, Solid
+from simscen.sim.simulation import CLEARANCE_REACH
+
+RADIUS = 0.22  # of the turtlebot
+MILLIMETRE = 1e-3
+
+
+def test_nothing_around_counts_as_the_reach_of_the_search(simulate):
+    assert simulate().truth().clearance == CLEARANCE_REACH
+
+
+@pytest.mark.parametrize("gap", [0.001, 0.02, 0.3, 1.0, 1.9])
+def test_a_round_robot_before_a_wall(simulate, gap):
+    wall = box("wall", RADIUS + gap + 0.05, 0, 0.1, 4)
+    assert simulate(solids=[wall]).truth().clearance == pytest.approx(gap, abs=MILLIMETRE)
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.4, 1.2])
+def test_a_round_robot_before_a_corner(simulate, yaw):
+    corner = box("corner", 1.0, 1.0, 0.4, 0.4, yaw=yaw)
+    edges = Polygon([(x, y) for x, y in _corners(1.0, 1.0, 0.4, 0.4, yaw)])
+    expected = edges.distance(Point(0, 0)) - RADIUS
+    assert simulate(solids=[corner]).truth().clearance == pytest.approx(expected, abs=MILLIMETRE)
+
+
+def test_a_round_robot_beside_a_post(simulate):
+    post = Solid(Cylinder(0.15, 1.0), Pose3(0.6, 0.8, 0.5), "post")
+    assert simulate(solids=[post]).truth().clearance == pytest.approx(1.0 - 0.15 - RADIUS, abs=MILLIMETRE)
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.3, 0.8, 1.5])
+def test_a_rectangular_robot_between_boxes(simulate, yaw):
+    others = [(1.2, 0.7, 0.5, 0.3, 0.2), (-0.9, -0.6, 0.2, 0.2, 0.9), (0.2, 1.1, 1.0, 0.1, 0.0)]
+    solids = [box(f"box{k}", *values[:4], yaw=values[4]) for k, values in enumerate(others)]
+    hull = Polygon(_corners(0, 0, 0.9, 0.6, yaw))
+    expected = hull.distance(unary_union([Polygon(_corners(*values)) for values in others]))
+    simulation = simulate("amr", solids, pose=Pose2(0.0, 0.0, yaw))
+    assert simulation.truth().clearance == pytest.approx(expected, abs=MILLIMETRE)
+
+
+def test_things_that_move_count_and_the_ground_does_not(simulate):
+    cart = Body("cart", (box("cart", 0, 0, 0.4, 0.4),), Pose3(1.0, 0.0))
+    simulation = simulate(bodies=[cart])
+    assert simulation.truth().clearance == pytest.approx(0.8 - RADIUS, abs=MILLIMETRE)
+    simulation.remove("cart")
+    assert simulation.truth().clearance == CLEARANCE_REACH
+    simulation.spawn(Body("prism", (Solid(Extrusion(((-0.1, -1), (0.1, -1), (0.1, 1), (-0.1, 1)), 0.5)),), Pose3(0.7)))
+    assert simulation.truth().clearance == pytest.approx(0.6 - RADIUS, abs=MILLIMETRE)
+
+
+def test_clearance_is_negative_where_hull_and_obstacle_overlap(simulate):
+    wall = box("wall", RADIUS - 0.01 + 0.05, 0, 0.1, 4)
+    assert simulate(solids=[wall]).truth().clearance == pytest.approx(-0.01, abs=MILLIMETRE)
+
+
+def test_what_hangs_above_the_robot_is_as_far_as_it_is_high(simulate):
+    shelf = Solid(box("shelf", 0, 0, 2, 2, 0.1).shape, Pose3(z=0.75), "shelf")
+    assert simulate(solids=[shelf]).truth().clearance == pytest.approx(0.7 - 0.18, abs=MILLIMETRE)
+
+
+def test_clearance_along_a_drive_is_that_of_the_plane(simulate):
+    solids = [box(f"box{k}", x, y, 0.4, 0.3) for k, (x, y) in enumerate([(1.5, 0.8), (2.5, -0.7), (3.5, 0.6)])]
+    shapes = unary_union([rectangle(*rect) for rect in [(1.3, 0.65, 1.7, 0.95), (2.3, -0.85, 2.7, -0.55),
+                                                        (3.3, 0.45, 3.7, 0.75)]])  # fmt: skip
+    simulation = simulate(solids=solids, drive=(0.5, 0.0, 0.0))
+    for _ in range(320):
+        simulation.step(6)
+        truth = simulation.truth()
+        expected = min(CLEARANCE_REACH, shapes.distance(Point(truth.pose.x, truth.pose.y)) - RADIUS)
+        assert truth.clearance == pytest.approx(expected, abs=MILLIMETRE)
+
+
+def _corners(x, y, length, width, yaw):
+    c, s = math.cos(yaw), math.sin(yaw)
+    half = [(a * length / 2, b * width / 2) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    return [(x + c * u - s * v, y + s * u + c * v) for u, v in half]

@@ -1,0 +1,125 @@
+"""Who hit whom, when and how hard."""
+
+import random
+
+import pytest
+from playground import box
+
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.motion import Twist
+from simscen.core.shapes import Body, Cylinder, MotionPath, Solid
+
+RADIUS = 0.22
+WALL = box("wall", 1.05, 0, 0.1, 4)
+CART = (box("cart", 0, 0, 0.6, 0.6, 0.5),)
+
+
+def collisions(simulation, ticks, every=6):
+    events = []
+    for _ in range(ticks // every):
+        simulation.step(every)
+        events += simulation.collisions()
+    return events
+
+
+def started(events):
+    return [event for event in events if event.kind == "collision.started"]
+
+
+def test_driving_into_a_wall_is_one_collision_with_its_place_speed_and_culprit(simulate):
+    simulation = simulate(solids=[WALL, box("far", -3, 0, 1, 1)], drive=(0.5, 0.0, 0.0))
+    events = collisions(simulation, 960)
+    assert [event.kind for event in events] == ["collision.started"]
+    (hit,) = events
+    assert hit.name == "wall"
+    assert hit.data["x"] == pytest.approx(1.0, abs=2e-3)
+    assert hit.data["y"] == pytest.approx(0.0, abs=5e-3)
+    assert hit.data["speed"] == pytest.approx(0.5, abs=0.01)
+    assert hit.data["impulse"] > 0.5
+    assert hit.data["robot_caused"] is True
+    assert simulation.touching()
+
+
+def test_a_collision_ends_a_tenth_of_a_second_after_the_last_touch(simulate):
+    simulation = simulate(solids=[WALL], drive=(0.5, 0.0, 0.0))
+    collisions(simulation, 720)
+    simulation.drive(Twist(-0.3, 0.0, 0.0))
+    events = collisions(simulation, 240)
+    assert [event.kind for event in events] == ["collision.ended"]
+    assert events[0].data["impulse"] > 0.5
+    assert not simulation.touching()
+
+
+def test_grazing_a_wall_counts_although_the_robot_hardly_moves_towards_it(simulate):
+    # The hull reaches a millimetre into the line of the wall while it drives along.
+    wall = box("wall", 3.0, RADIUS + 0.05 - 0.001, 4.0, 0.1)
+    (hit, *_) = started(collisions(simulate(solids=[wall], drive=(0.5, 0.0, 0.0)), 960))
+    assert hit.data["robot_caused"] is True
+
+
+def test_a_cart_that_drives_into_a_waiting_robot_is_the_carts_fault_and_pushes_it(simulate):
+    cart = Body("cart", CART, Pose3(-2.0), path=MotionPath((0.0, 4.0), (Pose2(-2, 0), Pose2(2, 0))))
+    simulation = simulate(bodies=[cart])
+    (hit,) = started(collisions(simulation, 720))
+    assert hit.name == "cart"
+    assert hit.data["robot_caused"] is False
+    assert hit.data["speed"] == pytest.approx(1.0, abs=0.01)
+    truth = simulation.truth()
+    assert truth.twist.vx == pytest.approx(1.0, abs=0.01)
+    assert truth.clearance == pytest.approx(0.0, abs=2e-3)
+
+
+def test_driving_into_a_standing_body_is_the_robots_fault(simulate):
+    (hit,) = started(collisions(simulate(bodies=[Body("cart", CART, Pose3(1.0))], drive=(0.5, 0.0, 0.0)), 720))
+    assert (hit.name, hit.data["robot_caused"]) == ("cart", True)
+
+
+def test_a_light_box_is_pushed_along_and_a_heavy_one_stops_the_robot(simulate):
+    boxes = (box("box", 0, 0, 0.3, 0.3, 0.2),)
+    for mass, moves in ((0.3, True), (200.0, False)):
+        simulation = simulate(bodies=[Body("box", boxes, Pose3(0.6), mass=mass)], drive=(0.3, 0.0, 0.0))
+        simulation.step(960)
+        assert (simulation.object_pose("box").x > 0.9) is moves
+        assert (simulation.truth().pose.x > 0.5) is moves
+
+
+def test_the_owner_is_named_although_all_solids_are_one_mesh(simulate):
+    solids = [box("left", 0, 1, 0.4, 0.4), Solid(Cylinder(0.2, 1), Pose3(1, 0, 0.5), "post"), box("right", 0, -1, 1, 1)]
+    (hit, *_) = collisions(simulate(solids=solids, drive=(0.4, 0.0, 0.0)), 720)
+    assert hit.name == "post"
+
+
+def test_wheels_on_the_ground_are_no_collision_even_where_the_world_has_a_floor_of_its_own(simulate):
+    floor = Solid(box("floor", 0, 0, 10, 10, 0.1).shape, Pose3(z=-0.05), "floor")
+    simulation = simulate(solids=[floor], drive=(0.5, 0.0, 0.3))
+    assert collisions(simulation, 480) == []
+    assert simulation.truth().clearance == 2.0
+
+
+@pytest.mark.parametrize("pushable", [False, True])
+@pytest.mark.parametrize("seed", range(2))
+def test_no_contact_is_missed_compared_with_asking_after_every_tick(simulate, monkeypatch, seed, pushable):
+    """Clearance rules out contacts for a while (conservative advancement); here it is checked against asking always."""
+    chance = random.Random(seed)
+    places = [(chance.uniform(-3, 3), chance.uniform(-3, 3)) for _ in range(40)]
+    solids = [box(f"box{k}", x, y, 0.2, 0.3) for k, (x, y) in enumerate(places) if abs(x) + abs(y) > 0.8]
+    path = MotionPath((0.0, 4.0), (Pose2(-3, 0.3), Pose2(3, -0.3)), "back_and_forth")
+    bodies = [Body("cart", CART, Pose3(-3, 0.3), path=path)]
+    if pushable:
+        bodies.append(Body("box", (box("box", 0, 0, 0.2, 0.2, 0.2),), Pose3(0.6), 0.5))
+    commands = [Twist(chance.uniform(-0.5, 0.5), 0.0, chance.uniform(-2, 2)) for _ in range(30)]
+
+    def run():
+        simulation, events = simulate(solids=solids, bodies=bodies), []
+        for k, command in enumerate(commands):
+            simulation.drive(command)
+            if k == 15:
+                simulation.push((3.0, 1.0))
+            events += collisions(simulation, 96)
+        return events, simulation.truth().pose
+
+    gated = run()
+    monkeypatch.setattr("simscen.sim.simulation.HORIZON", -1.0)
+    always = run()
+    assert started(always[0])
+    assert gated == always

@@ -1,0 +1,170 @@
+"""Closed forms of motion: what a robot does must be what its datasheet says."""
+
+import math
+
+import pybullet
+import pytest
+from playground import box, travelled
+
+from simscen.core.errors import RunError
+from simscen.core.geometry import Pose2
+from simscen.core.motion import Twist
+
+TICKS = 240
+
+
+@pytest.mark.parametrize("robot", ["turtlebot", "amr", "jackal", "car", "omni"])
+def test_a_robot_at_rest_stays_where_it_is(simulate, robot):
+    simulation = simulate(robot)
+    simulation.step(10 * TICKS)
+    pose = simulation.truth().pose
+    assert math.hypot(pose.x, pose.y) < 2e-4
+    assert abs(pose.z) < 2e-4
+    assert abs(pose.yaw) < 2e-3
+
+
+@pytest.mark.parametrize("robot", ["turtlebot", "amr", "jackal", "car", "omni"])
+def test_five_metres_straight_ahead_take_the_time_that_ramp_and_speed_say(simulate, robot):
+    simulation = simulate(robot, drive=(0.5, 0.0, 0.0))
+    simulation.step(TICKS)
+    begin = simulation.truth().pose
+    simulation.step(10 * TICKS)
+    end = simulation.truth().pose
+    assert end.x - begin.x == pytest.approx(5.0, rel=2e-3)
+    assert abs(end.y) < 5e-3
+    assert abs(end.yaw) < 2e-3
+
+
+@pytest.mark.parametrize("robot", ["turtlebot", "amr", "omni"])
+def test_a_turn_in_place_takes_the_time_that_its_rate_says_and_stays_in_place(simulate, robot):
+    simulation = simulate(robot, drive=(0.0, 0.0, 1.0))
+    simulation.step(TICKS)
+    turned, _ = travelled(simulation, round(2 * math.pi * TICKS / 6) * 6)
+    assert turned == pytest.approx(2 * math.pi, rel=2e-3)
+    pose = simulation.truth().pose
+    assert math.hypot(pose.x, pose.y) < 5e-3
+
+
+@pytest.mark.parametrize(("robot", "speed", "turn"), [("turtlebot", 0.4, 0.5), ("amr", 0.8, 0.8), ("omni", 0.5, 0.5),
+                                                      ("car", 0.8, 0.8)])  # fmt: skip
+def test_a_circle_has_the_radius_of_speed_over_turn_rate(simulate, robot, speed, turn):
+    simulation = simulate(robot, drive=(speed, 0.0, turn))
+    simulation.step(2 * TICKS)
+    turned, length = travelled(simulation, 4 * TICKS)
+    assert length / turned == pytest.approx(speed / turn, rel=0.01)
+
+
+def test_a_base_accelerates_and_brakes_as_its_limits_say(simulate):
+    simulation = simulate("turtlebot", drive=(0.5, 0.0, 0.0))
+    for tick in range(12, 96, 12):
+        simulation.step(12)
+        assert simulation.truth().twist.vx == pytest.approx(1.0 * tick / TICKS, abs=0.03)
+    simulation.step(TICKS)
+    simulation.drive(Twist(0.0, 0.0, 0.0))
+    begin = simulation.truth().pose.x
+    simulation.step(TICKS)
+    # v²/2a with 1.5 m/s², plus half a period of the firmware.
+    assert simulation.truth().pose.x - begin == pytest.approx(0.5**2 / 3.0, abs=0.008)
+    assert abs(simulation.truth().twist.vx) < 1e-4
+
+
+def test_commands_beyond_the_limits_are_clipped(simulate):
+    simulation = simulate("turtlebot", drive=(9.0, 9.0, 0.0))
+    simulation.step(2 * TICKS)
+    assert simulation.truth().twist == pytest.approx((0.5, 0.0, 0.0), abs=2e-3)
+
+
+def test_an_omnidirectional_base_goes_sideways_and_drives_arcs(simulate):
+    simulation = simulate("omni", drive=(0.3, 0.4, 0.0))
+    simulation.step(2 * TICKS)
+    assert simulation.truth().twist == pytest.approx((0.3, 0.4, 0.0), abs=1e-6)
+    simulation.drive(Twist(0.3, 0.4, 1.0))
+    simulation.step(TICKS)
+    turned, length = travelled(simulation, 3 * TICKS)
+    assert length / turned == pytest.approx(0.5, rel=2e-3)
+
+
+def test_a_car_cannot_turn_in_place_nor_tighter_than_its_steering(simulate):
+    simulation = simulate("car", drive=(0.0, 0.0, 1.0))
+    simulation.step(2 * TICKS)
+    assert abs(simulation.truth().pose.yaw) < 1e-3
+    simulation.drive(Twist(0.5, 0.0, 1.8))
+    simulation.step(2 * TICKS)
+    turned, length = travelled(simulation, 4 * TICKS)
+    assert length / turned == pytest.approx(0.45 / math.tan(0.51), rel=0.01)
+
+
+def test_a_car_drives_a_three_point_turn(simulate):
+    simulation = simulate("car")
+    for speed, turn in ((0.5, 0.6), (-0.5, 0.6), (0.5, 0.6)):
+        simulation.drive(Twist(speed, 0.0, turn))
+        simulation.step(2 * TICKS)
+    assert 0.5 * math.pi < simulation.truth().pose.yaw < 1.2 * math.pi
+
+
+def test_skid_steering_loses_a_part_of_its_wheels_turning(simulate):
+    """Between no slip and the 1.8 that the solver's friction gives; Coulomb's at four points gives 1 + (a/b)²."""
+    simulation = simulate("jackal", drive=(0.0, 0.0, 1.0))
+    simulation.step(TICKS)
+    left, right = simulation.encoders()
+    turned, _ = travelled(simulation, 4 * TICKS)
+    after = simulation.encoders()
+    rolled = (after[1] - right - after[0] + left) * 0.098 / 0.37559
+    assert 1.2 < rolled / turned < 1.9
+    pose = simulation.truth().pose
+    assert math.hypot(pose.x, pose.y) < 0.02
+
+
+def test_a_jackal_brakes_from_full_speed_without_tipping(simulate):
+    simulation = simulate("jackal", drive=(2.0, 0.0, 0.0))
+    for command in ((2.0, 0.0, 0.0), (-2.0, 0.0, 0.0), (2.0, 0.0, 1.0), (0.0, 0.0, 0.0)):
+        simulation.drive(Twist(*command))
+        for _ in range(20):
+            simulation.step(18)
+            pose = simulation.truth().pose
+            assert math.hypot(pose.qx, pose.qy) < 0.02
+
+
+def test_being_set_down_elsewhere_leaves_the_robot_at_rest_and_its_encoders_unaware(simulate):
+    for robot in ("turtlebot", "omni"):
+        simulation = simulate(robot, drive=(0.5, 0.0, 0.0))
+        simulation.step(TICKS)
+        before = simulation.encoders()
+        simulation.drive(Twist(0.0, 0.0, 0.0))
+        simulation.place_robot(Pose2(3.0, -2.0, 1.0))
+        truth = simulation.truth()
+        assert truth.pose.plane == pytest.approx(Pose2(3.0, -2.0, 1.0))
+        assert truth.twist == pytest.approx((0.0, 0.0, 0.0))
+        simulation.step(6)
+        assert simulation.encoders() == pytest.approx(before, abs=0.02)
+
+
+def test_a_push_moves_the_robot_the_way_it_points(simulate):
+    for robot in ("turtlebot", "jackal", "omni"):
+        simulation = simulate(robot)
+        simulation.push((0.0, 30.0))
+        simulation.step(30)
+        pose = simulation.truth().pose
+        assert pose.y > 0.01
+        assert abs(pose.x) < 0.2 * pose.y
+
+
+def test_a_push_in_free_flight_gives_the_robot_its_impulse(simulate):
+    """Half a metre above the ground there is no friction: the change of momentum is the impulse."""
+    simulation = simulate("turtlebot")
+    place, turn = pybullet.getBasePositionAndOrientation(simulation._base.id, physicsClientId=simulation._client)
+    up = (place[0], place[1], place[2] + 0.5)
+    pybullet.resetBasePositionAndOrientation(simulation._base.id, up, turn, physicsClientId=simulation._client)
+    simulation.push((0.9, 0.0))
+    simulation.step(1)
+    assert simulation.base_velocity()[0][0] == pytest.approx(0.9 / 1.8, rel=0.02)
+
+
+def test_physics_that_diverges_ends_the_run_with_the_time(simulate):
+    simulation = simulate("turtlebot", [box("wall", 0.5, 0, 0.1, 2)])
+    simulation.step(120)
+    pybullet.resetBaseVelocity(simulation._base.id, (math.nan, 0, 0), (0, 0, 0), physicsClientId=simulation._client)
+    with pytest.raises(RunError, match=r"simulation diverged at t=0\.5"):
+        for _ in range(10):
+            simulation.step(6)
+            simulation.truth()

@@ -1,0 +1,50 @@
+import math
+
+import numpy as np
+import pytest
+from shapely.geometry import MultiPoint, Polygon
+
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Solid, Sphere
+from simscen.sim.outline import circle, convex_hull, extremes, footprint
+
+
+def test_convex_hull_is_shapelys():
+    points = np.random.default_rng(1).normal(size=(500, 2))
+    hull = Polygon(convex_hull(points))
+    theirs = MultiPoint(points).convex_hull
+    assert hull.exterior.is_ccw
+    assert hull.symmetric_difference(theirs).area < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("shape", "area"),
+    [
+        (Box((0.4, 0.3, 0.2)), 0.12),
+        (Cylinder(0.2, 0.5), math.pi * 0.04),
+        (Sphere(0.2), math.pi * 0.04),
+        (Capsule(0.2, 0.5), math.pi * 0.04),
+        (Ellipsoid((0.1, 0.3, 0.2)), math.pi * 0.03),
+        (Cone(0.2, 0.6), math.pi * 0.04),
+        (Extrusion(((0, 0), (2, 0), (0, 2)), 0.5), 2.0),
+    ],
+    ids=lambda value: type(value).__name__,
+)
+def test_footprint_covers_what_the_shape_covers_from_above(shape, area):
+    placed = Solid(shape, Pose3.planar(Pose2(1.0, 2.0, 0.3), 0.5))
+    assert Polygon(footprint([placed])).area == pytest.approx(area, rel=0.01)
+
+
+def test_a_lying_cylinder_covers_a_rectangle():
+    lying = Solid(Cylinder(0.1, 0.6), Pose3.from_rpy(0, 0, 0.1, math.pi / 2, 0, 0))
+    assert Polygon(footprint([lying])).bounds == pytest.approx((-0.1, -0.3, 0.1, 0.3), abs=1e-3)
+
+
+def test_extremes_of_a_box_are_its_corners():
+    assert extremes(Box((2.0, 4.0, 6.0))).max(axis=0).tolist() == [1.0, 2.0, 3.0]
+
+
+def test_a_circle_has_its_corners_on_the_circle_anticlockwise():
+    corners = circle(0.22)
+    assert [math.hypot(x, y) for x, y in corners] == pytest.approx([0.22] * len(corners))
+    assert Polygon(corners).exterior.is_ccw
