@@ -12,6 +12,7 @@ from simscen.core.time import Clock
 from simscen.core.trace import Trace
 from simscen.judge.judge import judge
 from simscen.judge.result import RunResult, run_result, to_json
+from simscen.loading.resolved import resolved_text
 from simscen.model.robot import RobotSpec
 from simscen.record.header import LogHeader
 from simscen.record.recorder import Recorder
@@ -43,7 +44,7 @@ def perform(prepared: Prepared, key: RunKey, folder: Path, logs: tuple[Log, ...]
     clock = Clock(prepared.spec.physics.tick_rate)
     builder = TraceBuilder(clock)
     log = folder / "run.mcap"
-    (folder / "scenario.yaml").write_text(prepared.loaded.text, encoding="utf-8")
+    (folder / "scenario.yaml").write_text(resolved_text(prepared.loaded), encoding="utf-8")
     with Recorder(log, clock, log_header(prepared, key.seed)) as recorder:
         rig = assemble(prepared, key.seed)
         end = run_lockstep(rig, (builder, recorder, *logs))
@@ -71,7 +72,7 @@ def log_header(prepared: Prepared, seed: int) -> LogHeader:
         name=prepared.loaded.id,
         seed=seed,
         case=prepared.case,
-        scenario=prepared.loaded.text,
+        scenario=resolved_text(prepared.loaded),
         map=prepared.map,
         robot_description=prepared.body.urdf,
         frames=_sensor_frames(prepared.robot),

@@ -53,11 +53,13 @@ class Interrupted(BaseException):
 Happening = Started | Advanced | Ended
 
 
-def supervise(jobs: Iterable[Job], workers: int, entry: Sequence[str], go_on: Callable[[], bool]) -> Iterator[Happening]:
+def supervise(
+    jobs: Iterable[Job], workers: int, entry: Sequence[str], go_on: Callable[[], bool]
+) -> Iterator[Happening]:
     """Run all jobs, `workers` at a time, yielding what happens as it happens.
 
-    `entry` is how Python is called to be the warm process, e.g. `-m module`. `go_on` is asked before each new job. When the consumer stops
-    early (or an exception passes through), everything that still runs is killed.
+    `entry` is how Python is called to be the warm process, e.g. `-m module`. `go_on` is asked before each new job.
+    When the consumer stops early (or an exception passes through), everything that still runs is killed.
     """
     waiting, running = deque(jobs), dict[int, Job]()
     while waiting and go_on():
