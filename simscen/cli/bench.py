@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from simscen.cli import bench_nav
 from simscen.cli.diagnostics import print_text
 
 if TYPE_CHECKING:
     from simscen.run.bench import Field, Patrol
 
 app = typer.Typer(rich_markup_mode=None, add_completion=False)
+app.command("nav")(bench_nav.command)
 
 
 class Format(str, Enum):

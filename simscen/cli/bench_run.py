@@ -1,0 +1,119 @@
+"""Runs the experiments of `simscen bench nav`, through the same door as every other run."""
+
+import shlex
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from simscen.cli.run import ZYGOTE
+from simscen.cli.select import checked
+from simscen.core.errors import InvalidInput
+from simscen.core.session import Outcome, RunFinished, RunKey, SessionEvent
+from simscen.loading.scenario import load_scenario
+from simscen.record.replay import read_log
+from simscen.report.lines import finished, text_of
+from simscen.run.jobs import Job
+from simscen.run.session import Options, run_session
+from simscen.study.consistency import anees, bounds, nees_at
+from simscen.study.experiments import Experiment
+from simscen.study.tally import Row, Trial, mean, tally
+
+MOMENTS = (5.0, 10.0, 20.0, 30.0)
+"""Seconds of a run at which ANEES is averaged over the runs."""
+
+
+@dataclass(frozen=True)
+class Localized:
+    """How well the robot knew where it was: root mean square errors in m (mean and worst over runs), ANEES at MOMENTS.
+
+    `bounds` are those of ANEES with 95 % probability when the belief is consistent.
+    """
+
+    rmse: float | None
+    worst_rmse: float | None
+    anees: dict[float, float]
+    bounds: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One experiment's line."""
+
+    tally: Row
+    localized: Localized | None = None
+
+
+def drive(experiments: Sequence[Experiment], out: Path, workers: int) -> list[Measured]:
+    """Do all runs, tell of progress and of what went wrong on stderr, and sum up. Raises InvalidInput."""
+    jobs, owners = _planned(experiments, out)
+    options = Options(workers=workers)
+    answers, _ = run_session(jobs, options, ZYGOTE, _Progress(len(jobs), {job.key: job for job in jobs}))
+    trials: list[list[Trial]] = [[] for _ in experiments]
+    for answer in answers:
+        number, reference = owners[answer.key]
+        trials[number].append(Trial(answer, reference))
+    return [_measured(experiment, runs) for experiment, runs in zip(experiments, trials, strict=True)]
+
+
+Owner = tuple[int, float | None]
+
+
+def _planned(experiments: Sequence[Experiment], out: Path) -> tuple[list[Job], dict[RunKey, Owner]]:
+    """A job for each run, and the experiment and reference length it belongs to."""
+    jobs: list[Job] = []
+    owners: dict[RunKey, Owner] = {}
+    for number, experiment in enumerate(experiments):
+        for planned in experiment.drives:
+            scenario = load_scenario(planned.file, experiment.root, experiment.world_path)
+            if problems := checked(scenario):
+                raise InvalidInput(problems)
+            for seed in planned.seeds:
+                key = RunKey(scenario.id, seed)
+                folder = out / scenario.id / key.folder
+                jobs.append(Job(len(jobs), scenario, key, folder, Options().wall_limit))
+                owners[key] = number, planned.reference_length
+    return jobs, owners
+
+
+def again(job: Job) -> str:
+    """The command that repeats a run."""
+    scenario = job.scenario
+    folders = [part for folder in scenario.world_path for part in ("--world-path", str(folder))]
+    root = ["--root", str(scenario.root)]
+    return shlex.join(["simscen", "run", str(scenario.file), "--seed", str(job.key.seed), *root, *folders])
+
+
+class _Progress:
+    """A counter on a terminal; each run that was not passed in full."""
+
+    def __init__(self, total: int, jobs: dict[RunKey, Job]) -> None:
+        self._total, self._jobs, self._done = total, jobs, 0
+
+    def __call__(self, event: SessionEvent) -> None:
+        """Take one event of the session."""
+        if not isinstance(event, RunFinished):
+            return
+        self._done += 1
+        if event.outcome is not Outcome.PASSED:
+            told = replace(event, again=again(self._jobs[event.key]))
+            print(*(text_of(line) for line in finished(told, every_seed=True)), sep="\n", file=sys.stderr)
+        if sys.stderr.isatty():
+            print(f"{self._done} of {self._total} runs", end="\r", file=sys.stderr, flush=True)
+
+
+def _measured(experiment: Experiment, trials: list[Trial]) -> Measured:
+    row = tally(experiment.name, trials)
+    return Measured(row, _localized(trials) if experiment.localization else None)
+
+
+def _localized(trials: list[Trial]) -> Localized:
+    errors = [value for trial in trials if (value := trial.metric("localization_rmse")) is not None]
+    traces = [read_log(Path(trial.run.artifacts.mcap)).trace for trial in trials if trial.run.artifacts.mcap]
+    at = {seconds: [v for trace in traces if (v := nees_at(trace, seconds)) is not None] for seconds in MOMENTS}
+    return Localized(
+        rmse=mean(errors),
+        worst_rmse=max(errors, default=None),
+        anees={seconds: anees(values) for seconds, values in at.items() if values},
+        bounds=bounds(max(1, len(traces))),
+    )

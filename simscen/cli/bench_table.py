@@ -1,0 +1,68 @@
+"""The table of `simscen bench nav`, for people and for machines."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+
+from simscen.cli.bench_run import Localized, Measured
+from simscen.study.barn import DWA
+from simscen.study.tally import Row
+
+HEAD = ("experiment", "runs", "success", "95 % interval", "collision", "timeout", "failed", "time", "score", "path")
+
+
+def as_text(rows: Sequence[Measured]) -> str:
+    """Aligned columns; DWA's published numbers below BARN's."""
+    table: list[tuple[str, ...]] = [HEAD]
+    for measured in rows:
+        table.append(_cells(measured.tally))
+        if measured.tally.case == "BARN":
+            table.append(_published())
+    widths = [max(len(row[column]) for row in table) for column in range(len(HEAD))]
+    lines = [_aligned(row, widths) for row in table]
+    for measured in rows:
+        if measured.localized is not None:
+            lines += ["", *_belief(measured.tally.case, measured.localized)]
+    return "\n".join(lines)
+
+
+def as_json(rows: Sequence[Measured]) -> str:
+    """All numbers, and DWA's."""
+    return json.dumps({"experiments": [asdict(row) for row in rows], "dwa_published": DWA}, indent=2)
+
+
+def _cells(row: Row) -> tuple[str, ...]:
+    low, high = row.success_interval
+    return (
+        row.case,
+        f"{row.runs}",
+        f"{row.success:.3f}",
+        f"{low:.3f} … {high:.3f}",
+        f"{row.collisions:.3f}",
+        f"{row.timeouts:.3f}",
+        f"{row.failed + row.errors:.3f}",
+        _or_none(row.seconds, ".1f", " s"),
+        _or_none(row.score, ".3f"),
+        _or_none(row.path_ratio, ".2f"),
+    )
+
+
+def _published() -> tuple[str, ...]:
+    rates = [f"{DWA[name]:.3f}" for name in ("success", "collisions", "timeouts", "score")]
+    return ("  DWA, published", "500", rates[0], "", rates[1], rates[2], "", "", rates[3], "")
+
+
+def _or_none(value: float | None, form: str, unit: str = "") -> str:
+    return "-" if value is None else f"{value:{form}}{unit}"
+
+
+def _aligned(row: tuple[str, ...], widths: list[int]) -> str:
+    first, *rest = zip(row, widths, strict=True)
+    return "  ".join((first[0].ljust(first[1]), *(cell.rjust(width) for cell, width in rest))).rstrip()
+
+
+def _belief(case: str, localized: Localized) -> list[str]:
+    low, high = localized.bounds
+    moments = ", ".join(f"{value:.2f} at {seconds:g} s" for seconds, value in localized.anees.items())
+    errors = f"{_or_none(localized.rmse, '.3f', ' m')} RMSE, worst run {_or_none(localized.worst_rmse, '.3f', ' m')}"
+    return [f"{case}: {errors}", f"  ANEES {moments}; a consistent belief lies in {low:.2f} … {high:.2f} (95 %)"]

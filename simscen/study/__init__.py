@@ -1,0 +1,1 @@
+"""Studies: what many runs together say, and the generated worlds they drive in. Knows no simulator."""

@@ -1,0 +1,66 @@
+"""The BARN navigation challenge: its set-up, its score, and what a classical planner reaches in it.
+
+Perille et al., SSRR 2020; the-barn-challenge, run.py. A robot of a Jackal's size drives 10 m ahead through a field of
+cylinders that it has no map of; any contact ends the run.
+"""
+
+import csv
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+TIME_LIMIT = 100.0
+TOP_SPEED = 2.0
+DWA = {"success": 0.850, "collisions": 0.056, "timeouts": 0.094, "score": 0.159}
+"""Published for the dynamic window approach at 0.5 m/s in 50 worlds, 10 runs each."""
+
+SETUP = """\
+map: none
+robot: {model: jackal, pose: {x: -2.25, y: 3.0, yaw: 1.57}}
+stack:
+  localizer: {type: ekf}                    # as the Jackal's own robot_localization: wheels and gyroscope
+  controller: {desired_linear_vel: 2 m/s}
+goals:
+  - {name: beyond, pose: {x: -2.25, y: 13.0, yaw: 1.57}, xy_tolerance: 1 m, yaw_tolerance: 180 deg}
+time_limit: 100 s
+linger: 0
+events:
+  - {name: contact ends the run, when: {collision: {}}, do: {cancel_goal: {}}}
+pass:
+  - goals_reached: {}
+  - collisions: {max: 0}
+"""
+"""All of a scenario but its world; the same for the challenge's worlds and for generated ones."""
+
+
+@dataclass(frozen=True)
+class BarnWorld:
+    """One world of the challenge: its file, and the length in metres of the reference path that its score refers to."""
+
+    file: Path
+    reference_length: float
+
+
+def barn_worlds(folder: Path) -> list[BarnWorld]:
+    """The worlds that are in a folder, as its scenarios.csv lists them. Raises OSError or ValueError."""
+    with (folder / "scenarios.csv").open(newline="", encoding="utf-8") as file:
+        return list(_listed(folder, csv.DictReader(file)))
+
+
+def _listed(folder: Path, rows: Iterable[dict[str, str]]) -> Iterable[BarnWorld]:
+    for row in rows:
+        try:
+            yield BarnWorld(folder / f"world_{int(row['world'])}.world", float(row["ref_path_len"]))
+        except (KeyError, TypeError) as error:
+            raise ValueError(f"{folder / 'scenarios.csv'}: no column {error}") from error
+
+
+def score(success: bool, seconds: float, reference_length: float) -> float:
+    """The challenge's metric of one run: 0, or 0.125 (8 times the optimal time and slower) … 0.5 (twice and faster)."""
+    optimal = reference_length / TOP_SPEED
+    return optimal / min(max(seconds, 2 * optimal), 8 * optimal) if success else 0.0
+
+
+def scenario(name: str, world: str) -> str:
+    """The text of a scenario; `world` is what stands after `world:`."""
+    return f"simscen: 1\nname: {name}\nworld: {world}\n{SETUP}"

@@ -1,0 +1,112 @@
+"""What `simscen bench nav` drives: experiments, each a number of scenarios with seeds.
+
+Scenarios that are generated are written as files, so that everything goes through the front door and any run of them
+can be repeated by hand.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from simscen.core.chance import Streams
+from simscen.study import barn, localization, nav2_sandbox
+from simscen.study.obstacle_fields import CELL, HEIGHT, ObstacleField, obstacle_field
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A scenario file, the seeds to run it with, and BARN's reference length in metres where it has one."""
+
+    file: Path
+    seeds: Sequence[int]
+    reference_length: float | None = None
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """One line of the table. `root` and `world_path` are what `simscen run` needs to find everything."""
+
+    name: str
+    drives: tuple[Drive, ...]
+    root: Path
+    world_path: tuple[Path, ...] = ()
+    localization: bool = False
+
+
+def barn_challenge(folder: Path, dataset: Path, seeds: Sequence[int]) -> Experiment:
+    """The worlds of the dataset. Raises OSError or ValueError when it is unusable."""
+    drives = [
+        Drive(
+            _written(folder / f"barn/{world.file.stem}.scenario.yaml", barn.scenario(world.file.stem, world.file.name)),
+            seeds,
+            world.reference_length,
+        )
+        for world in barn.barn_worlds(dataset)
+    ]
+    return Experiment("BARN", tuple(drives), folder, (dataset,))
+
+
+def generated_fields(folder: Path, count: int) -> Experiment:
+    """Fields of the same kind and density, one seed each."""
+    drives = []
+    for number in range(1, count + 1):
+        field = obstacle_field(number)
+        world = _written(folder / f"fields/field_{number}.world.yaml", _world_text(field))
+        text = barn.scenario(f"field {number}", world.name)
+        file = _written(folder / f"fields/field_{number}.scenario.yaml", text)
+        drives.append(Drive(file, [number], field.shortest))
+    return Experiment("generated fields", tuple(drives), folder)
+
+
+def sandbox(folder: Path, nav2: Path, seeds: Sequence[int]) -> list[Experiment]:
+    """Nav2's own system test, without and with the box that is not on its map."""
+    return [
+        Experiment(
+            name,
+            (Drive(_written(folder / f"nav2/{stem}.scenario.yaml", nav2_sandbox.scenario(name, box)), seeds),),
+            folder,
+            (nav2, nav2 / "models"),
+        )
+        for name, stem, box in (("tb3_sandbox", "plain", False), ("tb3_sandbox, unmapped box", "with_box", True))
+    ]
+
+
+def corner_cases(scenarios: Path, root: Path, seeds: Sequence[int]) -> list[Experiment]:
+    """The shipped corner cases, each an experiment of its own."""
+    files = sorted(scenarios.glob("corner_cases/*.scenario.yaml"))
+    return [Experiment(f.name.split(".")[0].replace("_", " "), (Drive(f, seeds),), root) for f in files]
+
+
+def localizations(folder: Path, worlds: Path, seeds: Sequence[int], wrong: int) -> list[Experiment]:
+    """A tour of the shipped house told where it starts, and `wrong` times told a pose 0.5 m and 20 degrees off."""
+    tour = Drive(_written(folder / "localization/tour.scenario.yaml", localization.tour()), seeds)
+    misled = [
+        Drive(
+            _written(
+                folder / f"localization/misled_{seed}.scenario.yaml",
+                localization.misled(float(Streams(seed).generator("direction").uniform(-np.pi, np.pi)), seed % 2 == 0),
+            ),
+            [seed],
+        )
+        for seed in range(1, wrong + 1)
+    ]
+    return [
+        Experiment("localization, tour", (tour,), folder, (worlds,), localization=True),
+        Experiment("localization, told 0.5 m and 20° off", tuple(misled), folder, (worlds,), localization=True),
+    ]
+
+
+def _written(file: Path, text: str) -> Path:
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+def _world_text(field: ObstacleField) -> str:
+    pillars = "\n".join(
+        f"  - {{name: pillar, cylinder: [{CELL / 2:g}, {HEIGHT:g}], pose: {{x: {x:.3f}, y: {y:.3f}}}}}"
+        for x, y in field.centres.tolist()
+    )
+    return f"simscen: 1\nname: field {field.number}\nobstacles:\n{pillars}\n"

@@ -1,0 +1,49 @@
+"""How well the localizer knows where the robot is, in the shipped house and through the whole simulator."""
+
+import math
+
+START = (0.8, 4.95, 0.0)
+"""The house's dock: x, y in m, yaw in rad."""
+OFF, TURNED = 0.5, math.radians(20.0)
+"""How wrong the told pose is, in m and rad."""
+
+GOALS = """\
+goals:
+  - {pose: sofa, timeout: 120 s}
+  - {pose: kitchen, timeout: 120 s}
+  - {pose: study, timeout: 120 s}
+"""
+
+
+def tour() -> str:
+    """Three rooms; told the true start with Nav2's default covariance, AMCL's default noise."""
+    return f"""\
+simscen: 1
+name: tour of the house
+world: house.world.yaml
+robot: {{pose: dock}}
+{GOALS}pass:
+  - goals_reached: {{}}
+  - localization_error: {{rmse: 5 cm, after: 5 s}}
+  - collisions: {{max: 0}}
+"""
+
+
+def misled(direction: float, left: bool) -> str:
+    """Told a pose OFF away in this direction (rad) and TURNED; must be right again before the first goal."""
+    x, y = START[0] + OFF * math.cos(direction), START[1] + OFF * math.sin(direction)
+    yaw = START[2] + (TURNED if left else -TURNED)
+    return f"""\
+simscen: 1
+name: told the wrong place
+world: house.world.yaml
+robot:
+  pose: dock
+  initial_estimate: {{x: {x:.4f}, y: {y:.4f}, yaw: {yaw:.5f}}}
+goals:
+  - {{pose: kitchen, timeout: 120 s}}
+pass:
+  - goals_reached: {{}}
+  - localization_error: {{final: 10 cm}}
+  - collisions: {{max: 0}}
+"""

@@ -1,0 +1,103 @@
+"""Many runs of one case, summed up in the columns in which navigation benchmarks are published."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+from simscen.core.session import Outcome, RunFinished
+from simscen.core.verdict import Status
+from simscen.study.barn import score
+from simscen.study.intervals import wilson
+
+TIME_IS_UP = "time limit"
+"""What a run's `ended` says when nothing else ended it."""
+
+
+class Fate(str, Enum):
+    """How a run came out; exactly one of these."""
+
+    SUCCESS = "success"
+    COLLISION = "collision"
+    TIMEOUT = "timeout"
+    FAILED = "failed"
+    ERROR = "error"
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A run, and the reference length in metres that its score refers to (None = the case has no score)."""
+
+    run: RunFinished
+    reference_length: float | None = None
+
+    @property
+    def fate(self) -> Fate:
+        """A collision outweighs all else that went wrong; whoever ran out of time did not merely fail."""
+        if self.run.outcome is Outcome.ERROR:
+            return Fate.ERROR
+        if any(v.criterion == "collisions" and v.status is Status.FAIL for v in self.run.verdicts):
+            return Fate.COLLISION
+        if self.run.outcome is Outcome.PASSED:
+            return Fate.SUCCESS
+        return Fate.TIMEOUT if self.run.ended == TIME_IS_UP else Fate.FAILED
+
+    @property
+    def score(self) -> float | None:
+        """BARN's; None where the case has none."""
+        if self.reference_length is None:
+            return None
+        seconds = self.metric("time_to_goal")
+        return score(self.fate is Fate.SUCCESS and seconds is not None, seconds or 0.0, self.reference_length)
+
+    def metric(self, name: str) -> float | None:
+        """A number that the judge measured."""
+        return dict(self.run.metrics).get(name)
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the table. Rates are of all runs; seconds and path ratio are means over the successful ones.
+
+    `path_ratio` is driven over shortest length. `success_interval` is the 95 % interval of the success rate.
+    """
+
+    case: str
+    runs: int
+    success: float
+    success_interval: tuple[float, float]
+    collisions: float
+    timeouts: float
+    failed: float
+    errors: float
+    seconds: float | None
+    score: float | None
+    path_ratio: float | None
+
+
+def tally(case: str, trials: Sequence[Trial]) -> Row:
+    """Sum up the runs of a case. Raises ValueError without any."""
+    fates = [trial.fate for trial in trials]
+    good = [trial for trial in trials if trial.fate is Fate.SUCCESS]
+    return Row(
+        case=case,
+        runs=len(trials),
+        success=_rate(fates, Fate.SUCCESS),
+        success_interval=wilson(len(good), len(trials)),
+        collisions=_rate(fates, Fate.COLLISION),
+        timeouts=_rate(fates, Fate.TIMEOUT),
+        failed=_rate(fates, Fate.FAILED),
+        errors=_rate(fates, Fate.ERROR),
+        seconds=mean([trial.metric("time_to_goal") for trial in good]),
+        score=mean([trial.score for trial in trials]),
+        path_ratio=mean([trial.metric("path_ratio") for trial in good]),
+    )
+
+
+def _rate(fates: Sequence[Fate], which: Fate) -> float:
+    return fates.count(which) / len(fates) if fates else 0.0
+
+
+def mean(values: Sequence[float | None]) -> float | None:
+    """The mean of the values that are there; None when none is."""
+    known = [value for value in values if value is not None]
+    return sum(known) / len(known) if known else None
