@@ -96,7 +96,7 @@ def _not_reached(trace: Trace, story: GoalStory) -> Finding:
     away = _true_pose(trace, tick).distance(story.goal.pose)
     why = f"the run ended at t = {trace.seconds(trace.end):.2f} s: {ending(trace)}"
     details = [f"{away:.2f} m from the goal then", *([why] if story.end is None else [])]
-    return missed(what, f"{story.fate}, not reached", "reached", (trace, tick), details)
+    return missed(what, story.fate, "reached", (trace, tick), details)
 
 
 def _true_pose(trace: Trace, tick: int) -> Pose2:

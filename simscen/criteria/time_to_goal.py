@@ -46,13 +46,14 @@ class TimeToGoal(Spec, Criterion):
         begun = start or 0
         if story.reached is not None:
             return at_most(what, trace.seconds(story.reached - begun), self.max, "s", at=(trace, story.reached))
+        expected = f"to be there within {self.max:.2f} s"
         so_far = trace.seconds(trace.end - begun)
         if story.end is None and so_far > self.max:
             return at_most(
                 what, so_far, self.max, "s", at=(trace, trace.end), detail=[f"goal {story.goal.name}: {story.fate}"]
             )
         if story.end is None and not finished(trace):
-            return undecided(what, f"the log stops {so_far:.2f} s after the start, {story.fate}", f"≤ {self.max:.2f} s")
+            return undecided(what, f"the log stops {so_far:.2f} s after the start, {story.fate}", expected)
         tick = trace.end if story.end is None else story.end.tick
         fate = f"goal {story.goal.name}: {story.fate}"
-        return missed(what, "never reached", f"≤ {self.max:.2f} s", (trace, tick), [fate])
+        return missed(what, "never reached", expected, (trace, tick), [fate])

@@ -46,10 +46,10 @@ def violations(verdict: Verdict) -> tuple[Finding, ...]:
 def tightest(verdicts: Sequence[Verdict]) -> str:
     """The bound that was nearest to being broken, relative to its limit: "path_length +0.14 m"; "" when none has one.
 
-    Numbers of events are left out as long as something measured is there: 0 of 0 collisions is no news.
+    Numbers of events are left out: that 0 of 0 collisions happened is no news.
     """
-    findings = [(v, f) for v in verdicts for f in v.findings if f.status is Status.PASS and f.margin is not None]
-    measured = [(v, f) for v, f in findings if f.unit] or findings
+    findings = [(v, f) for v in verdicts for f in v.findings if f.status is Status.PASS]
+    measured = [(v, f) for v, f in findings if f.unit and f.margin is not None]
     if not measured:
         return ""
     verdict, finding = min(measured, key=lambda pair: _slack(pair[1]))

@@ -27,7 +27,10 @@ def font(size: int) -> Font:
 
 @dataclass(frozen=True)
 class Note:
-    """Text to be set at pixel (x, y): `anchor` as in Pillow; `box` paints a plate of that colour behind it."""
+    """Text to be set at pixel (x, y): `anchor` as in Pillow; `box` paints a plate of that colour behind it.
+
+    Without one, `halo` rims the letters, so that they can be read on anything.
+    """
 
     x: float
     y: float
@@ -36,6 +39,7 @@ class Note:
     colour: Colour
     anchor: str = "lm"
     box: Colour | None = None
+    halo: Colour | None = None
 
 
 class Canvas:
@@ -135,7 +139,15 @@ def write(draw: ImageDraw.ImageDraw, note: Note) -> None:
     if note.box is not None:
         left, top, right, bottom = draw.textbbox((note.x, note.y), note.text, font(note.size), anchor=note.anchor)
         draw.rounded_rectangle((left - 5, top - 4, right + 5, bottom + 4), 4, fill=(*note.box, 235))
-    draw.text((note.x, note.y), note.text, fill=note.colour, font=font(note.size), anchor=note.anchor)
+    draw.text(
+        (note.x, note.y),
+        note.text,
+        fill=note.colour,
+        font=font(note.size),
+        anchor=note.anchor,
+        stroke_width=0 if note.halo is None else 3,
+        stroke_fill=note.halo,
+    )
 
 
 def text_size(text: str, size: int) -> tuple[float, float]:

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
+from simscen.core.geometry import Array
 from simscen.report.picture import ground, marks, palette
 from simscen.report.picture.canvas import Bounds, Canvas, Note, font, shown, write
 from simscen.report.picture.scene import Scene
@@ -49,7 +50,8 @@ def _map(scene: Scene) -> Image.Image:
     return canvas.finish()
 
 
-def _shown(scene: Scene) -> "np.typing.NDArray[np.float64]":
+def _shown(scene: Scene) -> Array:
+    """Points that must be on the picture. Where things are parked far away until they are needed is not."""
     goals = np.array([(goal.pose.x, goal.pose.y) for goal in scene.case.goals]).reshape(-1, 2)
     return np.vstack((goals, scene.trace.truth.values[:, :2]))
 
@@ -70,7 +72,7 @@ def _scale_bar(canvas: Canvas) -> None:
     for x in (left, left + metres):
         canvas.line(np.array([(x, low - tick), (x, low + tick)]), palette.INK, 2.0)
     u, v = canvas.pixel(left + metres / 2, low)
-    canvas.note(Note(u, v - 11, f"{metres:g} m", 12, palette.INK, "mm", palette.PAGE))
+    canvas.note(Note(u, v - 11, f"{metres:g} m", 12, palette.INK, "mm", halo=palette.UNKNOWN))
 
 
 def _header(image: Image.Image, scene: Scene) -> None:

@@ -16,6 +16,7 @@ from simscen.report.picture.scene import Scene
 _STAR = [(r * math.cos(a), r * math.sin(a)) for k in range(16) for r, a in [((16, 7)[k % 2], k * math.pi / 8)]]
 _CROSS = [(1.6, 0), (5.4, 3.8), (3.8, 5.4), (0, 1.6), (-3.8, 5.4), (-5.4, 3.8), (-1.6, 0)]
 _CROSS += [(-5.4, -3.8), (-3.8, -5.4), (0, -1.6), (3.8, -5.4), (5.4, -3.8)]
+_DOT = 0.15 * np.column_stack((np.cos(np.arange(24) * np.pi / 12), np.sin(np.arange(24) * np.pi / 12)))
 _GHOSTS = 6
 _BANDS = 48
 
@@ -28,7 +29,7 @@ def draw_places(canvas: Canvas, scene: Scene) -> None:
             continue
         canvas.sign(pose.x, pose.y, [(0, -4), (4, 0), (0, 4), (-4, 0)], palette.PLACE)
         u, v = canvas.pixel(pose.x, pose.y)
-        canvas.note(Note(u + 8, v, shown(name), 11, palette.FAINT_INK, box=palette.PAGE))
+        canvas.note(Note(u + 8, v, shown(name), 11, palette.FAINT_INK, halo=palette.FREE))
 
 
 def draw_plans(canvas: Canvas, scene: Scene) -> None:
@@ -55,12 +56,12 @@ def draw_objects(canvas: Canvas, scene: Scene) -> None:
         for pose in poses[-1:]:
             canvas.polygon(pose.apply(shapes[name]), (*palette.OBJECT, 150), palette.OBJECT)
             u, v = canvas.pixel(pose.x, pose.y)
-            canvas.note(Note(u, v, shown(name), 11, palette.INK, "mm", palette.PAGE))
+            canvas.note(Note(u, v, shown(name), 12, palette.OBJECT, "mm", halo=palette.FREE))
 
 
 def draw_belief(canvas: Canvas, scene: Scene) -> None:
     """Where the robot thought it was."""
-    canvas.dashes(_thinned(scene.trace.belief.values[:, :2], canvas), palette.BELIEF, 1.6, 4.0)
+    canvas.dashes(_thinned(scene.trace.belief.values[:, :2], canvas), palette.BELIEF, 1.2, 4.0)
 
 
 def draw_truth(canvas: Canvas, scene: Scene) -> None:
@@ -95,7 +96,7 @@ def draw_goals(canvas: Canvas, scene: Scene) -> None:
         canvas.disc(x, y, 2.6, palette.GOAL)
         if told := names.pop((x, y), None):
             u, v = canvas.pixel(x, y)
-            canvas.note(Note(u, v - reach - 12, shown(", ".join(told)), 13, palette.GOAL, "mm", palette.PAGE))
+            canvas.note(Note(u, v - reach - 12, shown(", ".join(told)), 14, palette.GOAL, "mm", halo=palette.FREE))
 
 
 def draw_robot(canvas: Canvas, scene: Scene) -> None:
@@ -103,16 +104,13 @@ def draw_robot(canvas: Canvas, scene: Scene) -> None:
     if not len(scene.trace.truth):
         return
     first, last = (Pose2(*row) for row in scene.trace.truth.values[[0, -1]].tolist())
-    for pose, colour, filled in ((first, palette.START, False), (last, palette.ramp(1.0), True)):
-        hull = np.array(scene.case.footprint) if len(scene.case.footprint) > 2 else None
-        if hull is None:
-            canvas.disc(pose.x, pose.y, 6, (*colour, 110) if filled else None, colour)
-        else:
-            canvas.polygon(pose.apply(hull), (*colour, 110 if filled else 50), colour)
-            nose = float(hull[:, 0].max())
-            canvas.line(pose.apply(np.array([(0.3 * nose, 0.0), (nose, 0.0)])), colour, 2.2)
+    hull = np.array(scene.case.footprint) if len(scene.case.footprint) > 2 else _DOT
+    nose = np.array([(0.35, -0.4), (0.85, 0.0), (0.35, 0.4)]) * (float(hull[:, 0].max()), float(hull[:, 1].max()))
+    for pose, colour, strength in ((first, palette.START, 40), (last, palette.ROBOT, 170)):
+        canvas.polygon(pose.apply(hull), (*colour, strength), colour)
+        canvas.polygon(pose.apply(nose), palette.PAGE if strength > 100 else colour)
     u, v = canvas.pixel(first.x, first.y)
-    canvas.note(Note(u, v + 20, "start", 12, palette.START, "mm", palette.PAGE))
+    canvas.note(Note(u, v + 20, "start", 12, palette.START, "mm", halo=palette.FREE))
 
 
 def draw_collisions(canvas: Canvas, scene: Scene) -> None:
@@ -169,7 +167,7 @@ def _visible(canvas: Canvas, pose: Pose2) -> bool:
     return 0 <= u < canvas.width and 0 <= v < canvas.height
 
 
-def _short(text: str, limit: int = 72) -> str:
+def _short(text: str, limit: int = 48) -> str:
     return text if len(text) <= limit else f"{text[: limit - 1]}…"
 
 

@@ -9,6 +9,7 @@ from simscen.core.verdict import Status
 from simscen.judge.wording import comparison, subject
 from simscen.report.picture import palette
 from simscen.report.picture.canvas import Colour, Note, font, shown, write
+from simscen.report.picture.marks import round_step
 from simscen.report.picture.scene import Scene
 
 WIDTH = 340
@@ -19,13 +20,13 @@ Sample = Callable[[ImageDraw.ImageDraw, float, float], None]
 
 def sidebar(scene: Scene, height: int) -> Image.Image:
     """The sidebar, at least `height` pixels tall."""
-    rows = _criteria(scene)
-    needed = 40 + sum(_LINE * len(lines) + 8 for _, lines in rows) + 14 + 20 * len(_legend()) + 62
+    rows, legend = _criteria(scene), _legend(round_step(scene.result.simulated))
+    needed = 40 + sum(_LINE * len(lines) + 8 for _, lines in rows) + 14 + 20 * len(legend) + 62
     image = Image.new("RGB", (WIDTH, max(height, needed)), palette.PAGE)
     draw = ImageDraw.Draw(image, "RGBA")
     _criteria_list(draw, rows)
-    top = image.height - 20 * len(_legend()) - 50
-    for number, (text, sample) in enumerate(_legend()):
+    top = image.height - 20 * len(legend) - 50
+    for number, (text, sample) in enumerate(legend):
         y = top + 20 * number
         sample(draw, _PAD, y)
         write(draw, Note(_PAD + 34, y, text, 12, palette.FAINT_INK))
@@ -82,15 +83,28 @@ def _wrapped(text: str, size: int = 13) -> list[str]:
     return lines if len(lines) <= 4 else [*lines[:3], f"{lines[3]} …"]
 
 
-def _legend() -> list[tuple[str, Sample]]:
+def _legend(step: float) -> list[tuple[str, Sample]]:
     return [
-        ("where the robot thought it was", _dashes),
+        (f"where it truly was, a dot every {step:g} s", _way),
+        ("where it thought it was", _dashes),
         ("plans", lambda d, x, y: d.line([(x, y), (x + 24, y)], fill=palette.PLAN, width=4)),
         ("goal, its tolerance and heading", _ring),
+        ("robot at the end", _robot),
         ("spawned or moving object", _block),
         ("collision", lambda d, x, y: d.regular_polygon((x + 12, y, 7), 5, fill=palette.RED)),
         ("where a criterion failed", lambda d, x, y: _tick_or_cross(d, x + 12, y, palette.RED)),
     ]
+
+
+def _way(draw: ImageDraw.ImageDraw, x: float, y: float) -> None:
+    for k in range(24):
+        draw.line([(x + k, y), (x + k + 1, y)], fill=palette.ramp(k / 24), width=3)
+    draw.ellipse((x + 8, y - 4, x + 16, y + 4), fill=palette.PAGE, outline=palette.ramp(0.5), width=2)
+
+
+def _robot(draw: ImageDraw.ImageDraw, x: float, y: float) -> None:
+    draw.rectangle((x + 4, y - 6, x + 20, y + 6), fill=palette.START, outline=palette.ROBOT)
+    draw.polygon([(x + 13, y - 3), (x + 18, y), (x + 13, y + 3)], fill=palette.PAGE)
 
 
 def _dashes(draw: ImageDraw.ImageDraw, x: float, y: float) -> None:

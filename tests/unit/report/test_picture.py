@@ -1,0 +1,165 @@
+"""The picture of a run, checked where colours must be: on the path, on walls, on marks."""
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.grid import OccupancyGrid
+from simscen.core.shapes import Body, Box, Cylinder, Extrusion, Mesh, Solid, Sphere
+from simscen.criteria.criterion import AnyCriterion
+from simscen.judge.judge import judge
+from simscen.judge.result import run_result
+from simscen.judge.sketch import sketch, sketch_case
+from simscen.report.picture import Scene, draw, palette, write_picture
+from simscen.report.picture.canvas import Canvas
+from simscen.report.picture.compose import HEADER, LARGEST
+from simscen.report.picture.ground import MARGIN, extent, lay
+from simscen.report.picture.marks import round_step
+from simscen.report.picture.outline import of_event, of_shape, outlines
+
+WIDE, TALL, RESOLUTION = 200, 120, 0.05
+
+
+def room(yaw=0.0):
+    cells = np.zeros((TALL, WIDE), dtype=np.int8)
+    cells[[0, -1], :] = cells[:, [0, -1]] = 100
+    cells[:, 100:104] = 100
+    cells[40:60, 100:104] = 0
+    return OccupancyGrid(cells, RESOLUTION, Pose2(0.0, 0.0, yaw))
+
+
+def scene(**changes):
+    words = {
+        "seconds": 10,
+        "truth": [[0, 1, 1], [5, 1, 2.5], [10, 8, 2.5]],
+        "belief": None,
+        "events": [
+            [1, "goal.accepted", "end"],
+            [2, "object.spawned", "box", {"shape": "box", "size": [1, 1, 1], "x": 7, "y": 4.5, "yaw": 0.5}],
+            [6, "collision.started", "box", {"x": 3.0, "y": 5.0}],
+        ],
+        **changes,
+    }
+    case = sketch_case(
+        {"goals": [{"name": "end", "pose": [8, 4.5, 0]}], "footprint": [[-0.2, -0.2], [0.2, 0], [-0.2, 0.2]]}
+    )
+    trace = sketch(words)
+    verdicts = judge([AnyCriterion.model_validate({"clearance": {"min": 2.0}})], trace, case)
+    result = run_result("room/cross", "room/cross.scenario.yaml", 3, verdicts, trace, case)
+    return Scene(trace, case, room(), result, {"corner": Pose2(9, 1)})
+
+
+def pixel(image, x, y):
+    """The colour at a point of the world: the map fills its area from the margin around the known cells on."""
+    scale = min(LARGEST[0] / (WIDE * RESOLUTION + 2 * MARGIN), LARGEST[1] / (TALL * RESOLUTION + 2 * MARGIN))
+    u, v = (x + MARGIN) * scale, (TALL * RESOLUTION + MARGIN - y) * scale + HEADER
+    return image.getpixel((int(u), int(v)))
+
+
+def near(colour, wanted, tolerance=30):
+    return all(abs(a - b) <= tolerance for a, b in zip(colour, wanted, strict=True))
+
+
+def test_free_space_and_walls_are_where_the_map_has_them():
+    image = draw(scene())
+    assert near(pixel(image, 5.1, 0.5), palette.WALL)
+    assert near(pixel(image, 2.0, 4.0), palette.FREE)
+    assert near(pixel(image, -0.2, 3.0), palette.UNKNOWN)
+
+
+def test_the_driven_way_runs_through_the_door_and_changes_colour_with_time():
+    image = draw(scene())
+    early, late = pixel(image, 1.0, 1.75), pixel(image, 7.0, 2.5)
+    assert near(early, palette.ramp(0.25), 40)
+    assert near(late, palette.ramp(0.93), 40)
+    assert early[2] > late[2]
+
+
+def test_a_spawned_object_stands_where_its_event_says():
+    assert not near(pixel(draw(scene()), 7.3, 4.6), palette.FREE)
+    without = scene(events=[[1, "goal.accepted", "end"]])
+    assert near(pixel(draw(without), 6.8, 4.2), palette.FREE)
+
+
+def test_a_collision_has_a_red_star():
+    assert near(pixel(draw(scene()), 3.0, 5.0), palette.RED)
+
+
+def test_the_verdict_is_on_the_picture_in_its_colour():
+    image = draw(scene())
+    assert near(image.getpixel((20, 31)), palette.RED)
+
+
+def test_the_same_run_gives_the_same_picture(tmp_path):
+    for name in ("a.png", "b.png"):
+        write_picture(scene(), tmp_path / name)
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+    with Image.open(tmp_path / "a.png") as image:
+        assert image.width > image.height > 300
+
+
+@pytest.mark.parametrize("seconds", [0, 0.025, 1])
+def test_a_run_that_hardly_began_has_a_picture_too(seconds):
+    short = scene(seconds=seconds, truth=[[0, 1, 1]], ended=None, events=[])
+    assert draw(short).width > 300
+
+
+def test_a_turned_map_is_painted_turned():
+    grid = room(yaw=np.pi / 2)
+    bounds = extent(grid, np.empty((0, 2)))
+    assert bounds == pytest.approx((-6.4, -0.4, 0.4, 10.4))
+    canvas = Canvas(bounds, 40.0, palette.UNKNOWN)
+    lay(canvas, grid)
+    image = canvas.finish()
+    u, v = canvas.pixel(-1.0, 5.1)
+    assert near(image.getpixel((int(u), int(v))), palette.WALL)
+    u, v = canvas.pixel(-2.5, 5.1)
+    assert near(image.getpixel((int(u), int(v))), palette.FREE)
+
+
+def test_thin_walls_of_a_huge_map_stay_whole():
+    cells = np.zeros((2000, 2000), dtype=np.int8)
+    cells[:, 1000] = 100
+    grid = OccupancyGrid(cells, 0.01)
+    canvas = Canvas(extent(grid, np.empty((0, 2))), 10.0, palette.UNKNOWN)
+    lay(canvas, grid)
+    image = np.asarray(canvas.finish()).astype(int)
+    row = image[100:110, 95:115].sum(axis=2).min(axis=1)
+    assert (row < 3 * 200).all()
+
+
+@pytest.mark.parametrize(
+    ("shape", "area"),
+    [
+        (Box((2.0, 1.0, 5.0)), 2.0),
+        (Cylinder(1.0, 3.0), np.pi),
+        (Sphere(0.5), np.pi / 4),
+        (Extrusion(((0.0, 0.0), (2.0, 0.0), (0.0, 2.0)), 1.0), 2.0),
+        (Mesh(np.array([[0.0, 0, 0], [3, 0, 0], [0, 2, 1]]), np.array([[0, 1, 2]], dtype=np.int32)), 6.0),
+    ],
+)
+def test_outlines_have_the_area_of_their_shape_seen_from_above(shape, area):
+    x, y = of_shape(shape).T
+    assert abs(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1))) / 2 == pytest.approx(area, rel=0.01)
+
+
+def test_the_largest_solid_of_a_body_is_its_outline_and_the_unknown_is_a_disc():
+    small, large = Solid(Box((0.1, 0.1, 1.0))), Solid(Box((2.0, 1.0, 1.0)), Pose3(x=1.0))
+    trace = sketch({"seconds": 1, "truth": [[0, 0, 0]], "objects": {"ghost": [[0, 1, 1, 0]]}})
+    found = outlines(trace, [Body("cart", (small, large))])
+    assert found["cart"][:, 0].min() == pytest.approx(0.0)
+    assert np.hypot(*found["ghost"].T) == pytest.approx(np.full(32, 0.2))
+
+
+@pytest.mark.parametrize("data", [{}, {"shape": "mesh", "size": []}, {"shape": "box", "size": "big"}])
+def test_an_event_that_does_not_describe_a_shape_still_gives_one(data):
+    event = sketch({"seconds": 1, "truth": [[0, 0, 0]], "events": [[0, "object.spawned", "x", data]]}).events[0]
+    assert len(of_event(event)) == 32
+
+
+@pytest.mark.parametrize(
+    ("seconds", "step"), [(0, 1), (3, 1), (10, 1), (11, 2), (31, 5), (94, 10), (101, 20), (450, 50)]
+)
+def test_time_marks_stand_at_round_seconds_and_are_at_most_ten(seconds, step):
+    assert round_step(seconds) == step
