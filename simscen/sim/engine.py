@@ -7,6 +7,7 @@ import pybullet
 
 from simscen.core.geometry import Pose3
 from simscen.core.shapes import Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere, TriangleMesh
+from simscen.sim.camera import visible
 from simscen.sim.outline import extremes
 from simscen.sim.robot_body import GRAVITY
 
@@ -131,23 +132,37 @@ def body_shape(client: int, solids: Sequence[Solid], pushable: bool, triangulate
 
     Bullet moves convex shapes only, so what it pushes and cannot build from primitives becomes its convex hull.
     """
-    if all(isinstance(solid.shape, PRIMITIVES) for solid in solids):
+    if _simple(solids):
         return compound_shape(client, solids)
-    if pushable:
-        return hull_shape(client, solids)
+    return hull_shape(client, solids) if pushable else concave_shape(client, _fused(solids, triangulate))
+
+
+def body_visual(client: int, solids: Sequence[Solid], triangulate: Triangulate) -> int:
+    """What the renderer shows of it; -1 where that is the collision shape itself."""
+    return -1 if _simple(solids) else visible(client, _fused(solids, triangulate))
+
+
+def _simple(solids: Sequence[Solid]) -> bool:
+    return all(isinstance(solid.shape, PRIMITIVES) for solid in solids)
+
+
+def _fused(solids: Sequence[Solid], triangulate: Triangulate) -> Mesh:
     meshes = [(triangulate(solid.shape), solid.pose) for solid in solids]
     starts = np.cumsum([0, *(len(mesh.vertices) for mesh, _ in meshes)])
     vertices = np.concatenate([pose.apply(mesh.vertices) for mesh, pose in meshes])
     faces = [mesh.faces + np.int32(start) for (mesh, _), start in zip(meshes, starts, strict=False)]
-    return concave_shape(client, Mesh(vertices, np.concatenate(faces)))
+    return Mesh(vertices, np.concatenate(faces))
 
 
-def body(client: int, mass: float, shape: int, pose: Pose3, frame: Frame, friction: float) -> int:
-    """A single rigid body; `frame` holds its principal moments and its centre of mass. Nothing pushes mass 0."""
+def body(client: int, mass: float, shapes: tuple[int, int], pose: Pose3, frame: Frame, friction: float) -> int:
+    """A rigid body of a collision and a visual shape, with principal moments and centre of mass in `frame`.
+
+    Nothing pushes one of mass 0.
+    """
     moments, base_from_centre = frame
     centre = pose.compose(base_from_centre)
     number: int = pybullet.createMultiBody(
-        mass, shape, -1, pose.position, pose.quaternion,
+        mass, *shapes, pose.position, pose.quaternion,
         baseInertialFramePosition=base_from_centre.position,
         baseInertialFrameOrientation=base_from_centre.quaternion, physicsClientId=client,
     )  # fmt: skip
@@ -163,7 +178,7 @@ def body(client: int, mass: float, shape: int, pose: Pose3, frame: Frame, fricti
 
 def fixed(client: int, shape: int) -> int:
     """A body that never moves."""
-    return body(client, 0.0, shape, Pose3(), ((0.0, 0.0, 0.0), Pose3()), 1.0)
+    return body(client, 0.0, (shape, -1), Pose3(), ((0.0, 0.0, 0.0), Pose3()), 1.0)
 
 
 def _primitive(shape: Shape) -> tuple[int, Sequence[float], float, float]:

@@ -15,7 +15,7 @@ from simscen.core.shapes import Body, MotionPath, TriangleMesh
 from simscen.core.trace import Truth
 from simscen.sim import engine
 from simscen.sim.actors import Actors
-from simscen.sim.camera import picture
+from simscen.sim.camera import picture, show_static
 from simscen.sim.contacts import Contacts, Motion, touches
 from simscen.sim.drives import build
 from simscen.sim.nearest import Owners
@@ -57,6 +57,7 @@ class Simulation:
         engine.ground(self._client)
         self._static = engine.static_mesh(self._client, static)
         self._owners = Owners(static)
+        self._mesh, self._filmed = static, False
         self._actors = Actors(self._client, tick_rate, triangulate)
         self._firmware = max(1, round(tick_rate / FIRMWARE_RATE))
         self._base, self._drive = build(self._client, robot, pose, self._firmware / tick_rate)
@@ -218,6 +219,9 @@ class Simulation:
     ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float32]]:
         """What a camera at `mount` in the base frame sees; see `camera.picture`."""
         self._actors.show(self.tick)
+        if not self._filmed:
+            show_static(self._client, self._mesh)
+            self._filmed = True
         return picture(self._client, self._base.pose().compose(mount), width, height, field_of_view, far)
 
     def close(self) -> None:

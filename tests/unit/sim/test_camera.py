@@ -9,7 +9,7 @@ from simscen.core.shapes import Body, MotionPath
 FIELD, WIDTH, HEIGHT = 1.2, 64, 48
 
 
-def picture(simulation, mount=Pose3(z=0.5)):  # noqa: B008 - a NamedTuple
+def picture(simulation, mount=Pose3(z=0.5)):
     return simulation.image(mount, WIDTH, HEIGHT, FIELD, 10.0)
 
 

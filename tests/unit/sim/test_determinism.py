@@ -44,7 +44,7 @@ def test_two_runs_in_one_process_and_one_in_a_fresh_one_are_equal(capsys):
     code = RUN.format(folder=str(Path(__file__).parent), robot="turtlebot", turned=False)
     outputs = []
     for _ in range(2):
-        exec(code, {})  # noqa: S102 - the very code that the fresh process runs
+        exec(code, {})
         outputs.append(capsys.readouterr().out)
     assert "collision.started" in outputs[0]
     assert outputs[0] == outputs[1] == fresh("turtlebot")
