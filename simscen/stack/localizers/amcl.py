@@ -3,7 +3,7 @@
 Thrun, Burgard & Fox, Probabilistic Robotics, chapter 8; Fox, KLD-Sampling (IJRR 2003).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -90,7 +90,7 @@ class AmclLocalizer:
         if self._track.reaches(scan.tick):
             self._use(scan)
         else:
-            self._waiting[scan.sensor] = scan
+            self._waiting[scan.sensor] = replace(scan, ranges=scan.ranges.copy())
 
     def on_imu(self, imu: Imu) -> None:
         """Nothing: AMCL trusts its odometry."""

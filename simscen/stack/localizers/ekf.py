@@ -16,9 +16,9 @@ from simscen.stack.localizers.dead_reckoning import start_of
 from simscen.stack.localizers.odometry_track import believable
 
 X, Y, YAW, RATE, BIAS = range(5)
-# Before it is measured a turn rate may be anything: no robot turns at 100 rad/s.
-_ANY_RATE = 100.0
-# Wheels that stand still are sure of it; this keeps the innovation's variance from being exactly zero.
+# No robot turns faster than this, in rad/s: a gyroscope that says so is broken.
+_FASTEST = 100.0
+# Wheels that stand still and a perfect gyroscope would make the innovation's variance zero.
 _LEAST_VARIANCE = 1e-12
 
 
@@ -62,7 +62,7 @@ class EkfLocalizer:
     def on_imu(self, imu: Imu) -> None:
         """Keep the turn rate until the next odometry."""
         rate = imu.angular_velocity[2]
-        if abs(rate) < _ANY_RATE:
+        if abs(rate) < _FASTEST:
             self._rates.append(rate)
 
     @property
@@ -80,18 +80,14 @@ class EkfLocalizer:
     def _measure_rate(self, step: Pose2, seconds: float) -> None:
         """The turn rate of this step, out of odometry's turn and the mean of the gyroscope's readings."""
         state, covariance = self._filter.x, self._filter.P
-        state[RATE], covariance[RATE, :], covariance[:, RATE] = 0.0, 0.0, 0.0
-        covariance[RATE, RATE] = _ANY_RATE**2
+        # Nothing is known of the new turn rate, so that the first measurement of it is taken as it is.
         turned = math.hypot(step.x, step.y) + abs(step.yaw)
-        variance = self._spec.rotation_noise**2 * turned / seconds**2
-        self._update(step.yaw / seconds, np.array([[0.0, 0, 0, 1, 0]]), variance)
+        state[RATE], covariance[RATE, :], covariance[:, RATE] = step.yaw / seconds, 0.0, 0.0
+        covariance[RATE, RATE] = self._spec.rotation_noise**2 * turned / seconds**2
         if self._rates:
-            mean = sum(self._rates) / len(self._rates)
-            self._update(mean, np.array([[0.0, 0, 0, 1, 1]]), self._spec.gyro_noise**2 / len(self._rates))
-
-    def _update(self, value: float, row: Array, variance: float) -> None:
-        noise = np.array([[variance + _LEAST_VARIANCE]])
-        self._filter.update(np.array([value]), lambda _: row, lambda state: row @ state, R=noise)
+            mean, row = sum(self._rates) / len(self._rates), np.array([[0.0, 0, 0, 1, 1]])
+            noise = np.array([[self._spec.gyro_noise**2 / len(self._rates) + _LEAST_VARIANCE]])
+            self._filter.update(np.array([mean]), lambda _: row, lambda state: row @ state, R=noise)
 
     def _move(self, step: Pose2, seconds: float) -> None:
         """Drive the step; a turn other than odometry's turns its chord by half the difference."""

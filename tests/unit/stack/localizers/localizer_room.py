@@ -123,7 +123,10 @@ class Noise:
     gyro_bias: float = 0.0005
 
 
-def run(subject: Localizer, drive: Drive, seed: int, noise: Noise = Noise(), *, imu: bool = False) -> list[Belief]:
+USUAL = Noise()
+
+
+def run(subject: Localizer, drive: Drive, seed: int, noise: Noise = USUAL, *, imu: bool = False) -> list[Belief]:
     """The beliefs (k) of a localizer, one for each row of the truth."""
     chance, beliefs = np.random.default_rng((seed, 2)), []
     ranges = drive.ranges + chance.normal(0, noise.lidar, drive.ranges.shape)
@@ -148,7 +151,12 @@ def run(subject: Localizer, drive: Drive, seed: int, noise: Noise = Noise(), *, 
 
 def scan(ranges: Array, tick: int = 0, **changes: object) -> Scan:
     """A full-circle scan by the lidar in the middle of the robot."""
-    given = {"angle_min": -np.pi, "angle_increment": 2 * np.pi / len(ranges), "range_min": 0.05, "range_max": RANGE_MAX}
+    given = {
+        "angle_min": -np.pi,
+        "angle_increment": 2 * np.pi / max(len(ranges), 1),
+        "range_min": 0.05,
+        "range_max": RANGE_MAX,
+    }
     return Scan("lidar", tick, ranges, **(given | changes))  # type: ignore[arg-type]
 
 

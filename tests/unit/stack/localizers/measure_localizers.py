@@ -1,0 +1,169 @@
+"""Measures what docs/reference/localizers.md reports: `python tests/unit/stack/localizers/measure_localizers.py`."""
+
+import sys
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+from localizer_room import USUAL, Drive, Noise, drive, errors, kidnapped, localizer, nees, run, scan
+
+from simscen.core.belief import Estimate
+from simscen.core.geometry import Array, Pose2
+from simscen.core.motion import Twist
+from simscen.core.sensing import Odometry
+from simscen.model.stack import Amcl, Ekf
+from simscen.model.stack import Localizer as Spec
+
+PROB = Amcl(laser_model_type="likelihood_field_prob")
+BEAM = Amcl(laser_model_type="beam")
+MANY = Amcl(max_particles=5000)
+RECOVERING = Amcl(max_particles=5000, recovery_alpha_slow=0.001, recovery_alpha_fast=0.1)
+RECOVERING_PROB = RECOVERING.model_copy(update={"laser_model_type": "likelihood_field_prob"})
+EXACT_EKF = Ekf(type="ekf", translation_noise=0.01, rotation_noise=0.01, gyro_noise=0.002)
+MATCHED = Amcl(laser_model_type="likelihood_field_prob", alpha1=0.001, alpha2=0.001, alpha3=0.001, alpha4=0.001)
+FOUND_WITHIN = (0.25, 0.25)
+STD = np.array([0.1, 0.1, 0.05])
+
+
+@dataclass(frozen=True, eq=False)
+class Tracked:
+    """`rmse` (n,) of the translation of each run in m, `yaw` (n,) of the heading in rad, and the ANEES over runs."""
+
+    rmse: Array
+    yaw: Array
+    anees: float
+
+
+def tracking(spec: Spec, seeds: Iterable[int], seconds: float, noise: Noise = USUAL, imu: bool = False) -> Tracked:
+    """Drives from an estimate that is as good as it says; ANEES is the mean over runs at 4 fixed times."""
+    rows, way = [], drive(seconds)
+    for seed in seeds:
+        start = Pose2(*(way.truth[0] + np.random.default_rng((seed, 3)).normal(0, STD)))
+        beliefs = run(localizer(spec, Estimate(start, tuple(STD)), seed), way, seed, noise, imu=imu)
+        error = errors(beliefs, way.truth)
+        late = np.linspace(0.4, 1, 4) * (len(error) - 1)
+        consistency = np.mean([nees(beliefs[k], error[k]) for k in late.astype(int)])
+        rows.append((*np.sqrt([np.mean(error[:, 0] ** 2 + error[:, 1] ** 2), np.mean(error[:, 2] ** 2)]), consistency))
+    rmse, yaw, consistency = np.array(rows).T
+    return Tracked(rmse, yaw, float(consistency.mean()))
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """Whether each run ended (its last second) within 0.25 m and 0.25 rad, and how many seconds that took."""
+
+    found: "np.ndarray[tuple[int, ...], np.dtype[np.bool_]]"
+    seconds: Array
+
+
+def search(spec: Spec, seeds: Iterable[int], way: "dict[int, tuple[Drive, Estimate]]", begin: float = 0.0) -> Search:
+    """Runs each seed on its own drive from its own estimate."""
+    rows = []
+    for seed in seeds:
+        path, estimate = way[seed]
+        error = np.abs(errors(run(localizer(spec, estimate, seed), path, seed), path.truth))
+        lost = np.flatnonzero((np.hypot(error[:, 0], error[:, 1]) > FOUND_WITHIN[0]) | (error[:, 2] > FOUND_WITHIN[1]))
+        last = lost[-1] + 1 if len(lost) else 0
+        rows.append((last <= len(error) - 40, last / 40 - begin))
+    found, seconds = np.array(rows).T
+    return Search(found.astype(np.bool_), seconds)
+
+
+def wrong_start(spec: Spec, seeds: Iterable[int]) -> Search:
+    """The estimate is 0.5 m off in a random direction and 20° to either side."""
+    ways = {}
+    for seed in seeds:
+        chance, path = np.random.default_rng((seed, 4)), drive(20.0, seed % 12)
+        x, y, yaw = path.truth[0]
+        away, side = chance.uniform(-np.pi, np.pi), chance.choice([-1, 1])
+        guess = Pose2(x + 0.5 * np.cos(away), y + 0.5 * np.sin(away), yaw + side * np.deg2rad(20))
+        ways[seed] = (path, Estimate(guess))
+    return search(spec, seeds, ways)
+
+
+def global_start(spec: Spec, seeds: Iterable[int]) -> Search:
+    """Nothing is known."""
+    return search(spec, seeds, {seed: (drive(40.0, seed % 12), Estimate(None)) for seed in seeds})
+
+
+def kidnapping(spec: Spec, seeds: Iterable[int]) -> Search:
+    """After 10 s of driving the robot is carried to another place of the room and drives on for 60 s."""
+    ways = {}
+    for seed in seeds:
+        path = kidnapped(drive(10.0, seed % 12), drive(60.0, (seed + 5) % 12))
+        ways[seed] = (path, Estimate(Pose2(*path.truth[0])))
+    return search(spec, seeds, ways, begin=10.0)
+
+
+def update_cost(spec: Amcl, particles: int) -> float:
+    """Milliseconds that one correction by a scan takes with this many particles: the median of 100."""
+    way = drive(20.0)
+    fixed = spec.model_copy(update={"min_particles": particles, "max_particles": particles})
+    subject, costs = localizer(fixed, Estimate(Pose2(*way.truth[0])), 1), []
+    for tick in range(100):
+        subject.on_odometry(Odometry("odom", tick, Pose2(0.0, 0.0, 0.25 * (tick % 2)), Twist()))
+        began = time.perf_counter()
+        subject.on_scan(scan(way.ranges[0], tick))
+        costs.append(time.perf_counter() - began)
+    return float(np.median(costs)) * 1e3
+
+
+def main() -> None:
+    """Prints the tables, fifty seeds each."""
+    print_costs()
+    print_tracking(range(1, 51))
+    print_searches(range(1, 51))
+
+
+def print_costs() -> None:
+    """How long one correction takes."""
+    for spec in (Amcl(), PROB, BEAM):
+        cost = " and ".join(f"{update_cost(spec, n):.2f} ms with {n}" for n in (500, 2000))
+        print(f"an update, {spec.laser_model_type}, 60 beams: {cost} particles", flush=True)
+
+
+def print_tracking(seeds: Iterable[int]) -> None:
+    """How well each localizer knows where it is on the way round the room."""
+    tracked: list[tuple[str, Spec, Noise, bool]] = [
+        ("amcl", Amcl(), USUAL, False),
+        ("amcl, recovery", RECOVERING, USUAL, False),
+        ("amcl, prob", PROB, USUAL, False),
+        ("amcl, prob, recovery", RECOVERING_PROB, USUAL, False),
+        ("amcl, prob, alpha 0.001", MATCHED, USUAL, False),
+        ("amcl, beam", BEAM, USUAL, False),
+        ("ekf, odometry only, noise as specified", EXACT_EKF, Noise(drift=0.01, gyro_bias=0.002), False),
+        ("ekf, with gyroscope, noise as specified", EXACT_EKF, Noise(drift=0.01, gyro_bias=0.002), True),
+        ("ekf, defaults", Ekf(type="ekf"), USUAL, True),
+    ]
+    for name, spec, noise, imu in tracked:
+        result = tracking(spec, seeds, 60.0, noise, imu)
+        rmse, yaw, below = result.rmse, np.rad2deg(result.yaw.mean()), np.sum(result.rmse <= 0.05)
+        print(f"{name}: RMSE {rmse.mean():.4f} m (worst {rmse.max():.4f}, {below} of {len(rmse)} at most 0.05), "
+              f"{yaw:.2f}°, ANEES {result.anees:.2f}", flush=True)  # fmt: skip
+
+
+def print_searches(seeds: Iterable[int]) -> None:
+    """How often a robot that is lost finds itself."""
+    searches: list[tuple[str, Callable[[Spec, Iterable[int]], Search], Spec]] = [
+        ("wrong start, amcl", wrong_start, Amcl()),
+        ("wrong start, prob", wrong_start, PROB),
+        ("global, amcl, 2000", global_start, Amcl()),
+        ("global, amcl, 5000", global_start, MANY),
+        ("global, prob, 5000", global_start, PROB.model_copy(update={"max_particles": 5000})),
+        ("global, prob, 20000", global_start, PROB.model_copy(update={"max_particles": 20_000})),
+        ("kidnapped, amcl, recovery, 5000", kidnapping, RECOVERING),
+        ("kidnapped, prob, recovery, 5000", kidnapping, RECOVERING_PROB),
+        ("kidnapped, amcl, no recovery", kidnapping, Amcl()),
+    ]
+    for name, measure, spec in searches:
+        result = measure(spec, seeds)
+        print(f"{name}: {result.found.sum()} of {len(result.found)}, median {np.median(result.seconds):.1f} s, "
+              f"slowest found {result.seconds[result.found].max(initial=0):.1f} s", flush=True)  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,199 @@
+"""AMCL keeps Nav2's rhythm and stays sane whatever its sensors say."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from localizer_room import BEAMS, cast, drive, grid, localizer, scan, surroundings
+
+from simscen.core.belief import Belief, Estimate
+from simscen.core.geometry import Pose2
+from simscen.core.motion import Twist
+from simscen.core.sensing import Odometry, Scan
+from simscen.model.stack import Amcl
+from simscen.stack.localizers.build import build_localizer
+from simscen.stack.protocols import Localizer
+
+START = Pose2(-2.5, -1.8, 0.6)
+DEFAULT = Amcl()
+GUESS = Estimate(Pose2(-2.3, -1.9, 0.5), (0.3, 0.3, 0.2))
+
+
+def seen(pose: Pose2, tick: int, **changes: object) -> Scan:
+    return scan(cast(np.array([pose]), -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS))[0], tick, **changes)
+
+
+def odometry(tick: int, pose: Pose2) -> Odometry:
+    return Odometry("odom", tick, pose, Twist())
+
+
+def started(spec: Amcl = DEFAULT, **changes: object) -> Localizer:
+    """A localizer that has had its first odometry and its first scan."""
+    subject = localizer(spec, GUESS, 1)
+    subject.on_odometry(odometry(0, Pose2(0, 0, 0)))
+    subject.on_scan(seen(START, 0, **changes))
+    return subject
+
+
+def moved(subject: Localizer, tick: int, step: Pose2, **changes: object) -> Belief:
+    """After an honest step from the start."""
+    subject.on_odometry(odometry(tick, step))
+    subject.on_scan(seen(START.compose(step), tick, **changes))
+    return subject.belief
+
+
+def test_the_first_scan_corrects_although_nothing_has_moved() -> None:
+    error = START.between(started().belief.pose)
+    assert np.hypot(error.x, error.y) < 0.1
+    assert abs(error.yaw) < 0.06
+
+
+@pytest.mark.parametrize(
+    ("step", "corrects"),
+    [(Pose2(0.24, 0, 0.19), False), (Pose2(0.26, 0, 0), True), (Pose2(-0.2, 0.2, 0), True), (Pose2(0, 0, -0.21), True)],
+)
+def test_a_scan_corrects_only_after_enough_motion(step: Pose2, corrects: bool) -> None:
+    belief = moved(started(), 24, step)
+    assert belief.updated == (24 if corrects else 0)
+
+
+def test_between_corrections_odometry_carries_the_pose_and_uncertainty_grows() -> None:
+    subject = started()
+    before = subject.belief
+    subject.on_odometry(odometry(6, Pose2(0.1, 0.02, 0.05)))
+    after = subject.belief
+    assert after.pose == pytest.approx(before.pose.compose(Pose2(0.1, 0.02, 0.05)))
+    assert after.map_from_odom == before.map_from_odom
+    assert np.linalg.eigvalsh(after.covariance - before.covariance).max() > 0
+    assert np.trace(after.covariance) > np.trace(before.covariance)
+
+
+def test_each_lidar_corrects_once_after_enough_motion() -> None:
+    """As nav2_amcl, which keeps a flag for each laser."""
+    subject, step = started(), Pose2(0.26, 0, 0)
+    subject.on_scan(replace(seen(START, 0), sensor="rear"))
+    assert moved(subject, 24, step).updated == 24
+    subject.on_odometry(odometry(25, step))
+    subject.on_scan(replace(seen(START.compose(step), 25), sensor="rear"))
+    assert subject.belief.updated == 25
+    subject.on_odometry(odometry(26, step))
+    subject.on_scan(replace(seen(START.compose(step), 26), sensor="rear"))
+    assert subject.belief.updated == 25
+
+
+def test_a_scan_waits_for_the_odometry_of_its_tick() -> None:
+    """The order in which the readings of a beat are handed over makes no difference."""
+    early, late = started(), started()
+    expected = moved(early, 24, Pose2(0.3, 0, 0.1))
+    late.on_scan(seen(START.compose(Pose2(0.3, 0, 0.1)), 24))
+    assert late.belief.updated == 0
+    late.on_odometry(odometry(24, Pose2(0.3, 0, 0.1)))
+    assert late.belief.pose == expected.pose
+    assert np.array_equal(late.belief.particles, expected.particles)
+
+
+def test_a_scan_that_arrives_late_corrects_the_pose_at_which_it_was_taken() -> None:
+    punctual, delayed = started(), started()
+    steps = [(24, Pose2(0.3, 0, 0)), (48, Pose2(0.6, 0, 0.3))]
+    for tick, step in steps:
+        punctual.on_odometry(odometry(tick, step))
+        delayed.on_odometry(odometry(tick, step))
+        if tick == 24:
+            punctual.on_scan(seen(START.compose(step), tick))
+    delayed.on_scan(seen(START.compose(steps[0][1]), 24))
+    assert delayed.belief.pose == pytest.approx(punctual.belief.pose)
+
+
+def test_scans_older_than_any_odometry_are_left_alone() -> None:
+    subject = localizer(Amcl(), GUESS, 1)
+    subject.on_odometry(odometry(100, Pose2(0, 0, 0)))
+    subject.on_scan(seen(START, 50))
+    assert subject.belief.updated == 0
+
+
+def test_the_particles_start_at_the_most_and_shrink_to_the_least_as_the_place_becomes_certain() -> None:
+    spec = Amcl(min_particles=100, max_particles=3000, laser_model_type="likelihood_field_prob")
+    subject = localizer(spec, GUESS, 1)
+    assert len(subject.belief.particles) == 3000
+    for tick, row in enumerate(drive(20.0).truth[::20]):
+        subject.on_odometry(odometry(tick, Pose2(*drive(20.0).truth[0]).between(Pose2(*row))))
+        subject.on_scan(seen(Pose2(*row), tick))
+    assert 100 <= len(subject.belief.particles) < 200
+
+
+def test_more_least_than_most_means_the_least() -> None:
+    subject = localizer(Amcl(min_particles=900, max_particles=300), GUESS, 1)
+    assert len(subject.belief.particles) == 900
+
+
+def weights_after(spec: Amcl, updates: int) -> np.ndarray:
+    subject = started(spec)
+    for k in range(1, updates):
+        moved(subject, 24 * k, Pose2(0.3 * (k % 2), 0, 0))
+    return subject.belief.particles[:, 3]
+
+
+@pytest.mark.parametrize(("updates", "equal"), [(1, False), (2, False), (3, True), (4, False)])
+def test_resampling_happens_on_every_interval_only(updates: int, equal: bool) -> None:
+    assert (np.ptp(weights_after(Amcl(resample_interval=3), updates)) == 0) == equal
+
+
+def test_selective_resampling_waits_until_half_of_the_particles_carry_no_weight() -> None:
+    patient = weights_after(Amcl(selective_resampling=True), 1)
+    assert np.ptp(patient) > 0
+    assert 1 / (patient @ patient) > len(patient) / 2
+    sharp = Amcl(selective_resampling=True, laser_model_type="likelihood_field_prob")
+    assert np.ptp(weights_after(sharp, 1)) == 0
+
+
+@pytest.mark.parametrize("ranges", [np.full(BEAMS, np.nan), np.full(BEAMS, np.inf), np.full(BEAMS, -3.0), np.empty(0)])
+def test_a_blind_lidar_moves_nothing_and_the_particles_spread_as_odometry_drifts(ranges: np.ndarray) -> None:
+    subject = started()
+    for k in range(1, 20):
+        subject.on_odometry(odometry(24 * k, Pose2(0.3 * k, 0, 0)))
+        subject.on_scan(scan(ranges, 24 * k))
+    blind, sighted = subject.belief, started().belief
+    assert blind.map_from_odom == pytest.approx(sighted.map_from_odom)
+    assert blind.updated == 0
+    assert np.trace(blind.covariance) > 5 * np.trace(sighted.covariance)
+
+
+def test_a_scan_that_no_particle_can_explain_leaves_them_equally_likely() -> None:
+    """With z_rand = 0 and a narrow hit every particle off the walls has probability zero."""
+    spec = Amcl(laser_model_type="likelihood_field_prob", z_rand=0.0, sigma_hit=0.01, recovery_alpha_slow=0.001,
+                recovery_alpha_fast=0.1)  # fmt: skip
+    subject = started(spec, range_max=5.0)
+    subject.on_odometry(odometry(24, Pose2(0.3, 0, 0)))
+    subject.on_scan(scan(np.random.default_rng(1).uniform(0.2, 4, BEAMS), 24))
+    belief = subject.belief
+    assert np.isfinite(belief.covariance).all()
+    assert np.ptp(belief.particles[:, 3]) == 0
+
+
+def test_a_reset_starts_over_at_the_next_odometry() -> None:
+    subject = started()
+    moved(subject, 24, Pose2(0.3, 0, 0))
+    subject.reset(Estimate(Pose2(1, 1, 1), (0.1, 0.2, 0.3)))
+    assert subject.belief.pose == Pose2(1, 1, 1)
+    assert np.allclose(subject.belief.covariance, np.diag([0.01, 0.04, 0.09]))
+    subject.on_odometry(odometry(3, Pose2(7, 7, 7)))
+    assert subject.belief.pose == pytest.approx((1, 1, 1))
+
+
+def test_without_an_estimate_the_particles_lie_all_over_the_free_space() -> None:
+    belief = localizer(Amcl(), Estimate(None), 1).belief
+    assert (grid().values_at(belief.particles[:, :2]) == 0).all()
+    assert np.sqrt(np.diag(belief.covariance)).min() > 1
+
+
+def test_a_map_that_is_turned_changes_nothing() -> None:
+    """Cell borders fall differently, so a little differs; the place does not."""
+    straight, turn = surroundings().map, Pose2(3.0, -2.0, 0.7)
+    assert straight is not None
+    turned = replace(surroundings(), map=replace(straight, origin=turn.compose(straight.origin)))
+    start = Estimate(turn.compose(Pose2(-2.3, -1.9, 0.5)), (0.3, 0.3, 0.2))
+    subject = build_localizer(Amcl(), turned, start, np.random.default_rng((1, 1)))
+    subject.on_odometry(odometry(0, Pose2(0, 0, 0)))
+    subject.on_scan(seen(START, 0))
+    error = turn.compose(START).between(subject.belief.pose)
+    assert np.hypot(error.x, error.y) < 0.1

@@ -1,0 +1,95 @@
+"""The EKF adds up odometry exactly, weighs the gyroscope against the wheels, and knows how wrong it may be."""
+
+import numpy as np
+import pytest
+from localizer_room import Noise, drive, errors, localizer, nees, run
+from measure_localizers import STD
+from scipy import stats
+
+from simscen.core.belief import Estimate
+from simscen.core.geometry import Array, Pose2
+from simscen.core.motion import Twist
+from simscen.core.sensing import Imu, Odometry
+from simscen.model.stack import Ekf
+from simscen.stack.protocols import Localizer
+
+SPEC = Ekf(type="ekf", translation_noise=0.01, rotation_noise=0.01, gyro_noise=0.002)
+AS_SPECIFIED = Noise(drift=0.01, gyro_bias=0.002)
+SILENT = Noise(translation=0, rotation=0, drift=0, gyro=0, gyro_bias=0)
+
+
+def ekf(estimate: Estimate) -> Localizer:
+    return localizer(SPEC, estimate, 1)
+
+
+def feed(subject: Localizer, steps: int, step: Pose2, rate: float | None) -> None:
+    """Steps of 1/40 s; the gyroscope says `rate` in rad/s."""
+    pose = Pose2(0, 0, 0)
+    for k in range(steps + 1):
+        if rate is not None:
+            subject.on_imu(Imu("imu", 6 * k, (0.0, 0.0, rate), (0.0, 0.0, 9.81)))
+        subject.on_odometry(Odometry("odom", 6 * k, pose, Twist()))
+        pose = pose.compose(step)
+
+
+@pytest.mark.parametrize("imu", [False, True])
+def test_without_noise_it_arrives_exactly_where_the_robot_does(imu: bool) -> None:
+    way = drive(30.0)
+    subject = ekf(Estimate(Pose2(*way.truth[0]), (0.0, 0.0, 0.0)))
+    assert np.abs(errors(run(subject, way, 1, SILENT, imu=imu), way.truth)).max() < 1e-6
+
+
+@pytest.mark.parametrize("imu", [False, True])
+def test_its_covariance_is_consistent_with_its_errors(imu: bool) -> None:
+    """50 NEES of 3 degrees of freedom add up to chi-square with 150; all but one of 1000 such tests pass by chance."""
+    way, values = drive(10.0), []
+    for seed in range(50):
+        start = Pose2(*(way.truth[0] + np.random.default_rng((seed, 3)).normal(0, STD)))
+        subject = ekf(Estimate(start, (STD[0], STD[1], STD[2])))
+        beliefs = run(subject, way, seed, AS_SPECIFIED, imu=imu)
+        values.append(nees(beliefs[-1], errors(beliefs, way.truth)[-1]))
+    low, high = stats.chi2.ppf([0.0005, 0.9995], 150)
+    assert low <= np.sum(values) <= high
+
+
+def test_a_gyroscope_that_sees_no_turn_outweighs_wheels_that_slip() -> None:
+    """The wheels claim 1 rad/s, the gyroscope none: it is the more exact one by far."""
+    subject = ekf(Estimate(Pose2(0, 0, 0), (0.0, 0.0, 0.0)))
+    feed(subject, 40, Pose2(0.0125, 0, 0.025), 0.0)
+    alone = ekf(Estimate(Pose2(0, 0, 0), (0.0, 0.0, 0.0)))
+    feed(alone, 40, Pose2(0.0125, 0, 0.025), None)
+    assert alone.belief.pose.yaw == pytest.approx(1.0)
+    assert abs(subject.belief.pose.yaw) < 0.1
+    assert subject.belief.covariance[2, 2] < alone.belief.covariance[2, 2]
+
+
+def test_standing_still_reveals_the_bias_of_the_gyroscope() -> None:
+    subject = ekf(Estimate(Pose2(0, 0, 0), (0.0, 0.0, 0.0)))
+    feed(subject, 400, Pose2(0, 0, 0), 0.004)
+    assert abs(subject.belief.pose.yaw) < 1e-6
+
+
+def test_a_turn_that_the_gyroscope_corrects_bends_the_way_too() -> None:
+    """Chords of odometry's 1 rad/s arcs, driven at the gyroscope's 0: a straight line."""
+    subject = localizer(Ekf(type="ekf", rotation_noise=50.0, gyro_noise=1e-5), Estimate(Pose2(0, 0, 0), (0, 0, 0)), 1)
+    arc = Pose2(0.0125 * np.cos(0.0125), 0.0125 * np.sin(0.0125), 0.025)
+    feed(subject, 40, arc, 0.0)
+    assert subject.belief.pose == pytest.approx((0.5, 0, 0), abs=2e-3)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e9])
+def test_a_broken_gyroscope_is_not_listened_to(bad: float) -> None:
+    subject = ekf(Estimate(Pose2(0, 0, 0), (0.1, 0.1, 0.1)))
+    feed(subject, 40, Pose2(0.01, 0, 0), bad)
+    assert subject.belief.pose == pytest.approx((0.4, 0, 0))
+
+
+def test_the_uncertainty_of_a_straight_way_is_that_of_the_closed_form() -> None:
+    """σ² of the heading grows with the way; across the way it is the integral of the swing, rn² L³ / 3."""
+    subject = ekf(Estimate(Pose2(0, 0, 0), (0.0, 0.0, 0.0)))
+    feed(subject, 400, Pose2(0.025, 0, 0), None)
+    covariance: Array = subject.belief.covariance
+    length, noise = 10.0, 0.01
+    assert covariance[0, 0] == pytest.approx(noise**2 * length, rel=0.01)
+    assert covariance[1, 1] == pytest.approx(noise**2 * length**3 / 3, rel=0.01)
+    assert covariance[2, 2] == pytest.approx(noise**2 * length, rel=0.01)

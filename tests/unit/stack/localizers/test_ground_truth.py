@@ -1,0 +1,46 @@
+"""The ground-truth localizer believes the sensor `ground_truth` and nothing else for longer than a moment."""
+
+import numpy as np
+import pytest
+
+from simscen.core.belief import Estimate
+from simscen.core.geometry import Pose2
+from simscen.core.motion import Twist
+from simscen.core.sensing import Odometry
+from simscen.stack.localizers.ground_truth import TRUTH, GroundTruthLocalizer
+
+
+def said(subject: GroundTruthLocalizer, sensor: str, tick: int, pose: Pose2) -> Pose2:
+    subject.on_odometry(Odometry(sensor, tick, pose, Twist()))
+    return subject.belief.pose
+
+
+def test_the_truth_is_believed_at_once_whatever_the_estimate_was() -> None:
+    subject = GroundTruthLocalizer(Estimate(Pose2(9, 9, 9)))
+    assert said(subject, TRUTH, 0, Pose2(1, 2, 0.5)) == pytest.approx((1, 2, 0.5))
+    assert np.linalg.cond(subject.belief.covariance) == 1
+
+
+@pytest.mark.parametrize("truth_first", [True, False])
+def test_the_truth_holds_in_whichever_order_the_readings_of_a_tick_come(truth_first: bool) -> None:
+    subject, true, drifted = GroundTruthLocalizer(Estimate(Pose2(0, 0, 0))), Pose2(1, 2, 0.5), Pose2(0.7, 0, 0.1)
+    for tick in (0, 6, 12):
+        true, drifted = true.compose(Pose2(0.1, 0, 0.02)), drifted.compose(Pose2(0.3, 0, 0.5))
+        readings = [(TRUTH, true), ("odom", drifted)]
+        for sensor, pose in readings if truth_first else readings[::-1]:
+            said(subject, sensor, tick, pose)
+        assert subject.belief.pose == pytest.approx(true)
+        assert subject.belief.map_from_odom.compose(drifted) == pytest.approx(true)
+
+
+def test_odometry_carries_the_truth_on_until_the_next() -> None:
+    subject = GroundTruthLocalizer(Estimate(Pose2(0, 0, 0)))
+    said(subject, "odom", 0, Pose2(5, 5, 0))
+    said(subject, TRUTH, 0, Pose2(1, 2, np.pi / 2))
+    assert said(subject, "odom", 6, Pose2(5.5, 5, 0)) == pytest.approx((1, 2.5, np.pi / 2))
+
+
+def test_without_any_truth_it_is_dead_reckoning() -> None:
+    subject = GroundTruthLocalizer(Estimate(Pose2(1, 1, 0)))
+    assert said(subject, "odom", 0, Pose2(5, 5, 0)) == pytest.approx((1, 1, 0))
+    assert said(subject, "odom", 6, Pose2(5.5, 5, 0)) == pytest.approx((1.5, 1, 0))

@@ -1,0 +1,56 @@
+"""KLD-sampling asks for as many samples as Fox's bound says."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import stats
+
+from simscen.stack.localizers.kld import BIN_METRES, KldBound, bins, join, split
+
+coordinates = st.integers(-2_000_000, 2_000_000)
+
+
+@pytest.mark.parametrize("z", [0.99, 2.326])
+@pytest.mark.parametrize("occupied", [3, 10, 50, 400, 3000])
+def test_the_bound_is_the_chi_square_quantile_it_stands_for(occupied: int, z: float) -> None:
+    """Fox (2003), equation 5: n = χ²(k-1, 1-δ) / 2ε, of which the bound is Wilson and Hilferty's approximation."""
+    bound = KldBound(0.05, z, 1, 10**6)
+    exact = stats.chi2.ppf(stats.norm.cdf(z), occupied - 1) / (2 * 0.05)
+    assert bound.samples(occupied) == pytest.approx(exact, rel=0.01, abs=1)
+
+
+def test_the_bound_stays_between_its_limits_and_one_bin_needs_no_samples() -> None:
+    bound = KldBound(0.05, 0.99, 500, 2000)
+    assert bound.samples([0, 1, 2, 10, 10_000]).tolist() == [500, 500, 500, 500, 2000]
+
+
+@given(coordinates, coordinates, st.integers(0, 35))
+def test_keys_stand_for_coordinates(x: int, y: int, yaw: int) -> None:
+    parts = split(join(*(np.array([part]) for part in (x, y, yaw))))
+    assert [int(part[0]) for part in parts] == [x, y, yaw]
+
+
+@settings(max_examples=50)
+@given(st.lists(st.tuples(*[st.floats(-20, 20)] * 3), min_size=1, max_size=40))
+def test_particles_share_a_bin_exactly_when_their_whole_coordinates_are_equal(poses: list[tuple[float, ...]]) -> None:
+    whole = [(x // BIN_METRES, y // BIN_METRES, int(np.floor(yaw * 18 / np.pi)) % 36) for x, y, yaw in poses]
+    keys = bins(np.array(poses)).tolist()
+    assert [keys.index(key) for key in keys] == [whole.index(cell) for cell in whole]
+
+
+def test_headings_a_full_turn_apart_share_a_bin() -> None:
+    near, far = bins(np.array([[0.1, 0.1, 0.05], [0.1, 0.1, 0.05 + 2 * np.pi]]))
+    assert near == far
+
+
+@settings(max_examples=60)
+@given(st.lists(st.integers(0, 60), min_size=1, max_size=600), st.integers(1, 200))
+def test_enough_is_where_one_by_one_counting_stops(keys: list[int], least: int) -> None:
+    bound, seen, stop = KldBound(0.05, 0.99, least, 500), set(), None
+    for count, key in enumerate(keys, 1):
+        seen.add(key)
+        if count >= bound.samples(len(seen)):
+            stop = count
+            break
+    assert bound.enough(np.array(keys)) == stop

@@ -1,0 +1,47 @@
+"""A filter begins around a guess, or anywhere that is free."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from simscen.core.belief import Estimate
+from simscen.core.geometry import Pose2
+from simscen.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from simscen.stack.localizers.particles import FreeSpace, Particles
+
+GRID = OccupancyGrid(
+    np.array([[FREE, OCCUPIED, FREE], [UNKNOWN, FREE, FREE]], dtype=np.int8), 0.5, Pose2(3.0, -1.0, 0.9)
+)
+
+
+def test_anywhere_means_uniformly_over_the_free_cells_and_all_headings() -> None:
+    poses = FreeSpace(GRID).draw(20_000, np.random.default_rng(1))
+    cells = GRID.cell_of(poses[:, :2])
+    counts = np.bincount(cells[:, 0] * 3 + cells[:, 1], minlength=6)
+    assert counts[[1, 3]].tolist() == [0, 0]
+    assert stats.chisquare(counts[[0, 2, 4, 5]]).pvalue > 1e-3
+    assert stats.kstest(poses[:, 2], stats.uniform(-np.pi, 2 * np.pi).cdf).pvalue > 1e-3
+    inside = GRID.origin.inverse().apply(poses[:, :2]) / 0.5 % 1
+    assert stats.kstest(inside[:, 0], "uniform").pvalue > 1e-3
+
+
+def test_a_map_without_a_free_cell_still_gives_poses_on_it() -> None:
+    full = OccupancyGrid(np.full((3, 3), OCCUPIED, dtype=np.int8), 1.0)
+    poses = FreeSpace(full).draw(50, np.random.default_rng(1))
+    assert (poses[:, :2] >= 0).all()
+    assert (poses[:, :2] <= 3).all()
+
+
+def test_particles_begin_around_the_estimate_with_its_standard_deviations() -> None:
+    std = (0.5, 0.1, 0.2)
+    particles = FreeSpace(GRID).begin(Estimate(Pose2(1, 2, 3), std), 50_000, np.random.default_rng(2))
+    error = particles.poses - (1, 2, 3)
+    error[:, 2] = (error[:, 2] + np.pi) % (2 * np.pi) - np.pi
+    assert np.allclose(error.mean(axis=0), 0, atol=0.01)
+    assert np.allclose(error.std(axis=0), std, rtol=0.02)
+    assert np.abs(particles.poses[:, 2]).max() <= np.pi
+
+
+def test_the_effective_number_is_all_of_them_when_equal_and_one_when_one_has_it_all() -> None:
+    assert Particles.equal(np.zeros((40, 3))).effective == pytest.approx(40)
+    assert Particles(np.zeros((40, 3)), np.eye(40)[3]).effective == pytest.approx(1)
