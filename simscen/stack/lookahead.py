@@ -15,7 +15,7 @@ def time_free(footprint: Footprint, costmap: CostmapView, pose: Pose2, twist: Tw
     """Seconds until the first collision at this velocity; `horizon` when there is none before.
 
     A robot that seems to be in collision already (its map or its belief is off by a few centimetres) may move as long
-    as that takes it farther away from the obstacle: otherwise it could never get out.
+    as that brings it no more than half a cell nearer to the obstacle: otherwise it could never get out.
     """
     speed = math.hypot(twist.vx, twist.vy) + abs(twist.wz) * footprint.reach
     steps = max(2, math.ceil(horizon * speed / costmap.resolution) + 1)
@@ -26,7 +26,7 @@ def time_free(footprint: Footprint, costmap: CostmapView, pose: Pose2, twist: Tw
         return horizon
     if blocked[0]:
         clearance = footprint.clearance(costmap, poses)
-        worse = clearance < clearance[0] - 1e-6
+        worse = clearance < clearance[0] - 0.5 * costmap.resolution
         blocked &= worse
         if not blocked.any():
             return horizon

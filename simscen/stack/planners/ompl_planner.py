@@ -21,7 +21,7 @@ LESS_COMFORT = 0.05
 """What it keeps where COMFORT would close the way or cost a detour."""
 DETOUR = 1.1
 """A roomier way may be this much longer than the tightest (ratio)."""
-DETOUR_TO_TURN = 1.3
+DETOUR_TO_TURN = 2.0
 """A way on which the robot can turn in place may be this much longer than one on which it could get stuck."""
 GOOD = 1.03
 """A path no longer than this (ratio to the coarse grid's shortest) is taken at once; else the next attempt is made."""
@@ -49,10 +49,10 @@ class Attempt:
     share: float
 
 
-NARROW = (Attempt(0, 0.05, 0.05), Attempt(0, 0.05, 0.05), Attempt(-1, 0.05, 0.1))
-"""All of these are made until a path is GOOD; measured on houses and mazes, most plans end with the first."""
-WIDE = (Attempt(-1, 0.15, 0.1), Attempt(-1, 1.0, 0.7))
-"""These only when there is no path yet: gaps that the coarse grid took for open."""
+NARROW = (Attempt(0, 0.05, 0.05), Attempt(0, 0.05, 0.05), Attempt(0, 0.1, 0.1))
+"""These are made until a path is GOOD; measured on houses and mazes, most plans end with the first."""
+WIDE = (Attempt(-1, 0.05, 0.1), Attempt(-1, 0.15, 0.1), Attempt(-1, 1.0, 0.6))
+"""These until there is a path at all: where the coarse grid took a gap for open, or the room is too tight to find."""
 
 
 class OmplPlanner:
