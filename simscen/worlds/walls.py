@@ -14,8 +14,8 @@ SHARPEST_MITRE = -0.5
 def wall_solids(points: list[Point], thickness: float, height: float, name: str) -> list[Solid]:
     """The pieces of a wall about the centre line `points`; closed if the last point is the first.
 
-    Corners up to 120° are mitred, so that pieces neither overlap nor leave a notch; at sharper ones both pieces run
-    on by half the thickness. Repeated points are skipped.
+    Corners up to 120° are mitred, so that pieces neither overlap nor leave a notch; at sharper ones, and where a piece
+    is too short for its mitres, pieces run on straight by half the thickness. Repeated points are skipped.
     """
     corners = [p for k, p in enumerate(points) if k == 0 or p != points[k - 1]]
     if len(corners) < 2:
@@ -28,6 +28,8 @@ def wall_solids(points: list[Point], thickness: float, height: float, name: str)
     for (a, b), way, previous, following in zip(pairwise(corners), ways, before, after, strict=True):
         start = _end(a, way, previous, thickness / 2, -1.0)
         end = _end(b, way, following, thickness / 2, 1.0)
+        if any(_behind(start[side], end[side], way) for side in (0, 1)):
+            start, end = _run_on(a, way, thickness / 2, -1.0), _run_on(b, way, thickness / 2, 1.0)
         solids.append(Solid(Extrusion((start[1], end[1], end[0], start[0]), height), name=name))
     return solids
 
@@ -37,15 +39,24 @@ def _direction(a: Point, b: Point) -> Point:
     return (b[0] - a[0]) / length, (b[1] - a[1]) / length
 
 
+def _behind(start: Point, end: Point, way: Point) -> bool:
+    """Whether a side of a piece would run backwards, as its mitres cross."""
+    return (end[0] - start[0]) * way[0] + (end[1] - start[1]) * way[1] <= 0
+
+
 def _end(corner: Point, way: Point, other: Point | None, half: float, side: float) -> tuple[Point, Point]:
     """The left and right corner of a piece at one of its ends; `side` is -1 at its start, 1 at its end."""
     (x, y), (ux, uy) = corner, way
-    left, along = (-uy * half, ux * half), (0.0, 0.0)
-    if other is not None:
-        cosine = ux * other[0] + uy * other[1]
-        if cosine > SHARPEST_MITRE:
-            left = ((-uy - other[1]) * half / (1 + cosine), (ux + other[0]) * half / (1 + cosine))
-        else:
-            along = (ux * half * side, uy * half * side)
-    x, y = x + along[0], y + along[1]
+    if other is None:
+        return (x - uy * half, y + ux * half), (x + uy * half, y - ux * half)
+    cosine = ux * other[0] + uy * other[1]
+    if cosine < SHARPEST_MITRE:
+        return _run_on(corner, way, half, side)
+    left = (-uy - other[1]) * half / (1 + cosine), (ux + other[0]) * half / (1 + cosine)
     return (x + left[0], y + left[1]), (x - left[0], y - left[1])
+
+
+def _run_on(corner: Point, way: Point, half: float, side: float) -> tuple[Point, Point]:
+    (x, y), (ux, uy) = corner, way
+    x, y = x + ux * half * side, y + uy * half * side
+    return (x - uy * half, y + ux * half), (x + uy * half, y - ux * half)

@@ -83,9 +83,9 @@ def test_a_world_of_thousands_of_solids_is_searched_in_milliseconds():
     posts = [
         Solid(Cylinder(0.1, 1.0), Pose3(x, y, 0.5), f"p{k}") for k, (x, y) in enumerate(rng.uniform(-30, 30, (3000, 2)))
     ]
-    begin = time.perf_counter()
+    begin = time.process_time()
     assert blocking_solid(world(*posts), (posts[-1].pose.x, posts[-1].pose.y), 0.01, BODY) == "p2999"
-    assert time.perf_counter() - begin < 0.2
+    assert time.process_time() - begin < 0.2
 
 
 def test_asking_imports_no_heavy_library():

@@ -54,9 +54,9 @@ def test_sixteen_million_cells_of_a_building_take_seconds_at_most():
     cells[::100, :] = OCCUPIED
     cells[:, ::100] = OCCUPIED
     cells[50::100, 50::100] = 0
-    begin = time.perf_counter()
+    begin = time.process_time()
     solids = walls_of(OccupancyGrid(cells, 0.05), 1.0)
-    assert time.perf_counter() - begin < 10
+    assert time.process_time() - begin < 10
     assert len(World("w", tuple(solids)).solids) == 1
 
 

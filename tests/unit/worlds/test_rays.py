@@ -144,9 +144,9 @@ def test_a_scan_of_720_beams_among_hundreds_of_posts_takes_a_fraction_of_a_milli
     origins, directions = around(720, (0.0, 0.0, 0.3))
     took = []
     for step in range(60):
-        begin = time.perf_counter()
+        begin = time.process_time()  # not the wall clock: other tests run beside this one
         scene.set_moving({"cart": (CART, Pose3(step * 0.01, 3, 0))})
         scene.cast(origins, directions)
-        took.append(time.perf_counter() - begin)
-    # The bound of issue 3 is 0.3 ms; a busy machine gets some slack here, `simscen bench` measures it.
+        took.append(time.process_time() - begin)
+    # The bound is 0.3 ms on a quiet machine, which `simscen bench` measures; processor time on a busy one has slack.
     assert np.quantile(took, 0.2) < 0.0006
