@@ -1,0 +1,355 @@
+"""Robots from URDF files: what they become, and how bad ones are refused (CASES 37-44, 50)."""
+
+import math
+import os
+import struct
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+from simscen.core.errors import InvalidInput
+from simscen.core.geometry import Pose2
+from simscen.core.motion import Twist
+from simscen.core.shapes import Box, Mesh
+from simscen.model.robot import RobotSpec
+from simscen.sim.robot_body import robot_body
+from simscen.sim.simulation import Simulation
+from simscen.worlds.meshing import fuse, triangulate
+from simscen.worlds.sdf.meshfile import UnusableMesh, read_parts
+
+JACKAL = Path(__file__).parents[5] / "shared/data/jackal_urdf"
+DIFFERENTIAL = {"type": "differential", "wheel_radius": 0.05, "wheel_separation": 0.4}
+LIMITS = {"linear": 0.5, "angular": 2.0, "linear_acceleration": 1.0, "angular_acceleration": 3.0}
+
+WHEEL = """
+  <link name="{side}">
+    <collision><origin rpy="1.5707963 0 0"/><geometry><cylinder radius="0.05" length="0.03"/></geometry></collision>
+    <inertial><mass value="0.3"/><inertia ixx="0.0002" iyy="0.0004" izz="0.0002"/></inertial>
+  </link>
+  <joint name="{side}_joint" type="continuous">
+    <parent link="base"/><child link="{side}"/><origin xyz="0.1 {y} 0"/><axis xyz="0 1 0"/>
+  </joint>"""
+BASE = """
+  <link name="base">
+    <visual><geometry><mesh filename="package://gone/nowhere.dae"/></geometry></visual>
+    <collision><origin xyz="0.05 0 0.1"/><geometry>{geometry}</geometry></collision>
+    <inertial><origin xyz="0.05 0 0.05"/><mass value="4"/><inertia ixx="0.05" iyy="0.06" izz="0.08"/></inertial>
+  </link>"""
+BOX = '<box size="0.5 0.36 0.2"/>'
+
+
+def robot(geometry=BOX, extra="", base=BASE):
+    wheels = "".join(WHEEL.format(side=side, y=y) for side, y in (("left", 0.2), ("right", -0.2)))
+    return f'<?xml version="1.0"?>\n<robot name="cart">{base.format(geometry=geometry)}{wheels}{extra}\n</robot>\n'
+
+
+def spec(drive=DIFFERENTIAL, urdf="robot.urdf", **more):
+    return RobotSpec.model_validate(
+        {"simscen": 1, "name": "cart", "urdf": urdf, "drive": drive, "limits": LIMITS, "sensors": {}, **more}
+    )
+
+
+def read_mesh(path):
+    try:
+        parts = read_parts(path.read_bytes(), path.suffix, path.name)
+    except UnusableMesh as error:
+        raise ValueError(str(error)) from error
+    return Mesh(parts[0].vertices, parts[0].faces.astype("int32"))
+
+
+@pytest.fixture
+def load(tmp_path):
+    def load(text, **more):
+        (tmp_path / "robot.urdf").write_bytes(text if isinstance(text, bytes) else text.encode())
+        return robot_body(spec(**more), tmp_path / "cart.robot.yaml", [tmp_path], read_mesh)
+
+    return load
+
+
+@pytest.fixture
+def refusal(load):
+    def refusal(text, **more):
+        with pytest.raises(InvalidInput) as caught:
+            load(text, **more)
+        return caught.value.problems[0]
+
+    return refusal
+
+
+def line_of(text, piece):
+    return text[: text.index(piece)].count("\n") + 1
+
+
+def test_the_base_frame_is_on_the_ground_under_the_middle_of_the_axle(load):
+    body = load(robot())
+    (hull,) = (solid for solid in body.hull if solid.name == "base")
+    assert hull.shape == Box((0.5, 0.36, 0.2))
+    assert hull.pose.position == pytest.approx((-0.05, 0.0, 0.15))
+    assert [(w.name, w.x, w.y, w.radius) for w in body.wheels] == [
+        ("left_joint", pytest.approx(0), pytest.approx(0.2), 0.05),
+        ("right_joint", pytest.approx(0), pytest.approx(-0.2), 0.05),
+    ]
+    assert body.mass == pytest.approx(4.6)
+    assert body.chassis.centre == pytest.approx([-0.05, 0.0, 0.1])
+
+
+def test_a_mass_in_the_specification_rules(load):
+    assert load(robot(), mass=46.0).mass == pytest.approx(46.0)
+
+
+def test_visuals_cost_nothing_even_when_their_meshes_are_missing(load):
+    assert "nowhere" in robot()
+    assert load(robot()).hull
+
+
+def test_fixed_links_become_part_of_the_hull(load):
+    mast = """
+  <link name="mast"><collision><geometry><cylinder radius="0.05" length="0.4"/></geometry></collision></link>
+  <joint name="up" type="fixed"><parent link="base"/><child link="mast"/><origin xyz="0.1 0 0.4"/></joint>"""
+    body = load(robot(extra=mast))
+    (solid,) = (solid for solid in body.hull if solid.name == "mast")
+    assert solid.pose.position == pytest.approx((0.0, 0.0, 0.45))
+
+
+def test_casters_that_stand_on_the_ground_are_left_to_the_bodys_own(load):
+    caster = """
+  <link name="caster"><collision><geometry><sphere radius="0.02"/></geometry></collision></link>
+  <joint name="c" type="fixed"><parent link="base"/><child link="caster"/><origin xyz="-0.1 0 -0.03"/></joint>"""
+    body = load(robot(extra=caster))
+    assert "caster" not in [solid.name for solid in body.hull]
+    assert len(body.casters) == 2
+
+
+def test_it_drives(load):
+    simulation = Simulation(fuse([]), [], load(robot()), Pose2(0, 0, 0), triangulate)
+    simulation.drive(Twist(0.5, 0.0, 0.0))
+    simulation.step(240)
+    begin = simulation.truth().pose.x
+    simulation.step(480)
+    assert simulation.truth().pose.x - begin == pytest.approx(1.0, rel=0.01)
+    simulation.close()
+
+
+def test_meshes_are_part_of_the_hull_as_their_convex_hull(load, tmp_path):
+    (tmp_path / "tetra.stl").write_bytes(stl(4))
+    body = load(robot(extra="", geometry='<mesh filename="tetra.stl" scale="0.001 0.001 0.001"/>'))
+    (solid,) = (solid for solid in body.hull if solid.name == "base")
+    assert solid.shape.vertices.max() == pytest.approx(0.3)
+    simulation = Simulation(fuse([]), [], body, Pose2(0, 0, 0), triangulate)
+    simulation.step(10)
+    simulation.close()
+
+
+def stl(claimed):
+    corners = [(0, 0, 0), (300, 0, 0), (0, 300, 0), (0, 0, 300)]
+    data = b"\0" * 80 + struct.pack("<I", claimed)
+    for a, b, c in ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)):
+        data += struct.pack("<12fH", 0, 0, 1, *corners[a], *corners[b], *corners[c], 0)
+    return data
+
+
+def test_37_a_missing_mesh_is_named_with_its_line(refusal):
+    text = robot('<mesh filename="meshes/base.stl"/>')
+    problem = refusal(text)
+    assert (problem.path, problem.line) == ("robot.urdf", line_of(text, "meshes/base.stl"))
+    assert "meshes/base.stl" in problem.message
+    assert "no such file" in problem.message
+
+
+@pytest.mark.parametrize(
+    ("written", "why"),
+    [
+        ("../secret.stl", "outside the scenario root"),
+        ("/etc/passwd", "absolute paths are not read"),
+        ("package://robot/base.stl", "URLs such as package:// are not read"),
+        ("file:///etc/passwd", "URLs"),
+    ],
+)
+def test_38_meshes_outside_are_not_opened(refusal, written, why):
+    problem = refusal(robot(f'<mesh filename="{written}"/>'))
+    assert why in problem.message
+    assert problem.line > 1
+
+
+def test_38_a_link_that_leads_outside_is_not_followed(refusal, tmp_path):
+    (tmp_path / "base.stl").symlink_to("/etc/passwd")
+    assert "outside the scenario root" in refusal(robot('<mesh filename="base.stl"/>')).message
+
+
+def test_39_a_folder_is_no_urdf(tmp_path):
+    (tmp_path / "robot.urdf").mkdir()
+    with pytest.raises(InvalidInput, match="not a regular file"):
+        robot_body(spec(), tmp_path / "cart.robot.yaml", [tmp_path])
+
+
+def test_40_a_pipe_is_no_mesh(refusal, tmp_path):
+    os.mkfifo(tmp_path / "base.stl")
+    assert "not a regular file" in refusal(robot('<mesh filename="base.stl"/>')).message
+
+
+def test_41_a_false_count_of_triangles_is_told(refusal, tmp_path):
+    (tmp_path / "base.stl").write_bytes(stl(4000))
+    assert "STL header says 4000 triangles, file holds 4" in refusal(robot('<mesh filename="base.stl"/>')).message
+
+
+def test_42_a_doctype_is_refused(refusal):
+    text = '<?xml version="1.0"?>\n<!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/passwd">]>\n<robot name="&x;"/>'
+    problem = refusal(text)
+    assert (problem.line, problem.message) == (2, "DOCTYPE not allowed")
+
+
+@pytest.mark.parametrize("text", [robot()[:400], b"\x7fELF\x02\x01\x01\x00\x00", b""])
+def test_43_what_is_not_xml_is_told_with_its_line(refusal, text):
+    problem = refusal(text)
+    assert "not well-formed XML" in problem.message
+    assert problem.line >= 1
+
+
+def test_44_three_thousand_links_are_too_many(refusal):
+    problem = refusal(robot(extra="".join(f'<link name="l{k}"/>' for k in range(3000))))
+    assert problem.message == "more than 200 links"
+
+
+@pytest.mark.parametrize(
+    ("geometry", "message"),
+    [
+        ('<box size="-1 1 1"/>', "size must be greater than 0"),
+        ('<box size="1 1"/>', "size has 2 numbers instead of 3"),
+        ('<sphere radius="nan"/>', "finite"),
+        ('<cylinder radius="x" length="1"/>', "are not numbers"),
+        ('<torus radius="1"/>', "unknown geometry <torus>"),
+        ("", "<geometry> is empty"),
+    ],
+)
+def test_50_impossible_shapes_are_refused_at_their_line(refusal, geometry, message):
+    assert message in refusal(robot(geometry)).message
+
+
+def test_50_negative_masses_are_refused(refusal):
+    assert "negative" in refusal(robot(base=BASE.replace('value="4"', 'value="-4"'))).message
+
+
+@pytest.mark.parametrize(
+    ("extra", "message"),
+    [
+        ('<link name="base"/>', "two <link>s are called 'base'"),
+        ('<link name="loose"/>', "expected one root link, found 2"),
+        ('<joint name="j" type="fixed"><parent link="base"/><child link="gone"/></joint>', "'gone' that is not there"),
+        ('<joint name="j" type="fixed"><parent link="left"/><child link="right"/></joint>', "hangs on two joints"),
+        ('<link name="a"/><link name="b"/><joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint>'
+         '<joint name="k" type="fixed"><parent link="b"/><child link="a"/></joint>', "loop of joints"),
+        ('<joint name="j" type="fixed"><child link="left"/></joint>', "<joint> without <parent>"),
+    ],
+)  # fmt: skip
+def test_trees_that_are_none_are_refused(refusal, extra, message):
+    assert message in refusal(robot(extra=extra)).message
+
+
+def test_several_mistakes_are_told_at_once(load):
+    bad = '<link name="{}"><collision><geometry><box size="0 1 1"/></geometry></collision></link>'
+    with pytest.raises(InvalidInput) as caught:
+        load(robot(extra=bad.format("a") + bad.format("b")))
+    assert len(caught.value.problems) == 2
+
+
+def test_wheels_that_are_not_found_can_be_named(load, refusal):
+    text = robot().replace("cylinder", "box").replace('radius="0.05" length="0.03"', 'size="0.1 0.1 0.03"')
+    problem = refusal(text)
+    assert "no driven wheels" in problem.message and "left" in problem.hint
+    body = load(text, drive={**DIFFERENTIAL, "left": ["left_joint"], "right": ["right_joint"]})
+    assert [wheel.radius for wheel in body.wheels] == [0.05, 0.05]
+    assert "no joint called 'leftt'" in refusal(text, drive={**DIFFERENTIAL, "left": ["leftt"]}).message
+
+
+def test_a_hull_that_drags_over_the_ground_is_refused(refusal):
+    assert "drag over the ground" in refusal(robot('<box size="0.5 0.36 0.4"/>')).message
+
+
+def test_a_urdf_outside_the_root_is_refused(tmp_path):
+    (tmp_path / "in").mkdir()
+    (tmp_path / "robot.urdf").write_text(robot())
+    with pytest.raises(InvalidInput, match="outside the scenario root"):
+        robot_body(spec(urdf="../robot.urdf"), tmp_path / "in/cart.robot.yaml", [tmp_path / "in"])
+
+
+def test_a_car_is_steered_by_the_wheels_below_upright_joints(load):
+    steering = "".join(
+        f"""
+  <link name="knuckle_{side}"/>
+  <joint name="steer_{side}" type="revolute"><parent link="base"/><child link="knuckle_{side}"/>
+    <origin xyz="0.5 {y} 0"/><axis xyz="0 0 1"/><limit lower="-0.5" upper="0.5" effort="1" velocity="1"/></joint>
+  {WHEEL.format(side="front_" + side, y=0).replace('link="base"', f'link="knuckle_{side}"').replace("0.1 0 0", "0 0 0")}"""
+        for side, y in (("left", 0.2), ("right", -0.2))
+    )
+    drive = {"type": "ackermann", "wheel_radius": 0.05, "wheel_separation": 0.4, "wheel_base": 0.4, "max_steering": 0.5}
+    body = load(robot(extra=steering), drive=drive)
+    assert [(w.steered, w.driven, round(w.x, 3)) for w in body.wheels] == [
+        (False, True, 0.0), (False, True, 0.0), (True, False, 0.4), (True, False, 0.4)]  # fmt: skip
+    simulation = Simulation(fuse([]), [], body, Pose2(0, 0, 0), triangulate)
+    simulation.drive(Twist(0.4, 0.0, 0.4))
+    simulation.step(720)
+    assert simulation.truth().twist == pytest.approx((0.4, 0.0, 0.4), abs=0.02)
+    simulation.close()
+
+
+XACRO = '<robot name="c" xmlns:xacro="http://ros.org/wiki/xacro"><link name="a"/></robot>'
+
+
+@pytest.mark.skipif(find_spec("xacro") is not None, reason="the xacro package is installed")
+def test_xacro_files_say_what_they_need(tmp_path):
+    (tmp_path / "robot.urdf.xacro").write_text(XACRO)
+    with pytest.raises(InvalidInput, match=r"need the xacro package: pip install 'simscen\[xacro\]'"):
+        robot_body(spec(urdf="robot.urdf.xacro"), tmp_path / "cart.robot.yaml", [tmp_path])
+
+
+@pytest.mark.skipif(find_spec("xacro") is None, reason="the xacro package is not installed")
+def test_xacro_files_are_expanded(tmp_path):
+    (tmp_path / "robot.urdf.xacro").write_text(robot().replace("<robot ", XACRO[:6] + XACRO[16:57] + " "))
+    assert robot_body(spec(urdf="robot.urdf.xacro"), tmp_path / "cart.robot.yaml", [tmp_path]).hull
+
+
+@pytest.fixture
+def jackal():
+    if not JACKAL.is_dir():
+        pytest.skip("shared/data/jackal_urdf is not here")
+    drive = {"type": "skid_steer", "wheel_radius": 0.098, "wheel_separation": 0.37559, "wheel_base": 0.262,
+             "turning_scale": 1.6}  # fmt: skip
+    limits = {"linear": 2.0, "angular": 4.0, "linear_acceleration": 3.0, "angular_acceleration": 8.0}
+    body = robot_body(spec(drive, "jackal.urdf", limits=limits), JACKAL / "jackal.robot.yaml", [JACKAL])
+    simulation = Simulation(fuse([]), [], body, Pose2(0, 0, 0), triangulate)
+    yield simulation
+    simulation.close()
+
+
+def test_the_jackal_drives_a_square_of_two_metres(jackal):
+    """With feedback from the true pose, as a controller would: four sides, four turns in place."""
+    for side in range(4):
+        begin = jackal.truth().pose.plane
+        heading = side * math.pi / 2
+        while math.hypot(jackal.truth().pose.x - begin.x, jackal.truth().pose.y - begin.y) < 2.0 - 0.04:
+            off = math.remainder(heading - jackal.truth().pose.yaw, 2 * math.pi)
+            jackal.drive(Twist(0.5, 0.0, 2 * off))
+            jackal.step(12)
+        jackal.drive(Twist())
+        jackal.step(120)
+        while (left := math.remainder(heading + math.pi / 2 - jackal.truth().pose.yaw, 2 * math.pi)) > 0.01:
+            jackal.drive(Twist(0.0, 0.0, min(1.0, 2 * left + 0.1)))
+            jackal.step(12)
+        jackal.drive(Twist())
+        jackal.step(60)
+    pose = jackal.truth().pose
+    assert math.hypot(pose.x, pose.y) < 0.15
+    assert math.remainder(pose.yaw, 2 * math.pi) == pytest.approx(0.0, abs=0.05)
+
+
+def test_the_jackal_turns_in_place_and_its_wheels_slip(jackal):
+    jackal.drive(Twist(0.0, 0.0, 1.0))
+    jackal.step(240)
+    begin, rolled = jackal.truth().pose, jackal.encoders()
+    jackal.step(480)
+    end, after = jackal.truth().pose, jackal.encoders()
+    turned = math.remainder(end.yaw - begin.yaw, 2 * math.pi)
+    by_wheels = (after[1] - rolled[1] - after[0] + rolled[0]) * 0.098 / 0.37559
+    assert math.hypot(end.x - begin.x, end.y - begin.y) < 0.1
+    assert 1.2 < by_wheels / turned < 2.0
