@@ -1,0 +1,44 @@
+"""Every scenario and world that the documentation shows is valid."""
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from simscen.loading.anyfile import problems_of
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+BLOCK = re.compile(r"^```yaml\n(.*?)^```", re.MULTILINE | re.DOTALL)
+
+
+def blocks():
+    for page in PAGES:
+        for match in BLOCK.finditer(page.read_text(encoding="utf-8")):
+            if match[1].startswith("simscen: 1") or "\nsimscen: 1\n" in match[1]:
+                line = page.read_text(encoding="utf-8")[: match.start()].count("\n") + 2
+                yield pytest.param(match[1], id=f"{page.relative_to(ROOT)}:{line}")
+
+
+@pytest.fixture(scope="module")
+def project(tmp_path_factory):
+    root = tmp_path_factory.mktemp("docs")
+    shutil.copytree(ROOT / "worlds", root / "worlds")
+    (root / "scenarios" / "theme").mkdir(parents=True)
+    return root
+
+
+@pytest.mark.parametrize("block", blocks())
+def test_a_complete_example_is_valid(block, project):
+    kind = "scenario" if "\npass:" in block else "robot" if "\ndrive:" in block else "world"
+    folder = "scenarios/theme" if "../../worlds" in block else "scenarios"
+    file = project / folder / f"example.{kind}.yaml"
+    file.write_text(block, encoding="utf-8")
+    found, problems = problems_of(file, project, ())
+    assert found == kind
+    assert [f"{problem.place}: {problem.message}" for problem in problems] == []
+
+
+def test_the_documentation_has_examples():
+    assert len(list(blocks())) >= 3
