@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 from typing_extensions import assert_never
 
 from simscen.core.belief import Estimate
@@ -11,6 +12,8 @@ from simscen.core.time import Clock
 from simscen.model import stack as model
 from simscen.stack.behaviors.motions import BackUp, ClearCostmap, Spin, Wait
 from simscen.stack.collision_monitor import CollisionMonitor
+from simscen.stack.controllers.dwb import DynamicWindowController
+from simscen.stack.controllers.mppi import MppiController
 from simscen.stack.controllers.regulated_pure_pursuit import RegulatedPurePursuit
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.footprint import Footprint
@@ -36,8 +39,8 @@ def build_stack(
 ) -> Stack:
     """The stack of a specification, ready to `start`.
 
-    Its random streams are "localizer" and "planner#1", "planner#2", … for the plans of a run. Raises ValueError when
-    a rate does not divide the clock.
+    Its random streams are "localizer", "controller" and "planner#1", "planner#2", … for the plans of a run. Raises
+    ValueError when a rate does not divide the clock.
     """
     robot = surroundings.robot
     period = clock.period(spec.controller_frequency)
@@ -45,7 +48,7 @@ def build_stack(
     journal: list[Event] = []
     costmap = Costmap(spec.costmap, surroundings)
     footprint = Footprint(robot, costmap.view.resolution)
-    controller = build_controller(spec.controller, robot, footprint, seconds)
+    controller = build_controller(spec.controller, robot, footprint, seconds, streams.generator("controller"))
     localizer = build_localizer(spec.localizer, surroundings, Estimate(None), streams.generator("localizer"))
     navigator = Navigator(
         spec.planner,
@@ -75,13 +78,17 @@ def build_stack(
     )
 
 
-def build_controller(spec: model.Controller, robot: RobotModel, footprint: Footprint, period: float) -> Controller:
-    """The controller of a specification, called every `period` seconds."""
+def build_controller(
+    spec: model.Controller, robot: RobotModel, footprint: Footprint, period: float, chance: np.random.Generator
+) -> Controller:
+    """The controller of a specification, called every `period` seconds; `chance` is its own random stream."""
     match spec:
         case model.RegulatedPurePursuit():
             return RegulatedPurePursuit(spec, robot, footprint, period)
-        case model.DynamicWindow() | model.Mppi():
-            raise NotImplementedError(spec.type)
+        case model.DynamicWindow():
+            return DynamicWindowController(spec, robot, footprint, period)
+        case model.Mppi():
+            return MppiController(spec, robot, footprint, period, chance)
         case _:
             assert_never(spec)
 

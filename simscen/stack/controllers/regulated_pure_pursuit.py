@@ -4,11 +4,12 @@ import math
 
 import numpy as np
 
-from simscen.core.geometry import Pose2, wrap
+from simscen.core.geometry import Pose2
 from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import ErrorCode, Goal, Path
 from simscen.model.stack import RegulatedPurePursuit as RppSpec
 from simscen.stack.arcs import poses_along
+from simscen.stack.controllers.goal_pose import GoalPose
 from simscen.stack.controllers.tracking import PathTracker
 from simscen.stack.footprint import Footprint, distances
 from simscen.stack.lookahead import time_free
@@ -24,19 +25,19 @@ class RegulatedPurePursuit:
     """Steers at a carrot on the path and regulates its speed by curvature, nearness of obstacles and of the goal."""
 
     def __init__(self, spec: RppSpec, robot: RobotModel, footprint: Footprint, period: float) -> None:
-        self._spec, self._robot, self._footprint, self._period = spec, robot, footprint, period
+        self._spec, self._robot, self._footprint = spec, robot, footprint
         self._desired = min(spec.desired_linear_vel or DEFAULT_SPEED, robot.max_linear)
-        self._turn = min(spec.rotate_to_heading_angular_vel, robot.max_angular)
+        self._goal_pose = GoalPose(robot, spec.rotate_to_heading_angular_vel, spec.max_angular_accel, period)
         self._limit: float | None = None
         self._track: PathTracker | None = None
         self._arc: tuple[Pose2, Twist] | None = None
-        self._at_goal = False
 
     def set_path(self, path: Path) -> None:
         """Follow this path from now on."""
         if not len(path.points):
             raise NavigationFailure(ErrorCode.INVALID_PATH, "the path has no points")
-        self._track, self._at_goal = PathTracker(path), False
+        self._track = PathTracker(path)
+        self._goal_pose.reset()
 
     def set_speed_limit(self, limit: float | None) -> None:
         """Drive no faster than this in m/s; None lifts the limit."""
@@ -58,11 +59,10 @@ class RegulatedPurePursuit:
         reach = self._lookahead(twist.vx)
         x, y = track.carrot(pose, reach)
         carrot = pose.inverse().apply(np.array([[x, y]]))[0].tolist()
-        to_goal = math.hypot(goal.pose.x - pose.x, goal.pose.y - pose.y)
-        if self._arrived(to_goal, carrot, goal):
-            command = self._rotate(wrap(goal.pose.yaw - pose.yaw), twist)
+        if self._goal_pose.reached(pose, twist, goal, track.remaining()):
+            command = self._goal_pose.turn_to_goal(pose, goal, twist)
         elif self._should_rotate(carrot):
-            command = self._rotate(math.atan2(carrot[1], carrot[0]), twist)
+            command = self._goal_pose.turn(math.atan2(carrot[1], carrot[0]), twist)
         else:
             command = self._drive(carrot, pose, costmap)
         command = self._within_free_way(command, pose, costmap, math.hypot(*carrot))
@@ -75,25 +75,10 @@ class RegulatedPurePursuit:
             return spec.lookahead_dist
         return min(max(abs(speed) * spec.lookahead_time, spec.min_lookahead_dist), spec.max_lookahead_dist)
 
-    def _arrived(self, to_goal: float, carrot: list[float], goal: Goal) -> bool:
-        """Whether to stop driving and turn to the goal's heading: at the goal, or beside it with the goal behind."""
-        assert self._track is not None
-        near = to_goal <= 0.2 * goal.xy_tolerance
-        passed = to_goal <= 0.8 * goal.xy_tolerance and carrot[0] <= 0.0 and self._track.remaining() < 0.1
-        self._at_goal = to_goal <= goal.xy_tolerance and (self._at_goal or near or passed)
-        return self._at_goal and self._robot.turning_radius == 0.0
-
     def _should_rotate(self, carrot: list[float]) -> bool:
         if not self._spec.use_rotate_to_heading or self._robot.turning_radius > 0.0:
             return False
         return abs(math.atan2(carrot[1], carrot[0])) > self._spec.rotate_to_heading_min_angle
-
-    def _rotate(self, angle: float, twist: Twist) -> Twist:
-        """Turn in place by `angle`, no faster than it can stop at the end of it."""
-        stopping = math.sqrt(2.0 * self._spec.max_angular_accel * 0.8 * abs(angle))
-        speed = math.copysign(min(self._turn, stopping), angle)
-        change = self._spec.max_angular_accel * self._period
-        return Twist(0.0, 0.0, min(max(speed, twist.wz - change), twist.wz + change))
 
     def _drive(self, carrot: list[float], pose: Pose2, costmap: CostmapView) -> Twist:
         square = carrot[0] ** 2 + carrot[1] ** 2

@@ -1,0 +1,49 @@
+"""Turning in place to the goal's heading: what every controller does once it stands on its goal."""
+
+import math
+
+from simscen.core.geometry import Pose2, wrap
+from simscen.core.motion import Twist
+from simscen.core.navigation import Goal
+from simscen.stack.protocols import RobotModel
+
+ON_THE_SPOT, PASSED = 0.45, 0.8
+"""Parts of the goal's xy tolerance: so near, stop driving; so near with the goal behind, too."""
+
+STANDING = 0.01
+"""m/s. A controller that has come to rest inside the tolerance is as near as it gets."""
+
+
+class GoalPose:
+    """Remembers that the position is reached, so that turning does not start another approach."""
+
+    def __init__(self, robot: RobotModel, fastest: float, acceleration: float, period: float) -> None:
+        self._can_turn = robot.turning_radius == 0.0
+        self._fastest = min(fastest, robot.max_angular)
+        self._acceleration, self._period = acceleration, period
+        self._there = False
+
+    def reset(self) -> None:
+        """A new path."""
+        self._there = False
+
+    def reached(self, pose: Pose2, twist: Twist, goal: Goal, remaining: float) -> bool:
+        """Whether to stop driving and to turn to the goal's heading; `remaining` metres of path are left."""
+        distance = goal.pose.distance(pose)
+        dx, dy = goal.pose.x - pose.x, goal.pose.y - pose.y
+        behind = dx * math.cos(pose.yaw) + dy * math.sin(pose.yaw) <= 0.0
+        near = distance <= ON_THE_SPOT * goal.xy_tolerance or (abs(twist.vx) < STANDING and remaining < 0.2)
+        passed = distance <= PASSED * goal.xy_tolerance and behind and remaining < 0.1
+        self._there = distance <= goal.xy_tolerance and (self._there or near or passed)
+        return self._there and self._can_turn
+
+    def turn(self, angle: float, twist: Twist) -> Twist:
+        """Turn in place by `angle`, no faster than the base can stop at the end of it."""
+        stopping = math.sqrt(1.6 * self._acceleration * abs(angle))
+        speed = math.copysign(min(self._fastest, stopping), angle)
+        change = self._acceleration * self._period
+        return Twist(0.0, 0.0, min(max(speed, twist.wz - change), twist.wz + change))
+
+    def turn_to_goal(self, pose: Pose2, goal: Goal, twist: Twist) -> Twist:
+        """Turn to the goal's heading."""
+        return self.turn(wrap(goal.pose.yaw - pose.yaw), twist)
