@@ -4,7 +4,7 @@ import signal
 from pathlib import Path
 
 from simscen.core.session import Artifacts, Outcome, RunFailure, RunFinished
-from simscen.judge.result import from_json
+from simscen.judge.result import RunResult, from_json
 from simscen.run.confine import MEMORY_BYTES
 from simscen.run.jobs import Job, ProcessEnd
 
@@ -13,38 +13,43 @@ TAIL_LINES = 20
 
 def told(job: Job, end: ProcessEnd | None) -> RunFinished:
     """The answer to a run. It passed or failed only if its process ended by itself, with status 0 and a last word."""
-    key, scenario, folder = job.key, job.scenario, job.folder
-    failure = _failure(end, folder)
-    wall = end.wall if end else 0.0
-    if failure:
-        artifacts = Artifacts(folder=str(folder))
+    failure = _failure(end, job.folder)
+    result = _result(job.folder) if failure is None else failure
+    if isinstance(result, RunFailure):
         return RunFinished(
-            key,
-            scenario.path,
+            job.key,
+            job.scenario.path,
             1,
             Outcome.ERROR,
-            wall=wall,
-            artifacts=artifacts,
-            error=failure,
-            again=f"simscen run {scenario.path} --seed {key.seed}",
+            wall=end.wall if end else 0.0,
+            artifacts=Artifacts(folder=str(job.folder)),
+            error=result,
+            again=f"simscen run {job.scenario.path} --seed {job.key.seed}",
         )
-    result = from_json((folder / "result.json").read_text(encoding="utf-8"))
+    assert end is not None
     return RunFinished(
-        key=key,
-        path=scenario.path,
+        key=job.key,
+        path=job.scenario.path,
         line=1,
         outcome=result.outcome,
         verdicts=result.verdicts,
         lines=result.lines,
         simulated=result.simulated,
-        wall=wall,
+        wall=end.wall,
         ended=result.ended,
         metrics=tuple(sorted(result.metrics.items())),
         error=result.error,
-        artifacts=_artifacts(folder),
+        artifacts=_artifacts(job.folder),
         again=result.again,
         tick_rate=result.tick_rate,
     )
+
+
+def _result(folder: Path) -> RunResult | RunFailure:
+    try:
+        return from_json((folder / "result.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        return RunFailure("crashed", f"its result cannot be read: {error}", _tail(folder / "worker.log"))
 
 
 def _artifacts(folder: Path) -> Artifacts:

@@ -40,6 +40,9 @@ def perform(job, tell):
         case "kill-parent":
             os.kill(os.getppid(), signal.SIGKILL)
             time.sleep(60)
+        case "garbled":
+            (job.folder / "result.json").write_text('{"outcome": "passed"}')
+            return {"outcome": "passed"}
     (job.folder / "result.json").write_text(RESULT)
     return {"outcome": "passed"}
 

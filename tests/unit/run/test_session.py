@@ -58,6 +58,7 @@ def test_a_run_that_ends_well_is_answered_with_its_result(session):
         ("sys-exit", "crashed", "exited 0"),
         ("exception", "crashed", "ZeroDivisionError: the controller divided by zero (faulty_zygote.py:"),
         ("memory", "out-of-memory", "more memory than it may"),
+        ("garbled", "crashed", "its result cannot be read"),
         ("grandchild", "crashed", "left a process behind"),
     ],
 )
