@@ -1,5 +1,6 @@
 """Signals that criteria read off a trace. All are checked to be finite: nan compares false and would hide a failure."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,7 +74,7 @@ def drive(trace: Trace) -> Drive:
     kept, lengths = [0], [0.0]
     xs, ys = poses.values[:, 0].tolist(), poses.values[:, 1].tolist()
     for k in range(1, len(xs)):
-        step = float(np.hypot(xs[k] - xs[kept[-1]], ys[k] - ys[kept[-1]]))
+        step = math.hypot(xs[k] - xs[kept[-1]], ys[k] - ys[kept[-1]])
         if k in jumps:
             kept.append(k)
             lengths.append(0.0)

@@ -11,7 +11,7 @@ from simscen.report.wordsof import broken, complaints, failure, label, place
 
 Role = Literal["plain", "name", "good", "bad", "odd", "quiet"]
 
-NAME_WIDTH = 36
+NAME_WIDTH = 44
 TAIL = 12
 SIGNS = {Outcome.PASSED: ("✓", "good"), Outcome.FAILED: ("✗", "bad"), Outcome.ERROR: ("!", "odd")}
 

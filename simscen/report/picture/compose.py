@@ -22,7 +22,8 @@ def draw(scene: Scene) -> Image.Image:
     map_ = _map(scene)
     words = sidebar(scene, map_.height)
     image = Image.new("RGB", (map_.width + WIDTH, HEADER + max(map_.height, words.height)), palette.PAGE)
-    image.paste(map_, (0, HEADER))
+    image.paste(palette.UNKNOWN, (0, HEADER, map_.width, image.height))
+    image.paste(map_, (0, HEADER + (image.height - HEADER - map_.height) // 2))
     image.paste(words, (map_.width, HEADER))
     _header(image, scene)
     return image

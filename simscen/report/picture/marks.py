@@ -42,20 +42,23 @@ def draw_plans(canvas: Canvas, scene: Scene) -> None:
 
 
 def draw_objects(canvas: Canvas, scene: Scene) -> None:
-    """Spawned and moving things: their way, some ghosts of them on it, and themselves where they ended."""
+    """Spawned and moving things: where they ended, their way, and ghosts on it in the colour of their time.
+
+    A ghost has the colour that the robot's way has where the robot was at that moment.
+    """
     shapes = outlines(scene.trace, scene.bodies)
     spawned = {event.name: pose_of(event) for event in scene.trace.of_kind("object.spawned")}
     for name in sorted(shapes):
         samples = scene.trace.objects.get(name)
-        poses = _ghosts(samples) if samples is not None and len(samples) else []
-        poses = poses or ([spawned[name]] if name in spawned else [])
-        if samples is not None and len(poses) > 1:
-            canvas.dashes(_thinned(samples.values[:, :2], canvas), palette.OBJECT, 1.2)
-        for pose in poses[:-1]:
-            canvas.polygon(pose.apply(shapes[name]), (*palette.OBJECT, 40), None)
-        for pose in poses[-1:]:
-            canvas.polygon(pose.apply(shapes[name]), (*palette.OBJECT, 150), palette.OBJECT)
-            u, v = canvas.pixel(pose.x, pose.y)
+        last = spawned.get(name)
+        if samples is not None and len(samples):
+            last = _pose(samples, -1)
+            for k in _ghosts(samples):
+                colour = palette.ramp(int(samples.ticks[k]) / max(scene.trace.end, 1))
+                canvas.polygon(_pose(samples, k).apply(shapes[name]), (*colour, 36), colour, 1.0)
+        if last is not None:
+            canvas.polygon(last.apply(shapes[name]), (*palette.OBJECT, 150), palette.OBJECT)
+            u, v = canvas.pixel(last.x, last.y)
             canvas.note(Note(u, v, shown(name), 12, palette.OBJECT, "mm", halo=palette.FREE))
 
 
@@ -145,10 +148,18 @@ def round_step(seconds: float) -> float:
     return next(power * factor for factor in (1, 2, 5, 10) if seconds / (power * factor) <= 10)
 
 
-def _ghosts(samples: Samples) -> list[Pose2]:
-    moved = float(np.ptp(samples.values[:, :2], axis=0).max(initial=0.0)) > 0.02
-    chosen = np.linspace(0, len(samples) - 1, _GHOSTS).round().astype(int) if moved else [len(samples) - 1]
-    return [Pose2(*row) for row in samples.values[chosen, :3].tolist()]
+def _ghosts(samples: Samples) -> list[int]:
+    """Samples evenly spread over the way of a thing, without the last; none of a thing that stood still."""
+    steps = np.hypot(*np.diff(samples.values[:, :2], axis=0).T)
+    way = np.concatenate(([0.0], np.cumsum(steps)))
+    if way[-1] < 0.02:
+        return []
+    chosen = np.searchsorted(way, np.linspace(0, way[-1], _GHOSTS)[:-1], side="right") - 1
+    return sorted(set(chosen.tolist()))
+
+
+def _pose(samples: Samples, k: int) -> Pose2:
+    return Pose2(*samples.values[k, :3].tolist())
 
 
 def _thinned(points: Array, canvas: Canvas) -> Array:

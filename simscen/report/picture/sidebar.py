@@ -90,7 +90,7 @@ def _legend(step: float) -> list[tuple[str, Sample]]:
         ("plans", lambda d, x, y: d.line([(x, y), (x + 24, y)], fill=palette.PLAN, width=4)),
         ("goal, its tolerance and heading", _ring),
         ("robot at the end", _robot),
-        ("spawned or moving object", _block),
+        ("object at the end; before, in its time's colour", _block),
         ("collision", lambda d, x, y: d.regular_polygon((x + 12, y, 7), 5, fill=palette.RED)),
         ("where a criterion failed", lambda d, x, y: _tick_or_cross(d, x + 12, y, palette.RED)),
     ]

@@ -1,0 +1,114 @@
+"""report.html: one file that shows a session, pictures included; no script, nothing loaded from elsewhere."""
+
+import base64
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+
+from simscen.core.session import Outcome, RunFinished
+from simscen.judge.wording import comparison, subject, tightest
+from simscen.report.text import one_line, visible
+from simscen.report.wordsof import broken, complaints, failure, place
+
+MOST_PICTURES = 400
+"""A picture weighs some 40 kB; more of them make a page that no browser likes."""
+
+_STYLE = """
+:root { color-scheme: light; font: 15px/1.45 system-ui, sans-serif; color: #262a30; }
+body { max-width: 1180px; margin: 32px auto; padding: 0 20px; }
+h1 { font-size: 22px; margin: 0 0 4px; } .quiet { color: #6f757d; }
+details { border: 1px solid #dee0e3; border-radius: 8px; margin: 8px 0; }
+summary { display: flex; gap: 14px; align-items: baseline; padding: 9px 14px; cursor: pointer; list-style: none; }
+summary .name { font-weight: 600; flex: 1; overflow-wrap: anywhere; }
+.pill { border-radius: 5px; color: #fff; padding: 1px 9px; font-size: 13px; text-transform: uppercase; }
+.passed { background: #1c8042; } .failed { background: #c81e28; } .error { background: #be7800; }
+.in { padding: 4px 16px 14px; } table { border-collapse: collapse; width: 100%; margin: 6px 0 12px; }
+td, th { text-align: left; padding: 4px 10px 4px 0; border-top: 1px solid #eceef0; vertical-align: top; }
+td.margin { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+.bad td:first-child { color: #c81e28; font-weight: 600; } .odd td:first-child { color: #be7800; font-weight: 600; }
+img { max-width: 100%; border: 1px solid #dee0e3; border-radius: 6px; } code, pre { font-size: 13px; }
+pre { background: #f4f5f6; padding: 10px; border-radius: 6px; overflow-x: auto; white-space: pre-wrap; }
+"""
+
+
+def to_html(runs: Sequence[RunFinished], title: str = "simscen") -> str:
+    """The page; what did not pass comes first and stands open. Pictures are read from the runs' artifacts."""
+    order = [Outcome.ERROR, Outcome.FAILED, Outcome.PASSED]
+    ordered = sorted(runs, key=lambda run: (order.index(run.outcome), run.path, run.key))
+    counts = ", ".join(
+        f"{number} {outcome.value}"
+        for outcome in (Outcome.PASSED, Outcome.FAILED, Outcome.ERROR)
+        if (number := sum(run.outcome is outcome for run in runs)) or outcome is Outcome.PASSED
+    )
+    simulated = sum(run.simulated for run in ordered)
+    body = "\n".join(_run(run, number < MOST_PICTURES) for number, run in enumerate(ordered))
+    return (
+        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">\n'
+        '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; img-src data:; '
+        "style-src 'unsafe-inline'\">\n"
+        f"<title>{_text(title)}: {counts}</title><style>{_STYLE}</style></head>\n<body>\n"
+        f'<h1>{counts}</h1><p class="quiet">{len(runs)} runs, {simulated:.0f} s simulated</p>\n{body}\n</body></html>\n'
+    )
+
+
+def _run(run: RunFinished, with_picture: bool) -> str:
+    label = ", ".join(part for part in (f"seed {run.key.seed}", run.key.variation) if part)
+    nearest = f"tightest: {tightest(run.verdicts)}" if run.outcome is Outcome.PASSED else ""
+    opened = "" if run.outcome is Outcome.PASSED else " open"
+    return (
+        f"<details{opened}><summary>"
+        f'<span class="pill {run.outcome.value}">{run.outcome.value}</span>'
+        f'<span class="name">{_text(run.key.scenario)}</span><span class="quiet">{_text(label)}</span>'
+        f'<span class="quiet">{run.simulated:.1f} s</span><span class="quiet">{_text(nearest)}</span></summary>'
+        f'<div class="in">{_why(run)}{_verdicts(run)}{_picture(run) if with_picture else ""}{_metrics(run)}'
+        f"{_again(run)}</div></details>"
+    )
+
+
+def _why(run: RunFinished) -> str:
+    if run.outcome is not Outcome.ERROR:
+        return ""
+    tail = failure(run)[2]
+    return f"<p><b>{_text(broken(run))}</b></p>" + (f"<pre>{escape(visible(tail))}</pre>" if tail else "")
+
+
+def _verdicts(run: RunFinished) -> str:
+    lines = dict(zip(run.verdicts, run.lines, strict=True)) if run.lines else {}
+    rows = []
+    for verdict in run.verdicts:
+        for finding in verdict.findings:
+            status = finding.status.value
+            look = {"pass": "", "fail": "bad"}.get(status, "odd")
+            margin = "" if finding.margin is None else f"{finding.margin:+.3g} {finding.unit}".rstrip()
+            details = "".join(f'<div class="quiet">{_text(text)}</div>' for text in finding.detail)
+            rows.append(
+                f'<tr class="{look}"><td>{status}</td><td>{_text(subject(verdict, finding))}</td>'
+                f'<td>{_text(comparison(finding))}{details}</td><td class="margin">{_text(margin)}</td>'
+                f'<td class="quiet">{_text(place(run, lines.get(verdict, 0)))}</td></tr>'
+            )
+    head = "<tr><th></th><th>criterion</th><th>measured</th><th>margin</th><th>written in</th></tr>"
+    return f"<table>{head}{''.join(rows)}</table>" if rows else ""
+
+
+def _picture(run: RunFinished) -> str:
+    """The picture inside the page; one that has gone since is left out."""
+    path = Path(run.artifacts.picture)
+    if not run.artifacts.picture or not path.is_file():
+        return ""
+    data = base64.b64encode(path.read_bytes()).decode("ascii")
+    return f'<img alt="map of the run" loading="lazy" src="data:image/png;base64,{data}">'
+
+
+def _metrics(run: RunFinished) -> str:
+    told = [f"{name} {value:.4g}" for name, value in run.metrics if value is not None]
+    return f'<p class="quiet">{_text(" · ".join(told))}</p>' if told else ""
+
+
+def _again(run: RunFinished) -> str:
+    warned = [complaint.message for complaint in complaints(run) if complaint.warning]
+    notes = "".join(f"<p>warning: {_text(message)}</p>" for message in warned)
+    return notes + (f"<p>again: <code>{_text(run.again)}</code></p>" if run.again else "")
+
+
+def _text(text: str) -> str:
+    return escape(one_line(text))
