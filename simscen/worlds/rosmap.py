@@ -67,11 +67,11 @@ def save_map(grid: OccupancyGrid, yaml_path: Path) -> None:
     height, width = grid.shape
     header = f"P5\n{width} {height}\n255\n".encode()
     image_path.write_bytes(header + _greys(grid.cells, trinary)[::-1].tobytes())
-    origin = ", ".join(_decimal(value) for value in grid.origin)
+    origin = ", ".join(decimal(value) for value in grid.origin)
     lines = (
         f"image: {json.dumps(image_path.name)}",
         f"mode: {'trinary' if trinary else 'raw'}",
-        f"resolution: {_decimal(grid.resolution)}",
+        f"resolution: {decimal(grid.resolution)}",
         f"origin: [{origin}]",
         "negate: 0",
         "occupied_thresh: 0.65",
@@ -86,6 +86,6 @@ def _greys(cells: npt.NDArray[np.int8], trinary: bool) -> npt.NDArray[np.uint8]:
     return np.select((cells == FREE, cells == OCCUPIED), (FREE_GREY, OCCUPIED_GREY), UNKNOWN_GREY).astype(np.uint8)
 
 
-def _decimal(value: float) -> str:
+def decimal(value: float) -> str:
     """The shortest decimal that reads back as the same number; without an exponent, which YAML 1.1 takes for text."""
     return np.format_float_positional(value, unique=True, trim="0")
