@@ -14,8 +14,8 @@ from simscen.worlds.meshing import fuse
 from simscen.worlds.rosmap import decimal
 from simscen.worlds.section import outlines
 
-SHEET = 0.02
-"""Thickness in metres of the walls that stand for the outline of a mesh."""
+SHEET = 0.004
+"""Thickness in metres of the walls that stand for the outline of a mesh: half of it is outside, 2 mm."""
 MOST_POINTS = 10_000
 """Of one wall in the language."""
 
