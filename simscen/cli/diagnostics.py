@@ -4,6 +4,7 @@ import json
 import os
 import re
 import sys
+import textwrap
 import unicodedata
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -17,7 +18,9 @@ from simscen.report.text import ascii_only, one_line
 MOST_A_FILE = 50
 WIDEST = 100
 
-_TOKEN = re.compile(r"""'(?:[^']|'')*'|"(?:[^"\\]|\\.)*"|(?:[^\s,\]\}\[\{:#]|:(?=\S)|(?<=\S)#)+""")
+_WORD = r"(?:[^\s,\]\}\[\{:#]|:(?=\S)|(?<=\S)#)+"
+_TOKEN = re.compile(rf"""'(?:[^']|'')*'|"(?:[^"\\]|\\.)*"|-(?=\s)|{_WORD}(?: +{_WORD})*""")
+"""A scalar as it is written: quoted, or words up to the next sign that means something to YAML."""
 _WORKFLOW_COMMAND = re.compile(r"^(\s*):(?=:)", re.MULTILINE)
 
 
@@ -71,8 +74,16 @@ def _block(problem: Problem) -> str:
     head = f"{harmless(problem.place)}: {problem.severity}[{problem.code}] {harmless(problem.message)}"
     lines = [head, *(_excerpt(problem) if problem.source.strip() and problem.line else [])]
     if problem.hint:
-        margin = " " * (len(str(problem.line)) + 5) if problem.source.strip() else "     "
-        lines.append(f"{margin}= {harmless(problem.hint)}")
+        margin = " " * (len(str(problem.line)) + 5)
+        lines.append(
+            textwrap.fill(
+                harmless(problem.hint),
+                WIDEST,
+                initial_indent=f"{margin}= ",
+                subsequent_indent=f"{margin}  ",
+                break_long_words=False,
+            )
+        )
     return "\n".join(lines)
 
 

@@ -79,8 +79,8 @@ class Assets:
         shipped = shipped_robots()
         if written in shipped:
             return self.robot_file(shipped[written], bundled=True)
-        hint = suggestion(written, shipped) + "; or give the path of a *.robot.yaml or .urdf file"
-        self._add(place, "SC023", f"no robot called {quoted(written)} ships with simscen", hint.lstrip("; "))
+        hint = f"{suggestion(written, shipped)} (or the path of a *.robot.yaml or .urdf file)"
+        self._add(place, "SC023", f"no robot called {quoted(written)} ships with simscen", hint)
         return None
 
     def robot_file(self, path: Path, bundled: bool = False) -> LoadedRobot | None:

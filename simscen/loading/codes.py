@@ -36,6 +36,7 @@ CODES = {
     "SC320": "A map image cannot be used.",
     "SC330": "A map would have too many cells.",
     "SC331": "A map would become too many walls.",
+    "SC400": "The variations of a scenario, or what is asked of their statistics, cannot be used.",
     "SC800": "The log cannot be read.",
     "SC801": "The file is not a log of simscen.",
     "SC802": "The log is damaged.",

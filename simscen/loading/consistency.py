@@ -98,5 +98,6 @@ def _uneven(
             place = value_place(loaded.tree, tick_rate)
         else:
             place = value_place(tree, keys) if real_keys(tree, keys) == keys else key_place(tree, keys)
-        subject = ".".join(str(key) for key in keys)
+        whose = "" if tree is loaded.tree else f" of robot `{loaded.robot.name}`"
+        subject = ".".join(str(key) for key in keys) + whose
         yield loaded.problem_at(place, "SC034", f"{subject}: {error}")

@@ -7,6 +7,7 @@ from pathlib import Path
 from simscen.core.errors import InvalidInput, NothingSelected
 from simscen.core.problems import Problem
 from simscen.loading.messages import quoted
+from simscen.loading.paths import is_folder
 from simscen.loading.scenario import scenario_id
 
 SCENARIO = (".scenario.yaml", ".scenario.yml")
@@ -28,14 +29,14 @@ def discover(paths: Sequence[Path], root: Path, suffixes: tuple[str, ...] = SCEN
         where = ", ".join(quoted(str(path)) for path in paths)
         raise NothingSelected(f"no scenarios found in {where}; a folder is searched for *{suffixes[0]}")
     files = sorted(found, key=lambda file: file.parts)
-    if problems := list(_same_ids(files, root.resolve())):
+    if problems := list(_same_ids(files, Path(os.path.realpath(root)))):
         raise InvalidInput(problems)
     return files
 
 
 def default_root(paths: Iterable[Path]) -> Path:
     """The repository that holds all of `paths`, or else their common folder."""
-    folders = [path.resolve() if path.is_dir() else path.resolve().parent for path in paths]
+    folders = [Path(os.path.realpath(path if is_folder(path) else path.parent)) for path in paths]
     common = Path(os.path.commonpath(folders)) if folders else Path.cwd()
     return next((folder for folder in (common, *common.parents) if (folder / ".git").exists()), common)
 
@@ -45,7 +46,7 @@ def _there(path: Path) -> bool:
 
 
 def _files(path: Path, suffixes: tuple[str, ...]) -> Iterator[Path]:
-    if not path.is_dir():
+    if not is_folder(path):
         yield path
         return
     for folder, below, names in os.walk(path):
@@ -59,8 +60,8 @@ def _same_ids(files: list[Path], root: Path) -> Iterator[Problem]:
     for file in files:
         other = seen.setdefault(scenario_id(file, root).casefold(), file)
         if other != file:
-            message = (
-                f"its id is that of {quoted(str(other.relative_to(root)))}, but for upper and lower case or suffix"
+            mine, its = (
+                str(path.relative_to(root)) if path.is_relative_to(root) else str(path) for path in (file, other)
             )
-            shown = str(file.relative_to(root)) if file.is_relative_to(root) else str(file)
-            yield Problem(shown, 0, 0, "SC040", message, "rename one of them")
+            message = f"has the same id as {quoted(its)}, but for upper and lower case or suffix"
+            yield Problem(mine, 0, 0, "SC040", message, "rename one of them")

@@ -1,6 +1,7 @@
 """What pydantic found wrong, in the words of somebody who writes YAML."""
 
 import difflib
+import re
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
@@ -23,13 +24,14 @@ _BOUNDS = {
     "less_than": ("less than", "lt"),
     "less_than_equal": ("at most", "le"),
 }
+_NUMBER = re.compile(r"[-+]?\d+(\.\d*)?")
+_LEADING_ZERO = re.compile(r"[-+]?0\d")
 _TEXTS = {
     "finite_number": ("SC013", "must be a finite number"),
-    "too_short": ("SC017", "expected at least {min_length} values, got {actual_length}"),
-    "too_long": ("SC017", "expected at most {max_length} values"),
+    "too_short": ("SC017", "expected {min_length} or more values, got {actual_length}"),
+    "too_long": ("SC017", "expected no more than {max_length} values"),
     "string_too_short": ("SC017", "must not be empty"),
     "string_too_long": ("SC017", "longer than {max_length} characters"),
-    "value_error": ("SC016", "{error}"),
 }
 
 
@@ -88,6 +90,13 @@ def explain(kind: str, context: Mapping[str, Any], node: Node, text: str) -> Mes
         return Message(
             "SC014", f"{shown(node)} is not one of the choices", suggestion(word, _choices(str(context["expected"])))
         )
+    if kind == "value_error":
+        told = str(context["error"])
+        return (
+            Message("SC016", "nothing is chosen here", told)
+            if told.startswith("expected one of")
+            else Message("SC016", told)
+        )
     if kind == "quantity":
         return Message("SC015", str(context["problem"]), f"units: {context['units']}; a bare number is SI")
     if "names" in context:
@@ -99,10 +108,8 @@ def explain(kind: str, context: Mapping[str, Any], node: Node, text: str) -> Mes
 def _type_hint(kind: str, node: Node) -> str:
     if not isinstance(node, Leaf) or not isinstance(node.value, str):
         return ""
-    number = node.value.strip().lstrip("+-").replace(".", "", 1)
-    if kind in ("int_type", "float_type") and number.isdigit():
-        leading_zero = len(number) > 1 and number[0] == "0"
-        return "remove the leading zero" if leading_zero else "remove the quotes"
+    if kind in ("int_type", "float_type") and _NUMBER.fullmatch(node.value):
+        return "remove the leading zero" if _LEADING_ZERO.match(node.value) else "remove the quotes"
     if kind == "bool_type" and node.value.lower() in ("yes", "no", "on", "off", "y", "n"):
         return f"write {'true' if node.value.lower() in ('yes', 'on', 'y') else 'false'}"
     return ""

@@ -23,7 +23,7 @@ class Fence:
     @classmethod
     def around(cls, root: Path, world_path: Sequence[Path] = ()) -> "Fence":
         """Folders as given, made absolute with symbolic links followed."""
-        return cls(root.resolve(), tuple(folder.resolve() for folder in world_path))
+        return cls(_real(root), tuple(_real(folder) for folder in world_path))
 
     def find(self, written: str, folder: Path) -> "Path | Refusal":
         """The existing file or folder that `written` means in a file that lies in `folder`.
@@ -36,7 +36,7 @@ class Fence:
         if written.startswith(MODEL):
             missing = Refusal("SC023", f"{quoted(written)} is in no folder of --world-path", _world_path_hint(self))
             return self._in_world_path(written.removeprefix(MODEL)) or missing
-        inside = Path(os.path.realpath(folder / written))
+        inside = _real(folder / written)
         if self.holds(inside):
             try:
                 inside.stat()
@@ -48,14 +48,14 @@ class Fence:
 
     def entered(self, path: Path) -> Path | Problem:
         """The absolute path of a file that the command line names, with links in its folder followed, if inside."""
-        file = path.parent.resolve() / path.name
+        file = _real(path.parent) / path.name
         if self.holds(file):
             return file
         return Problem(str(path), 0, 0, "SC020", "the file is outside the scenario root", "choose one with --root")
 
     def holds(self, path: Path) -> bool:
         """Whether a file, with symbolic links followed, is inside the root or an allowed folder."""
-        real = Path(os.path.realpath(path))
+        real = _real(path)
         return any(real.is_relative_to(allowed) for allowed in (self.root, *self.world_path))
 
     def shown(self, path: Path) -> str:
@@ -65,8 +65,18 @@ class Fence:
     def _in_world_path(self, written: str) -> Path | None:
         if ".." in PurePosixPath(written).parts:
             return None
-        candidates = ((folder, Path(os.path.realpath(folder / written))) for folder in self.world_path)
-        return next((found for folder, found in candidates if found.is_relative_to(folder) and found.exists()), None)
+        candidates = ((folder, _real(folder / written)) for folder in self.world_path)
+        return next((found for folder, found in candidates if found.is_relative_to(folder) and exists(found)), None)
+
+
+def exists(path: Path) -> bool:
+    """Whether there is something; False for names that cannot be, where Path.exists raises."""
+    return os.path.exists(path)  # noqa: PTH110
+
+
+def is_folder(path: Path) -> bool:
+    """Whether it is a folder; False for names that cannot be, where Path.is_dir raises."""
+    return os.path.isdir(path)  # noqa: PTH112
 
 
 @dataclass(frozen=True)
@@ -86,6 +96,11 @@ def _refused_form(written: str) -> Refusal | None:
     if "://" in written and not written.startswith(MODEL):
         return Refusal("SC021", f"{quoted(written)} is a URL", "only relative paths and model://name are read")
     return None
+
+
+def _real(path: Path) -> Path:
+    """With links followed, like Path.resolve, which however raises RuntimeError on a loop."""
+    return Path(os.path.realpath(path))
 
 
 def _outside(written: str) -> Refusal:

@@ -59,6 +59,10 @@ class Quantity:
         """What an editor shows."""
         return f"{self.dimension}, e.g. {self.example}"
 
+    @property
+    def _a_dimension(self) -> str:
+        return f"an {self.dimension}" if self.dimension[0] in "aeiou" else f"a {self.dimension}"
+
     def parse(self, value: Any) -> Any:
         """Turn "90 deg" into radians; leave anything but text to pydantic."""
         if not isinstance(value, str):
@@ -69,11 +73,11 @@ class Quantity:
             return float(match[1]) * units[match[2]]
         if match and any(match[2] in others for others in UNITS.values()):
             other = next(name for name, others in UNITS.items() if match[2] in others)
-            problem = f"`{match[2]}` is a unit of {other}, but this is a {self.dimension}"
+            problem = f"`{match[2]}` is a unit of {other}, but this is {self._a_dimension}"
         elif match:
-            problem = f"unknown unit `{match[2]}` for a {self.dimension}"
+            problem = f"unknown unit `{match[2]}` for {self._a_dimension}"
         else:
-            problem = f"expected a {self.dimension}, got the text `{value}`"
+            problem = f"expected {self._a_dimension}, got the text `{value}`"
         raise PydanticCustomError(
             "quantity", "{problem}; units: {units}", {"problem": problem, "units": ", ".join(units)}
         )

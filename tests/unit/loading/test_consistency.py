@@ -1,0 +1,105 @@
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from simscen.core.problems import Problem
+from simscen.loading.scenario import try_scenario
+
+Write = Callable[[str, str], Path]
+Told = Callable[[str], list[Problem]]
+
+
+@pytest.fixture
+def told(write: Write, scenario: str, tmp_path: Path) -> Told:
+    """What is wrong with the valid scenario after more lines were added to it."""
+
+    def problems(more: str) -> list[Problem]:
+        found = try_scenario(write("a.scenario.yaml", scenario + more), tmp_path)
+        return found if isinstance(found, list) else []
+
+    return problems
+
+
+def test_the_scenario_without_more_is_consistent(told: Told) -> None:
+    assert told("") == []
+
+
+@pytest.mark.parametrize(
+    "trigger",
+    [
+        "{robot_in: {region: hall}}",
+        "{robot_within: {object: cart, distance: 1}}",
+        "{robot_within: {object: box, distance: 1}}",
+        "{event: {name: falls}}",
+        "{event: {name: event-2}}",
+        "{goal: {name: desk, status: reached}}",
+        "{goal: {name: detour, status: reached}}",
+        "{all: [{time: 1}, {not: {any: [{robot_in: {region: hall}}]}}]}",
+    ],
+)
+def test_names_of_the_world_and_of_the_scenario_are_known(told: Told, trigger: str) -> None:
+    events = "- {name: falls, when: {time: 1}, do: {spawn: {name: box, box: [1, 1, 1], ahead: [1, 0]}}}"
+    more = "- {when: {time: 2}, do: [{new_goal: {name: detour, pose: {x: 1, y: 1}}}]}"
+    assert told(f"events:\n  {events}\n  {more}\n  - {{when: {trigger}, do: {{cancel_goal: {{}}}}}}\n") == []
+
+
+@pytest.mark.parametrize(
+    "trigger",
+    [
+        "{robot_in: {region: halls}}",
+        "{robot_within: {region: halls, distance: 1}}",
+        "{robot_within: {object: cartoon, distance: 1}}",
+        "{event: {name: event-2}}",
+        "{goal: {name: goal-1, status: reached}}",
+        "{all: [{time: 1}, {not: {any: [{robot_in: {region: halls}}]}}]}",
+        "{collision: {with: nobody}}",
+    ],
+)
+def test_unknown_names_are_told_wherever_they_stand(told: Told, trigger: str) -> None:
+    problems = told(f"events:\n  - {{when: {trigger}, do: {{cancel_goal: {{}}}}}}\n")
+    assert [(p.code, p.line) for p in problems] == [("SC030", 7)]
+
+
+def test_criteria_may_wait_for_faults_by_label_or_name(told: Told) -> None:
+    faults = "faults: [{sensor: front, off: {}}, {sensor: odom, slip: {}, name: wet}]\n"
+    text = faults + "events: [{name: x, when: {time: 1}, do: {cancel_goal: {}}}]\n"
+    criteria = "".join(f"- stopped_within: {{time: 1, after: {name}}}\n" for name in ("front.off", "wet", "x"))
+    assert told(text + "pass:\n" + criteria)[0].code == "SC007"  # the scenario has a `pass` already
+    assert told(text) == []
+
+
+def test_objects_of_imported_worlds_are_not_second_guessed(write: Write, scenario: str, tmp_path: Path) -> None:
+    write("hall.sdf", "<sdf/>")
+    text = (
+        scenario.replace("room.world.yaml", "hall.sdf").replace("start", "{x: 1, y: 1}").replace("desk", "{x: 1, y: 2}")
+    )
+    more = "events: [{when: {collision: {with: shelf}}, do: {cancel_goal: {}}}]\n"
+    assert not isinstance(try_scenario(write("a.scenario.yaml", text + more), tmp_path), list)
+
+
+def test_a_fault_must_fit_its_sensor(told: Told) -> None:
+    problems = told("faults:\n  - {sensor: front, slip: {left: 10 %}}\n  - {sensor: rear, off: {}}\n")
+    assert [(p.code, p.line, p.col) for p in problems] == [("SC032", 7, 21), ("SC031", 8, 14)]
+    assert problems[0].hint == "it can happen to: odom"
+    assert problems[1].hint == "expected one of: cmd_vel, front, odom"
+
+
+def test_rates_must_divide_the_ticks_where_they_are_written(write: Write, told: Told) -> None:
+    assert [p.place for p in told("stack: {controller_frequency: 7}\n")] == ["a.scenario.yaml:6:31"]
+    robot = (write("x", "").parent / "cube.robot.yaml").read_text()
+    write("cube.robot.yaml", robot.replace("10 Hz", "11 Hz"))
+    problem = told("")[0]
+    assert problem.place == "cube.robot.yaml:8:25"
+    assert problem.message.endswith("11 Hz does not divide 240 Hz; the nearest that does is 10 Hz")
+
+
+def test_two_goals_at_one_place_are_fine_but_two_of_one_name_are_not(
+    write: Write, scenario: str, tmp_path: Path
+) -> None:
+    twice = scenario.replace("[{pose: desk}]", "[{pose: desk}, {pose: start}, {pose: desk}]")
+    assert not isinstance(try_scenario(write("a.scenario.yaml", twice), tmp_path), list)
+    named = scenario.replace("[{pose: desk}]", "[{name: a, pose: desk}, {name: a, pose: start}]")
+    problems = try_scenario(write("b.scenario.yaml", named), tmp_path)
+    assert isinstance(problems, list)
+    assert [p.message for p in problems] == ["goal `a` is there already (first at 4:16)"]
