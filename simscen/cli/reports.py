@@ -1,4 +1,4 @@
-"""What `simscen run` leaves behind: journal, results.json, junit.xml, run.json; and what it prints meanwhile."""
+"""What `simscen run` leaves behind: journal, results.json, junit.xml, report.html, run.json; and what it prints meanwhile."""
 
 import json
 import os
@@ -18,6 +18,7 @@ from simscen.report.console import Reporter, text_reporter
 from simscen.report.github import github_reporter
 from simscen.report.junit import Family, to_xml
 from simscen.report.machine import json_reporter
+from simscen.report.page import to_html
 from simscen.report.results import to_json
 from simscen.run.outfolder import write_atomically
 
@@ -67,6 +68,7 @@ class Reports:
             self.folder / "results.json": to_json(answers, str(self.folder)).encode(),
             self.folder / "junit.xml": to_xml(answers, self._family),
             self.junit: to_xml(answers, self._family),
+            self.folder / "report.html": to_html(answers).encode(),
             self.folder / "run.json": _circumstances(wall),
         }
         written = True
