@@ -30,6 +30,8 @@ WHEEL = """
   <joint name="{side}_joint" type="continuous">
     <parent link="base"/><child link="{side}"/><origin xyz="0.1 {y} 0"/><axis xyz="0 1 0"/>
   </joint>"""
+FRONT_WHEEL = WHEEL.replace('link="base"', 'link="knuckle_{side}"').replace("0.1 {y} 0", "0 0 0").replace(
+    'name="{side}', 'name="front_{side}').replace('link="{side}"', 'link="front_{side}"')  # fmt: skip
 BASE = """
   <link name="base">
     <visual><geometry><mesh filename="package://gone/nowhere.dae"/></geometry></visual>
@@ -279,7 +281,7 @@ def test_a_car_is_steered_by_the_wheels_below_upright_joints(load):
   <link name="knuckle_{side}"/>
   <joint name="steer_{side}" type="revolute"><parent link="base"/><child link="knuckle_{side}"/>
     <origin xyz="0.5 {y} 0"/><axis xyz="0 0 1"/><limit lower="-0.5" upper="0.5" effort="1" velocity="1"/></joint>
-  {WHEEL.format(side="front_" + side, y=0).replace('link="base"', f'link="knuckle_{side}"').replace("0.1 0 0", "0 0 0")}"""
+  {FRONT_WHEEL.format(side=side)}"""
         for side, y in (("left", 0.2), ("right", -0.2))
     )
     drive = {"type": "ackermann", "wheel_radius": 0.05, "wheel_separation": 0.4, "wheel_base": 0.4, "max_steering": 0.5}
@@ -305,7 +307,9 @@ def test_xacro_files_say_what_they_need(tmp_path):
 
 @pytest.mark.skipif(find_spec("xacro") is None, reason="the xacro package is not installed")
 def test_xacro_files_are_expanded(tmp_path):
-    (tmp_path / "robot.urdf.xacro").write_text(robot().replace("<robot ", XACRO[:6] + XACRO[16:57] + " "))
+    (tmp_path / "robot.urdf.xacro").write_text(
+        robot().replace("<robot ", '<robot xmlns:xacro="http://ros.org/wiki/xacro" ')
+    )
     assert robot_body(spec(urdf="robot.urdf.xacro"), tmp_path / "cart.robot.yaml", [tmp_path]).hull
 
 
