@@ -1,4 +1,4 @@
-"""What `simscen run` leaves behind: journal, results.json, junit.xml, report.html, run.json; and what it prints meanwhile."""
+"""What `simscen run` leaves behind, results.json, junit.xml, report.html, run.json, and what it prints meanwhile."""
 
 import json
 import os
