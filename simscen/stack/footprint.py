@@ -14,12 +14,14 @@ Reals = npt.NDArray[np.floating]
 
 def distances(costmap: CostmapView, points: Reals) -> npt.NDArray[np.float32]:
     """Distance in metres (…,) to the nearest lethal cell at points (…, 2); 0 off the costmap."""
-    cells = np.floor((points - np.array(costmap.origin)) * (1.0 / costmap.resolution)).astype(np.int64)
-    rows, columns = cells[..., 1], cells[..., 0]
     height, width = costmap.distance.shape
-    inside = (rows >= 0) & (columns >= 0) & (rows < height) & (columns < width)
-    flat = np.where(inside, rows * width + columns, 0)
-    return np.where(inside, costmap.distance.reshape(-1)[flat], np.float32(0.0))
+    across = (points[..., 0] - costmap.origin[0]) * (1.0 / costmap.resolution)
+    up = (points[..., 1] - costmap.origin[1]) * (1.0 / costmap.resolution)
+    inside = (up >= 0) & (across >= 0) & (up < height) & (across < width)
+    if inside.all():
+        return costmap.distance[up.astype(np.int32), across.astype(np.int32)]
+    rows, columns = np.where(inside, up, 0.0).astype(np.int32), np.where(inside, across, 0.0).astype(np.int32)
+    return np.where(inside, costmap.distance[rows, columns], np.float32(0.0))
 
 
 class Footprint:

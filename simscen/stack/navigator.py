@@ -23,6 +23,8 @@ from simscen.stack.replanning import PlanInForce
 
 BETTER_PERIOD = 2.0
 """Seconds between two looks for a shorter way after obstacles have gone."""
+GONE = 8
+"""Cells of live obstacles that must have gone for that; single cells come and go with the lidar's noise."""
 FAILURE_TOLERANCE = 0.3
 """nav2 controller_server: seconds a controller may fail before it counts."""
 
@@ -61,7 +63,7 @@ class Navigator:
         self._behavior_since = 0.0
         self._retried = False
         self._trouble_since: float | None = None
-        self._checked, self._looked, self._gone = -1, self._clock, self._costmap.gone
+        self._checked, self._looked, self._most = -1, self._clock, 0
 
     def pursue(self, goal: Goal) -> None:
         """Drive to this goal from the next step on."""
@@ -118,11 +120,17 @@ class Navigator:
             if self.plan.blocked(costmap.view):
                 self._adopt(tick, self._compute(tick, goal, pose), "blocked")
                 return
-        if costmap.gone != self._gone and self._clock - self._looked >= BETTER_PERIOD:
-            self._looked, self._gone = self._clock, costmap.gone
+        if self._clock - self._looked >= BETTER_PERIOD and self._something_went(costmap.obstacle_cells):
             other = self._compute(tick, goal, pose)
             if self.plan.worse_than(other):
                 self._adopt(tick, other, "better")
+
+    def _something_went(self, cells: int) -> bool:
+        """Whether clearly fewer cells are marked than at some time since the last look: an obstacle has gone."""
+        self._looked = self._clock
+        gone = cells < self._most - GONE
+        self._most = cells if gone else max(self._most, cells)
+        return gone
 
     def _compute(self, tick: int, goal: Goal, pose: Pose2) -> Path:
         self._plans += 1
@@ -135,7 +143,7 @@ class Navigator:
     def _adopt(self, tick: int, path: Path, reason: str) -> None:
         self.plan = PlanInForce(path, self._radius)
         self._controller.set_path(path)
-        self._looked, self._gone, self._checked = self._clock, self._costmap.gone, self._costmap.view.revision
+        self._looked, self._checked = self._clock, self._costmap.view.revision
         self._note(tick, "plan.made", "", reason=reason, length=round(path.length(), 6))
 
     def _failed(self, tick: int, goal: Goal, pose: Pose2, failure: NavigationFailure) -> Twist:

@@ -41,8 +41,6 @@ class Costmap:
         self._margin = math.ceil(reach / resolution)
         self._revision = 0
         self._newest: dict[str, tuple[Pose2, Scan]] = {}
-        self.gone = 0
-        """Cells that a beam has cleared so far: grows when an obstacle has gone away."""
         self._install(layer, np.zeros(layer.frame.shape, dtype=bool))
 
     @property
@@ -54,6 +52,11 @@ class Costmap:
     def static(self) -> StaticLayer:
         """What never changes."""
         return self._layer_now
+
+    @property
+    def obstacle_cells(self) -> int:
+        """How many cells are marked as live obstacles."""
+        return int(np.count_nonzero(self._live))
 
     def update(self, base: Pose2, scan: Scan) -> None:
         """Clear what the beams pass through, then mark what they hit, seen from the robot at `base`."""
@@ -71,8 +74,6 @@ class Costmap:
         under = seen[self._under_footprint(seen, base)]
         self._live[under[:, 0], under[:, 1]] = False
         changed = np.argwhere(before != live) + corner
-        if len(gone):
-            self.gone += int(np.count_nonzero(~self._live[gone[:, 0], gone[:, 1]]))
         self._newest[scan.sensor] = (base, scan)
         self._refresh(changed)
 

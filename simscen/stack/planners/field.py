@@ -34,6 +34,14 @@ class Field:
         """Distances (n,) at points (n, 2); 0 off the map."""
         return distances(self.costmap, points).astype(np.float64)
 
+    def slopes(self, points: Array) -> tuple[Array, Array]:
+        """Distances (n,) at points (n, 2), and the directions (n, 2) in which they grow, at most 1 m a m each."""
+        h = self.resolution
+        around = points[None] + np.array(((0.0, 0.0), (h, 0.0), (-h, 0.0), (0.0, h), (0.0, -h)))[:, None]
+        middle, east, west, north, south = distances(self.costmap, around).astype(np.float64)
+        slope = np.column_stack((east - west, north - south)) / (2 * h)
+        return middle, np.clip(slope, -1.0, 1.0)
+
     def segment_free(self, ax: float, ay: float, bx: float, by: float, radius: float) -> bool:
         """Whether a disc of `radius` can go straight from a to b.
 

@@ -70,7 +70,7 @@ def with_headings(points: Array, goal: Pose2) -> Array:
     return np.column_stack((points, yaw))
 
 
-def relaxed(field: Field, points: Array, radius: float, wanted: float, rounds: int = 60) -> Array:
+def relaxed(field: Field, points: Array, radius: float, wanted: float, rounds: int = 40) -> Array:
     """An elastic band (Quinlan and Khatib 1993): the points (n, 2) contract and keep `wanted` metres off obstacles.
 
     The result is used only where it is free for a disc of `radius`; otherwise the points come back as they were.
@@ -78,19 +78,12 @@ def relaxed(field: Field, points: Array, radius: float, wanted: float, rounds: i
     if len(points) < 3:
         return points
     band = points.copy()
-    east, north = np.array((field.resolution, 0.0)), np.array((0.0, field.resolution))
     for _ in range(rounds):
         inner = band[1:-1]
         tension = 0.5 * (band[:-2] + band[2:]) - inner
-        clearance = field.many(inner)
+        clearance, slope = field.slopes(inner)
         push = np.clip(wanted - clearance, 0.0, None)[:, None]
-        slope = np.column_stack(
-            (
-                field.many(inner + east) - field.many(inner - east),
-                field.many(inner + north) - field.many(inner - north),
-            )
-        ) / (2 * field.resolution)
-        band[1:-1] = inner + 0.4 * tension + 0.3 * push * np.clip(slope, -1, 1)
+        band[1:-1] = inner + 0.4 * tension + 0.3 * push * slope
     return _blended(field, band, points, radius)
 
 
