@@ -16,6 +16,9 @@ FACES_AT_ONCE = 40_000
 FLOOR = 0.005
 """Faces that lie wholly below this height in m are left to the ground plane, on which wheels roll smoothly."""
 
+STATIC, GROUND = 2, 64
+"""Collision groups: Bullet's own of what never moves, and one that only the ground plane is in."""
+
 PRIMITIVES = (Box, Cylinder, Sphere, Capsule)
 """What the engine knows as such."""
 
@@ -59,7 +62,14 @@ def connect(tick_rate: int, solver_iterations: int) -> int:
 
 def ground(client: int) -> int:
     """The plane z = 0."""
-    return fixed(client, pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client))
+    plane = fixed(client, pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client))
+    pybullet.setCollisionFilterGroupMask(plane, -1, STATIC | GROUND, ~STATIC, physicsClientId=client)
+    return plane
+
+
+def on_ground_only(client: int, body: int, link: int) -> None:
+    """Let a link touch nothing but the ground. In no group, it is in nobody's mask: one match suffices to collide."""
+    pybullet.setCollisionFilterGroupMask(body, link, 0, GROUND, physicsClientId=client)
 
 
 def static_mesh(client: int, mesh: TriangleMesh) -> list[int]:

@@ -38,9 +38,12 @@ class Vehicle:
 
     def _set_up(self, wheel: Wheel, joint: int) -> None:
         xx, yy, zz = wheel.inertia.tensor.diagonal().tolist()  # a wheel turns about y and is round
+        link = joint + 1 if wheel.steered else joint
+        # The ball reaches out beyond a narrow wheel's sides: its guard in the hull stands for it there.
+        engine.on_ground_only(self._client, self.id, link)
         pybullet.changeDynamics(
             self.id,
-            joint + 1 if wheel.steered else joint,
+            link,
             lateralFriction=1.0,
             restitution=0.0,
             linearDamping=0,
