@@ -109,7 +109,7 @@ def _around(built: BuiltWorld, stops: Sequence[Pose2]) -> tuple[float, float, fl
     """The world's bounds, or where it states none those of its map, widened to hold the stops."""
     x0, y0, x1, y1 = built.world.bounds
     corners = [(x0, y0), (x1, y1)]
-    if x0 >= x1 or y0 >= y1:
+    if not any(built.world.bounds):
         height, width = (cells * built.map.resolution for cells in built.map.shape)
         corners = built.map.origin.apply(np.array([[0, 0], [width, 0], [0, height], [width, height]])).tolist()
     points = np.array([*corners, *(stop[:2] for stop in stops)])

@@ -125,3 +125,8 @@ def test_what_is_added_to_a_ros_map_is_drawn_into_it_under_its_yaw():
 def test_a_map_that_would_be_too_large_is_refused_with_its_size():
     with pytest.raises(InvalidInput, match="map too large: 400040 x 400040 cells"):
         grid_of(bounds=(-1e4, -1e4, 1e4, 1e4))
+
+
+def test_a_world_of_places_alone_has_a_map_that_holds_them():
+    built = grid_of(places={"a": Pose2(3, 2), "b": Pose2(8, 2)}, bounds=(3, 2, 8, 2))
+    assert built.values_at(np.array([[3.0, 2.0], [8.0, 2.0]])).tolist() == [FREE, FREE]
