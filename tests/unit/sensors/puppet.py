@@ -1,0 +1,56 @@
+"""A robot that stands or moves as told, and walls to look at, for tests of sensors."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from simscen.core.geometry import Pose2, Pose3
+
+
+@dataclass
+class Puppet:
+    """A SensorView whose truth is set by hand."""
+
+    pose: Pose3 = Pose3()
+    linear: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    angular: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    rolled: tuple[float, ...] = (0.0, 0.0)
+    pressed: bool = False
+
+    def base_pose(self):
+        return self.pose
+
+    def base_velocity(self):
+        return self.linear, self.angular
+
+    def encoders(self):
+        return self.rolled
+
+    def touching(self):
+        return self.pressed
+
+    def image(self, mount, width, height, field_of_view, far):
+        return np.zeros((height, width, 3), np.uint8), np.full((height, width), np.inf, np.float32)
+
+
+class SquareRoom:
+    """Four walls at x, y = ± `half`: distances in closed form."""
+
+    def __init__(self, half):
+        self.half = half
+
+    def cast(self, origins, directions):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            walls = (np.sign(directions[:, :2]) * self.half - origins[:, :2]) / directions[:, :2]
+        return np.nanmin(np.where(walls > 0, walls, np.inf), axis=1)
+
+
+class Nothing:
+    """An empty world."""
+
+    def cast(self, origins, directions):
+        return np.full(len(origins), np.inf)
+
+
+def at(x, y, yaw=0.0):
+    return Puppet(Pose3.planar(Pose2(x, y, yaw)))

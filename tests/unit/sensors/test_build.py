@@ -1,0 +1,71 @@
+import numpy as np
+import pytest
+from puppet import Puppet, SquareRoom
+
+from simscen.core.chance import Streams
+from simscen.core.sensing import Bump, Image, Imu, Odometry, Scan
+from simscen.core.time import Clock
+from simscen.model.robot import RobotSpec
+from simscen.sensors.build import build_sensors
+
+SENSORS = {
+    "zed": {"camera": {"rate": 5.0, "width": 16, "height": 8}},
+    "back": {"lidar": {"rate": 10.0, "beams": 8}},
+    "front": {"lidar": {"rate": 20.0, "beams": 8}},
+    "odom": {"odometry": {}},
+    "imu": {"imu": {}},
+    "bumper": {"bumper": {}},
+}
+
+
+def robot(sensors):
+    return RobotSpec.model_validate({
+        "simscen": 1, "name": "r", "mass": 1.0, "body": [{"cylinder": [0.2, 0.1]}],
+        "drive": {"type": "differential", "wheel_radius": 0.03, "wheel_separation": 0.3},
+        "limits": {"linear": 1.0, "angular": 1.0, "linear_acceleration": 1.0, "angular_acceleration": 1.0},
+        "sensors": sensors,
+    })  # fmt: skip
+
+
+def build(sensors=SENSORS, seed=1, view=None):
+    return build_sensors(robot(sensors), Clock(240), Streams(seed), view or Puppet(), SquareRoom(3.0))
+
+
+def test_sensors_come_in_the_order_of_their_names_whatever_the_file_says():
+    reversed_file = dict(reversed(SENSORS.items()))
+    assert [sensor.name for sensor in build()] == ["back", "bumper", "front", "imu", "odom", "zed"]
+    assert [sensor.name for sensor in build(reversed_file)] == [sensor.name for sensor in build()]
+
+
+def test_periods_are_whole_ticks():
+    assert {sensor.name: sensor.period for sensor in build()} == {
+        "back": 24, "bumper": 6, "front": 12, "imu": 4, "odom": 6, "zed": 48}  # fmt: skip
+
+
+def test_a_rate_that_does_not_divide_the_clock_is_refused_with_the_nearest_that_does():
+    with pytest.raises(ValueError, match="7 Hz does not divide 240 Hz; the nearest that does is"):
+        build({"lidar": {"lidar": {"rate": 7.0}}})
+
+
+def test_every_kind_of_sensor_gives_its_kind_of_reading():
+    kinds = {type(sensor.read(0)) for sensor in build()}
+    assert kinds == {Scan, Odometry, Imu, Bump, Image}
+
+
+def test_one_sensor_more_changes_nothing_for_the_others():
+    alone = build({"front": SENSORS["front"]})[0].read(0)
+    among = next(sensor for sensor in build() if sensor.name == "front").read(0)
+    assert np.array_equal(alone.ranges, among.ranges)
+
+
+def test_two_lidars_have_noise_of_their_own():
+    back, *_, front = (s.read(0) for s in build() if s.name in {"back", "front"})
+    assert not np.array_equal(back.ranges, front.ranges)
+
+
+def test_the_bumper_says_what_the_hull_feels():
+    view = Puppet()
+    (bumper,) = build({"bumper": {"bumper": {}}}, view=view)
+    assert not bumper.read(0).pressed
+    view.pressed = True
+    assert bumper.read(6).pressed

@@ -1,0 +1,52 @@
+import math
+
+import numpy as np
+import pytest
+from puppet import Puppet
+
+from simscen.core.geometry import Pose3
+from simscen.model.robot import InertialUnit
+from simscen.sensors.imu import ImuSensor
+
+EXACT = {"gyro_noise": 0.0, "gyro_bias": 0.0, "accelerometer_noise": 0.0}
+
+
+def imu(view, seed=1, **spec):
+    return ImuSensor("imu", InertialUnit(**spec), 4, 1 / 60, np.random.default_rng(seed), view)
+
+
+def test_at_rest_and_level_it_feels_gravity_upwards():
+    reading = imu(Puppet(), **EXACT).read(4)
+    assert reading.linear_acceleration == (0.0, 0.0, 9.81)
+    assert reading.angular_velocity == (0.0, 0.0, 0.0)
+
+
+def test_it_feels_the_change_of_velocity_in_its_own_frame():
+    view = Puppet(Pose3.from_rpy(0, 0, 0, 0, 0, math.pi / 2))
+    sensor = imu(view, **EXACT)
+    view.linear = (0.0, 0.02, 0.0)  # along the world's y, which is straight ahead
+    assert sensor.read(4).linear_acceleration == pytest.approx((1.2, 0.0, 9.81))
+    assert sensor.read(8).linear_acceleration == pytest.approx((0.0, 0.0, 9.81))
+
+
+def test_on_a_slope_gravity_leans_back():
+    reading = imu(Puppet(Pose3.from_rpy(0, 0, 0, 0, -0.1, 0)), **EXACT).read(4)
+    assert reading.linear_acceleration == pytest.approx((9.81 * math.sin(0.1), 0.0, 9.81 * math.cos(0.1)))
+
+
+def test_turn_rates_are_about_its_own_axes():
+    view = Puppet(Pose3.from_rpy(0, 0, 0, math.pi / 2, 0, 0), angular=(0.0, 0.0, 1.0))
+    assert imu(view, **EXACT).read(4).angular_velocity == pytest.approx((0.0, 1.0, 0.0))
+
+
+def test_noise_is_new_each_time_and_the_bias_stays():
+    spec = {"gyro_noise": 0.01, "gyro_bias": 0.5, "accelerometer_noise": 0.1}
+    sensor = imu(Puppet(), **spec)
+    readings = [sensor.read(k) for k in range(3000)]
+    rates = np.array([reading.angular_velocity for reading in readings])
+    forces = np.array([reading.linear_acceleration for reading in readings]) - (0, 0, 9.81)
+    assert rates.std(axis=0) == pytest.approx([0.01] * 3, rel=0.06)
+    assert forces.std(axis=0) == pytest.approx([0.1] * 3, rel=0.06)
+    assert np.abs(rates.mean(axis=0)).max() > 0.05
+    biases = [imu(Puppet(), seed, gyro_noise=0.0, gyro_bias=0.5).read(0).angular_velocity[2] for seed in range(400)]
+    assert np.std(biases) == pytest.approx(0.5, rel=0.12)

@@ -1,0 +1,106 @@
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from puppet import Nothing, Puppet, SquareRoom, at
+
+from simscen.core.geometry import Pose3
+from simscen.model.robot import Lidar, Mount
+from simscen.sensors.lidar import LidarSensor
+
+QUIET = {"noise": 0.0, "mount": Mount(z=0.2)}
+
+
+def lidar(view, rays, seed=1, **spec):
+    return LidarSensor("lidar", Lidar(**spec), 24, np.random.default_rng(seed), view, rays)
+
+
+def test_a_square_room_is_measured_within_half_a_step():
+    scan = lidar(at(0.5, -0.3, 0.4), SquareRoom(3.0), **QUIET).read(24)
+    x, y = scan.points().T
+    hits = at(0.5, -0.3, 0.4).pose.plane.apply(np.column_stack((x, y)))
+    assert np.abs(np.abs(hits).max(axis=1) - 3.0).max() <= 0.0005 + 1e-9
+    assert len(hits) == 360
+    assert (scan.sensor, scan.tick) == ("lidar", 24)
+
+
+def test_ranges_are_whole_steps():
+    for resolution in (0.001, 0.01):
+        ranges = lidar(at(0, 0), SquareRoom(3.0), resolution=resolution).read(0).ranges
+        assert np.allclose(ranges / resolution, np.round(ranges / resolution), atol=1e-6)
+
+
+def test_a_full_circle_has_every_direction_once_and_the_back_first():
+    scan = lidar(at(0, 0), Nothing(), beams=360).read(0)
+    assert scan.angle_min == pytest.approx(-math.pi)
+    assert scan.angles()[-1] + scan.angle_increment == pytest.approx(math.pi)
+
+
+def test_a_narrower_field_has_beams_on_both_edges():
+    scan = lidar(at(0, 0), Nothing(), beams=720, field_of_view=math.radians(270)).read(0)
+    assert scan.angles()[0] == pytest.approx(-math.radians(135))
+    assert scan.angles()[-1] == pytest.approx(math.radians(135))
+    assert len(scan.ranges) == 720
+
+
+def test_a_single_beam_looks_straight_ahead():
+    scan = lidar(at(1, 0), SquareRoom(3.0), beams=1, field_of_view=0.1, **QUIET).read(0)
+    assert scan.angles().tolist() == [0.0]
+    assert scan.ranges == pytest.approx([2.0])
+
+
+def test_nothing_in_reach_is_inf_and_what_is_too_near_is_nan():
+    assert np.isinf(lidar(at(0, 0), Nothing()).read(0).ranges).all()
+    assert np.isinf(lidar(at(0, 0), SquareRoom(3.0), max_range=2.0).read(0).ranges).all()
+    assert np.isnan(lidar(at(0, 0), SquareRoom(3.0), min_range=5.0).read(0).ranges).all()
+
+
+def test_the_mount_is_where_the_lidar_is_and_where_it_looks():
+    mount = Mount(x=0.5, y=0.1, z=0.3, yaw=math.pi / 2)
+    scan = lidar(at(0, 0), SquareRoom(3.0), noise=0.0, mount=mount).read(0)
+    ahead = scan.ranges[180]  # the beam at angle 0 of the lidar, which looks to the left
+    assert ahead == pytest.approx(3.0 - 0.1)
+    assert np.abs(np.abs(scan.points()).max(axis=1) - 3.0).max() <= 0.0006
+
+
+def test_a_robot_that_leans_shines_into_the_air():
+    seen = []
+
+    class Watcher:
+        def cast(self, origins, directions):
+            seen.append((origins[0], directions[180]))
+            return np.ones(len(origins))
+
+    lidar(Puppet(Pose3.from_rpy(0, 0, 0, 0, -0.1, 0)), Watcher(), **QUIET).read(0)
+    origin, ahead = seen[0]
+    assert ahead == pytest.approx([math.cos(0.1), 0.0, math.sin(0.1)])
+    assert origin == pytest.approx([-0.2 * math.sin(0.1), 0.0, 0.2 * math.cos(0.1)])
+
+
+def test_noise_has_the_moments_that_were_asked_for():
+    sensor = lidar(at(0, 0), SquareRoom(3.0), noise=0.02)
+    quiet = lidar(at(0, 0), SquareRoom(3.0), **QUIET).read(0).ranges
+    errors = np.concatenate([sensor.read(k).ranges - quiet for k in range(200)])
+    count = len(errors)
+    assert abs(errors.mean()) < 4 * 0.02 / math.sqrt(count)
+    assert errors.std() == pytest.approx(0.02, rel=4 / math.sqrt(2 * count))
+    z = errors / errors.std()
+    assert abs((z**4).mean() - 3.0) < 4 * math.sqrt(24 / count)  # the kurtosis of a normal distribution
+
+
+def test_noise_of_neighbouring_beams_and_scans_is_independent():
+    sensor = lidar(at(0, 0), SquareRoom(3.0), noise=0.02)
+    quiet = lidar(at(0, 0), SquareRoom(3.0), **QUIET).read(0).ranges
+    errors = np.array([sensor.read(k).ranges - quiet for k in range(100)]) / 0.02
+    bound = 4 / math.sqrt(errors.size)
+    assert abs((errors[:, 1:] * errors[:, :-1]).mean()) < bound
+    assert abs((errors[1:] * errors[:-1]).mean()) < bound
+
+
+def test_a_scan_is_kept_as_it_was_read():
+    sensor = lidar(at(0, 0), SquareRoom(3.0))
+    first = sensor.read(0)
+    copy = replace(first, ranges=first.ranges.copy())
+    sensor.read(24)
+    assert np.array_equal(first.ranges, copy.ranges)
