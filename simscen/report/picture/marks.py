@@ -58,8 +58,8 @@ def draw_objects(canvas: Canvas, scene: Scene) -> None:
                 canvas.polygon(_pose(samples, k).apply(shapes[name]), (*colour, 36), colour, 1.0)
         if last is not None:
             canvas.polygon(last.apply(shapes[name]), (*palette.OBJECT, 150), palette.OBJECT)
-            u, v = canvas.pixel(last.x, last.y)
-            canvas.note(Note(u, v, shown(name), 12, palette.OBJECT, "mm", halo=palette.FREE))
+            u, v = canvas.pixel(last.x, float(last.apply(shapes[name])[:, 1].max()))
+            canvas.note(Note(u, v - 10, shown(name), 12, palette.OBJECT, "mm", halo=palette.FREE))
 
 
 def draw_belief(canvas: Canvas, scene: Scene) -> None:
