@@ -32,7 +32,7 @@ Cells = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class ObstacleField:
-    """`centres` (n, 2) of cylinders in m, and the length in m of the shortest way of a disc of GAP from START to GOAL."""
+    """`centres` (n, 2) of cylinders and the length of the shortest way of a disc of GAP from START to GOAL, in m."""
 
     number: int
     centres: Array
