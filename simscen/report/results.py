@@ -25,11 +25,12 @@ def as_document(runs: Sequence[RunFinished], folder: str = "") -> dict[str, Any]
         "total": len(runs),
         **counts,
         "simulated_seconds": sum(run.simulated for run in ordered),
-        "runs": [{**as_data(_result(run)), "artifacts": _artifacts(run, folder)} for run in ordered],
+        "runs": [{**as_data(result_of(run)), "artifacts": _artifacts(run, folder)} for run in ordered],
     }
 
 
-def _result(run: RunFinished) -> RunResult:
+def result_of(run: RunFinished) -> RunResult:
+    """What a run says about itself, in the form of its result.json."""
     return RunResult(
         key=run.key,
         path=run.path,
@@ -46,9 +47,10 @@ def _result(run: RunFinished) -> RunResult:
 
 def _artifacts(run: RunFinished, folder: str) -> dict[str, str]:
     files = {"mcap": run.artifacts.mcap, "picture": run.artifacts.picture, "result": run.artifacts.result}
-    return {name: _relative(path, folder) for name, path in files.items() if path}
+    return {name: relative(path, folder) for name, path in files.items() if path}
 
 
-def _relative(path: str, folder: str) -> str:
+def relative(path: str, folder: str) -> str:
+    """The path of a file inside `folder`; of any other, the path as it is."""
     inside = folder and PurePath(path).is_relative_to(folder)
     return PurePath(path).relative_to(folder).as_posix() if inside else PurePath(path).as_posix()

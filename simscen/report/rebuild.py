@@ -1,0 +1,100 @@
+"""A session as its journal tells it, also when it was killed half-way."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from simscen.core.errors import InvalidInput
+from simscen.core.problems import Problem
+from simscen.core.session import Outcome, RunFailure, RunFinished, RunKey, SessionStarted
+from simscen.report.journaldata import FORMAT, NAME, Planned, read_planned, read_run
+
+
+@dataclass(frozen=True)
+class Past:
+    """The last session in a journal: what it planned, what was answered, and which runs had at least begun.
+
+    `wall` is how many seconds after its start the last line was written; `ended` whether it came to its end.
+    """
+
+    version: str
+    workers: int
+    planned: tuple[Planned, ...]
+    answered: Mapping[RunKey, RunFinished]
+    begun: frozenset[RunKey]
+    wall: float
+    ended: bool
+    interrupted: bool
+
+    @property
+    def answers(self) -> list[RunFinished]:
+        """An answer for every planned run: an error where simscen ended before there was one."""
+        return [self.answered.get(run.key) or self._unanswered(run) for run in self.planned]
+
+    def started(self, folder: Path) -> SessionStarted:
+        """The event that the session began with."""
+        scenarios = len({run.path for run in self.planned})
+        return SessionStarted(self.version, len(self.planned), scenarios, self.workers, str(folder))
+
+    def _unanswered(self, run: Planned) -> RunFinished:
+        kind = "interrupted" if run.key in self.begun else "not-run"
+        why = "before it was finished" if run.key in self.begun else "before it began"
+        failure = RunFailure(kind, f"simscen ended {why}")
+        again = f"simscen run {run.path} --seed {run.key.seed}"
+        return RunFinished(run.key, run.path, run.line, Outcome.ERROR, error=failure, again=again)
+
+
+def read_journal(folder: Path) -> Past:
+    """The last session of the journal in `folder`. Raises InvalidInput when there is none that can be understood."""
+    if not (folder / NAME).is_file():
+        hint = "name the folder that `simscen run` wrote, e.g. simscen-out/latest"
+        raise _invalid(folder, f"there is no {NAME} in it", hint)
+    try:
+        lines = session_lines(folder)
+        if not lines:
+            raise _invalid(folder / NAME, "the session ended before it had planned its runs")
+        return _past(lines, folder)
+    except OSError as error:
+        raise _invalid(folder / NAME, f"cannot read the journal: {error.strerror}") from error
+    except (ValueError, KeyError, TypeError, IndexError) as error:
+        raise _invalid(folder / NAME, f"the journal is damaged: {error}") from error
+
+
+def session_lines(folder: Path) -> list[dict[str, Any]]:
+    """The lines of the last session; a last line that was cut short is not one. Raises OSError or ValueError."""
+    whole = (folder / NAME).read_bytes().split(b"\n")[:-1]
+    lines = [json.loads(line) for line in whole]
+    starts = [number for number, line in enumerate(lines) if line["event"] == "planned"]
+    return lines[starts[-1] :] if starts else []
+
+
+def _past(lines: list[dict[str, Any]], folder: Path) -> Past:
+    first = lines[0]
+    if first["format"] != FORMAT:
+        raise ValueError(f"it has format {first['format']}; this version reads {FORMAT}")
+    planned = tuple(read_planned(run) for run in first["runs"])
+    answered: dict[RunKey, RunFinished] = {}
+    begun: set[RunKey] = set()
+    for line in lines[1:]:
+        if line["event"] == "started":
+            begun.add(planned[line["run"]].key)
+        elif line["event"] == "finished":
+            key = planned[line["run"]].key
+            answered[key] = read_run(line, key, folder)
+    last = lines[-1]
+    return Past(
+        version=first["version"],
+        workers=first["workers"],
+        planned=planned,
+        answered=answered,
+        begun=frozenset(begun),
+        wall=last["at"],
+        ended=last["event"] == "ended",
+        interrupted=last["event"] != "ended" or last["interrupted"],
+    )
+
+
+def _invalid(path: Path, message: str, hint: str = "") -> InvalidInput:
+    return InvalidInput([Problem(str(path), 0, 0, "SC810", message, hint)])
