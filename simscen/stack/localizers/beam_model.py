@@ -12,7 +12,7 @@ import numpy as np
 from simscen.core.geometry import Array
 from simscen.core.grid import FREE, OccupancyGrid
 from simscen.stack.localizers.beams import Beams
-from simscen.stack.localizers.distance_field import DistanceField
+from simscen.stack.localizers.distance_field import DistanceField, by_blocks
 
 
 def opaque_field(grid: OccupancyGrid, max_distance: float) -> DistanceField:
@@ -60,10 +60,14 @@ class BeamModel:
 
     def log_likelihood(self, poses: Array, beams: Beams, converged: bool) -> Array:
         """Logarithms (n,) of 1 + Σ p³."""
-        expected, missed = cast_rays(self.field, poses, beams), beams.ranges >= beams.range_max
-        error = beams.ranges - expected
-        p = self.z_hit * np.exp(np.square(error) / (-2 * self.sigma_hit**2))
-        p += (error < 0) * (self.z_short * self.lambda_short * np.exp(-self.lambda_short * beams.ranges))
-        p += np.where(missed, self.z_max, self.z_rand / beams.range_max)
-        logarithm: Array = np.log1p((p * p * p).sum(axis=1))
-        return logarithm
+        missed = beams.ranges >= beams.range_max
+
+        def judge(block: Array) -> Array:
+            error = beams.ranges - cast_rays(self.field, block, beams)
+            p = self.z_hit * np.exp(np.square(error) / (-2 * self.sigma_hit**2))
+            p += (error < 0) * (self.z_short * self.lambda_short * np.exp(-self.lambda_short * beams.ranges))
+            p += np.where(missed, self.z_max, self.z_rand / beams.range_max)
+            logarithm: Array = np.log1p((p * p * p).sum(axis=1))
+            return logarithm
+
+        return by_blocks(judge, poses)

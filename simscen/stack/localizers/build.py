@@ -18,6 +18,7 @@ from simscen.stack.localizers.likelihood_field import (
     obstacle_field,
 )
 from simscen.stack.localizers.motion_models import Differential, MotionModel, Omni
+from simscen.stack.localizers.particle_filter import ParticleFilter
 from simscen.stack.localizers.particles import FreeSpace
 from simscen.stack.protocols import Localizer, Surroundings
 
@@ -34,7 +35,8 @@ def build_localizer(
         case model.Amcl() if surroundings.map is not None:
             motion = _motion_model(spec, surroundings.robot.holonomic)
             sensor, anywhere = _sensor_model(spec, surroundings.map), FreeSpace(surroundings.map)
-            return AmclLocalizer(spec, motion, sensor, anywhere, estimate, chance, rate)
+            particles = ParticleFilter(spec, motion, sensor, anywhere, chance)
+            return AmclLocalizer(spec, particles, motion, estimate, rate)
         case model.Amcl() | model.OdometryOnly():
             return DeadReckoning(estimate)
         case model.Ekf():

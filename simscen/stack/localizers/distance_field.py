@@ -1,5 +1,6 @@
 """How far each cell of a map is from the nearest obstacle: what likelihood fields and ray marching look up."""
 
+from collections.abc import Callable
 from typing import cast
 
 import numpy as np
@@ -10,6 +11,16 @@ from simscen.core.grid import OccupancyGrid
 
 Float32 = npt.NDArray[np.float32]
 Cells = npt.NDArray[np.intp]
+
+
+# 512 x 60 beams fit the second-level cache. Larger tables also cost fresh pages from the system at every update:
+# 5000 particles at once took 8 to 100 ms, in blocks 3 ms.
+BLOCK = 512
+
+
+def by_blocks(judge: Callable[[Array], Array], poses: Array) -> Array:
+    """What `judge` says (n,) of `poses` (n, 3), asked in blocks."""
+    return np.concatenate([judge(poses[begin : begin + BLOCK]) for begin in range(0, len(poses), BLOCK)])
 
 
 class DistanceField:

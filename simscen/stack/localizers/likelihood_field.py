@@ -13,7 +13,7 @@ import numpy.typing as npt
 from simscen.core.geometry import Array
 from simscen.core.grid import OCCUPIED, OccupancyGrid
 from simscen.stack.localizers.beams import Beams
-from simscen.stack.localizers.distance_field import Cells, DistanceField, Float32
+from simscen.stack.localizers.distance_field import DistanceField, Float32, by_blocks
 
 
 class SensorModel(Protocol):
@@ -56,10 +56,15 @@ class LikelihoodField:
 
     def log_likelihood(self, poses: Array, beams: Beams, converged: bool) -> Array:
         """Logarithms (n,) of 1 + Σ p³."""
-        p = self._hit.take(self._field.cells_seen(poses, beams.ends()))
-        p += self._z_rand / np.float32(beams.range_max)
-        logarithm: Array = np.log1p(np.sum(p * p * p, axis=1, dtype=np.float64))
-        return logarithm
+        points, z_rand = beams.ends(), self._z_rand / np.float32(beams.range_max)
+
+        def judge(block: Array) -> Array:
+            p = self._hit.take(self._field.cells_seen(block, points))
+            p += z_rand
+            logarithm: Array = np.log1p(np.sum(p * p * p, axis=1, dtype=np.float64))
+            return logarithm
+
+        return by_blocks(judge, poses)
 
 
 @dataclass(frozen=True)
@@ -87,17 +92,21 @@ class LikelihoodFieldProb:
 
     def log_likelihood(self, poses: Array, beams: Beams, converged: bool) -> Array:
         """Logarithms (n,) of Π p."""
-        cells = self._field.cells_seen(poses, beams.ends())
+        points, z_rand = beams.ends(), self._z_rand / np.float32(beams.range_max)
         if self._skipping is not None and converged:
-            cells = cells[:, self._kept(cells, self._skipping)]
-        p = self._hit.take(cells)
-        p += self._z_rand / np.float32(beams.range_max)
-        with np.errstate(divide="ignore"):
-            logarithm: Array = np.sum(np.log(p), axis=1, dtype=np.float64)
-        return logarithm
+            points = points[self._kept(poses, points, self._skipping)]
 
-    def _kept(self, cells: Cells, skipping: BeamSkipping) -> npt.NDArray[np.bool_] | slice:
-        near = self._field.table.take(cells) < skipping.distance
+        def judge(block: Array) -> Array:
+            p = self._hit.take(self._field.cells_seen(block, points))
+            p += z_rand
+            with np.errstate(divide="ignore"):
+                logarithm: Array = np.sum(np.log(p), axis=1, dtype=np.float64)
+            return logarithm
+
+        return by_blocks(judge, poses)
+
+    def _kept(self, poses: Array, points: Array, skipping: BeamSkipping) -> npt.NDArray[np.bool_] | slice:
+        near = self._field.table.take(self._field.cells_seen(poses, points)) < skipping.distance
         explained: npt.NDArray[np.bool_] = near.mean(axis=0) > skipping.threshold
         misfit = np.count_nonzero(~explained) >= len(explained) * skipping.error_threshold
         return slice(None) if misfit else explained

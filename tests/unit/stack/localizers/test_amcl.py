@@ -170,6 +170,16 @@ def test_a_scan_that_no_particle_can_explain_leaves_them_equally_likely() -> Non
     assert np.ptp(belief.particles[:, 3]) == 0
 
 
+def test_weights_that_vanish_between_two_draws_are_made_equal_again() -> None:
+    """Sixty sure beams and a hundred scans between two draws leave less than the smallest number."""
+    spec = Amcl(laser_model_type="likelihood_field_prob", z_rand=1e-6, sigma_hit=0.02, resample_interval=100)
+    subject = started(spec)
+    for k in range(1, 60):
+        belief = moved(subject, 24 * k, Pose2(0.3 * (k % 2), 0, 0))
+        assert np.isfinite(belief.covariance).all()
+        assert belief.particles[:, 3].sum() == pytest.approx(1)
+
+
 def test_a_reset_starts_over_at_the_next_odometry() -> None:
     subject = started()
     moved(subject, 24, Pose2(0.3, 0, 0))

@@ -22,6 +22,10 @@ def test_a_robot_that_is_told_nothing_finds_itself() -> None:
     assert measure.global_start(measure.MANY, SEEDS[:3]).found.all()
 
 
+def test_recovery_leaves_a_robot_alone_that_knows_where_it_is() -> None:
+    assert measure.tracking(measure.RECOVERING, SEEDS[:1], 60.0).rmse.max() <= 0.05
+
+
 def test_a_kidnapped_robot_finds_itself_with_recovery_and_not_without() -> None:
     assert measure.kidnapping(measure.RECOVERING, SEEDS[:2]).found.all()
     assert not measure.kidnapping(measure.PROB, SEEDS[:1]).found.any()

@@ -1,0 +1,81 @@
+"""Adaptive Monte Carlo localisation: move, weigh, sum up, draw anew.
+
+Thrun, Burgard & Fox, Probabilistic Robotics, tables 8.2 to 8.4; nav2_amcl's pf.c.
+"""
+
+import numpy as np
+
+from simscen.core.belief import Estimate
+from simscen.core.geometry import Array, Pose2
+from simscen.core.sensing import Scan
+from simscen.model.stack import Amcl
+from simscen.stack.localizers.beams import select_beams
+from simscen.stack.localizers.clusters import summarise
+from simscen.stack.localizers.kld import KldBound
+from simscen.stack.localizers.likelihood_field import SensorModel
+from simscen.stack.localizers.motion_models import MotionModel
+from simscen.stack.localizers.particles import FreeSpace, Particles
+from simscen.stack.localizers.recovery import Recovery
+from simscen.stack.localizers.resampling import adaptive, systematic
+
+CONVERGED_WITHIN = 0.5  # nav2_amcl's pf.dist_threshold, in m
+
+
+class ParticleFilter:
+    """Particles that are moved by odometry and weighed by scans; it knows neither time nor frames but the map's."""
+
+    def __init__(
+        self, spec: Amcl, motion: MotionModel, sensor: SensorModel, anywhere: FreeSpace, chance: np.random.Generator
+    ) -> None:
+        self._spec, self._motion, self._sensor, self._anywhere, self._chance = spec, motion, sensor, anywhere, chance
+        most = max(spec.min_particles, spec.max_particles)
+        self._bound = KldBound(spec.pf_err, spec.pf_z, spec.min_particles, most)
+        self.begin(Estimate(None))
+
+    def begin(self, estimate: Estimate) -> None:
+        """Start over: particles around the estimate's pose, or over all free space when it has none."""
+        self.particles = self._anywhere.begin(estimate, self._bound.most, self._chance)
+        self._recovery = Recovery(self._spec.recovery_alpha_slow, self._spec.recovery_alpha_fast)
+        self._corrections = 0
+
+    def move(self, delta: Pose2) -> None:
+        """Move each particle by its own noisy copy of a motion that odometry reports in the base frame."""
+        poses = self._motion.sample(self.particles.poses, delta, self._chance)
+        self.particles = Particles(poses, self.particles.weights)
+
+    def correct(self, scan: Scan) -> tuple[Pose2, Array] | None:
+        """Weigh the particles by a scan and draw new ones; where that says the robot is, with covariance (3, 3).
+
+        None when it does not say: nothing was hit, or no particle can explain the scan. The latter leaves the
+        particles equally likely, as in nav2_amcl, and counts as likelihood zero for the recovery. Particles are
+        summed up before new ones are drawn, which would only add noise (Probabilistic Robotics, section 4.3.4).
+        """
+        spec, poses = self._spec, self.particles.poses
+        beams = select_beams(scan, spec.max_beams, spec.laser_min_range, spec.laser_max_range)
+        converged = spec.do_beamskip and self.particles.within(CONVERGED_WITHIN)
+        logarithm = self._sensor.log_likelihood(poses, beams, converged)
+        best = logarithm.max()
+        if best == logarithm.min() and best > -np.inf:
+            return None
+        weights = self.particles.weights * np.exp(logarithm - max(best, -1e300))
+        total = weights.sum()
+        self._recovery.observe(float(np.exp(best) * total))
+        self.particles = Particles(poses, weights / total) if total > 0 else Particles.equal(poses)
+        answer = summarise(self.particles) if total > 0 else None
+        self._resample()
+        return answer
+
+    def _resample(self) -> None:
+        """Draw new particles, on every resample_interval-th scan and, if selective, when too few carry weight."""
+        self._corrections += 1
+        lopsided = self.particles.effective <= len(self.particles.weights) / 2
+        if self._corrections % self._spec.resample_interval == 0 and (lopsided or not self._spec.selective_resampling):
+            self.particles = Particles.equal(adaptive(self._draw, self._bound))
+
+    def _draw(self, count: int) -> Array:
+        """Poses (count, 3) in random order: most from the particles, the recovery's share from anywhere."""
+        poses = self.particles.poses[systematic(self.particles.weights, count, self._chance)]
+        if self._recovery.share > 0:
+            lost = self._chance.random(count) < self._recovery.share
+            poses[lost] = self._anywhere.draw(int(lost.sum()), self._chance)
+        return self._chance.permutation(poses)
