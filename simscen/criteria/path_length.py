@@ -51,20 +51,29 @@ class PathLength(Spec, Criterion):
     def _ratio(self, trace: Trace, case: Case, way: Drive) -> Finding:
         assert self.max_ratio is not None
         what = "path_length ratio"
-        lengths = [case.shortest.get(goal.name, math.nan) for goal in case.goals]
-        if not lengths or not all(math.isfinite(length) for length in lengths) or sum(lengths) <= 0:
-            without = [g.name for g in case.goals if not math.isfinite(case.shortest.get(g.name, math.nan))]
-            because = (
-                f"no shortest way to {', '.join(without)} is known" if without else "the shortest way has no length"
-            )
+        shortest, because = shortest_way(case)
+        if because:
             return undecided(what, because, f"≤ {self.max_ratio:g}")
-        limit = self.max_ratio * sum(lengths)
-        context = f"({self.max_ratio:g} times the shortest way of {sum(lengths):.2f} m)"
+        limit = self.max_ratio * shortest
+        context = f"({self.max_ratio:g} times the shortest way of {shortest:.2f} m)"
         unreached = [story for story in stories(trace, case) if story.reached is None]
         if unreached and way.length <= limit:
             name = unreached[0].goal.name
             return undecided(what, f"goal {name} was not reached, so there is no whole way to compare", context)
         return _bound(trace, way, what, limit, context)
+
+
+def shortest_way(case: Case) -> tuple[float, str]:
+    """The length in metres of the shortest way through all goals; or nan, and why there is none to compare with."""
+    names = [goal.name for goal in case.goals]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    without = [name for name in names if not math.isfinite(case.shortest.get(name, math.nan))]
+    length = sum(case.shortest.get(name, math.nan) for name in names)
+    if twice:
+        return math.nan, f"several goals are called {', '.join(twice)}: their shortest ways cannot be told apart"
+    if without:
+        return math.nan, f"no shortest way to {', '.join(without)} is known"
+    return (length, "") if length > 0 else (math.nan, "the shortest way has no length")
 
 
 def _bound(trace: Trace, way: Drive, what: str, limit: float, context: str = "") -> Finding:

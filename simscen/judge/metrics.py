@@ -10,6 +10,7 @@ from simscen.core.trace import Trace
 from simscen.core.verdict import Status
 from simscen.criteria.goals_reached import GoalsReached
 from simscen.criteria.moments import stories
+from simscen.criteria.path_length import shortest_way
 from simscen.criteria.signals import drive, finite, pose_error, speed, truth, turn_rate
 
 STANDING_SPEED, STANDING_TURN = 0.01, 0.02
@@ -38,9 +39,9 @@ def measure(trace: Trace, case: Case) -> Metrics:
 
 def _navigation(trace: Trace, case: Case) -> Metrics:
     length = drive(trace).length
-    shortest = sum(case.shortest.get(goal.name, math.inf) for goal in case.goals) if case.goals else math.inf
+    shortest, unknown = shortest_way(case)
+    known = not unknown
     success = _success(trace, case)
-    known = math.isfinite(shortest) and shortest > 0
     ends = [story.reached for story in stories(trace, case)]
     starts = trace.of_kind("goal.accepted")
     arrived = starts and ends and ends[-1] is not None
