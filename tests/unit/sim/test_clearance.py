@@ -85,3 +85,13 @@ def _corners(x, y, length, width, yaw):
     c, s = math.cos(yaw), math.sin(yaw)
     half = [(a * length / 2, b * width / 2) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
     return [(x + c * u - s * v, y + s * u + c * v) for u, v in half]
+
+
+def test_wheels_rub_along_nothing_that_their_guards_do_not_touch(simulate):
+    """A Jackal beside a wall, 3 cm from its wheels: the balls that roll for them would reach into it."""
+    free = simulate("jackal", drive=(1.0, 0.0, 0.0))
+    beside = simulate("jackal", solids=[box("wall", 0, -(0.2078 + 0.03 + 0.05), 10, 0.1)], drive=(1.0, 0.0, 0.0))
+    for simulation in (free, beside):
+        simulation.step(480)
+    assert beside.truth().pose.x == pytest.approx(free.truth().pose.x, abs=1e-3)
+    assert beside.collisions() == ()

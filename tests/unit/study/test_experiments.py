@@ -1,0 +1,42 @@
+"""Every scenario that the benchmark generates is a scenario like any other."""
+
+from pathlib import Path
+
+import pytest
+
+from simscen.loading.scenario import load_scenario
+from simscen.study.experiments import Experiment, corner_cases, generated_fields, localizations, sandbox
+
+PROJECT = Path(__file__).parents[3]
+SANDBOX = PROJECT.parent / "shared" / "data" / "nav2_tb3_sandbox"
+
+
+def loads(experiment: Experiment) -> None:
+    for drive in experiment.drives:
+        load_scenario(drive.file, experiment.root, experiment.world_path)
+
+
+def test_generated_fields_load_and_carry_their_reference_length(tmp_path: Path) -> None:
+    fields = generated_fields(tmp_path, 1)
+    loads(fields)
+    assert (fields.drives[0].reference_length or 0.0) >= 10.0
+
+
+def test_localization_loads_and_misleads_in_another_direction_each_time(tmp_path: Path) -> None:
+    tour, misled = localizations(tmp_path, PROJECT / "worlds", range(1, 21), 3)
+    loads(tour)
+    loads(misled)
+    assert len({drive.file.read_text() for drive in misled.drives}) == 3
+
+
+def test_every_corner_case_that_ships_is_an_experiment() -> None:
+    cases = corner_cases(PROJECT / "scenarios", PROJECT, range(1, 21))
+    assert {"narrow doorway", "dead end", "u trap"} <= {case.name for case in cases}
+    for case in cases:
+        loads(case)
+
+
+@pytest.mark.skipif(not SANDBOX.is_dir(), reason="Nav2's sandbox is not beside the project")
+def test_the_sandbox_loads_with_and_without_the_box(tmp_path: Path) -> None:
+    for experiment in sandbox(tmp_path, SANDBOX, [1]):
+        loads(experiment)
