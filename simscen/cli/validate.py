@@ -10,10 +10,12 @@ from typing import Annotated
 import typer
 
 from simscen.cli.diagnostics import as_github, as_json, as_text, from_here, print_text
+from simscen.cli.select import checked as geometric_problems
 from simscen.core.errors import Exit
 from simscen.core.problems import Problem
-from simscen.loading.anyfile import problems_of
+from simscen.loading.anyfile import kind_of, problems_of
 from simscen.loading.discovery import ROBOT, SCENARIO, WORLD, default_root, discover
+from simscen.loading.scenario import try_scenario
 
 
 class Format(str, Enum):
@@ -38,11 +40,18 @@ def command(
     home = root if root is not None else default_root(paths)
     checked = _Checked()
     for file in discover(paths, home, SCENARIO + WORLD + ROBOT):
-        kind, problems = problems_of(file, home, world_path or ())
-        checked.add(kind, from_here(problems, home))
+        kind = kind_of(file, home)
+        checked.add(kind, from_here(_problems(kind, file, home, world_path or []), home))
     _PRINT[format_](checked)
     if checked.wrong:
         sys.exit(Exit.USAGE)
+
+
+def _problems(kind: str, file: Path, root: Path, world_path: list[Path]) -> list[Problem]:
+    if kind != "scenario":
+        return problems_of(kind, file, root, world_path)
+    loaded = try_scenario(file, root, world_path)
+    return loaded if isinstance(loaded, list) else geometric_problems(loaded)
 
 
 @dataclass

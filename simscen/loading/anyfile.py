@@ -16,15 +16,14 @@ _ONLY_WORLDS = frozenset({"walls", "obstacles", "objects", "doors", "places", "r
 _ONLY_SCENARIOS = frozenset({"world", "robot", "goals", "pass", "events", "faults", "stack"})
 
 
-def problems_of(file: Path, root: Path, world_path: Sequence[Path] = ()) -> tuple[str, list[Problem]]:
-    """What kind of file it is ("scenario", "world", "robot" or "map"), and all that is wrong with it."""
-    kind = kind_of(file, root)
+def problems_of(kind: str, file: Path, root: Path, world_path: Sequence[Path] = ()) -> list[Problem]:
+    """All that is wrong with a "scenario", "world", "robot" or "map" file and the files it names."""
     if kind == "scenario":
         loaded = try_scenario(file, root, world_path)
-        return kind, loaded if isinstance(loaded, list) else list(loaded.notes)
+        return loaded if isinstance(loaded, list) else []
     library = Library(Fence.around(root, world_path))
     if isinstance(path := library.fence.entered(file), Problem):
-        return kind, [path]
+        return [path]
     assets = Assets(library)
     if kind == "world":
         assets.world_file(path)
@@ -32,7 +31,7 @@ def problems_of(file: Path, root: Path, world_path: Sequence[Path] = ()) -> tupl
         assets.robot_file(path)
     else:
         assets.map_file(path)
-    return kind, library.with_source(sorted(assets.problems))
+    return library.with_source(sorted(assets.problems))
 
 
 def kind_of(file: Path, root: Path) -> str:

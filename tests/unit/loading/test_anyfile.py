@@ -3,6 +3,7 @@ from pathlib import Path
 
 import pytest
 
+from simscen.core.problems import Problem
 from simscen.loading.anyfile import kind_of, problems_of
 
 Write = Callable[[str, str], Path]
@@ -27,18 +28,22 @@ def test_a_file_tells_its_kind_by_name_or_keys(write: Write, tmp_path: Path, nam
     assert kind_of(write(name, text), tmp_path) == kind
 
 
+def _problems(file: Path, root: Path) -> list[Problem]:
+    return problems_of(kind_of(file, root), file, root)
+
+
 def test_every_kind_is_checked(write: Write, scenario: str, tmp_path: Path) -> None:
     write("a.scenario.yaml", scenario)
     for name in ("a.scenario.yaml", "room.world.yaml", "cube.robot.yaml"):
-        assert problems_of(tmp_path / name, tmp_path)[1] == []
+        assert _problems(tmp_path / name, tmp_path) == []
     write("map.yaml", "image: no.pgm\nresolution: 1\norigin: [0, 0, 0]\n")
-    assert [p.place for p in problems_of(tmp_path / "map.yaml", tmp_path)[1]] == ["map.yaml:1:8"]
+    assert [p.place for p in _problems(tmp_path / "map.yaml", tmp_path)] == ["map.yaml:1:8"]
 
 
 def test_a_robot_is_checked_down_to_its_urdf(write: Write, tmp_path: Path) -> None:
     robot = (tmp_path / "cube.robot.yaml").read_text().replace("body: [{box: [0.3, 0.3, 0.3]}]", "urdf: cube.urdf")
     write("cube.robot.yaml", robot)
-    assert [p.code for p in problems_of(tmp_path / "cube.robot.yaml", tmp_path)[1]] == ["SC023"]
+    assert [p.code for p in _problems(tmp_path / "cube.robot.yaml", tmp_path)] == ["SC023"]
 
 
 def test_paths_may_be_relative_to_the_working_folder(
@@ -47,4 +52,4 @@ def test_paths_may_be_relative_to_the_working_folder(
     write("a.scenario.yaml", scenario)
     monkeypatch.chdir(tmp_path)
     for name in ("a.scenario.yaml", "room.world.yaml"):
-        assert problems_of(Path(name), Path())[1] == []
+        assert _problems(Path(name), Path()) == []

@@ -1,0 +1,83 @@
+"""Every word of the language is documented, and its example is valid."""
+
+from typing import Any
+
+import pytest
+from pydantic import BaseModel
+
+from simscen.actions.action import AnyAction
+from simscen.cli.catalogue import Topic, fields_of, kind_of, topics
+from simscen.criteria.criterion import AnyCriterion
+from simscen.loading.compose import compose
+from simscen.model.disturbance import FaultEntry
+from simscen.model.stack import Amcl
+from simscen.spec.quantities import Angle, Probability
+from simscen.triggers import trigger
+
+TOPICS = topics()
+WORDS = [topic for topic in TOPICS if topic.group in ("trigger", "action", "fault", "criterion") and topic.model]
+SINGLE = [topic for topic in WORDS if topic.name not in ("when", "faults", "pass")]
+
+
+def plain(text: str) -> Any:
+    """As simscen reads it: PyYAML's own loader takes the key `off` for false."""
+    tree, problems = compose(text, "example")
+    assert tree is not None
+    assert not problems
+    return tree.plain
+
+
+def _id(topic: Topic) -> str:
+    return f"{topic.group}.{topic.name}"
+
+
+@pytest.mark.parametrize("topic", TOPICS, ids=_id)
+def test_everything_is_described_in_a_sentence(topic: Topic) -> None:
+    first = topic.text.split("\n\n")[0]
+    assert first[:1].isupper() or first.startswith("nav2_")
+    assert first.rstrip().endswith((".", ":"))
+
+
+@pytest.mark.parametrize("topic", WORDS, ids=_id)
+def test_every_key_of_a_word_is_described(topic: Topic) -> None:
+    assert [field.key for field in topic.fields if not field.text] == []
+
+
+@pytest.mark.parametrize("topic", SINGLE, ids=_id)
+def test_every_word_has_an_example_that_is_valid_and_about_it(topic: Topic) -> None:
+    example = plain(topic.example)
+    models: dict[str, tuple[type[BaseModel], str | None]] = {
+        "trigger": (trigger.Trigger, "when"),
+        "action": (AnyAction, "do"),
+        "fault": (FaultEntry, None),
+        "criterion": (AnyCriterion, None),
+    }
+    model, key = models[topic.group]
+    written = example[key] if key else example
+    model.model_validate(written, by_alias=True, by_name=False)
+    assert topic.name in written
+
+
+@pytest.mark.parametrize("topic", [t for t in SINGLE if t.group == "criterion"], ids=_id)
+def test_every_criterion_tells_what_when_why_and_whence(topic: Topic) -> None:
+    for heading in ("What is measured:", "When it fails:", "Why this:", "Source:"):
+        assert f"\n{heading} " in topic.text
+
+
+def test_a_type_is_told_with_unit_and_range() -> None:
+    assert kind_of(Angle) == "angle in rad, -100 … 100"
+    assert kind_of(Probability) == "ratio, 0 … 1"
+    assert kind_of(list[Angle] | None) == "list of angle in rad, -100 … 100"
+
+
+def test_defaults_are_told_and_what_is_required_has_none() -> None:
+    fields = {field.key: field for field in fields_of(Amcl)}
+    assert (fields["max_particles"].kind, fields["max_particles"].default) == ("integer, 10 … 50000", "2000")
+    assert fields["selective_resampling"].default == "false"
+    names = {field.key: field.default for field in next(t for t in TOPICS if t.name == "stopped_within").fields}
+    assert names["time"] == ""
+
+
+def test_modifiers_are_listed_apart_from_the_choices() -> None:
+    assert [field.key for field in fields_of(trigger.Trigger)] == ["edge", "delay", "times", "probability"]
+    assert {topic.name for topic in TOPICS if topic.group == "trigger"} == {*trigger.Test.choices(), "when"}

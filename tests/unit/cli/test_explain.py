@@ -1,0 +1,44 @@
+import pytest
+
+
+def test_without_a_name_everything_is_listed(simscen) -> None:
+    out = simscen("explain").out
+    for name in ("trigger:", "stopped_within", "amcl", "slip", "spawn", "robot_within"):
+        assert name in out
+
+
+def test_a_word_is_told_with_keys_units_defaults_and_an_example(simscen) -> None:
+    out = simscen("explain", "collisions").out
+    assert out.startswith("collisions (criterion)\n")
+    assert "max_impulse: impulse in N s" in out
+    assert "caused_by_robot: true or false (default false)" in out
+    assert "Example: collisions: {max: 0}" in out
+
+
+def test_a_bare_value_is_told(simscen) -> None:
+    assert "Value: duration in s" in simscen("explain", "trigger.time").out
+
+
+def test_one_name_may_mean_several_things(simscen) -> None:
+    out = simscen("explain", "localization_error").out
+    assert "localization_error (trigger)" in out
+    assert "localization_error (criterion)" in out
+    assert "(trigger)" not in simscen("explain", "criterion.localization_error").out
+
+
+def test_codes_are_explained(simscen) -> None:
+    assert simscen("explain", "sc012").out == "SC012\n  A key is not known there.\n"
+
+
+@pytest.mark.parametrize(("name", "hint"), [("collision_s", "did you mean"), ("zzzzzz", "lists what there is")])
+def test_an_unknown_name_is_a_usage_error(simscen, name: str, hint: str) -> None:
+    ended = simscen("explain", name)
+    assert ended.code == 2
+    assert hint in ended.err
+
+
+def test_a_narrow_terminal_is_respected(simscen, monkeypatch) -> None:
+    monkeypatch.setenv("COLUMNS", "50")
+    text = [line for line in simscen("explain", "stopped_within").out.splitlines() if not line.startswith("  Example")]
+    prose = [line for line in text if ": " not in line]
+    assert max(map(len, prose)) <= 50

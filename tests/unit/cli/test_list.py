@@ -1,0 +1,47 @@
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture(autouse=True)
+def _three(simscen, tmp_path: Path) -> None:
+    good = (tmp_path / "good.scenario.yaml").read_text()
+    (tmp_path / "faults").mkdir()
+    (tmp_path / "faults/off.scenario.yaml").write_text(
+        good.replace("drive", "lidar off").replace("smoke", "fault, lidar")
+    )
+    (tmp_path / "faults/slip.scenario.yaml").write_text(
+        good.replace("name: drive\n", "").replace("tags: [smoke]\n", "")
+    )
+
+
+def test_each_scenario_is_a_line(simscen) -> None:
+    assert (
+        simscen("list", ".").out == "faults/off   lidar off [fault, lidar]\nfaults/slip\ngood         drive [smoke]\n"
+    )
+
+
+def test_keyword_and_tag_select(simscen) -> None:
+    assert simscen("list", ".", "-k", "faults and not slip").out.split()[0] == "faults/off"
+    assert simscen("list", ".", "--tag", "smoke", "--tag", "lidar").out.count("\n") == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "told"),
+    [
+        (["-k", "nothing"], 5, "none of 3 scenarios matches -k `nothing`"),
+        (["--tag", "smoek"], 5, "did you mean `smoke`?"),
+        (["-k", "("], 2, "cannot read -k `(`"),
+    ],
+)
+def test_an_empty_or_broken_selection_is_told(simscen, arguments: list[str], code: int, told: str) -> None:
+    ended = simscen("list", ".", *arguments)
+    assert (ended.code, ended.out) == (code, "")
+    assert told in ended.err
+
+
+def test_an_invalid_scenario_stops_it(simscen, tmp_path: Path) -> None:
+    (tmp_path / "bad.scenario.yaml").write_text("simscen: 1\n")
+    ended = simscen("list", ".")
+    assert ended.code == 2
+    assert "missing key `world`" in ended.err

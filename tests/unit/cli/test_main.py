@@ -1,0 +1,83 @@
+import subprocess
+import sys
+
+import pytest
+
+import simscen.cli.main as cli
+from simscen.core.errors import NothingSelected, UsageError
+
+
+def test_help_lists_the_commands_without_importing_them(simscen) -> None:
+    ended = simscen("--help")
+    assert ended.code == 0
+    assert "  validate  Check scenario, world and robot files without running anything." in ended.out
+
+
+def test_without_a_command_the_help_is_shown(simscen) -> None:
+    ended = simscen()
+    assert "Commands:" in ended.out + ended.err
+
+
+def test_the_version_is_printed(simscen) -> None:
+    assert simscen("--version").out.startswith("simscen 0")
+
+
+@pytest.mark.parametrize("name", [name for name in cli.COMMANDS if cli.importlib.util.find_spec(f"simscen.cli.{name}")])
+def test_the_table_says_what_the_command_says(simscen, name: str) -> None:
+    told = " ".join(simscen(name, "--help").out.split())
+    assert cli.COMMANDS[name].rstrip(".") in told
+
+
+def test_an_unknown_command_is_a_usage_error(simscen) -> None:
+    ended = simscen("rum")
+    assert ended.code == 2
+    assert "No such command 'rum'" in ended.err
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "told"),
+    [
+        (UsageError("no such folder"), 2, "simscen: no such folder\n"),
+        (NothingSelected("nothing matches"), 5, "simscen: nothing matches\n"),
+        (UsageError("::error::[/red]\nx"), 2, "simscen: :\\:error::[/red] x\n"),
+        (KeyboardInterrupt(), 130, ""),
+    ],
+)
+def test_errors_become_words_and_exit_codes(simscen, monkeypatch, error: BaseException, code: int, told: str) -> None:
+    def broken() -> None:
+        raise error
+
+    monkeypatch.setattr(cli, "app", broken)
+    assert simscen()[0::2] == (code, told)
+
+
+def test_what_nobody_foresaw_is_an_internal_error(simscen, monkeypatch) -> None:
+    def broken() -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(cli, "app", broken)
+    ended = simscen()
+    assert ended.code == 4
+    assert "internal error" in ended.err
+
+
+LIGHT = """
+import sys
+from simscen.cli.main import main
+sys.argv = ["simscen", *{arguments}]
+try:
+    main()
+except SystemExit as end:
+    assert not end.code, end.code
+heavy = {{"pybullet", "ompl", "scipy", "filterpy", "trimesh", "embreex", "PIL", "mcap", "rich"}} & set(sys.modules)
+assert not heavy, heavy
+"""
+
+
+@pytest.mark.parametrize(
+    "arguments", [["--help"], ["validate", "."], ["list", "."], ["schema"], ["explain", "amcl"], ["new", "x"]], ids=str
+)
+def test_light_commands_import_no_engine(simscen, arguments: list[str]) -> None:
+    code = LIGHT.format(arguments=arguments)
+    ended = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr

@@ -1,0 +1,109 @@
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+
+from simscen.cli.generate import ROOT, outdated
+from simscen.cli.jsonschema import MODELS, schema_of
+from simscen.loading.compose import compose
+
+DIAGNOSTICS = ROOT / "tests/diagnostics"
+SHIPPED = {
+    "scenario": sorted(ROOT.glob("scenarios/**/*.scenario.yaml")),
+    "world": sorted(ROOT.glob("worlds/**/*.world.yaml")),
+    "robot": sorted(ROOT.glob("simscen/data/robots/*.robot.yaml")),
+}
+FORM = [
+    "five_mistakes", "typo_in_a_key", "key_far_from_all", "wrong_types", "units", "choices", "empty_values", "names",
+    "single_key_choices", "another_version", "misspelt_instead_of_missing",
+]  # fmt: skip
+
+
+def test_what_is_generated_is_what_the_code_says() -> None:
+    assert outdated() == [], "run `make docs`"
+
+
+def _plain(text: str) -> Any:
+    """As simscen and editors read it: PyYAML's own loader takes the key `off` for false."""
+    tree, _ = compose(text, "f")
+    return tree and tree.plain
+
+
+@pytest.mark.parametrize("kind", MODELS)
+def test_a_schema_is_a_schema(kind: str) -> None:
+    jsonschema.Draft7Validator.check_schema(schema_of(kind))
+
+
+@pytest.mark.parametrize("kind", SHIPPED)
+def test_shipped_files_fit_their_schema(kind: str) -> None:
+    validator = jsonschema.Draft7Validator(schema_of(kind))
+    for file in SHIPPED[kind]:
+        errors = [error.message for error in validator.iter_errors(_plain(file.read_text()))]
+        assert not errors, file
+
+
+@pytest.mark.parametrize("name", FORM)
+def test_files_of_the_wrong_form_do_not_fit(name: str) -> None:
+    validator = jsonschema.Draft7Validator(schema_of("scenario"))
+    assert not validator.is_valid(_plain((DIAGNOSTICS / f"{name}.scenario.yaml").read_text()))
+
+
+def _errors(text: str) -> list[str]:
+    errors = jsonschema.Draft7Validator(schema_of("scenario")).iter_errors(_plain(text))
+    return [f"{'.'.join(map(str, error.absolute_path))}: {error.message}" for error in errors]
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("simscen: 1\nseeed: 7", ": Additional properties are not allowed ('seeed' was unexpected)"),
+        ("simscen: 1\nstack: {controller: {type: dwb, gamma: 1}}", "stack.controller: Additional properties"),
+        ("simscen: 1\nstack: {localizer: {alpha1: x}}", "stack.localizer.alpha1: 'x' is not of type 'number'"),
+        ("simscen: 1\nrobot: {pose: {x: 1}}", "robot.pose: 'y' is a required property"),
+        ("simscen: 1\nevents: [{when: {time: 1}, do: {spwan: {}}}]", "events.0.do: Additional properties"),
+        ("simscen: 1\nevents: [{when: {time: 1}, do: [{remove: {nam: x}}]}]", "events.0.do.0.remove: Additional"),
+    ],
+)
+def test_one_mistake_gives_an_error_at_its_place(text: str, told: str) -> None:
+    assert any(error.startswith(told) for error in _errors(text)), _errors(text)
+
+
+def test_every_key_has_a_text_or_a_meaning_by_its_type() -> None:
+    """Hover texts: what a scenario is made of is described; the parameters of the stack carry Nav2's names."""
+    definitions = schema_of("scenario")["$defs"]
+    for name in ("GoalEntry", "EventEntry", "FaultEntry", "Spawn", "StoppedWithin", "Wall"):
+        for key, schema in definitions[name]["properties"].items():
+            assert schema.get("description") or "$ref" in schema, f"{name}.{key}"
+
+
+def _walk(node: Any) -> list[dict[str, Any]]:
+    if isinstance(node, dict):
+        return [node, *(found for value in node.values() for found in _walk(value))]
+    return [found for item in node for found in _walk(item)] if isinstance(node, list) else []
+
+
+def test_nothing_is_null_and_no_default_is_bulky() -> None:
+    for node in _walk(schema_of("scenario")):
+        assert node.get("type") != "null"
+        assert not isinstance(node.get("default"), dict)
+
+
+def test_the_command_writes_what_is_committed(simscen, tmp_path: Path) -> None:
+    assert simscen("schema", "--write", "made").code == 0
+    for kind in MODELS:
+        made = (tmp_path / f"made/{kind}.schema.json").read_text()
+        assert made == (ROOT / f"schemas/{kind}.schema.json").read_text()
+    assert json.loads(simscen("schema", "world").out) == schema_of("world")
+
+
+def test_check_jsonschema_agrees() -> None:
+    """The tool that pre-commit hooks use, on a good and a bad file."""
+    schema = str(ROOT / "schemas/scenario.schema.json")
+    for file, valid in ((SHIPPED["scenario"][0], True), (DIAGNOSTICS / "five_mistakes.scenario.yaml", False)):
+        command = [sys.executable, "-m", "check_jsonschema", "--schemafile", schema, str(file)]
+        ended = subprocess.run(command, check=False, capture_output=True, text=True)
+        assert (ended.returncode == 0) == valid, ended.stdout

@@ -1,0 +1,96 @@
+import json
+from pathlib import Path
+
+import pytest
+
+BAD = "simscen: 1\nwrold: x\nrobot: {pose: {x: 1, y: 2 s}}\npass: [{goals_reached: {}}]\n"
+
+
+def test_valid_files_are_counted_by_kind(simscen, tmp_path: Path) -> None:
+    (tmp_path / "a.world.yaml").write_text("simscen: 1\n")
+    ended = simscen("validate", ".")
+    assert ended == (0, "1 world and 1 scenario are valid\n", "")
+
+
+def test_one_is_singular(simscen) -> None:
+    assert simscen("validate", "good.scenario.yaml").out == "1 scenario is valid\n"
+
+
+def test_every_problem_is_shown_with_its_line(simscen, tmp_path: Path) -> None:
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub/bad.scenario.yaml").write_text(BAD)
+    ended = simscen("validate", ".")
+    assert ended.code == 2
+    assert ended.out == (
+        "sub/bad.scenario.yaml:2:1: error[SC012] unknown key `wrold`\n"
+        "    2 | wrold: x\n"
+        "      | ^^^^^\n"
+        "      = did you mean `world`?\n"
+        "sub/bad.scenario.yaml:3:25: error[SC015] `s` is a unit of duration, but this is a length\n"
+        "    3 | robot: {pose: {x: 1, y: 2 s}}\n"
+        "      |                         ^^^\n"
+        "      = units: m, cm, mm, km; a bare number is SI\n"
+        "2 problems in 1 of 2 files\n"
+    )
+
+
+def test_machines_get_json(simscen, tmp_path: Path) -> None:
+    (tmp_path / "bad.scenario.yaml").write_text(BAD)
+    ended = simscen("validate", ".", "--format", "json")
+    told = json.loads(ended.out)
+    assert (ended.code, told["valid"], told["files"]) == (2, False, 2)
+    assert told["problems"][0] == {
+        "path": "bad.scenario.yaml", "line": 2, "col": 1, "code": "SC012", "severity": "error",
+        "message": "unknown key `wrold`", "hint": "did you mean `world`?",
+    }  # fmt: skip
+
+
+def test_github_gets_annotations(simscen, tmp_path: Path) -> None:
+    (tmp_path / "bad.scenario.yaml").write_text(BAD)
+    first = simscen("validate", ".", "--format", "github").out.splitlines()[0]
+    assert first == (
+        "::error file=bad.scenario.yaml,line=2,col=1,title=simscen SC012::unknown key `wrold`%0Adid you mean `world`?"
+    )
+
+
+def test_a_goal_in_a_wall_is_found_without_running(simscen, tmp_path: Path) -> None:
+    good = (tmp_path / "good.scenario.yaml").read_text()
+    (tmp_path / "bad.scenario.yaml").write_text(good.replace("x: 5, y: 3", "x: 3, y: 2"))
+    ended = simscen("validate", "bad.scenario.yaml")
+    assert ended.code == 2
+    assert 'is inside obstacle "crate"' in ended.out
+
+
+@pytest.mark.parametrize(
+    ("argument", "code", "told"),
+    [
+        ("nowhere", 2, "nowhere: error[SC001] no such file or directory"),
+        ("x" * 5000, 2, "no such file or directory"),
+        ("empty", 5, "no scenarios found in `empty`"),
+    ],
+)
+def test_arguments_that_mean_nothing_are_told(simscen, tmp_path: Path, argument: str, code: int, told: str) -> None:
+    (tmp_path / "empty").mkdir()
+    ended = simscen("validate", argument)
+    assert ended.code == code
+    assert told in ended.err
+    assert "Traceback" not in ended.err
+
+
+@pytest.mark.parametrize("name", ["[/red]", "::error::x", "##[error]x", "]]><script>", "a\nb"])
+def test_no_name_of_a_file_is_obeyed(simscen, tmp_path: Path, name: str) -> None:
+    file = tmp_path / f"{name.replace('/', '-')}.scenario.yaml"
+    file.write_text("simscen: 1\n::set-output name=x:: 1\n")
+    for kind in ("text", "github"):
+        out = simscen("validate", file.name, "--format", kind).out
+        commands = [line for line in out.splitlines() if line.lstrip().startswith("::")]
+        assert all(line.startswith("::error file=") for line in commands)
+        assert "##[" not in out
+
+
+def test_a_flood_of_problems_is_cut(simscen, tmp_path: Path) -> None:
+    keys = "".join(f"k{i}: 1\n" for i in range(80))
+    (tmp_path / "bad.scenario.yaml").write_text("simscen: 1\n" + keys)
+    ended = simscen("validate", "bad.scenario.yaml")
+    assert "bad.scenario.yaml: … and 33 more" in ended.out
+    assert ended.out.endswith("83 problems in 1 of 1 file\n")
