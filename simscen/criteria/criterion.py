@@ -5,6 +5,7 @@ from typing import ClassVar, Literal
 from simscen.criteria.clearance import Clearance
 from simscen.criteria.collisions import Collisions
 from simscen.criteria.goals_reached import GoalsReached
+from simscen.criteria.keepout import Keepout
 from simscen.criteria.localization_error import LocalizationError
 from simscen.criteria.no_false_success import NoFalseSuccess
 from simscen.criteria.path_length import PathLength
@@ -14,6 +15,7 @@ from simscen.criteria.replans import Replans
 from simscen.criteria.result import ErrorCodeIs, Result
 from simscen.criteria.speed import Speed
 from simscen.criteria.stopped_within import StoppedWithin
+from simscen.criteria.stuck import Stuck
 from simscen.criteria.time_to_goal import TimeToGoal
 from simscen.spec.base import Choice
 from simscen.spec.places import Name
@@ -35,10 +37,12 @@ class AnyCriterion(Choice):
     no_false_success: NoFalseSuccess | None = None
     collisions: Collisions | None = None
     clearance: Clearance | None = None
+    keepout: Keepout | None = None
     time_to_goal: TimeToGoal | None = None
     path_length: PathLength | None = None
     speed: Speed | None = None
     stopped_within: StoppedWithin | None = None
+    stuck: Stuck | None = None
     localization_error: LocalizationError | None = None
     relocalized_within: RelocalizedWithin | None = None
     replans: Replans | None = None

@@ -111,6 +111,7 @@ def sketch_case(words: Mapping[str, Any]) -> Case:
         start=_pose(words.get("start", [0, 0])),
         goals=goals,
         shortest=words.get("shortest", {}),
+        regions={name: tuple((x, y) for x, y in corners) for name, corners in words.get("regions", {}).items()},
         footprint=tuple((x, y) for x, y in words.get("footprint", [])),
         inscribed_radius=words.get("inscribed_radius", 0.2),
         time_limit=words.get("time_limit", 60.0),

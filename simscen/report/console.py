@@ -28,7 +28,7 @@ class Reporter(Protocol):
 
 def text_reporter(out: TextIO, live: bool | None = None) -> Reporter:
     """For people: live on a terminal, plain lines elsewhere. `live` overrides what `out` says it is."""
-    if not (out.isatty() if live is None else live):
+    if not (out.isatty() and _can_encode(out) if live is None else live):
         return _Plain(out)
     from simscen.report.live import LiveReporter  # rich, which lists and pipes need not wait for
 

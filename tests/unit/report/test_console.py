@@ -40,7 +40,6 @@ def told(reporter, session):
 
 def test_piped_output_is_exactly_this(session):
     out = io.StringIO()
-    out.encoding_hint = "utf-8"
     told(text_reporter(utf8(out)), session)
     assert out.getvalue() == EXPECTED
 
@@ -71,6 +70,18 @@ def test_a_stream_that_knows_only_ascii_gets_ascii(session):
     text = raw.getvalue().decode("ascii")
     assert "  + navigation/goal" in text
     assert "  x faults/lidar_off" in text
+
+
+def test_a_terminal_that_knows_only_ascii_gets_plain_lines(session):
+    class Terminal(io.TextIOWrapper):
+        def isatty(self):
+            return True
+
+    raw = io.BytesIO()
+    out = Terminal(raw, encoding="ascii")
+    told(text_reporter(out), session)
+    out.flush()
+    assert b"\x1b" not in raw.getvalue()
 
 
 def test_a_terminal_gets_the_same_facts_in_colour_and_user_text_is_no_markup(session):
