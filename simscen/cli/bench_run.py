@@ -66,7 +66,7 @@ def _planned(experiments: Sequence[Experiment], out: Path) -> tuple[list[Job], d
     for number, experiment in enumerate(experiments):
         for planned in experiment.drives:
             scenario = load_scenario(planned.file, experiment.root, experiment.world_path)
-            if problems := checked(scenario):
+            if problems := [problem for problem in checked(scenario) if problem.severity == "error"]:
                 raise InvalidInput(problems)
             for seed in planned.seeds:
                 key = RunKey(scenario.id, seed)

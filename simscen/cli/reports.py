@@ -1,58 +1,24 @@
-"""What `simscen run` leaves behind, results.json, junit.xml, report.html, run.json, and what it prints meanwhile."""
+"""What a session leaves behind: results.json, junit.xml, run.json; and its exit code."""
 
-import json
-import os
-import platform
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from datetime import datetime, timezone
+from collections.abc import Sequence
 from enum import Enum
-from importlib.metadata import version
 from pathlib import Path
-from typing import TextIO
 
+from simscen.cli import circumstances
 from simscen.cli.diagnostics import print_text
-from simscen.core.session import RunFinished
-from simscen.report.console import Reporter, text_reporter
-from simscen.report.github import github_reporter
+from simscen.core.errors import Exit, UsageError
+from simscen.core.session import Outcome, RunFinished, SessionFinished
 from simscen.report.junit import Family, to_xml
-from simscen.report.machine import json_reporter
-from simscen.report.page import to_html
 from simscen.report.results import to_json
-from simscen.run.outfolder import write_atomically
-
-PACKAGES = ("simscen", "pybullet", "ompl", "numpy", "scipy", "embreex", "mcap", "pydantic")
+from simscen.run.outfolder import probe_writable, write_atomically
 
 
-class Format(str, Enum):
-    """What is printed."""
+class JunitFamily(str, Enum):
+    """Dialects of JUnit XML."""
 
-    TEXT = "text"
-    JSON = "json"
-    GITHUB = "github"
-
-
-def printer(format_: Format, summary: TextIO | None) -> Reporter:
-    """What prints on stdout; `summary` is GitHub's step summary."""
-    match format_:
-        case Format.TEXT:
-            return text_reporter(sys.stdout)
-        case Format.JSON:
-            return json_reporter(sys.stdout)
-        case Format.GITHUB:
-            return github_reporter(sys.stdout, summary)
-
-
-@contextmanager
-def step_summary() -> Iterator[TextIO | None]:
-    """The file that GitHub Actions shows as the summary of a step, where there is one."""
-    path = os.environ.get("GITHUB_STEP_SUMMARY")
-    if not path:
-        yield None
-        return
-    with Path(path).open("a", encoding="utf-8") as file:
-        yield file
+    SIMSCEN = "simscen"
+    XUNIT2 = "xunit2"
 
 
 class Reports:
@@ -62,49 +28,64 @@ class Reports:
         self.folder, self.junit = folder, junit or folder / "junit.xml"
         self._family: Family = family
 
-    def write(self, answers: Sequence[RunFinished], wall: float) -> bool:
-        """Write all reports; a report that cannot be written is told, and the one before it stays whole."""
+    def begin(self) -> None:
+        """Write run.json, so that a session that is killed has said where it ran."""
+        write_atomically(self.folder / "run.json", circumstances.as_json())
+
+    def write(self, answers: Sequence[RunFinished]) -> bool:
+        """Write the reports; one that cannot be written is told, and the one before it stays whole."""
+        junit = to_xml(answers, self._family)
         documents = {
             self.folder / "results.json": to_json(answers, str(self.folder)).encode(),
-            self.folder / "junit.xml": to_xml(answers, self._family),
-            self.junit: to_xml(answers, self._family),
-            self.folder / "report.html": to_html(answers).encode(),
-            self.folder / "run.json": _circumstances(wall),
+            self.folder / "junit.xml": junit,
+            self.junit: junit,
         }
-        written = True
-        for path, data in documents.items():
-            try:
-                write_atomically(path, data)
-            except OSError as error:
-                written = False
-                print_text(f"simscen: cannot write {path}: {error.strerror}", sys.stderr)
-        return written
+        outcomes = [_written(path, data) for path, data in documents.items()]  # every one is tried
+        return all(outcomes)
+
+    def end(self, wall: float) -> bool:
+        """Write run.json anew, with the seconds that the session took."""
+        return _written(self.folder / "run.json", circumstances.as_json(wall))
+
+    def closing(self, answers: Sequence[RunFinished], wall: float, interrupted: bool) -> SessionFinished:
+        """The last event of a session."""
+        count = {outcome: sum(answer.outcome is outcome for answer in answers) for outcome in Outcome}
+        return SessionFinished(
+            count[Outcome.PASSED],
+            count[Outcome.FAILED],
+            count[Outcome.ERROR],
+            simulated=sum(answer.simulated for answer in answers),
+            wall=wall,
+            interrupted=interrupted,
+            junit=str(self.junit),
+            folder=str(self.folder),
+        )
 
 
-def _circumstances(wall: float) -> bytes:
-    """run.json: all that may differ between two equal sessions."""
-    return json.dumps(
-        {
-            "ended": datetime.now(timezone.utc).isoformat(timespec="seconds"),
-            "wall_seconds": round(wall, 3),
-            "host": platform.node(),
-            "command": sys.argv,
-            "python": platform.python_version(),
-            "machine": platform.machine(),
-            "cores": os.cpu_count(),
-            "cpu_flags": _cpu_flags(),
-            "packages": {name: version(name) for name in PACKAGES},
-        },
-        indent=2,
-    ).encode()
+def verdict(answers: Sequence[RunFinished]) -> Exit:
+    """The exit code of a session that was not interrupted."""
+    outcomes = {answer.outcome for answer in answers}
+    if Outcome.ERROR in outcomes:
+        only_skipped = all(a.error and a.error.kind == "not-run" for a in answers if a.outcome is Outcome.ERROR)
+        return Exit.FAILED if only_skipped and Outcome.FAILED in outcomes else Exit.INCOMPLETE
+    return Exit.FAILED if Outcome.FAILED in outcomes else Exit.PASSED
 
 
-def _cpu_flags() -> list[str]:
-    """Which of the instruction sets that change last bits this machine has."""
-    known = {"fma", "avx", "avx2", "avx512f", "sse4_2"}
+def require_writable(junit: Path | None) -> None:
+    """Raise UsageError for a report that cannot be written: that should be known before anything runs."""
+    if junit is None:
+        return
     try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        return []
-    flags = next((line.split(":", 1)[1].split() for line in lines if line.startswith("flags")), [])
-    return sorted(known.intersection(flags))
+        junit.parent.mkdir(parents=True, exist_ok=True)
+        probe_writable(junit)
+    except OSError as error:
+        raise UsageError(f"cannot write {junit}: {error.strerror}") from error
+
+
+def _written(path: Path, data: bytes) -> bool:
+    try:
+        write_atomically(path, data)
+    except OSError as error:
+        print_text(f"simscen: cannot write {path}: {error.strerror}", sys.stderr)
+        return False
+    return True

@@ -4,32 +4,26 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
-from enum import Enum
 from pathlib import Path
 from types import FrameType
 from typing import Annotated
 
 import typer
 
-from simscen import __version__
-from simscen.cli.reports import Format, Reports, printer, step_summary
-from simscen.cli.select import load_all
+from simscen.cli.diagnostics import as_text, print_text
+from simscen.cli.reports import JunitFamily, Reports, require_writable, verdict
+from simscen.cli.screen import Format, Screen, screen
+from simscen.cli.select import Selection, load_all, shard_of
+from simscen.cli.work import Work, begin
 from simscen.core.errors import Exit, UsageError
-from simscen.core.session import Listener, Outcome, RunFinished, SessionFinished, SessionStarted
-from simscen.run.jobs import Job
-from simscen.run.outfolder import make_folder, probe_writable
+from simscen.core.session import SessionEvent
+from simscen.report.journal import Journal, require_free
+from simscen.report.rebuild import read_journal
+from simscen.run.outfolder import make_folder
 from simscen.run.session import Options, plan, run_session
 from simscen.run.supervisor import Interrupted
-
-
-class Family(str, Enum):
-    """Dialects of JUnit XML."""
-
-    SIMSCEN = "simscen"
-    XUNIT2 = "xunit2"
-
 
 ZYGOTE = ("-m", "simscen.cli.zygote")
 
@@ -58,62 +52,78 @@ def command(
     ] = False,
     junit: Annotated[Path | None, typer.Option(help="Write JUnit XML here as well.")] = None,
     junit_family: Annotated[
-        Family, typer.Option(help="xunit2 leaves out what Jenkins' schema forbids.")
-    ] = Family.SIMSCEN,
+        JunitFamily, typer.Option(help="xunit2 leaves out what Jenkins' schema forbids.")
+    ] = JunitFamily.SIMSCEN,
     format_: Annotated[Format, typer.Option("--format", help="What to print.")] = Format.TEXT,
     wall_limit: Annotated[float, typer.Option(min=1, help="Seconds of wall time that one run may take.")] = 300.0,
+    resume: Annotated[
+        Path | None, typer.Option(help="Go on in this output folder: only what has no verdict yet, or has changed.")
+    ] = None,
+    shard: Annotated[str, typer.Option(help="i/n: only every n-th scenario, from the i-th on.")] = "1/1",
     root: Annotated[Path | None, typer.Option(help="Files inside scenarios stay in this folder.")] = None,
     world_path: Annotated[list[Path] | None, typer.Option(help="Folder with worlds and models; repeatable.")] = None,
+    lenient: Annotated[
+        bool, typer.Option("--lenient", help="Leave out what of an SDF world cannot be used, with a warning.")
+    ] = False,
 ) -> None:
     """Run scenarios and report what passed.
 
     Everything is validated first; with one bad file nothing is run. Each run leaves its MCAP log, a picture and its
-    verdicts in the output folder, beside results.json and junit.xml.
+    verdicts in the output folder, beside results.json and junit.xml. Should simscen itself be killed, `simscen report`
+    makes these from the journal, and --resume goes on where it stopped.
 
     Exit code 0: all passed; 1: a criterion failed; 2: an invalid scenario or an unusable output folder (nothing was
     run); 3: a run could not be completed; 5: nothing selected; 130 and 143: interrupted.
     """
-    scenarios = load_all(paths, root, world_path or [], keyword, tag or [])
+    wanted = Selection(keyword, tag or [], shard_of(shard))
+    scenarios, warnings = load_all(paths, root, world_path or [], lenient, wanted)
+    if warnings:
+        print_text(as_text(warnings), sys.stderr)
     options = Options(workers or _cores(), seed, repeat, check_determinism, fail_fast, wall_limit)
-    _require_writable(junit)
-    folder = make_folder(out)
+    folder, journal = _output_folder(out, resume)
+    require_writable(junit)
     reports = Reports(folder, junit, junit_family.value)
-    with step_summary() as summary, printer(format_, summary) as listen:
-        code = _run(plan(scenarios, options, folder), options, reports, listen)
-    sys.exit(code)
+    reports.begin()
+    work = begin(journal, plan(scenarios, options, folder), options.workers)
+    with screen(format_) as shown:
+        code = _run(work, options, reports, shown)
+    sys.exit(code if shown.complete else max(code, Exit.INCOMPLETE))
 
 
-def _run(jobs: Sequence[Job], options: Options, reports: Reports, listen: Listener) -> Exit:
-    """Run all jobs, tell the reports, and say how it went."""
+def _run(work: Work, options: Options, reports: Reports, shown: Screen) -> Exit:
+    """Do what is left to do, tell the journal, the screen and the reports, and say how it went."""
     begun = time.monotonic()
-    scenarios = len({job.scenario.id for job in jobs})
-    listen(SessionStarted(__version__, len(jobs), scenarios, options.workers, str(reports.folder)))
+
+    def listen(event: SessionEvent) -> None:
+        work.journal(event)
+        shown(event)
+
+    shown(work.started(reports.folder))
+    for answer in work.kept:
+        shown(answer)
     with _signals_interrupt():
-        answers, stopped = run_session(jobs, options, ZYGOTE, listen)
-    written = reports.write(answers, time.monotonic() - begun)
-    count = {outcome: sum(answer.outcome is outcome for answer in answers) for outcome in Outcome}
-    listen(
-        SessionFinished(
-            count[Outcome.PASSED],
-            count[Outcome.FAILED],
-            count[Outcome.ERROR],
-            simulated=sum(answer.simulated for answer in answers),
-            wall=time.monotonic() - begun,
-            interrupted=stopped is not None,
-            junit=str(reports.junit),
-            folder=str(reports.folder),
-        )
-    )
-    return stopped or verdict(answers) if written else Exit.INCOMPLETE
+        answers, stopped = run_session(work.jobs, options, ZYGOTE, listen)
+    answers = [*work.kept, *answers]
+    written = reports.write(answers)
+    wall = time.monotonic() - begun
+    listen(reports.closing(answers, wall, stopped is not None))
+    written = reports.end(wall) and written and work.journal.error is None
+    return stopped or (verdict(answers) if written else Exit.INCOMPLETE)
 
 
-def verdict(answers: Sequence[RunFinished]) -> Exit:
-    """The exit code of a session that was not interrupted."""
-    outcomes = {answer.outcome for answer in answers}
-    if Outcome.ERROR in outcomes:
-        only_skipped = all(a.error and a.error.kind == "not-run" for a in answers if a.outcome is Outcome.ERROR)
-        return Exit.FAILED if only_skipped and Outcome.FAILED in outcomes else Exit.INCOMPLETE
-    return Exit.FAILED if Outcome.FAILED in outcomes else Exit.PASSED
+def _output_folder(out: Path | None, resume: Path | None) -> tuple[Path, Journal]:
+    """The folder and its journal, locked. Raises UsageError before anything in it is touched."""
+    if resume is not None and out is not None:
+        raise UsageError("--out and --resume exclude each other")
+    if resume is not None:
+        read_journal(resume)
+    elif out is not None:
+        require_free(out)
+    folder = resume or make_folder(out)
+    try:
+        return folder, Journal(folder, goes_on=resume is not None)
+    except OSError as error:
+        raise UsageError(f"cannot use the output folder {folder}: {error.strerror}") from error
 
 
 @contextmanager
@@ -132,17 +142,6 @@ def _signals_interrupt() -> Iterator[None]:
         if signal.getsignal(signal.SIGINT) is interrupt:
             for number, handler in before.items():
                 signal.signal(number, handler)
-
-
-def _require_writable(junit: Path | None) -> None:
-    """An unwritable report is known before anything runs."""
-    if junit is None:
-        return
-    try:
-        junit.parent.mkdir(parents=True, exist_ok=True)
-        probe_writable(junit)
-    except OSError as error:
-        raise UsageError(f"cannot write {junit}: {error.strerror}") from error
 
 
 def _cores() -> int:

@@ -1,10 +1,11 @@
 """From paths on the command line to scenarios that can run."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from simscen.cli.diagnostics import from_here
-from simscen.core.errors import InvalidInput
+from simscen.cli.diagnostics import from_here, harmless
+from simscen.core.errors import InvalidInput, NothingSelected, UsageError
 from simscen.core.problems import Problem
 from simscen.loading.discovery import default_root, discover
 from simscen.loading.loaded import LoadedScenario
@@ -13,25 +14,54 @@ from simscen.loading.selection import select
 from simscen.run.check import check
 
 
+@dataclass(frozen=True)
+class Selection:
+    """Which scenarios a command is about: `keyword` and `tags` as for pytest, `shard` as (i, n) from (1, n)."""
+
+    keyword: str = ""
+    tags: Sequence[str] = ()
+    shard: tuple[int, int] = (1, 1)
+
+
 def load_all(
-    paths: Sequence[Path], root: Path | None, world_path: Sequence[Path], keyword: str, tags: Sequence[str]
-) -> list[LoadedScenario]:
-    """The selected scenarios, all of them valid.
+    paths: Sequence[Path], root: Path | None, world_path: Sequence[Path], lenient: bool, wanted: Selection
+) -> tuple[list[LoadedScenario], list[Problem]]:
+    """The selected scenarios, all of them valid, and warnings about them, each once.
 
     Raises InvalidInput with every problem of every file, selected or not, and NothingSelected.
     """
     home = root if root is not None else default_root(paths)
     loaded: list[LoadedScenario] = []
-    problems: list[Problem] = []
+    problems: dict[Problem, None] = {}
+    warnings: dict[str, list[Problem]] = {}
     for file in discover(paths, home):
         scenario = try_scenario(file, home, world_path)
         if isinstance(scenario, LoadedScenario):
-            loaded.append(scenario)
-            scenario = checked(scenario)
-        problems += [problem for problem in scenario if problem not in problems]
+            loaded.append(replace(scenario, lenient=lenient))
+            scenario = [*scenario.notes, *checked(loaded[-1])]
+            warnings[loaded[-1].id] = scenario
+        problems.update(dict.fromkeys(scenario))
     if any(problem.severity == "error" for problem in problems):
         raise InvalidInput(from_here(problems, home))
-    return select(loaded, keyword, tags)
+    chosen = _shard(select(loaded, wanted.keyword, wanted.tags), *wanted.shard)
+    told = dict.fromkeys(warning for scenario in chosen for warning in warnings[scenario.id])
+    return chosen, from_here(told, home)
+
+
+def shard_of(text: str) -> tuple[int, int]:
+    """`i/n` as numbers. Raises UsageError."""
+    number, slash, count = text.partition("/")
+    if slash and number.isdecimal() and count.isdecimal() and 1 <= int(number) <= int(count):
+        return int(number), int(count)
+    raise UsageError(f"cannot read --shard {harmless(text)}: expected i/n with 1 <= i <= n, e.g. 2/4")
+
+
+def _shard(scenarios: list[LoadedScenario], number: int, count: int) -> list[LoadedScenario]:
+    """Every n-th scenario, so that folders with slow ones are spread over all shards."""
+    share = scenarios[number - 1 :: count]
+    if not share:
+        raise NothingSelected(f"shard {number}/{count} of {len(scenarios)} scenarios is empty")
+    return share
 
 
 def checked(scenario: LoadedScenario) -> list[Problem]:

@@ -16,7 +16,7 @@ from simscen.report.journaldata import FORMAT, NAME, Planned, read_planned, read
 class Past:
     """The last session in a journal: what it planned, what was answered, and which runs had at least begun.
 
-    `wall` is how many seconds after its start the last line was written; `ended` whether it came to its end.
+    `wall` is how many seconds after its start the last line was written.
     """
 
     version: str
@@ -25,7 +25,6 @@ class Past:
     answered: Mapping[RunKey, RunFinished]
     begun: frozenset[RunKey]
     wall: float
-    ended: bool
     interrupted: bool
 
     @property
@@ -91,8 +90,7 @@ def _past(lines: list[dict[str, Any]], folder: Path) -> Past:
         answered=answered,
         begun=frozenset(begun),
         wall=last["at"],
-        ended=last["event"] == "ended",
-        interrupted=last["event"] != "ended" or last["interrupted"],
+        interrupted=len(answered) < len(planned) or bool(last.get("interrupted")),
     )
 
 

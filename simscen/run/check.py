@@ -4,12 +4,13 @@ Needs no engine: worlds of simple shapes are checked with numpy alone.
 """
 
 from collections.abc import Iterator
+from pathlib import Path
 
 from simscen.core.geometry import Pose2
 from simscen.core.problems import Problem
 from simscen.core.world import World
 from simscen.criteria.result import Result
-from simscen.loading.loaded import LoadedScenario
+from simscen.loading.loaded import LoadedScenario, LoadedWorld
 from simscen.model.scenario import ScenarioSpec
 from simscen.run.prepare import goals_of, pose_of
 from simscen.run.robotmodel import inscribed_radius
@@ -21,14 +22,24 @@ NEAR_GROUND, ROBOT_HEIGHT = 0.02, 0.4
 
 
 def check(loaded: LoadedScenario) -> list[Problem]:
-    """Every start and goal that cannot be, at the line it is written in. Raises InvalidInput for unusable files."""
+    """Every start and goal that cannot be, at the line it is written in, and what its world notes, as warnings.
+
+    Raises InvalidInput for unusable files.
+    """
     world = load_world(loaded)
     radius = inscribed_radius(load_robot(loaded)[1])
-    return [
+    misplaced = [
         loaded.problem(keys, "SC301", f"{what} ({pose.x:g}, {pose.y:g}) is {where}", hint)
         for keys, what, pose, hint in _poses(loaded.spec, world)
         if (where := _outside(loaded, world, pose) or _in_the_way(world, pose, radius))
     ]
+    return [*misplaced, *notes_of(world, loaded.world, loaded.root)]
+
+
+def notes_of(world: World, source: LoadedWorld, root: Path) -> list[Problem]:
+    """What the readers of a world had to say, as warnings about its file."""
+    shown = source.path.relative_to(root).as_posix() if source.path.is_relative_to(root) else str(source.path)
+    return [Problem(shown, 0, 0, "SC311", note.removeprefix(f"{shown}: "), severity="warning") for note in world.notes]
 
 
 def _poses(spec: ScenarioSpec, world: World) -> Iterator[tuple[tuple[str | int, ...], str, Pose2, str]]:

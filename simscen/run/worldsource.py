@@ -1,5 +1,6 @@
 """Where a scenario's world, map and robot come from."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from simscen.core.errors import InvalidInput
@@ -16,18 +17,23 @@ from simscen.worlds.own import build_own
 
 def load_world(loaded: LoadedScenario) -> World:
     """The world of a scenario. Raises InvalidInput for a map image or an SDF file that cannot be used."""
-    source = loaded.world
+    return world_of(loaded.world, loaded.root, loaded.world_path, loaded.lenient)
+
+
+def world_of(source: LoadedWorld, root: Path, world_path: Sequence[Path] = (), lenient: bool = False) -> World:
+    """The world of a file; what SDF names stays inside `root` and `world_path`.
+
+    Raises InvalidInput for a map image or an SDF file that cannot be used; with `lenient`, the elements of SDF that
+    cannot be used become notes.
+    """
+    base: World | None = None
+    if source.sdf is not None:
+        from simscen.worlds.sdf import load_sdf
+
+        base = load_sdf(source.sdf, search=world_path, root=root, lenient=lenient)
     spec = source.spec or WorldSpec(simscen=1)
     grid, notes = _map_and_notes(source.map) if source.map else (None, ())
-    return build_own(spec, source.name, grid, _sdf(source, loaded), notes)
-
-
-def _sdf(source: LoadedWorld, loaded: LoadedScenario) -> World | None:
-    if source.sdf is None:
-        return None
-    from simscen.worlds.sdf import load_sdf
-
-    return load_sdf(source.sdf, search=loaded.world_path, root=loaded.root)
+    return build_own(spec, source.name, grid, base, notes)
 
 
 def load_map(source: LoadedMap) -> OccupancyGrid:

@@ -1,0 +1,44 @@
+"""`simscen report`."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from simscen.cli.reports import JunitFamily, Reports, require_writable, verdict
+from simscen.cli.screen import Format, screen
+from simscen.core.errors import Exit
+from simscen.report.journal import require_free
+from simscen.report.rebuild import read_journal
+
+
+def command(
+    folder: Annotated[Path, typer.Argument(help="The output folder of `simscen run`.")],
+    junit: Annotated[Path | None, typer.Option(help="Write JUnit XML here as well.")] = None,
+    junit_family: Annotated[
+        JunitFamily, typer.Option(help="xunit2 leaves out what Jenkins' schema forbids.")
+    ] = JunitFamily.SIMSCEN,
+    format_: Annotated[Format, typer.Option("--format", help="What to print.")] = Format.TEXT,
+) -> None:
+    """Write the reports of an output folder anew from its journal.
+
+    Every run that was planned is in results.json and junit.xml, also when simscen itself was killed: a run that had
+    begun is then an error of type `interrupted`, one that had not `not-run`. Nothing is simulated or judged again.
+
+    Exit code as of `simscen run`: 0: all passed; 1: a criterion failed; 2: not an output folder, or still in use; 3: a
+    run was not completed.
+    """
+    past = read_journal(folder)
+    require_free(folder)
+    require_writable(junit)
+    reports = Reports(folder, junit, junit_family.value)
+    answers = past.answers
+    with screen(format_) as shown:
+        shown(past.started(folder))
+        for answer in answers:
+            shown(answer)
+        written = reports.write(answers)
+        shown(reports.closing(answers, past.wall, past.interrupted))
+    code = verdict(answers) if written else Exit.INCOMPLETE
+    sys.exit(code if shown.complete else max(code, Exit.INCOMPLETE))

@@ -1,0 +1,87 @@
+"""What a session prints. Its files matter more: a full disk or a closed pipe behind stdout ends the printing only."""
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from enum import Enum
+from pathlib import Path
+from typing import TextIO
+
+from simscen.core.session import SessionEvent
+from simscen.report.console import Reporter, text_reporter
+from simscen.report.github import github_reporter
+from simscen.report.machine import json_reporter
+
+
+class Format(str, Enum):
+    """What is printed."""
+
+    TEXT = "text"
+    JSON = "json"
+    GITHUB = "github"
+
+
+class Screen:
+    """Passes events on until the printer fails; `lost` is why."""
+
+    def __init__(self, printer: Reporter) -> None:
+        self._printer = printer
+        self.lost: OSError | None = None
+
+    def __call__(self, event: SessionEvent) -> None:
+        """Print what the event is worth."""
+        if self.lost is None:
+            with self.forgiving():
+                self._printer(event)
+
+    @contextmanager
+    def forgiving(self) -> Iterator[None]:
+        """Survive a stdout that takes no more, and keep the interpreter from failing on it when it flushes at exit."""
+        try:
+            yield
+        except OSError as error:
+            self.lost = self.lost or error
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, sys.stdout.fileno())
+            os.close(nowhere)
+
+    @property
+    def complete(self) -> bool:
+        """Whether everything was printed that anybody waited for: who closes a pipe has read enough."""
+        return self.lost is None or isinstance(self.lost, BrokenPipeError)
+
+
+@contextmanager
+def screen(format_: Format) -> Iterator[Screen]:
+    """Print a session on stdout, and on GitHub also as the summary of the step."""
+    with _step_summary() as summary:
+        printer = _printer(format_, summary)
+        shown = Screen(printer)
+        printer.__enter__()
+        try:
+            yield shown
+        finally:
+            with shown.forgiving():
+                printer.__exit__(*sys.exc_info())
+
+
+def _printer(format_: Format, summary: TextIO | None) -> Reporter:
+    match format_:
+        case Format.TEXT:
+            return text_reporter(sys.stdout)
+        case Format.JSON:
+            return json_reporter(sys.stdout)
+        case Format.GITHUB:
+            return github_reporter(sys.stdout, summary)
+
+
+@contextmanager
+def _step_summary() -> Iterator[TextIO | None]:
+    """The file that GitHub Actions shows as the summary of a step, where there is one."""
+    path = os.environ.get("GITHUB_STEP_SUMMARY")
+    if not path:
+        yield None
+        return
+    with Path(path).open("a", encoding="utf-8") as file:
+        yield file

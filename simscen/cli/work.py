@@ -1,0 +1,76 @@
+"""What a session has to do: all of its runs, or those that an earlier one in the same folder left."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from simscen import __version__
+from simscen.core.errors import InvalidInput, UsageError
+from simscen.core.session import Outcome, RunFinished, SessionStarted
+from simscen.report.journal import Journal
+from simscen.report.journaldata import Planned
+from simscen.report.rebuild import read_journal
+from simscen.run.digest import digest
+from simscen.run.jobs import Job
+
+
+@dataclass(frozen=True)
+class Work:
+    """The journal of the session, the jobs to do, and the answers that are `kept` from the session before."""
+
+    journal: Journal
+    jobs: Sequence[Job]
+    kept: Sequence[RunFinished]
+    scenarios: int
+    workers: int
+
+    def started(self, folder: Path) -> SessionStarted:
+        """The first event of the session."""
+        return SessionStarted(__version__, len(self.jobs) + len(self.kept), self.scenarios, self.workers, str(folder))
+
+
+def begin(journal: Journal, jobs: Sequence[Job], workers: int) -> Work:
+    """Plan the session in its journal. Raises UsageError when not even that can be written.
+
+    Kept are verdicts, not errors, on scenarios that are as they were; of two runs that are to be compared, both or
+    none.
+    """
+    digests = {job.scenario.id: digest(job.scenario) for job in jobs}
+    planned = [Planned(job.key, job.scenario.path, 1, digests[job.scenario.id]) for job in jobs]
+    known = _verdicts(journal)
+    answers = [known.get(run) for run in planned]
+    kept: list[RunFinished] = []
+    left: list[Job] = []
+    for number, (job, answer) in enumerate(zip(jobs, answers, strict=True)):
+        if answer is not None and answers[_twin(jobs, number)] is not None:
+            kept.append(answer)
+        else:
+            left.append(job)
+    journal.plan(planned, __version__, workers)
+    for answer in kept:
+        journal(answer)
+    if journal.error:
+        raise UsageError(f"cannot write the journal in {journal.folder}: {journal.error.strerror}")
+    return Work(journal, left, kept, len(digests), workers)
+
+
+def _verdicts(journal: Journal) -> dict[Planned, RunFinished]:
+    """The verdicts that the folder holds already, by what was asked."""
+    try:
+        past = read_journal(journal.folder)
+    except InvalidInput:  # a new folder
+        return {}
+    answers = {run: past.answered[run.key] for run in past.planned if run.key in past.answered}
+    return {run: answer for run, answer in answers.items() if answer.outcome is not Outcome.ERROR}
+
+
+def _twin(jobs: Sequence[Job], number: int) -> int:
+    """The number of the run that is to be compared with this one (--check-determinism); its own when there is none."""
+    twin = number ^ 1
+    if twin < len(jobs) and jobs[twin].key != jobs[number].key and _question(jobs[twin]) == _question(jobs[number]):
+        return twin
+    return number
+
+
+def _question(job: Job) -> tuple[str, int]:
+    return job.key.scenario, job.key.seed
