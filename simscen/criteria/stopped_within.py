@@ -27,7 +27,7 @@ class StoppedWithin(Spec, Criterion):
     When it fails: that took longer than `time`; or, with `stay`, the robot moved again before the fault ended.
     Why this: a robot that no longer sees must not drive. The command may be zero while the wheels still roll, so the
         truth decides.
-    Source: Nav2's collision monitor (source_timeout); ISO 3691-4 for stopping on a failed personnel detection.
+    Source: Nav2's collision monitor, whose source_timeout stops a robot that is no longer told what is around it.
 
     Inconclusive when it never happened, when the fault or the run was over before `time` was, or when the robot stood
     already each time: then nothing was tested.
