@@ -209,4 +209,6 @@ class _Composer:
         message = error.problem or "cannot be read as YAML"
         if start is not None and error.context and start.index != mark.index:
             message += f" ({error.context} that begins at {start.line + 1}:{start.column + 1})"
-        return Problem(self.path, mark.line + 1, mark.column + 1, "SC003", message)
+        if mark.line < len(lines):
+            return Problem(self.path, mark.line + 1, mark.column + 1, "SC003", message)
+        return Problem(self.path, len(lines), len(lines[-1]) + 1, "SC003", message)

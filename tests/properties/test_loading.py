@@ -1,0 +1,154 @@
+"""Whatever a file holds, loading it ends in a scenario or in problems that lie inside the file."""
+
+from contextlib import suppress
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from simscen.cli.diagnostics import as_text
+from simscen.core.errors import UsageError
+from simscen.core.problems import Problem
+from simscen.loading.compose import compose
+from simscen.loading.loaded import LoadedScenario
+from simscen.loading.scenario import try_scenario
+from simscen.loading.selection import keyword_matcher
+from simscen.report.text import visible
+
+SCENARIO = """\
+simscen: 1
+name: all of it
+tags: [smoke]
+seed: 7
+world:
+  simscen: 1
+  walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]
+  objects: [{name: cart, box: [0.5, 0.5, 1], pose: {x: 3, y: 2}}]
+  places: {start: {x: 1, y: 1}, desk: {x: 5, y: 3, yaw: 90 deg}}
+  regions: {hall: [[0, 0], [2, 0], [2, 4]]}
+robot: {model: turtlebot, pose: start, initial_estimate: {x: 1, y: 1, std: [0.1, 0.1, 0.1]}}
+stack: {localizer: {type: amcl, alpha1: 0.1}, controller: {type: dwb, sim_time: 1 s}}
+goals: [{pose: desk, timeout: 60 s}, {pose: {x: 1, y: 3}}]
+events:
+  - name: push
+    when: {any: [{time: 10 s}, {robot_in: {region: hall}}], delay: 1 s}
+    do: [{move: {name: cart, through: [[4, 1]], speed: 1}}, {cancel_goal: {}}]
+faults: [{sensor: lidar, off: {}, when: {travelled: 1 m}, for: 2 s}]
+pass: [{goals_reached: {}}, {stopped_within: {time: 1, after: lidar.off}, severity: warn}]
+"""
+TREE = compose(SCENARIO, "f")[0]
+assert TREE is not None
+PLAIN: Any = TREE.plain
+
+QUICK = settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+@pytest.fixture
+def load(tmp_path: Path) -> Any:
+    """Loads a text or bytes, and checks what holds of every answer."""
+    path = tmp_path / "a.scenario.yaml"
+
+    def loaded(content: str | bytes) -> LoadedScenario | list[Problem]:
+        raw = content.encode("utf-8", "surrogatepass") if isinstance(content, str) else content
+        path.write_bytes(raw)
+        answer = try_scenario(path, tmp_path)
+        if isinstance(answer, list):
+            assert answer, "neither a scenario nor a problem"
+            _lie_inside(answer, raw)
+        return answer
+
+    return loaded
+
+
+def _lie_inside(problems: list[Problem], raw: bytes) -> None:
+    lines = raw.decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    for problem in problems:
+        if problem.line:
+            assert 1 <= problem.line <= len(lines)
+            assert 1 <= problem.col <= len(lines[problem.line - 1]) + 1
+    assert visible(told := as_text(problems)) == told
+
+
+def test_the_scenario_that_is_varied_is_valid(load: Any) -> None:
+    assert isinstance(load(SCENARIO), LoadedScenario)
+
+
+@QUICK
+@given(st.binary(max_size=400))
+def test_any_bytes(load: Any, raw: bytes) -> None:
+    load(raw)
+
+
+@QUICK
+@given(st.text(st.sampled_from("abc:-[]{}\"'#&*!|>%@`?, \n\t1.eE~<\\é机"), max_size=200))
+def test_any_text_of_yaml_signs(load: Any, text: str) -> None:
+    load(text)
+
+
+@QUICK
+@given(
+    st.integers(0, len(SCENARIO)), st.integers(0, 40), st.text(st.sampled_from(":-[]{}\"'#&*!\n \tx1~\0é"), max_size=5)
+)
+def test_any_cut_or_insertion_in_a_valid_scenario(load: Any, at: int, cut: int, inserted: str) -> None:
+    load(SCENARIO[:at] + inserted + SCENARIO[at + cut :])
+
+
+JSON = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers()
+    | st.floats()
+    | st.text(max_size=10)
+    | st.sampled_from(["5 s", "desk", "1 m", "cart"]),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=8), inner, max_size=3),
+    max_leaves=6,
+)
+
+
+def _paths(node: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    below = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
+    return [path, *(found for key, value in below for found in _paths(value, (*path, key)))]
+
+
+PLACES = _paths(PLAIN)[1:]
+
+
+@QUICK
+@given(st.sampled_from(PLACES), JSON)
+def test_any_value_anywhere_in_a_valid_scenario(load: Any, path: tuple[Any, ...], value: Any) -> None:
+    varied = deepcopy(PLAIN)
+    holder = varied
+    for key in path[:-1]:
+        holder = holder[key]
+    holder[path[-1]] = value
+    load(yaml.safe_dump(varied, allow_unicode=True))
+
+
+@QUICK
+@given(st.sampled_from(PLACES), st.text("abcdefghijklmnopqrstuvwxyz_", min_size=1, max_size=12))
+def test_a_key_that_nobody_knows_is_told_at_its_place(load: Any, path: tuple[Any, ...], key: str) -> None:
+    varied = deepcopy(PLAIN)
+    holder = varied
+    for part in path:
+        holder = holder[part]
+    named = path and path[-1] in ("places", "regions")
+    if not isinstance(holder, dict) or named:
+        return
+    holder[f"{key}_zz"] = 1
+    problems = load(yaml.safe_dump(varied))
+    assert isinstance(problems, list)
+    assert any(
+        p.code == "SC012" and f"`{key}_zz`" in p.message and p.source[p.col - 1 :].startswith(f"{key}_zz")
+        for p in problems
+    )
+
+
+@QUICK
+@given(st.text(max_size=60))
+def test_any_keyword_expression_is_read_or_refused(text: str) -> None:
+    with suppress(UsageError):
+        keyword_matcher(text)("faults/lidar_off")
