@@ -80,8 +80,8 @@ def command(
     if warnings:
         print_text(as_text(warnings), sys.stderr)
     options = Options(workers or _cores(), seed, repeat, check_determinism, fail_fast, wall_limit)
-    folder, journal = _output_folder(out, resume)
     require_writable(junit)
+    folder, journal = _output_folder(out, resume)
     reports = Reports(folder, junit, junit_family.value)
     reports.begin()
     work = begin(journal, plan(scenarios, options, folder), options.workers)
