@@ -7,8 +7,9 @@ from pathlib import Path
 from simscen.core.errors import InvalidInput, NothingSelected
 from simscen.core.problems import Problem
 from simscen.loading.messages import quoted
-from simscen.loading.paths import is_folder
+from simscen.loading.paths import exists, is_folder
 from simscen.loading.scenario import scenario_id
+from simscen.loading.source import reason
 
 SCENARIO = (".scenario.yaml", ".scenario.yml")
 WORLD = (".world.yaml", ".world.yml")
@@ -21,10 +22,10 @@ def discover(paths: Sequence[Path], root: Path, suffixes: tuple[str, ...] = SCEN
     Raises InvalidInput where a path is missing or two scenarios would have the same id but for case, NothingSelected
     where there is nothing.
     """
-    problems = [Problem(str(path), 0, 0, "SC001", "no such file or directory") for path in paths if not _there(path)]
+    problems = [problem for path in paths if (problem := _absent(path))]
+    found = dict.fromkeys(file.absolute() for path in paths for file in _files(path, suffixes, problems))
     if problems:
         raise InvalidInput(problems)
-    found = dict.fromkeys(file.absolute() for path in paths for file in _files(path, suffixes))
     if not found:
         where = ", ".join(quoted(str(path)) for path in paths)
         raise NothingSelected(f"no scenarios found in {where}; a folder is searched for *{suffixes[0]}")
@@ -38,18 +39,28 @@ def default_root(paths: Iterable[Path]) -> Path:
     """The repository that holds all of `paths`, or else their common folder."""
     folders = [Path(os.path.realpath(path if is_folder(path) else path.parent)) for path in paths]
     common = Path(os.path.commonpath(folders)) if folders else Path.cwd()
-    return next((folder for folder in (common, *common.parents) if (folder / ".git").exists()), common)
+    return next((folder for folder in (common, *common.parents) if exists(folder / ".git")), common)
 
 
-def _there(path: Path) -> bool:
-    return os.path.lexists(path)
+def _absent(path: Path) -> Problem | None:
+    try:
+        path.lstat()
+    except (OSError, ValueError) as error:
+        told = reason(error) if isinstance(error, OSError) else "no such file or directory"
+        return Problem(str(path), 0, 0, "SC001", told)
+    return None
 
 
-def _files(path: Path, suffixes: tuple[str, ...]) -> Iterator[Path]:
+def _files(path: Path, suffixes: tuple[str, ...], problems: list[Problem]) -> Iterator[Path]:
+    """The files that `path` means; folders that cannot be searched become problems."""
     if not is_folder(path):
         yield path
         return
-    for folder, below, names in os.walk(path):
+
+    def unsearchable(error: OSError) -> None:
+        problems.append(Problem(str(error.filename), 0, 0, "SC001", reason(error)))
+
+    for folder, below, names in os.walk(path, onerror=unsearchable):
         below[:] = sorted(name for name in below if not name.startswith("."))
         yield from (Path(folder) / name for name in sorted(names) if name.endswith(suffixes))
 

@@ -1,5 +1,6 @@
 """One YAML document out of several files: `extends:` and the `defaults.yaml` beside it."""
 
+import os
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -29,8 +30,9 @@ class Library:
         """The tree of `path` with what it extends, and with `defaults`, the `defaults.yaml` beside it, merged in."""
         tree, problems = self._with_base(path, ())
         beside = path.parent / DEFAULTS
-        if defaults and isinstance(tree, Fields) and beside.is_file() and path.name != DEFAULTS:
-            below, more = self._with_base(beside, ())
+        # Whatever is called so is meant to be read: one that cannot be is told rather than passed over.
+        if defaults and isinstance(tree, Fields) and os.path.lexists(beside) and path.name != DEFAULTS:
+            below, more = self._defaults(beside)
             problems += more
             if isinstance(below, Fields):
                 tree = merge(tree, below)
@@ -63,6 +65,10 @@ class Library:
         if isinstance(below, Fields):
             return merge(own, below), problems + more
         return own, problems + more
+
+    def _defaults(self, beside: Path) -> tuple[Node | None, list[Problem]]:
+        entered = self.fence.entered(beside)
+        return (None, [entered]) if isinstance(entered, Problem) else self._with_base(entered, ())
 
     def _one(self, path: Path) -> tuple[Node | None, list[Problem]]:
         shown = self.fence.shown(path)

@@ -65,7 +65,7 @@ def test_a_goal_in_a_wall_is_found_without_running(simscen, tmp_path: Path) -> N
     ("argument", "code", "told"),
     [
         ("nowhere", 2, "nowhere: error[SC001] no such file or directory"),
-        ("x" * 5000, 2, "no such file or directory"),
+        ("x" * 5000, 2, "the name is too long"),
         ("empty", 5, "no scenarios found in `empty`"),
     ],
 )

@@ -1,0 +1,159 @@
+"""The front door: `simscen validate` and `simscen run` as a user calls them, in a folder with small valid files."""
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from simscen.cli.main import main
+
+WORLD = """\
+simscen: 1
+walls:
+  - {points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}
+obstacles:
+  - {name: crate, box: [1, 1, 1], pose: {x: 3, y: 2}}
+places: {start: {x: 1, y: 1}, desk: {x: 5, y: 3}}
+"""
+ROBOT = """\
+simscen: 1
+name: cube
+body: [{box: [0.3, 0.2, 0.3], z: 4 cm}]
+mass: 5 kg
+drive: {type: differential, wheel_radius: 5 cm, wheel_separation: 0.25}
+limits: {linear: 0.5, angular: 1, linear_acceleration: 1, angular_acceleration: 2}
+sensors: {lidar: {lidar: {rate: 10 Hz}}, odom: {odometry: {}}}
+"""
+SCENARIO = """\
+simscen: 1
+seed: 7
+world: room.world.yaml
+robot: {model: cube.robot.yaml, pose: {x: 1, y: 1}}
+goals: [{pose: {x: 1.5, y: 1}}]
+time_limit: 20
+pass: [{goals_reached: {}}]
+"""
+_PLACE = re.compile(r"^(?P<path>\S.*?)(?P<place>(:\d+:\d+)?): (error\[SC\d{3}\]|… and \d+ more)")
+
+
+class Ended(NamedTuple):
+    """How a command ended."""
+
+    code: int
+    out: str
+    err: str
+
+
+Simscen = Callable[..., Ended]
+Refused = Callable[..., str]
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The working folder: a world, a robot and a scenario, all of them valid."""
+    home = tmp_path / "home"
+    home.mkdir()
+    for name, text in (("room.world.yaml", WORLD), ("cube.robot.yaml", ROBOT), ("a.scenario.yaml", SCENARIO)):
+        (home / name).write_text(text)
+    monkeypatch.chdir(home)
+    return home
+
+
+@pytest.fixture
+def simscen(folder: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Simscen:
+    """Calls the command line without a new process."""
+
+    def call(*arguments: object) -> Ended:
+        monkeypatch.setattr(sys, "argv", ["simscen", *map(str, arguments)])
+        code = 0
+        try:
+            main()
+        except SystemExit as end:
+            code = int(end.code or 0)
+        out, err = capfd.readouterr()
+        return Ended(code, out, err)
+
+    return call
+
+
+@pytest.fixture
+def refused(simscen: Simscen) -> Refused:
+    """What `validate` and `run` both say about something that cannot be used: the same, and nothing is run."""
+
+    def call(*arguments: object) -> str:
+        told, ran = simscen("validate", *arguments), simscen("run", *arguments, "--out", "out")
+        assert (told.code, ran.code) == (2, 2), told.out + ran.out + told.err + ran.err
+        problems = re.sub(r"\d+ problems? in \d+ of \d+ files?\n$", "", told.out) + told.err
+        assert ran.err == problems
+        assert (ran.out, Path("out").exists()) == ("", False)
+        assert "Traceback" not in problems
+        _every_problem_has_a_place(problems)
+        return problems
+
+    return call
+
+
+def _every_problem_has_a_place(problems: str) -> None:
+    """A path that opens from the working folder, or that was given and is not there."""
+    heads = [line for line in problems.splitlines() if not line.startswith("    ") and line]
+    for head in heads:
+        match = _PLACE.match(head)
+        assert match, head
+        assert not match["place"] or Path(match["path"]).exists(), head
+
+
+@pytest.fixture
+def with_scenario(folder: Path, refused: Refused) -> Refused:
+    """Writes `bad.scenario.yaml` and calls `refused` with it; `replace` swaps parts of the valid scenario."""
+
+    def call(text: str | bytes | None = None, *arguments: object, replace: dict[str, str] | None = None) -> str:
+        if text is None:
+            text = SCENARIO
+            for old, new in (replace or {}).items():
+                assert old in text
+                text = text.replace(old, new)
+        (folder / "bad.scenario.yaml").write_bytes(text.encode() if isinstance(text, str) else text)
+        return refused("bad.scenario.yaml", *arguments)
+
+    return call
+
+
+def process(*arguments: object, cwd: Path | None = None, timeout: float = 60, **environment: str) -> Ended:
+    """The installed command in a process of its own; fails when it takes longer than `timeout` seconds."""
+    command = [str(Path(sys.executable).with_name("simscen")), *map(str, arguments)]
+    done = subprocess.run(
+        command, cwd=cwd, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=timeout, check=False,
+        env={**os.environ, **environment},
+    )  # fmt: skip
+    return Ended(done.returncode, done.stdout, done.stderr)
+
+
+MEASURED = """
+import sys, time
+from simscen.cli.main import main
+begun = time.process_time()
+try:
+    main()
+finally:
+    (peak,) = [line.split()[1] for line in open("/proc/self/status") if line.startswith("VmHWM")]
+    print("measured", peak, time.process_time() - begun, file=sys.stderr)
+"""
+
+
+@pytest.fixture
+def cost(folder: Path) -> Callable[..., tuple[int, float, float, str]]:
+    """Exit code, peak memory in MiB, seconds of CPU time and output of a command in a process of its own."""
+
+    def call(*arguments: object) -> tuple[int, float, float, str]:
+        command = [sys.executable, "-c", MEASURED, *map(str, arguments)]
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=20, check=False)
+        *err, measured = done.stderr.splitlines()
+        _, peak, cpu = measured.split()
+        return done.returncode, int(peak) / 1024, float(cpu), done.stdout + "\n".join(err)
+
+    return call

@@ -1,0 +1,246 @@
+"""Files that are no scenarios: `validate` and `run` refuse them with the same words, at the same place."""
+
+import os
+import re
+import socket
+import tempfile
+from pathlib import Path
+
+import pytest
+
+SCENARIO = "simscen: 1\nworld: {simscen: 1}\nrobot: {pose: {x: 0, y: 0}}\npass: [{goals_reached: {}}]\n"
+LAUGHS = "\n".join(["a0: &a0 [x, x]", *(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]" for i in range(1, 12))])
+
+
+def test_1_a_path_that_is_not_there(refused) -> None:
+    assert "nowhere.scenario.yaml: error[SC001] no such file or directory" in refused("nowhere.scenario.yaml")
+    assert "nowhere: error[SC001] no such file or directory" in refused("nowhere")
+
+
+@pytest.mark.parametrize("command", ["validate", "run"])
+def test_2_a_folder_without_scenarios_is_not_a_success(simscen, folder: Path, command: str) -> None:
+    (folder / "empty").mkdir()
+    (folder / "empty/readme.yaml").write_text("x: 1")
+    ended = simscen(command, "empty")
+    assert (ended.code, ended.out) == (5, "")
+    assert "no scenarios found in `empty`" in ended.err
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "told"),
+    [
+        pytest.param("", "", "the file is empty", id="3 empty"),
+        pytest.param("# nothing\n\n# yet\n", "", "the file is empty", id="3 only comments"),
+        pytest.param("- a\n- b\n", "1:1", "expected a mapping at top level, got a list", id="4 a list"),
+        pytest.param("hello", "1:1", "expected a mapping at top level, got the text `hello`", id="4 a text"),
+        pytest.param("simscen: 1\n---\nsimscen: 1\n", "2:1", "more than one YAML document (line 2)", id="5"),
+        pytest.param("simscen: 1\nrobot:\n\tpose: start\n", "3:1", "tab character", id="6"),
+        pytest.param("simscen: 1\ngoals: [a, b\npass: 1\n", "3:5", "", id="7 bracket"),
+        pytest.param("simscen: 1\nname: 'a\n", "2:7", "this quoted scalar never ends", id="7 quote"),
+        pytest.param("simscen: 1\nseed: 1\nseed: 2\n", "3:1", "duplicate key `seed` (first at 2:1)", id="8"),
+        pytest.param("!!python/object/apply:os.system ['touch marker']\n", "1:1", "tag", id="23 python"),
+        pytest.param("simscen: 1\nseed: !!int abc\n", "2:7", "tag", id="15 !!int abc"),
+        pytest.param("simscen: 1\nname: !!timestamp 2001-99-99\n", "2:7", "tag", id="15 !!timestamp"),
+        pytest.param("simscen: 1\nbase: &base [*base]\n", "2:14", "itself", id="24"),
+        pytest.param("[" * 200_000, "1:41", "nested deeper than 40", id="21 brackets"),
+        pytest.param("{a: " * 200_000, "1:161", "nested deeper than 40", id="21 braces"),
+        pytest.param(LAUGHS, "6:25", "aliases expand to more than 100000 values", id="20"),
+        pytest.param("simscen: 99\nwarp: 9\n", "1:10", "needs schema 99; this version of simscen supports 1", id="30"),
+        pytest.param("simscen: 1\nseed: " + "9" * 5000, "2:7", "integer too large", id="14"),
+        pytest.param(b"simscen: 1\nname: caf\xe9\n", "2:10", "not valid UTF-8 at byte 20", id="16"),
+        pytest.param("simscen: 1\n".encode("utf-16"), "1:1", "not valid UTF-8 at byte 0", id="17 UTF-16"),
+        pytest.param("simscen: 1\n".encode("utf-16-le"), "1:2", "control character U+0000", id="17 no mark"),
+        pytest.param(b"simscen: 1\nname: a\x00b\n", "2:8", "control character U+0000", id="18 NUL"),
+        pytest.param(b"simscen: 1\nname: \x1b[31mred\n", "2:7", "control character U+001B", id="18 ESC"),
+        pytest.param("simscen: 1\nname: a\u202eb\n", "2:8", "control character U+202E", id="18 bidirectional"),
+    ],
+)  # fmt: skip
+def test_a_text_that_is_not_one_yaml_mapping(with_scenario, folder: Path, text, place: str, told: str) -> None:
+    head = with_scenario(text).splitlines()[0]
+    where = f"bad.scenario.yaml:{place}" if place else "bad.scenario.yaml"
+    assert head.startswith(f"{where}: error[SC")
+    assert told in head
+    assert not (folder / "marker").exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "place", "told"),
+    [
+        pytest.param("time_limit", "tiem_limit", "6:1", "unknown key `tiem_limit`", id="9"),
+        pytest.param("time_limit", "zzz", "6:1", "unknown key `zzz`", id="10"),
+        pytest.param("seed: 7", 'seed: "7"', "2:7", "expected an integer, got the text `7`", id="11"),
+        pytest.param("seed: 7", "seed: true", "2:7", "expected an integer, got the truth value true", id="12 integer"),
+        pytest.param("x: 1,", "x: true,", "4:43", "expected a number, got the truth value true", id="12 number"),
+        pytest.param("x: 1,", "x: .nan,", "4:43", "must be a finite number", id="13 nan"),
+        pytest.param("x: 1,", "x: -.inf,", "4:43", "must be a finite number", id="13 inf"),
+        pytest.param("x: 1,", "x: 1e400,", "4:43", "must be a finite number", id="13 1e400"),
+        pytest.param("x: 1,", "x: 1e400 m,", "4:43", "must be a finite number", id="13 1e400 with a unit"),
+        pytest.param("x: 1,", f"x: {'9' * 5000}.0 m,", "4:43", "must be a finite number", id="14 long with a unit"),
+        pytest.param("seed: 7", "seed: 2001-99-99", "2:7", "expected an integer", id="15"),
+        pytest.param("seed: 7", r'name: "\x1b[31m"', "2:7", "control character U+001B", id="19 ESC"),
+        pytest.param("seed: 7", r'name: "a\0b"', "2:7", "control character U+0000", id="19 NUL"),
+        pytest.param("seed: 7", r'name: "a\u202eb"', "2:7", "control character U+202E", id="19 bidirectional"),
+        pytest.param("seed: 7", r'name: "a\nb"', "2:7", "control character U+000A", id="19 newline"),
+        pytest.param("seed: 7", "seed: yes", "2:7", "expected an integer, got the text `yes`", id="25 yes"),
+        pytest.param("seed: 7", "seed: 1:30", "2:7", "expected an integer, got the text `1:30`", id="25 1:30"),
+        pytest.param("seed: 7", "seed: 012", "2:7", "expected an integer, got the text `012`", id="25 012"),
+        pytest.param("time_limit: 20", "time_limit: 1:30", "6:13", "unknown unit `:30`", id="25 quantity"),
+        pytest.param("time_limit: 20", "time_limit: 020", "6:13", "020", id="25 quantity with a zero"),
+        pytest.param("seed: 7", "seed: 0", "2:7", "must be at least 1", id="89 seed 0"),
+        pytest.param("seed: 7", f"name: {'x' * 121}", "2:7", "longer than 120 characters", id="limit of names"),
+        pytest.param("x: 1,", "x: 10001,", "4:43", "must be at most 10000", id="limit of coordinates"),
+        pytest.param("time_limit: 20", "time_limit: 8001", "6:13", "must be at most 8000", id="limit of steps"),
+        pytest.param("seed: 7", "physics: {solver_iterations: 1001}", "2:30", "must be at most 1000", id="iterations"),
+        pytest.param("seed: 7", "physics: {tick_rate: 1}", "2:22", "must be at least 60", id="limit of rates"),
+        pytest.param("seed: 7", "stack: {localizer: {type: amcl, max_particles: 50001}}", "2:48", "50000",
+                     id="limit of particles"),
+    ],
+)  # fmt: skip
+def test_a_value_that_cannot_be_meant(with_scenario, old: str, new: str, place: str, told: str) -> None:
+    head = with_scenario(replace={old: new}).splitlines()[0]
+    assert head.startswith(f"bad.scenario.yaml:{place}: error[SC")
+    assert told in head
+
+
+def test_9_and_10_an_unknown_key_is_told_what_was_meant_or_what_there_is(with_scenario) -> None:
+    assert "= did you mean `time_limit`?" in with_scenario(replace={"time_limit": "tiem_limit"})
+    assert "expected one of: simscen, name, description, tags, seed" in with_scenario(replace={"time_limit": "zzz"})
+
+
+def test_20_an_alias_bomb_is_defused_before_it_grows_while_ordinary_aliases_work(cost, simscen, folder: Path) -> None:
+    (folder / "bomb.scenario.yaml").write_text(LAUGHS)
+    code, peak, cpu, told = cost("validate", "bomb.scenario.yaml")
+    assert code == 2
+    assert "aliases" in told
+    assert peak < 100
+    assert cpu < 0.5
+    good = (folder / "a.scenario.yaml").read_text()
+    good = good.replace("pose: {x: 1, y: 1}", "pose: &start {x: 1, y: 1}").replace(
+        "pose: {x: 1.5, y: 1}", "pose: *start"
+    )
+    (folder / "a.scenario.yaml").write_text(good)
+    assert simscen("validate", "a.scenario.yaml").code == 0
+
+
+def test_22_a_file_of_100_mb_is_not_read(cost, refused, folder: Path) -> None:
+    with (folder / "huge.scenario.yaml").open("wb") as file:
+        file.truncate(100 << 20)
+    assert "huge.scenario.yaml: error[SC001] larger than 1 MiB" in refused("huge.scenario.yaml")
+    _, peak, cpu, _ = cost("validate", "huge.scenario.yaml")
+    assert peak < 100
+    assert cpu < 0.5
+
+
+def odd(folder: Path, kind: str, name: str) -> None:
+    """Something in `folder` that is not a regular file."""
+    if kind == "folder":
+        (folder / name).mkdir()
+    elif kind == "fifo":
+        os.mkfifo(folder / name)
+    elif kind == "device":
+        (folder / name).symlink_to("/dev/zero")
+    else:
+        with socket.socket(socket.AF_UNIX) as end:
+            end.bind(name)
+
+
+ODD = ["folder", "fifo", "device", "socket"]
+
+
+@pytest.mark.parametrize("kind", ODD[1:])
+def test_26_what_is_not_a_regular_file_is_not_read(refused, folder: Path, kind: str) -> None:
+    odd(folder, kind, "odd.scenario.yaml")
+    told = refused("odd.scenario.yaml")
+    assert re.match(r"odd.scenario.yaml: error\[SC0(01|20)\] (not a regular file|the file is outside)", told)
+
+
+def test_26_a_folder_with_the_name_of_a_scenario_is_searched(simscen, folder: Path) -> None:
+    (folder / "odd.scenario.yaml").mkdir()
+    assert simscen("validate", "odd.scenario.yaml").code == 5
+    assert simscen("validate", ".").code == 0
+
+
+@pytest.mark.parametrize("kind", ODD[1:])
+def test_26_nor_when_a_search_finds_it(refused, folder: Path, kind: str) -> None:
+    odd(folder, kind, "odd.scenario.yaml")
+    assert "odd.scenario.yaml: error[SC0" in refused(".")
+
+
+@pytest.mark.parametrize("kind", ODD)
+@pytest.mark.parametrize(
+    ("old", "place"), [("room.world.yaml", "3:8"), ("cube.robot.yaml", "4:16")], ids=["world", "robot"]
+)
+def test_26_nor_when_a_scenario_names_it(with_scenario, folder: Path, kind: str, old: str, place: str) -> None:
+    odd(folder, kind, "odd.yaml")
+    told = with_scenario(replace={old: "odd.yaml"})
+    expected = "outside the scenario root" if kind == "device" else "not a regular file"
+    assert told.startswith(f"bad.scenario.yaml:{place}: error[SC0")
+    assert expected in told
+
+
+@pytest.mark.parametrize("kind", ODD)
+def test_26_nor_as_defaults_or_as_a_base(with_scenario, folder: Path, kind: str) -> None:
+    odd(folder, kind, "odd.yaml")
+    assert "odd.yaml" in with_scenario("extends: odd.yaml\n")
+    (folder / "odd.yaml").rename(folder / "defaults.yaml")
+    assert "defaults.yaml: error[SC0" in with_scenario(replace={})
+
+
+@pytest.fixture
+def everyman():
+    """A folder that everybody may enter, and no longer the rights of root, who may read everything."""
+    before = Path.cwd()
+    with tempfile.TemporaryDirectory() as name:
+        Path(name).chmod(0o777)
+        os.chdir(name)
+        root = os.geteuid() == 0
+        if root:
+            os.seteuid(65534)
+        try:
+            yield Path(name)
+        finally:
+            if root:
+                os.seteuid(0)
+            os.chdir(before)
+
+
+def test_27_a_file_that_may_not_be_read(refused, everyman: Path) -> None:
+    (everyman / "locked.scenario.yaml").write_text("simscen: 1")
+    (everyman / "locked.scenario.yaml").chmod(0)
+    assert refused("locked.scenario.yaml") == "locked.scenario.yaml: error[SC001] permission denied\n"
+
+
+def test_27_a_folder_that_may_not_be_searched(refused, everyman: Path) -> None:
+    (everyman / "locked").mkdir(mode=0)
+    told = refused("locked/a.scenario.yaml")
+    assert told == "locked/a.scenario.yaml: error[SC001] permission denied\n"
+
+
+def test_27_a_folder_that_a_search_may_not_enter_is_not_passed_over(refused, everyman: Path) -> None:
+    (everyman / "a.scenario.yaml").write_text(SCENARIO)
+    (everyman / "locked").mkdir(mode=0)
+    assert refused(".") == "./locked: error[SC001] permission denied\n"
+
+
+def test_28_many_mistakes_are_all_told_and_a_flood_is_cut(with_scenario) -> None:
+    few = with_scenario("simscen: 1\n" + "".join(f"k{i}: 1\n" for i in range(22)))
+    assert all(f"bad.scenario.yaml:{line}:1: error[SC012]" in few for line in range(2, 24))
+    many = with_scenario("simscen: 1\n" + "".join(f"k{i}: 1\n" for i in range(80)))
+    assert many.count("error[") == 50
+    assert "bad.scenario.yaml: … and 33 more\n" in many
+
+
+def test_29_with_one_bad_file_nothing_is_run_and_all_are_checked(refused, folder: Path) -> None:
+    good = (folder / "a.scenario.yaml").read_text()
+    for name in "bcde":
+        (folder / f"{name}.scenario.yaml").write_text(good.replace("seed: 7", "seed: x") if name in "bd" else good)
+    told = refused(".")
+    assert [line.split(":")[0] for line in told.splitlines() if "error[" in line] == [
+        "b.scenario.yaml", "d.scenario.yaml"
+    ]  # fmt: skip
+
+
+def test_a_search_goes_round_no_circle(simscen, folder: Path) -> None:
+    (folder / "sub").mkdir()
+    (folder / "sub/up").symlink_to("..")
+    assert simscen("validate", ".").code == 0
