@@ -99,6 +99,14 @@ def concave_shape(client: int, mesh: Mesh) -> int:
     return _made(shape)
 
 
+def convex_shape(client: int, mesh: Mesh) -> int:
+    """The convex hull of a mesh's vertices."""
+    shape: int = pybullet.createCollisionShape(
+        pybullet.GEOM_MESH, vertices=mesh.vertices.tolist(), physicsClientId=client
+    )
+    return _made(shape)
+
+
 def compound_shape(client: int, solids: Iterable[Solid]) -> int:
     """One rigid shape of boxes, cylinders, balls and capsules."""
     kinds, halves, radii, lengths, places, turns = [], [], [], [], [], []
@@ -125,8 +133,7 @@ def compound_shape(client: int, solids: Iterable[Solid]) -> int:
 def hull_shape(client: int, solids: Iterable[Solid]) -> int:
     """The convex hull of solids of any kind."""
     points = np.concatenate([solid.pose.apply(extremes(solid.shape)) for solid in solids])
-    shape: int = pybullet.createCollisionShape(pybullet.GEOM_MESH, vertices=points.tolist(), physicsClientId=client)
-    return _made(shape)
+    return convex_shape(client, Mesh(points, np.empty((0, 3), np.int32)))
 
 
 def hull_shapes(client: int, solids: Sequence[Solid]) -> list[int]:

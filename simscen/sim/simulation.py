@@ -18,7 +18,7 @@ from simscen.sim.actors import Actors
 from simscen.sim.camera import picture, show_static
 from simscen.sim.contacts import Contacts, Motion, touches
 from simscen.sim.drives import build
-from simscen.sim.nearest import Owners
+from simscen.sim.proximity import Proximity
 from simscen.sim.robot_body import RobotBody
 from simscen.sim.vehicle import base_twist
 
@@ -52,11 +52,11 @@ class Simulation:
         `triangulate` gives the surface of a shape, for moving things that the engine has no primitive for.
         """
         self.tick = 0
-        self._rate, self._body = tick_rate, robot
+        self._rate, self._limits, self._radius = tick_rate, robot.limits, robot.circumscribed_radius
         self._client = engine.connect(tick_rate, solver_iterations)
         engine.ground(self._client)
         self._static = engine.static_mesh(self._client, static)
-        self._owners = Owners(static)
+        self._proximity = Proximity(static, robot, CLEARANCE_REACH)
         self._mesh, self._filmed = static, False
         self._actors = Actors(self._client, tick_rate, triangulate)
         self._firmware = max(1, round(tick_rate / FIRMWARE_RATE))
@@ -65,7 +65,8 @@ class Simulation:
             self._actors.add(body, 0)
         self._contacts = Contacts(tick_rate)
         self._names: dict[int, str | None] = {}
-        self._clearance, self._closing_speed = 0.0, 0.0
+        self._touched: dict[tuple[int, int, int], str] = {}
+        self._clearance = 0.0
         self._measured_at, self._no_contact_before = -1, 0
         self._settle(pose)
         self._changed()
@@ -98,7 +99,7 @@ class Simulation:
         pybullet.stepSimulation(self._client)
         self.tick += 1
         if self._contacts.touching or self.tick > self._no_contact_before:
-            touched = touches(self._client, self._base.id, self._names, self._owners.name, 1 / self._rate)
+            touched = touches(self._client, self._base.id, self._names, self._owner, 1 / self._rate)
             self._contacts.note(self.tick, touched, before)
         self._actors.show(self.tick)
 
@@ -118,39 +119,41 @@ class Simulation:
         if self._measured_at == self.tick:
             return self._clearance
         self._actors.show(self.tick)
-        travelled = self._closing_speed * (self.tick - self._measured_at) / self._rate
-        self._clearance = self._search(min(CLEARANCE_REACH, self._clearance + travelled + 0.01))
+        self._clearance = self._search()
         self._measured_at = self.tick
-        self._closing_speed = self._fastest()
-        free = min(HORIZON, max(0.0, self._clearance - 0.002) / self._closing_speed)
+        free = min(HORIZON, max(0.0, self._clearance - 0.002) / self._fastest())
         self._no_contact_before = self.tick + math.floor(free * self._rate)
         return self._clearance
 
-    def _search(self, reach: float) -> float:
-        """The least distance of the hull to anything. Few triangles lie within a reach that just holds the nearest."""
+    def _search(self) -> float:
+        """The least distance of the hull to anything, up to CLEARANCE_REACH."""
         robot, client = self._base.id, self._client
-        while True:
-            nearest = math.inf
-            for other in self._names:
-                for link in self._base.hull_links:
-                    within = min(reach, nearest)
-                    points = pybullet.getClosestPoints(robot, other, within, link, physicsClientId=client)
-                    nearest = min((point[8] for point in points), default=nearest)
-            if nearest <= reach or reach >= CLEARANCE_REACH:
-                return min(nearest, CLEARANCE_REACH)
-            reach = min(2 * reach, CLEARANCE_REACH)
+        nearest = min(CLEARANCE_REACH, self._proximity.distance(self._base.pose()))
+        for other in self._actors.ids():
+            for link in self._base.hull_links:
+                points = pybullet.getClosestPoints(robot, other, nearest, link, physicsClientId=client)
+                nearest = min((point[8] for point in points), default=nearest)
+        return nearest
+
+    def _owner(self, place: Vector) -> str:
+        """The static solid that is touched at a place; remembered by the centimetre, since contacts last."""
+        x, y, z = place
+        cell = (round(100 * x), round(100 * y), round(100 * z))
+        if cell not in self._touched:
+            self._touched[cell] = self._proximity.owner(place)
+        return self._touched[cell]
 
     def _fastest(self) -> float:
         """The greatest speed in m/s at which the hull and anything else can approach each other for a while."""
-        limits, (linear, angular) = self._body.limits, self._base.velocity()
+        limits, (linear, angular) = self._limits, self._base.velocity()
         forward = max(limits.linear, limits.reverse or 0.0, limits.lateral or 0.0, math.hypot(*linear))
-        turning = max(limits.angular, math.hypot(*angular)) * self._body.circumscribed_radius
+        turning = max(limits.angular, math.hypot(*angular)) * self._radius
         return 1.25 * (forward + turning) + self._actors.top_speed() + 0.1
 
     def _changed(self) -> None:
         """Something was put into or taken out of the world, or set down elsewhere."""
         self._names = {**dict.fromkeys(self._static), **self._actors.ids()}
-        self._clearance, self._closing_speed = 0.0, 0.0
+        self._clearance = 0.0
         self._measured_at, self._no_contact_before = -1, 0
 
     def collisions(self) -> tuple[Event, ...]:
@@ -226,4 +229,5 @@ class Simulation:
 
     def close(self) -> None:
         """Give the engine back."""
+        self._proximity.close()
         pybullet.disconnect(self._client)

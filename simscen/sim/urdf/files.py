@@ -31,11 +31,8 @@ class Folders:
         return cls(tuple(root.resolve() for root in roots))
 
     def shown(self, path: Path) -> str:
-        """How messages name a file: relative to the root it is in."""
-        for root in self.roots:
-            if path.is_relative_to(root):
-                return path.relative_to(root).as_posix()
-        return path.name
+        """How messages name a file: relative to the first root, which is the scenarios', elsewhere absolute."""
+        return path.relative_to(self.roots[0]).as_posix() if path.is_relative_to(self.roots[0]) else str(path)
 
     def locate(self, written: str, folder: Path) -> Path:
         """The real path of what `written` means in a file in `folder`; raises Trouble.

@@ -1,0 +1,61 @@
+import math
+
+import numpy as np
+import pytest
+import trimesh
+from playground import box, shipped
+
+from simscen.core.geometry import Pose3
+from simscen.core.shapes import Box, Cylinder, Extrusion, Solid
+from simscen.sim.proximity import Proximity, point_to_triangles
+from simscen.sim.robot_body import robot_body
+from simscen.worlds.meshing import fuse
+
+
+def test_distances_to_triangles_are_trimeshs():
+    rng = np.random.default_rng(3)
+    corners = rng.normal(size=(300, 3, 3))
+    point = rng.normal(size=3)
+    closest = trimesh.triangles.closest_point(corners, np.tile(point, (300, 1)))
+    assert point_to_triangles(point, corners) == pytest.approx(np.linalg.norm(closest - point, axis=1))
+
+
+def test_a_triangle_without_area_is_as_far_as_its_edges():
+    flat = np.array([[[0.0, 0, 0], [1, 0, 0], [2, 0, 0]]])
+    assert point_to_triangles(np.array([1.5, 2.0, 0.0]), flat) == pytest.approx([2.0])
+
+
+@pytest.fixture
+def proximity():
+    solids = [
+        box("shelf", 0, 0, 2, 2),
+        Solid(Cylinder(0.3, 1), Pose3(3, 0, 0.5), "post"),
+        Solid(Extrusion(((0, 0), (2, 0), (2, 0.2), (0.2, 0.2), (0.2, 2), (0, 2)), 1.0), Pose3(5, 5), "corner"),
+        Solid(Box((20, 20, 0.1)), Pose3(z=-0.05), "floor"),
+    ]
+    made = Proximity(fuse(solids), robot_body(shipped("turtlebot")), 2.0)
+    yield made
+    made.close()
+
+
+def test_the_owner_is_the_solid_whose_surface_is_nearest(proximity):
+    assert proximity.owner((1.01, 0.5, 0.2)) == "shelf"
+    assert proximity.owner((2.71, 0.0, 0.2)) == "post"
+    assert proximity.owner((50.0, 0.0, 0.2)) == ""
+
+
+def test_distances_are_to_the_nearest_solid_but_the_floor(proximity):
+    assert proximity.distance(Pose3(1.9, 0.0)) == pytest.approx(0.8 - 0.22, abs=1e-3)
+    assert proximity.distance(Pose3(1.5, 0.0)) == pytest.approx(0.5 - 0.22, abs=1e-3)
+    assert proximity.distance(Pose3(-9.0, -9.0)) == math.inf
+
+
+def test_a_hollow_solid_is_hollow(proximity):
+    assert proximity.distance(Pose3(6.0, 6.0)) == pytest.approx(0.8 - 0.22, abs=1e-3)
+
+
+def test_the_same_place_gives_the_same_distance_whatever_was_asked_before(proximity):
+    first = proximity.distance(Pose3(1.9, 0.3))
+    for x in range(10):
+        proximity.distance(Pose3(x, x / 2))
+    assert proximity.distance(Pose3(1.9, 0.3)) == first
