@@ -3,6 +3,8 @@
 Thrun, Burgard & Fox, Probabilistic Robotics, tables 8.2 to 8.4; nav2_amcl's pf.c.
 """
 
+import math
+
 import numpy as np
 
 from simscen.core.belief import Estimate
@@ -54,12 +56,13 @@ class ParticleFilter:
         beams = select_beams(scan, spec.max_beams, spec.laser_min_range, spec.laser_max_range)
         converged = spec.do_beamskip and self.particles.within(CONVERGED_WITHIN)
         logarithm = self._sensor.log_likelihood(poses, beams, converged)
-        best = logarithm.max()
+        best = float(logarithm.max())
         if best == logarithm.min() and best > -np.inf:
             return None
-        weights = self.particles.weights * np.exp(logarithm - max(best, -1e300))
-        total = weights.sum()
-        self._recovery.observe(float(np.exp(best) * total))
+        shift = best if best > -np.inf else 0.0
+        weights = self.particles.weights * np.exp(logarithm - shift)
+        total = float(weights.sum())
+        self._recovery.observe(math.exp(shift) * total)
         self.particles = Particles(poses, weights / total) if total > 0 else Particles.equal(poses)
         answer = summarise(self.particles) if total > 0 else None
         self._resample()

@@ -31,7 +31,12 @@ def test_a_kidnapped_robot_finds_itself_with_recovery_and_not_without() -> None:
     assert not measure.kidnapping(measure.PROB, SEEDS[:1]).found.any()
 
 
-def test_a_covariance_may_be_too_large_but_never_too_small() -> None:
-    """ANEES of 3 is consistent; Nav2's alphas assume odometry far noisier as ours."""
+def test_a_filter_tuned_to_its_sensors_is_about_as_wrong_as_it_says() -> None:
+    """3 would be exact. It is not, place by place: the map's cells err by the same half a cell in every run."""
+    assert 1.0 < measure.tracking(measure.TUNED, SEEDS, 60.0).anees.mean() < 5.0
+
+
+def test_with_nav2s_defaults_the_covariance_is_too_large_and_never_too_small() -> None:
+    """They assume wheels and a lidar that are ten times as noisy as ours."""
     for spec in (Amcl(), measure.PROB):
-        assert measure.tracking(spec, SEEDS, 20.0).anees < 4.2
+        assert measure.tracking(spec, SEEDS, 20.0).anees.max() < 3
