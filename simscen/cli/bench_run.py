@@ -12,7 +12,7 @@ from simscen.core.errors import InvalidInput
 from simscen.core.session import Outcome, RunFinished, RunKey, SessionEvent
 from simscen.loading.scenario import load_scenario
 from simscen.record.replay import read_log
-from simscen.report.lines import finished, text_of
+from simscen.report.lines import Naming, finished, text_of
 from simscen.run.jobs import Job
 from simscen.run.session import Options, run_session
 from simscen.study.consistency import anees, bounds, nees_at
@@ -97,7 +97,7 @@ class _Progress:
         self._done += 1
         if event.outcome is not Outcome.PASSED:
             told = replace(event, again=again(self._jobs[event.key]))
-            print(*(text_of(line) for line in finished(told, every_seed=True)), sep="\n", file=sys.stderr)
+            print(*(text_of(line) for line in finished(told, Naming(every_seed=True))), sep="\n", file=sys.stderr)
         if sys.stderr.isatty():
             print(f"{self._done} of {self._total} runs", end="\r", file=sys.stderr, flush=True)
 

@@ -15,7 +15,7 @@ from simscen.judge.result import run_result, to_json
 from simscen.loading.resolved import spec_of_text
 from simscen.loading.source import read_text
 from simscen.record.replay import read_log
-from simscen.report.lines import finished, text_of
+from simscen.report.lines import Naming, finished, text_of
 
 
 def command(
@@ -49,7 +49,7 @@ def command(
             error=result.error,
             tick_rate=result.tick_rate,
         )
-        for line in finished(answer, False):
+        for line in finished(answer, Naming()):
             print_text(text_of(line))
     sys.exit({Outcome.PASSED: Exit.PASSED, Outcome.FAILED: Exit.FAILED, Outcome.ERROR: Exit.INCOMPLETE}[result.outcome])
 

@@ -21,12 +21,13 @@ class Work:
     journal: Journal
     jobs: Sequence[Job]
     kept: Sequence[RunFinished]
-    scenarios: int
     workers: int
 
     def started(self, folder: Path) -> SessionStarted:
         """The first event of the session."""
-        return SessionStarted(__version__, len(self.jobs) + len(self.kept), self.scenarios, self.workers, str(folder))
+        ids = {job.scenario.id for job in self.jobs} | {answer.key.scenario for answer in self.kept}
+        total = len(self.jobs) + len(self.kept)
+        return SessionStarted(__version__, total, len(ids), self.workers, str(folder), tuple(sorted(ids)))
 
 
 def begin(journal: Journal, jobs: Sequence[Job], workers: int) -> Work:
@@ -51,7 +52,7 @@ def begin(journal: Journal, jobs: Sequence[Job], workers: int) -> Work:
         journal(answer)
     if journal.error:
         raise UsageError(f"cannot write the journal in {journal.folder}: {journal.error.strerror}")
-    return Work(journal, left, kept, len(digests), workers)
+    return Work(journal, left, kept, workers)
 
 
 def _verdicts(journal: Journal) -> dict[Planned, RunFinished]:

@@ -1,5 +1,7 @@
 """Where a robot thinks it is."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Every random consumer has its own named stream, so that adding one thing reshuffles nothing else."""
 
+from __future__ import annotations
+
 import hashlib
 from dataclasses import dataclass
 

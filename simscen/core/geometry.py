@@ -1,12 +1,18 @@
 """Poses and rigid motions in the plane and in space. Metres and radians; frames as in ROS REP 103."""
 
+from __future__ import annotations
+
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    Array = npt.NDArray[np.float64]
+else:
+    Array = object  # annotations are not evaluated; commands that only read files need no numpy
 
 
 def wrap(angle: float) -> float:
@@ -27,26 +33,27 @@ class Pose2(NamedTuple):
     y: float
     yaw: float = 0.0
 
-    def compose(self, other: "Pose2") -> "Pose2":
+    def compose(self, other: Pose2) -> Pose2:
         """`a_from_b.compose(b_from_c)` is `a_from_c`."""
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         return Pose2(self.x + c * other.x - s * other.y, self.y + s * other.x + c * other.y, wrap(self.yaw + other.yaw))
 
-    def inverse(self) -> "Pose2":
+    def inverse(self) -> Pose2:
         """`a_from_b.inverse()` is `b_from_a`."""
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         return Pose2(-c * self.x - s * self.y, s * self.x - c * self.y, wrap(-self.yaw))
 
-    def between(self, other: "Pose2") -> "Pose2":
+    def between(self, other: Pose2) -> Pose2:
         """The pose `other` seen from this one; both given in the same frame."""
         return self.inverse().compose(other)
 
     def apply(self, points: Array) -> Array:
         """Points (n, 2) of this pose's frame, expressed in its parent frame."""
         c, s = math.cos(self.yaw), math.sin(self.yaw)
-        return points @ np.array([[c, s], [-s, c]]) + np.array([self.x, self.y])
+        moved: Array = points @ np.array([[c, s], [-s, c]]) + np.array([self.x, self.y])
+        return moved
 
-    def distance(self, other: "Pose2") -> float:
+    def distance(self, other: Pose2) -> float:
         """Distance between the two positions in metres; headings do not count."""
         return math.hypot(other.x - self.x, other.y - self.y)
 
@@ -63,7 +70,7 @@ class Pose3(NamedTuple):
     qw: float = 1.0
 
     @classmethod
-    def from_rpy(cls, x: float, y: float, z: float, roll: float, pitch: float, yaw: float) -> "Pose3":
+    def from_rpy(cls, x: float, y: float, z: float, roll: float, pitch: float, yaw: float) -> Pose3:
         """Fixed-axis roll, pitch, yaw as in URDF and SDF."""
         cr, sr = math.cos(roll / 2), math.sin(roll / 2)
         cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
@@ -77,7 +84,7 @@ class Pose3(NamedTuple):
         )  # fmt: skip
 
     @classmethod
-    def planar(cls, pose: Pose2, z: float = 0.0) -> "Pose3":
+    def planar(cls, pose: Pose2, z: float = 0.0) -> Pose3:
         """A pose of the plane, lifted to height `z`."""
         return cls(pose.x, pose.y, z, 0.0, 0.0, math.sin(pose.yaw / 2), math.cos(pose.yaw / 2))
 
@@ -104,9 +111,10 @@ class Pose3(NamedTuple):
 
     def apply(self, points: Array) -> Array:
         """Points (n, 3) of this pose's frame, expressed in its parent frame."""
-        return points @ self.rotation().T + np.array(self.position)
+        moved: Array = points @ self.rotation().T + np.array(self.position)
+        return moved
 
-    def compose(self, other: "Pose3") -> "Pose3":
+    def compose(self, other: Pose3) -> Pose3:
         """`a_from_b.compose(b_from_c)` is `a_from_c`."""
         x, y, z = self.apply(np.array([other.position]))[0].tolist()
         ax, ay, az, aw = self.quaternion
@@ -119,7 +127,7 @@ class Pose3(NamedTuple):
             aw * bw - ax * bx - ay * by - az * bz,
         )  # fmt: skip
 
-    def inverse(self) -> "Pose3":
+    def inverse(self) -> Pose3:
         """`a_from_b.inverse()` is `b_from_a`."""
         turn = Pose3(0, 0, 0, -self.qx, -self.qy, -self.qz, self.qw)
         x, y, z = (-turn.apply(np.array([self.position]))[0]).tolist()

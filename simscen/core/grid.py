@@ -1,11 +1,16 @@
 """Occupancy grids with the meaning of nav_msgs/OccupancyGrid."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
 

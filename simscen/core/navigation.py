@@ -1,5 +1,7 @@
 """Goals, paths and results with the names and numbers of Nav2."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
 from enum import Enum, IntEnum
 

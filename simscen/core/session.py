@@ -54,13 +54,17 @@ class RunFailure:
 
 @dataclass(frozen=True)
 class SessionStarted:
-    """The first event: `total` runs of `scenarios` files will be spread over `workers` processes."""
+    """The first event: `total` runs of `scenarios` files will be spread over `workers` processes.
+
+    `ids` are the scenarios' ids.
+    """
 
     version: str
     total: int
     scenarios: int
     workers: int
     folder: str = ""
+    ids: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,17 @@ Every shape is given about its own origin: boxes, cylinders, capsules and cones 
 Sizes are in metres.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2, Pose3
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
 
 
 @dataclass(frozen=True)
@@ -97,7 +102,7 @@ class Body:
     solids: tuple[Solid, ...]
     pose: Pose3 = Pose3()
     mass: float = 0.0
-    path: "MotionPath | None" = None
+    path: MotionPath | None = None
 
 
 @dataclass(frozen=True)

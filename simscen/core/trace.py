@@ -4,11 +4,13 @@ A run hands on one Moment per beat. The MCAP recorder and the TraceBuilder eat t
 gives the same Trace, so that a run can be judged years later without a simulator.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from simscen.core.belief import Belief
 from simscen.core.events import Event
@@ -17,7 +19,12 @@ from simscen.core.motion import Twist
 from simscen.core.navigation import Path
 from simscen.core.sensing import Readings
 
-Ticks = npt.NDArray[np.int64]
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    Ticks = npt.NDArray[np.int64]
+else:
+    Ticks = object  # annotations are not evaluated; commands that only read files need no numpy
 
 
 @dataclass(frozen=True)

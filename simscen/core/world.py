@@ -14,8 +14,9 @@ Polygon = tuple[tuple[float, float], ...]
 class World:
     """Everything that is there before the robot: `solids` never move, `bodies` may.
 
-    `doors` maps a door's name, which is also its body's, to that body's pose when closed and when open. `bounds` is (min x, min y, max x, max y) in metres. `grid` is set when the world came with an occupancy map of its
-    own (a ROS map). `notes` are warnings of the importer, each a sentence that names file and element.
+    `doors` maps a door's name, which is also its body's, to that body's pose when closed and when open. `bounds` is
+    (min x, min y, max x, max y) in metres. `grid` is set when the world came with an occupancy map of its own (a ROS
+    map). `notes` are warnings of the importer, each a sentence that names file and element.
     """
 
     name: str

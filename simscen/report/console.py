@@ -4,7 +4,7 @@ from types import TracebackType
 from typing import Protocol, TextIO
 
 from simscen.core.session import RunFinished, RunProgress, RunStarted, SessionEvent, SessionFinished, SessionStarted
-from simscen.report.lines import Line, closing, finished, opening, text_of
+from simscen.report.lines import Line, Naming, closing, finished, opening, text_of
 from simscen.report.text import ascii_only, no_command
 
 
@@ -35,29 +35,24 @@ def text_reporter(out: TextIO, live: bool | None = None) -> Reporter:
     return LiveReporter(out)
 
 
-def lines_of(event: SessionEvent, every_seed: bool) -> list[Line]:
-    """What an event is worth; `every_seed` tells runs of a scenario apart by their seeds."""
+def lines_of(event: SessionEvent, naming: Naming) -> list[Line]:
+    """What an event is worth."""
     match event:
         case SessionStarted():
             return [opening(event)]
         case RunFinished():
-            return list(finished(event, every_seed))
+            return list(finished(event, naming))
         case SessionFinished():
             return list(closing(event))
         case RunStarted() | RunProgress():
             return []
 
 
-def needs_seeds(started: SessionStarted) -> bool:
-    """Whether some scenario runs more than once."""
-    return started.total != started.scenarios
-
-
 class _Plain:
     """Each line as it happens: no colour, no cursor movement, ASCII where the stream knows no more."""
 
     def __init__(self, out: TextIO) -> None:
-        self._out, self._every_seed = out, False
+        self._out, self._naming = out, Naming()
         self._ascii = not _can_encode(out)
 
     def __enter__(self) -> "_Plain":
@@ -71,8 +66,8 @@ class _Plain:
     def __call__(self, event: SessionEvent) -> None:
         """Print what the event is worth."""
         if isinstance(event, SessionStarted):
-            self._every_seed = needs_seeds(event)
-        for line in lines_of(event, self._every_seed):
+            self._naming = Naming.of(event)
+        for line in lines_of(event, self._naming):
             text = no_command(text_of(line))
             self._out.write(f"{ascii_only(text) if self._ascii else text}\n")
         self._out.flush()

@@ -47,7 +47,7 @@ class _GitHub:
 
 def annotations(run: RunFinished) -> list[str]:
     """The workflow commands for one run."""
-    name = label(run)
+    name = label(run.key)
     lines = [
         _command(
             "warning" if found.warning else "error", run, found.line, name, "\n".join((found.message, *found.detail))
@@ -67,7 +67,7 @@ def markdown(runs: list[RunFinished], session: SessionFinished) -> str:
     errors = "error" if session.errors == 1 else "errors"
     head = f"### simscen: {session.passed} passed, {session.failed} failed, {session.errors} {errors}"
     rows = [
-        f"| {signs[run.outcome]} | {_cell(label(run))} | {run.simulated:.1f} s | {_cell(_why(run))} |"
+        f"| {signs[run.outcome]} | {_cell(label(run.key))} | {run.simulated:.1f} s | {_cell(_why(run))} |"
         for run in ordered
     ]
     return "\n".join([head, "", "| | scenario | simulated | |", "|---|---|---:|---|", *rows, "", ""])

@@ -1,17 +1,16 @@
 """A session as lines of text: what the console prints, piece by piece with the role of each piece."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from simscen.core.session import Outcome, RunFinished, SessionFinished, SessionStarted
+from simscen.core.session import Outcome, RunFinished, RunKey, SessionFinished, SessionStarted
 from simscen.judge.wording import tightest
 from simscen.report.text import one_line
 from simscen.report.wordsof import broken, complaints, failure, label, place
 
 Role = Literal["plain", "name", "good", "bad", "odd", "quiet"]
 
-NAME_WIDTH = 44
 TAIL = 12
 SIGNS = {Outcome.PASSED: ("✓", "good"), Outcome.FAILED: ("✗", "bad"), Outcome.ERROR: ("!", "odd")}
 
@@ -27,6 +26,36 @@ class Piece:
 Line = tuple[Piece, ...]
 
 
+@dataclass(frozen=True)
+class Naming:
+    """How runs are called in the lines of a session: short, unique, and in a column of `width`."""
+
+    every_seed: bool = False
+    prefix: str = ""
+    width: int = 0
+
+    @classmethod
+    def of(cls, session: SessionStarted) -> "Naming":
+        """Seeds are told where a scenario runs more than once."""
+        every_seed = session.total != session.scenarios
+        prefix = _common_folder(session.ids)
+        longest = max((len(one) for one in session.ids), default=0) - len(prefix)
+        return cls(every_seed, prefix, longest + (len(" (seed 1234)") if every_seed else 0))
+
+    def name(self, key: RunKey) -> str:
+        """The run's name, padded."""
+        return f"{label(key, self.every_seed, self.prefix):{self.width}}"
+
+
+def _common_folder(ids: Sequence[str]) -> str:
+    """The folder that all ids begin with, with its slash: "scenarios/"; "" for a single one or none."""
+    if len(ids) < 2:
+        return ""
+    shortest, longest = min(ids), max(ids)
+    same = next((k for k, (a, b) in enumerate(zip(shortest, longest, strict=False)) if a != b), len(shortest))
+    return shortest[: shortest.rfind("/", 0, same) + 1]
+
+
 def opening(started: SessionStarted) -> Line:
     """simscen 0.1.0 · 14 scenarios · 2 workers."""
     runs = "" if started.total == started.scenarios else f" · {_count(started.total, 'run')}"
@@ -34,13 +63,13 @@ def opening(started: SessionStarted) -> Line:
     return (Piece(f"simscen {started.version} · {_count(started.scenarios, 'scenario')}{runs} · {workers}", "quiet"),)
 
 
-def finished(run: RunFinished, every_seed: bool) -> Iterator[Line]:
+def finished(run: RunFinished, naming: Naming) -> Iterator[Line]:
     """One line for a run that passed; for the others also what was violated, where, and how to see it again."""
     sign, role = SIGNS[run.outcome]
     yield (
         Piece("  "),
         Piece(sign, _role(role)),
-        Piece(f" {label(run, every_seed):{NAME_WIDTH}} ", "name"),
+        Piece(f" {naming.name(run.key)} ", "name"),
         *_summary(run),
     )
     if run.outcome is Outcome.ERROR:

@@ -16,8 +16,8 @@ from simscen.core.session import (
     SessionFinished,
     SessionStarted,
 )
-from simscen.report.console import lines_of, needs_seeds
-from simscen.report.lines import NAME_WIDTH, Line
+from simscen.report.console import lines_of
+from simscen.report.lines import Line, Naming
 from simscen.report.text import one_line
 
 STYLES = {"plain": "", "name": "bold", "good": "green", "bad": "red", "odd": "yellow", "quiet": "dim"}
@@ -31,7 +31,7 @@ class LiveReporter:
         self._live = Live(console=self._console, refresh_per_second=8, transient=True)
         self._under_way: dict[RunKey, tuple[RunStarted, float, str]] = {}
         self._done, self._total = 0, 0
-        self._every_seed = False
+        self._naming = Naming()
 
     def __enter__(self) -> "LiveReporter":
         self._live.start()
@@ -46,7 +46,7 @@ class LiveReporter:
         """Print what is final above, show what is under way below."""
         match event:
             case SessionStarted():
-                self._every_seed = needs_seeds(event)
+                self._naming = Naming.of(event)
                 self._total = event.total
             case RunStarted():
                 self._under_way[event.key] = (event, 0.0, "")
@@ -60,7 +60,7 @@ class LiveReporter:
         self._live.update(self._status())
         if isinstance(event, SessionFinished):
             self._live.stop()
-        for line in lines_of(event, self._every_seed):
+        for line in lines_of(event, self._naming):
             self._console.print(_styled(line))
 
     def _status(self) -> Group:
@@ -69,12 +69,10 @@ class LiveReporter:
         return Group(*rows, *counter)
 
     def _row(self, started: RunStarted, simulated: float, note: str) -> Text:
-        name = one_line(started.key.scenario)
-        if self._every_seed:
-            name += f" (seed {started.key.seed})"
+        name = self._naming.name(started.key)
         limit = f" of at most {started.time_limit:.0f} s" if started.time_limit else ""
         return Text.assemble(
-            ("  … ", "cyan"), (f"{name:{NAME_WIDTH}} ", ""), (f"{simulated:6.1f} s{limit}  {one_line(note)}", "dim")
+            ("  … ", "cyan"), (f"{name} ", ""), (f"{simulated:6.1f} s{limit}  {one_line(note)}", "dim")
         )
 
 

@@ -34,8 +34,8 @@ class Past:
 
     def started(self, folder: Path) -> SessionStarted:
         """The event that the session began with."""
-        scenarios = len({run.path for run in self.planned})
-        return SessionStarted(self.version, len(self.planned), scenarios, self.workers, str(folder))
+        ids = tuple(sorted({run.key.scenario for run in self.planned}))
+        return SessionStarted(self.version, len(self.planned), len(ids), self.workers, str(folder), ids)
 
     def _unanswered(self, run: Planned) -> RunFinished:
         kind = "interrupted" if run.key in self.begun else "not-run"

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from simscen.core.session import Outcome, RunFinished
+from simscen.core.session import Outcome, RunFinished, RunKey
 from simscen.core.verdict import Finding, Status, Verdict
 from simscen.judge.wording import sentence, violations
 from simscen.report.text import one_line, visible
@@ -33,10 +33,11 @@ def complaints(run: RunFinished) -> list[Complaint]:
     ]
 
 
-def label(run: RunFinished, every_seed: bool = True) -> str:
-    """What a run is called in a list: the scenario's id, and the seed where there are several."""
-    extra = ", ".join(part for part in (f"seed {run.key.seed}" if every_seed else "", run.key.variation) if part)
-    return one_line(f"{run.key.scenario} ({extra})" if extra else run.key.scenario)
+def label(key: RunKey, every_seed: bool = True, prefix: str = "") -> str:
+    """What a run is called in a list: the scenario's id without `prefix`, and the seed where there are several."""
+    extra = ", ".join(part for part in (f"seed {key.seed}" if every_seed else "", key.variation) if part)
+    name = key.scenario.removeprefix(prefix)
+    return one_line(f"{name} ({extra})" if extra else name)
 
 
 def place(run: RunFinished, line: int = 0) -> str:

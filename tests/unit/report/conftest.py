@@ -85,7 +85,7 @@ def crashed():
 @pytest.fixture
 def session(passed, failed, crashed):
     return [
-        SessionStarted("0.1.0", 3, 3, 2, "out"),
+        SessionStarted("0.1.0", 3, 3, 2, "out", ("evil/[red]::error::x", "faults/lidar_off", "navigation/goal")),
         RunStarted(passed.key, passed.path, 60.0),
         RunProgress(passed.key, 3.5),
         passed,

@@ -12,15 +12,15 @@ from simscen.report.results import to_json
 
 EXPECTED = """\
 simscen 0.1.0 · 3 scenarios · 2 workers
-  ✓ navigation/goal                                18.2 s simulated in 0.21 s   tightest: path_length +0.14 m
-  ✗ faults/lidar_off                               31.0 s simulated in 0.35 s
+  ✓ navigation/goal        18.2 s simulated in 0.21 s   tightest: path_length +0.14 m
+  ✗ faults/lidar_off       31.0 s simulated in 0.35 s
       stopped_within: 0.84 s > 0.50 s after lidar.off, at t = 10.84 s, (2.10, 3.41)
         drove 0.31 m blind at 0.37 m/s; the newest scan was 0.9 s old
       warning: speed: 0.60 m/s > 0.50 m/s, at t = 1.00 s, (1.00, 1.00)
       scenario  scenarios/faults/lidar_off.scenario.yaml:27
       picture   out/x/map.png
       again     simscen run scenarios/faults/lidar_off.scenario.yaml --seed 7
-  ! evil/[red]::error::x                         crashed after 1.25 s
+  ! evil/[red]::error::x crashed after 1.25 s
       crashed: SIGSEGV
         | ::error::owned
         | #\\x23[error]x
@@ -30,6 +30,14 @@ simscen 0.1.0 · 3 scenarios · 2 workers
       again     simscen run evil
 1 passed, 1 failed, 1 error · 49 s simulated in 0.5 s (98x) · out/junit.xml
 """
+
+
+def test_the_folder_that_all_ids_share_is_not_repeated_on_every_line(passed):
+    out = io.StringIO()
+    one, other = (replace(passed, key=RunKey(f"scenarios/{name}", 1)) for name in ("faults/a", "fancy/long"))
+    ids = ("scenarios/fancy/long", "scenarios/faults/a")
+    told(text_reporter(utf8(out)), [SessionStarted("0.1.0", 2, 2, 1, ids=ids), one, other])
+    assert re.findall(r"✓ (\S+ *) ", out.getvalue()) == ["faults/a    ", "fancy/long  "]
 
 
 def told(reporter, session):
