@@ -1,5 +1,7 @@
 """`open`, `close`: doors of the world."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from simscen.actions.base import Action

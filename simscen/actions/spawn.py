@@ -1,5 +1,7 @@
 """`spawn`: put an object into the world."""
 
+from __future__ import annotations
+
 from typing import Annotated
 
 import numpy as np
@@ -38,7 +40,7 @@ class Spawn(Shaped, Action):
     """In kg; 0 = immovable for the robot."""
 
     @model_validator(mode="after")
-    def _one_place(self) -> "Spawn":
+    def _one_place(self) -> Spawn:
         if sum(place is not None for place in (self.pose, self.ahead, self.on_plan)) != 1:
             raise ValueError("expected exactly one of: pose, ahead, on_plan")
         return self

@@ -1,5 +1,7 @@
 """`clearance`: how near the robot came to things."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from simscen.core.case import Case

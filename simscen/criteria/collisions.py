@@ -1,5 +1,7 @@
 """`collisions`: what the robot touched, and how hard."""
 
+from __future__ import annotations
+
 import math
 from typing import Annotated
 

@@ -1,5 +1,7 @@
 """`goals_reached`: the robot truly was where it was sent."""
 
+from __future__ import annotations
+
 import math
 from typing import Annotated
 

@@ -1,5 +1,7 @@
 """`keepout`: where the robot must not be."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from simscen.core.case import Case

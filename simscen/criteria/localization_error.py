@@ -1,5 +1,7 @@
 """`localization_error`: how well the robot knows where it is."""
 
+from __future__ import annotations
+
 import numpy as np
 from pydantic import model_validator
 
@@ -38,7 +40,7 @@ class LocalizationError(Spec, Criterion):
     """Only from this simulated time on: time to settle in."""
 
     @model_validator(mode="after")
-    def _some_bound(self) -> "LocalizationError":
+    def _some_bound(self) -> LocalizationError:
         if self.max is None and self.rmse is None and self.final is None and self.max_yaw is None:
             raise ValueError("expected at least one of: max, rmse, final, max_yaw")
         return self

@@ -1,5 +1,7 @@
 """`no_false_success`: the robot does not claim what is not so."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from simscen.core.case import Case

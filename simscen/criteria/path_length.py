@@ -1,5 +1,7 @@
 """`path_length`: how far the robot drove."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np
@@ -35,7 +37,7 @@ class PathLength(Spec, Criterion):
     """Times the shortest way; 1 is a perfect drive."""
 
     @model_validator(mode="after")
-    def _some_bound(self) -> "PathLength":
+    def _some_bound(self) -> PathLength:
         if self.max is None and self.max_ratio is None:
             raise ValueError("expected max or max_ratio")
         return self

@@ -1,16 +1,23 @@
 """Signals that criteria read off a trace. All are checked to be finite: nan compares false and would hide a failure."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from simscen.core.geometry import Array, wrap_array
 from simscen.core.trace import Samples, Ticks, Trace
 from simscen.criteria.bounds import BrokenTrace
 
-Flags = npt.NDArray[np.bool_]
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    Flags = npt.NDArray[np.bool_]
+else:
+    Flags = object  # annotations are not evaluated; commands that only read files need no numpy
 
 SMALLEST_MOVE = 0.01
 """Metres; shorter moves are the trembling of a body at rest and are not driven (METRICS: path_length)."""

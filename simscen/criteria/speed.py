@@ -1,5 +1,7 @@
 """`speed`: how fast the robot went."""
 
+from __future__ import annotations
+
 import numpy as np
 from pydantic import model_validator
 
@@ -30,7 +32,7 @@ class Speed(Spec, Criterion):
     """rad/s, either way."""
 
     @model_validator(mode="after")
-    def _some_bound(self) -> "Speed":
+    def _some_bound(self) -> Speed:
         if self.max is None and self.max_turn_rate is None:
             raise ValueError("expected max or max_turn_rate")
         return self

@@ -1,5 +1,7 @@
 """`stopped_within`: how soon the robot stops after something happened."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -1,5 +1,7 @@
 """`stuck`: how long the robot got nowhere."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

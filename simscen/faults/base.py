@@ -1,5 +1,7 @@
 """What a fault is."""
 
+from __future__ import annotations
+
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
@@ -32,7 +34,7 @@ class Disturbance:
         """What the wheels do instead of `command`."""
         return command
 
-    def end(self) -> "Disturbance | None":
+    def end(self) -> Disturbance | None:
         """What stays when the fault is over; None = nothing."""
         return None
 

@@ -1,5 +1,7 @@
 """`beam_dropout`: single lidar beams give no answer."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from typing import ClassVar
 

@@ -1,5 +1,7 @@
 """`bias`: odometry over- or under-reports, steadily."""
 
+from __future__ import annotations
+
 from typing import ClassVar
 
 import numpy as np

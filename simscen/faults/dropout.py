@@ -1,5 +1,7 @@
 """`dropout`: messages get lost."""
 
+from __future__ import annotations
+
 from typing import ClassVar
 
 import numpy as np

@@ -1,5 +1,7 @@
 """`noise`: a lidar gets noisier than it should be."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from typing import ClassVar
 

@@ -1,5 +1,7 @@
 """`off`: the sensor falls silent."""
 
+from __future__ import annotations
+
 from typing import ClassVar
 
 import numpy as np

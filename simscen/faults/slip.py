@@ -1,5 +1,7 @@
 """`slip`: wheels turn more than they drive."""
 
+from __future__ import annotations
+
 from typing import Annotated, ClassVar
 
 import numpy as np
