@@ -21,7 +21,7 @@ from simscen.model.world import WorldSpec
 
 Model = TypeVar("Model", bound=BaseModel)
 
-GAZEBO = (".sdf", ".world")
+GAZEBO = (".sdf", ".world", ".sdf.xacro", ".world.xacro")
 URDF = (".urdf", ".xacro")
 ROBOT = ".robot.yaml"
 
@@ -40,8 +40,8 @@ class Assets:
 
     def world_file(self, path: Path) -> LoadedWorld | None:
         """The world in a file: SDF by suffix, a ROS map by its keys, else our own language."""
-        if path.suffix in GAZEBO:
-            return LoadedWorld(path.stem, path, sdf=path)
+        if path.name.endswith(GAZEBO):
+            return LoadedWorld(path.name.split(".")[0], path, sdf=path)
         tree = self._tree(path)
         if is_ros_map(tree):
             loaded = self._ros_map(tree, path)

@@ -34,6 +34,7 @@ CODES = {
     "SC301": "A start or goal is inside an obstacle or off the map.",
     "SC310": "Something in an SDF file cannot be used.",
     "SC311": "Something in a world or map deserves a look; with --lenient, also what was left out of it.",
+    "SC312": "A world holds more than one world file of our own can.",
     "SC320": "A map image cannot be used.",
     "SC330": "A map would have too many cells.",
     "SC331": "A map would become too many walls.",
