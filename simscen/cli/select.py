@@ -11,7 +11,9 @@ from simscen.loading.discovery import default_root, discover
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import try_scenario
 from simscen.loading.selection import select
-from simscen.run.check import check
+from simscen.loading.worldfile import load_world_file
+from simscen.run.check import check, notes_of
+from simscen.run.worldsource import world_of
 
 
 @dataclass(frozen=True)
@@ -68,5 +70,14 @@ def checked(scenario: LoadedScenario) -> list[Problem]:
     """What only geometry can tell, or why its world cannot be used."""
     try:
         return check(scenario)
+    except InvalidInput as error:
+        return error.problems
+
+
+def checked_world(file: Path, root: Path, world_path: Sequence[Path], lenient: bool) -> list[Problem]:
+    """What only building a world can tell, or why it cannot be used."""
+    try:
+        source = load_world_file(file, root, world_path)
+        return notes_of(world_of(source, root, world_path, lenient), source, root)
     except InvalidInput as error:
         return error.problems

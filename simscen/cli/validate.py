@@ -2,7 +2,7 @@
 
 import sys
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from pathlib import Path
 from typing import Annotated
@@ -10,7 +10,8 @@ from typing import Annotated
 import typer
 
 from simscen.cli.diagnostics import as_github, as_json, as_text, from_here, print_text
-from simscen.cli.select import checked as geometric_problems
+from simscen.cli.select import checked as checked_scenario
+from simscen.cli.select import checked_world
 from simscen.core.errors import Exit
 from simscen.core.problems import Problem
 from simscen.loading.anyfile import kind_of, problems_of
@@ -31,6 +32,9 @@ def command(
     format_: Annotated[Format, typer.Option("--format", help="How to print problems.")] = Format.TEXT,
     root: Annotated[Path | None, typer.Option(help="Files inside scenarios stay in this folder.")] = None,
     world_path: Annotated[list[Path] | None, typer.Option(help="Folder with worlds and models; repeatable.")] = None,
+    lenient: Annotated[
+        bool, typer.Option("--lenient", help="What of an SDF world cannot be used is a warning, not an error.")
+    ] = False,
 ) -> None:
     """Check scenario, world and robot files without running anything.
 
@@ -41,17 +45,18 @@ def command(
     checked = _Checked()
     for file in discover(paths, home, SCENARIO + WORLD + ROBOT):
         kind = kind_of(file, home)
-        checked.add(kind, from_here(_problems(kind, file, home, world_path or []), home))
+        checked.add(kind, from_here(_problems(kind, file, home, world_path or [], lenient), home))
     _PRINT[format_](checked)
     if checked.wrong:
         sys.exit(Exit.USAGE)
 
 
-def _problems(kind: str, file: Path, root: Path, world_path: list[Path]) -> list[Problem]:
-    if kind != "scenario":
-        return problems_of(kind, file, root, world_path)
-    loaded = try_scenario(file, root, world_path)
-    return loaded if isinstance(loaded, list) else geometric_problems(loaded)
+def _problems(kind: str, file: Path, root: Path, world_path: list[Path], lenient: bool) -> list[Problem]:
+    if kind == "scenario":
+        loaded = try_scenario(file, root, world_path)
+        return loaded if isinstance(loaded, list) else checked_scenario(replace(loaded, lenient=lenient))
+    found = problems_of(kind, file, root, world_path)
+    return found if found or kind == "robot" else checked_world(file, root, world_path, lenient)
 
 
 @dataclass
