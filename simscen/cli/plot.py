@@ -1,0 +1,74 @@
+"""`simscen plot`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from simscen.cli.diagnostics import harmless, print_text
+from simscen.core.errors import InvalidInput, UsageError
+from simscen.core.geometry import Pose2
+from simscen.core.grid import UNKNOWN, OccupancyGrid
+from simscen.core.problems import Problem
+from simscen.judge.judge import judge
+from simscen.judge.result import RunResult, from_json, run_result
+from simscen.loading.resolved import spec_of_text
+from simscen.record.replay import Log, read_log
+
+LOGS = ("run.mcap", "run.partial.mcap")
+
+
+def command(
+    run: Annotated[Path, typer.Argument(help="The folder of a run, or its run.mcap.")],
+    out: Annotated[Path | None, typer.Option(help="The picture (png); default: map.png beside the log.")] = None,
+) -> None:
+    """Draw a recorded run from its log alone.
+
+    The map that the robot had, the true way, the belief, the plans, what was spawned, and where each criterion was
+    violated. What only the world knows, its places and the shapes of its objects, is not in a log. One that broke off
+    (run.partial.mcap) is drawn as far as it goes. Exit code 0; 2: not a usable log, or the picture cannot be written.
+    """
+    file = _log(run)
+    log = read_log(file)
+    picture = out or file.with_name("map.png")
+    _draw(log, file, picture)
+    print_text(harmless(str(picture)))
+
+
+def _log(run: Path) -> Path:
+    """The log itself. Raises InvalidInput when a folder holds none."""
+    if not run.is_dir():
+        return run
+    found = [run / name for name in LOGS if (run / name).is_file()]
+    if not found:
+        hint = "name the folder of one run, e.g. simscen-out/latest/SCENARIO/seed-1"
+        raise InvalidInput([Problem(str(run), 0, 0, "SC800", f"there is no {LOGS[0]} in it", hint)])
+    return found[0]
+
+
+def _draw(log: Log, file: Path, picture: Path) -> None:
+    from simscen.report.picture import Scene, write_picture
+
+    scene = Scene(log.trace, log.about.case, log.about.map or _nothing(log), _result(log, file))
+    try:
+        write_picture(scene, picture)
+    except (OSError, ValueError) as error:  # Pillow: a suffix that it does not know
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else error
+        raise UsageError(f"cannot write {picture}: {reason}") from error
+
+
+def _result(log: Log, file: Path) -> RunResult:
+    """What the run said of itself; for one that broke off, what its criteria say of what there is."""
+    if log.result:
+        return from_json(log.result)
+    about = log.about
+    spec = spec_of_text(about.scenario, str(file))
+    verdicts = judge(spec.pass_, log.trace, about.case)
+    return run_result(about.name, about.name, about.seed, verdicts, log.trace, about.case)
+
+
+def _nothing(log: Log) -> OccupancyGrid:
+    """One unknown cell where the robot started, for a robot without a map."""
+    start = log.about.case.start
+    return OccupancyGrid(np.full((1, 1), UNKNOWN, dtype=np.int8), 0.05, Pose2(start.x, start.y))
