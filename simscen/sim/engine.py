@@ -16,8 +16,9 @@ FACES_AT_ONCE = 40_000
 FLOOR = 0.005
 """Faces that lie wholly below this height in m are left to the ground plane, on which wheels roll smoothly."""
 
-STATIC, GROUND = 2, 64
-"""Collision groups: Bullet's own of what never moves, and one that only the ground plane is in."""
+GROUND, HULL, WHEEL = 64, 32, 16
+"""Collision groups of the ground and of a robot's parts; everything else is in Bullet's own 1 and 2."""
+EVERYTHING = -1
 
 PRIMITIVES = (Box, Cylinder, Sphere, Capsule)
 """What the engine knows as such."""
@@ -43,7 +44,7 @@ def connect(tick_rate: int, solver_iterations: int) -> int:
         restitutionVelocityThreshold=0.2,
         contactBreakingThreshold=0.02,
         contactSlop=1e-5,
-        collisionFilterMode=1,
+        collisionFilterMode=0,
         useSplitImpulse=0,
         enableConeFriction=1,
         enableFileCaching=0,
@@ -63,13 +64,13 @@ def connect(tick_rate: int, solver_iterations: int) -> int:
 def ground(client: int) -> int:
     """The plane z = 0."""
     plane = fixed(client, pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client))
-    pybullet.setCollisionFilterGroupMask(plane, -1, STATIC | GROUND, ~STATIC, physicsClientId=client)
+    touch(client, plane, -1, GROUND, EVERYTHING)
     return plane
 
 
-def on_ground_only(client: int, body: int, link: int) -> None:
-    """Let a link touch nothing but the ground. In no group, it is in nobody's mask: one match suffices to collide."""
-    pybullet.setCollisionFilterGroupMask(body, link, 0, GROUND, physicsClientId=client)
+def touch(client: int, body: int, link: int, group: int, others: int) -> None:
+    """Let a link touch only what is in the groups `others`, and of that only what lets itself be touched by `group`."""
+    pybullet.setCollisionFilterGroupMask(body, link, group, others, physicsClientId=client)
 
 
 def static_mesh(client: int, mesh: TriangleMesh) -> list[int]:

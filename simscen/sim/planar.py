@@ -51,6 +51,8 @@ class PlanarBase:
                 self.id, link, lateralFriction=0.0, restitution=0.0, linearDamping=0, angularDamping=0, jointDamping=0,
                 physicsClientId=client,
             )  # fmt: skip
+        for link in self.hull_links:
+            engine.touch(client, self.id, link, engine.HULL, ~(engine.HULL | engine.GROUND))
         self._mass = body.mass
         self._radius = body.circumscribed_radius
         self.place(pose)

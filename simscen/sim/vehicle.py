@@ -40,7 +40,7 @@ class Vehicle:
         xx, yy, zz = wheel.inertia.tensor.diagonal().tolist()  # a wheel turns about y and is round
         link = joint + 1 if wheel.steered else joint
         # The ball reaches out beyond a narrow wheel's sides: its guard in the hull stands for it there.
-        engine.on_ground_only(self._client, self.id, link)
+        engine.touch(self._client, self.id, link, engine.WHEEL, engine.GROUND)
         pybullet.changeDynamics(
             self.id,
             link,
@@ -132,6 +132,7 @@ def _build(client: int, body: RobotBody) -> tuple[int, tuple[int, ...], tuple[in
         physicsClientId=client,
     )
     for link in hull:
+        engine.touch(client, robot, link, engine.HULL, ~(engine.HULL | engine.WHEEL))
         pybullet.changeDynamics(
             robot, link, lateralFriction=0.0, restitution=0.0, linearDamping=0, angularDamping=0,
             physicsClientId=client,
