@@ -11,7 +11,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 def generated() -> dict[str, str]:
     """Path in the repository → content."""
-    schemas = {f"schemas/{name}.schema.json": as_text(schema_of(name)) for name in MODELS}
+    schemas = {f"simscen/data/schemas/{name}.schema.json": as_text(schema_of(name)) for name in MODELS}
     return {
         **schemas,
         "docs/reference/language.md": language_page(),

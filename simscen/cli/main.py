@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from simscen.cli.later import import_later
 from simscen.core.errors import Exit, InvalidInput, SimscenError
 
 COMMANDS = {
@@ -27,6 +28,10 @@ COMMANDS = {
 """Command → what it does. `simscen.cli.<command>` has a function `command`, or an `app` with commands of its own."""
 
 
+LIGHT = frozenset({"validate", "list", "schema", "explain", "new"})
+"""Commands that must answer at once. Numpy is a quarter of their start; few of them compute anything."""
+
+
 class Commands(TyperGroup):
     """Imports a command's module when it is called: `validate` must not wait for pybullet."""
 
@@ -38,6 +43,8 @@ class Commands(TyperGroup):
         """The command itself; its module is imported now."""
         if cmd_name not in self.list_commands(ctx):
             return None
+        if cmd_name in LIGHT:
+            import_later("numpy")
         module = importlib.import_module(_module(cmd_name))
         app = getattr(module, "app", None)
         if app is None:

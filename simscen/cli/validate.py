@@ -10,8 +10,6 @@ from typing import Annotated
 import typer
 
 from simscen.cli.diagnostics import as_github, as_json, as_text, from_here, print_text
-from simscen.cli.select import checked as checked_scenario
-from simscen.cli.select import checked_world
 from simscen.core.errors import Exit
 from simscen.core.problems import Problem
 from simscen.loading.anyfile import kind_of, problems_of
@@ -52,11 +50,20 @@ def command(
 
 
 def _problems(kind: str, file: Path, root: Path, world_path: list[Path], lenient: bool) -> list[Problem]:
+    """What the text tells; where that is nothing, what the geometry tells, which needs numpy."""
     if kind == "scenario":
         loaded = try_scenario(file, root, world_path)
-        return loaded if isinstance(loaded, list) else checked_scenario(replace(loaded, lenient=lenient))
+        if isinstance(loaded, list):
+            return loaded
+        from simscen.cli.select import checked
+
+        return checked(replace(loaded, lenient=lenient))
     found = problems_of(kind, file, root, world_path)
-    return found if found or kind == "robot" else checked_world(file, root, world_path, lenient)
+    if found or kind == "robot":
+        return found
+    from simscen.cli.select import checked_world
+
+    return checked_world(file, root, world_path, lenient)
 
 
 @dataclass

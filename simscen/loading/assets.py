@@ -1,12 +1,12 @@
 """The files a scenario names: worlds, maps, robots."""
 
 from dataclasses import dataclass, field
-from importlib import resources
 from pathlib import Path
 from typing import TypeVar
 
 from pydantic import BaseModel
 
+import simscen
 from simscen.core.problems import Problem
 from simscen.loading.check import check
 from simscen.loading.document import Library
@@ -142,5 +142,5 @@ def is_ros_map(tree: Node | None) -> bool:
 
 def shipped_robots() -> dict[str, Path]:
     """The robots that ship with simscen, by name."""
-    folder = Path(str(resources.files("simscen"))) / "data" / "robots"
+    folder = Path(simscen.__file__).parent / "data" / "robots"
     return {path.name.removesuffix(ROBOT): path for path in sorted(folder.glob(f"*{ROBOT}"))}

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from simscen.spec.base import Choice, Spec
+from simscen.spec.base import Choice, Spec, by_default
 from simscen.spec.objects import Shaped
 from simscen.spec.places import Name, Point, PoseSpec
 from simscen.spec.quantities import (
@@ -114,7 +114,7 @@ class Lidar(Spec):
     """Standard deviation of a range."""
     resolution: PositiveLength = 0.001
     """Ranges are whole multiples of this."""
-    mount: Mount = Mount()
+    mount: Mount = by_default()
 
 
 class WheelOdometry(Spec):
@@ -156,7 +156,7 @@ class Camera(Spec):
     field_of_view: PositiveAngle = 1.2
     """Horizontal."""
     max_range: PositiveLength = 10.0
-    mount: Mount = Mount()
+    mount: Mount = by_default()
 
 
 class Sensor(Choice):

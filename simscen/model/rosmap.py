@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, ValidationInfo, field_validator
 
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Length, PositiveLength, Probability
@@ -21,7 +21,16 @@ class RosMapSpec(Spec):
     """Whether black is free and white is occupied."""
     occupied_thresh: Probability = 0.65
     """A pixel at least this dark is occupied."""
-    free_thresh: Probability = 0.25
+    free_thresh: Annotated[Probability, Field(validate_default=True)] = 0.25
     """A pixel at most this dark is free."""
     mode: Literal["trinary", "scale", "raw"] = "trinary"
     """How greys between the thresholds are read."""
+
+    @field_validator("free_thresh")
+    @classmethod
+    def _below_occupied(cls, free: float, info: ValidationInfo) -> float:
+        """Otherwise map_server would call some greys both free and occupied, and the order of its tests would decide."""
+        occupied = info.data.get("occupied_thresh", 1.0)
+        if free >= occupied:
+            raise ValueError(f"free_thresh {free:g} must be less than occupied_thresh {occupied:g}")
+        return free

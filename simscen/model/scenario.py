@@ -11,7 +11,7 @@ from simscen.criteria.criterion import AnyCriterion
 from simscen.model.disturbance import EventEntry, FaultEntry
 from simscen.model.stack import StackSpec
 from simscen.model.world import WorldSpec
-from simscen.spec.base import Spec
+from simscen.spec.base import Spec, by_default
 from simscen.spec.places import Name, PlaceName, PoseSpec
 from simscen.spec.quantities import (
     Angle,
@@ -113,7 +113,7 @@ class ScenarioSpec(Spec):
     map: FilePath | None = None
     """The map the robot gets, if it is not that of the world; `none` = no map, odometry only."""
     robot: RobotEntry
-    stack: StackSpec = StackSpec()
+    stack: StackSpec = by_default()
     goals: Annotated[list[GoalEntry], Field(max_length=1000)] = []
     """In this order."""
     on_goal_failure: Literal["stop", "continue"] = "stop"
@@ -124,7 +124,7 @@ class ScenarioSpec(Spec):
     """Simulated seconds that the run goes on after the last goal, to see that the robot stays where it is."""
     events: Annotated[list[EventEntry], Field(max_length=500)] = []
     faults: Annotated[list[FaultEntry], Field(max_length=500)] = []
-    physics: Physics = Physics()
+    physics: Physics = by_default()
     pass_: Annotated[list[AnyCriterion], Field(min_length=1, max_length=200, alias="pass")]
     """All of these must hold."""
 

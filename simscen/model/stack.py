@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from simscen.spec.base import Spec, type_or
+from simscen.spec.base import Spec, by_default, type_or
 from simscen.spec.quantities import (
     Angle,
     Duration,
@@ -269,12 +269,12 @@ class StackSpec(Spec):
 
     type: Literal["reference"] = "reference"
     controller_frequency: Frequency = 20.0
-    localizer: Localizer = Amcl()
-    costmap: Costmap = Costmap()
-    planner: Planner = Planner()
-    controller: Controller = RegulatedPurePursuit()
-    goal_checker: GoalChecker = GoalChecker()
-    progress_checker: ProgressChecker = ProgressChecker()
-    recovery: Recovery = Recovery()
-    velocity_smoother: VelocitySmoother = VelocitySmoother()
-    collision_monitor: CollisionMonitor = CollisionMonitor()
+    localizer: Localizer = by_default()
+    costmap: Costmap = by_default()
+    planner: Planner = by_default()
+    controller: Controller = by_default()
+    goal_checker: GoalChecker = by_default()
+    progress_checker: ProgressChecker = by_default()
+    recovery: Recovery = by_default()
+    velocity_smoother: VelocitySmoother = by_default()
+    collision_monitor: CollisionMonitor = by_default()

@@ -76,7 +76,3 @@ class Trigger(Test):
     """Start at most so often."""
     probability: Probability = 1.0
     """The chance that an edge counts, drawn from the scenario's seed."""
-
-
-Test.model_rebuild()
-Trigger.model_rebuild()
