@@ -1,0 +1,195 @@
+import math
+
+import numpy as np
+import pytest
+from flatland import RATE, Flatland, round_robot
+from scipy.ndimage import distance_transform_edt
+
+from simscen.core.geometry import Pose2
+from simscen.core.grid import OccupancyGrid
+from simscen.core.sensing import Scan
+from simscen.model.stack import Costmap as Spec
+from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.protocols import Surroundings
+
+ROBOT = round_robot()
+BOUNDS = (-0.5, -0.5, 8.5, 6.5)
+REACH = 0.72  # circumscribed radius + 0.5 m
+
+
+def scan_of(world: Flatland, pose: Pose2, beams: int = 360, range_max: float = 12.0, noise: float = 0.0) -> Scan:
+    step = 2 * math.pi / beams
+    angles = -math.pi + step * np.arange(beams)
+    ranges = world.cast((pose.x, pose.y), angles + pose.yaw)
+    ranges = ranges + np.random.default_rng(3).normal(0, noise, beams)
+    return Scan("lidar", 0, np.where(ranges > range_max, np.inf, ranges), -math.pi, step, 0.05, range_max)
+
+
+def costmap(world: Flatland | None, spec: Spec | None = None, **options: object) -> Costmap:
+    grid = world.grid(BOUNDS) if world else None
+    return Costmap(spec or Spec(), Surroundings(ROBOT, grid, RATE, **options))
+
+
+def at(costmap: Costmap, x: float, y: float) -> tuple[int, float]:
+    """Cost and distance under a point."""
+    view = costmap.view
+    row, column = int((y - view.origin[1]) / view.resolution), int((x - view.origin[0]) / view.resolution)
+    return int(view.costs[row, column]), float(view.distance[row, column])
+
+
+def full(lethal: np.ndarray) -> np.ndarray:
+    return np.minimum(distance_transform_edt(~lethal) * 0.05, REACH)
+
+
+def test_distances_of_the_map_are_those_between_cell_centres() -> None:
+    view = costmap(Flatland().room(8, 6)).view
+    lethal = view.costs == 254
+    cells, here = np.argwhere(lethal), np.array([60, 80])
+    brute = np.sqrt(((cells - here) ** 2).sum(axis=1)).min() * 0.05
+    assert view.distance[60, 80] == pytest.approx(min(brute, REACH), abs=1e-6)
+    assert np.allclose(view.distance, full(lethal), atol=1e-6)
+
+
+def test_costs_follow_nav2s_formula_between_the_inscribed_and_the_inflation_radius() -> None:
+    map_ = costmap(Flatland().room(8, 6))
+    for x in (0.1, 0.3, 0.45, 0.6, 0.75):
+        cost, distance = at(map_, x, 3.0)
+        expected = 253 if distance <= 0.22 else int(252 * math.exp(-3.0 * (distance - 0.22)))
+        assert cost == (expected if distance <= 0.70 else 0)
+
+
+def test_unknown_cells_stay_unknown_unless_the_robot_would_touch_a_wall_there() -> None:
+    cells = np.full((40, 40), -1, dtype=np.int8)
+    cells[20, 20] = 100
+    map_ = Costmap(Spec(), Surroundings(ROBOT, OccupancyGrid(cells, 0.05), RATE))
+    assert at(map_, 1.025, 1.125)[0] == 253
+    assert at(map_, 1.025, 1.725)[0] == 255
+
+
+def test_a_turned_map_is_sampled_into_an_unturned_costmap() -> None:
+    cells = np.zeros((40, 60), dtype=np.int8)
+    cells[10, 50] = 100
+    grid = OccupancyGrid(cells, 0.05, Pose2(1.0, 2.0, math.pi / 2))
+    view = Costmap(Spec(), Surroundings(ROBOT, grid, RATE)).view
+    row, column = np.argwhere(view.costs == 254)[0]
+    x, y = grid.centre_of(np.array([[10, 50]]))[0]
+    assert view.origin[0] + (column + 0.5) * 0.05 == pytest.approx(x, abs=0.051)
+    assert view.origin[1] + (row + 0.5) * 0.05 == pytest.approx(y, abs=0.051)
+
+
+def test_a_hit_is_marked_up_to_the_obstacle_range_and_not_beyond() -> None:
+    world = Flatland().room(8, 6)
+    map_ = costmap(world)
+    world.discs += [(4.0, 3.0, 0.1), (7.0, 3.0, 0.1)]
+    map_.update(Pose2(2.0, 3.0), scan_of(world, Pose2(2.0, 3.0)))
+    assert at(map_, 3.92, 3.0)[0] == 254
+    assert at(map_, 6.92, 3.0)[0] == 0
+
+
+def test_an_obstacle_that_went_away_is_cleared_and_the_map_is_as_before() -> None:
+    world = Flatland().room(8, 6)
+    map_ = costmap(world)
+    before = map_.view.costs.copy(), map_.view.distance.copy()
+    world.discs.append((4.0, 3.0, 0.3))
+    map_.update(Pose2(2.0, 3.0), scan_of(world, Pose2(2.0, 3.0)))
+    assert not np.array_equal(map_.view.costs, before[0])
+    world.discs.pop()
+    map_.update(Pose2(2.0, 3.0), scan_of(world, Pose2(2.0, 3.0)))
+    assert np.array_equal(map_.view.costs, before[0])
+    assert np.array_equal(map_.view.distance, before[1])
+
+
+def test_walls_of_the_map_are_never_cleared() -> None:
+    map_ = costmap(Flatland().room(8, 6))
+    before = map_.view.costs.copy()
+    map_.update(Pose2(1.0, 1.0), scan_of(Flatland(), Pose2(1.0, 1.0)))
+    assert np.array_equal(map_.view.costs, before)
+
+
+@pytest.mark.parametrize(("ranges", "cleared"), [(np.inf, True), (np.nan, False), (0.01, False), (13.0, True)])
+def test_only_beams_that_say_something_clear(ranges: float, cleared: bool) -> None:
+    world = Flatland().room(8, 6)
+    map_ = costmap(world)
+    world.discs.append((4.0, 3.0, 0.1))
+    seen = scan_of(world, Pose2(2.0, 3.0))
+    map_.update(Pose2(2.0, 3.0), seen)
+    blind = Scan("lidar", 1, np.full(360, ranges), seen.angle_min, seen.angle_increment, 0.05, 12.0)
+    map_.update(Pose2(2.0, 3.0), blind)
+    assert (at(map_, 3.92, 3.0)[0] != 254) == cleared
+
+
+def test_an_obstacle_beyond_the_ray_tracing_range_persists() -> None:
+    world = Flatland().room(8, 6)
+    map_ = costmap(world)
+    world.discs.append((4.0, 3.0, 0.1))
+    map_.update(Pose2(2.0, 3.0), scan_of(world, Pose2(2.0, 3.0)))
+    world.discs.pop()
+    map_.update(Pose2(0.6, 3.0), scan_of(world, Pose2(0.6, 3.0)))
+    assert at(map_, 3.92, 3.0)[0] == 254
+
+
+def test_distances_kept_up_to_date_piece_by_piece_equal_those_computed_at_once() -> None:
+    world = Flatland().room(8, 6)
+    map_ = costmap(world)
+    chance = np.random.default_rng(5)
+    for k in range(12):
+        world.discs = [(*chance.uniform((1, 1), (7, 5)), 0.2) for _ in range(4)]
+        pose = Pose2(1.0 + 0.5 * k, 3.0, 0.3 * k)
+        map_.update(pose, scan_of(world, pose, noise=0.01))
+        assert np.allclose(map_.view.distance, full(map_.view.costs == 254), atol=1e-6)
+
+
+def test_a_rolling_window_follows_the_robot_and_keeps_what_it_saw() -> None:
+    map_ = costmap(None, Spec(rolling_size=8.0))
+    world = Flatland(discs=[(2.0, 0.5, 0.1)])
+    map_.update(Pose2(0.0, 0.0), scan_of(world, Pose2(0.0, 0.0)))
+    assert at(map_, 1.9, 0.475)[0] == 254
+    map_.update(Pose2(3.0, -2.0), scan_of(Flatland(), Pose2(3.0, -2.0), range_max=0.5))
+    view = map_.view
+    assert view.origin == pytest.approx((-1.0, -6.0), abs=0.06)
+
+
+def test_what_leaves_the_rolling_window_is_forgotten() -> None:
+    map_ = costmap(None, Spec(rolling_size=8.0))
+    map_.update(Pose2(0, 0), scan_of(Flatland(discs=[(2.0, 0.5, 0.1)]), Pose2(0, 0)))
+    map_.update(Pose2(20, 0), scan_of(Flatland(), Pose2(20, 0)))
+    map_.update(Pose2(0, 0), Scan("lidar", 2, np.full(4, np.nan), 0.0, 1.0, 0.05, 12.0))
+    assert not (map_.view.costs == 254).any()
+
+
+def test_keepout_zones_are_walls() -> None:
+    map_ = costmap(Flatland().room(8, 6), keepout=(((3, 2), (5, 2), (5, 4), (3, 4)),))
+    assert at(map_, 4.0, 3.0) == (254, 0.0)
+    assert at(map_, 2.87, 3.0)[0] == 253
+
+
+def test_clearing_forgets_what_is_not_seen_any_more_and_keeps_what_is() -> None:
+    world = Flatland().room(8, 6)
+    map_ = costmap(world)
+    world.discs.append((4.0, 3.0, 0.1))
+    map_.update(Pose2(2.0, 3.0), scan_of(world, Pose2(2.0, 3.0)))
+    world.discs = [(1.5, 3.0, 0.1)]
+    map_.update(Pose2(0.6, 3.0), scan_of(world, Pose2(0.6, 3.0)))
+    map_.clear()
+    assert at(map_, 3.92, 3.0)[0] != 254
+    assert at(map_, 1.42, 3.0)[0] == 254
+
+
+def test_cells_under_the_robot_are_free() -> None:
+    world = Flatland().room(8, 6)
+    map_ = costmap(world)
+    world.discs.append((2.3, 3.0, 0.1))
+    map_.update(Pose2(2.0, 3.0), scan_of(world, Pose2(2.0, 3.0)))
+    map_.update(Pose2(2.2, 3.0), scan_of(Flatland(), Pose2(2.2, 3.0), range_max=0.06))
+    assert at(map_, 2.2, 3.0)[0] != 254
+
+
+def test_the_revision_grows_when_something_changed() -> None:
+    world = Flatland().room(8, 6)
+    map_ = costmap(world)
+    before = map_.view.revision
+    map_.update(Pose2(2.0, 3.0), scan_of(world, Pose2(2.0, 3.0)))
+    assert map_.view.revision == before
+    world.discs.append((4.0, 3.0, 0.1))
+    map_.update(Pose2(2.0, 3.0), scan_of(world, Pose2(2.0, 3.0)))
+    assert map_.view.revision == before + 1

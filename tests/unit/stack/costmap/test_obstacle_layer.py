@@ -1,0 +1,46 @@
+import math
+
+import numpy as np
+import pytest
+
+from simscen.core.geometry import Pose2
+from simscen.core.sensing import Scan
+from simscen.model.stack import Costmap as Spec
+from simscen.stack.costmap.frame import Frame
+from simscen.stack.costmap.obstacle_layer import crossed, hits
+
+FRAME = Frame((-4.0, -4.0), 0.05, (160, 160))
+
+
+def walked(scan: Scan, base: Pose2, spec: Spec) -> set[tuple[int, int]]:
+    """The cells that beams pass through, by walking along each in steps of a millimetre."""
+    lidar = base.compose(scan.mount)
+    cells: set[tuple[int, int]] = set()
+    for angle, length in zip(scan.angles() + lidar.yaw, scan.ranges, strict=True):
+        along = np.arange(0.0, min(length, spec.raytrace_max_range), 0.001)
+        points = np.column_stack((lidar.x + along * math.cos(angle), lidar.y + along * math.sin(angle)))
+        cells |= set(map(tuple, FRAME.cells(points).tolist()))
+    return cells
+
+
+@pytest.mark.parametrize("beams", [36, 720])
+def test_crossed_cells_are_those_a_walk_along_the_beams_comes_through(beams: int) -> None:
+    spec, base = Spec(), Pose2(0.31, -0.22, 0.7)
+    step = 2 * math.pi / beams
+    scan = Scan("l", 0, 2.0 + np.sin(3 * np.arange(beams) * step), -math.pi, step, 0.05, 12.0, Pose2(0.1, 0.05, 0.2))
+    cells = np.argwhere(np.ones(FRAME.shape, dtype=bool))
+    found = {tuple(cell) for cell in cells[crossed(cells, FRAME, scan, base, spec)].tolist()}
+    truth = walked(scan, base, spec)
+    ends = {tuple(cell) for cell in FRAME.cells(hits(scan, base, 0.0, 99.0)).tolist()}
+    # Cells at a beam's end may go either way: marking comes after clearing. Near the lidar many beams share a cell.
+    lidar = base.compose(scan.mount)
+    far = {c for c in truth if np.hypot(*(FRAME.centres(np.array([c]))[0] - lidar[:2])) > 0.3}
+    assert len(found - truth) <= 0.01 * len(truth)
+    missed = {c for c in far - found if all(max(abs(c[0] - e[0]), abs(c[1] - e[1])) > 1 for e in ends)}
+    assert len(missed) <= 0.03 * len(far)
+
+
+def test_hits_are_points_in_the_map() -> None:
+    scan = Scan("l", 0, np.array([1.0, np.inf, np.nan, 2.0, 9.0]), 0.0, math.pi / 2, 0.05, 12.0, Pose2(0.1, 0, 0))
+    points = hits(scan, Pose2(1.0, 1.0, math.pi / 2), 0.0, 2.5)
+    assert points == pytest.approx(np.array([[1.0, 2.1], [3.0, 1.1]]))

@@ -1,0 +1,234 @@
+"""Whole drives: what the navigator makes of doors, walls, blind lidars and impatient clients."""
+
+import math
+
+import pytest
+from flatland import Drive, Flatland, box_robot, drive, round_robot
+
+from simscen.core.geometry import Pose2
+from simscen.core.motion import STOP, Twist
+from simscen.core.navigation import Goal
+from simscen.model.stack import Costmap, GroundTruth, Planner, ProgressChecker, Recovery, StackSpec
+
+TRUTH = GroundTruth(type="ground_truth")
+BOUNDS = (-0.5, -0.5, 10.5, 6.5)
+START, FAR = Pose2(1.0, 1.0), Goal("far", Pose2(9.0, 1.0, math.pi / 2), timeout=90.0)
+DOOR = (4.9, 2.5, 5.0, 3.5)
+
+
+def rooms(*more: tuple[float, float, float, float]) -> Flatland:
+    """Two rooms and a door of one metre between them."""
+    world = Flatland().room(10, 6)
+    world.boxes += [(4.9, 0.0, 5.0, 2.5), (4.9, 3.5, 5.0, 6.0), *more]
+    return world
+
+
+def start(world: Flatland, *goals: Goal, grid: Flatland | None = None, **options: object) -> Drive:
+    return drive(world, START, *(goals or (FAR,)), grid=(grid or world).grid(BOUNDS), **options)
+
+
+def codes(drive: Drive, kind: str = "goal.failed") -> list[object]:
+    return [event.data["error_name"] for event in drive.kinds(kind)]
+
+
+def reasons(drive: Drive) -> list[object]:
+    return [event.data["reason"] for event in drive.kinds("plan.made")]
+
+
+def test_it_drives_through_a_door_to_the_goal_and_stands_there() -> None:
+    d = start(rooms()).run(60)
+    assert d.result == "SUCCEEDED"
+    assert d.pose.distance(FAR.pose) < 0.2
+    assert abs(d.pose.yaw - math.pi / 2) < 0.2
+    assert d.least > 0.05
+    assert reasons(d) == ["goal"]
+    d.run(1.0)
+    assert set(d.commands[-30:]) == {STOP}
+
+
+def test_it_visits_goals_in_order() -> None:
+    d = start(rooms(), Goal("a", Pose2(3, 5)), Goal("b", Pose2(8, 3)), Goal("c", Pose2(1, 1))).run(120)
+    assert [e.name for e in d.kinds("goal.reached")] == ["a", "b", "c"]
+    assert [e.data["index"] for e in d.kinds("goal.accepted")] == [0, 1, 2]
+    assert len(d.kinds("navigation.ended")) == 1
+
+
+def test_a_door_that_is_shut_is_waited_for_with_recoveries_and_passed_when_it_opens() -> None:
+    world = rooms()
+    d = start(world).run(2.0)
+    world.boxes.append(DOOR)
+    d.run(8.0)
+    assert d.kinds("recovery.started")
+    world.boxes.remove(DOOR)
+    d.run(60.0)
+    assert d.result == "SUCCEEDED"
+    assert d.least > 0.02
+
+
+def test_recoveries_come_in_nav2s_order_and_end_after_the_retries() -> None:
+    d = start(rooms(DOOR), grid=rooms()).run(90)
+    assert [e.name for e in d.kinds("recovery.started")] == [
+        "clear_costmap", "spin", "wait", "backup", "clear_costmap", "spin",
+    ]  # fmt: skip
+    assert codes(d) == ["NO_VALID_PATH"]
+    assert d.result == "FAILED"
+
+
+def test_an_unmapped_obstacle_on_the_plan_is_driven_around_without_recovery() -> None:
+    world = rooms()
+    world.discs.append((7.5, 2.0, 0.3))
+    d = start(world, grid=rooms()).run(60)
+    assert d.result == "SUCCEEDED"
+    assert "blocked" in reasons(d)
+    assert not d.kinds("recovery.started")
+    assert d.least > 0.02
+
+
+def test_a_way_that_opens_is_taken_when_it_is_clearly_shorter() -> None:
+    mapped = Flatland().room(10, 6)
+    mapped.boxes += [(4.9, 0.0, 5.0, 2.5), (4.9, 3.5, 5.0, 5.0)]  # a door, and a long way round by the top
+    world = Flatland(mapped.boxes + [DOOR])
+    d = drive(world, Pose2(2.0, 1.0), Goal("g", Pose2(8.0, 1.0), timeout=90.0), grid=mapped.grid(BOUNDS)).run(4.0)
+    assert "blocked" in reasons(d)
+    world.boxes.remove(DOOR)
+    d.run(60)
+    assert d.result == "SUCCEEDED"
+    assert "better" in reasons(d)
+
+
+@pytest.mark.parametrize(
+    ("goal", "code"), [(Pose2(30.0, 1.0), "GOAL_OUTSIDE_MAP"), (Pose2(4.95, 1.0), "GOAL_OCCUPIED")]
+)
+def test_a_goal_that_can_never_be_reached_fails_at_once(goal: Pose2, code: str) -> None:
+    d = start(rooms(), Goal("bad", goal)).run(10)
+    assert codes(d) == [code]
+    assert d.tick < 240
+    assert not d.kinds("recovery.started")
+
+
+def test_a_goal_occupied_by_something_that_is_not_on_the_map_fails_after_recoveries() -> None:
+    world = rooms((8.3, 0.3, 9.7, 1.7))
+    d = start(world, grid=rooms()).run(90)
+    assert codes(d) == ["GOAL_OCCUPIED"]
+    assert d.kinds("recovery.started")
+    assert d.least > 0.02
+
+
+def test_a_start_outside_the_map_fails_with_its_code() -> None:
+    world = rooms()
+    d = drive(world, Pose2(-3.0, 1.0), FAR, grid=world.grid(BOUNDS)).run(60)
+    assert codes(d) == ["START_OUTSIDE_MAP"]
+
+
+def test_a_goal_takes_no_longer_than_its_timeout() -> None:
+    d = start(rooms(), Goal("soon", FAR.pose, timeout=5.0)).run(60)
+    assert codes(d) == ["NAVIGATE_TIMEOUT"]
+    assert d.tick / 240 == pytest.approx(5.0, abs=0.1)
+
+
+def test_a_robot_that_does_not_move_is_found_out() -> None:
+    spec = StackSpec(
+        localizer=TRUTH, progress_checker=ProgressChecker(movement_time_allowance=1.0),
+        recovery=Recovery(number_of_retries=2, wait_duration=0.5),
+    )  # fmt: skip
+    d = start(rooms(), spec=spec)
+    d._move = lambda *_: None
+    d.run(60)
+    assert codes(d) == ["FAILED_TO_MAKE_PROGRESS"]
+
+
+def test_after_a_failed_goal_it_stops_or_goes_on_as_told() -> None:
+    goals = Goal("bad", Pose2(30, 1)), Goal("good", Pose2(2.5, 1.0))
+    stopped = start(rooms(), *goals).run(30)
+    assert [e.name for e in stopped.kinds("goal.accepted")] == ["bad"]
+    went_on = start(rooms(), *goals, stop_on_failure=False).run(30)
+    assert [e.name for e in went_on.kinds("goal.reached")] == ["good"]
+    assert went_on.result == "FAILED"
+
+
+def test_a_silent_lidar_stops_the_robot_within_half_a_second_and_it_goes_on_when_it_speaks() -> None:
+    d = start(rooms()).run(5.0)
+    d.blind = True
+    d.run(0.5)
+    assert d.twist.vx < 0.06
+    d.run(14.5)
+    assert d.commands[-1] == STOP
+    assert not d.kinds("recovery.started")  # the progress checker's clock stood still
+    d.blind = False
+    d.run(60)
+    assert d.result == "SUCCEEDED"
+    assert not d.kinds("recovery.started")
+
+
+def test_cancel_stops_at_once_and_ends_the_task() -> None:
+    d = start(rooms()).run(3.0)
+    d.stack.cancel()
+    d.run(1.0)
+    assert [e.name for e in d.kinds("goal.canceled")] == ["far"]
+    assert d.result == "CANCELED"
+    assert set(d.commands[-30:]) == {STOP}
+    assert d.stack.goal is None
+
+
+def test_a_new_goal_preempts_the_current_one_and_the_later_ones_follow() -> None:
+    d = start(rooms(), FAR, Goal("last", Pose2(1.0, 1.0))).run(2.0)
+    d.stack.preempt(Goal("new", Pose2(3.0, 5.0)))
+    d.run(60)
+    assert [e.name for e in d.kinds("goal.canceled")] == ["far"]
+    assert [e.name for e in d.kinds("goal.reached")] == ["new", "last"]
+
+
+def test_a_task_that_has_ended_can_be_given_a_new_goal() -> None:
+    d = start(rooms(), Goal("a", Pose2(2.0, 1.0))).run(30)
+    d.stack.preempt(Goal("b", Pose2(1.0, 2.0)))
+    d.run(30)
+    assert [e.name for e in d.kinds("goal.reached")] == ["a", "b"]
+
+
+def test_replanning_at_a_rate_replans_at_that_rate() -> None:
+    d = start(rooms(), spec=StackSpec(localizer=TRUTH, planner=Planner(replanning="rate", replanning_rate=0.5))).run(60)
+    assert d.result == "SUCCEEDED"
+    assert reasons(d).count("rate") == pytest.approx(d.tick / 480, abs=2)
+
+
+def test_it_drives_without_a_map() -> None:
+    world = Flatland(discs=[(3.0, 0.1, 0.3), (5.0, -0.4, 0.4), (4.0, 1.0, 0.3)])
+    d = drive(world, Pose2(0, 0), Goal("g", Pose2(8.0, 0.0)), grid=None).run(60)
+    assert d.result == "SUCCEEDED"
+    assert d.least > 0.02
+
+
+def test_it_drives_without_a_map_to_a_goal_beyond_the_rolling_window() -> None:
+    spec = StackSpec(localizer=TRUTH, costmap=Costmap(rolling_size=6.0))
+    d = drive(Flatland(discs=[(3.0, 0.1, 0.3)]), Pose2(0, 0), Goal("g", Pose2(9.0, 0.0)), grid=None, spec=spec).run(60)
+    assert d.result == "SUCCEEDED"
+
+
+def test_a_long_robot_drives_through_a_gap_a_hand_wider_than_itself() -> None:
+    world = Flatland().room(6, 3)
+    world.boxes += [(3.0, 0.0, 3.1, 1.24), (3.0, 1.76, 3.1, 3.0)]
+    grid = world.grid((-0.5, -0.5, 6.5, 3.5))
+    d = drive(world, Pose2(1, 1), Goal("g", Pose2(5, 1)), grid=grid, robot=box_robot(speed=0.8)).run(40)
+    assert d.result == "SUCCEEDED"
+    assert d.least > 0.02
+
+
+def test_the_same_seed_gives_the_same_drive_and_another_seed_may_not() -> None:
+    one, other = (start(rooms(), seed=3).run(10) for _ in range(2))
+    assert one.track == other.track
+    assert one.log == other.log
+
+
+def test_commands_stay_within_the_robots_limits_and_ramp() -> None:
+    robot = round_robot(linear_acceleration=1.0, linear_deceleration=2.0)
+    d = start(rooms(), robot=robot).run(20)
+    steps = [b.vx - a.vx for a, b in zip(d.commands, d.commands[1:], strict=False)]
+    assert max(steps) <= 1.0 / 20 + 1e-9
+    assert all(abs(c.vx) <= 0.5 and abs(c.wz) <= 1.9 for c in d.commands)
+
+
+def test_no_goal_means_no_motion() -> None:
+    world = rooms()
+    d = drive(world, START, grid=world.grid(BOUNDS)).run(1.0)
+    assert set(d.commands) == {Twist()}
+    assert not d.log
