@@ -73,8 +73,7 @@ class RobotBody:
     """Everything needed to build a robot, in its base frame: on the ground under the middle of its axle.
 
     `hull` is what touches obstacles; `casters` glide on the ground without friction; wheels roll on it. `chassis` is
-    the mass of all but the wheels. `footprint` is anticlockwise; `radius` is set for a round robot. `urdf` describes
-    the robot to others (/robot_description).
+    the mass of all but the wheels. `footprint` is anticlockwise; `radius` is set for a round robot.
     """
 
     name: str
@@ -86,7 +85,13 @@ class RobotBody:
     radius: float | None
     drive: Drive
     limits: Limits
-    urdf: str = ""
+
+    @property
+    def urdf(self) -> str:
+        """The robot as URDF, for viewers."""
+        from simscen.sim.urdf.describe import describe
+
+        return describe(self)
 
     @property
     def mass(self) -> float:

@@ -61,7 +61,9 @@ def body_of_tree(spec: RobotSpec, tree: Tree) -> RobotBody:
     hull = tuple(replace(solid, pose=base_from_root.compose(solid.pose)) for solid in solids)
     scale = _scale(spec, tree)
     wheels = tuple(_wheel(tree, joint, base_from_root, scale, spec) for joint in joints)
-    return assemble(spec, _off_the_ground(tree, hull), wheels, _weighed(tree, fixed, base_from_root, scale))
+    if wheels:
+        hull = _off_the_ground(tree, hull)  # an omnidirectional base hovers, whatever its wheels are drawn as
+    return assemble(spec, hull, wheels, _weighed(tree, fixed, base_from_root, scale))
 
 
 def _check_wheels(spec: RobotSpec, tree: Tree, wheels: list[WheelJoint]) -> None:

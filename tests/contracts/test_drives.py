@@ -1,0 +1,84 @@
+"""Every drive against the promises of simscen.sim.drives.Drive."""
+
+import random
+from pathlib import Path
+
+import pytest
+import yaml
+
+from simscen.core.geometry import Pose2
+from simscen.core.motion import STOP, Twist
+from simscen.model.robot import RobotSpec
+from simscen.sim.robot_body import robot_body
+from simscen.sim.simulation import Simulation
+from simscen.worlds.meshing import fuse, triangulate
+
+ROBOTS = Path(__file__).parents[2] / "simscen/data/robots"
+NAMES = sorted(path.name.removesuffix(".robot.yaml") for path in ROBOTS.glob("*.robot.yaml"))
+FIRMWARE = 4  # ticks between two steps of a ramp
+
+
+@pytest.fixture(params=NAMES)
+def robot(request):
+    spec = RobotSpec.model_validate(yaml.safe_load((ROBOTS / f"{request.param}.robot.yaml").read_text()))
+    simulation = Simulation(fuse([]), [], robot_body(spec), Pose2(0.0, 0.0, 0.0), triangulate)
+    yield spec, simulation
+    simulation.close()
+
+
+def test_all_kinds_of_drive_ship():
+    drives = {yaml.safe_load((ROBOTS / f"{name}.robot.yaml").read_text())["drive"]["type"] for name in NAMES}
+    assert drives == {"differential", "skid_steer", "ackermann", "omnidirectional"}
+
+
+def test_given_any_command_then_neither_speeds_nor_accelerations_exceed_the_limits(robot):
+    spec, simulation = robot
+    limits, chance = spec.limits, random.Random(5)
+    lateral = limits.lateral or limits.linear if spec.drive.type == "omnidirectional" else 0.0
+    fastest = max(limits.linear_acceleration, limits.linear_deceleration or 0.0)
+    before = STOP
+    for _ in range(40):
+        simulation.drive(Twist(*(chance.uniform(-9, 9) for _ in range(3))))
+        simulation.step(24)
+        now = simulation.truth().twist
+        # Wheels that slip sideways let a base swing out a little further than was asked of it.
+        assert -(limits.reverse or limits.linear) * 1.05 <= now.vx <= limits.linear * 1.05
+        assert abs(now.wz) <= limits.angular * 1.3
+        if spec.drive.type == "omnidirectional":
+            assert abs(now.vy) <= lateral * 1.01
+        if spec.drive.type == "differential":
+            assert abs(now.vx - before.vx) <= fastest * (24 + FIRMWARE) / 240 * 1.1
+        before = now
+
+
+def test_given_no_obstacle_and_a_steady_command_then_the_base_drives_it(robot):
+    _, simulation = robot
+    simulation.drive(Twist(0.4, 0.0, 0.3))
+    simulation.step(720)
+    twist = simulation.truth().twist
+    assert twist.vx == pytest.approx(0.4, rel=0.03)
+    assert twist.wz == pytest.approx(0.3, rel=0.25)  # skid steering is only as good as its turning scale
+
+
+def test_given_that_the_robot_is_set_down_elsewhere_then_the_encoders_do_not_notice(robot):
+    _, simulation = robot
+    simulation.drive(Twist(0.3, 0.0, 0.0))
+    simulation.step(240)
+    simulation.drive(STOP)
+    simulation.step(240)
+    before = simulation.encoders()
+    simulation.place_robot(Pose2(5.0, 5.0, 2.0))
+    simulation.step(60)
+    assert simulation.encoders() == pytest.approx(before, abs=0.01)
+
+
+def test_given_the_same_commands_then_the_same_motion(robot):
+    spec, first = robot
+    second = Simulation(fuse([]), [], robot_body(spec), Pose2(0.0, 0.0, 0.0), triangulate)
+    for simulation in (first, second):
+        for k in range(20):
+            simulation.drive(Twist(0.4, 0.1, 0.1 * k - 1.0))
+            simulation.step(18)
+    assert first.truth() == second.truth()
+    assert first.encoders() == second.encoders()
+    second.close()

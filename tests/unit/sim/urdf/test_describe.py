@@ -1,0 +1,43 @@
+"""A body written as URDF and read again is the same body."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from playground import shipped
+
+from simscen.sim.outline import extremes
+from simscen.sim.robot_body import robot_body
+
+
+@pytest.mark.parametrize("name", ["turtlebot", "amr", "jackal"])
+def test_a_description_read_again_gives_the_same_robot(tmp_path, name):
+    spec = shipped(name)
+    body = robot_body(spec)
+    (tmp_path / "robot.urdf").write_text(body.urdf)
+    written = {"body": None, "mass": None, "urdf": "robot.urdf"}
+    again = robot_body(spec.model_copy(update=written), tmp_path / "x.robot.yaml", [tmp_path])
+    assert again.mass == pytest.approx(body.mass)
+    assert [(w.x, w.y, w.radius) for w in again.wheels] == [
+        pytest.approx((w.x, w.y, w.radius), abs=1e-6) for w in body.wheels
+    ]
+    assert again.chassis.centre == pytest.approx(body.chassis.centre, abs=1e-6)
+    assert again.footprint == pytest.approx(np.array(body.footprint), abs=1e-6)
+    for ours, theirs in zip(body.hull, again.hull, strict=False):
+        there = theirs.pose.apply(extremes(theirs.shape))
+        assert ours.pose.apply(extremes(ours.shape)) == pytest.approx(there, abs=1e-6)
+
+
+def test_an_omnidirectional_urdf_stands_on_its_lowest_point_and_goes_sideways(tmp_path, simulate):
+    spec = shipped("omni")
+    (tmp_path / "robot.urdf").write_text(robot_body(spec).urdf)
+    written = {"body": None, "mass": None, "urdf": "robot.urdf"}
+    body = robot_body(spec.model_copy(update=written), tmp_path / "x.robot.yaml", [tmp_path])
+    assert min((s.pose.apply(extremes(s.shape))[:, 2]).min() for s in body.hull) == pytest.approx(0.0)
+    simulation = simulate(body, drive=(0.0, 0.3, 0.0))
+    simulation.step(480)
+    assert simulation.truth().twist == pytest.approx((0.0, 0.3, 0.0), abs=1e-6)
