@@ -56,7 +56,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class Row:
-    """One line of the table. Rates are of all runs; seconds and path ratio are means over the successful ones.
+    """One line of the table. Rates are of all runs; seconds and path ratio are means over those that arrived.
 
     `path_ratio` is driven over shortest length. `success_interval` is the 95 % interval of the success rate.
     """
@@ -78,6 +78,7 @@ def tally(case: str, trials: Sequence[Trial]) -> Row:
     """Sum up the runs of a case. Raises ValueError without any."""
     fates = [trial.fate for trial in trials]
     good = [trial for trial in trials if trial.fate is Fate.SUCCESS]
+    arrived = [trial for trial in good if trial.metric("time_to_goal") is not None]
     return Row(
         case=case,
         runs=len(trials),
@@ -87,9 +88,9 @@ def tally(case: str, trials: Sequence[Trial]) -> Row:
         timeouts=_rate(fates, Fate.TIMEOUT),
         failed=_rate(fates, Fate.FAILED),
         errors=_rate(fates, Fate.ERROR),
-        seconds=mean([trial.metric("time_to_goal") for trial in good]),
+        seconds=mean([trial.metric("time_to_goal") for trial in arrived]),
         score=mean([trial.score for trial in trials]),
-        path_ratio=mean([trial.metric("path_ratio") for trial in good]),
+        path_ratio=mean([trial.metric("path_ratio") for trial in arrived]),
     )
 
 
