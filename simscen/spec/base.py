@@ -1,9 +1,9 @@
 """The base of everything a user writes in YAML."""
 
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Generic, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler, model_validator
+from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler, RootModel, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
@@ -31,6 +31,15 @@ class Spec(BaseModel):
             if name in docs:
                 schema["properties"][field.alias or name]["description"] = docs[name]
         return schema
+
+
+T = TypeVar("T")
+
+
+class Value(RootModel[T], Generic[T]):
+    """A bare value instead of a mapping, e.g. `time: 10 s`, as strict as a mapping is."""
+
+    model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False, defer_build=True)
 
 
 class Choice(Spec):

@@ -2,14 +2,13 @@
 
 import math
 
-from pydantic import RootModel
-
 from simscen.core.stage import Situation
+from simscen.spec.base import Value
 from simscen.spec.quantities import NonNegativeLength, PositiveSpeed
 from simscen.triggers.base import Condition
 
 
-class SpeedBelow(RootModel[PositiveSpeed], Condition):
+class SpeedBelow(Value[PositiveSpeed], Condition):
     """True while the robot truly drives slower than this.
 
     Example: `when: {speed_below: 0.05 m/s}`
@@ -20,7 +19,7 @@ class SpeedBelow(RootModel[PositiveSpeed], Condition):
         return math.hypot(now.twist.vx, now.twist.vy) < self.root
 
 
-class SpeedAbove(RootModel[PositiveSpeed], Condition):
+class SpeedAbove(Value[PositiveSpeed], Condition):
     """True while the robot truly drives faster than this.
 
     Example: `when: {speed_above: 0.4 m/s}`
@@ -31,7 +30,7 @@ class SpeedAbove(RootModel[PositiveSpeed], Condition):
         return math.hypot(now.twist.vx, now.twist.vy) > self.root
 
 
-class DistanceRemaining(RootModel[NonNegativeLength], Condition):
+class DistanceRemaining(Value[NonNegativeLength], Condition):
     """True while the robot is truly at most this far from its goal, as the crow flies.
 
     Example: `when: {distance_remaining: 2 m}`
@@ -42,7 +41,7 @@ class DistanceRemaining(RootModel[NonNegativeLength], Condition):
         return now.goal is not None and now.robot.distance(now.goal.pose) <= self.root
 
 
-class LocalizationError(RootModel[NonNegativeLength], Condition):
+class LocalizationError(Value[NonNegativeLength], Condition):
     """True while the robot believes itself further than this from where it is.
 
     Example: `when: {localization_error: 0.5 m}`

@@ -1,13 +1,12 @@
 """`time`: the clock has reached a moment."""
 
-from pydantic import RootModel
-
 from simscen.core.stage import Situation
+from simscen.spec.base import Value
 from simscen.spec.quantities import Duration
 from simscen.triggers.base import Condition
 
 
-class Time(RootModel[Duration], Condition):
+class Time(Value[Duration], Condition):
     """True from this simulated time on.
 
     Example: `when: {time: 10 s}`

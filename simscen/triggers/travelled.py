@@ -1,13 +1,12 @@
 """`travelled`: the robot has driven a distance."""
 
-from pydantic import RootModel
-
 from simscen.core.stage import Situation
+from simscen.spec.base import Value
 from simscen.spec.quantities import NonNegativeLength
 from simscen.triggers.base import Condition
 
 
-class Travelled(RootModel[NonNegativeLength], Condition):
+class Travelled(Value[NonNegativeLength], Condition):
     """True once the robot has truly driven this far since the start.
 
     Example: `when: {travelled: 2.5 m}`

@@ -97,3 +97,9 @@ def test_a_choice_without_a_key_lists_the_keys() -> None:
     problem = _problems(ScenarioSpec, SCENARIO.replace("[{goals_reached: {}}]", "[{severity: warn}]"))[0]
     assert (problem.line, problem.col, problem.message) == (4, 8, "nothing is chosen here")
     assert problem.hint.startswith("expected one of: goals_reached, ")
+
+
+def test_a_bare_value_is_as_strict_as_any_other() -> None:
+    for written in ("true", "'5'", ".nan", "-1 s", "3 m"):
+        text = SCENARIO + f"events: [{{when: {{time: {written}}}, do: {{cancel_goal: {{}}}}}}]\n"
+        assert [(line, col) for line, col, _ in _told(ScenarioSpec, text)] == [(5, 24)], written
