@@ -1,0 +1,66 @@
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from playground import shipped
+
+from simscen.core.errors import InvalidInput
+from simscen.sim.robot_body import robot_body
+from simscen.sim.urdf.infer import spec_of_urdf
+
+JACKAL = Path(__file__).parents[5] / "shared/data/jackal_urdf/jackal.urdf"
+
+
+@pytest.fixture
+def infer(tmp_path):
+    def infer(text):
+        (tmp_path / "robot.urdf").write_text(text)
+        return spec_of_urdf(tmp_path / "robot.urdf", [tmp_path])
+
+    return infer
+
+
+@pytest.mark.parametrize("name", ["turtlebot", "amr", "jackal"])
+def test_the_drive_of_a_shipped_robot_is_found_in_its_description(infer, name):
+    spec = shipped(name)
+    found = infer(robot_body(spec).urdf)
+    assert found.drive.type == spec.drive.type
+    assert found.drive.wheel_radius == pytest.approx(spec.drive.wheel_radius)
+    assert found.drive.wheel_separation == pytest.approx(spec.drive.wheel_separation)
+    assert sorted(found.sensors) == ["imu", "lidar", "odom"]
+
+
+def test_the_lidar_sits_on_its_link_or_on_top(infer):
+    text = robot_body(shipped("amr")).urdf
+    assert infer(text).sensors["lidar"].lidar.mount.z == pytest.approx(0.32 + 0.02)
+    link = (
+        '<link name="base_scan"/><joint name="s" type="fixed"><parent link="base_link"/><child link="base_scan"/>'
+        '<origin xyz="0.3 0.1 0.25" rpy="0 0 0.5"/></joint></robot>'
+    )
+    mount = infer(text.replace("</robot>", link)).sensors["lidar"].lidar.mount
+    assert (mount.x, mount.y, mount.z, mount.yaw) == pytest.approx((0.3, 0.1, 0.25, 0.5))
+
+
+def test_wheel_joints_that_know_their_speed_limit_the_robot(infer):
+    text = robot_body(shipped("amr")).urdf.replace(
+        '<axis xyz="0 1 0" />', '<axis xyz="0 1 0"/><limit effort="1" velocity="5"/>'
+    )
+    assert infer(text).limits.linear == pytest.approx(0.5)
+
+
+def test_a_robot_without_wheels_is_not_guessed(infer):
+    with pytest.raises(InvalidInput, match="cannot tell from its wheels"):
+        infer(robot_body(shipped("omni")).urdf)
+
+
+@pytest.mark.skipif(not JACKAL.exists(), reason="shared/data/jackal_urdf is not here")
+def test_the_jackal_is_skid_steered():
+    spec = spec_of_urdf(JACKAL)
+    assert spec.drive.type == "skid_steer"
+    assert spec.drive.wheel_separation == pytest.approx(0.37559)
+    assert spec.drive.wheel_base == pytest.approx(0.262)
+    assert spec.drive.turning_scale == pytest.approx(1.487, abs=0.001)
+    assert robot_body(spec, JACKAL).mass == pytest.approx(18.4, abs=0.1)
