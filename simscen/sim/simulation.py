@@ -93,7 +93,7 @@ class Simulation:
     def _careful_step(self) -> None:
         """A step in which something might touch something; scripted bodies need to be in place only here."""
         self._actors.begin(self.tick)
-        if not self._contacts.touching:
+        if self.tick >= self._no_contact_before and not self._contacts.touching:
             self._measure()
         before = Motion(self._base.pose().position, *self._base.velocity(), self._actors.velocities(self.tick))
         pybullet.stepSimulation(self._client)

@@ -37,8 +37,8 @@ def spec_of_urdf(path: Path, roots: Sequence[Path] = (), read_mesh: MeshReader |
     """The robot in a URDF file: drive from its wheels, and a lidar, odometry and IMU with our defaults.
 
     Two driven wheels make a differential drive, four or more a skid-steered one, steered wheels a car. Limits are
-    1 m/s, 1.5 rad/s, 1 m/s² and 2 rad/s², or less where its wheel joints say so. The lidar sits on the link that is called
-    laser, lidar or scan, or on top. Raises InvalidInput when the file is unusable or its drive is not plain.
+    1 m/s, 1.5 rad/s, 1 m/s² and 2 rad/s², or less where its wheel joints say so. The lidar sits on the link that is
+    called laser, lidar or scan, or on top. Raises InvalidInput when the file is unusable or its drive is not plain.
     """
     folders = Folders.of(roots or (path.resolve().parent,))
     tree = read_tree(path, folders, read_mesh)
