@@ -64,6 +64,7 @@ class Navigator:
         self._retried = False
         self._trouble_since: float | None = None
         self._checked, self._looked, self._most = -1, self._clock, 0
+        self._partial, self._origin = False, (0.0, 0.0)
 
     def pursue(self, goal: Goal) -> None:
         """Drive to this goal from the next step on."""
@@ -117,8 +118,12 @@ class Navigator:
         costmap = self._costmap
         if costmap.view.revision != self._checked:
             self._checked = costmap.view.revision
+            self._most = max(self._most, costmap.obstacle_cells)
             if self.plan.blocked(costmap.view):
                 self._adopt(tick, self._compute(tick, goal, pose), "blocked")
+                return
+            if self._origin != costmap.view.origin and self._partial:
+                self._adopt(tick, self._compute(tick, goal, pose), "window")
                 return
         if self._clock - self._looked >= BETTER_PERIOD and self._something_went(costmap.obstacle_cells):
             other = self._compute(tick, goal, pose)
@@ -134,9 +139,11 @@ class Navigator:
 
     def _compute(self, tick: int, goal: Goal, pose: Pose2) -> Path:
         self._plans += 1
-        path = self.planner.plan(self._costmap.view, pose, goal.pose, self._plan_seed(self._plans))
+        aim = self._costmap.clipped(pose, goal.pose)
+        self._partial, self._origin = aim is not goal.pose, self._costmap.view.origin
+        path = self.planner.plan(self._costmap.view, pose, aim, self._plan_seed(self._plans))
         x, y, yaw = path.points[-1].tolist()
-        if goal.pose.distance(Pose2(x, y, yaw)) > goal.xy_tolerance:
+        if not self._partial and goal.pose.distance(Pose2(x, y, yaw)) > goal.xy_tolerance:
             raise NavigationFailure(ErrorCode.GOAL_OCCUPIED, "the robot does not fit within the goal's tolerance")
         return replace(path, tick=tick)
 

@@ -72,7 +72,7 @@ class ReferenceStack:
         """Cancel the current goal and all after it."""
         self._task.cancel(self._tick)
         self._navigator.stop()
-        self._command = STOP
+        self._command, self._nothing = STOP, Decision(STOP)
 
     @property
     def plan(self) -> Path | None:

@@ -18,6 +18,8 @@ BESIDE_A_WALL = 2
 """Hits within one cell (squared distance 2) of a mapped wall are the wall itself: marking them would tell nothing."""
 LIDAR_OFFSET = 1.0
 """Metres: no lidar is mounted farther from its robot's base."""
+EDGE = 0.6
+"""Metres inside a rolling window's edge where a goal beyond it is aimed at."""
 
 
 class Costmap:
@@ -84,10 +86,31 @@ class Costmap:
             self.update(base, scan)
 
     def fits_static(self, pose: Pose2, tolerance: float) -> bool:
-        """Whether the robot's inscribed circle fits on the static map somewhere within `tolerance` of the pose."""
+        """Whether the pose is off the walls of the map and the robot's inscribed circle fits somewhere so near it."""
         row, column = self._frame.cells(np.array([[pose.x, pose.y]]))[0].tolist()
-        near = self._frame.window((row, column), (row, column), math.floor(tolerance / self._frame.resolution))
-        return bool((self._inflation.metres[self._static_squared[near]] > self._robot.inscribed_radius).any())
+        if self._static_squared[row, column] == 0:
+            return False
+        near = self._frame.window((row, column), (row, column), math.ceil(tolerance / self._frame.resolution))
+        fits = self._inflation.metres[self._static_squared[near]] > self._robot.inscribed_radius
+        points = self._frame.centres(np.argwhere(fits) + np.array((near[0].start, near[1].start)))
+        return bool((np.hypot(points[:, 0] - pose.x, points[:, 1] - pose.y) <= tolerance).any())
+
+    def clipped(self, start: Pose2, goal: Pose2) -> Pose2:
+        """The goal; or, when it is beyond a rolling window, the point of the straight way to it just inside."""
+        size = self._frame.shape[0] * self._frame.resolution
+        if not self._rolling or self._frame.covers(goal.x, goal.y):
+            return goal
+        part = 1.0
+        for along, low, here in (
+            (goal.x - start.x, self._frame.origin[0], start.x),
+            (goal.y - start.y, self._frame.origin[1], start.y),
+        ):
+            edge = low + size - EDGE if along > 0 else low + EDGE
+            if along != 0.0:
+                part = min(part, (edge - here) / along)
+        part = max(part, 0.0)
+        x, y = start.x + part * (goal.x - start.x), start.y + part * (goal.y - start.y)
+        return Pose2(x, y, math.atan2(goal.y - start.y, goal.x - start.x))
 
     def _layer(self, centre: Pose2) -> StaticLayer:
         grid = self._surroundings.map
