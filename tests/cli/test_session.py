@@ -1,0 +1,153 @@
+"""A session through the front door: killed, interrupted, without room or listeners, gone on with."""
+
+import json
+import os
+import signal
+import time
+from pathlib import Path
+
+import pytest
+from junitparser import JUnitXml
+
+PATIENCE = 60.0
+
+
+def outcomes(folder: Path) -> dict[str, str]:
+    """Scenario → how its run came out, or the kind of its error, as junit.xml and results.json agree on."""
+    told = {
+        run["scenario"]: run["error"]["kind"] if run["error"] else run["outcome"]
+        for run in json.loads((folder / "results.json").read_text())["runs"]
+    }
+    cases = [case for suite in JUnitXml.fromfile(str(folder / "junit.xml")) for case in suite]
+    assert len(cases) == len(told)
+    return told
+
+
+def wait_for(happened) -> None:
+    end = time.monotonic() + PATIENCE
+    while not happened():
+        assert time.monotonic() < end, "it did not happen"
+        time.sleep(0.02)
+
+
+def descendants(pid: int) -> set[int]:
+    """All processes below one, by their parents in /proc."""
+    parents: dict[int, int] = {}
+    for entry in os.scandir("/proc"):
+        if entry.name.isdigit():
+            try:
+                parents[int(entry.name)] = int(Path(entry.path, "stat").read_text().rsplit(")", 1)[1].split()[1])
+            except OSError:
+                continue
+    below: set[int] = set()
+    while more := {child for child, parent in parents.items() if parent in below | {pid}} - below:
+        below |= more
+    return below
+
+
+def gone(pids: set[int]) -> bool:
+    return all(not Path(f"/proc/{pid}").exists() or _is_zombie(pid) for pid in pids)
+
+
+def _is_zombie(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] == "Z"
+    except OSError:
+        return True
+
+
+def begun(folder: Path, *events: str) -> bool:
+    journal = folder / "out" / "events.jsonl"
+    told = journal.read_text() if journal.exists() else ""
+    return all(f'"event": "{event}"' in told for event in events)
+
+
+def under_way(folder: Path) -> bool:
+    return bool(list(folder.glob("out/*/*/run.partial.mcap")))
+
+
+@pytest.fixture
+def three(folder, scenario):
+    """One that passes at once, one that takes long, one that will not begin."""
+    for name, kind in (("a", "quick"), ("b", "long"), ("c", "long")):
+        scenario(name, kind)
+    return folder
+
+
+@pytest.fixture
+def two(folder, scenario):
+    """Two that pass at once."""
+    scenario("quick", "quick")
+    scenario("quick2", "quick")
+    return folder
+
+
+def test_a_killed_session_leaves_no_process_and_all_runs_in_its_reports_and_can_go_on(start, three, scenario):
+    run = start("run", ".", "--out", "out", "-j", "1")
+    wait_for(lambda: begun(three, "finished") and under_way(three))
+    below = descendants(run.pid)
+    assert below
+    again = start("run", "a.scenario.yaml", "--out", "out")
+    assert f"the output folder out is in use by pid {run.pid}" in again.communicate(timeout=PATIENCE)[1]
+    assert again.returncode == 2
+    run.kill()
+    run.communicate()
+    killed = time.monotonic()
+    wait_for(lambda: gone(below))
+    assert time.monotonic() - killed < 1.0
+    report = start("report", "out")
+    report.communicate(timeout=PATIENCE)
+    assert report.returncode == 3
+    assert outcomes(three / "out") == {"a": "passed", "b": "interrupted", "c": "not-run"}
+    first = (three / "out/a/seed-1/run.mcap").stat().st_mtime_ns
+    scenario("b", "quick")
+    scenario("c", "failing")
+    more = start("run", ".", "--resume", "out")
+    more.communicate(timeout=PATIENCE)
+    assert more.returncode == 1
+    assert outcomes(three / "out") == {"a": "passed", "b": "passed", "c": "failed"}
+    assert (three / "out/a/seed-1/run.mcap").stat().st_mtime_ns == first
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_an_interrupted_session_lists_all_and_leaves_no_process(start, three, number, code):
+    run = start("run", ".", "--out", "out", "-j", "1")
+    wait_for(lambda: begun(three, "finished") and under_way(three))
+    below = descendants(run.pid)
+    run.send_signal(number)
+    run.send_signal(number)  # the impatient press Ctrl-C twice
+    out, err = run.communicate(timeout=PATIENCE)
+    assert run.returncode == code, err
+    assert gone(below)
+    assert outcomes(three / "out") == {"a": "passed", "b": "interrupted", "c": "not-run"}
+    assert "interrupted" in out
+
+
+def test_a_changed_scenario_is_run_again(start, two, scenario):
+    start("run", ".", "--out", "out").communicate(timeout=PATIENCE)
+    assert outcomes(two / "out") == {"quick": "passed", "quick2": "passed"}
+    scenario("quick2", "failing")
+    more = start("run", ".", "--resume", "out")
+    out, _ = more.communicate(timeout=PATIENCE)
+    assert more.returncode == 1, out
+    assert outcomes(two / "out") == {"quick": "passed", "quick2": "failed"}
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_a_full_stdout_costs_the_exit_code_but_no_report(start, two):
+    with Path("/dev/full").open("w") as full:
+        run = start("run", "quick.scenario.yaml", "--out", "out", stdout=full)
+        err = run.communicate(timeout=PATIENCE)[1]
+    assert run.returncode == 3
+    assert "Traceback" not in err
+    assert outcomes(two / "out") == {"quick": "passed"}
+
+
+def test_a_closed_pipe_costs_nothing(start, two):
+    reading, writing = os.pipe()
+    os.close(reading)
+    run = start("run", "quick.scenario.yaml", "--out", "out", stdout=writing)
+    os.close(writing)
+    err = run.communicate(timeout=PATIENCE)[1]
+    assert (run.returncode, err) == (0, "")
+    assert outcomes(two / "out") == {"quick": "passed"}

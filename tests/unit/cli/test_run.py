@@ -1,0 +1,62 @@
+"""What `simscen run` refuses before it runs anything."""
+
+import hashlib
+from pathlib import Path
+
+import pytest
+
+
+def contents(folder: Path) -> list[tuple[str, str]]:
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    return [(str(path), hashlib.sha256(path.read_bytes()).hexdigest()) for path in files]
+
+
+def test_a_folder_that_is_not_empty_stays_untouched(simscen, tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out/mine.txt").write_text("keep me")
+    before = contents(tmp_path / "out")
+    ended = simscen("run", "good.scenario.yaml", "--out", "out")
+    assert (ended.code, ended.err) == (2, "simscen: the output folder out is not empty; nothing in it was touched\n")
+    assert contents(tmp_path / "out") == before
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (("--out", "good.scenario.yaml/out"), "cannot use the output folder"),
+        (("--junit", "good.scenario.yaml/junit.xml"), "cannot write good.scenario.yaml/junit.xml"),
+        (("--out", "a", "--resume", "b"), "--out and --resume exclude each other"),
+        (("--resume", "nowhere"), "nowhere: error[SC810] there is no events.jsonl in it"),
+        (("--shard", "3/2"), "cannot read --shard 3/2"),
+        (("--shard", "half"), "cannot read --shard half"),
+    ],
+)
+def test_what_cannot_be_is_told_before_anything_runs(simscen, tmp_path: Path, options, told) -> None:
+    ended = simscen("run", "good.scenario.yaml", *options)
+    assert ended.code == 2
+    assert told in ended.err
+    assert not list(tmp_path.rglob("*.mcap"))
+
+
+def test_an_empty_shard_is_nothing_selected(simscen) -> None:
+    ended = simscen("run", "good.scenario.yaml", "--shard", "2/2")
+    assert (ended.code, ended.err) == (5, "simscen: shard 2/2 of 1 scenarios is empty\n")
+
+
+SDF = """<sdf version='1.6'><world name='w'><model name='m'><static>1</static><link name='l'>
+<collision name='c'><geometry><box><size>1 1 1</size></box></geometry></collision></link></model>
+<include><uri>model://nowhere</uri></include></world></sdf>"""
+
+
+def test_what_of_sdf_cannot_be_used_is_an_error_or_with_lenient_a_warning(simscen, tmp_path: Path) -> None:
+    (tmp_path / "shop.sdf").write_text(SDF)
+    (tmp_path / "shop.scenario.yaml").write_text(
+        "simscen: 1\nworld: shop.sdf\nmap: none\nrobot: {pose: {x: 3, y: 3}}\npass: [{collisions: {max: 0}}]\n"
+    )
+    strict = simscen("validate", "shop.scenario.yaml")
+    assert strict.code == 2
+    assert "shop.sdf:3:10: error[SC310] world[w]/include/uri: model://nowhere: no such file or directory" in strict.out
+    for argument in ("shop.scenario.yaml", "shop.sdf"):
+        lenient = simscen("validate", argument, "--lenient")
+        assert lenient.code == 0
+        assert "shop.sdf: warning[SC311] world[w]/include/uri: skipped: model://nowhere" in lenient.out

@@ -1,0 +1,58 @@
+"""Which scenarios a command runs."""
+
+from pathlib import Path
+
+import pytest
+
+from simscen.cli.select import Selection, load_all, shard_of
+from simscen.core.errors import InvalidInput, UsageError
+
+TEXT = """\
+simscen: 1
+world: room.world.yaml
+robot: {pose: {x: 1, y: 1}}
+pass: [{collisions: {max: 0}}]
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "room.world.yaml").write_text(
+        "simscen: 1\nwalls: [{points: [[0, 0], [4, 0], [4, 4], [0, 4], [0, 0]]}]\n"
+    )
+    for name in "abcde":
+        (tmp_path / f"{name}.scenario.yaml").write_text(TEXT)
+    return tmp_path
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 5])
+def test_every_scenario_is_in_exactly_one_shard(folder: Path, count: int) -> None:
+    shares = [load_all([folder], folder, [], False, Selection(shard=(k + 1, count)))[0] for k in range(count)]
+    ids = [scenario.id for share in shares for scenario in share]
+    assert sorted(ids) == ["a", "b", "c", "d", "e"]
+    assert max(map(len, shares)) - min(map(len, shares)) <= 1
+
+
+@pytest.mark.parametrize("text", ["", "1", "0/2", "3/2", "1/0", "-1/2", "a/b", "1/2/3", "１/２x"])
+def test_other_shards_are_refused(text: str) -> None:
+    with pytest.raises(UsageError, match="expected i/n"):
+        shard_of(text)
+
+
+def test_one_bad_file_stops_all_even_if_it_was_not_asked_for(folder: Path) -> None:
+    (folder / "bad.scenario.yaml").write_text("simscen: 1\n")
+    with pytest.raises(InvalidInput, match=r"bad\.scenario\.yaml"):
+        load_all([folder], folder, [], False, Selection(keyword="a"))
+
+
+def test_what_a_world_notes_is_told_once_however_many_scenarios_are_in_it(folder: Path) -> None:
+    sdf = """<sdf version='1.6'><world name='w'><model name='m'><static>1</static><link name='l'><collision name='c'>
+    <geometry><box><size>1 1 1</size></box></geometry></collision></link></model></world><world name='x'/></sdf>"""
+    (folder / "two.sdf").write_text(sdf)
+    for name in "xy":
+        text = TEXT.replace("room.world.yaml", "two.sdf\nmap: none").replace("{x: 1, y: 1}", "{x: 3, y: 3}")
+        (folder / f"{name}.scenario.yaml").write_text(text)
+    _, warnings = load_all([folder], folder, [], False, Selection(keyword="x or y"))
+    assert [warning.severity for warning in warnings] == ["warning"]
+    assert "only the first world of a file is loaded" in warnings[0].message
+    assert load_all([folder], folder, [], False, Selection(keyword="a"))[1] == []

@@ -1,0 +1,141 @@
+"""The journal holds a session so that all its reports can be made again, wherever it was cut off."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from simscen.core.errors import InvalidInput, UsageError
+from simscen.core.session import Outcome, RunStarted, SessionFinished
+from simscen.report.journal import Journal, require_free
+from simscen.report.journaldata import NAME, Planned
+from simscen.report.junit import to_xml
+from simscen.report.rebuild import read_journal
+from simscen.report.results import to_json
+
+
+@pytest.fixture
+def runs(passed, failed, crashed):
+    return [passed, failed, crashed]
+
+
+def planned(runs):
+    return [Planned(run.key, run.path, run.line) for run in runs]
+
+
+def written(folder, runs, finished, ended=True):
+    journal = Journal(folder)
+    journal.plan(planned(runs), "0.1.0", 2)
+    for run in runs:
+        journal(RunStarted(run.key, run.path))
+    for run in finished:
+        journal(run)
+    if ended:
+        journal(SessionFinished(1, 1, 1, 1.0, 1.0))
+    journal.close()
+    assert journal.error is None
+
+
+def test_reports_made_from_the_journal_are_those_of_the_session(tmp_path, runs):
+    inside = [
+        replace(run, artifacts=replace(run.artifacts, **dict.fromkeys(("folder", "mcap", "picture", "result"), "")))
+        for run in runs
+    ]
+    written(tmp_path, inside, inside)
+    past = read_journal(tmp_path)
+    assert past.answers == inside
+    assert not past.interrupted
+    assert to_xml(past.answers) == to_xml(inside)
+    assert to_json(past.answers) == to_json(inside)
+
+
+def test_files_are_kept_relative_to_the_folder_so_that_it_can_be_moved(tmp_path, passed):
+    (tmp_path / "old").mkdir()
+    log = str(tmp_path / "old" / "a" / "run.mcap")
+    written(tmp_path / "old", [passed], [replace(passed, artifacts=replace(passed.artifacts, mcap=log))])
+    (tmp_path / "old").rename(tmp_path / "new")
+    assert read_journal(tmp_path / "new").answers[0].artifacts.mcap == str(tmp_path / "new" / "a" / "run.mcap")
+
+
+def test_what_was_planned_but_not_answered_is_an_error(tmp_path, runs):
+    journal = Journal(tmp_path)
+    journal.plan(planned(runs), "0.1.0", 2)
+    journal(runs[0])
+    journal(RunStarted(runs[1].key, runs[1].path))
+    journal.close()
+    past = read_journal(tmp_path)
+    assert past.interrupted
+    assert [run.outcome for run in past.answers] == [Outcome.PASSED, Outcome.ERROR, Outcome.ERROR]
+    assert [run.error.kind for run in past.answers[1:]] == ["interrupted", "not-run"]
+
+
+@pytest.mark.parametrize("lost", [1, 10, 200])
+def test_a_line_that_was_cut_short_never_was(tmp_path, runs, lost):
+    written(tmp_path, runs, runs, ended=False)
+    file = tmp_path / NAME
+    file.write_bytes(file.read_bytes()[:-lost])
+    assert [run.error.kind if run.error else "" for run in read_journal(tmp_path).answers][-1] == "interrupted"
+
+
+def test_the_next_session_goes_on_behind_the_last_whole_line(tmp_path, runs):
+    written(tmp_path, runs, runs, ended=False)
+    with (tmp_path / NAME).open("ab") as file:
+        file.write(b'{"event": "fini')
+    journal = Journal(tmp_path, goes_on=True)
+    journal.plan(planned(runs[:1]), "0.1.0", 1)
+    journal(runs[0])
+    journal.close()
+    assert all(json.loads(line) for line in (tmp_path / NAME).read_bytes().splitlines())
+    assert [run.key for run in read_journal(tmp_path).answers] == [runs[0].key]
+
+
+def test_a_folder_belongs_to_one_session_at_a_time(tmp_path, runs):
+    journal = Journal(tmp_path)
+    journal.plan(planned(runs), "0.1.0", 2)
+    with pytest.raises(UsageError, match=r"is in use by pid \d+"):
+        require_free(tmp_path)
+    with pytest.raises(UsageError, match="is in use by pid"):
+        Journal(tmp_path, goes_on=True)
+    journal.close()
+    require_free(tmp_path)
+    with pytest.raises(UsageError, match="holds a session already"):
+        Journal(tmp_path)
+
+
+def test_a_full_disk_costs_lines_but_never_half_a_line(tmp_path, runs, monkeypatch):
+    import errno
+    import os
+
+    journal = Journal(tmp_path)
+    journal.plan(planned(runs), "0.1.0", 2)
+    write = os.write
+
+    def full(file, data):
+        if len(data) < 20:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return write(file, data[:-10])
+
+    monkeypatch.setattr(os, "write", full)
+    journal(runs[0])
+    monkeypatch.setattr(os, "write", write)
+    assert journal.error is not None
+    journal(runs[1])
+    journal.close()
+    assert [run.outcome for run in read_journal(tmp_path).answers] == [Outcome.ERROR, Outcome.FAILED, Outcome.ERROR]
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        (None, "there is no events.jsonl in it"),
+        (b"", "ended before it had planned its runs"),
+        (b"junk\n", "the journal is damaged"),
+        (b'{"event": "planned", "format": 99, "runs": []}\n', "it has format 99"),
+        (b'{"event": "planned", "format": 1, "runs": [{}], "version": "", "workers": 1, "at": 0}\n', "damaged"),
+    ],
+)
+def test_other_files_are_no_journals(tmp_path, content, told):
+    if content is not None:
+        (tmp_path / NAME).write_bytes(content)
+    with pytest.raises(InvalidInput, match=told):
+        read_journal(tmp_path)
