@@ -46,7 +46,7 @@ class Amcl(Spec):
     pf_err: Annotated[float, Field(gt=0, lt=1)] = 0.05
     """KLD: greatest distance between the true and the sampled distribution."""
     pf_z: Annotated[float, Field(gt=0, lt=1)] = 0.99
-    """KLD: probability that the distance is kept."""
+    """KLD: upper quantile of the standard normal distribution, used as it is, as Nav2 does."""
     update_min_d: NonNegativeLength = 0.25
     update_min_a: Annotated[float, Field(ge=0, le=6.3)] = 0.2
     resample_interval: Annotated[int, Field(ge=1, le=100)] = 1

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.loading.anyfile import problems_of
+from simscen.loading.anyfile import kind_of, problems_of
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -35,8 +35,7 @@ def test_a_complete_example_is_valid(block, project):
     folder = "scenarios/theme" if "../../worlds" in block else "scenarios"
     file = project / folder / f"example.{kind}.yaml"
     file.write_text(block, encoding="utf-8")
-    found, problems = problems_of(file, project, ())
-    assert found == kind
+    problems = problems_of(kind_of(file, project), file, project, ())
     assert [f"{problem.place}: {problem.message}" for problem in problems] == []
 
 
