@@ -129,6 +129,6 @@ def _property(text: str) -> str:
 
 
 def _from_here(path: str, root: Path) -> str:
-    absolute = root / path
-    here = os.path.relpath(absolute)
-    return here if absolute.exists() and len(here) <= len(str(absolute)) else path
+    """Relative to the working folder, or absolute where that is shorter; what is not there stays as it was given."""
+    absolute = str(root.absolute() / path)
+    return min(os.path.relpath(absolute), absolute, key=len) if os.path.lexists(absolute) else path

@@ -29,7 +29,7 @@ class RosMapSpec(Spec):
     @field_validator("free_thresh")
     @classmethod
     def _below_occupied(cls, free: float, info: ValidationInfo) -> float:
-        """Otherwise map_server would call some greys both free and occupied, and the order of its tests would decide."""
+        """Otherwise some greys were both free and occupied, and the order of the tests would decide."""
         occupied = info.data.get("occupied_thresh", 1.0)
         if free >= occupied:
             raise ValueError(f"free_thresh {free:g} must be less than occupied_thresh {occupied:g}")

@@ -4,9 +4,13 @@ Needs no engine: worlds of simple shapes are checked with numpy alone.
 """
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from simscen.core.geometry import Pose2
+from simscen.core.grid import OccupancyGrid
 from simscen.core.problems import Problem
 from simscen.core.world import World
 from simscen.criteria.result import Result
@@ -14,7 +18,7 @@ from simscen.loading.loaded import LoadedScenario, LoadedWorld
 from simscen.model.scenario import ScenarioSpec
 from simscen.run.prepare import goals_of, pose_of
 from simscen.run.robotmodel import inscribed_radius
-from simscen.run.worldsource import load_robot, load_world
+from simscen.run.worldsource import load_map, load_robot, load_world
 from simscen.worlds.contain import blocking_solid
 
 NEAR_GROUND, ROBOT_HEIGHT = 0.02, 0.4
@@ -28,10 +32,11 @@ def check(loaded: LoadedScenario) -> list[Problem]:
     """
     world = load_world(loaded)
     radius = inscribed_radius(load_robot(loaded)[1])
+    ground = _ground(loaded, world)
     misplaced = [
         loaded.problem(keys, "SC301", f"{what} ({pose.x:g}, {pose.y:g}) is {where}", hint)
         for keys, what, pose, hint in _poses(loaded.spec, world)
-        if (where := _outside(loaded, world, pose) or _in_the_way(world, pose, radius))
+        if (where := ground.outside(pose) or _in_the_way(world, pose, radius))
     ]
     return [*misplaced, *notes_of(world, loaded.world, loaded.root)]
 
@@ -58,12 +63,32 @@ def expects_unreachable_goal(spec: ScenarioSpec) -> bool:
     )
 
 
-def _outside(loaded: LoadedScenario, world: World, pose: Pose2) -> str | None:
+def _ground(loaded: LoadedScenario, world: World) -> "_Ground":
+    """Where the robot can be: on the map that it gets, which for a world without one covers all that is in it."""
+    if loaded.map == "none":
+        return _Ground()
+    grid = world.grid if loaded.map is None else load_map(loaded.map)
+    return _Ground(world.bounds if grid is None else None, grid)
+
+
+@dataclass(frozen=True)
+class _Ground:
     """Without a map the ground goes on beyond the obstacles: BARN's goals lie there."""
-    left, bottom, right, top = world.bounds
-    if loaded.map == "none" or (left <= pose.x <= right and bottom <= pose.y <= top):
-        return None
-    return f"outside the world ({left:g} … {right:g}, {bottom:g} … {top:g})"
+
+    bounds: tuple[float, float, float, float] | None = None
+    grid: OccupancyGrid | None = None
+
+    def outside(self, pose: Pose2) -> str | None:
+        if self.grid is not None and not self.grid.inside(self.grid.cell_of(np.array([[pose.x, pose.y]])))[0]:
+            rows, columns = self.grid.shape
+            size = f"{columns * self.grid.resolution:g} m x {rows * self.grid.resolution:g} m"
+            return f"outside the map ({size} from ({self.grid.origin.x:g}, {self.grid.origin.y:g}))"
+        if self.bounds is None:
+            return None
+        left, bottom, right, top = self.bounds
+        if left <= pose.x <= right and bottom <= pose.y <= top:
+            return None
+        return f"outside the world ({left:g} … {right:g}, {bottom:g} … {top:g})"
 
 
 def _in_the_way(world: World, pose: Pose2, radius: float) -> str | None:

@@ -27,11 +27,8 @@ class Library:
         self.search = tuple(Path(os.path.realpath(folder)) for folder in search)
 
     def shown(self, path: Path) -> str:
-        """The name of a file for users: relative to the root or to its search folder."""
-        for folder in (self.root, *self.search):
-            if path.is_relative_to(folder):
-                return path.relative_to(folder).as_posix()
-        return str(path)
+        """The name of a file for users: relative to the root, elsewhere absolute."""
+        return path.relative_to(self.root).as_posix() if path.is_relative_to(self.root) else str(path)
 
     def open(self, path: Path, limit: int) -> tuple[Path, bytes]:
         """The real path and the bytes of a regular file of at most `limit` bytes; raises Trouble."""
