@@ -1,0 +1,115 @@
+"""One recorded run: its reports made anew, its picture drawn again."""
+
+import json
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from simscen.cli.main import main
+from simscen.report.journal import Journal
+
+SCENARIO = """\
+simscen: 1
+world: {simscen: 1, walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]}
+robot: {pose: {x: 1, y: 1}}
+goals: [{pose: {x: 5, y: 3}}]
+time_limit: 2 s
+pass: [{collisions: {max: 0}}, {goals_reached: {}}]
+"""
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The output folder of a run that failed."""
+    folder = tmp_path_factory.mktemp("recorded")
+    (folder / "short.scenario.yaml").write_text(SCENARIO)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        patch.setattr(sys, "argv", ["simscen", "run", "short.scenario.yaml", "--out", "out", "--repeat", "2"])
+        with pytest.raises(SystemExit) as end:
+            main()
+    assert end.value.code == 1
+    return folder / "out"
+
+
+@pytest.fixture
+def out(recorded: Path, tmp_path: Path) -> Path:
+    """A copy of it in the working folder."""
+    return Path(shutil.copytree(recorded, tmp_path / "out"))
+
+
+@pytest.mark.parametrize("name", ["results.json", "junit.xml"])
+def test_reports_come_back_byte_for_byte(simscen, out: Path, name: str) -> None:
+    before = (out / name).read_bytes()
+    (out / name).write_text("spoilt")
+    ended = simscen("report", "out")
+    assert (ended.code, ended.err) == (1, "")
+    assert (out / name).read_bytes() == before
+    assert "2 failed" in ended.out
+
+
+def test_reports_come_in_other_forms_and_places(simscen, out: Path) -> None:
+    ended = simscen("report", "out", "--format", "json", "--junit", "ci/junit.xml", "--junit-family", "xunit2")
+    assert json.loads(ended.out) == json.loads((out / "results.json").read_text())
+    assert b'line="' not in (out.parent / "ci/junit.xml").read_bytes()
+
+
+def test_a_session_under_way_is_left_alone(simscen, out: Path) -> None:
+    journal = Journal(out, goes_on=True)
+    ended = simscen("report", "out")
+    journal.close()
+    assert ended.code == 2
+    assert "is in use" in ended.err
+
+
+def test_other_folders_hold_nothing_to_report(simscen, tmp_path: Path) -> None:
+    ended = simscen("report", ".")
+    assert ended.code == 2
+    assert "there is no events.jsonl in it" in ended.err
+
+
+def test_a_run_is_drawn_from_its_log_alone(simscen, out: Path, tmp_path: Path) -> None:
+    log = out / "short/seed-1/run.mcap"
+    shutil.move(log, tmp_path / "alone.mcap")
+    shutil.rmtree(out)
+    ended = simscen("plot", "alone.mcap", "--out", "alone.png")
+    assert ended == (0, "alone.png\n", "")
+    with Image.open(tmp_path / "alone.png") as picture:
+        assert picture.format == "PNG"
+        assert picture.width > 600
+
+
+def test_the_picture_is_that_of_the_run(simscen, out: Path) -> None:
+    """This world has no places and no objects, which a log would not hold."""
+    before = (out / "short/seed-1/map.png").read_bytes()
+    (out / "short/seed-1/map.png").unlink()
+    assert simscen("plot", "out/short/seed-1").code == 0
+    assert (out / "short/seed-1/map.png").read_bytes() == before
+
+
+def test_a_log_that_broke_off_is_drawn_as_far_as_it_goes(simscen, out: Path) -> None:
+    folder = out / "short/seed-1"
+    data = (folder / "run.mcap").read_bytes()
+    (folder / "run.mcap").unlink()
+    (folder / "map.png").unlink()
+    (folder / "run.partial.mcap").write_bytes(data[: len(data) * 3 // 4])
+    assert simscen("plot", "out/short/seed-1").code == 0
+    assert (folder / "map.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("nowhere",), "nowhere: error[SC800] cannot read the log: No such file or directory"),
+        (("out",), "out: error[SC800] there is no run.mcap in it"),
+        (("good.scenario.yaml",), "error[SC801] not a log of simscen"),
+        (("out/short/seed-1", "--out", "good.scenario.yaml/x.png"), "cannot write good.scenario.yaml/x.png"),
+    ],
+)
+def test_what_cannot_be_drawn_is_told(simscen, out: Path, arguments, told) -> None:
+    ended = simscen("plot", *arguments)
+    assert ended.code == 2
+    assert told in ended.err

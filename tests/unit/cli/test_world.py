@@ -1,0 +1,121 @@
+"""Worlds inspected, exported and converted from the command line."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from simscen.core.grid import FREE, OCCUPIED
+from simscen.loading.worldfile import load_world_file
+from simscen.worlds.rosmap import load_grid
+
+ROOM = """\
+simscen: 1
+walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]
+obstacles: [{name: crate, box: [1, 1, 1], pose: {x: 3, y: 2}}]
+objects: [{name: cart, cylinder: [0.3, 1], mass: 5, pose: {x: 1, y: 1}}]
+places: {dock: {x: 5, y: 3}}
+regions: {bay: [[0, 0], [1, 0], [1, 1]]}
+"""
+SDF = """<sdf version='1.6'><world name='shop'><model name='m'><static>1</static><link name='l'>
+<collision name='c'><geometry><sphere><radius>1</radius></sphere></geometry></collision></link></model>{more}
+</world></sdf>"""
+
+
+@pytest.fixture
+def room(tmp_path: Path) -> Path:
+    (tmp_path / "room.world.yaml").write_text(ROOM)
+    return tmp_path
+
+
+def test_inspect_tells_what_there_is(simscen, room: Path) -> None:
+    ended = simscen("world", "inspect", "room.world.yaml")
+    assert ended.code == 0
+    assert "  bounds    x -0.05 … 6.05 m, y -0.05 … 4.05 m (6.10 x 4.10 m)\n" in ended.out
+    assert "  static    5 solids: 4 extrusion, 1 box\n  moving    1 object\n" in ended.out
+    assert "    crate   box            12 triangles  x 2.50 … 3.50  y 1.50 … 2.50  z 0.00 … 1.00\n" in ended.out
+    assert "z 0.00 … 1.00  5 kg\n" in ended.out
+    assert ended.out.endswith("  places    dock\n  regions   bay\n")
+
+
+def test_inspect_draws_the_cut_with_the_map_over_it(simscen, room: Path) -> None:
+    assert simscen("world", "inspect", "room.world.yaml", "--png", "new/room.png").code == 0
+    with Image.open(room / "new/room.png") as picture:
+        assert max(picture.size) == 1200
+        assert len(picture.getcolors(1 << 20)) > 3
+
+
+def test_machines_get_json(simscen, room: Path) -> None:
+    told = json.loads(simscen("world", "inspect", "room.world.yaml", "--json").out)
+    assert [body["name"] for body in told["bodies"]] == ["cart"]
+    assert told["map_resolution"] == 0.05
+
+
+def test_long_lists_are_cut_unless_everything_is_wanted(simscen, room: Path) -> None:
+    posts = ", ".join(f"{{name: post, box: [0.1, 0.1, 1], pose: {{x: {x}, y: 0}}}}" for x in range(30))
+    (room / "many.world.yaml").write_text(f"simscen: 1\nobstacles: [{posts}]\n")
+    assert "… and 10 more (--all lists them)" in simscen("world", "inspect", "many.world.yaml").out
+    assert simscen("world", "inspect", "many.world.yaml", "--all").out.count("post") == 30
+
+
+def test_what_the_importer_notes_is_told(simscen, room: Path) -> None:
+    (room / "shop.sdf").write_text(SDF.format(more="<include><uri>model://nowhere</uri></include>"))
+    strict = simscen("world", "inspect", "shop.sdf")
+    assert strict.code == 2
+    assert "shop.sdf:2:113: error[SC310]" in strict.err
+    lenient = simscen("world", "inspect", "shop.sdf", "--lenient")
+    assert lenient.code == 0
+    assert "shop.sdf: warning[SC311] world[shop]/include/uri: skipped: model://nowhere" in lenient.out
+
+
+def test_an_exported_map_reads_back_as_what_a_lidar_would_have_mapped(simscen, room: Path) -> None:
+    ended = simscen("world", "export", "room.world.yaml", "--map", "maps/room.yaml")
+    assert (ended.code, ended.out) == (0, "maps/room.yaml: 162 x 122 cells of 0.05 m\n")
+    loaded = load_world_file(room / "maps/room.yaml", room).map
+    assert loaded is not None
+    grid, _ = load_grid(loaded.spec, loaded.image)
+    points = np.array([[3.0, 2.0], [5.0, 1.0], [6.0, 2.0], [1.0, 1.0]])
+    assert grid.values_at(points).tolist() == [OCCUPIED, FREE, OCCUPIED, FREE]
+
+
+def test_a_converted_world_says_what_has_changed(simscen, room: Path) -> None:
+    (room / "shop.sdf").write_text(SDF.format(more=""))
+    ended = simscen("world", "convert", "shop.sdf", "shop.world.yaml")
+    assert (ended.code, ended.out) == (
+        0,
+        "changed: m::l::c: a sphere; it became an upright prism over its cut at 0.2 m\n"
+        "shop.world.yaml: 1 walls, obstacles, objects and doors; 1 changed\n",
+    )
+    assert simscen("validate", "shop.world.yaml").code == 0
+
+
+def test_a_world_of_our_own_stays_as_it_is_but_for_its_comments(simscen, room: Path) -> None:
+    assert simscen("world", "convert", "room.world.yaml", "sub/copy.world.yaml").code == 0
+    before, after = (load_world_file(room / name, room).spec for name in ("room.world.yaml", "sub/copy.world.yaml"))
+    assert after == before
+
+
+def test_a_ros_map_stays_a_file_of_its_own(simscen, room: Path) -> None:
+    simscen("world", "export", "room.world.yaml", "--map", "maps/room.yaml")
+    assert simscen("world", "convert", "maps/room.yaml", "worlds/from_map.world.yaml").code == 0
+    converted = load_world_file(room / "worlds/from_map.world.yaml", room)
+    assert converted.map is not None
+    assert converted.map.path == room / "maps/room.yaml"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("inspect", "nowhere.world.yaml"), "no such file or directory"),
+        (("inspect", "."), "not a regular file"),
+        (("inspect", "room.world.yaml", "--png", "room.world.yaml/x.png"), "cannot write room.world.yaml/x.png"),
+        (("export", "room.world.yaml", "--map", "room.world.yaml/x.yaml"), "cannot write room.world.yaml/x.yaml"),
+        (("convert", "room.world.yaml", "room.world.yaml/x"), "cannot write room.world.yaml/x"),
+    ],
+)
+def test_what_cannot_be_done_is_told(simscen, room: Path, arguments, told) -> None:
+    ended = simscen("world", *arguments)
+    assert ended.code == 2
+    assert told in ended.err
