@@ -6,8 +6,9 @@ import pybullet
 
 from simscen.core.motion import Twist
 from simscen.model.robot import Ackermann
+from simscen.sim.inertia import GRAVITY
 from simscen.sim.ramp import Ramp
-from simscen.sim.robot_body import GRAVITY, RobotBody
+from simscen.sim.robot_body import RobotBody
 from simscen.sim.vehicle import Vehicle
 from simscen.sim.wheels import driven, hold, mean_angle
 

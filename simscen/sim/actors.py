@@ -8,10 +8,9 @@ import pybullet
 from simscen.core.geometry import Pose3, wrap
 from simscen.core.shapes import Body, MotionPath
 from simscen.sim import engine
-from simscen.sim.inertia import of_solids
+from simscen.sim.inertia import GRAVITY, of_solids
 from simscen.sim.motion_path import pose_at, top_speed
 from simscen.sim.outline import footprint
-from simscen.sim.robot_body import GRAVITY
 
 FRICTION = 0.6
 """Of pushable things on the ground: about that of wood or cardboard on concrete."""

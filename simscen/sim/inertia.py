@@ -10,6 +10,8 @@ from simscen.core.geometry import Array, Pose3
 from simscen.core.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Shape, Solid, Sphere
 
 Vector = tuple[float, float, float]
+GRAVITY = 9.81
+"""m/s² down."""
 
 
 @dataclass(frozen=True, eq=False)

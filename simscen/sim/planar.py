@@ -7,8 +7,9 @@ import pybullet
 from simscen.core.geometry import Pose2, Pose3, wrap
 from simscen.core.motion import STOP, Twist
 from simscen.sim import engine
+from simscen.sim.inertia import GRAVITY
 from simscen.sim.ramp import Ramp
-from simscen.sim.robot_body import GRAVITY, RobotBody
+from simscen.sim.robot_body import RobotBody
 
 Vector = tuple[float, float, float]
 GRIP = 0.7

@@ -7,7 +7,8 @@ import pybullet
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.motion import Twist
 from simscen.sim import engine
-from simscen.sim.robot_body import RobotBody, Wheel
+from simscen.sim.robot_body import RobotBody
+from simscen.sim.undercarriage import Wheel
 
 Vector = tuple[float, float, float]
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)

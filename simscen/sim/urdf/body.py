@@ -13,15 +13,14 @@ from simscen.core.shapes import Solid
 from simscen.model.robot import Omnidirectional, RobotSpec
 from simscen.sim.inertia import MassProperties, combined
 from simscen.sim.outline import extremes
-from simscen.sim.robot_body import RobotBody, Wheel, assemble, wheel_inertia
+from simscen.sim.robot_body import GROUND_CLEARANCE, RobotBody, assemble
+from simscen.sim.undercarriage import Wheel, wheel_inertia
 from simscen.sim.urdf.elements import Meshes, MeshReader
 from simscen.sim.urdf.files import Folders, Trouble, read_urdf
 from simscen.sim.urdf.markup import CODE, parse
 from simscen.sim.urdf.tree import Tree, tree_of
 from simscen.sim.urdf.wheels import WheelJoint, chosen
 
-GROUND = 0.005
-"""m above the ground: whatever reaches lower is a caster, which the body has of its own."""
 CASTER = 0.35
 """A caster is smaller than this fraction of the hull's length and width."""
 
@@ -130,10 +129,10 @@ def _off_the_ground(tree: Tree, hull: tuple[Solid, ...]) -> tuple[Solid, ...]:
     whole = np.ptp(np.concatenate(points)[:, :2], axis=0)
     kept = []
     for solid, corners in zip(hull, points, strict=True):
-        if corners[:, 2].min() >= GROUND:
+        if corners[:, 2].min() >= GROUND_CLEARANCE:
             kept.append(solid)
         elif (np.ptp(corners[:, :2], axis=0) > CASTER * whole).any():
-            depth = GROUND - corners[:, 2].min()
+            depth = GROUND_CLEARANCE - corners[:, 2].min()
             message = f"link {solid.name!r} reaches {depth:.3f} m too low: it would drag over the ground"
             hint = "its wheels' collision shapes must reach lower than everything else"
             raise InvalidInput([tree.links[solid.name].element.problem(message, hint)])

@@ -6,7 +6,8 @@ from xml.etree import ElementTree as ET
 from simscen.core.geometry import Pose3
 from simscen.core.shapes import Box, Capsule, Cylinder, Solid, Sphere
 from simscen.sim.outline import extremes
-from simscen.sim.robot_body import RobotBody, Wheel
+from simscen.sim.robot_body import RobotBody
+from simscen.sim.undercarriage import Wheel
 
 BASE = "base_link"
 

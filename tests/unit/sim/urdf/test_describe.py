@@ -1,13 +1,7 @@
 """A body written as URDF and read again is the same body."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
-
 from playground import shipped
 
 from simscen.sim.outline import extremes
