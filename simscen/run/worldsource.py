@@ -48,9 +48,13 @@ def _map_and_notes(source: LoadedMap) -> tuple[OccupancyGrid, tuple[str, ...]]:
 
 
 def _read_mesh(path: Path) -> Mesh:
+    """For a URDF, which tells what is wrong with a mesh at the line that names it."""
     from simscen.worlds.sdf.meshes import read_mesh
 
-    return read_mesh(path)
+    try:
+        return read_mesh(path)
+    except InvalidInput as error:
+        raise ValueError("; ".join(problem.message for problem in error.problems)) from error
 
 
 def load_robot(loaded: LoadedScenario) -> tuple[RobotSpec, RobotBody]:

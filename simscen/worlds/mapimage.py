@@ -108,7 +108,7 @@ def _ascii(raster: bytes) -> npt.NDArray[np.generic]:
 
 
 def _compressed(data: bytes) -> MapImage:
-    from PIL import Image
+    from PIL import Image, UnidentifiedImageError
 
     if data[:8] == b"\x89PNG\r\n\x1a\n" and len(data) >= 24:
         kind, (width, height) = "PNG", struct.unpack(">II", data[16:24])
@@ -123,6 +123,8 @@ def _compressed(data: bytes) -> MapImage:
             image = Image.open(io.BytesIO(data), formats=[kind])
             _check_size(*image.size)
             image.load()
+    except UnidentifiedImageError:  # its message holds the address of an object
+        raise BadImage(f"the {kind} cannot be decoded") from None
     except (OSError, SyntaxError, ValueError, EOFError, Image.DecompressionBombError) as error:
         raise BadImage(f"the {kind} cannot be decoded: {error}") from None
     return _grey_and_alpha(image)
