@@ -20,6 +20,6 @@ goals:
   - {{name: goal, pose: {{x: 0.0, y: 2.0, yaw: 0}}}}
 time_limit: 120 s
 pass:
-  - goals_reached: {{tolerance: 0.25 m}}
+  - goals_reached: {{tolerance: 0.25 m, yaw_tolerance: 20 deg}}
   - collisions: {{max: 0}}
 """
