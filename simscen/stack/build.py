@@ -20,7 +20,7 @@ from simscen.stack.footprint import Footprint
 from simscen.stack.goal_checker import GoalChecker
 from simscen.stack.localizers.build import build_localizer
 from simscen.stack.navigator import Navigator
-from simscen.stack.planners.ompl_planner import OmplPlanner
+from simscen.stack.planners.build import build_planner
 from simscen.stack.progress_checker import ProgressChecker
 from simscen.stack.protocols import Behavior, Controller, RobotModel, Stack, Surroundings
 from simscen.stack.recovery import RoundRobin
@@ -52,7 +52,7 @@ def build_stack(
     localizer = build_localizer(spec.localizer, surroundings, Estimate(None), streams.generator("localizer"))
     navigator = Navigator(
         spec.planner,
-        OmplPlanner(spec.planner, robot),
+        build_planner(spec.planner, robot, footprint),
         controller,
         RoundRobin(_behaviors(spec.recovery, robot, footprint, costmap), spec.recovery.number_of_retries),
         GoalChecker(spec.goal_checker.stateful),

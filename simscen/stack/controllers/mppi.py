@@ -89,8 +89,9 @@ class MppiController:
     def _improve(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> None:
         assert self._track is not None
         self._advance()
-        vx, wz = self._limited(self._vx + self._noise_vx, self._wz + self._noise_wz)
-        rolled = self._roll(pose, twist, vx, wz)
+        # The rollouts obey the limits but the average is over what was asked: else it would shy away from the limits.
+        vx, wz = self._vx + self._noise_vx, self._wz + self._noise_wz
+        rolled = self._roll(pose, twist, *self._limited(vx, wz))
         cost, hit = score(rolled, self._track, pose, costmap, goal, self._footprint, self._fastest)
         if hit.all():
             self._forget()

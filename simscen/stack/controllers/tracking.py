@@ -11,13 +11,26 @@ SEARCH_AHEAD = 1.5
 """Metres of path beyond the last place that are searched for the nearest point, so that a path may cross itself."""
 
 
+AT_CUSP = 0.1
+"""Metres before a change of direction at which it counts as reached."""
+
+
 class PathTracker:
-    """Follows the robot's progress along a path; the place only ever moves forward."""
+    """Follows the robot's progress along a path; the place only ever moves forward.
+
+    A path may change between forward and backward (Reeds-Shepp). It is followed piece by piece: nothing beyond the
+    next such cusp is looked at until the robot is there.
+    """
 
     def __init__(self, path: Path) -> None:
         self.points = np.ascontiguousarray(path.points)
-        steps = np.hypot(*np.diff(self.points[:, :2], axis=0).T) if len(self.points) > 1 else np.zeros(0)
-        self.along = np.concatenate(([0.0], np.cumsum(steps)))
+        steps = np.diff(self.points[:, :2], axis=0)
+        lengths = np.hypot(steps[:, 0], steps[:, 1])
+        self.along = np.concatenate(([0.0], np.cumsum(lengths)))
+        ahead = steps[:, 0] * np.cos(self.points[:-1, 2]) + steps[:, 1] * np.sin(self.points[:-1, 2]) >= -1e-9
+        changes = np.flatnonzero(ahead[1:] != ahead[:-1]) + 1 if len(ahead) else np.zeros(0, dtype=np.int64)
+        self._ends: list[int] = [*changes.tolist(), len(self.points) - 1]
+        self._forward: list[bool] = [bool(ahead[max(0, end - 1)]) if len(ahead) else True for end in self._ends]
         self.index = 0
 
     @property
@@ -25,10 +38,21 @@ class PathTracker:
         """Length of the path in metres."""
         return float(self.along[-1])
 
+    @property
+    def forward(self) -> bool:
+        """Whether the piece being followed is driven forward."""
+        return self._forward[0]
+
     def locate(self, pose: Pose2) -> None:
-        """Move to the point of the path nearest to the robot."""
-        end = int(np.searchsorted(self.along, self.along[self.index] + SEARCH_AHEAD, side="right"))
-        ahead = self.points[self.index : end]
+        """Move to the point of this piece nearest to the robot, and on to the next piece at its end."""
+        self._nearest(pose)
+        while len(self._ends) > 1 and self.to_cusp() <= AT_CUSP:
+            self.index = self._ends.pop(0)
+            self._forward.pop(0)
+            self._nearest(pose)
+
+    def _nearest(self, pose: Pose2) -> None:
+        ahead = self.points[self.index : self._stop(SEARCH_AHEAD)]
         square = (ahead[:, 0] - pose.x) ** 2 + (ahead[:, 1] - pose.y) ** 2
         self.index += int(square.argmin())
 
@@ -36,13 +60,16 @@ class PathTracker:
         """Metres of path from the nearest point to the end."""
         return float(self.along[-1] - self.along[self.index])
 
+    def to_cusp(self) -> float:
+        """Metres of path to the end of this piece."""
+        return float(self.along[self._ends[0]] - self.along[self.index])
+
     def carrot(self, pose: Pose2, distance: float) -> tuple[float, float]:
-        """Where the path leaves the circle of `distance` around the robot; its end if it does not leave.
+        """Where the piece leaves the circle of `distance` around the robot; its end if it does not leave.
 
         Interpolated between points, so that the carrot glides (RPP's circleSegmentIntersection).
         """
-        end = int(np.searchsorted(self.along, self.along[self.index] + 2 * distance + 0.5, side="right"))
-        ahead = self.points[self.index : end]
+        ahead = self.points[self.index : self._stop(2 * distance + 0.5)]
         outside = np.hypot(ahead[:, 0] - pose.x, ahead[:, 1] - pose.y) >= distance
         first = int(outside.argmax())
         if not outside[first]:
@@ -53,6 +80,11 @@ class PathTracker:
             return x, y
         ax, ay, _ = ahead[first - 1].tolist()
         return _leaving(ax - pose.x, ay - pose.y, x - pose.x, y - pose.y, distance, pose)
+
+    def _stop(self, metres: float) -> int:
+        """One past the last point so far ahead, or of this piece."""
+        end = int(np.searchsorted(self.along, self.along[self.index] + metres, side="right"))
+        return min(end, self._ends[0] + 1)
 
 
 def _leaving(ax: float, ay: float, bx: float, by: float, radius: float, centre: Pose2) -> tuple[float, float]:

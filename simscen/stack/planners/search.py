@@ -70,7 +70,7 @@ def search(
         planner.setRange(RANGE)
     planner.setProblemDefinition(problem)
     planner.setup()
-    planner.solve(ob.PlannerTerminationCondition(_after(iterations)))
+    planner.solve(ob.PlannerTerminationCondition(after(iterations)))
     if not problem.hasExactSolution():
         return None
     return [(state[0], state[1]) for state in problem.getSolutionPath().getStates()]
@@ -82,7 +82,8 @@ def _state(information: Any, point: Point) -> Any:
     return state
 
 
-def _after(iterations: int) -> Callable[[], bool]:
+def after(iterations: int) -> Callable[[], bool]:
+    """A termination condition that is asked once an iteration and says stop after so many."""
     left = iterations
 
     def over() -> bool:

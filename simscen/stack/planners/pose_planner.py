@@ -1,0 +1,85 @@
+"""Plans poses rather than points: Dubins and Reeds-Shepp paths for cars, SE(2) for long hulls."""
+
+import math
+
+import numpy as np
+
+from simscen.core.geometry import Pose2
+from simscen.core.navigation import ErrorCode, Path
+from simscen.model.stack import Planner as PlannerSpec
+from simscen.stack.footprint import Footprint
+from simscen.stack.planners.ends import find_ends
+from simscen.stack.planners.field import Field
+from simscen.stack.planners.informed_set import InformedSet
+from simscen.stack.planners.pose_search import Space, Valid, search_poses
+from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
+
+TIGHTEST = 0.2
+"""Metres: the arcs of a long robot that could turn in place, but should not have to."""
+ROOM = 0.05
+"""Metres beyond the hull that are kept in all attempts but the last."""
+ATTEMPTS = ((0.15, ROOM, 0.1), (0.15, ROOM, 0.1), (0.3, ROOM, 0.1), (0.3, 0.0, 0.2), (2.0, 0.0, 0.5))
+"""Slack of the informed set, room, share of the iterations. Cars need wider sets than discs: they swing out."""
+
+
+class PosePlanner:
+    """Checks the whole hull at each pose, as a row of discs."""
+
+    def __init__(self, spec: PlannerSpec, robot: RobotModel, footprint: Footprint, space: Space) -> None:
+        self._spec, self._inscribed, self._footprint, self._space = spec, robot.inscribed_radius, footprint, space
+        self._turning_radius = max(robot.turning_radius, TIGHTEST)
+
+    def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
+        """A path of poses in the map frame, 5 cm apart; the shortest of a few searches."""
+        field = Field(costmap)
+        ends = find_ends(field, start, goal, self._inscribed, self._spec.tolerance)
+        self._hull_fits(costmap, start, ErrorCode.START_OCCUPIED, "start")
+        goal = Pose2(*ends.goal, goal.yaw)
+        self._hull_fits(costmap, goal, ErrorCode.GOAL_OCCUPIED, "goal")
+        informed = InformedSet(field, ends.start, ends.goal, self._inscribed)
+        best: list[Pose2] | None = None
+        for number, (slack, room, share) in enumerate(ATTEMPTS):
+            if best is not None and number >= 2:
+                break
+            informed.narrow(slack)
+            poses = search_poses(
+                self._spec.type,
+                self._space,
+                self._turning_radius,
+                informed.bounds(),
+                start,
+                goal,
+                self._valid(field, informed, room, (start, goal)),
+                seed + number,
+                max(1, round(share * self._spec.max_iterations)),
+            )
+            if poses is not None and (best is None or len(poses) < len(best)):
+                best = poses
+        if best is None:
+            message = f"{self._spec.type}: no path in {self._spec.max_iterations} iterations"
+            raise NavigationFailure(ErrorCode.NO_VALID_PATH, message)
+        return Path(np.array(best))
+
+    def _hull_fits(self, costmap: CostmapView, pose: Pose2, code: ErrorCode, what: str) -> None:
+        if not self._footprint.free(costmap, np.array([pose]))[0]:
+            raise NavigationFailure(code, f"the robot does not fit at the {what} ({pose.x:.2f}, {pose.y:.2f})")
+
+    def _valid(self, field: Field, informed: InformedSet, room: float, ends: tuple[Pose2, Pose2]) -> Valid:
+        """Whether a pose is in the informed set and clear of obstacles; near the ends without the extra room."""
+        offsets = self._footprint.discs.offsets.tolist()
+        tight, roomy = self._footprint.discs.radius, self._footprint.discs.radius + room
+        inner = self._inscribed
+        at, has, free, costmap = field.at, informed.has, self._footprint.free, field.costmap
+
+        def valid(x: float, y: float, yaw: float) -> bool:
+            if not has(x, y) or at(x, y) <= inner:
+                return False
+            cosine, sine = math.cos(yaw), math.sin(yaw)
+            least = min(at(x + offset * cosine, y + offset * sine) for offset in offsets)
+            if least > roomy:
+                return True
+            if min(math.hypot(x - end.x, y - end.y) for end in ends) > 2 * roomy:
+                return False
+            return least > tight or bool(free(costmap, np.array([(x, y, yaw)]))[0])
+
+        return valid
