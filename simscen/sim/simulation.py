@@ -16,21 +16,16 @@ from simscen.core.trace import Truth
 from simscen.sim import engine
 from simscen.sim.actors import Actors
 from simscen.sim.camera import picture, show_static
+from simscen.sim.clearance import Clearance
 from simscen.sim.contacts import Contacts, Motion, touches
 from simscen.sim.drives import build
-from simscen.sim.proximity import Proximity
 from simscen.sim.robot_body import RobotBody
 from simscen.sim.vehicle import base_twist
 
-CLEARANCE_REACH = 2.0
-"""How far in metres clearance is searched."""
 FIRMWARE_RATE = 60
 """Hz at which a base's firmware updates its wheel speeds; Clearpath's and Robotis' run at 50 to 100 Hz."""
 SETTLING = 60
 """Ticks before tick 0 in which everything comes to rest on the ground."""
-HORIZON = 0.1
-"""Seconds for which a clearance may at most rule out a contact."""
-
 Vector = tuple[float, float, float]
 
 
@@ -52,11 +47,10 @@ class Simulation:
         `triangulate` gives the surface of a shape, for moving things that the engine has no primitive for.
         """
         self.tick = 0
-        self._rate, self._limits, self._radius = tick_rate, robot.limits, robot.circumscribed_radius
+        self._rate = tick_rate
         self._client = engine.connect(tick_rate, solver_iterations)
         engine.ground(self._client)
         self._static = engine.static_mesh(self._client, static)
-        self._proximity = Proximity(static, robot, CLEARANCE_REACH)
         self._mesh, self._filmed = static, False
         self._actors = Actors(self._client, tick_rate, triangulate)
         self._firmware = max(1, round(tick_rate / FIRMWARE_RATE))
@@ -65,9 +59,7 @@ class Simulation:
             self._actors.add(body, 0)
         self._contacts = Contacts(tick_rate)
         self._names: dict[int, str | None] = {}
-        self._touched: dict[tuple[int, int, int], str] = {}
-        self._clearance = 0.0
-        self._measured_at, self._no_contact_before = -1, 0
+        self._clearance = Clearance(self._client, tick_rate, static, robot, self._base, self._actors)
         self._settle(pose)
         self._changed()
 
@@ -84,7 +76,7 @@ class Simulation:
         while self.tick < until:
             if self.tick % self._firmware == 0:
                 self._drive.advance()
-            if self.tick < self._no_contact_before and not self._actors.pushing:
+            if self.tick < self._clearance.no_contact_before and not self._actors.pushing:
                 pybullet.stepSimulation(client)
                 self.tick += 1
             else:
@@ -93,13 +85,13 @@ class Simulation:
     def _careful_step(self) -> None:
         """A step in which something might touch something; scripted bodies need to be in place only here."""
         self._actors.begin(self.tick)
-        if self.tick >= self._no_contact_before and not self._contacts.touching:
-            self._measure()
+        if self.tick >= self._clearance.no_contact_before and not self._contacts.touching:
+            self._clearance.measure(self.tick)
         before = Motion(self._base.pose().position, *self._base.velocity(), self._actors.velocities(self.tick))
         pybullet.stepSimulation(self._client)
         self.tick += 1
-        if self._contacts.touching or self.tick > self._no_contact_before:
-            touched = touches(self._client, self._base.id, self._names, self._owner, 1 / self._rate)
+        if self._contacts.touching or self.tick > self._clearance.no_contact_before:
+            touched = touches(self._client, self._base.id, self._names, self._clearance.owner, 1 / self._rate)
             self._contacts.note(self.tick, touched, before)
         self._actors.show(self.tick)
 
@@ -112,49 +104,14 @@ class Simulation:
         pose, velocity = self._base.pose(), self._base.velocity()
         if not all(math.isfinite(value) for value in (*pose, *velocity[0], *velocity[1])):
             raise RunError("diverged", f"simulation diverged at t={self.tick / self._rate:.3f} s: the pose is {pose}")
-        return Truth(pose, base_twist(pose, velocity), self._measure(), self._actors.poses(self.tick))
-
-    def _measure(self) -> float:
-        """Clearance in metres; also works out how long no contact is possible (conservative advancement)."""
-        if self._measured_at == self.tick:
-            return self._clearance
-        self._actors.show(self.tick)
-        self._clearance = self._search()
-        self._measured_at = self.tick
-        free = min(HORIZON, max(0.0, self._clearance - 0.002) / self._fastest())
-        self._no_contact_before = self.tick + math.floor(free * self._rate)
-        return self._clearance
-
-    def _search(self) -> float:
-        """The least distance of the hull to anything, up to CLEARANCE_REACH."""
-        robot, client = self._base.id, self._client
-        nearest = min(CLEARANCE_REACH, self._proximity.distance(self._base.pose()))
-        for other in self._actors.ids():
-            for link in self._base.hull_links:
-                points = pybullet.getClosestPoints(robot, other, nearest, link, physicsClientId=client)
-                nearest = min((point[8] for point in points), default=nearest)
-        return nearest
-
-    def _owner(self, place: Vector) -> str:
-        """The static solid that is touched at a place; remembered by the centimetre, since contacts last."""
-        x, y, z = place
-        cell = (round(100 * x), round(100 * y), round(100 * z))
-        if cell not in self._touched:
-            self._touched[cell] = self._proximity.owner(place)
-        return self._touched[cell]
-
-    def _fastest(self) -> float:
-        """The greatest speed in m/s at which the hull and anything else can approach each other for a while."""
-        limits, (linear, angular) = self._limits, self._base.velocity()
-        forward = max(limits.linear, limits.reverse or 0.0, limits.lateral or 0.0, math.hypot(*linear))
-        turning = max(limits.angular, math.hypot(*angular)) * self._radius
-        return 1.25 * (forward + turning) + self._actors.top_speed() + 0.1
+        return Truth(
+            pose, base_twist(pose, velocity), self._clearance.measure(self.tick), self._actors.poses(self.tick)
+        )
 
     def _changed(self) -> None:
         """Something was put into or taken out of the world, or set down elsewhere."""
         self._names = {**dict.fromkeys(self._static), **self._actors.ids()}
-        self._clearance = 0.0
-        self._measured_at, self._no_contact_before = -1, 0
+        self._clearance.forget()
 
     def collisions(self) -> tuple[Event, ...]:
         """collision.started and collision.ended since last asked.
@@ -229,5 +186,5 @@ class Simulation:
 
     def close(self) -> None:
         """Give the engine back."""
-        self._proximity.close()
+        self._clearance.close()
         pybullet.disconnect(self._client)

@@ -10,14 +10,14 @@ from shapely.ops import unary_union
 
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.shapes import Body, Cylinder, Extrusion, Solid
-from simscen.sim.simulation import CLEARANCE_REACH
+from simscen.sim.clearance import REACH
 
 RADIUS = 0.22  # of the turtlebot
 MILLIMETRE = 1e-3
 
 
 def test_nothing_around_counts_as_the_reach_of_the_search(simulate):
-    assert simulate().truth().clearance == CLEARANCE_REACH
+    assert simulate().truth().clearance == REACH
 
 
 @pytest.mark.parametrize("gap", [0.001, 0.02, 0.3, 1.0, 1.9])
@@ -54,7 +54,7 @@ def test_things_that_move_count_and_the_ground_does_not(simulate):
     simulation = simulate(bodies=[cart])
     assert simulation.truth().clearance == pytest.approx(0.8 - RADIUS, abs=MILLIMETRE)
     simulation.remove("cart")
-    assert simulation.truth().clearance == CLEARANCE_REACH
+    assert simulation.truth().clearance == REACH
     simulation.spawn(Body("prism", (Solid(Extrusion(((-0.1, -1), (0.1, -1), (0.1, 1), (-0.1, 1)), 0.5)),), Pose3(0.7)))
     assert simulation.truth().clearance == pytest.approx(0.6 - RADIUS, abs=MILLIMETRE)
 
@@ -77,7 +77,7 @@ def test_clearance_along_a_drive_is_that_of_the_plane(simulate):
     for _ in range(320):
         simulation.step(6)
         truth = simulation.truth()
-        expected = min(CLEARANCE_REACH, shapes.distance(Point(truth.pose.x, truth.pose.y)) - RADIUS)
+        expected = min(REACH, shapes.distance(Point(truth.pose.x, truth.pose.y)) - RADIUS)
         assert truth.clearance == pytest.approx(expected, abs=MILLIMETRE)
 
 

@@ -1,0 +1,81 @@
+"""How near the robot's hull is to anything, and how long it therefore cannot touch anything."""
+
+import math
+
+import pybullet
+
+from simscen.core.shapes import TriangleMesh
+from simscen.sim.actors import Actors
+from simscen.sim.drives import Base
+from simscen.sim.proximity import Proximity
+from simscen.sim.robot_body import RobotBody
+
+REACH = 2.0
+"""How far in metres is searched."""
+HORIZON = 0.1
+"""Seconds for which a clearance may at most rule out a contact."""
+TOLERANCE = 0.002
+"""m of clearance that count as none: corners of shapes are rounded by up to 0.4 mm."""
+
+Vector = tuple[float, float, float]
+
+
+class Clearance:
+    """Measures the distance to what stands and what moves.
+
+    Asking the engine for contacts after every tick costs more than measuring a distance now and then: as long as
+    nothing can have closed the gap, there is nothing to ask for (conservative advancement; Mirtich, Impulse-based
+    dynamic simulation, 1996, section 2.3). Before tick `no_contact_before` no contact is possible.
+    """
+
+    def __init__(
+        self, client: int, tick_rate: int, static: TriangleMesh, robot: RobotBody, base: Base, actors: Actors
+    ) -> None:
+        self._client, self._rate, self._base, self._actors = client, tick_rate, base, actors
+        self._limits, self._radius = robot.limits, robot.circumscribed_radius
+        self._proximity = Proximity(static, robot, REACH)
+        self._touched: dict[tuple[int, int, int], str] = {}
+        self.forget()
+
+    def forget(self) -> None:
+        """Something was put into or taken out of the world, or set down elsewhere: measure anew."""
+        self._distance = 0.0
+        self._measured_at, self.no_contact_before = -1, 0
+
+    def measure(self, tick: int) -> float:
+        """The clearance at `tick`, which is now, in metres; REACH where nothing is nearer."""
+        if self._measured_at == tick:
+            return self._distance
+        self._actors.show(tick)
+        self._distance = self._search()
+        self._measured_at = tick
+        free = min(HORIZON, max(0.0, self._distance - TOLERANCE) / self._fastest())
+        self.no_contact_before = tick + math.floor(free * self._rate)
+        return self._distance
+
+    def _search(self) -> float:
+        nearest = min(REACH, self._proximity.distance(self._base.pose()))
+        for other in self._actors.ids():
+            for link in self._base.hull_links:
+                points = pybullet.getClosestPoints(self._base.id, other, nearest, link, physicsClientId=self._client)
+                nearest = min((point[8] for point in points), default=nearest)
+        return nearest
+
+    def _fastest(self) -> float:
+        """The greatest speed in m/s at which the hull and anything else can approach each other for a while."""
+        limits, (linear, angular) = self._limits, self._base.velocity()
+        forward = max(limits.linear, limits.reverse or 0.0, limits.lateral or 0.0, math.hypot(*linear))
+        turning = max(limits.angular, math.hypot(*angular)) * self._radius
+        return 1.25 * (forward + turning) + self._actors.top_speed() + 0.1
+
+    def owner(self, place: Vector) -> str:
+        """The static solid that is touched at a place; remembered by the centimetre, since contacts last."""
+        x, y, z = place
+        cell = (round(100 * x), round(100 * y), round(100 * z))
+        if cell not in self._touched:
+            self._touched[cell] = self._proximity.owner(place)
+        return self._touched[cell]
+
+    def close(self) -> None:
+        """Give the engine back."""
+        self._proximity.close()
