@@ -4,6 +4,7 @@ from itertools import groupby
 
 from simscen.cli.catalogue import OPTIONAL, Field, Topic, topics
 from simscen.cli.main import COMMANDS
+from simscen.cli.options import commands_of, exits, section
 from simscen.loading.codes import CODES
 from simscen.spec.quantities import UNITS
 
@@ -44,8 +45,10 @@ def problems_page() -> str:
 def commands_page() -> str:
     """docs/reference/commands.md."""
     rows = "\n".join(f"| `simscen {name}` | {text} |" for name, text in COMMANDS.items())
-    intro = "# Commands\n\n`simscen COMMAND --help` tells the options."
-    return f"{_MADE}{intro}\n\n| command | what it does |\n|---|---|\n{rows}\n"
+    intro = "# Commands\n\n`simscen COMMAND --help` tells the same."
+    sections = [section(words, function) for name in COMMANDS for words, function in commands_of(name)]
+    table = f"| command | what it does |\n|---|---|\n{rows}\n"
+    return "\n".join([f"{_MADE}{intro}\n\n{table}", *sections, exits()])
 
 
 def _units() -> str:

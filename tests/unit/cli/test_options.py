@@ -1,0 +1,44 @@
+"""The page of commands tells of the options that there are, and of all exit codes."""
+
+import re
+
+import pytest
+import typer
+
+from simscen.cli.main import COMMANDS, app
+from simscen.cli.options import EXITS, commands_of, exits, parameters_of, section
+from simscen.core.errors import Exit
+
+
+def calls():
+    return [(words, function) for name in COMMANDS for words, function in commands_of(name)]
+
+
+def typers_own(words):
+    """The command that typer makes of it."""
+    command = typer.main.get_command(app)
+    for word in words.split():
+        command = command.get_command(None, word)
+    return command
+
+
+@pytest.mark.parametrize(("words", "function"), calls(), ids=lambda value: value if isinstance(value, str) else "")
+def test_the_page_lists_what_typer_takes(words, function) -> None:
+    taken = [parameter for parameter in typers_own(words).params if parameter.name != "help"]
+    names = [", ".join(p.opts) if p.param_type_name == "option" else p.name for p in taken]
+    told = [parameter.written for parameter in parameters_of(function)]
+    arguments = re.compile(r"^\[?[A-Z_]+\]?…?$")
+    assert [name for name in names if name.startswith("-")] == [name for name in told if name.startswith("-")]
+    assert len(told) == len(names)
+    assert all(name.startswith("-") or arguments.match(name) for name in told)
+    assert all(parameter.help for parameter in parameters_of(function))
+
+
+def test_every_exit_code_is_explained() -> None:
+    assert set(EXITS) == set(Exit)
+    assert all(f"| {code.value} |" in exits() for code in Exit)
+
+
+def test_names_with_stars_and_brackets_stay_what_they_are() -> None:
+    assert r"\*.scenario.yaml" in section("validate", dict(calls())["validate"])
+    assert r"simscen-out/\<run-id>" in section("run", dict(calls())["run"])
