@@ -3,7 +3,7 @@
 import math
 
 from simscen.core.geometry import Pose2, wrap
-from simscen.core.motion import Twist
+from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import Goal
 from simscen.stack.protocols import RobotModel
 
@@ -35,7 +35,7 @@ class GoalPose:
         near = distance <= ON_THE_SPOT * goal.xy_tolerance or (abs(twist.vx) < STANDING and remaining < 0.2)
         passed = distance <= PASSED * goal.xy_tolerance and behind and remaining < 0.1
         self._there = distance <= goal.xy_tolerance and (self._there or near or passed)
-        return self._there and self._can_turn
+        return self._there
 
     def turn(self, angle: float, twist: Twist) -> Twist:
         """Turn in place by `angle`, no faster than the base can stop at the end of it."""
@@ -45,5 +45,7 @@ class GoalPose:
         return Twist(0.0, 0.0, min(max(speed, twist.wz - change), twist.wz + change))
 
     def turn_to_goal(self, pose: Pose2, goal: Goal, twist: Twist) -> Twist:
-        """Turn to the goal's heading."""
+        """Turn to the goal's heading; a car stands, as it has come with the heading it has."""
+        if not self._can_turn:
+            return STOP
         return self.turn(wrap(goal.pose.yaw - pose.yaw), twist)

@@ -62,7 +62,7 @@ class RegulatedPurePursuit:
         if self._goal_pose.reached(pose, twist, goal, track.remaining()):
             command = self._goal_pose.turn_to_goal(pose, goal, twist)
         elif self._should_rotate(carrot):
-            command = self._goal_pose.turn(math.atan2(carrot[1], carrot[0]), twist)
+            command = self._goal_pose.turn(self._bearing(carrot), twist)
         else:
             command = self._drive(carrot, pose, costmap)
         command = self._within_free_way(command, pose, costmap, math.hypot(*carrot))
@@ -78,7 +78,13 @@ class RegulatedPurePursuit:
     def _should_rotate(self, carrot: list[float]) -> bool:
         if not self._spec.use_rotate_to_heading or self._robot.turning_radius > 0.0:
             return False
-        return abs(math.atan2(carrot[1], carrot[0])) > self._spec.rotate_to_heading_min_angle
+        return abs(self._bearing(carrot)) > self._spec.rotate_to_heading_min_angle
+
+    def _bearing(self, carrot: list[float]) -> float:
+        """How far the end of the robot that goes first must turn to point at the carrot."""
+        assert self._track is not None
+        sign = 1.0 if self._track.forward else -1.0
+        return math.atan2(sign * carrot[1], sign * carrot[0])
 
     def _drive(self, carrot: list[float], pose: Pose2, costmap: CostmapView) -> Twist:
         square = carrot[0] ** 2 + carrot[1] ** 2
@@ -89,6 +95,9 @@ class RegulatedPurePursuit:
         speed = self._regulated(curvature, pose, costmap)
         if abs(curvature) * speed > self._robot.max_angular:
             speed = self._robot.max_angular / abs(curvature)
+        assert self._track is not None
+        if not self._track.forward:
+            speed = -min(speed, self._robot.max_reverse)
         return Twist(speed, 0.0, speed * curvature)
 
     def _regulated(self, curvature: float, pose: Pose2, costmap: CostmapView) -> float:
@@ -106,9 +115,9 @@ class RegulatedPurePursuit:
         return self._approaching(speed)
 
     def _approaching(self, speed: float) -> float:
-        """Slow down near the end of the path: by Nav2's ratio, and never faster than the brakes allow."""
+        """Slow down near the end of the path, or of a piece: by Nav2's ratio, never faster than the brakes allow."""
         assert self._track is not None
-        left, spec = self._track.remaining(), self._spec
+        left, spec = self._track.to_cusp(), self._spec
         if left < spec.approach_velocity_scaling_dist:
             speed = min(
                 speed, max(speed * left / spec.approach_velocity_scaling_dist, spec.min_approach_linear_velocity)
@@ -124,11 +133,11 @@ class RegulatedPurePursuit:
         if not self._spec.use_collision_detection or command == STOP:
             return command
         allowed = self._spec.max_allowed_time_to_collision_up_to_carrot
-        horizon = min(allowed, carrot / command.vx) if command.vx > 0 else allowed
+        horizon = min(allowed, carrot / abs(command.vx)) if command.vx != 0.0 else allowed
         free = time_free(self._footprint, costmap, pose, command, horizon)
         if free >= horizon:
             return command
         scale = free / allowed
-        if command.vx * scale < CREEP:
+        if abs(command.vx) * scale < CREEP:
             raise NavigationFailure(ErrorCode.NO_VALID_CONTROL, f"collision ahead in {free:.2f} s")
         return Twist(command.vx * scale, 0.0, command.wz * scale)

@@ -9,6 +9,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import Goal
 from simscen.model.stack import Costmap, GroundTruth, Planner, ProgressChecker, Recovery, StackSpec
+from simscen.stack.protocols import RobotModel
 
 TRUTH = GroundTruth(type="ground_truth")
 BOUNDS = (-0.5, -0.5, 10.5, 6.5)
@@ -235,3 +236,13 @@ def test_no_goal_means_no_motion() -> None:
     d = drive(world, START, grid=world.grid(BOUNDS)).run(1.0)
     assert set(d.commands) == {Twist()}
     assert not d.log
+
+
+def test_a_car_drives_to_a_goal_behind_it() -> None:
+    car = RobotModel(box_robot(0.6, 0.4).footprint, None, 0.8, 0.5, 0.0, 1.5, 2.0, 2.0, 3.0, turning_radius=0.6)
+    world = Flatland().room(10, 6)
+    d = drive(world, Pose2(5, 3, 0), Goal("g", Pose2(2, 4, 0.0)), grid=world.grid(BOUNDS), robot=car).run(60)
+    assert d.result == "SUCCEEDED"
+    assert d.least > 0.02
+    assert min(command.vx for command in d.commands) < -0.1
+    assert all(abs(c.wz) <= abs(c.vx) / 0.6 * 1.5 + 0.05 for c in d.commands)
