@@ -30,7 +30,6 @@ CODES = {
     "SC033": "Two things have the same name.",
     "SC034": "A rate does not divide the physics rate, so that it would not be regular.",
     "SC040": "Two scenarios have the same id, or would have on a file system that ignores case.",
-    "SC201": "A URDF alone does not tell how the robot drives; a `*.robot.yaml` beside it does.",
     "SC301": "A start or goal is inside an obstacle or off the map.",
     "SC310": "Something in an SDF file cannot be used.",
     "SC311": "Something in a world or map deserves a look; with --lenient, also what was left out of it.",

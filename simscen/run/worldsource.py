@@ -5,7 +5,6 @@ from pathlib import Path
 
 from simscen.core.errors import InvalidInput
 from simscen.core.grid import OccupancyGrid
-from simscen.core.problems import Problem
 from simscen.core.shapes import Mesh
 from simscen.core.world import World
 from simscen.loading.loaded import LoadedMap, LoadedScenario, LoadedWorld
@@ -58,12 +57,13 @@ def _read_mesh(path: Path) -> Mesh:
 
 
 def load_robot(loaded: LoadedScenario) -> tuple[RobotSpec, RobotBody]:
-    """The robot as specified, and made ready for physics."""
-    robot = loaded.robot
-    if robot.spec is None:
-        hint = (
-            "write a short *.robot.yaml beside it that names its drive, limits and sensors: see `simscen explain robot`"
-        )
-        problem = Problem(str(robot.path), 0, 0, "SC201", "a URDF alone does not say how the robot drives", hint)
-        raise InvalidInput([problem])
-    return robot.spec, robot_body(robot.spec, robot.path, (loaded.root, *loaded.world_path), _read_mesh)
+    """The robot as specified (a bare URDF as far as it makes plain), and made ready for physics."""
+    robot, roots = loaded.robot, (loaded.root, *loaded.world_path)
+    spec = robot.spec or _inferred(robot.path, roots)
+    return spec, robot_body(spec, robot.path, roots, _read_mesh)
+
+
+def _inferred(urdf: Path, roots: tuple[Path, ...]) -> RobotSpec:
+    from simscen.sim.urdf.infer import spec_of_urdf
+
+    return spec_of_urdf(urdf, roots, _read_mesh)
