@@ -28,7 +28,7 @@ class Footprint:
     """Checks many poses at once.
 
     A round robot collides where a lethal cell's centre is within its radius. Any other collides where one is within
-    the inscribed radius or under the hull's edge; far from everything (circumscribed radius) it never does. `reach` is
+    the inscribed radius or anywhere under the hull; far from everything (circumscribed radius) it never does. `reach` is
     how far turning in place moves the hull: 0 when it is round.
     """
 
@@ -36,7 +36,9 @@ class Footprint:
         self._inscribed, self._circumscribed = robot.inscribed_radius, robot.circumscribed_radius
         self._round = robot.radius is not None
         self.reach = 0.0 if self._round else robot.circumscribed_radius
-        self._edge = _edge_points(np.array(robot.footprint, dtype=np.float64), resolution)
+        corners = np.array(robot.footprint, dtype=np.float64)
+        inner = _inner_points(corners, resolution, self._inscribed)
+        self._hull = np.concatenate((_edge_points(corners, resolution), inner))
         self.discs = Discs(robot)
 
     def free(self, costmap: CostmapView, poses: Array) -> Mask:
@@ -47,7 +49,7 @@ class Footprint:
             return free
         unsure = np.flatnonzero(free & (distance <= self._circumscribed + costmap.resolution))
         if len(unsure):
-            free[unsure] = self._edge_free(costmap, poses[unsure])
+            free[unsure] = self._hull_free(costmap, poses[unsure])
         return free
 
     def clearance(self, costmap: CostmapView, poses: Array) -> Array:
@@ -59,13 +61,13 @@ class Footprint:
         middle = distances(costmap, poses[:, :2]).astype(np.float64) - self._inscribed
         return np.asarray(np.minimum(edge, middle))
 
-    def _edge_free(self, costmap: CostmapView, poses: Array) -> Mask:
+    def _hull_free(self, costmap: CostmapView, poses: Array) -> Mask:
         return np.asarray((distances(costmap, self._placed(poses)) > 0).all(axis=1))
 
     def _placed(self, poses: Array) -> Array:
         cosine, sine = np.cos(poses[:, 2, None]), np.sin(poses[:, 2, None])
-        x = poses[:, 0, None] + cosine * self._edge[:, 0] - sine * self._edge[:, 1]
-        y = poses[:, 1, None] + sine * self._edge[:, 0] + cosine * self._edge[:, 1]
+        x = poses[:, 0, None] + cosine * self._hull[:, 0] - sine * self._hull[:, 1]
+        y = poses[:, 1, None] + sine * self._hull[:, 0] + cosine * self._hull[:, 1]
         return np.stack((x, y), axis=-1)
 
 
@@ -97,6 +99,20 @@ class Discs:
             least = near if least is None else np.minimum(least, near)
         assert least is not None
         return np.asarray(least - np.float32(self.radius))
+
+
+def _inner_points(corners: Array, resolution: float, inscribed: float) -> Array:
+    """Points inside the hull, so dense that no cell is missed, outside the inscribed circle that is checked anyway."""
+    spacing = resolution / math.sqrt(2.0)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    axes = [np.arange(a + spacing, b, spacing) for a, b in zip(low.tolist(), high.tolist(), strict=True)]
+    points = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
+    inside = np.zeros(len(points), dtype=bool)
+    for (ax, ay), (bx, by) in zip(corners.tolist(), np.roll(corners, -1, axis=0).tolist(), strict=True):
+        if ay != by:
+            crosses = (ay > points[:, 1]) != (by > points[:, 1])
+            inside ^= crosses & (points[:, 0] < ax + (points[:, 1] - ay) / (by - ay) * (bx - ax))
+    return np.asarray(points[inside & (np.hypot(points[:, 0], points[:, 1]) > inscribed - resolution)])
 
 
 def _edge_points(corners: Array, resolution: float) -> Array:

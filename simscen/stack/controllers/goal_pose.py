@@ -13,6 +13,9 @@ ON_THE_SPOT, PASSED = 0.45, 0.8
 STANDING = 0.01
 """m/s. A controller that has come to rest inside the tolerance is as near as it gets."""
 
+AT_END = 0.03
+"""Metres of path that a car may leave out: its last arc is what gives it its heading."""
+
 
 class GoalPose:
     """Remembers that the position is reached, so that turning does not start another approach."""
@@ -32,7 +35,8 @@ class GoalPose:
         distance = goal.pose.distance(pose)
         dx, dy = goal.pose.x - pose.x, goal.pose.y - pose.y
         behind = dx * math.cos(pose.yaw) + dy * math.sin(pose.yaw) <= 0.0
-        near = distance <= ON_THE_SPOT * goal.xy_tolerance or (abs(twist.vx) < STANDING and remaining < 0.2)
+        standing = abs(twist.vx) < STANDING and remaining < 0.2
+        near = standing or (distance <= ON_THE_SPOT * goal.xy_tolerance and (self._can_turn or remaining < AT_END))
         passed = distance <= PASSED * goal.xy_tolerance and behind and remaining < 0.1
         self._there = distance <= goal.xy_tolerance and (self._there or near or passed)
         return self._there

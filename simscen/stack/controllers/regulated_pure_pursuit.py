@@ -57,7 +57,7 @@ class RegulatedPurePursuit:
         track = self._track
         track.locate(pose)
         reach = self._lookahead(twist.vx)
-        x, y = track.carrot(pose, reach)
+        x, y = track.carrot(pose, reach, beyond=self._robot.turning_radius > 0.0)
         carrot = pose.inverse().apply(np.array([[x, y]]))[0].tolist()
         if self._goal_pose.reached(pose, twist, goal, track.remaining()):
             command = self._goal_pose.turn_to_goal(pose, goal, twist)

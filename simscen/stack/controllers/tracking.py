@@ -64,17 +64,24 @@ class PathTracker:
         """Metres of path to the end of this piece."""
         return float(self.along[self._ends[0]] - self.along[self.index])
 
-    def carrot(self, pose: Pose2, distance: float) -> tuple[float, float]:
+    def carrot(self, pose: Pose2, distance: float, beyond: bool = False) -> tuple[float, float]:
         """Where the piece leaves the circle of `distance` around the robot; its end if it does not leave.
 
-        Interpolated between points, so that the carrot glides (RPP's circleSegmentIntersection).
+        Interpolated between points, so that the carrot glides (RPP's circleSegmentIntersection). `beyond` prolongs
+        the piece in the direction it ends in, so that the robot comes in straight (interpolate_curvature_after_goal).
         """
         ahead = self.points[self.index : self._stop(2 * distance + 0.5)]
         outside = np.hypot(ahead[:, 0] - pose.x, ahead[:, 1] - pose.y) >= distance
         first = int(outside.argmax())
         if not outside[first]:
-            x, y, _ = ahead[-1].tolist()
-            return x, y
+            x, y, yaw = ahead[-1].tolist()
+            if not beyond:
+                return x, y
+            more = distance if self.forward else -distance
+            return _leaving(
+                x - pose.x, y - pose.y, x + 2 * more * math.cos(yaw) - pose.x, y + 2 * more * math.sin(yaw) - pose.y,
+                distance, pose,
+            )  # fmt: skip
         x, y, _ = ahead[first].tolist()
         if first == 0:
             return x, y

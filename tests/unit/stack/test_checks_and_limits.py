@@ -1,0 +1,254 @@
+"""Goal, progress, speed and retries: small rules with exact answers."""
+
+import math
+
+import numpy as np
+import pytest
+from flatland import RATE, Flatland, box_robot, round_robot
+
+from simscen.core.events import Event
+from simscen.core.geometry import Pose2
+from simscen.core.motion import STOP, Twist
+from simscen.core.navigation import ErrorCode, Goal, Path
+from simscen.core.sensing import Scan
+from simscen.model.stack import CollisionMonitor as MonitorSpec
+from simscen.model.stack import Costmap as CostmapSpec
+from simscen.model.stack import ProgressChecker as ProgressSpec
+from simscen.model.stack import VelocitySmoother as SmootherSpec
+from simscen.stack.arcs import poses_along
+from simscen.stack.behaviors.motions import Wait
+from simscen.stack.collision_monitor import CollisionMonitor
+from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.footprint import Footprint
+from simscen.stack.goal_checker import GoalChecker
+from simscen.stack.lookahead import time_free
+from simscen.stack.progress_checker import ProgressChecker
+from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
+from simscen.stack.recovery import RoundRobin
+from simscen.stack.replanning import PlanInForce
+from simscen.stack.tasks import Task
+from simscen.stack.velocity_smoother import VelocitySmoother
+from simscen.stack.zones import speed_limit
+
+GOAL = Goal("g", Pose2(1.0, 0.0, 0.0), xy_tolerance=0.2, yaw_tolerance=0.2)
+DRIVING = Twist(0.3)
+
+
+def view_of(world: Flatland, robot: RobotModel) -> CostmapView:
+    return Costmap(CostmapSpec(), Surroundings(robot, world.grid((-2.0, -2.0, 6.0, 2.0)), RATE)).view
+
+
+@pytest.mark.parametrize(
+    ("pose", "twist", "reached"),
+    [
+        (Pose2(0.85, 0.0, 0.0), DRIVING, False),  # inside, but not well inside
+        (Pose2(0.85, 0.0, 0.0), STOP, True),
+        (Pose2(0.95, 0.0, 0.0), DRIVING, True),
+        (Pose2(0.95, 0.0, 0.15), DRIVING, False),
+        (Pose2(0.95, 0.0, 0.15), STOP, True),
+        (Pose2(0.95, 0.0, 0.3), STOP, False),
+        (Pose2(0.75, 0.0, 0.0), STOP, False),
+    ],
+)
+def test_a_goal_is_reached_well_inside_its_tolerance_or_standing_anywhere_inside(
+    pose: Pose2, twist: Twist, reached: bool
+) -> None:
+    assert GoalChecker(True).reached(GOAL, pose, twist) == reached
+
+
+def test_a_stateful_goal_checker_lets_the_robot_turn_without_losing_its_place() -> None:
+    stateful, forgetful = GoalChecker(True), GoalChecker(False)
+    for checker in (stateful, forgetful):
+        checker.reached(GOAL, Pose2(0.95, 0.0, 1.0), DRIVING)
+    assert stateful.reached(GOAL, Pose2(0.85, 0.0, 0.05), DRIVING)
+    assert not forgetful.reached(GOAL, Pose2(0.85, 0.0, 0.05), DRIVING)
+
+
+def test_progress_means_the_radius_within_the_allowance() -> None:
+    checker = ProgressChecker(ProgressSpec(required_movement_radius=0.5, movement_time_allowance=10.0))
+    assert not checker.stuck(Pose2(0, 0), 0.0)
+    assert not checker.stuck(Pose2(0.49, 0), 10.0)
+    assert checker.stuck(Pose2(0.49, 0), 10.1)
+    assert not checker.stuck(Pose2(0.5, 0), 10.2)
+
+
+def test_turning_is_progress_only_if_an_angle_is_given() -> None:
+    for angle, stuck in ((None, True), (0.5, False)):
+        checker = ProgressChecker(ProgressSpec(required_movement_angle=angle))
+        checker.stuck(Pose2(0, 0, 0), 0.0)
+        checker.stuck(Pose2(0, 0, 0.6), 9.0)
+        assert checker.stuck(Pose2(0, 0, 0.6), 11.0) == stuck
+
+
+def test_the_smoother_speeds_up_gently_and_brakes_with_all_the_base_has() -> None:
+    robot = round_robot(linear_acceleration=1.0, linear_deceleration=4.0)
+    smoother = VelocitySmoother(SmootherSpec(), robot, 0.1)
+    assert [round(smoother.smooth(Twist(0.25)).vx, 6) for _ in range(4)] == [0.1, 0.2, 0.25, 0.25]
+    assert smoother.smooth(Twist(0.0)).vx == 0.0
+    assert smoother.smooth(Twist(wz=1.0)).wz == pytest.approx(0.32)
+
+
+def test_the_smoother_passes_zero_before_it_reverses() -> None:
+    smoother = VelocitySmoother(SmootherSpec(), round_robot(), 0.05)
+    smoother.reset(Twist(0.05))
+    assert smoother.smooth(Twist(-0.5)).vx == 0.0
+    assert smoother.smooth(Twist(-0.5)).vx == pytest.approx(-0.125)
+
+
+def test_a_disabled_smoother_changes_nothing() -> None:
+    assert VelocitySmoother(SmootherSpec(enabled=False), round_robot(), 0.1).smooth(Twist(9.0)) == Twist(9.0)
+
+
+def scan(*points: tuple[float, float], tick: int = 0) -> Scan:
+    """A scan of one beam a point; the lidar is at the base."""
+    angles = np.array([math.atan2(y, x) for x, y in points])
+    step = 1e-3
+    ranges = np.full(7000, np.inf)
+    ranges[np.round((angles + 3.5) / step).astype(int)] = [math.hypot(x, y) for x, y in points]
+    return Scan("lidar", tick, ranges, -3.5, step, 0.05, 12.0)
+
+
+def monitor(robot: RobotModel | None = None, **options: float) -> CollisionMonitor:
+    return CollisionMonitor(MonitorSpec(**options), robot or round_robot(), ("lidar",), RATE)
+
+
+@pytest.mark.parametrize(("x", "scale"), [(2.0, 1.0), (0.22 + 0.02 + 0.125, 0.5), (0.23, 0.0)])
+def test_the_monitor_keeps_the_time_before_collision(x: float, scale: float) -> None:
+    guard = monitor()
+    guard.on_scan(scan((x, 0.0)), Pose2(0, 0))
+    allowed = guard.allow(Twist(0.5, 0.0, 0.0), Pose2(0, 0))
+    assert allowed.vx == pytest.approx(0.5 * scale, abs=0.5 / 8)
+    assert allowed.vx <= 0.5 * scale + 1e-9 or scale == 1.0
+
+
+def test_the_monitor_lets_the_robot_drive_away_from_what_it_nearly_touches() -> None:
+    guard = monitor()
+    guard.on_scan(scan((0.23, 0.0)), Pose2(0, 0))
+    assert guard.allow(Twist(-0.2), Pose2(0, 0)) == Twist(-0.2)
+    assert guard.allow(Twist(wz=1.0), Pose2(0, 0)) == Twist(wz=1.0)
+
+
+def test_the_monitor_counts_what_the_robot_has_driven_since_the_scan() -> None:
+    guard = monitor()
+    guard.on_scan(scan((0.6, 0.0)), Pose2(5, 5, 1.0))
+    assert guard.allow(Twist(0.2), Pose2(5, 5, 1.0)) == Twist(0.2)
+    moved = Pose2(5, 5, 1.0).compose(Pose2(0.36, 0.0))
+    assert guard.allow(Twist(0.2), moved) == STOP
+
+
+def test_the_monitor_sees_the_corner_of_a_long_hull_swing() -> None:
+    guard = monitor(box_robot())
+    guard.on_scan(scan((0.15, 0.19)), Pose2(0, 0))
+    assert guard.allow(Twist(wz=1.0), Pose2(0, 0)).wz < 0.5
+    assert guard.allow(Twist(0.3), Pose2(0, 0)).vx == 0.3
+
+
+def test_silence_is_a_lidar_unheard_for_the_timeout_or_blind() -> None:
+    guard = monitor(source_timeout=0.3)
+    guard.start(0)
+    assert not guard.silent(72)
+    assert guard.silent(73)
+    guard.on_scan(scan((2.0, 0.0), tick=100), Pose2(0, 0))
+    assert not guard.silent(172)
+    guard.on_scan(Scan("lidar", 180, np.full(9, np.nan), 0.0, 0.1, 0.05, 12.0), Pose2(0, 0))
+    assert guard.silent(181)
+
+
+def test_arcs_are_those_of_a_fine_integration() -> None:
+    twist, pose = Twist(0.7, 0.2, -0.9), Pose2(1.0, 2.0, 0.4)
+    x, y, yaw = pose
+    for _ in range(200_000):
+        dt = 1.5 / 200_000
+        x += (twist.vx * math.cos(yaw) - twist.vy * math.sin(yaw)) * dt
+        y += (twist.vx * math.sin(yaw) + twist.vy * math.cos(yaw)) * dt
+        yaw += twist.wz * dt
+    assert poses_along(pose, twist, np.array([1.5]))[0] == pytest.approx((x, y, yaw), abs=1e-5)
+    straight = poses_along(pose, Twist(1.0), np.array([2.0]))[0]
+    assert straight == pytest.approx((1 + 2 * math.cos(0.4), 2 + 2 * math.sin(0.4), 0.4))
+
+
+def test_time_free_is_the_way_to_the_obstacle_over_the_speed() -> None:
+    robot = round_robot()
+    view = view_of(Flatland(boxes=[(2.0, -1.0, 2.5, 1.0)]), robot)
+    free = time_free(Footprint(robot, 0.05), view, Pose2(0, 0), Twist(0.5), 10.0)
+    assert free == pytest.approx((2.0 - 0.22) / 0.5, abs=0.06 / 0.5)
+
+
+def test_a_robot_in_collision_may_move_out_but_not_further_in() -> None:
+    robot = round_robot()
+    view = view_of(Flatland(boxes=[(2.0, -1.0, 2.5, 1.0)]), robot)
+    footprint = Footprint(robot, 0.05)
+    assert time_free(footprint, view, Pose2(1.85, 0), Twist(-0.5), 1.0) == 1.0
+    assert time_free(footprint, view, Pose2(1.85, 0), Twist(0.5), 1.0) < 0.2
+
+
+def test_a_footprint_collides_where_its_edge_or_its_inside_is_on_something() -> None:
+    robot = box_robot(1.0, 0.4)
+    view = view_of(Flatland(discs=[(2.0, 0.0, 0.05)]), robot)
+    footprint = Footprint(robot, 0.05)
+    poses = np.array([[1.4, 0, 0], [1.55, 0, 0], [2.0, 0, 0], [2.0, 0.35, 0], [2.0, 0.35, 1.57]])
+    assert footprint.free(view, poses).tolist() == [True, False, False, True, False]
+
+
+def test_discs_cover_the_hull() -> None:
+    robot = box_robot(0.9, 0.3)
+    discs = Footprint(robot, 0.05).discs
+    chance = np.random.default_rng(1)
+    inside = chance.uniform((-0.45, -0.15), (0.45, 0.15), (2000, 2))
+    near = np.hypot(inside[:, None, 0] - discs.offsets, inside[:, None, 1]).min(axis=1)
+    assert near.max() <= discs.radius
+    assert discs.radius < 0.25
+
+
+def test_recoveries_are_handed_out_in_turn_until_the_retries_are_used_up() -> None:
+    class Named(Wait):
+        def __init__(self, name: str) -> None:
+            self.name = name
+
+    robin = RoundRobin([Named("a"), Named("b"), Named("c")], 4)
+    assert [b.name for b in iter(robin.next, None)] == ["a", "b", "c", "a"]
+    robin.reset()
+    assert robin.next().name == "b"
+    assert RoundRobin([], 3).next() is None
+
+
+def test_a_plan_is_blocked_by_what_comes_to_lie_ahead_on_it_but_not_behind() -> None:
+    robot = round_robot()
+    line = np.column_stack((np.arange(0.0, 4.0, 0.05), np.zeros(80), np.zeros(80)))
+    plan = PlanInForce(Path(line), robot.inscribed_radius)
+    for x, blocked in ((2.0, True), (-0.5, False)):
+        plan.locate(Pose2(1.0, 0.0))
+        assert plan.blocked(view_of(Flatland(discs=[(x, 0.1, 0.1)]), robot)) == blocked
+    assert plan.remaining() == pytest.approx(2.95, abs=0.05)
+
+
+@pytest.mark.parametrize(("length", "better"), [(1.0, True), (2.4, True), (2.6, False)])
+def test_another_plan_must_be_clearly_shorter(length: float, better: bool) -> None:
+    line = np.column_stack((np.linspace(0, 3, 61), np.zeros(61), np.zeros(61)))
+    other = Path(np.array([[0, 0, 0], [length, 0, 0]], dtype=float))
+    assert PlanInForce(Path(line), 0.2).worse_than(other) == better
+
+
+def test_the_lowest_limit_of_the_zones_one_is_in_counts() -> None:
+    zones = ((((0, 0), (2, 0), (2, 2), (0, 2)), 0.3), (((1, 0), (3, 0), (3, 2), (1, 2)), 0.2))
+    assert speed_limit(zones, Pose2(0.5, 1)) == 0.3
+    assert speed_limit(zones, Pose2(1.5, 1)) == 0.2
+    assert speed_limit(zones, Pose2(5, 1)) is None
+
+
+def test_a_task_says_how_it_ended_with_the_code_of_the_last_failure() -> None:
+    journal: list[Event] = []
+    task = Task(False, journal)
+    task.start((Goal("a", Pose2(0, 0)), Goal("b", Pose2(1, 0))))
+    task.next(1)
+    task.failed(5, ErrorCode.GOAL_OCCUPIED, "in a wall")
+    task.next(6)
+    task.reached(9)
+    assert [(e.tick, e.kind, e.name) for e in journal] == [
+        (1, "goal.accepted", "a"),
+        (5, "goal.failed", "a"),
+        (6, "goal.accepted", "b"),
+        (9, "goal.reached", "b"),
+        (9, "navigation.ended", "FAILED"),
+    ]
+    assert journal[-1].data == {"error_code": 206, "error_name": "GOAL_OCCUPIED"}
