@@ -10,6 +10,7 @@ from simscen.core.session import Outcome, RunFinished, SessionStarted
 from simscen.report.journal import Journal
 from simscen.report.journaldata import Planned
 from simscen.report.rebuild import read_journal
+from simscen.run.again import again, shown
 from simscen.run.digest import digest
 from simscen.run.jobs import Job
 
@@ -37,7 +38,7 @@ def begin(journal: Journal, jobs: Sequence[Job], workers: int) -> Work:
     none.
     """
     digests = {job.scenario.id: digest(job.scenario) for job in jobs}
-    planned = [Planned(job.key, job.scenario.path, 1, digests[job.scenario.id]) for job in jobs]
+    planned = [_planned(job, digests[job.scenario.id]) for job in jobs]
     known = _verdicts(journal)
     answers = [known.get(run) for run in planned]
     kept: list[RunFinished] = []
@@ -53,6 +54,11 @@ def begin(journal: Journal, jobs: Sequence[Job], workers: int) -> Work:
     if journal.error:
         raise UsageError(f"cannot write the journal in {journal.folder}: {journal.error.strerror}")
     return Work(journal, left, kept, workers)
+
+
+def _planned(job: Job, digest: str) -> Planned:
+    scenario = job.scenario
+    return Planned(job.key, scenario.path, 1, digest, again(scenario, job.key.seed), shown(scenario.file))
 
 
 def _verdicts(journal: Journal) -> dict[Planned, RunFinished]:

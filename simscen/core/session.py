@@ -92,7 +92,8 @@ class RunFinished:
     `path` and `line` are where the scenario is written (line from 1). `lines` holds the line of each criterion, in the
     order of `verdicts`; empty or 0 = unknown. `ended` is why the simulation stopped. `metrics` are numbers by name.
     `error` is set exactly when the outcome is ERROR. `again` is the command that repeats this run.
-    `tick_rate` turns the findings' ticks into seconds.
+    `tick_rate` turns the findings' ticks into seconds. `file` is the scenario as seen from the working folder, for
+    people to open; "" = `path`.
     """
 
     key: RunKey
@@ -109,6 +110,7 @@ class RunFinished:
     error: RunFailure | None = None
     again: str = ""
     tick_rate: int = 240
+    file: str = ""
 
 
 @dataclass(frozen=True)

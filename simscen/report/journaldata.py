@@ -1,6 +1,6 @@
 """Runs as lines of the journal, and back."""
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,30 +16,35 @@ FORMAT = 1
 class Planned:
     """A run that a session has taken on: `path` and `line` are where it is written.
 
-    `digest` changes with everything the run depends on, so that an old answer is not kept for a new question.
+    `digest` changes with everything the run depends on, so that an old answer is not kept for a new question. `again`
+    and `file` are as in RunFinished; they depend on where the session was started, which is no other question.
     """
 
     key: RunKey
     path: str
     line: int = 1
     digest: str = ""
+    again: str = field(default="", compare=False)
+    file: str = field(default="", compare=False)
 
 
 def planned_data(run: Planned) -> dict[str, Any]:
     """A planned run as plain data."""
-    return {**asdict(run.key), "path": run.path, "line": run.line, "digest": run.digest}
+    where = {"path": run.path, "line": run.line, "file": run.file, "again": run.again}
+    return {**asdict(run.key), **where, "digest": run.digest}
 
 
 def read_planned(data: dict[str, Any]) -> Planned:
     """The run that `planned_data` described. Raises KeyError or TypeError when it is none."""
     key = RunKey(data["scenario"], data["seed"], data["variation"])
-    return Planned(key, data["path"], data["line"], data["digest"])
+    return Planned(key, data["path"], data["line"], data["digest"], data["again"], data["file"])
 
 
 def run_data(run: RunFinished, folder: Path) -> dict[str, Any]:
     """An answer as plain data: its result.json and what that leaves out. Files are relative to `folder`."""
     files = {name: relative(path, str(folder)) if path else "" for name, path in asdict(run.artifacts).items()}
-    return {"line": run.line, "wall": run.wall, "again": run.again, "files": files, "result": as_data(result_of(run))}
+    more = {"line": run.line, "wall": run.wall, "again": run.again, "file": run.file}
+    return {**more, "files": files, "result": as_data(result_of(run))}
 
 
 def read_run(data: dict[str, Any], key: RunKey, folder: Path) -> RunFinished:
@@ -60,6 +65,7 @@ def read_run(data: dict[str, Any], key: RunKey, folder: Path) -> RunFinished:
         artifacts=Artifacts(**files),
         error=result.error,
         again=data["again"],
+        file=data["file"],
         tick_rate=result.tick_rate,
     )
     return replace(run, lines=()) if not any(run.lines) else run

@@ -41,8 +41,7 @@ class Past:
         kind = "interrupted" if run.key in self.begun else "not-run"
         why = "before it was finished" if run.key in self.begun else "before it began"
         failure = RunFailure(kind, f"simscen ended {why}")
-        again = f"simscen run {run.path} --seed {run.key.seed}"
-        return RunFinished(run.key, run.path, run.line, Outcome.ERROR, error=failure, again=again)
+        return RunFinished(run.key, run.path, run.line, Outcome.ERROR, error=failure, again=run.again, file=run.file)
 
 
 def read_journal(folder: Path) -> Past:

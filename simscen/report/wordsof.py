@@ -42,7 +42,8 @@ def label(key: RunKey, every_seed: bool = True, prefix: str = "") -> str:
 
 def place(run: RunFinished, line: int = 0) -> str:
     """path:line of a criterion, or of the scenario."""
-    return one_line(f"{run.path}:{line or run.line}" if line or run.line else run.path)
+    file = run.file or run.path
+    return one_line(f"{file}:{line or run.line}" if line or run.line else file)
 
 
 def failure(run: RunFinished) -> tuple[str, str, str]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from simscen.core.errors import Exit
 from simscen.core.session import Listener, Outcome, RunFailure, RunFinished, RunKey, RunProgress, RunStarted
 from simscen.loading.loaded import LoadedScenario
+from simscen.run.again import again, shown
 from simscen.run.jobs import Job
 from simscen.run.supervisor import Advanced, Ended, Interrupted, Started, supervise
 from simscen.run.told import told
@@ -97,4 +98,6 @@ def _not_done(job: Job, begun: bool, stopped: Exit | None) -> RunFinished:
         failure = RunFailure("interrupted", "interrupted before it was finished")
     else:
         failure = RunFailure("not-run", "interrupted" if stopped else "another run did not pass (--fail-fast)")
-    return RunFinished(job.key, job.scenario.path, 1, Outcome.ERROR, error=failure)
+    scenario = job.scenario
+    repeat, file = again(scenario, job.key.seed), shown(scenario.file)
+    return RunFinished(job.key, scenario.path, 1, Outcome.ERROR, error=failure, again=repeat, file=file)

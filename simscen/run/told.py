@@ -5,6 +5,7 @@ from pathlib import Path
 
 from simscen.core.session import Artifacts, Outcome, RunFailure, RunFinished
 from simscen.judge.result import RunResult, from_json
+from simscen.run.again import again, shown
 from simscen.run.confine import MEMORY_BYTES
 from simscen.run.jobs import Job, ProcessEnd
 
@@ -24,7 +25,8 @@ def told(job: Job, end: ProcessEnd | None) -> RunFinished:
             wall=end.wall if end else 0.0,
             artifacts=Artifacts(folder=str(job.folder)),
             error=result,
-            again=f"simscen run {job.scenario.path} --seed {job.key.seed}",
+            again=again(job.scenario, job.key.seed),
+            file=shown(job.scenario.file),
         )
     assert end is not None
     return RunFinished(
@@ -40,7 +42,8 @@ def told(job: Job, end: ProcessEnd | None) -> RunFinished:
         metrics=tuple(sorted(result.metrics.items())),
         error=result.error,
         artifacts=_artifacts(job.folder),
-        again=result.again,
+        again=again(job.scenario, job.key.seed),
+        file=shown(job.scenario.file),
         tick_rate=result.tick_rate,
     )
 

@@ -1,0 +1,23 @@
+"""How to repeat a run: the command that does, from where we are."""
+
+import os
+import shlex
+from pathlib import Path
+
+from simscen.loading.discovery import default_root
+from simscen.loading.loaded import LoadedScenario
+
+
+def again(scenario: LoadedScenario, seed: int) -> str:
+    """The command that repeats a run, called from the working folder. Options are named only where they matter."""
+    words = ["simscen", "run", shown(scenario.file), "--seed", str(seed)]
+    if scenario.root != default_root([scenario.file]):
+        words += ["--root", shown(scenario.root)]
+    for folder in scenario.world_path:
+        words += ["--world-path", shown(folder)]
+    return shlex.join([*words, *(["--lenient"] if scenario.lenient else [])])
+
+
+def shown(path: Path) -> str:
+    """A file or folder as seen from the working folder, or absolute where that is shorter."""
+    return min(os.path.relpath(path), str(path), key=len)

@@ -1,0 +1,35 @@
+"""The command that repeats a run works from where it is printed."""
+
+import shlex
+from dataclasses import replace
+
+from simscen.loading.scenario import load_scenario
+from simscen.run.again import again, shown
+
+TEXT = "simscen: 1\nworld: {simscen: 1}\nrobot: {pose: {x: 0, y: 0}}\npass: [{collisions: {}}]\n"
+
+
+def test_a_scenario_of_the_folder_needs_no_options(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a b.scenario.yaml").write_text(TEXT)
+    scenario = load_scenario(tmp_path / "a b.scenario.yaml", tmp_path)
+    assert again(scenario, 7) == "simscen run 'a b.scenario.yaml' --seed 7"
+
+
+def test_the_path_is_seen_from_here_and_what_matters_is_named(tmp_path, monkeypatch):
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "models").mkdir()
+    (tmp_path / "sub/a.scenario.yaml").write_text(TEXT)
+    monkeypatch.chdir(tmp_path / "models")
+    scenario = load_scenario(tmp_path / "sub/a.scenario.yaml", tmp_path, [tmp_path / "models"])
+    told = shlex.split(again(replace(scenario, lenient=True), 1))
+    assert told[2:] == ["../sub/a.scenario.yaml", "--seed", "1", "--root", "..", "--world-path", ".", "--lenient"]
+
+
+def test_from_far_away_the_absolute_path_is_shorter(tmp_path, monkeypatch):
+    deep = tmp_path.joinpath(*"abcdefghijklmnopqrstuvwxyz")
+    deep.mkdir(parents=True)
+    monkeypatch.chdir(deep)
+    (deep / "near").touch()
+    assert shown(deep / "near") == "near"
+    assert shown(tmp_path / "far") == str(tmp_path / "far") or len(str(tmp_path)) > 3 * 26
