@@ -28,8 +28,8 @@ class Footprint:
     """Checks many poses at once.
 
     A round robot collides where a lethal cell's centre is within its radius. Any other collides where one is within
-    the inscribed radius or anywhere under the hull; far from everything (circumscribed radius) it never does. `reach` is
-    how far turning in place moves the hull: 0 when it is round.
+    the inscribed radius or anywhere under the hull; far from everything (circumscribed radius) it never does. `reach`
+    is how far turning in place moves the hull: 0 when it is round.
     """
 
     def __init__(self, robot: RobotModel, resolution: float) -> None:
