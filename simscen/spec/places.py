@@ -12,7 +12,8 @@ Name = Annotated[
     str,
     StringConstraints(min_length=1, max_length=120, pattern=r"^[^\x00-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]*$"),
 ]
-PlaceName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][\w .-]{0,119}$")]
+# The length stands apart from the pattern: a Unicode `\w` repeated 119 times takes 25 ms to compile, at every start.
+PlaceName = Annotated[str, StringConstraints(max_length=120, pattern=r"^[A-Za-z_][\w .-]*$")]
 Point = Annotated[list[Length], Field(min_length=2, max_length=2)]
 
 
