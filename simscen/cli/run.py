@@ -104,6 +104,7 @@ def _run(work: Work, options: Options, reports: Reports, shown: Screen) -> Exit:
     with _signals_interrupt():
         answers, stopped = run_session(work.jobs, options, ZYGOTE, listen)
     answers = [*work.kept, *answers]
+    work.journal.complete(answers)
     written = reports.write(answers)
     wall = time.monotonic() - begun
     listen(reports.closing(answers, wall, stopped is not None))

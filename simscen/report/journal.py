@@ -31,15 +31,15 @@ class Journal:
         self.error: OSError | None = None
         self._file = os.open(folder / NAME, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
         _lock(self._file, folder)
-        self._size = _whole_lines(self._file)
-        if self._size and not goes_on:
+        if _whole_lines(self._file) and not goes_on:
             raise UsageError(f"the output folder {folder} holds a session already; nothing in it was touched")
         self._numbers: dict[RunKey, int] = {}
+        self._answered: set[RunKey] = set()
         self._begun = time.monotonic()
 
     def plan(self, runs: Sequence[Planned], version: str, workers: int) -> None:
         """Open a session of these runs; what stood in the journal before no longer counts."""
-        self._numbers = {run.key: number for number, run in enumerate(runs)}
+        self._numbers, self._answered = {run.key: number for number, run in enumerate(runs)}, set()
         facts = {"format": FORMAT, "version": version, "workers": workers, "pid": os.getpid()}
         self._write({"event": "planned", **facts, "runs": [planned_data(run) for run in runs]})
 
@@ -49,28 +49,38 @@ class Journal:
             case RunStarted():
                 self._write({"event": "started", "run": self._numbers[event.key]})
             case RunFinished():
-                self._write({"event": "finished", "run": self._numbers[event.key], **run_data(event, self.folder)})
+                answer = {"event": "finished", "run": self._numbers[event.key], **run_data(event, self.folder)}
+                if self._write(answer):
+                    self._answered.add(event.key)
             case SessionFinished():
                 self._write({"event": "ended", "interrupted": event.interrupted})
             case _:
                 pass
 
+    def complete(self, answers: Sequence[RunFinished]) -> None:
+        """Write down the answers that are missing: an interrupt or a full disk may have come between."""
+        for answer in answers:
+            if answer.key not in self._answered:
+                self(answer)
+
     def close(self) -> None:
         """Let go of the folder."""
         os.close(self._file)
 
-    def _write(self, message: dict[str, Any]) -> None:
+    def _write(self, message: dict[str, Any]) -> bool:
         message = {**message, "at": round(time.monotonic() - self._begun, 3)}
         data = json.dumps(message, sort_keys=True, ensure_ascii=True, allow_nan=False).encode() + b"\n"
+        size = os.fstat(self._file).st_size
         try:
             written = os.write(self._file, data)
             if written < len(data):  # the disk is full: say so, as the rest of the line would
                 os.write(self._file, data[written:])
             os.fdatasync(self._file)
-            self._size += len(data)
         except OSError as error:
             self.error = error
-            os.ftruncate(self._file, self._size)
+            os.ftruncate(self._file, size)
+            return False
+        return True
 
 
 def _whole_lines(file: int) -> int:

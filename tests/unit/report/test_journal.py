@@ -139,3 +139,14 @@ def test_other_files_are_no_journals(tmp_path, content, told):
         (tmp_path / NAME).write_bytes(content)
     with pytest.raises(InvalidInput, match=told):
         read_journal(tmp_path)
+
+
+def test_answers_that_an_interrupt_kept_from_the_journal_are_added_once(tmp_path, runs):
+    journal = Journal(tmp_path)
+    journal.plan(planned(runs), "0.1.0", 2)
+    journal(runs[1])
+    journal.complete(runs)
+    journal.complete(runs)
+    journal.close()
+    finished = [line for line in (tmp_path / NAME).read_text().splitlines() if '"finished"' in line]
+    assert [json.loads(line)["run"] for line in finished] == [1, 0, 2]
