@@ -24,18 +24,29 @@ def distances(costmap: CostmapView, points: Reals) -> npt.NDArray[np.float32]:
     return np.where(inside, costmap.distance[rows, columns], np.float32(0.0))
 
 
+def distance_at(costmap: CostmapView, x: float, y: float) -> float:
+    """The same for one point: a tenth of the time."""
+    row = math.floor((y - costmap.origin[1]) / costmap.resolution)
+    column = math.floor((x - costmap.origin[0]) / costmap.resolution)
+    height, width = costmap.distance.shape
+    if 0 <= row < height and 0 <= column < width:
+        return float(costmap.distance[row, column])
+    return 0.0
+
+
 class Footprint:
     """Checks many poses at once.
 
     A round robot collides where a lethal cell's centre is within its radius. Any other collides where one is within
     the inscribed radius or anywhere under the hull; far from everything (circumscribed radius) it never does. `reach`
-    is how far turning in place moves the hull: 0 when it is round.
+    is how far turning in place moves the hull: 0 when it is round; `circumscribed` is the radius around all of it.
     """
 
     def __init__(self, robot: RobotModel, resolution: float) -> None:
-        self._inscribed, self._circumscribed = robot.inscribed_radius, robot.circumscribed_radius
+        self._inscribed = robot.inscribed_radius
         self._round = robot.radius is not None
         self.reach = 0.0 if self._round else robot.circumscribed_radius
+        self.circumscribed = robot.circumscribed_radius
         corners = np.array(robot.footprint, dtype=np.float64)
         inner = _inner_points(corners, resolution, self._inscribed)
         self._hull = np.concatenate((_edge_points(corners, resolution), inner))
@@ -47,7 +58,7 @@ class Footprint:
         free: Mask = np.asarray(distance > np.float32(self._inscribed))
         if self._round:
             return free
-        unsure = np.flatnonzero(free & (distance <= self._circumscribed + costmap.resolution))
+        unsure = np.flatnonzero(free & (distance <= self.circumscribed + costmap.resolution))
         if len(unsure):
             free[unsure] = self._hull_free(costmap, poses[unsure])
         return free

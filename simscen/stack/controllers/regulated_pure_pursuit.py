@@ -11,7 +11,7 @@ from simscen.model.stack import RegulatedPurePursuit as RppSpec
 from simscen.stack.arcs import poses_along
 from simscen.stack.controllers.goal_pose import GoalPose
 from simscen.stack.controllers.tracking import PathTracker
-from simscen.stack.footprint import Footprint, distances
+from simscen.stack.footprint import Footprint, distance_at
 from simscen.stack.lookahead import time_free
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
 
@@ -58,7 +58,7 @@ class RegulatedPurePursuit:
         track.locate(pose)
         reach = self._lookahead(twist.vx)
         x, y = track.carrot(pose, reach, beyond=self._robot.turning_radius > 0.0)
-        carrot = pose.inverse().apply(np.array([[x, y]]))[0].tolist()
+        carrot = _seen_from(pose, x, y)
         if self._goal_pose.reached(pose, twist, goal, track.remaining()):
             command = self._goal_pose.turn_to_goal(pose, goal, twist)
         elif self._should_rotate(carrot):
@@ -75,18 +75,18 @@ class RegulatedPurePursuit:
             return spec.lookahead_dist
         return min(max(abs(speed) * spec.lookahead_time, spec.min_lookahead_dist), spec.max_lookahead_dist)
 
-    def _should_rotate(self, carrot: list[float]) -> bool:
+    def _should_rotate(self, carrot: tuple[float, float]) -> bool:
         if not self._spec.use_rotate_to_heading or self._robot.turning_radius > 0.0:
             return False
         return abs(self._bearing(carrot)) > self._spec.rotate_to_heading_min_angle
 
-    def _bearing(self, carrot: list[float]) -> float:
+    def _bearing(self, carrot: tuple[float, float]) -> float:
         """How far the end of the robot that goes first must turn to point at the carrot."""
         assert self._track is not None
         sign = 1.0 if self._track.forward else -1.0
         return math.atan2(sign * carrot[1], sign * carrot[0])
 
-    def _drive(self, carrot: list[float], pose: Pose2, costmap: CostmapView) -> Twist:
+    def _drive(self, carrot: tuple[float, float], pose: Pose2, costmap: CostmapView) -> Twist:
         square = carrot[0] ** 2 + carrot[1] ** 2
         curvature = 2.0 * carrot[1] / square if square > 1e-6 else 0.0
         if self._robot.turning_radius > 0.0:
@@ -108,7 +108,7 @@ class RegulatedPurePursuit:
         if spec.use_regulated_linear_velocity_scaling and abs(curvature) * spec.regulated_linear_scaling_min_radius > 1:
             slow = min(slow, speed / (abs(curvature) * spec.regulated_linear_scaling_min_radius))
         if spec.use_cost_regulated_linear_velocity_scaling:
-            near = float(distances(costmap, np.array([pose.x, pose.y])))
+            near = distance_at(costmap, pose.x, pose.y)
             if near < spec.cost_scaling_dist:
                 slow = min(slow, speed * spec.cost_scaling_gain * near / spec.cost_scaling_dist)
         speed = min(speed, max(slow, spec.regulated_linear_scaling_min_speed))
@@ -141,3 +141,9 @@ class RegulatedPurePursuit:
         if abs(command.vx) * scale < CREEP:
             raise NavigationFailure(ErrorCode.NO_VALID_CONTROL, f"collision ahead in {free:.2f} s")
         return Twist(command.vx * scale, 0.0, command.wz * scale)
+
+
+def _seen_from(pose: Pose2, x: float, y: float) -> tuple[float, float]:
+    """A point of the map in the robot's frame."""
+    cosine, sine = math.cos(pose.yaw), math.sin(pose.yaw)
+    return cosine * (x - pose.x) + sine * (y - pose.y), cosine * (y - pose.y) - sine * (x - pose.x)

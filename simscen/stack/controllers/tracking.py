@@ -1,6 +1,7 @@
 """Where the robot is on its path, and what lies ahead."""
 
 import math
+from bisect import bisect_right
 
 import numpy as np
 
@@ -27,6 +28,7 @@ class PathTracker:
         steps = np.diff(self.points[:, :2], axis=0)
         lengths = np.hypot(steps[:, 0], steps[:, 1])
         self.along = np.concatenate(([0.0], np.cumsum(lengths)))
+        self._metres: list[float] = self.along.tolist()
         ahead = steps[:, 0] * np.cos(self.points[:-1, 2]) + steps[:, 1] * np.sin(self.points[:-1, 2]) >= -1e-9
         changes = np.flatnonzero(ahead[1:] != ahead[:-1]) + 1 if len(ahead) else np.zeros(0, dtype=np.int64)
         self._ends: list[int] = [*changes.tolist(), len(self.points) - 1]
@@ -36,7 +38,7 @@ class PathTracker:
     @property
     def length(self) -> float:
         """Length of the path in metres."""
-        return float(self.along[-1])
+        return self._metres[-1]
 
     @property
     def forward(self) -> bool:
@@ -58,11 +60,11 @@ class PathTracker:
 
     def remaining(self) -> float:
         """Metres of path from the nearest point to the end."""
-        return float(self.along[-1] - self.along[self.index])
+        return self._metres[-1] - self._metres[self.index]
 
     def to_cusp(self) -> float:
         """Metres of path to the end of this piece."""
-        return float(self.along[self._ends[0]] - self.along[self.index])
+        return self._metres[self._ends[0]] - self._metres[self.index]
 
     def carrot(self, pose: Pose2, distance: float, beyond: bool = False) -> tuple[float, float]:
         """Where the piece leaves the circle of `distance` around the robot; its end if it does not leave.
@@ -90,7 +92,7 @@ class PathTracker:
 
     def _stop(self, metres: float) -> int:
         """One past the last point so far ahead, or of this piece."""
-        end = int(np.searchsorted(self.along, self.along[self.index] + metres, side="right"))
+        end = bisect_right(self._metres, self._metres[self.index] + metres)
         return min(end, self._ends[0] + 1)
 
 

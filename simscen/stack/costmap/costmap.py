@@ -33,13 +33,12 @@ class Costmap:
     def __init__(self, spec: CostmapSpec, surroundings: Surroundings) -> None:
         self._spec, self._surroundings = spec, surroundings
         self._robot = surroundings.robot
+        self._inscribed = surroundings.robot.inscribed_radius
         self._rolling = surroundings.map is None
         layer = self._layer(Pose2(0.0, 0.0))
         resolution = layer.frame.resolution
         reach = max(spec.inflation_radius, self._robot.circumscribed_radius + 0.5)
-        self._inflation = Inflation(
-            resolution, self._robot.inscribed_radius, spec.inflation_radius, spec.cost_scaling_factor, reach
-        )
+        self._inflation = Inflation(resolution, self._inscribed, spec.inflation_radius, spec.cost_scaling_factor, reach)
         self._margin = math.ceil(reach / resolution)
         self._revision = 0
         self._newest: dict[str, tuple[Pose2, Scan]] = {}
@@ -91,7 +90,7 @@ class Costmap:
         if self._static_squared[row, column] == 0:
             return False
         near = self._frame.window((row, column), (row, column), math.ceil(tolerance / self._frame.resolution))
-        fits = self._inflation.metres[self._static_squared[near]] > self._robot.inscribed_radius
+        fits = self._inflation.metres[self._static_squared[near]] > self._inscribed
         points = self._frame.centres(np.argwhere(fits) + np.array((near[0].start, near[1].start)))
         return bool((np.hypot(points[:, 0] - pose.x, points[:, 1] - pose.y) <= tolerance).any())
 
@@ -151,16 +150,14 @@ class Costmap:
 
     def _under_footprint(self, cells: Cells, base: Pose2) -> npt.NDArray[np.bool_]:
         offset = self._frame.centres(cells) - np.array([base.x, base.y])
-        inside: npt.NDArray[np.bool_] = np.hypot(offset[:, 0], offset[:, 1]) < self._robot.inscribed_radius
+        inside: npt.NDArray[np.bool_] = np.hypot(offset[:, 0], offset[:, 1]) < self._inscribed
         return inside
 
     def _marks(self, base: Pose2, scan: Scan) -> Cells:
         points = hits(scan, base, self._spec.obstacle_min_range, self._spec.obstacle_max_range)
         cells = self._frame.cells(points)
         cells = cells[self._frame.inside(cells)]
-        cells = cells[self._static_squared[cells[:, 0], cells[:, 1]] > BESIDE_A_WALL]
-        flat = np.unique(cells[:, 0] * self._frame.shape[1] + cells[:, 1])
-        return np.column_stack(np.divmod(flat, self._frame.shape[1]))
+        return cells[self._static_squared[cells[:, 0], cells[:, 1]] > BESIDE_A_WALL]
 
     def _refresh(self, changed: Cells) -> None:
         """Compute distances and costs again wherever one of the changed cells can matter."""
