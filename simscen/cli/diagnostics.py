@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from simscen.core.problems import Problem
-from simscen.report.text import ascii_only, one_line
+from simscen.report.text import ascii_only, no_marker, no_marker_in_json, one_line
 
 MOST_A_FILE = 50
 WIDEST = 100
@@ -44,7 +44,7 @@ def as_json(problems: Iterable[Problem], **more: Any) -> str:
     """One JSON object: `problems`, and whatever else is given."""
     keys = ("path", "line", "col", "code", "severity", "message", "hint")
     listed = [{key: getattr(problem, key) for key in keys} for problem in problems]
-    return json.dumps({**more, "problems": listed}, indent=2, ensure_ascii=False)
+    return no_marker_in_json(json.dumps({**more, "problems": listed}, indent=2))
 
 
 def as_github(problems: Iterable[Problem]) -> str:
@@ -55,9 +55,9 @@ def as_github(problems: Iterable[Problem]) -> str:
 def harmless(text: str) -> str:
     """Foreign text on one line that no terminal and no CI system obeys.
 
-    GitHub runs `::command::` at the start of a line and `##[command]` anywhere in one; a backslash keeps it from that.
+    GitHub runs `::command::` at the start of a line; a backslash keeps it from that.
     """
-    return _WORKFLOW_COMMAND.sub(r"\1:\\", one_line(text)).replace("##[", "##\\[")
+    return no_marker(_WORKFLOW_COMMAND.sub(r"\1:\\", one_line(text)))
 
 
 def print_text(text: str, stream: TextIO | None = None) -> None:
@@ -103,7 +103,7 @@ def _excerpt(problem: Problem) -> list[str]:
 
 def _kept(source: str) -> str:
     """A line of the file with its spaces as they are; it follows a number and a bar, so it begins no line."""
-    return source.replace("##[", "##\\[")
+    return no_marker(source)
 
 
 def _columns(text: str) -> int:
@@ -121,7 +121,7 @@ def _annotation(problem: Problem) -> str:
 
 
 def _data(text: str) -> str:
-    return text.replace("##[", "##\\[").replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+    return no_marker(text).replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
 
 
 def _property(text: str) -> str:

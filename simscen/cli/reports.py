@@ -1,4 +1,4 @@
-"""What a session leaves behind: results.json, junit.xml, run.json; and its exit code."""
+"""What a session leaves behind: results.json, junit.xml, report.html, run.json; and its exit code."""
 
 import sys
 from collections.abc import Sequence
@@ -10,6 +10,7 @@ from simscen.cli.diagnostics import print_text
 from simscen.core.errors import Exit, UsageError
 from simscen.core.session import Outcome, RunFinished, SessionFinished
 from simscen.report.junit import Family, to_xml
+from simscen.report.page import to_html
 from simscen.report.results import to_json
 from simscen.run.outfolder import probe_writable, write_atomically
 
@@ -38,6 +39,7 @@ class Reports:
         documents = {
             self.folder / "results.json": to_json(answers, str(self.folder)).encode(),
             self.folder / "junit.xml": junit,
+            self.folder / "report.html": to_html(answers).encode(),
             self.junit: junit,
         }
         outcomes = [_written(path, data) for path, data in documents.items()]  # every one is tried

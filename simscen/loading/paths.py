@@ -2,6 +2,7 @@
 
 import errno
 import os
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -11,6 +12,9 @@ from simscen.loading.messages import quoted, suggestion
 from simscen.loading.source import reason
 
 MODEL = "model://"
+
+_UNSPEAKABLE = re.compile("[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
+"""Control and bidirectional characters, and what stands for bytes that are not UTF-8 (PEP 383)."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +54,7 @@ class Fence:
         """The absolute path of a file that the command line names, with links in its folder followed, if inside."""
         file = _real(path.parent) / path.name
         if self.holds(file):
-            return file
+            return _unspeakable(path, self.shown(file)) or file
         return Problem(str(path), 0, 0, "SC020", "the file is outside the scenario root", "choose one with --root")
 
     def holds(self, path: Path) -> bool:
@@ -96,6 +100,16 @@ def _refused_form(written: str) -> Refusal | None:
     if "://" in written and not written.startswith(MODEL):
         return Refusal("SC021", f"{quoted(written)} is a URL", "only relative paths and model://name are read")
     return None
+
+
+def _unspeakable(path: Path, name: str) -> Problem | None:
+    """The name becomes the scenario's id, which folders, XML and people must be able to take."""
+    character = _UNSPEAKABLE.search(name)
+    if character is None:
+        return None
+    code = ord(character[0])
+    told = "its name is not valid UTF-8" if 0xD800 <= code < 0xE000 else f"control character U+{code:04X} in its name"
+    return Problem(str(path), 0, 0, "SC017", told, "rename it")
 
 
 def _real(path: Path) -> Path:

@@ -6,6 +6,7 @@ from typing import TextIO
 from simscen.core.session import RunFinished, SessionEvent, SessionFinished
 from simscen.report.console import Reporter
 from simscen.report.results import to_json
+from simscen.report.text import no_marker_in_json
 
 
 def json_reporter(out: TextIO) -> Reporter:
@@ -31,5 +32,5 @@ class _Json:
         if isinstance(event, RunFinished):
             self._runs.append(event)
         if isinstance(event, SessionFinished):
-            self._out.write(to_json(self._runs, event.folder))
+            self._out.write(no_marker_in_json(to_json(self._runs, event.folder)))
             self._out.flush()

@@ -3,6 +3,7 @@
 import re
 
 _UNSAFE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
+_MARKER = re.compile(r"##(\w*)\[")
 _ASCII = str.maketrans(
     {"✓": "+", "✗": "x", "·": "-", "≤": "<=", "≥": ">=", "°": " deg", "×": "x", "…": "...", "—": "-"}
 )
@@ -27,9 +28,18 @@ def ascii_only(text: str) -> str:
 
 
 def no_command(line: str) -> str:
-    """A line of output that no CI takes for one of its commands (`::error::` on GitHub, `##[error]` on Azure)."""
-    defused = line.replace("##[", "#\\x23[")
-    return re.sub(r"^(\s*):(?=:)", r"\1\\x3a", defused)
+    """A line of output that no CI takes for one of its commands, such as `::error::` at its start on GitHub."""
+    return re.sub(r"^(\s*):(?=:)", r"\1\\x3a", no_marker(line))
+
+
+def no_marker(text: str) -> str:
+    """Text without what CI obeys anywhere in a line: `##[error]` (GitHub, Azure), `##vso[…]`, `##teamcity[…]`."""
+    return _MARKER.sub(r"##\1\\[", text)
+
+
+def no_marker_in_json(document: str) -> str:
+    """The same for a JSON document, whose content stays as it is."""
+    return document.replace("##", "#\\u0023")
 
 
 def _escaped(character: str) -> str:

@@ -85,7 +85,7 @@ def _of_shapes(spec: RobotSpec, file: Path | None) -> RobotBody:
     if wheels and min(float(part.pose.apply(extremes(part.shape))[:, 2].min()) for part in parts) < GROUND_CLEARANCE:
         message = f"a part of the body of {spec.name!r} reaches the ground: it would drag instead of roll"
         hint = f"give each part a `z` of at least {GROUND_CLEARANCE:g} m"
-        raise InvalidInput([Problem(file.name if file else spec.name, 0, 0, "SC401", message, hint)])
+        raise InvalidInput([Problem(str(file or spec.name), 0, 0, "SC401", message, hint)])
     even = of_solids(parts, spec.mass - sum(w.inertia.mass for w in wheels))
     chassis = MassProperties(even.mass, even.centre * (1.0, 1.0, LOW), even.tensor)
     return assemble(spec, parts, wheels, chassis)

@@ -196,6 +196,14 @@ def test_39_a_urdf_that_is_a_folder(with_scenario, folder: Path) -> None:
     assert "cube.robot.yaml:3:7: error[SC001] not a regular file: `cube.urdf`" in with_scenario(replace={})
 
 
+def test_a_robot_in_another_folder_that_would_drag_is_told_with_a_path_that_opens(with_scenario, folder: Path) -> None:
+    (folder / "robots").mkdir()
+    text = (folder / "cube.robot.yaml").read_text()
+    (folder / "robots/cube.robot.yaml").write_text(text.replace("z: 4 cm", "z: 0"))
+    told = with_scenario(replace={"cube.robot.yaml": "robots/cube.robot.yaml"})
+    assert told.startswith("robots/cube.robot.yaml: error[SC401] a part of the body of 'cube' reaches the ground")
+
+
 def linked(count: int) -> str:
     joint = '<joint name="j{0}" type="fixed"><parent link="base"/><child link="l{0}"/></joint><link name="l{0}"/>'
     return URDF.replace("</robot>", "\n".join(joint.format(i) for i in range(count)) + "</robot>")

@@ -1,0 +1,204 @@
+"""Text of users and workers is shown, never obeyed; code beside scenarios is not run; secrets stay outside."""
+
+import json
+import os
+import pty
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+HOSTILE = [
+    "[/red]", "[link=https://example.org]here[/link]", "::error::gotcha", "##[error]gotcha", "##vso[task.x]",
+    "##teamcity[x]", "]]>", "&lt;&amp;", "<script>alert(1)</script>", "<img src=x onerror=alert(1)>", "=cmd()",
+    "%0A::error::gotcha", "a,b:c%d", "[[ATTACHMENT|/etc/passwd]]", "|cell|`code`", "{0} %s",
+]  # fmt: skip
+COMMAND = re.compile(r"^\s*::|##\w*\[", re.MULTILINE)
+ANNOTATION = re.compile(r"::(error|warning) (file|line|col|title)=[^:,]*(,(file|line|col|title)=[^:,]*)*::[^\r\n]*")
+LIVELESS = {
+    "html", "head", "meta", "title", "style", "body", "h1", "p", "details", "summary", "span", "div", "table",
+    "tr", "th", "td", "img", "code", "pre", "b",
+}  # fmt: skip
+TELLING = str(Path(__file__).with_name("telling_zygote.py"))
+
+
+@pytest.fixture
+def hostile(folder: Path) -> str:
+    """A scenario that fails, and whatever has a name in it has a hostile one."""
+    goals = [{"name": name, "pose": {"x": 5, "y": 3}, "timeout": 0.1} for name in HOSTILE]
+    events = [
+        {
+            "name": f"event {name}",
+            "when": {"time": 0.1},
+            "do": {"spawn": {"name": name, "box": [0.1, 0.1, 0.1], "pose": {"x": 2 + number / 4, "y": 0.3}}},
+        }
+        for number, name in enumerate(HOSTILE)
+    ]
+    scenario = {
+        "simscen": 1, "name": HOSTILE[2], "world": "room.world.yaml", "on_goal_failure": "continue", "goals": goals,
+        "description": "\n::error::gotcha\n".join(HOSTILE), "events": events, "linger": 0,
+        "robot": {"model": "cube.robot.yaml", "pose": "start"}, "pass": [{"goals_reached": {}}],
+    }  # fmt: skip
+    (folder / "::error::h##[x]<b>.scenario.yaml").write_text(json.dumps(scenario))
+    return "./::error::h##[x]<b>.scenario.yaml"
+
+
+class Tags(HTMLParser):
+    """What a browser would take for elements and attributes."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.tags: set[str] = set()
+        self.attributes: set[str] = set()
+        self.text = ""
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs) -> None:
+        self.tags.add(tag)
+        self.attributes |= {name for name, _ in attrs}
+
+    def handle_data(self, data) -> None:
+        self.text += data
+
+
+def check_reports(out: Path) -> str:
+    """They are well-formed, attach nothing from elsewhere, and hold no live element; gives the text of failures."""
+    junit = ElementTree.fromstring((out / "junit.xml").read_bytes())
+    attached = [
+        path for text in junit.iter("system-out") for path in re.findall(r"\[\[ATTACHMENT\|(.*?)\]\]", text.text)
+    ]
+    assert attached
+    assert all(Path(path).resolve().is_relative_to(out.resolve()) for path in attached)
+    json.loads((out / "results.json").read_text())
+    page = Tags((out / "report.html").read_text())
+    assert page.tags <= LIVELESS
+    assert page.attributes <= {"lang", "charset", "http-equiv", "content", "class", "open", "alt", "loading", "src"}
+    assert "<script>alert(1)</script>" in page.text
+    return "\n".join(found.text or "" for kind in ("failure", "error") for found in junit.iter(kind))
+
+
+def test_81_on_the_console_and_in_the_reports(simscen, hostile: str, folder: Path) -> None:
+    ended = simscen("run", hostile, "--out", "out")
+    assert (ended.code, ended.err) == (1, "")
+    assert not COMMAND.search(ended.out)
+    told = check_reports(folder / "out")
+    assert [name for name in HOSTILE if name not in told] == []
+    assert all(name in ended.out for name in ("[/red]", "[link=https://example.org]here[/link]", "]]>", "=cmd()"))
+
+
+def test_81_on_github(simscen, hostile: str, folder: Path, monkeypatch) -> None:
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(folder / "summary.md"))
+    ended = simscen("run", hostile, "--out", "out", "--format", "github")
+    assert ended.code == 1
+    commands = [line for line in ended.out.splitlines() if COMMAND.search(line)]
+    assert commands
+    assert all(ANNOTATION.fullmatch(line) for line in commands)
+    summary = (folder / "summary.md").read_text()
+    assert not COMMAND.search(summary)
+    assert "<script>" not in summary
+    assert "<img" not in summary
+
+
+def test_81_as_json(simscen, hostile: str) -> None:
+    ended = simscen("run", hostile, "--out", "out", "--format", "json")
+    assert ended.code == 1
+    assert json.loads(ended.out)["failed"] == 1
+    assert not COMMAND.search(ended.out)
+
+
+def test_81_on_a_terminal(hostile: str, folder: Path) -> None:
+    main, end = pty.openpty()
+    command = [Path(sys.executable).with_name("simscen"), "run", hostile, "--out", "out"]
+    child = subprocess.Popen(
+        command, cwd=folder, stdin=end, stdout=end, stderr=end, env={**os.environ, "TERM": "xterm"}
+    )
+    os.close(end)
+    shown = b""
+    try:
+        while piece := os.read(main, 65536):
+            shown += piece
+    except OSError:  # the other end of a terminal has been closed
+        pass
+    os.close(main)
+    assert child.wait(timeout=60) == 1
+    assert b"[/red]" in shown
+    assert b"[link=https://example.org]here[/link]" in shown
+    assert b"\x1b]8" not in shown, "a link that can be clicked"
+
+
+@pytest.mark.parametrize("name", ["[red]a", "]]>", "&amp;", "=cmd()", "%0A::x", "-x", "機械", "a,b"])
+def test_81_names_of_files_are_shown(simscen, folder: Path, name: str) -> None:
+    (folder / "a.scenario.yaml").rename(folder / f"{name}.scenario.yaml")
+    told, listed = simscen("validate", "."), simscen("list", ".")
+    assert (told.code, listed.code) == (0, 0)
+    assert name in listed.out
+    assert not COMMAND.search(told.out + listed.out)
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("a b\u202ec", "control character U+202E in its name"),
+        ("a\nb", "control character U+000A in its name"),
+        ("\x1b[31m", "control character U+001B in its name"),
+        ("caf\udce9", "its name is not valid UTF-8"),
+    ],
+)
+def test_81_names_that_no_report_could_show_are_refused(refused, simscen, folder: Path, name: str, told: str) -> None:
+    (folder / "a.scenario.yaml").rename(folder / f"{name}.scenario.yaml")
+    problems = refused(".")
+    assert told in problems
+    assert problems.isprintable() or problems.count("\n") == 2
+    assert json.loads(simscen("validate", ".", "--format", "json").out)["problems"][0]["message"] == told
+
+
+def test_82_what_a_worker_prints_is_quoted_where_it_died(simscen, folder: Path, monkeypatch) -> None:
+    monkeypatch.setattr("simscen.cli.run.ZYGOTE", (TELLING,))
+    text = (folder / "a.scenario.yaml").read_text()
+    (folder / "a.scenario.yaml").write_text(text.replace("seed: 7", "tags: [chatter]"))
+    for kind in ("text", "github"):
+        ended = simscen("run", "a.scenario.yaml", "--out", kind, "--format", kind)
+        assert ended.code == 3
+        assert "SIGKILL" in ended.out
+        assert "set-output name=x" in ended.out
+        assert all(ANNOTATION.fullmatch(line) for line in ended.out.splitlines() if COMMAND.search(line))
+        assert "\x1b" not in ended.out
+    junit = ElementTree.fromstring((folder / "text/junit.xml").read_bytes())
+    assert "::set-output name=x::y" in junit.find(".//error").text
+    page = Tags((folder / "text/report.html").read_text())
+    assert "script" not in page.tags
+
+
+def test_83_annotations_of_validate_escape_what_github_reads(simscen, folder: Path) -> None:
+    (folder / "a,b:c%d.scenario.yaml").write_text("simscen: 1\n'50 %, a:b': 1\n")
+    lines = simscen("validate", "a,b:c%d.scenario.yaml", "--format", "github").out.splitlines()
+    line = next(line for line in lines if "SC012" in line)
+    assert ANNOTATION.fullmatch(line)
+    assert line.startswith("::error file=a%2Cb%3Ac%25d.scenario.yaml,line=2,col=1,title=simscen SC012::")
+    assert "50 %25, a:b" in line
+
+
+def test_84_code_beside_scenarios_is_not_run(folder: Path) -> None:
+    for module in ("yaml", "simscen", "sitecustomize", "usercustomize", "numpy", "pybullet", "json", "ompl", "typer"):
+        (folder / f"{module}.py").write_text(f"open('marker', 'a').write('{module} ')\n")
+    command = [Path(sys.executable).with_name("simscen"), "run", ".", "--out", "out"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert not list(folder.rglob("marker"))
+
+
+def test_85_a_secret_is_not_in_the_environment_of_a_worker(simscen, folder: Path, monkeypatch) -> None:
+    monkeypatch.setattr("simscen.cli.run.ZYGOTE", (TELLING,))
+    for name in ("GITHUB_TOKEN", "AWS_SECRET_ACCESS_KEY", "LD_PRELOAD_SECRET", "PYTHONPATH_SECRET"):
+        monkeypatch.setenv(name, "hunter2")
+    text = (folder / "a.scenario.yaml").read_text()
+    (folder / "a.scenario.yaml").write_text(text.replace("seed: 7", "tags: [environment]"))
+    assert simscen("run", "a.scenario.yaml", "--out", "out").code == 0
+    (log,) = (folder / "out").rglob("worker.log")
+    assert "PATH" in log.read_text()
+    everything = b"".join(path.read_bytes() for path in (folder / "out").rglob("*") if path.is_file())
+    assert b"hunter2" not in everything
