@@ -87,7 +87,7 @@ class Library:
             except Trouble as trouble:
                 if str(trouble) != _ABSENT:
                     raise element.unusable(f"{uri}: {trouble}") from trouble
-        looked = ", ".join(self.shown(folder) or "." for folder in folders) or "no folder"
+        looked = ", ".join(dict.fromkeys(self.shown(folder) or "." for folder in folders)) or "no folder"
         raise element.unusable(f"{uri}: {_ABSENT}", f"looked in {looked}; allow its folder with --world-path")
 
     def read(self, path: Path, element: Element, limit: int) -> bytes:

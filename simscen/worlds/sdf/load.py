@@ -1,7 +1,9 @@
 """From an SDF file to a world."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -12,6 +14,7 @@ from simscen.worlds.extents import plan_extents
 from simscen.worlds.sdf.actors import read_actor
 from simscen.worlds.sdf.bodies import distinct, split
 from simscen.worlds.sdf.files import Library
+from simscen.worlds.sdf.floor import floor_height
 from simscen.worlds.sdf.includes import Shelf
 from simscen.worlds.sdf.links import read_link
 from simscen.worlds.sdf.markup import Element
@@ -26,7 +29,8 @@ def load_sdf(path: Path, *, search: Sequence[Path] = (), root: Path, lenient: bo
     """The world in a Gazebo `.sdf`, `.world` or model file of SDF 1.3 to 1.12.
 
     Only collision geometry counts. Static models become solids, others bodies with their mass; actors become bodies
-    of mass 0 with a path. Everything is in the world's frame and in document order. Files that it names are looked for
+    of mass 0 with a path. Everything is in the world's frame and in document order; a floor that lies above z = 0 is
+    brought down to it, where robots drive. Files that it names are looked for
     beside it and in `search`, and must lie inside `root` or `search`.
 
     Raises InvalidInput with everything that would change the geometry and cannot be used; with `lenient` that is
@@ -106,7 +110,12 @@ class _Builder:
         extents = [plan_extents(solid) for solid in self.solids]
         extents += [plan_extents(solid, body.pose) for body in bodies for solid in body.solids]
         name = element.name or Path(element.source.name).stem
-        return World(name, tuple(self.solids), bodies, bounds=_around(extents), notes=self.report.notes)
+        bounds = _around(extents)
+        height = floor_height(self.solids, bounds)
+        if height:
+            self.report.note(element.place, f"its floor lies {height:.3f} m high; the world is lowered by as much")
+        solids, bodies = _lowered(self.solids, height), _lowered(bodies, height)
+        return World(name, solids, bodies, bounds=bounds, notes=self.report.notes)
 
     def _why_empty(self) -> str:
         models = [m for part in self.whole.parts if isinstance(part, Model) for m in part.models()]
@@ -118,6 +127,13 @@ class _Builder:
         if not links:
             return "no collision geometry in this world: its models have no links"
         return "no collision geometry in this world: its links have visuals at most"
+
+
+Placed = TypeVar("Placed", Solid, Body)
+
+
+def _lowered(things: Sequence[Placed], height: float) -> tuple[Placed, ...]:
+    return tuple(replace(thing, pose=thing.pose._replace(z=thing.pose.z - height)) for thing in things)
 
 
 def _around(extents: list[Array]) -> tuple[float, float, float, float]:
