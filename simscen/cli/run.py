@@ -1,18 +1,15 @@
 """`simscen run`."""
 
 import os
-import signal
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from types import FrameType
 from typing import Annotated
 
 import typer
 
 from simscen.cli.diagnostics import as_text, print_text
+from simscen.cli.interrupts import signals_interrupt
 from simscen.cli.reports import JunitFamily, Reports, require_writable, verdict
 from simscen.cli.screen import Format, Screen, screen
 from simscen.cli.select import Selection, load_all, shard_of
@@ -23,7 +20,6 @@ from simscen.report.journal import Journal, require_free
 from simscen.report.rebuild import read_journal
 from simscen.run.outfolder import make_folder
 from simscen.run.session import Options, plan, run_session
-from simscen.run.supervisor import Interrupted
 
 ZYGOTE = ("-m", "simscen.cli.zygote")
 
@@ -101,7 +97,7 @@ def _run(work: Work, options: Options, reports: Reports, shown: Screen) -> Exit:
     shown(work.started(reports.folder))
     for answer in work.kept:
         shown(answer)
-    with _signals_interrupt():
+    with signals_interrupt():
         answers, stopped = run_session(work.jobs, options, ZYGOTE, listen)
     answers = [*work.kept, *answers]
     work.journal.complete(answers)
@@ -125,24 +121,6 @@ def _output_folder(out: Path | None, resume: Path | None) -> tuple[Path, Journal
         return folder, Journal(folder, goes_on=resume is not None)
     except OSError as error:
         raise UsageError(f"cannot use the output folder {folder}: {error.strerror}") from error
-
-
-@contextmanager
-def _signals_interrupt() -> Iterator[None]:
-    """Turn the first SIGINT or SIGTERM into an orderly end; more of them change nothing."""
-
-    def interrupt(number: int, _: FrameType | None) -> None:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)
-        raise Interrupted(number)
-
-    before = {number: signal.signal(number, interrupt) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield
-    finally:
-        if signal.getsignal(signal.SIGINT) is interrupt:
-            for number, handler in before.items():
-                signal.signal(number, handler)
 
 
 def _cores() -> int:
