@@ -1,0 +1,100 @@
+"""A run is a function of scenario and seed: neither neighbours, load, order, folder nor environment show in it."""
+
+import hashlib
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import simscen.run.supervisor as supervisor
+
+SIMSCEN = Path(sys.executable).with_name("simscen")
+TELLING = str(Path(__file__).with_name("telling_zygote.py"))
+BUSY = "import time; end = time.monotonic() + 60\nwhile time.monotonic() < end: sum(range(100000))"
+NOISY = """\
+events: [{when: {time: 1 s}, do: {spawn: {name: box, box: [0.2, 0.2, 0.4], pose: {x: 1.9, y: 1.6}}}}]
+faults: [{sensor: lidar, noise: {std: 5 cm}}, {sensor: odom, slip: {left: 0.1, right: 0.05}, when: {time: 1 s}, for: 1 s}]
+stack: {localizer: {type: amcl, max_particles: 500}}
+"""
+
+
+def results(out: Path) -> dict[str, tuple[bytes, str]]:
+    """Of each run its result and its log's hash."""
+    return {
+        log.parent.relative_to(out).as_posix(): (
+            (log.parent / "result.json").read_bytes(),
+            hashlib.sha256(log.read_bytes()).hexdigest(),
+        )
+        for log in sorted(out.rglob("run.mcap"))
+    }
+
+
+@pytest.fixture
+def pair(folder: Path) -> Path:
+    """A plain scenario, and one in which everything that is random takes part."""
+    text = (folder / "a.scenario.yaml").read_text()
+    (folder / "b.scenario.yaml").write_text(text + NOISY)
+    return folder
+
+
+@pytest.fixture
+def reference(pair: Path, simscen) -> dict[str, tuple[bytes, str]]:
+    ended = simscen("run", ".", "-j", 1, "--out", "reference")
+    assert ended.code == 0, ended.out + ended.err
+    return results(pair / "reference")
+
+
+def test_86_87_order_folder_hash_seed_neighbours_and_load_change_nothing(reference, pair: Path) -> None:
+    elsewhere = pair.parent / "elsewhere"
+    elsewhere.mkdir()
+    busy = [subprocess.Popen([sys.executable, "-c", BUSY]) for _ in range(2)]
+    try:
+        done = subprocess.run(
+            [SIMSCEN, "run", "../home/b.scenario.yaml", "../home/a.scenario.yaml", "-j", "2", "--out", "out"],
+            cwd=elsewhere, capture_output=True, text=True, timeout=120, check=False,
+            env={**os.environ, "PYTHONHASHSEED": "4711", "OMP_NUM_THREADS": "4", "LC_ALL": "C", "TZ": "Asia/Tokyo"},
+        )  # fmt: skip
+    finally:
+        for process in busy:
+            process.kill()
+            process.wait()
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert results(elsewhere / "out") == reference
+    assert (elsewhere / "out/results.json").read_bytes() == (pair / "reference/results.json").read_bytes()
+
+
+def test_88_a_run_after_one_that_crashed_is_as_if_alone(reference, pair: Path, simscen, monkeypatch) -> None:
+    monkeypatch.setattr("simscen.cli.run.ZYGOTE", (TELLING,))
+    text = (pair / "a.scenario.yaml").read_text()
+    (pair / "a.scenario.yaml").write_text(text.replace("seed: 7", "tags: [crash]"))
+    assert simscen("run", ".", "-j", 1, "--out", "out").code == 3
+    document = json.loads((pair / "out/results.json").read_text())
+    assert (document["error"], document["passed"]) == (1, 1)
+    assert results(pair / "out")["b/seed-7"] == reference["b/seed-7"]
+
+
+def test_89_another_seed_is_another_run_and_0_is_none(reference, pair: Path, simscen) -> None:
+    assert simscen("run", "b.scenario.yaml", "--seed", 8, "--out", "out").code == 0
+    assert results(pair / "out")["b/seed-8"][1] != reference["b/seed-7"][1]
+    ended = simscen("run", "b.scenario.yaml", "--seed", 0, "--out", "none")
+    assert ended.code == 2
+    assert not (pair / "none").exists()
+
+
+def test_90_without_fused_multiply_add_the_verdicts_are_the_same(reference, pair: Path, simscen, monkeypatch) -> None:
+    plain = {
+        "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-AVX512F",
+        "NPY_DISABLE_CPU_FEATURES": "AVX2 FMA3 AVX512F AVX512CD AVX512_SKX",
+    }
+    environment = supervisor.environment()
+    monkeypatch.setattr(supervisor, "environment", lambda: {**environment, **plain})
+    assert simscen("run", ".", "--out", "out").code == 0
+    assert isinstance(json.loads((pair / "out/run.json").read_text())["cpu_flags"], list)
+    verdicts = {
+        name: [verdict["status"] for verdict in json.loads(result)["verdicts"]]
+        for name, (result, _) in results(pair / "out").items()
+    }
+    assert verdicts == {name: ["pass"] for name in reference}
