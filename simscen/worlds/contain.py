@@ -1,28 +1,16 @@
-"""Which solid is in the way at a place: for `goal (2.5, 1.0) is inside obstacle "wall_1"`. Numpy only."""
+"""Which solid is in the way at a place: for `goal (2.5, 1.0) is inside obstacle "wall_1"`.
+
+Simple shapes that stand upright are looked at in plain numbers, so that `validate` of most scenarios needs no numpy.
+"""
 
 import math
 from collections.abc import Iterable
 
 import numpy as np
-import numpy.typing as npt
 
-from simscen.core.geometry import Array
-from simscen.core.shapes import (
-    Box,
-    Capsule,
-    Cone,
-    Cylinder,
-    Ellipsoid,
-    Extrusion,
-    Mesh,
-    Shape,
-    Solid,
-    Sphere,
-    TriangleMesh,
-)
+from simscen.core.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Shape, Solid, Sphere
 from simscen.core.world import World
-from simscen.worlds.meshing import fuse
-from simscen.worlds.section import outlines
+from simscen.worlds.upright import upright
 
 ZRange = tuple[float, float]
 
@@ -39,39 +27,20 @@ def blocking_solid(world: World, point: tuple[float, float], radius: float, z_ra
 def first_blocking(solids: Iterable[Solid], point: tuple[float, float], radius: float, z_range: ZRange) -> str | None:
     """Like `blocking_solid`, among some solids."""
     for solid in solids:
-        if _near(solid, point, radius) and distance_in_plan(fuse([solid]), point, z_range, radius) < radius:
+        if _near(solid, point, radius) and _distance(solid, point, z_range, radius) < radius:
             return solid.name
     return None
 
 
-def distance_in_plan(
-    mesh: TriangleMesh, point: tuple[float, float], z_range: ZRange, within: float = math.inf
-) -> float:
-    """Horizontal distance in metres from a point to what a mesh has between two heights; 0 inside of it.
+def _distance(solid: Solid, point: tuple[float, float], z_range: ZRange, within: float) -> float:
+    """Horizontal distance in metres to what a solid has between two heights; inf if that is not `within`."""
+    prism = upright(solid)
+    if prism is not None:
+        return prism.distance(point, z_range)
+    from simscen.worlds.meshing import fuse
+    from simscen.worlds.plan_distance import distance_in_plan
 
-    inf if there is nothing at those heights, or nothing nearer than `within`.
-    """
-    low, high = z_range
-    bottom, top = mesh.vertices[:, 2].min(), mesh.vertices[:, 2].max()
-    if bottom >= high or top <= low:
-        return math.inf
-    middle = (max(bottom, low) + min(top, high)) / 2
-    if _winds_about(outlines(mesh, middle), point):
-        return 0.0
-    corners, valid = _clipped(_close(mesh, point, within), low, high)
-    corners, valid = corners[valid.any(axis=1)] - point, valid[valid.any(axis=1)]
-    if not len(corners):
-        return math.inf
-    return 0.0 if _around_origin(corners, valid).any() else _nearest(corners, valid)
-
-
-def _close(mesh: TriangleMesh, point: tuple[float, float], within: float) -> Array:
-    """The triangles (m, 3, 3) whose bounding rectangle is not further from the point than `within`."""
-    triangles = mesh.vertices[mesh.faces]
-    plan = triangles[:, :, :2] - point
-    close = np.all((plan.min(axis=1) <= within) & (plan.max(axis=1) >= -within), axis=1)
-    near: Array = triangles[close]
-    return near
+    return distance_in_plan(fuse([solid]), point, z_range, within)
 
 
 def _near(solid: Solid, point: tuple[float, float], radius: float) -> bool:
@@ -95,54 +64,3 @@ def _reach(shape: Shape) -> float:
             return max(math.hypot(x, y, height) for x, y in polygon)
         case Mesh(vertices):
             return float(np.linalg.norm(vertices, axis=1).max(initial=0.0))
-
-
-def _winds_about(segments: Array, point: tuple[float, float]) -> bool:
-    """Whether outlines wind anticlockwise about a point, as seen both towards +x and towards -x.
-
-    For closed outlines both counts are the same; where a mesh has holes, one alone would find insides that leak.
-    """
-    (x0, y0), (x1, y1) = segments[:, 0].T - np.array(point)[:, None], segments[:, 1].T - np.array(point)[:, None]
-    crosses = (y0 > 0) != (y1 > 0)
-    x0, y0, x1, y1 = x0[crosses], y0[crosses], x1[crosses], y1[crosses]
-    ahead = x0 - y0 * (x1 - x0) / (y1 - y0) > 0
-    upwards = np.where(y1 > y0, 1, -1)
-    return bool(upwards[ahead].sum() > 0 and -upwards[~ahead].sum() > 0)
-
-
-def _clipped(triangles: Array, low: float, high: float) -> tuple[Array, npt.NDArray[np.bool_]]:
-    """The part of triangles (m, 3, 3) between two heights, in plan: up to 9 corners (m, 9, 2) and which of them count.
-
-    A clipped triangle is convex, so its own corners inside the slab and the points where its edges pass the slab's
-    faces are all there is to know.
-    """
-    z = triangles[:, :, 2]
-    corners, valid = [triangles[:, :, :2]], [(z >= low) & (z <= high)]
-    ends, end_z = np.roll(triangles, -1, axis=1)[:, :, :2], np.roll(z, -1, axis=1)
-    for height in (low, high):
-        crosses = (z > height) != (end_z > height)
-        along = (height - z) / np.where(crosses, end_z - z, 1.0)
-        corners.append(triangles[:, :, :2] + along[:, :, None] * (ends - triangles[:, :, :2]))
-        valid.append(crosses)
-    return np.concatenate(corners, axis=1), np.concatenate(valid, axis=1)
-
-
-def _around_origin(corners: Array, valid: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """Which convex sets have the origin inside: seen from it, no gap between their corners is 180° or more."""
-    angles = np.where(valid, np.arctan2(corners[:, :, 1], corners[:, :, 0]), np.nan)
-    angles = np.sort(angles, axis=1)
-    last = np.nanmax(angles, axis=1) - 2 * math.pi
-    gaps = np.diff(np.column_stack((last, angles)), axis=1)
-    inside: npt.NDArray[np.bool_] = np.nanmax(gaps, axis=1) < math.pi - 1e-9
-    return inside
-
-
-def _nearest(corners: Array, valid: npt.NDArray[np.bool_]) -> float:
-    """Distance from the origin to the nearest of convex sets that do not hold it: their edges are among all pairs."""
-    first, second = np.triu_indices(corners.shape[1])
-    both = valid[:, first] & valid[:, second]
-    a, b = corners[:, first][both], corners[:, second][both]
-    step = b - a
-    squared = np.einsum("ij,ij->i", step, step)
-    along = np.clip(-np.einsum("ij,ij->i", a, step) / np.where(squared > 0, squared, 1.0), 0.0, 1.0)
-    return float(np.sqrt(np.min(np.sum((a + along[:, None] * step) ** 2, axis=1))))

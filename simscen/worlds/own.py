@@ -4,16 +4,13 @@ import math
 from collections.abc import Iterable
 from dataclasses import replace
 
-import numpy as np
-
 from simscen.actions.move import route
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.grid import OccupancyGrid
 from simscen.core.shapes import Body, Box, MotionPath, Solid
 from simscen.core.world import World
 from simscen.model.world import Door, Movable, Obstacle, Wall, WorldSpec
-from simscen.worlds.extents import plan_extents
-from simscen.worlds.extrude import walls_of
+from simscen.worlds.extents import rectangle
 from simscen.worlds.walls import wall_solids
 
 
@@ -33,6 +30,8 @@ def build_own(
     base = base or World(name, ())
     solids = [*base.solids]
     if grid is not None:
+        from simscen.worlds.extrude import walls_of
+
         solids += walls_of(grid, spec.map_height)
     for number, wall in enumerate(spec.walls, start=1):
         solids += wall_solids(_corners(wall), wall.thickness, wall.height, _wall_name(wall, number))
@@ -76,7 +75,7 @@ def _wall_name(wall: Wall, number: int) -> str:
 
 def _standing(obstacle: Obstacle) -> Solid:
     solid = obstacle.solid(obstacle.name)
-    return replace(solid, pose=Pose3.planar(obstacle.pose.pose).compose(solid.pose))
+    return replace(solid, pose=Pose3.planar(obstacle.pose.pose, solid.pose.z))
 
 
 def _movable(thing: Movable) -> Body:
@@ -99,14 +98,19 @@ def _bounds(
     solids: Iterable[Solid], bodies: Iterable[Body], places: Iterable[Pose2], grid: OccupancyGrid | None
 ) -> tuple[float, float, float, float]:
     """What holds all there is, as (min x, min y, max x, max y); zeros for nothing at all."""
-    corners = [np.array([(place.x, place.y) for place in places]).reshape(-1, 2)]
-    corners += [plan_extents(solid) for solid in solids]
-    corners += [plan_extents(solid, body.pose) for body in bodies for solid in body.solids]
+    corners = [(place.x, place.y) for place in places]
+    covered = [rectangle(solid) for solid in solids]
+    covered += [rectangle(solid, body.pose) for body in bodies for solid in body.solids]
+    corners += [corner for left, low, right, high in covered for corner in ((left, low), (right, high))]
     if grid is not None:
-        height, width = (cells * grid.resolution for cells in grid.shape)
-        corners.append(grid.origin.apply(np.array([[0, 0], [width, 0], [width, height], [0, height]])))
-    points = np.concatenate(corners)
-    if not len(points):
+        corners += _corners_of(grid)
+    if not corners:
         return (0.0, 0.0, 0.0, 0.0)
-    (left, low), (right, high) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
-    return left, low, right, high
+    xs, ys = zip(*corners, strict=True)
+    return min(xs), min(ys), max(xs), max(ys)
+
+
+def _corners_of(grid: OccupancyGrid) -> list[tuple[float, float]]:
+    height, width = (cells * grid.resolution for cells in grid.shape)
+    local = ((0.0, 0.0), (width, 0.0), (width, height), (0.0, height))
+    return [grid.origin.compose(Pose2(x, y))[:2] for x, y in local]
