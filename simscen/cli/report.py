@@ -41,4 +41,4 @@ def command(
         written = reports.write(answers)
         shown(reports.closing(answers, past.wall, past.interrupted))
     code = verdict(answers) if written else Exit.INCOMPLETE
-    sys.exit(code if shown.complete else max(code, Exit.INCOMPLETE))
+    sys.exit(shown.exit(code))

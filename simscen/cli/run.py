@@ -83,7 +83,7 @@ def command(
     work = begin(journal, plan(scenarios, options, folder), options.workers)
     with screen(format_) as shown:
         code = _run(work, options, reports, shown)
-    sys.exit(code if shown.complete else max(code, Exit.INCOMPLETE))
+    sys.exit(shown.exit(code))
 
 
 def _run(work: Work, options: Options, reports: Reports, shown: Screen) -> Exit:
@@ -104,8 +104,16 @@ def _run(work: Work, options: Options, reports: Reports, shown: Screen) -> Exit:
     written = reports.write(answers)
     wall = time.monotonic() - begun
     listen(reports.closing(answers, wall, stopped is not None))
-    written = reports.end(wall) and written and work.journal.error is None
+    written = reports.end(wall) and written and _kept(work.journal)
     return stopped or (verdict(answers) if written else Exit.INCOMPLETE)
+
+
+def _kept(journal: Journal) -> bool:
+    """Whether the journal is whole; told if it is not."""
+    if journal.error is not None:
+        told = f"simscen: lines are missing from the journal in {journal.folder}: {journal.error.strerror}"
+        print_text(told, sys.stderr)
+    return journal.error is None
 
 
 def _output_folder(out: Path | None, resume: Path | None) -> tuple[Path, Journal]:

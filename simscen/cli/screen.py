@@ -8,6 +8,8 @@ from enum import Enum
 from pathlib import Path
 from typing import TextIO
 
+from simscen.cli.diagnostics import print_text
+from simscen.core.errors import Exit
 from simscen.core.session import SessionEvent
 from simscen.report.console import Reporter, text_reporter
 from simscen.report.github import github_reporter
@@ -46,10 +48,12 @@ class Screen:
             os.dup2(nowhere, sys.stdout.fileno())
             os.close(nowhere)
 
-    @property
-    def complete(self) -> bool:
-        """Whether everything was printed that anybody waited for: who closes a pipe has read enough."""
-        return self.lost is None or isinstance(self.lost, BrokenPipeError)
+    def exit(self, code: Exit) -> Exit:
+        """The exit code of the session, or that of output that was lost. Who closes a pipe has read enough."""
+        if self.lost is None or isinstance(self.lost, BrokenPipeError):
+            return code
+        print_text(f"simscen: cannot write to stdout: {self.lost.strerror}", sys.stderr)
+        return max(code, Exit.INCOMPLETE)
 
 
 @contextmanager

@@ -1,6 +1,8 @@
 """One recorded run: its reports made anew, its picture drawn again."""
 
+import errno
 import json
+import os
 import shutil
 import sys
 from pathlib import Path
@@ -55,6 +57,19 @@ def test_reports_come_in_other_forms_and_places(simscen, out: Path) -> None:
     ended = simscen("report", "out", "--format", "json", "--junit", "ci/junit.xml", "--junit-family", "xunit2")
     assert json.loads(ended.out) == json.loads((out / "results.json").read_text())
     assert b'line="' not in (out.parent / "ci/junit.xml").read_bytes()
+
+
+def test_a_full_disk_leaves_the_reports_that_were_there(simscen, out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = {path: path.read_bytes() for path in out.iterdir() if path.is_file()}
+
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", full)
+    ended = simscen("report", "out")
+    assert ended.code == 3
+    assert "simscen: cannot write out/junit.xml: No space left on device\n" in ended.err
+    assert {path: path.read_bytes() for path in out.iterdir() if path.is_file()} == before
 
 
 def test_a_session_under_way_is_left_alone(simscen, out: Path) -> None:
