@@ -9,14 +9,16 @@ from pathlib import Path
 
 import pytest
 
-import simscen.run.supervisor as supervisor
+from simscen.run import supervisor
 
 SIMSCEN = Path(sys.executable).with_name("simscen")
 TELLING = str(Path(__file__).with_name("telling_zygote.py"))
 BUSY = "import time; end = time.monotonic() + 60\nwhile time.monotonic() < end: sum(range(100000))"
 NOISY = """\
 events: [{when: {time: 1 s}, do: {spawn: {name: box, box: [0.2, 0.2, 0.4], pose: {x: 1.9, y: 1.6}}}}]
-faults: [{sensor: lidar, noise: {std: 5 cm}}, {sensor: odom, slip: {left: 0.1, right: 0.05}, when: {time: 1 s}, for: 1 s}]
+faults:
+  - {sensor: lidar, noise: {std: 5 cm}}
+  - {sensor: odom, slip: {left: 0.1, right: 0.05}, when: {time: 1 s}, for: 1 s}
 stack: {localizer: {type: amcl, max_particles: 500}}
 """
 
