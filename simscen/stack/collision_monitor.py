@@ -1,6 +1,7 @@
 """The last word before the base: nav2_collision_monitor on the raw scan, knowing nothing of map or costmap."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,6 +16,15 @@ STEPS = 8
 """Moments within the prediction at which the hull is compared with the scan."""
 
 
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """The newest scan of a lidar: taken at `odometry`, with nothing nearer to the base than `nearest` metres."""
+
+    scan: Scan
+    odometry: Pose2
+    nearest: float
+
+
 class CollisionMonitor:
     """Stops when a lidar is silent; slows down (APPROACH) or stops (STOP) before what the newest scan shows."""
 
@@ -22,9 +32,7 @@ class CollisionMonitor:
         self._spec, self._robot = spec, robot
         self._timeout = round(spec.source_timeout * tick_rate)
         self._seen = dict.fromkeys(lidars, 0)
-        self._points: dict[str, Array] = {}
-        self._nearest: dict[str, float] = {}
-        self._odometry: dict[str, Pose2] = {}
+        self._scans: dict[str, Seen] = {}
         corners = np.array(robot.footprint, dtype=np.float64)
         ends = np.roll(corners, -1, axis=0)
         normal = np.column_stack((ends[:, 1] - corners[:, 1], corners[:, 0] - ends[:, 0]))
@@ -37,12 +45,12 @@ class CollisionMonitor:
 
     def on_scan(self, scan: Scan, odometry: Pose2) -> None:
         """A scan, and where odometry was when it came; one in which no beam answers is silence."""
-        if np.isnan(scan.ranges).all():
+        answers = scan.ranges >= scan.range_min
+        if not answers.any():
             return
-        points = scan.points()
         self._seen[scan.sensor] = scan.tick
-        self._points[scan.sensor], self._odometry[scan.sensor] = points, odometry
-        self._nearest[scan.sensor] = float(np.hypot(points[:, 0], points[:, 1]).min()) if len(points) else math.inf
+        nearest = float(scan.ranges.min(where=answers, initial=math.inf))
+        self._scans[scan.sensor] = Seen(scan, odometry, nearest - math.hypot(scan.mount.x, scan.mount.y))
 
     def silent(self, tick: int) -> bool:
         """Whether a lidar has not been heard for `source_timeout`."""
@@ -54,21 +62,20 @@ class CollisionMonitor:
             return wanted
         horizon = self._spec.time_before_collision
         scale = 1.0
-        for sensor in self._points:
-            scale = min(scale, self._time_free(sensor, wanted, odometry, horizon) / horizon)
+        for seen in self._scans.values():
+            scale = min(scale, self._time_free(seen, wanted, odometry, horizon) / horizon)
         if scale >= 1.0:
             return wanted
         return Twist(wanted.vx * scale, wanted.vy * scale, wanted.wz * scale) if scale > 0.0 else STOP
 
-    def _time_free(self, sensor: str, wanted: Twist, odometry: Pose2, horizon: float) -> float:
+    def _time_free(self, seen: "Seen", wanted: Twist, odometry: Pose2, horizon: float) -> float:
         """Seconds until a point of the scan would be within the stop margin; points it moves away from are no harm."""
-        moved = self._odometry[sensor].between(odometry)
+        moved = seen.odometry.between(odometry)
         reach = self._robot.circumscribed_radius + self._spec.stop_margin
-        reach += math.hypot(wanted.vx, wanted.vy) * horizon
-        if self._nearest[sensor] - math.hypot(moved.x, moved.y) > reach:
+        reach += math.hypot(wanted.vx, wanted.vy) * horizon + math.hypot(moved.x, moved.y)
+        if seen.nearest > reach:
             return horizon
-        points = moved.inverse().apply(self._points[sensor])
-        points = points[np.hypot(points[:, 0], points[:, 1]) <= reach]
+        points = moved.inverse().apply(_points_within(seen.scan, reach))
         if not len(points):
             return horizon
         times = np.linspace(0.0, horizon, STEPS + 1)
@@ -91,3 +98,11 @@ class CollisionMonitor:
         body = np.stack((cosine * dx + sine * dy, cosine * dy - sine * dx), axis=-1)
         gaps: Array = (body @ self._normal.T - self._offset).max(axis=-1)
         return gaps
+
+
+def _points_within(scan: Scan, reach: float) -> Array:
+    """The hits (n, 2) at most `reach` metres from the base, in its frame; few of a scan, so little to compute."""
+    most = reach + math.hypot(scan.mount.x, scan.mount.y)
+    near = np.flatnonzero((scan.ranges >= scan.range_min) & (scan.ranges <= min(most, scan.range_max)))
+    angles, ranges = scan.angle_min + scan.angle_increment * near, scan.ranges[near]
+    return scan.mount.apply(np.column_stack((ranges * np.cos(angles), ranges * np.sin(angles))))

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from simscen.core.geometry import Pose2
+from simscen.core.geometry import Array, Pose2
 from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import ErrorCode, Goal, Path
 from simscen.model.stack import RegulatedPurePursuit as RppSpec
@@ -17,6 +17,8 @@ from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
 
 DEFAULT_SPEED = 0.5
 """Nav2's desired_linear_vel."""
+SHOWN: Array = np.arange(16, dtype=np.float64) * 0.1
+"""Seconds of the arc that `local_plan` shows."""
 CREEP = 0.1
 """m/s. When only slower than this would keep the time to collision, the way is blocked."""
 
@@ -48,7 +50,7 @@ class RegulatedPurePursuit:
         """The arc it expects to drive in the next second and a half."""
         if self._arc is None:
             return None
-        return Path(poses_along(*self._arc, np.linspace(0.0, 1.5, 16)))
+        return Path(poses_along(*self._arc, SHOWN))
 
     def command(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> Twist:
         """The velocity to drive now. Raises NO_VALID_CONTROL when the arc to the carrot is blocked."""
