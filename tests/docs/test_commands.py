@@ -1,0 +1,44 @@
+"""Every command that the documentation shows exists, with the options it is shown with."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from simscen.cli.main import COMMANDS
+from simscen.cli.options import commands_of, parameters_of
+from simscen.core.errors import Exit
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+SHOWN = re.compile(r"\bsimscen ([a-z]+)\b([^`#\n]*)")
+OPTION = re.compile(r"(?<!\S)(--?[a-z][a-z-]*)(?=[\s=…]|$)")
+GLOBAL = {"--help", "--version"}
+
+
+def shown():
+    """Page, words of the command, and the options beside it."""
+    for page in PAGES:
+        for match in SHOWN.finditer(page.read_text(encoding="utf-8")):
+            name, rest = match[1], match[2]
+            if name in COMMANDS:
+                yield page.relative_to(ROOT).as_posix(), name, rest
+
+
+@pytest.mark.parametrize("page", sorted({page for page, _, _ in shown()}))
+def test_commands_are_shown_with_options_that_they_have(page: str) -> None:
+    unknown = []
+    for where, name, rest in shown():
+        if where == page:
+            words = f"{name} {rest.split()[0]}" if rest.split() else name
+            functions = dict(commands_of(name))
+            function = functions.get(words) or functions.get(name) or next(iter(functions.values()))
+            known = {option for p in parameters_of(function) for option in p.written.split(", ")} | GLOBAL
+            unknown += [f"simscen {name} {option}" for option in OPTION.findall(rest) if option not in known]
+    assert unknown == []
+
+
+def test_the_guide_lists_every_exit_code() -> None:
+    table = (ROOT / "docs/guides/command-line.md").read_text(encoding="utf-8").partition("## Exit codes")[2]
+    told = {int(code) for row in re.findall(r"^\| ([\d, ]+) \|", table, re.MULTILINE) for code in row.split(",")}
+    assert told == {code.value for code in Exit}
