@@ -12,6 +12,9 @@ Here the robot goes on until it is well inside, or until it stands anywhere insi
 """
 STANDING = 0.02
 """m/s and rad/s (times five) under which a robot stands."""
+AT_REST = 10
+"""Checks in a row in which a robot must stand to be at rest: half a second at the controller's usual rate. It also
+stands for a moment between driving up to the goal and turning to its heading."""
 
 
 class GoalChecker:
@@ -19,16 +22,17 @@ class GoalChecker:
 
     def __init__(self, stateful: bool) -> None:
         self._stateful = stateful
-        self._there = False
+        self._there, self._stood = False, 0
 
     def reset(self) -> None:
         """A new goal."""
-        self._there = False
+        self._there, self._stood = False, 0
 
     def reached(self, goal: Goal, pose: Pose2, twist: Twist) -> bool:
         """Whether the robot, believed at `pose`, has reached the goal."""
         standing = abs(twist.vx) + abs(twist.vy) < STANDING and abs(twist.wz) < 5 * STANDING
-        part = 1.0 if standing else WELL_INSIDE
+        self._stood = self._stood + 1 if standing else 0
+        part = 1.0 if self._stood >= AT_REST else WELL_INSIDE
         there = goal.pose.distance(pose) <= part * goal.xy_tolerance
         self._there = there or (self._stateful and self._there and goal.pose.distance(pose) <= goal.xy_tolerance)
         return self._there and abs(wrap(goal.pose.yaw - pose.yaw)) <= part * goal.yaw_tolerance

@@ -21,6 +21,8 @@ from simscen.stack.protocols import Behavior, Controller, NavigationFailure, Pla
 from simscen.stack.recovery import RoundRobin
 from simscen.stack.replanning import PlanInForce
 
+TIGHT_PERIOD = 0.5
+"""Seconds between two looks for a roomier way where the followed one has become tight."""
 BETTER_PERIOD = 2.0
 """Seconds between two looks for a shorter way after obstacles have gone."""
 RECONSIDER = 2
@@ -60,6 +62,7 @@ class Navigator:
 
     def _forget(self) -> None:
         self.plan = None
+        self._adopted = 0.0
         self._reason = "goal"
         self._behavior: Behavior | None = None
         self._behavior_since = 0.0
@@ -82,8 +85,11 @@ class Navigator:
         self.goal = None
         self._forget()
 
-    def step(self, tick: int, pose: Pose2, twist: Twist) -> tuple[Twist, bool]:
-        """The velocity wanted now, and whether the goal is reached. Raises NavigationFailure when it has failed."""
+    def step(self, tick: int, pose: Pose2, twist: Twist, held: bool = False) -> tuple[Twist, bool]:
+        """The velocity wanted now, and whether the goal is reached. Raises NavigationFailure when it has failed.
+
+        `held`: the collision monitor has kept the robot from driving for a while.
+        """
         goal = self.goal
         if goal is None:
             return STOP, False
@@ -93,13 +99,13 @@ class Navigator:
         if self._goal_checker.reached(goal, pose, twist):
             return STOP, True
         try:
-            command = self._follow(tick, goal, pose, twist)
+            command = self._follow(tick, goal, pose, twist, held)
         except NavigationFailure as failure:
             return self._failed(tick, goal, pose, failure), False
         self._trouble_since = None
         return command, False
 
-    def _follow(self, tick: int, goal: Goal, pose: Pose2, twist: Twist) -> Twist:
+    def _follow(self, tick: int, goal: Goal, pose: Pose2, twist: Twist, held: bool) -> Twist:
         if self.plan is None:
             self._adopt(tick, self._compute(tick, goal, pose), self._reason)
         assert self.plan is not None
@@ -108,6 +114,8 @@ class Navigator:
             self.plan.locate(pose)
             self._reconsider(tick, goal, pose)
         command = self._controller.command(pose, twist, self._costmap.view, goal)
+        if held:
+            raise NavigationFailure(ErrorCode.FAILED_TO_MAKE_PROGRESS, "the collision monitor holds the robot")
         if self._progress.stuck(pose, self._clock):
             self._progress.reset()
             raise NavigationFailure(ErrorCode.FAILED_TO_MAKE_PROGRESS, "the robot does not get on")
@@ -127,6 +135,9 @@ class Navigator:
             if self.plan.blocked(costmap.view):
                 self._adopt(tick, self._compute(tick, goal, pose), "blocked")
                 return
+            if self._clock - self._adopted >= TIGHT_PERIOD and self.plan.tightened(costmap.view):
+                self._adopt(tick, self._compute(tick, goal, pose), "tight")
+                return
             if self._origin != costmap.view.origin and self._partial:
                 self._adopt(tick, self._compute(tick, goal, pose), "window")
                 return
@@ -144,7 +155,7 @@ class Navigator:
 
     def _compute(self, tick: int, goal: Goal, pose: Pose2) -> Path:
         self._plans += 1
-        aim = self._costmap.clipped(pose, goal.pose)
+        aim = self._costmap.aim(pose, goal.pose)
         self._partial, self._origin = aim is not goal.pose, self._costmap.view.origin
         path = self.planner.plan(self._costmap.view, pose, aim, self._plan_seed(self._plans))
         x, y, yaw = path.points[-1].tolist()
@@ -153,7 +164,8 @@ class Navigator:
         return replace(path, tick=tick)
 
     def _adopt(self, tick: int, path: Path, reason: str) -> None:
-        self.plan = PlanInForce(path, self._radius)
+        self.plan = PlanInForce(path, self._radius, self._costmap.view)
+        self._adopted = self._clock
         self._controller.set_path(path)
         self._looked, self._checked = self._clock, self._costmap.view.revision
         self._note(tick, "plan.made", "", reason=reason, length=round(path.length(), 6))

@@ -21,6 +21,11 @@ from simscen.stack.velocity_smoother import VelocitySmoother
 from simscen.stack.zones import speed_limit
 
 
+HELD = 1.0
+"""Seconds for which the collision monitor may hold the robot before that counts as a failure: the controller cannot see
+what the monitor sees (an obstacle nearer than a cell), and would try the same until no progress is made."""
+
+
 class ReferenceStack:
     """Nav2 in miniature. Decides at the controller's rate and repeats its command in between."""
 
@@ -51,6 +56,7 @@ class ReferenceStack:
         self._odometry = Pose2(0.0, 0.0)
         self._scans: dict[str, Scan] = {}
         self._mapped = -costmap_period
+        self._free_at = 0
         self._told = -self._belief_period
         self._plan_told: Path | None = None
         self._arc_told = 0
@@ -146,6 +152,7 @@ class ReferenceStack:
         goal = self._task.next(tick)
         if goal is None:
             self._smoother.reset(STOP)
+            self._free_at = tick
             return STOP
         if self._navigator.goal is not goal:
             self._navigator.pursue(goal)
@@ -153,12 +160,13 @@ class ReferenceStack:
             return self._give_up(tick, NavigationFailure(ErrorCode.NAVIGATE_TIMEOUT, f"{goal.timeout:g} s are over"))
         if self._monitor.silent(tick):
             self._smoother.reset(STOP)
+            self._free_at = tick
             return STOP
         pose = self._localizer.belief.pose
         if self._zones:
             self._controller.set_speed_limit(speed_limit(self._zones, pose))
         try:
-            wanted, reached = self._navigator.step(tick, pose, self._twist)
+            wanted, reached = self._navigator.step(tick, pose, self._twist, self._held(tick))
         except NavigationFailure as failure:
             return self._give_up(tick, failure)
         if reached:
@@ -168,11 +176,20 @@ class ReferenceStack:
             return STOP
         return self._guarded(wanted)
 
+    def _held(self, tick: int) -> bool:
+        """Whether the monitor has allowed nothing for HELD; once told, the waiting begins anew."""
+        held = tick - self._free_at >= HELD * self._tick_rate
+        if held:
+            self._free_at = tick
+        return held
+
     def _guarded(self, wanted: Twist) -> Twist:
         smooth = self._smoother.smooth(wanted)
         allowed = self._monitor.allow(smooth, self._odometry)
         if allowed is not smooth:
             self._smoother.reset(allowed)
+        if allowed != STOP or wanted == STOP:
+            self._free_at = self._tick
         return allowed
 
     def _give_up(self, tick: int, failure: NavigationFailure) -> Twist:

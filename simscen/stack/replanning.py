@@ -12,12 +12,22 @@ CLEARLY_SHORTER, AT_LEAST = 0.85, 0.5
 """Hysteresis: another way must be this much shorter (ratio, and metres) before the robot changes its mind."""
 
 
+TIGHTER = 0.1
+"""Metres of room that a plan may lose to what has been seen since, or to the drift of odometry, before it is looked
+at again: two cells."""
+ROOMY = 0.5
+"""Metres from obstacles beyond which more room is no gain."""
+SOON = 4.0
+"""Metres of plan ahead whose room counts."""
+
+
 class PlanInForce:
     """The plan being followed, and how far the robot has come on it."""
 
-    def __init__(self, path: Path, radius: float) -> None:
+    def __init__(self, path: Path, radius: float, costmap: CostmapView) -> None:
         self.path, self._radius = path, radius
         self._track = PathTracker(path)
+        self._room = self._rooms(costmap, 0)
 
     def locate(self, pose: Pose2) -> None:
         """Note where the robot is."""
@@ -38,6 +48,19 @@ class PlanInForce:
             return False
         out = int((~bad).argmax())
         return bool(bad[out:].any() or bad.all())
+
+    def tightened(self, costmap: CostmapView) -> bool:
+        """Whether the plan has clearly less room soon than it had when it was made.
+
+        A plan made when an obstacle was half seen leads past it without room, though the robot would still fit.
+        """
+        index = self._track.index
+        end = int(np.searchsorted(self._track.along, self._track.along[index] + SOON, side="right"))
+        return bool((self._rooms(costmap, index)[: end - index] < self._room[index:end] - np.float32(TIGHTER)).any())
+
+    def _rooms(self, costmap: CostmapView, first: int) -> Array:
+        rooms: Array = np.minimum(distances(costmap, self._track.points[first:, :2]), np.float32(ROOMY))
+        return rooms
 
     def worse_than(self, other: Path) -> bool:
         """Whether another path is clearly shorter than what is left of this one."""

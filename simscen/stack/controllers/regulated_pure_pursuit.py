@@ -11,6 +11,7 @@ from simscen.model.stack import RegulatedPurePursuit as RppSpec
 from simscen.stack.arcs import poses_along
 from simscen.stack.controllers.goal_pose import GoalPose
 from simscen.stack.controllers.tracking import PathTracker
+from simscen.stack.controllers.turning import TurningRoom
 from simscen.stack.footprint import Footprint, distance_at
 from simscen.stack.lookahead import time_free
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
@@ -21,6 +22,9 @@ SHOWN: Array = np.arange(16, dtype=np.float64) * 0.1
 """Seconds of the arc that `local_plan` shows."""
 CREEP = 0.1
 """m/s. When only slower than this would keep the time to collision, the way is blocked."""
+NEARER = (1.0, 0.7, 0.5, 0.35)
+"""Parts of the look-ahead distance that are tried until the arc is free: an arc to a far carrot cuts the path's bends,
+shorter ones keep to it. nav2_graceful_controller goes through its targets likewise."""
 
 
 class RegulatedPurePursuit:
@@ -30,6 +34,7 @@ class RegulatedPurePursuit:
         self._spec, self._robot, self._footprint = spec, robot, footprint
         self._desired = min(spec.desired_linear_vel or DEFAULT_SPEED, robot.max_linear)
         self._goal_pose = GoalPose(robot, spec.rotate_to_heading_angular_vel, spec.max_angular_accel, period)
+        self._turning = TurningRoom(footprint)
         self._limit: float | None = None
         self._track: PathTracker | None = None
         self._arc: tuple[Pose2, Twist] | None = None
@@ -58,18 +63,46 @@ class RegulatedPurePursuit:
             raise NavigationFailure(ErrorCode.INVALID_PATH, "there is no path to follow")
         track = self._track
         track.locate(pose)
-        reach = self._lookahead(twist.vx)
-        x, y = track.carrot(pose, reach, beyond=self._robot.turning_radius > 0.0)
-        carrot = _seen_from(pose, x, y)
         if self._goal_pose.reached(pose, twist, goal, track.remaining()):
-            command = self._goal_pose.turn_to_goal(pose, goal, twist)
-        elif self._should_rotate(carrot):
-            command = self._goal_pose.turn(self._bearing(carrot), twist)
+            command = self._turn(wrap(goal.pose.yaw - pose.yaw), pose, twist, costmap)
         else:
-            command = self._drive(carrot, pose, costmap)
-        command = self._within_free_way(command, pose, costmap, math.hypot(*carrot))
+            command = self._follow(track, pose, twist, costmap)
         self._arc = (pose, command)
         return command
+
+    def _follow(self, track: PathTracker, pose: Pose2, twist: Twist, costmap: CostmapView) -> Twist:
+        """To the farthest carrot that can be reached freely; if none can, on the arc that is free for longest."""
+        reach = self._lookahead(twist.vx)
+        arcs: list[tuple[float, float, Twist]] = []
+        turn: float | None = None
+        for part in NEARER:
+            if part < 1.0 and part * reach < self._spec.min_lookahead_dist:
+                break
+            carrot = _seen_from(pose, *track.carrot(pose, part * reach, beyond=self._robot.turning_radius > 0.0))
+            if self._should_rotate(carrot):
+                turn = self._bearing(carrot)
+                break
+            command = self._drive(carrot, pose, costmap)
+            free, horizon = self._time_free(command, pose, costmap, math.hypot(*carrot))
+            if free >= horizon:
+                return command
+            arcs.append((free, horizon, command))
+        if turn is not None:
+            return self._turn(turn, pose, twist, costmap)
+        free, horizon, command = max(arcs, key=lambda arc: arc[0])
+        return self._within_free_way(command, free, horizon)
+
+    def _turn(self, angle: float, pose: Pose2, twist: Twist, costmap: CostmapView) -> Twist:
+        """In place, whichever way round there is room; else back out to where there is."""
+        if not self._spec.use_collision_detection:
+            return self._goal_pose.turn(angle, twist)
+        way = self._turning.way_round(angle, pose, costmap)
+        if way is not None:
+            return self._goal_pose.turn(way, twist)
+        back = self._turning.back_out(pose, costmap)
+        if back is None:
+            raise NavigationFailure(ErrorCode.NO_VALID_CONTROL, "no room to turn, nor to back out")
+        return back
 
     def _lookahead(self, speed: float) -> float:
         spec = self._spec
@@ -127,19 +160,22 @@ class RegulatedPurePursuit:
         braking = math.sqrt(1.6 * self._robot.linear_deceleration * left)
         return min(speed, max(braking, spec.min_approach_linear_velocity))
 
-    def _within_free_way(self, command: Twist, pose: Pose2, costmap: CostmapView, carrot: float) -> Twist:
-        """Slow down, or fail, so that the time to collision on the arc up to the carrot is as long as demanded.
+    def _time_free(self, command: Twist, pose: Pose2, costmap: CostmapView, carrot: float) -> tuple[float, float]:
+        """Seconds until the first collision on the arc up to the carrot, and how many are demanded."""
+        allowed = self._spec.max_allowed_time_to_collision_up_to_carrot
+        if not self._spec.use_collision_detection or command == STOP:
+            return allowed, allowed
+        horizon = min(allowed, carrot / abs(command.vx)) if command.vx != 0.0 else allowed
+        return time_free(self._footprint, costmap, pose, command, horizon), horizon
+
+    def _within_free_way(self, command: Twist, free: float, horizon: float) -> Twist:
+        """Slow down, or fail, so that the time to collision is as long as demanded.
 
         Nav2 fails at once; slowing first lets the planner find a way round before the robot stands before a wall.
         """
-        if not self._spec.use_collision_detection or command == STOP:
-            return command
-        allowed = self._spec.max_allowed_time_to_collision_up_to_carrot
-        horizon = min(allowed, carrot / abs(command.vx)) if command.vx != 0.0 else allowed
-        free = time_free(self._footprint, costmap, pose, command, horizon)
         if free >= horizon:
             return command
-        scale = free / allowed
+        scale = free / self._spec.max_allowed_time_to_collision_up_to_carrot
         if abs(command.vx) * scale < CREEP:
             raise NavigationFailure(ErrorCode.NO_VALID_CONTROL, f"collision ahead in {free:.2f} s")
         return Twist(command.vx * scale, 0.0, command.wz * scale)
