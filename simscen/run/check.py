@@ -1,6 +1,6 @@
 """What only geometry can tell about a scenario before it runs: is the start free, can a goal be reached at all?
 
-Needs no engine: worlds of simple shapes are checked with numpy alone.
+Needs no engine, and for own worlds of simple shapes not even numpy.
 """
 
 from collections.abc import Iterator
@@ -16,9 +16,9 @@ from simscen.core.world import World
 from simscen.criteria.result import Result
 from simscen.loading.loaded import LoadedScenario, LoadedWorld
 from simscen.model.scenario import ScenarioSpec
-from simscen.run.prepare import goals_of, pose_of
-from simscen.run.robotmodel import inscribed_radius
-from simscen.run.worldsource import load_map, load_robot, load_world
+from simscen.run.goals import goals_of, pose_of
+from simscen.run.robotsize import inscribed_radius_of
+from simscen.run.worldsource import load_map, load_world
 from simscen.worlds.contain import blocking_solid
 
 NEAR_GROUND, ROBOT_HEIGHT = 0.02, 0.4
@@ -31,7 +31,7 @@ def check(loaded: LoadedScenario) -> list[Problem]:
     Raises InvalidInput for unusable files.
     """
     world = load_world(loaded)
-    radius = inscribed_radius(load_robot(loaded)[1])
+    radius = inscribed_radius_of(loaded)
     ground = _ground(loaded, world)
     misplaced = [
         loaded.problem(keys, "SC301", f"{what} ({pose.x:g}, {pose.y:g}) is {where}", hint)

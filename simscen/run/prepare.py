@@ -11,15 +11,15 @@ from simscen.core.case import Case
 from simscen.core.geometry import Pose2
 from simscen.core.grid import OccupancyGrid
 from simscen.core.navigation import Goal
-from simscen.core.world import BuiltWorld, World
+from simscen.core.world import BuiltWorld
 from simscen.loading.loaded import LoadedScenario
 from simscen.model.robot import RobotSpec
-from simscen.model.scenario import GoalEntry, ScenarioSpec, estimate_of
+from simscen.model.scenario import ScenarioSpec, estimate_of
 from simscen.model.stack import Amcl, OdometryOnly, StackSpec
-from simscen.run.robotmodel import inscribed_radius
+from simscen.run.goals import goals_of, pose_of
+from simscen.run.robotsize import inscribed_radius
 from simscen.run.worldsource import load_map, load_robot, load_world
 from simscen.sim.robot_body import RobotBody
-from simscen.spec.places import PoseSpec
 from simscen.worlds.build import build
 from simscen.worlds.shortest import shortest_lengths
 
@@ -68,7 +68,7 @@ def prepare(loaded: LoadedScenario, world_of: BuildWorld = build_world) -> Prepa
         goals=goals,
         regions=world.regions,
         footprint=body.footprint,
-        inscribed_radius=inscribed_radius(body),
+        inscribed_radius=inscribed_radius(body.radius, body.footprint),
         time_limit=spec.time_limit,
     )
     return Prepared(
@@ -99,27 +99,6 @@ def lidar_height(robot: RobotSpec) -> float:
     """The height that the robot's map shows: that of its first lidar."""
     heights = [sensor.lidar.mount.z for sensor in robot.sensors.values() if sensor.lidar]
     return heights[0] if heights else DEFAULT_LIDAR_HEIGHT
-
-
-def pose_of(place: str | PoseSpec, world: World) -> Pose2:
-    """A pose as written, or that of a place of the world."""
-    return world.places[place] if isinstance(place, str) else place.pose
-
-
-def goals_of(spec: ScenarioSpec, world: World) -> tuple[Goal, ...]:
-    """The goals in order, named, with their tolerances."""
-    return tuple(_goal(number, entry, spec.stack, world) for number, entry in enumerate(spec.goals, start=1))
-
-
-def _goal(number: int, entry: GoalEntry, stack: StackSpec, world: World) -> Goal:
-    place = entry.pose if isinstance(entry.pose, str) else f"goal-{number}"
-    return Goal(
-        name=entry.name or place,
-        pose=pose_of(entry.pose, world),
-        xy_tolerance=entry.xy_tolerance or stack.goal_checker.xy_goal_tolerance,
-        yaw_tolerance=entry.yaw_tolerance or stack.goal_checker.yaw_goal_tolerance,
-        timeout=entry.timeout,
-    )
 
 
 def stack_of(spec: ScenarioSpec) -> StackSpec:

@@ -2,7 +2,6 @@
 
 import math
 
-from simscen.core.polygons import distance_to_segment
 from simscen.model.robot import Ackermann, Omnidirectional
 from simscen.sim.robot_body import RobotBody
 from simscen.stack.protocols import RobotModel
@@ -25,11 +24,3 @@ def robot_model(body: RobotBody) -> RobotModel:
         turning_radius=drive.wheel_base / math.tan(drive.max_steering) if isinstance(drive, Ackermann) else 0.0,
         holonomic=holonomic,
     )
-
-
-def inscribed_radius(body: RobotBody) -> float:
-    """The largest circle about the base's origin inside the footprint, in metres."""
-    if body.radius is not None:
-        return body.radius
-    corners = body.footprint
-    return min(distance_to_segment(0.0, 0.0, a, b) for a, b in zip(corners, (*corners[1:], corners[0]), strict=True))

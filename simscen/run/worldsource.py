@@ -1,7 +1,10 @@
 """Where a scenario's world, map and robot come from."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from simscen.core.errors import InvalidInput
 from simscen.core.grid import OccupancyGrid
@@ -10,8 +13,10 @@ from simscen.core.world import World
 from simscen.loading.loaded import LoadedMap, LoadedScenario, LoadedWorld
 from simscen.model.robot import RobotSpec
 from simscen.model.world import WorldSpec
-from simscen.sim.robot_body import RobotBody, robot_body
 from simscen.worlds.own import build_own
+
+if TYPE_CHECKING:
+    from simscen.sim.robot_body import RobotBody
 
 
 def load_world(loaded: LoadedScenario) -> World:
@@ -58,6 +63,8 @@ def _read_mesh(path: Path) -> Mesh:
 
 def load_robot(loaded: LoadedScenario) -> tuple[RobotSpec, RobotBody]:
     """The robot as specified (a bare URDF as far as it makes plain), and made ready for physics."""
+    from simscen.sim.robot_body import robot_body
+
     robot, roots = loaded.robot, (loaded.root, *loaded.world_path)
     spec = robot.spec or _inferred(robot.path, roots)
     return spec, robot_body(spec, robot.path, roots, _read_mesh)

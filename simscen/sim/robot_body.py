@@ -5,18 +5,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from simscen.core.errors import InvalidInput
 from simscen.core.geometry import Pose3
-from simscen.core.problems import Problem
 from simscen.core.shapes import Mesh, Solid
 from simscen.core.world import Polygon
 from simscen.model.robot import Drive, Limits, RobotSpec
+from simscen.sim.ground import refuse_dragging
 from simscen.sim.inertia import MassProperties, of_solids
-from simscen.sim.outline import circle, extremes, footprint
+from simscen.sim.outline import circle, footprint
 from simscen.sim.undercarriage import Wheel, guards, motorised, on_casters, wheels_of
 
-GROUND_CLEARANCE = 0.005
-"""m that a hull must be above the ground."""
 LOW = 0.5
 """Height of the centre of mass over that of the hull's volume: batteries and motors lie at the bottom."""
 MeshReader = Callable[[Path], Mesh]
@@ -76,16 +73,13 @@ def robot_body(
 
 def _of_shapes(spec: RobotSpec, file: Path | None) -> RobotBody:
     assert spec.body is not None and spec.mass is not None  # RobotSpec promises it
+    refuse_dragging(spec, file)
     parts = tuple(
         Solid(solid.shape, Pose3.planar(part.pose.pose).compose(solid.pose), solid.name)
         for part in spec.body
         for solid in [part.solid("hull")]
     )
     wheels = wheels_of(spec.drive, spec.mass)
-    if wheels and min(float(part.pose.apply(extremes(part.shape))[:, 2].min()) for part in parts) < GROUND_CLEARANCE:
-        message = f"a part of the body of {spec.name!r} reaches the ground: it would drag instead of roll"
-        hint = f"give each part a `z` of at least {GROUND_CLEARANCE:g} m"
-        raise InvalidInput([Problem(str(file or spec.name), 0, 0, "SC401", message, hint)])
     even = of_solids(parts, spec.mass - sum(w.inertia.mass for w in wheels))
     chassis = MassProperties(even.mass, even.centre * (1.0, 1.0, LOW), even.tensor)
     return assemble(spec, parts, wheels, chassis)

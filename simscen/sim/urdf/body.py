@@ -11,9 +11,10 @@ from simscen.core.geometry import Pose3
 from simscen.core.problems import Problem
 from simscen.core.shapes import Solid
 from simscen.model.robot import Omnidirectional, RobotSpec
+from simscen.sim.ground import GROUND_CLEARANCE
 from simscen.sim.inertia import MassProperties, combined
 from simscen.sim.outline import extremes
-from simscen.sim.robot_body import GROUND_CLEARANCE, RobotBody, assemble
+from simscen.sim.robot_body import RobotBody, assemble
 from simscen.sim.undercarriage import Wheel, wheel_inertia
 from simscen.sim.urdf.elements import Meshes, MeshReader
 from simscen.sim.urdf.files import Folders, Trouble, read_urdf

@@ -1,0 +1,29 @@
+"""Where a scenario starts and what it is sent to, as its world places them."""
+
+from simscen.core.geometry import Pose2
+from simscen.core.navigation import Goal
+from simscen.core.world import World
+from simscen.model.scenario import GoalEntry, ScenarioSpec
+from simscen.model.stack import StackSpec
+from simscen.spec.places import PoseSpec
+
+
+def pose_of(place: str | PoseSpec, world: World) -> Pose2:
+    """A pose as written, or that of a place of the world."""
+    return world.places[place] if isinstance(place, str) else place.pose
+
+
+def goals_of(spec: ScenarioSpec, world: World) -> tuple[Goal, ...]:
+    """The goals in order, named, with their tolerances."""
+    return tuple(_goal(number, entry, spec.stack, world) for number, entry in enumerate(spec.goals, start=1))
+
+
+def _goal(number: int, entry: GoalEntry, stack: StackSpec, world: World) -> Goal:
+    place = entry.pose if isinstance(entry.pose, str) else f"goal-{number}"
+    return Goal(
+        name=entry.name or place,
+        pose=pose_of(entry.pose, world),
+        xy_tolerance=entry.xy_tolerance or stack.goal_checker.xy_goal_tolerance,
+        yaw_tolerance=entry.yaw_tolerance or stack.goal_checker.yaw_goal_tolerance,
+        timeout=entry.timeout,
+    )
