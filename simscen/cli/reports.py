@@ -30,8 +30,11 @@ class Reports:
         self._family: Family = family
 
     def begin(self) -> None:
-        """Write run.json, so that a session that is killed has said where it ran."""
-        write_atomically(self.folder / "run.json", circumstances.as_json())
+        """Write run.json, so that a session that is killed has said where it ran. Raises UsageError."""
+        try:
+            write_atomically(self.folder / "run.json", circumstances.as_json())
+        except OSError as error:
+            raise UsageError(f"cannot use the output folder {self.folder}: {error.strerror}") from error
 
     def write(self, answers: Sequence[RunFinished]) -> bool:
         """Write the reports; one that cannot be written is told, and the one before it stays whole."""

@@ -1,6 +1,8 @@
 """What `simscen run` refuses before it runs anything."""
 
+import errno
 import hashlib
+import os
 from pathlib import Path
 
 import pytest
@@ -36,6 +38,19 @@ def test_what_cannot_be_is_told_before_anything_runs(simscen, tmp_path: Path, op
     assert ended.code == 2
     assert told in ended.err
     assert not list(tmp_path.rglob("*.mcap"))
+
+
+def test_a_disk_that_is_full_already_is_told_before_anything_runs(simscen, tmp_path: Path, monkeypatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    for sync in ("fsync", "fdatasync"):
+        with monkeypatch.context() as patch:
+            patch.setattr(os, sync, full)
+            ended = simscen("run", "good.scenario.yaml", "--out", sync)
+        assert ended.code == 2
+        assert ended.err.endswith(f"{sync}: No space left on device\n")
+        assert not list((tmp_path / sync).rglob("*.mcap"))
 
 
 def test_an_empty_shard_is_nothing_selected(simscen) -> None:
