@@ -1,0 +1,48 @@
+"""Turning in place where the hull has corners: only where all of the turn has room, else back out first."""
+
+import math
+
+import numpy as np
+
+from simscen.core.geometry import Pose2
+from simscen.core.motion import Twist
+from simscen.stack.arcs import poses_along
+from simscen.stack.footprint import Footprint
+from simscen.stack.lookahead import time_free
+from simscen.stack.protocols import CostmapView
+
+ROOM = 1.01
+"""Cells between the hull and the nearest lethal cell's centre that a turn must keep: cells stand for obstacles that
+may reach half a cell nearer, and behind the robot no scan corrects them."""
+BACK_OUT, AHEAD = 0.15, 1.0
+"""m/s of backing out, Nav2's backup_speed, and seconds of free way that it needs."""
+
+
+class TurningRoom:
+    """Finds out which way round a robot can turn.
+
+    A turn that is begun without room for all of it wedges the robot: its corners come nearer to obstacles with every
+    step, until it can neither turn nor leave.
+    """
+
+    def __init__(self, footprint: Footprint) -> None:
+        self._footprint = footprint
+
+    def way_round(self, angle: float, pose: Pose2, costmap: CostmapView) -> float | None:
+        """The angle in rad itself, or the longer turn the other way, whichever has room; None when neither has."""
+        if self._footprint.reach == 0.0:
+            return angle
+        other = angle - math.copysign(2.0 * math.pi, angle)
+        return next((turn for turn in (angle, other) if self._free(turn, pose, costmap)), None)
+
+    def back_out(self, pose: Pose2, costmap: CostmapView) -> Twist | None:
+        """Straight back, where the robot came from; None when that is blocked, too."""
+        back = Twist(-BACK_OUT, 0.0, 0.0)
+        return back if time_free(self._footprint, costmap, pose, back, AHEAD) >= AHEAD else None
+
+    def _free(self, angle: float, pose: Pose2, costmap: CostmapView) -> bool:
+        """Whether the hull keeps its room, or all that it has now, throughout the turn."""
+        steps = max(2, math.ceil(abs(angle) * self._footprint.reach / costmap.resolution) + 1)
+        poses = poses_along(pose, Twist(0.0, 0.0, angle), np.linspace(0.0, 1.0, steps))
+        room = self._footprint.clearance(costmap, poses)
+        return bool((room >= min(ROOM * costmap.resolution, float(room[0]))).all())
