@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from pydantic import ValidationError
 
 from simscen.cli.diagnostics import as_text, from_here, harmless, print_text
 from simscen.cli.worldtext import described
@@ -138,10 +139,10 @@ def _converted(
     done = converted(world, height)
     try:
         return done.onto(spec), [*done.changes, *world.notes]
-    except ValueError as error:  # pydantic's own errors are among them
-        raise InvalidInput(
-            [Problem(str(source.path), 0, 0, "SC312", f"too much for one world file: {error}")]
-        ) from None
+    except ValidationError as error:
+        told = "; ".join(f"{'.'.join(map(str, found['loc']))}: {found['msg']}" for found in error.errors()[:3])
+        message = f"a world file cannot hold this world: {told}"
+        raise InvalidInput([Problem(str(source.path), 0, 0, "SC312", message)]) from None
 
 
 def _built(source: LoadedWorld, home: Path, world_path: list[Path], lenient: bool) -> World:

@@ -27,7 +27,7 @@ class Conversion:
     changes: list[str] = field(default_factory=list)
 
     def onto(self, spec: WorldSpec) -> WorldSpec:
-        """The specification with this before what it adds itself. Raises ValueError when it holds too much."""
+        """The specification with this before what it adds itself. Raises pydantic's error for too much."""
         return WorldSpec.model_validate(
             {
                 **spec.model_dump(exclude_unset=True),
