@@ -136,8 +136,8 @@ def _converted(
     from simscen.worlds.convert import convert as converted
 
     world = _built(replace(source, spec=None, map=None), home, world_path, lenient)
-    done = converted(world, height)
     try:
+        done = converted(world, height)
         return done.onto(spec), [*done.changes, *world.notes]
     except ValidationError as error:
         told = "; ".join(f"{'.'.join(map(str, found['loc']))}: {found['msg']}" for found in error.errors()[:3])
