@@ -3,7 +3,7 @@
 Needs no engine, and for own worlds of simple shapes not even numpy.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +12,7 @@ import numpy as np
 from simscen.core.geometry import Pose2
 from simscen.core.grid import OccupancyGrid
 from simscen.core.problems import Problem
+from simscen.core.shapes import Body, Solid
 from simscen.core.world import World
 from simscen.criteria.result import Result
 from simscen.loading.loaded import LoadedScenario, LoadedWorld
@@ -19,9 +20,10 @@ from simscen.model.scenario import ScenarioSpec
 from simscen.run.goals import goals_of, pose_of
 from simscen.run.robotsize import inscribed_radius_of
 from simscen.run.worldsource import load_map, load_world
-from simscen.worlds.contain import blocking_solid
+from simscen.worlds.contain import first_blocking
+from simscen.worlds.mapsize import too_large
 
-NEAR_GROUND, ROBOT_HEIGHT = 0.02, 0.4
+HEIGHTS = 0.02, 0.4
 """Heights between which something is in a robot's way; the floor and door sills are below."""
 
 
@@ -36,15 +38,21 @@ def check(loaded: LoadedScenario) -> list[Problem]:
     misplaced = [
         loaded.problem(keys, "SC301", f"{what} ({pose.x:g}, {pose.y:g}) is {where}", hint)
         for keys, what, pose, hint in _poses(loaded.spec, world)
-        if (where := ground.outside(pose) or _in_the_way(world, pose, radius))
+        if (where := ground.outside(pose) or _in_the_way(world, pose, radius, at_start=keys[0] == "robot"))
     ]
-    return [*misplaced, *notes_of(world, loaded.world, loaded.root)]
+    return [*_too_large(loaded, world), *misplaced, *notes_of(world, loaded.world, loaded.root)]
 
 
 def notes_of(world: World, source: LoadedWorld, root: Path) -> list[Problem]:
     """What the readers of a world had to say, as warnings about its file."""
     shown = source.path.relative_to(root).as_posix() if source.path.is_relative_to(root) else str(source.path)
     return [Problem(shown, 0, 0, "SC311", note.removeprefix(f"{shown}: "), severity="warning") for note in world.notes]
+
+
+def _too_large(loaded: LoadedScenario, world: World) -> Iterator[Problem]:
+    message = too_large(world.bounds) if world.grid is None else None
+    if message:
+        yield loaded.problem(("world",), "SC330", message, "is something placed far away from the rest?")
 
 
 def _poses(spec: ScenarioSpec, world: World) -> Iterator[tuple[tuple[str | int, ...], str, Pose2, str]]:
@@ -91,9 +99,17 @@ class _Ground:
         return f"outside the world ({left:g} … {right:g}, {bottom:g} … {top:g})"
 
 
-def _in_the_way(world: World, pose: Pose2, radius: float) -> str | None:
-    solid = blocking_solid(world, (pose.x, pose.y), 1e-6, (NEAR_GROUND, ROBOT_HEIGHT))
-    if solid:
+def _in_the_way(world: World, pose: Pose2, radius: float, at_start: bool) -> str | None:
+    """What a robot there would be inside of; what can move counts at the start only, for it may be gone later."""
+    solids = (*world.solids, *(_standing(world.bodies) if at_start else ()))
+    if solid := first_blocking(solids, (pose.x, pose.y), 1e-6, HEIGHTS):
         return f'inside obstacle "{solid}"'
-    solid = blocking_solid(world, (pose.x, pose.y), radius, (NEAR_GROUND, ROBOT_HEIGHT))
+    solid = first_blocking(solids, (pose.x, pose.y), radius, HEIGHTS)
     return f'nearer to obstacle "{solid}" than the robot\'s radius of {radius:.2f} m' if solid else None
+
+
+def _standing(bodies: Iterable[Body]) -> Iterator[Solid]:
+    """What can move, where it is at first, by the names that scenarios know."""
+    for body in bodies:
+        for solid in body.solids:
+            yield Solid(solid.shape, body.pose.compose(solid.pose), body.name)

@@ -1,11 +1,12 @@
 """A world made ready: once for each world and lidar height, shared by all its runs."""
 
 from simscen.core.world import BuiltWorld, World
+from simscen.worlds.mapsize import RESOLUTION
 from simscen.worlds.meshing import fuse
 from simscen.worlds.slicing import map_of
 
 
-def build(world: World, lidar_height: float, resolution: float = 0.05) -> BuiltWorld:
+def build(world: World, lidar_height: float, resolution: float = RESOLUTION) -> BuiltWorld:
     """Fuse the static solids and draw the map a robot with a lidar at `lidar_height` metres would have.
 
     Numpy arrays only, so that the result can be made before forking and shared by every run. Takes some 10 ms for

@@ -1,7 +1,5 @@
 """The occupancy map of a world: what SLAM with a perfect lidar at one height would have drawn."""
 
-import math
-
 import numpy as np
 import numpy.typing as npt
 
@@ -11,16 +9,12 @@ from simscen.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from simscen.core.problems import Problem
 from simscen.core.shapes import TriangleMesh
 from simscen.core.world import World
+from simscen.worlds.mapsize import RESOLUTION, map_size, too_large
 from simscen.worlds.raster import Cells, filled, touched
 from simscen.worlds.section import Section, section
 
-MARGIN = 1.0
-"""Metres of map around everything there is, so that a robot outside of the last wall is still on the map."""
-MOST_CELLS = 16_000_000
-"""Of a map that is drawn: 200 x 200 m at 5 cm."""
 
-
-def map_of(world: World, mesh: TriangleMesh, height: float, resolution: float = 0.05) -> OccupancyGrid:
+def map_of(world: World, mesh: TriangleMesh, height: float, resolution: float = RESOLUTION) -> OccupancyGrid:
     """The map a robot gets of a world whose static solids are `mesh`, cut at `height` in metres.
 
     A cell is occupied if any part of a solid is in it at that height, hollow or not; unknown if it lies outside of
@@ -45,14 +39,11 @@ def occupied_cells(grid: OccupancyGrid, cut: Section) -> Cells:
 
 def empty_grid(bounds: tuple[float, float, float, float], resolution: float, name: str) -> OccupancyGrid:
     """A free grid over bounds (min x, min y, max x, max y) and MARGIN; its lines are multiples of `resolution`."""
-    low = [math.floor(round((edge - MARGIN) / resolution, 6)) for edge in bounds[:2]]
-    high = [math.ceil(round((edge + MARGIN) / resolution, 6)) for edge in bounds[2:]]
-    width, height = high[0] - low[0], high[1] - low[1]
-    if width * height > MOST_CELLS:
-        message = f"map too large: {width} x {height} cells of {resolution:g} m, more than {MOST_CELLS} cells"
+    if message := too_large(bounds, resolution):
         raise InvalidInput([Problem(name, 0, 0, "SC330", message, "is something placed far away from the rest?")])
-    cells = np.zeros((height, width), dtype=np.int8)
-    return OccupancyGrid(cells, resolution, Pose2(low[0] * resolution, low[1] * resolution))
+    size = map_size(bounds, resolution)
+    cells = np.zeros((size.height, size.width), dtype=np.int8)
+    return OccupancyGrid(cells, resolution, Pose2(size.left * resolution, size.bottom * resolution))
 
 
 def _bounds(world: World, segments: Array) -> tuple[float, float, float, float]:

@@ -377,6 +377,23 @@ def test_49_a_start_or_goal_that_cannot_be(with_scenario, old: str, new: str, pl
     assert told in head
 
 
+@pytest.mark.parametrize(
+    "thing",
+    [
+        "objects: [{name: cart, box: [0.4, 0.4, 1], pose: {x: 1, y: 1}}]",
+        "doors: [{name: cart, points: [[0.5, 1], [1.5, 1]], closed: true}]",
+    ],
+)
+def test_49_a_start_inside_of_what_can_move(with_world, thing: str) -> None:
+    told = with_world(f"simscen: 1\nwalls: [{{points: [[0, 0], [6, 0], [6, 4]]}}]\n{thing}\n")
+    assert told.startswith('bad.scenario.yaml:4:39: error[SC301] the robot\'s start (1, 1) is inside obstacle "cart"')
+
+
+def test_a_world_whose_map_would_be_too_large(with_world) -> None:
+    told = with_world("simscen: 1\nwalls: [{points: [[-9000, -9000], [9000, 9000]]}]\n")
+    assert told.startswith("bad.scenario.yaml:3:8: error[SC330] map too large: 360042 x 360042 cells")
+
+
 def test_49_a_goal_off_the_map_that_the_robot_gets(with_scenario, folder: Path) -> None:
     (folder / "map.pgm").write_bytes(b"P5 40 40 255\n" + b"\xff" * 1600)
     (folder / "old.yaml").write_text(MAP)
