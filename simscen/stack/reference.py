@@ -20,7 +20,6 @@ from simscen.stack.tasks import Task
 from simscen.stack.velocity_smoother import VelocitySmoother
 from simscen.stack.zones import speed_limit
 
-
 HELD = 1.0
 """Seconds for which the collision monitor may hold the robot before that counts as a failure: the controller cannot see
 what the monitor sees (an obstacle nearer than a cell), and would try the same until no progress is made."""

@@ -21,7 +21,7 @@ stack:
   # As the Jackal's own robot_localization: wheels for the way, the gyroscope for turns, of which skidding wheels know
   # little.
   localizer: {type: ekf, rotation_noise: 0.5}
-  costmap: {obstacle_max_range: 8 m, raytrace_max_range: 10 m}
+  costmap: {obstacle_max_range: 8 m, raytrace_max_range: 10 m, update_frequency: 10 Hz}
   # Nav2's 0.9 m is for 0.5 m/s; at 2 m/s this bend is 2 m/s² sideways.
   controller: {desired_linear_vel: 2 m/s, regulated_linear_scaling_min_radius: 2 m}
 goals:

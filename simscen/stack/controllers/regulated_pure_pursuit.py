@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import ErrorCode, Goal, Path
 from simscen.model.stack import RegulatedPurePursuit as RppSpec
@@ -64,7 +64,8 @@ class RegulatedPurePursuit:
         track = self._track
         track.locate(pose)
         if self._goal_pose.reached(pose, twist, goal, track.remaining()):
-            command = self._turn(wrap(goal.pose.yaw - pose.yaw), pose, twist, costmap)
+            angle = wrap(goal.pose.yaw - pose.yaw)
+            command = self._turn(angle, pose, twist, costmap) if self._robot.turning_radius == 0.0 else STOP
         else:
             command = self._follow(track, pose, twist, costmap)
         self._arc = (pose, command)

@@ -20,7 +20,7 @@ from simscen.stack.behaviors.motions import Wait
 from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.footprint import Footprint
-from simscen.stack.goal_checker import GoalChecker
+from simscen.stack.goal_checker import AT_REST, GoalChecker
 from simscen.stack.lookahead import time_free
 from simscen.stack.progress_checker import ProgressChecker
 from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
@@ -53,7 +53,12 @@ def view_of(world: Flatland, robot: RobotModel) -> CostmapView:
 def test_a_goal_is_reached_well_inside_its_tolerance_or_standing_anywhere_inside(
     pose: Pose2, twist: Twist, reached: bool
 ) -> None:
-    assert GoalChecker(True).reached(GOAL, pose, twist) == reached
+    checker = GoalChecker(True)
+    assert [checker.reached(GOAL, pose, twist) for _ in range(AT_REST)][-1] == reached
+
+
+def test_a_robot_that_stands_for_a_moment_between_driving_and_turning_is_not_there_yet() -> None:
+    assert not GoalChecker(True).reached(GOAL, Pose2(0.95, 0.0, 0.15), STOP)
 
 
 def test_a_stateful_goal_checker_lets_the_robot_turn_without_losing_its_place() -> None:
@@ -215,7 +220,7 @@ def test_recoveries_are_handed_out_in_turn_until_the_retries_are_used_up() -> No
 def test_a_plan_is_blocked_by_what_comes_to_lie_ahead_on_it_but_not_behind() -> None:
     robot = round_robot()
     line = np.column_stack((np.arange(0.0, 4.0, 0.05), np.zeros(80), np.zeros(80)))
-    plan = PlanInForce(Path(line), robot.inscribed_radius)
+    plan = PlanInForce(Path(line), robot.inscribed_radius, view_of(Flatland(), robot))
     for x, blocked in ((2.0, True), (-0.5, False)):
         plan.locate(Pose2(1.0, 0.0))
         assert plan.blocked(view_of(Flatland(discs=[(x, 0.1, 0.1)]), robot)) == blocked
@@ -226,7 +231,17 @@ def test_a_plan_is_blocked_by_what_comes_to_lie_ahead_on_it_but_not_behind() -> 
 def test_another_plan_must_be_clearly_shorter(length: float, better: bool) -> None:
     line = np.column_stack((np.linspace(0, 3, 61), np.zeros(61), np.zeros(61)))
     other = Path(np.array([[0, 0, 0], [length, 0, 0]], dtype=float))
-    assert PlanInForce(Path(line), 0.2).worse_than(other) == better
+    plan = PlanInForce(Path(line), 0.2, view_of(Flatland(), round_robot()))
+    assert plan.worse_than(other) == better
+
+
+def test_a_plan_is_tight_where_it_has_lost_room_soon_but_not_where_it_never_had_any() -> None:
+    robot = round_robot()
+    line = Path(np.column_stack((np.arange(0.0, 4.0, 0.05), np.zeros(80), np.zeros(80))))
+    roomy, narrow = (view_of(Flatland(discs=discs), robot) for discs in ((), [(2.0, 0.45, 0.1)]))
+    assert PlanInForce(line, robot.inscribed_radius, roomy).tightened(narrow)
+    assert not PlanInForce(line, robot.inscribed_radius, narrow).tightened(narrow)
+    assert not PlanInForce(line, robot.inscribed_radius, narrow).tightened(roomy)
 
 
 def test_the_lowest_limit_of_the_zones_one_is_in_counts() -> None:
