@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from simscen.spec.base import Choice, Spec, by_default
+from simscen.spec.base import Choice, Ranged, Spec, by_default
 from simscen.spec.objects import Shaped
 from simscen.spec.places import Name, Point, PoseSpec
 from simscen.spec.quantities import (
@@ -101,7 +101,7 @@ class Mount(Spec):
     yaw: Angle = 0.0
 
 
-class Lidar(Spec):
+class Lidar(Ranged):
     """A planar lidar."""
 
     rate: Frequency = 10.0

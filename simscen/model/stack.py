@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from simscen.spec.base import Spec, by_default, type_or
+from simscen.spec.base import Ranged, Spec, by_default, type_or
 from simscen.spec.quantities import (
     Angle,
     Duration,
@@ -25,7 +25,7 @@ Noise = Annotated[float, Field(ge=0, le=100)]
 Iterations = Annotated[int, Field(ge=1, le=1_000_000)]
 
 
-class Amcl(Spec):
+class Amcl(Ranged):
     """Particle-filter localisation: nav2_amcl's parameters (Thrun et al., Probabilistic Robotics, ch. 8)."""
 
     type: Literal["amcl"] = "amcl"
@@ -104,7 +104,7 @@ Localizer = Annotated[
 ]
 
 
-class Costmap(Spec):
+class Costmap(Ranged):
     """nav2_costmap_2d: static, obstacle and inflation layers."""
 
     resolution: PositiveLength = 0.05
@@ -137,7 +137,7 @@ class Planner(Spec):
     replanning_rate: Frequency = 1.0
 
 
-class RegulatedPurePursuit(Spec):
+class RegulatedPurePursuit(Ranged):
     """nav2_regulated_pure_pursuit_controller (Macenski et al. 2023)."""
 
     type: Literal["regulated_pure_pursuit"] = "regulated_pure_pursuit"

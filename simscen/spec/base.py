@@ -42,6 +42,21 @@ class Value(RootModel[T], Generic[T]):
     model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False, defer_build=True)
 
 
+class Ranged(Spec):
+    """A specification in which no `min_…` is greater than its `max_…`."""
+
+    @model_validator(mode="after")
+    def _in_order(self) -> "Ranged":
+        for low in type(self).model_fields:
+            high = low.replace("min", "max")
+            if high == low or high not in type(self).model_fields:
+                continue
+            least, most = getattr(self, low), getattr(self, high)
+            if least > most:
+                raise ValueError(f"`{low}` {least:g} is greater than `{high}` {most:g}")
+        return self
+
+
 class Choice(Spec):
     """A mapping with exactly one key out of several, e.g. `spawn: {…}`, plus some modifiers.
 

@@ -6,13 +6,18 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from simscen.core.errors import InvalidInput
 from simscen.core.geometry import Pose2
 from simscen.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from simscen.core.problems import Problem
 from simscen.model.rosmap import RosMapSpec
-from simscen.worlds.mapimage import read_image
+from simscen.worlds.mapimage import CODE, read_image
 
 UNKNOWN_GREY, FREE_GREY, OCCUPIED_GREY = 205, 254, 0
 """The greys in which map_saver writes trinary maps."""
+
+FARTHEST = 1e4
+"""m from the origin: where coordinates end in all files."""
 
 
 def load_grid(spec: RosMapSpec, image_path: Path) -> tuple[OccupancyGrid, tuple[str, ...]]:
@@ -22,12 +27,24 @@ def load_grid(spec: RosMapSpec, image_path: Path) -> tuple[OccupancyGrid, tuple[
     pixels that are not opaque are unknown.
     """
     image = read_image(image_path)
+    _refuse_distance(spec, image.grey.shape[::-1], image_path)
     table = cell_values(spec)
     cells = table[image.grey]
     if image.alpha is not None and spec.mode != "raw":
         cells[image.alpha < 255] = UNKNOWN
     grid = OccupancyGrid(np.ascontiguousarray(cells[::-1]), spec.resolution, Pose2(*spec.origin))
     return grid, _doubts(spec, table, int(np.count_nonzero(image.grey == UNKNOWN_GREY)))
+
+
+def _refuse_distance(spec: RosMapSpec, pixels: tuple[int, ...], image_path: Path) -> None:
+    """Metres taken for millimetres would make a map that takes forever to prepare."""
+    reach = max(pixels) * spec.resolution + max(abs(spec.origin[0]), abs(spec.origin[1]))
+    if reach > FARTHEST:
+        size = " x ".join(str(count) for count in pixels)
+        message = (
+            f"map too large: {size} pixels of {spec.resolution:g} m reach {reach:g} m, farther than {FARTHEST:g} m"
+        )
+        raise InvalidInput([Problem(str(image_path), 0, 0, CODE, message, "check the map's `resolution`")])
 
 
 def cell_values(spec: RosMapSpec) -> npt.NDArray[np.int8]:
