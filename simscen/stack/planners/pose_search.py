@@ -46,8 +46,11 @@ def search_poses(
     information.setStateValidityChecker(lambda state: valid(state.getX(), state.getY(), state.getYaw()))
     information.setStateValidityCheckingResolution(SPACING / states.getMaximumExtent())
     information.setup()
+    ends = _state(information, start), _state(information, goal)
+    if not all(information.satisfiesBounds(end) and information.isValid(end) for end in ends):
+        return None  # a planner would wait for a better goal, 5 ms an iteration
     problem = ob.ProblemDefinition(information)
-    problem.setStartAndGoalStates(_state(information, start), _state(information, goal))
+    problem.setStartAndGoalStates(*ends)
     planner = PLANNERS[kind](information)
     planner.setProblemDefinition(problem)
     planner.setup()
@@ -72,5 +75,5 @@ def _state(information: Any, pose: Pose2) -> Any:
     state = information.allocState()
     state.setX(pose.x)
     state.setY(pose.y)
-    state.setYaw(pose.yaw)
+    state.setYaw(-math.pi if pose.yaw >= math.pi else pose.yaw)  # OMPL's headings lie in [-π, π)
     return state

@@ -1,0 +1,46 @@
+"""Searches over poses: their ends, and what they promise of the way between."""
+
+import math
+import time
+
+import numpy as np
+import pytest
+
+from simscen.core.geometry import Pose2, wrap
+from simscen.stack.planners.pose_search import search_poses
+
+BOUNDS = (-5.0, -5.0, 5.0, 5.0)
+
+
+def everywhere(x, y, yaw):
+    return True
+
+
+@pytest.mark.parametrize("yaw", [math.pi, -math.pi, 0.0])
+def test_any_heading_can_be_a_goal(yaw):
+    """OMPL's headings lie in [-π, π), ours in (-π, π]; a goal out of bounds would be waited for, not refused."""
+    poses = search_poses("rrt_connect", "reeds_shepp", 0.8, BOUNDS, Pose2(0, 0), Pose2(1, 1, yaw), everywhere, 1, 2000)
+    assert poses is not None
+    assert poses[-1][:2] == pytest.approx((1, 1), abs=1e-6)
+    assert wrap(poses[-1].yaw - yaw) == pytest.approx(0, abs=1e-6)
+
+
+def test_an_end_where_the_robot_cannot_be_is_no_path_at_once():
+    begin = time.process_time()
+    for start, goal in ((Pose2(0, 0), Pose2(2, 2)), (Pose2(2, 2), Pose2(0, 0)), (Pose2(0, 0), Pose2(9, 0))):
+        free = search_poses("rrt_connect", "reeds_shepp", 0.8, BOUNDS, start, goal, lambda x, y, yaw: x < 1, 1, 20_000)
+        assert free is None
+    assert time.process_time() - begin < 0.5
+
+
+@pytest.mark.parametrize("space", ["dubins", "reeds_shepp"])
+def test_no_arc_is_tighter_than_the_turning_radius_and_dubins_never_goes_back(space):
+    poses = search_poses("rrt_connect", space, 0.8, BOUNDS, Pose2(0, 0), Pose2(0, 1, math.pi), everywhere, 3, 2000)
+    assert poses is not None
+    points = np.array(poses)
+    step = np.diff(points[:, :2], axis=0)
+    turned = np.abs((np.diff(points[:, 2]) + np.pi) % (2 * np.pi) - np.pi)
+    chord = 2 * 0.8 * np.sin(np.minimum(turned, 3.0) / 2)
+    assert (np.hypot(step[:, 0], step[:, 1]) >= chord - 1e-3).mean() > 0.95  # but where a piece ends within a step
+    ahead = step[:, 0] * np.cos(points[:-1, 2]) + step[:, 1] * np.sin(points[:-1, 2])
+    assert (ahead < -0.01).any() == (space == "reeds_shepp")
