@@ -1,28 +1,25 @@
 """The list of actions: a new one is one file and one line here."""
 
+from typing import Annotated
+
 from simscen.actions.base import Action
-from simscen.actions.doors import CloseDoor, OpenDoor
-from simscen.actions.goals import CancelGoal, NewGoal
-from simscen.actions.move import Move
-from simscen.actions.remove import Remove
-from simscen.actions.robot import Kidnap, Push
-from simscen.actions.spawn import Spawn
 from simscen.core.stage import Stage
 from simscen.spec.base import Choice
+from simscen.spec.ondemand import OnDemand
 
 
 class AnyAction(Choice):
     """One thing to do."""
 
-    spawn: Spawn | None = None
-    remove: Remove | None = None
-    move: Move | None = None
-    open: OpenDoor | None = None
-    close: CloseDoor | None = None
-    kidnap: Kidnap | None = None
-    push: Push | None = None
-    new_goal: NewGoal | None = None
-    cancel_goal: CancelGoal | None = None
+    spawn: Annotated[Action | None, OnDemand("simscen.actions.spawn", "Spawn")] = None
+    remove: Annotated[Action | None, OnDemand("simscen.actions.remove", "Remove")] = None
+    move: Annotated[Action | None, OnDemand("simscen.actions.move", "Move")] = None
+    open: Annotated[Action | None, OnDemand("simscen.actions.doors", "OpenDoor")] = None
+    close: Annotated[Action | None, OnDemand("simscen.actions.doors", "CloseDoor")] = None
+    kidnap: Annotated[Action | None, OnDemand("simscen.actions.robot", "Kidnap")] = None
+    push: Annotated[Action | None, OnDemand("simscen.actions.robot", "Push")] = None
+    new_goal: Annotated[Action | None, OnDemand("simscen.actions.goals", "NewGoal")] = None
+    cancel_goal: Annotated[Action | None, OnDemand("simscen.actions.goals", "CancelGoal")] = None
 
     def perform(self, stage: Stage) -> None:
         """Do it now."""

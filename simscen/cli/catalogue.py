@@ -19,6 +19,7 @@ from simscen.model.disturbance import EventEntry, FaultEntry
 from simscen.model.rosmap import RosMapSpec
 from simscen.spec.base import Choice
 from simscen.spec.docs import field_docs
+from simscen.spec.ondemand import type_of
 from simscen.spec.quantities import UNITS, Quantity
 from simscen.triggers.trigger import Test, Trigger
 
@@ -194,9 +195,8 @@ def _default(field: FieldInfo) -> str:
 def _choices(group: str, choice: type[Choice]) -> Iterator[Topic]:
     docs = field_docs(choice)
     for key, name in choice.choices().items():
-        models = [
-            m for m in get_args(choice.model_fields[name].annotation) if isinstance(m, type) and m is not NoneType
-        ]
+        kind = type_of(choice.model_fields[name])
+        models = [m for m in get_args(kind) or (kind,) if isinstance(m, type) and m is not NoneType]
         model = models[0] if models and issubclass(models[0], BaseModel) and models[0] is not choice else None
         yield _topic(group, key, model) if model is not None else Topic(group, key, None, docs.get(name, ""))
 

@@ -116,7 +116,7 @@ class Pose3(NamedTuple):
 
     def compose(self, other: Pose3) -> Pose3:
         """`a_from_b.compose(b_from_c)` is `a_from_c`."""
-        x, y, z = self.apply(np.array([other.position]))[0].tolist()
+        x, y, z = self._moved(other.position)
         ax, ay, az, aw = self.quaternion
         bx, by, bz, bw = other.quaternion
         return Pose3(
@@ -126,6 +126,14 @@ class Pose3(NamedTuple):
             aw * bz + ax * by - ay * bx + az * bw,
             aw * bw - ax * bx - ay * by - az * bz,
         )  # fmt: skip
+
+    def _moved(self, point: tuple[float, float, float]) -> tuple[float, float, float]:
+        """One point of its frame in its parent frame; for an upright pose without numpy, which takes time to import."""
+        if self.qx != 0 or self.qy != 0:
+            x, y, z = self.apply(np.array([point]))[0].tolist()
+            return x, y, z
+        c, s = 1 - 2 * self.qz * self.qz, 2 * self.qz * self.qw
+        return c * point[0] - s * point[1] + self.x, s * point[0] + c * point[1] + self.y, point[2] + self.z
 
     def inverse(self) -> Pose3:
         """`a_from_b.inverse()` is `b_from_a`."""

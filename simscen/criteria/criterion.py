@@ -1,23 +1,10 @@
 """The list of criteria: a new one is one file and one line here."""
 
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
-from simscen.criteria.clearance import Clearance
-from simscen.criteria.collisions import Collisions
-from simscen.criteria.goals_reached import GoalsReached
-from simscen.criteria.keepout import Keepout
-from simscen.criteria.localization_error import LocalizationError
-from simscen.criteria.no_false_success import NoFalseSuccess
-from simscen.criteria.path_length import PathLength
-from simscen.criteria.recoveries import Recoveries
-from simscen.criteria.relocalized_within import RelocalizedWithin
-from simscen.criteria.replans import Replans
-from simscen.criteria.result import ErrorCodeIs, Result
-from simscen.criteria.speed import Speed
-from simscen.criteria.stopped_within import StoppedWithin
-from simscen.criteria.stuck import Stuck
-from simscen.criteria.time_to_goal import TimeToGoal
+from simscen.criteria.base import Criterion
 from simscen.spec.base import Choice
+from simscen.spec.ondemand import OnDemand
 from simscen.spec.places import Name
 
 
@@ -31,19 +18,25 @@ class AnyCriterion(Choice):
     severity: Literal["fail", "warn"] = "fail"
     """Whether a violation fails the run or is only reported."""
 
-    goals_reached: GoalsReached | None = None
-    result: Result | None = None
-    error_code: ErrorCodeIs | None = None
-    no_false_success: NoFalseSuccess | None = None
-    collisions: Collisions | None = None
-    clearance: Clearance | None = None
-    keepout: Keepout | None = None
-    time_to_goal: TimeToGoal | None = None
-    path_length: PathLength | None = None
-    speed: Speed | None = None
-    stopped_within: StoppedWithin | None = None
-    stuck: Stuck | None = None
-    localization_error: LocalizationError | None = None
-    relocalized_within: RelocalizedWithin | None = None
-    replans: Replans | None = None
-    recoveries: Recoveries | None = None
+    goals_reached: Annotated[Criterion | None, OnDemand("simscen.criteria.goals_reached", "GoalsReached")] = None
+    result: Annotated[Criterion | None, OnDemand("simscen.criteria.result", "Result")] = None
+    error_code: Annotated[Criterion | None, OnDemand("simscen.criteria.result", "ErrorCodeIs")] = None
+    no_false_success: Annotated[Criterion | None, OnDemand("simscen.criteria.no_false_success", "NoFalseSuccess")] = (
+        None
+    )
+    collisions: Annotated[Criterion | None, OnDemand("simscen.criteria.collisions", "Collisions")] = None
+    clearance: Annotated[Criterion | None, OnDemand("simscen.criteria.clearance", "Clearance")] = None
+    keepout: Annotated[Criterion | None, OnDemand("simscen.criteria.keepout", "Keepout")] = None
+    time_to_goal: Annotated[Criterion | None, OnDemand("simscen.criteria.time_to_goal", "TimeToGoal")] = None
+    path_length: Annotated[Criterion | None, OnDemand("simscen.criteria.path_length", "PathLength")] = None
+    speed: Annotated[Criterion | None, OnDemand("simscen.criteria.speed", "Speed")] = None
+    stopped_within: Annotated[Criterion | None, OnDemand("simscen.criteria.stopped_within", "StoppedWithin")] = None
+    stuck: Annotated[Criterion | None, OnDemand("simscen.criteria.stuck", "Stuck")] = None
+    localization_error: Annotated[
+        Criterion | None, OnDemand("simscen.criteria.localization_error", "LocalizationError")
+    ] = None
+    relocalized_within: Annotated[
+        Criterion | None, OnDemand("simscen.criteria.relocalized_within", "RelocalizedWithin")
+    ] = None
+    replans: Annotated[Criterion | None, OnDemand("simscen.criteria.replans", "Replans")] = None
+    recoveries: Annotated[Criterion | None, OnDemand("simscen.criteria.recoveries", "Recoveries")] = None

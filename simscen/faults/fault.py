@@ -1,24 +1,21 @@
 """The list of faults: a new one is one file and one line here."""
 
+from typing import Annotated
+
 from simscen.faults.base import Fault
-from simscen.faults.beam_dropout import BeamDropout
-from simscen.faults.bias import Bias
-from simscen.faults.dropout import Dropout
-from simscen.faults.noise import Noise
-from simscen.faults.off import Off
-from simscen.faults.slip import Slip
 from simscen.spec.base import Choice
+from simscen.spec.ondemand import OnDemand
 
 
 class AnyFault(Choice):
     """One thing that goes wrong."""
 
-    off: Off | None = None
-    dropout: Dropout | None = None
-    beam_dropout: BeamDropout | None = None
-    noise: Noise | None = None
-    bias: Bias | None = None
-    slip: Slip | None = None
+    off: Annotated[Fault | None, OnDemand("simscen.faults.off", "Off")] = None
+    dropout: Annotated[Fault | None, OnDemand("simscen.faults.dropout", "Dropout")] = None
+    beam_dropout: Annotated[Fault | None, OnDemand("simscen.faults.beam_dropout", "BeamDropout")] = None
+    noise: Annotated[Fault | None, OnDemand("simscen.faults.noise", "Noise")] = None
+    bias: Annotated[Fault | None, OnDemand("simscen.faults.bias", "Bias")] = None
+    slip: Annotated[Fault | None, OnDemand("simscen.faults.slip", "Slip")] = None
 
     @property
     def fault(self) -> Fault:

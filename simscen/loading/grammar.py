@@ -12,6 +12,7 @@ from pydantic import BaseModel, RootModel, Tag
 
 from simscen.loading.tree import Key
 from simscen.spec.base import Choice
+from simscen.spec.ondemand import type_of
 
 
 def models_at(model: type[BaseModel], loc: Sequence[Key]) -> list[type[BaseModel]]:
@@ -46,7 +47,7 @@ def field_type(model: type[BaseModel], key: str) -> Any:
     """The declared type of the field that is written as `key`."""
     for name, field in model.model_fields.items():
         if key in (field.alias, name):
-            return field.annotation
+            return type_of(field)
     return None
 
 

@@ -36,7 +36,7 @@ def goal_names(loaded: LoadedScenario) -> list[str]:
         goal.name or (goal.pose if isinstance(goal.pose, str) else f"goal-{number}")
         for number, goal in enumerate(loaded.spec.goals, start=1)
     ]
-    sent = [action.new_goal.name for event in loaded.spec.events for action in event.actions if action.new_goal]
+    sent = _made(loaded, "new_goal")
     return own + sent
 
 
@@ -49,8 +49,13 @@ def _objects(loaded: LoadedScenario) -> list[str] | None:
     world = loaded.world
     if world.spec is None or world.map is not None or world.sdf is not None:
         return None
-    spawned = [action.spawn.name for event in loaded.spec.events for action in event.actions if action.spawn]
-    return _standing(world.spec) + spawned
+    return _standing(world.spec) + _made(loaded, "spawn")
+
+
+def _made(loaded: LoadedScenario, kind: str) -> list[str]:
+    """The names that actions of one kind give to what they bring."""
+    actions = [action for event in loaded.spec.events for action in event.actions]
+    return [str(getattr(action.chosen, "name", "")) for action in actions if action.kind == kind]
 
 
 def _standing(world: WorldSpec) -> list[str]:

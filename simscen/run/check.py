@@ -14,7 +14,6 @@ from simscen.core.grid import OccupancyGrid
 from simscen.core.problems import Problem
 from simscen.core.shapes import Body, Solid
 from simscen.core.world import World
-from simscen.criteria.result import Result
 from simscen.loading.loaded import LoadedScenario, LoadedWorld
 from simscen.model.scenario import ScenarioSpec
 from simscen.run.goals import goals_of, pose_of
@@ -66,9 +65,8 @@ def _poses(spec: ScenarioSpec, world: World) -> Iterator[tuple[tuple[str | int, 
 
 def expects_unreachable_goal(spec: ScenarioSpec) -> bool:
     """Whether the scenario passes when the robot refuses its goal."""
-    return any(
-        isinstance(criterion, Result) and criterion.status == "FAILED" for criterion in (e.chosen for e in spec.pass_)
-    )
+    results = [entry.result for entry in spec.pass_ if entry.result is not None]
+    return any(getattr(result, "status", None) == "FAILED" for result in results)
 
 
 def _ground(loaded: LoadedScenario, world: World) -> "_Ground":

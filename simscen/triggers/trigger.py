@@ -6,33 +6,27 @@ from pydantic import Field
 
 from simscen.core.stage import Situation
 from simscen.spec.base import Choice
+from simscen.spec.ondemand import OnDemand
 from simscen.spec.quantities import Duration, Probability
 from simscen.triggers.base import Condition
-from simscen.triggers.goal import GoalStatus
-from simscen.triggers.happened import Collided, EventStatus, RecoveryStatus, Replan
-from simscen.triggers.motion import DistanceRemaining, LocalizationError, SpeedAbove, SpeedBelow
-from simscen.triggers.robot_in import RobotIn
-from simscen.triggers.robot_within import RobotWithin
-from simscen.triggers.time import Time
-from simscen.triggers.travelled import Travelled
 
 
 class Test(Choice):
     """One condition, or several combined."""
 
-    time: Time | None = None
-    robot_within: RobotWithin | None = None
-    robot_in: RobotIn | None = None
-    travelled: Travelled | None = None
-    speed_below: SpeedBelow | None = None
-    speed_above: SpeedAbove | None = None
-    distance_remaining: DistanceRemaining | None = None
-    localization_error: LocalizationError | None = None
-    goal: GoalStatus | None = None
-    replan: Replan | None = None
-    recovery: RecoveryStatus | None = None
-    collision: Collided | None = None
-    event: EventStatus | None = None
+    time: Annotated[Condition | None, OnDemand("simscen.triggers.time", "Time")] = None
+    robot_within: Annotated[Condition | None, OnDemand("simscen.triggers.robot_within", "RobotWithin")] = None
+    robot_in: Annotated[Condition | None, OnDemand("simscen.triggers.robot_in", "RobotIn")] = None
+    travelled: Annotated[Condition | None, OnDemand("simscen.triggers.travelled", "Travelled")] = None
+    speed_below: Annotated[Condition | None, OnDemand("simscen.triggers.motion", "SpeedBelow")] = None
+    speed_above: Annotated[Condition | None, OnDemand("simscen.triggers.motion", "SpeedAbove")] = None
+    distance_remaining: Annotated[Condition | None, OnDemand("simscen.triggers.motion", "DistanceRemaining")] = None
+    localization_error: Annotated[Condition | None, OnDemand("simscen.triggers.motion", "LocalizationError")] = None
+    goal: Annotated[Condition | None, OnDemand("simscen.triggers.goal", "GoalStatus")] = None
+    replan: Annotated[Condition | None, OnDemand("simscen.triggers.happened", "Replan")] = None
+    recovery: Annotated[Condition | None, OnDemand("simscen.triggers.happened", "RecoveryStatus")] = None
+    collision: Annotated[Condition | None, OnDemand("simscen.triggers.happened", "Collided")] = None
+    event: Annotated[Condition | None, OnDemand("simscen.triggers.happened", "EventStatus")] = None
     all: Annotated[list["Test"], Field(min_length=1, max_length=50)] | None = None
     """True while all of these are."""
     any: Annotated[list["Test"], Field(min_length=1, max_length=50)] | None = None

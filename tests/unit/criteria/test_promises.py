@@ -16,6 +16,7 @@ from simscen.criteria.bounds import BrokenTrace, at_least, at_most, counted
 from simscen.criteria.criterion import AnyCriterion
 from simscen.judge.judge import judge
 from simscen.judge.sketch import sketch, sketch_case
+from simscen.spec.ondemand import type_of
 
 CHOICES = AnyCriterion.choices()
 HEADINGS = ["What is measured:", "When it fails:", "Why this:", "Source:", "Example:"]
@@ -39,7 +40,7 @@ CASE = {"goals": [{"name": "shelf", "pose": [2.5, 0.5, 0]}], "shortest": {"shelf
 
 
 def specification(kind):
-    return AnyCriterion.model_fields[CHOICES[kind]].annotation.__args__[0]
+    return type_of(AnyCriterion.model_fields[CHOICES[kind]])
 
 
 def example(kind):
