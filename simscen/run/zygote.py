@@ -10,7 +10,7 @@ import os
 import selectors
 import signal
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
@@ -62,7 +62,7 @@ class Zygote:
             return False
         self._tell({"started": job.number})
         # A mistake is met again in the run's own process, where it is reported as that run's error.
-        with contextlib.suppress(Exception):
+        with contextlib.suppress(Exception), _at_most(job.wall_limit):
             self._warm_up(job)
         self._fork(job)
         return True
@@ -187,3 +187,19 @@ def _group_has_others(leader: int) -> bool:
             if int(stat.rsplit(")", 1)[1].split()[2]) == leader:
                 return True
     return False
+
+
+@contextlib.contextmanager
+def _at_most(seconds: float) -> Iterator[None]:
+    """Raise TimeoutError inside a block that takes longer: nobody else watches over the warm process."""
+
+    def ring(*_: object) -> None:
+        raise TimeoutError
+
+    before = signal.signal(signal.SIGALRM, ring)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)

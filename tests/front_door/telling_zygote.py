@@ -3,10 +3,12 @@
 import ctypes
 import os
 import signal
+import time
 
 from simscen.cli import zygote
 
 perform = zygote._perform
+prepared = zygote._WORKSHOP.prepared
 
 
 def misbehave(job, tell):
@@ -21,6 +23,13 @@ def misbehave(job, tell):
     return perform(job, tell)
 
 
+def slow_to_prepare(scenario):
+    if "slow-to-prepare" in scenario.spec.tags:
+        time.sleep(60)
+    return prepared(scenario)
+
+
 if __name__ == "__main__":
     zygote._perform = misbehave
+    zygote._WORKSHOP.prepared = slow_to_prepare
     zygote.main()

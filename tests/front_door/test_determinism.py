@@ -78,6 +78,18 @@ def test_88_a_run_after_one_that_crashed_is_as_if_alone(reference, pair: Path, s
     assert results(pair / "out")["b/seed-7"] == reference["b/seed-7"]
 
 
+def test_a_world_that_takes_forever_to_prepare_is_a_timeout_of_its_own_run(pair: Path, simscen, monkeypatch) -> None:
+    monkeypatch.setattr("simscen.cli.run.ZYGOTE", (TELLING,))
+    text = (pair / "a.scenario.yaml").read_text()
+    (pair / "a.scenario.yaml").write_text(text.replace("seed: 7", "tags: [slow-to-prepare]"))
+    assert simscen("run", ".", "-j", 1, "--out", "out", "--wall-limit", 3).code == 3
+    document = json.loads((pair / "out/results.json").read_text())
+    assert [(run["outcome"], (run["error"] or {}).get("kind")) for run in document["runs"]] == [
+        ("error", "timeout"),
+        ("passed", None),
+    ]
+
+
 def test_89_another_seed_is_another_run_and_0_is_none(reference, pair: Path, simscen) -> None:
     assert simscen("run", "b.scenario.yaml", "--seed", 8, "--out", "out").code == 0
     assert results(pair / "out")["b/seed-8"][1] != reference["b/seed-7"][1]
