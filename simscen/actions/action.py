@@ -1,11 +1,13 @@
 """The list of actions: a new one is one file and one line here."""
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from simscen.actions.base import Action
-from simscen.core.stage import Stage
 from simscen.spec.base import Choice
 from simscen.spec.ondemand import OnDemand
+
+if TYPE_CHECKING:
+    from simscen.core.stage import Stage
 
 
 class AnyAction(Choice):
@@ -21,7 +23,7 @@ class AnyAction(Choice):
     new_goal: Annotated[Action | None, OnDemand("simscen.actions.goals", "NewGoal")] = None
     cancel_goal: Annotated[Action | None, OnDemand("simscen.actions.goals", "CancelGoal")] = None
 
-    def perform(self, stage: Stage) -> None:
+    def perform(self, stage: "Stage") -> None:
         """Do it now."""
         action = self.chosen
         assert isinstance(action, Action)

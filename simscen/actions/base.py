@@ -1,8 +1,12 @@
 """What an action is."""
 
-from abc import ABC, abstractmethod
+from __future__ import annotations
 
-from simscen.core.stage import Stage
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from simscen.core.stage import Stage
 
 
 class Action(ABC):

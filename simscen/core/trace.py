@@ -8,23 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from simscen.core.belief import Belief
 from simscen.core.events import Event
-from simscen.core.geometry import Array, Pose3
+from simscen.core.geometry import Pose3
 from simscen.core.motion import Twist
 from simscen.core.navigation import Path
+from simscen.core.samples import Samples, Ticks
 from simscen.core.sensing import Readings
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    Ticks = npt.NDArray[np.int64]
-else:
-    Ticks = object  # annotations are not evaluated; commands that only read files need no numpy
 
 
 @dataclass(frozen=True)
@@ -65,21 +58,6 @@ class Moment:
     readings: Readings
     decision: Decision
     events: tuple[Event, ...] = ()
-
-
-@dataclass(frozen=True, eq=False)
-class Samples:
-    """A signal: `ticks` (n,) ascending, `values` (n, k)."""
-
-    ticks: Ticks
-    values: Array
-
-    def __len__(self) -> int:
-        return len(self.ticks)
-
-    def at(self, ticks: Ticks) -> Array:
-        """The newest value at each of `ticks` (sample and hold); the first value before the first sample."""
-        return self.values[np.maximum(np.searchsorted(self.ticks, ticks, side="right") - 1, 0)]
 
 
 @dataclass(frozen=True, eq=False)

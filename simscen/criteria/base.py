@@ -1,10 +1,15 @@
 """What a criterion is."""
 
-from abc import ABC, abstractmethod
+from __future__ import annotations
 
-from simscen.core.case import Case
-from simscen.core.trace import Trace
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING
+
 from simscen.core.verdict import Finding
+
+if TYPE_CHECKING:
+    from simscen.core.case import Case
+    from simscen.core.trace import Trace
 
 
 class Criterion(ABC):

@@ -1,10 +1,15 @@
 """How a measured number becomes a finding: the margin is the distance to the limit, and the sign decides."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from simscen.core.trace import Trace
 from simscen.core.verdict import Finding, Status
+
+if TYPE_CHECKING:
+    from simscen.core.trace import Trace
 
 
 class BrokenTrace(ValueError):

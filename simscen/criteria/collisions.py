@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from pydantic import Field
 
-from simscen.core.case import Case
 from simscen.core.events import Event
-from simscen.core.trace import Trace
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import BrokenTrace, at_most, counted
@@ -18,6 +16,10 @@ from simscen.criteria.signals import speed, turn_rate
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Impulse
 from simscen.spec.references import ObjectName
+
+if TYPE_CHECKING:
+    from simscen.core.case import Case
+    from simscen.core.trace import Trace
 
 OWN_FAULT = 0.1
 """m/s; a slower robot was run into (CARLA's CollisionTest draws the line here)."""

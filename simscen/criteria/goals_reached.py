@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from pydantic import Field
 
-from simscen.core.case import Case
 from simscen.core.geometry import Pose2, wrap
-from simscen.core.trace import Trace
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import at_most, missed, undecided
@@ -19,6 +17,10 @@ from simscen.criteria.signals import finite, truth
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveAngle, PositiveDuration, PositiveLength
 from simscen.spec.references import GoalName
+
+if TYPE_CHECKING:
+    from simscen.core.case import Case
+    from simscen.core.trace import Trace
 
 
 class GoalsReached(Spec, Criterion):

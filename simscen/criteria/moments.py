@@ -1,12 +1,17 @@
 """When things happened that criteria refer to by name."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from itertools import zip_longest
+from typing import TYPE_CHECKING
 
-from simscen.core.case import Case
 from simscen.core.events import Event
 from simscen.core.navigation import Goal
-from simscen.core.trace import Trace
+
+if TYPE_CHECKING:
+    from simscen.core.case import Case
+    from simscen.core.trace import Trace
 
 _STARTS = ("fault.started", "event.started")
 _ENDS = ("fault.ended", "event.ended")

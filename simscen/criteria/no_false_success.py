@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from simscen.core.case import Case
 from simscen.core.geometry import Pose2
-from simscen.core.trace import Trace
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import at_most, held, missed, undecided
@@ -14,6 +14,10 @@ from simscen.criteria.moments import stories
 from simscen.criteria.signals import truth
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveLength
+
+if TYPE_CHECKING:
+    from simscen.core.case import Case
+    from simscen.core.trace import Trace
 
 
 class NoFalseSuccess(Spec, Criterion):

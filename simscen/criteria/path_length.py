@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pydantic import model_validator
 
-from simscen.core.case import Case
-from simscen.core.trace import Trace
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import at_most, undecided
@@ -16,6 +15,10 @@ from simscen.criteria.moments import stories
 from simscen.criteria.signals import Drive, drive
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveLength, Ratio
+
+if TYPE_CHECKING:
+    from simscen.core.case import Case
+    from simscen.core.trace import Trace
 
 
 class PathLength(Spec, Criterion):

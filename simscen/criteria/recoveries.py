@@ -1,16 +1,20 @@
 """`recoveries`: how often the robot had to help itself."""
 
-from typing import Annotated
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field, model_validator
 
-from simscen.core.case import Case
-from simscen.core.trace import Trace
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import counted
 from simscen.spec.base import Spec
 from simscen.spec.places import Name
+
+if TYPE_CHECKING:
+    from simscen.core.case import Case
+    from simscen.core.trace import Trace
 
 Count = Annotated[int, Field(ge=0, le=100_000)]
 
@@ -35,7 +39,7 @@ class Recoveries(Spec, Criterion):
     """Only this behaviour: spin, wait, backup, clear_costmap, …"""
 
     @model_validator(mode="after")
-    def _some_bound(self) -> "Recoveries":
+    def _some_bound(self) -> Recoveries:
         if self.min is None and self.max is None:
             raise ValueError("expected min or max")
         return self

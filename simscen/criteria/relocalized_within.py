@@ -1,7 +1,9 @@
 """`relocalized_within`: how soon a lost robot knows again where it is."""
 
-from simscen.core.case import Case
-from simscen.core.trace import Samples, Trace
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import at_most, undecided
@@ -10,6 +12,11 @@ from simscen.criteria.signals import first_lasting, pose_error
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveAngle, PositiveDuration, PositiveLength
 from simscen.spec.references import HappeningName
+
+if TYPE_CHECKING:
+    from simscen.core.case import Case
+    from simscen.core.samples import Samples
+    from simscen.core.trace import Trace
 
 
 class RelocalizedWithin(Spec, Criterion):

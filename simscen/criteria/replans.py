@@ -1,16 +1,20 @@
 """`replans`: how often the robot changed its plan."""
 
-from typing import Annotated
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field, model_validator
 
-from simscen.core.case import Case
-from simscen.core.trace import Trace
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import counted
 from simscen.spec.base import Spec
 from simscen.spec.places import Name
+
+if TYPE_CHECKING:
+    from simscen.core.case import Case
+    from simscen.core.trace import Trace
 
 Count = Annotated[int, Field(ge=0, le=100_000)]
 
@@ -35,7 +39,7 @@ class Replans(Spec, Criterion):
     """Only plans made for this reason, e.g. `blocked`."""
 
     @model_validator(mode="after")
-    def _some_bound(self) -> "Replans":
+    def _some_bound(self) -> Replans:
         if self.min is None and self.max is None:
             raise ValueError("expected min or max")
         return self

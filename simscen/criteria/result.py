@@ -1,10 +1,10 @@
 """`result` and `error_code`: how the navigation ended, in Nav2's words."""
 
-from typing import Literal
+from __future__ import annotations
 
-from simscen.core.case import Case
+from typing import TYPE_CHECKING, Literal
+
 from simscen.core.events import Event
-from simscen.core.trace import Trace
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import held, missed, undecided
@@ -12,6 +12,10 @@ from simscen.criteria.codes import Code, code_of
 from simscen.criteria.moments import ending, finished
 from simscen.spec.base import Spec
 from simscen.spec.references import GoalName
+
+if TYPE_CHECKING:
+    from simscen.core.case import Case
+    from simscen.core.trace import Trace
 
 
 class Result(Spec, Criterion):

@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simscen.core.geometry import Array, wrap_array
-from simscen.core.trace import Samples, Ticks, Trace
+from simscen.core.samples import Samples, Ticks
 from simscen.criteria.bounds import BrokenTrace
 
 if TYPE_CHECKING:
     import numpy.typing as npt
+
+    from simscen.core.trace import Trace
 
     Flags = npt.NDArray[np.bool_]
 else:

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from pydantic import model_validator
 
-from simscen.core.case import Case
-from simscen.core.trace import Samples, Trace
 from simscen.core.verdict import Finding
 from simscen.criteria import signals
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import at_most, undecided
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveAngularSpeed, PositiveSpeed
+
+if TYPE_CHECKING:
+    from simscen.core.case import Case
+    from simscen.core.samples import Samples
+    from simscen.core.trace import Trace
 
 
 class Speed(Spec, Criterion):

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simscen.core.case import Case
-from simscen.core.trace import Trace
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import at_most, held, missed, undecided
@@ -16,6 +15,10 @@ from simscen.criteria.signals import Flags, drive, first_lasting, speed, turn_ra
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveAngularSpeed, PositiveDuration, PositiveSpeed
 from simscen.spec.references import HappeningName
+
+if TYPE_CHECKING:
+    from simscen.core.case import Case
+    from simscen.core.trace import Trace
 
 OLD_SCAN = 0.2
 """Seconds; a scan older than two periods of a 10 Hz lidar is worth a line."""

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simscen.core.case import Case
-from simscen.core.trace import Samples, Trace
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import at_most, undecided
@@ -15,6 +14,11 @@ from simscen.criteria.moments import stories
 from simscen.criteria.signals import truth
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveDuration, PositiveLength
+
+if TYPE_CHECKING:
+    from simscen.core.case import Case
+    from simscen.core.samples import Samples
+    from simscen.core.trace import Trace
 
 
 class Stuck(Spec, Criterion):

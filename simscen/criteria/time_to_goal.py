@@ -1,7 +1,9 @@
 """`time_to_goal`: how long the drive took."""
 
-from simscen.core.case import Case
-from simscen.core.trace import Trace
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import at_most, missed, undecided
@@ -9,6 +11,10 @@ from simscen.criteria.moments import GoalStory, finished, stories
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveDuration
 from simscen.spec.references import GoalName
+
+if TYPE_CHECKING:
+    from simscen.core.case import Case
+    from simscen.core.trace import Trace
 
 
 class TimeToGoal(Spec, Criterion):

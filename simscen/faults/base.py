@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from simscen.core.motion import Twist
-from simscen.core.sensing import Reading
+if TYPE_CHECKING:
+    from simscen.core.motion import Twist
+    from simscen.core.sensing import Reading
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,8 @@ from simscen.core.case import Case
 from simscen.core.events import Event
 from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.core.navigation import Goal, Path
-from simscen.core.trace import Samples, Ticks, Trace
+from simscen.core.samples import Samples, Ticks
+from simscen.core.trace import Trace
 
 TICK_RATE, TRUTH_PERIOD, SCAN_PERIOD, BELIEF_PERIOD = 240, 6, 24, 24
 

@@ -4,7 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from simscen.core.trace import Samples, Trace
+from simscen.core.samples import Samples
+from simscen.core.trace import Trace
 
 _POSE = ("x", "y", "yaw")
 _COLUMNS = {

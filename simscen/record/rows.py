@@ -12,7 +12,8 @@ import numpy as np
 from simscen.core.events import Event
 from simscen.core.geometry import Array
 from simscen.core.navigation import Path
-from simscen.core.trace import Samples, Ticks, Trace
+from simscen.core.samples import Samples, Ticks
+from simscen.core.trace import Trace
 
 
 class Series:

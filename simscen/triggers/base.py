@@ -1,8 +1,12 @@
 """What a trigger is."""
 
-from abc import ABC, abstractmethod
+from __future__ import annotations
 
-from simscen.core.stage import Situation
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from simscen.core.stage import Situation
 
 
 class Condition(ABC):

@@ -1,14 +1,16 @@
 """The list of triggers: a new one is one file and one line here."""
 
-from typing import Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from simscen.core.stage import Situation
 from simscen.spec.base import Choice
 from simscen.spec.ondemand import OnDemand
 from simscen.spec.quantities import Duration, Probability
 from simscen.triggers.base import Condition
+
+if TYPE_CHECKING:
+    from simscen.core.stage import Situation
 
 
 class Test(Choice):
@@ -34,7 +36,7 @@ class Test(Choice):
     not_: "Test | None" = Field(default=None, alias="not")
     """True while this is not."""
 
-    def holds(self, now: Situation) -> bool:
+    def holds(self, now: "Situation") -> bool:
         """Whether the condition is true at this beat."""
         if self.all is not None:
             return all_hold(self.all, now)
@@ -47,12 +49,12 @@ class Test(Choice):
         return condition.holds(now)
 
 
-def all_hold(tests: list[Test], now: Situation) -> bool:
+def all_hold(tests: list[Test], now: "Situation") -> bool:
     """Conjunction."""
     return all(test.holds(now) for test in tests)
 
 
-def any_holds(tests: list[Test], now: Situation) -> bool:
+def any_holds(tests: list[Test], now: "Situation") -> bool:
     """Disjunction."""
     return any(test.holds(now) for test in tests)
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
-from simscen.core.trace import Samples
+from simscen.core.samples import Samples
 from simscen.core.verdict import Status
 from simscen.judge.wording import comparison, subject
 from simscen.report.picture import palette

