@@ -333,6 +333,26 @@ def test_geometry_of_sdf_that_cannot_be_used(with_world, folder: Path, geometry:
     assert told in head
 
 
+def test_50_a_quaternion_of_zeros(with_world) -> None:
+    pose = '<model name="thing"><pose rotation_format="quat_xyzw">0 0 0  0 0 0 0</pose>'
+    text = (
+        SDF.replace('<model name="thing">', pose).replace("1.7", "1.9").format(geometry="<box><size>1 1 1</size></box>")
+    )
+    head = with_world(text, "bad.sdf").splitlines()[0]
+    assert head.startswith("bad.sdf:4:")
+    assert "quaternion" in head
+
+
+def test_a_problem_is_told_with_the_shorter_path_that_opens(refused, folder: Path, monkeypatch) -> None:
+    (folder / "bad.scenario.yaml").write_text("- a list\n")
+    deep = folder.parent / "/".join("a deep folder" for _ in range(60))
+    deep.mkdir(parents=True)
+    monkeypatch.chdir(deep)
+    assert refused(folder / "bad.scenario.yaml").startswith(f"{folder}/bad.scenario.yaml:1:1: error[SC004]")
+    monkeypatch.chdir(folder.parent)
+    assert refused(folder / "bad.scenario.yaml").startswith("home/bad.scenario.yaml:1:1: error[SC004]")
+
+
 @pytest.mark.parametrize(
     ("content", "place", "told"),
     [
