@@ -123,16 +123,6 @@ def with_scenario(folder: Path, refused: Refused) -> Refused:
     return call
 
 
-def process(*arguments: object, cwd: Path | None = None, timeout: float = 60, **environment: str) -> Ended:
-    """The installed command in a process of its own; fails when it takes longer than `timeout` seconds."""
-    command = [str(Path(sys.executable).with_name("simscen")), *map(str, arguments)]
-    done = subprocess.run(
-        command, cwd=cwd, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=timeout, check=False,
-        env={**os.environ, **environment},
-    )  # fmt: skip
-    return Ended(done.returncode, done.stdout, done.stderr)
-
-
 MEASURED = """
 import sys, time
 from simscen.cli.main import main
