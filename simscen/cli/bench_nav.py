@@ -33,7 +33,7 @@ def command(
         int | None, typer.Option(min=1, max=1000, help="Seeds of each scenario; default: 5 for BARN, else 20.")
     ] = None,
     fields: Annotated[int, typer.Option(min=0, max=10_000, help="How many obstacle fields to generate.")] = 100,
-    misled: Annotated[int, typer.Option(min=0, max=10_000, help="How many wrong initial estimates to try.")] = 50,
+    lost: Annotated[int, typer.Option(min=0, max=10_000, help="How often the robot does not know where it is.")] = 50,
     workers: Annotated[int | None, typer.Option("--workers", "-j", min=1, max=256, help="Default: all cores.")] = None,
     out: Annotated[Path | None, typer.Option(help="Output folder, new or empty.")] = None,
     format_: Annotated[Format, typer.Option("--format", help="What to print.")] = Format.TEXT,
@@ -57,7 +57,7 @@ def command(
         "generated fields": (folder, lambda: [generated_fields(made, fields)] if fields else []),
         "tb3_sandbox": (nav2, lambda: sandbox(made, nav2, many)),
         "corner cases": (project / "scenarios", lambda: corner_cases(project / "scenarios", project, many)),
-        "localization": (project / "worlds", lambda: localizations(made, project / "worlds", many, misled)),
+        "localization": (project / "worlds", lambda: localizations(made, project / "worlds", many, lost)),
     }
     experiments: list[Experiment] = []
     for name, (needed, make) in offers.items():

@@ -79,22 +79,28 @@ def corner_cases(scenarios: Path, root: Path, seeds: Sequence[int]) -> list[Expe
     return [Experiment(f.name.split(".")[0].replace("_", " "), (Drive(f, seeds),), root) for f in files]
 
 
-def localizations(folder: Path, worlds: Path, seeds: Sequence[int], wrong: int) -> list[Experiment]:
-    """A tour of the shipped house told where it starts, and `wrong` times told a pose 0.5 m and 20 degrees off."""
-    tour = Drive(_written(folder / "localization/tour.scenario.yaml", localization.tour()), seeds)
-    misled = [
-        Drive(
-            _written(
-                folder / f"localization/misled_{seed}.scenario.yaml",
-                localization.misled(float(Streams(seed).generator("direction").uniform(-np.pi, np.pi)), seed % 2 == 0),
-            ),
-            [seed],
-        )
-        for seed in range(1, wrong + 1)
-    ]
+def localizations(folder: Path, worlds: Path, seeds: Sequence[int], lost: int) -> list[Experiment]:
+    """A tour of the shipped house told where it starts; and `lost` times told a pose 0.5 m and 20 degrees off, told
+    nothing, and kidnapped.
+    """
+
+    def experiment(name: str, *drives: Drive, known: bool = False) -> Experiment:
+        return Experiment(f"localization, {name}", drives, folder, (worlds,), localization=known)
+
+    def one(stem: str, text: str, seeds: Sequence[int]) -> Drive:
+        return Drive(_written(folder / f"localization/{stem}.scenario.yaml", text), seeds)
+
+    numbers = range(1, lost + 1)
+    directions = {seed: float(Streams(seed).generator("direction").uniform(-np.pi, np.pi)) for seed in numbers}
+    misled = [one(f"misled_{n}", localization.misled(directions[n], n % 2 == 0), [n]) for n in numbers]
+    tour = experiment("tour", one("tour", localization.tour(), seeds), known=True)
+    if not lost:
+        return [tour]
     return [
-        Experiment("localization, tour", (tour,), folder, (worlds,), localization=True),
-        Experiment("localization, told 0.5 m and 20° off", tuple(misled), folder, (worlds,), localization=True),
+        tour,
+        experiment("told 0.5 m and 20° off", *misled, known=True),
+        experiment("start unknown", one("start_unknown", localization.start_unknown(), numbers)),
+        experiment("kidnapped", one("kidnapped", localization.kidnapped(), numbers)),
     ]
 
 

@@ -47,3 +47,39 @@ pass:
   - localization_error: {{final: 10 cm}}
   - collisions: {{max: 0}}
 """
+
+
+FINDS_ITSELF = """\
+stack:
+  localizer: {type: amcl, max_particles: 5000, recovery_alpha_slow: 0.001, recovery_alpha_fast: 0.1}
+goals:
+  - {pose: kitchen, timeout: 200 s}
+time_limit: 210 s
+pass:
+  - goals_reached: {}
+  - localization_error: {final: 0.2 m}
+  - collisions: {max: 0, caused_by_robot: true}
+"""
+"""AMCL as one sets it up to find a lost robot: augmented MCL, with particles for a whole flat."""
+
+
+def start_unknown() -> str:
+    """The robot is told nothing of where it is, and must find out while it drives to its goal."""
+    return f"""\
+simscen: 1
+name: start unknown
+world: house.world.yaml
+robot: {{pose: dock, initial_estimate: unknown}}
+{FINDS_ITSELF}"""
+
+
+def kidnapped() -> str:
+    """After 3 m the robot is carried from the corridor into the study."""
+    return f"""\
+simscen: 1
+name: kidnapped
+world: house.world.yaml
+robot: {{pose: dock}}
+events:
+  - {{name: kidnapped, when: {{travelled: 3 m}}, do: {{kidnap: {{pose: {{x: 9.4, y: 7.3, yaw: 90 deg}}}}}}}}
+{FINDS_ITSELF}"""

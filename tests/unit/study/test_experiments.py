@@ -23,9 +23,11 @@ def test_generated_fields_load_and_carry_their_reference_length(tmp_path: Path) 
 
 
 def test_localization_loads_and_misleads_in_another_direction_each_time(tmp_path: Path) -> None:
-    tour, misled = localizations(tmp_path, PROJECT / "worlds", range(1, 21), 3)
-    loads(tour)
-    loads(misled)
+    experiments = localizations(tmp_path, PROJECT / "worlds", range(1, 21), 3)
+    for experiment in experiments:
+        loads(experiment)
+    _, misled, unknown, _ = experiments
+    assert list(unknown.drives[0].seeds) == [1, 2, 3]
     assert len({drive.file.read_text() for drive in misled.drives}) == 3
 
 
