@@ -62,6 +62,7 @@ def build_stack(
         seconds,
         robot.inscribed_radius,
         journal,
+        steered=robot.turning_radius > 0.0,
     )
     return ReferenceStack(
         surroundings,
@@ -100,4 +101,4 @@ def _behaviors(spec: model.Recovery, robot: RobotModel, footprint: Footprint, co
         "wait": Wait(spec),
         "backup": BackUp(spec, robot, footprint),
     }
-    return [known[name] for name in spec.behaviors]
+    return [known[name] for name in spec.behaviors if name != "spin" or robot.turning_radius == 0.0]

@@ -23,6 +23,8 @@ from simscen.stack.replanning import PlanInForce
 
 TIGHT_PERIOD = 0.5
 """Seconds between two looks for a roomier way where the followed one has become tight."""
+MISSED_PERIOD = 1.0
+"""Seconds that a car follows a plan before it may find that it has missed it."""
 BETTER_PERIOD = 2.0
 """Seconds between two looks for a shorter way after obstacles have gone."""
 RECONSIDER = 2
@@ -49,11 +51,12 @@ class Navigator:
         period: float,
         radius: float,
         journal: list[Event],
+        steered: bool = False,
     ) -> None:
         self._spec, self.planner, self._controller, self._recovery = spec, planner, controller, recovery
         self._goal_checker, self._progress, self._costmap = goal_checker, progress, costmap
         self._plan_seed, self._period, self._radius = plan_seed, period, radius
-        self._events = journal
+        self._events, self._steered = journal, steered
         self._plans = 0
         self._clock = 0.0
         self.goal: Goal | None = None
@@ -124,6 +127,9 @@ class Navigator:
     def _reconsider(self, tick: int, goal: Goal, pose: Pose2) -> None:
         """Replace the plan when it is blocked, outdated, or clearly longer than need be."""
         assert self.plan is not None
+        if self._steered and self._clock - self._adopted >= MISSED_PERIOD and self.plan.missed(pose):
+            self._adopt(tick, self._compute(tick, goal, pose), "missed")
+            return
         if self._spec.replanning == "rate":
             if self._clock - self._looked >= 1.0 / self._spec.replanning_rate:
                 self._adopt(tick, self._compute(tick, goal, pose), "rate")

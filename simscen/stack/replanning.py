@@ -1,5 +1,7 @@
 """When a plan that is being followed should be replaced."""
 
+import math
+
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
@@ -21,6 +23,10 @@ SOON = 4.0
 """Metres of plan ahead whose room counts."""
 
 
+STRAYED, AT_END = 0.2, 0.03
+"""Metres beside its plan, or from its end, at which a car needs another: it cannot turn back on the spot."""
+
+
 class PlanInForce:
     """The plan being followed, and how far the robot has come on it."""
 
@@ -32,6 +38,11 @@ class PlanInForce:
     def locate(self, pose: Pose2) -> None:
         """Note where the robot is."""
         self._track.locate(pose)
+
+    def missed(self, pose: Pose2) -> bool:
+        """Whether a car that has not reached its goal can no longer do so on this plan."""
+        x, y, _ = self._track.points[self._track.index].tolist()
+        return math.hypot(pose.x - x, pose.y - y) > STRAYED or self.remaining() < AT_END
 
     def remaining(self) -> float:
         """Metres to go."""

@@ -14,6 +14,7 @@ class VelocitySmoother:
         self._faster, self._slower = faster * period, robot.linear_deceleration * period
         turn = min(spec.max_angular_accel or robot.angular_acceleration, robot.angular_acceleration)
         self._turn = turn * period
+        self._steered = robot.turning_radius > 0.0
         self._last = Twist()
 
     def reset(self, twist: Twist) -> None:
@@ -25,9 +26,12 @@ class VelocitySmoother:
         if not self._enabled:
             return wanted
         last = self._last
-        self._last = Twist(
-            self._towards(last.vx, wanted.vx), self._towards(last.vy, wanted.vy), self._turned(last.wz, wanted.wz)
-        )
+        vx = self._towards(last.vx, wanted.vx)
+        if self._steered and wanted.vx != 0.0:
+            turn = vx * wanted.wz / wanted.vx  # nav2's scale_velocities: a car keeps to the curve while it speeds up
+        else:
+            turn = self._turned(last.wz, wanted.wz)
+        self._last = Twist(vx, self._towards(last.vy, wanted.vy), turn)
         return self._last
 
     def _towards(self, now: float, wanted: float) -> float:

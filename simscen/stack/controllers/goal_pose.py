@@ -33,10 +33,11 @@ class GoalPose:
     def reached(self, pose: Pose2, twist: Twist, goal: Goal, remaining: float) -> bool:
         """Whether to stop driving and to turn to the goal's heading; `remaining` metres of path are left."""
         distance = goal.pose.distance(pose)
+        if not self._can_turn:
+            return distance <= goal.xy_tolerance and remaining < AT_END
         dx, dy = goal.pose.x - pose.x, goal.pose.y - pose.y
         behind = dx * math.cos(pose.yaw) + dy * math.sin(pose.yaw) <= 0.0
-        standing = abs(twist.vx) < STANDING and remaining < 0.2
-        near = standing or (distance <= ON_THE_SPOT * goal.xy_tolerance and (self._can_turn or remaining < AT_END))
+        near = distance <= ON_THE_SPOT * goal.xy_tolerance or (abs(twist.vx) < STANDING and remaining < 0.2)
         passed = distance <= PASSED * goal.xy_tolerance and behind and remaining < 0.1
         self._there = distance <= goal.xy_tolerance and (self._there or near or passed)
         return self._there

@@ -22,6 +22,9 @@ SHOWN: Array = np.arange(16, dtype=np.float64) * 0.1
 """Seconds of the arc that `local_plan` shows."""
 CREEP = 0.1
 """m/s. When only slower than this would keep the time to collision, the way is blocked."""
+BEND = 0.4
+"""Of its turning radius a car looks ahead at most: its plans go from full left to full right, and what a chord cuts off
+there it cannot make good again."""
 NEARER = (1.0, 0.7, 0.5, 0.35)
 """Parts of the look-ahead distance that are tried until the arc is free: an arc to a far carrot cuts the path's bends,
 shorter ones keep to it. nav2_graceful_controller goes through its targets likewise."""
@@ -109,7 +112,10 @@ class RegulatedPurePursuit:
         spec = self._spec
         if not spec.use_velocity_scaled_lookahead_dist:
             return spec.lookahead_dist
-        return min(max(abs(speed) * spec.lookahead_time, spec.min_lookahead_dist), spec.max_lookahead_dist)
+        reach = min(max(abs(speed) * spec.lookahead_time, spec.min_lookahead_dist), spec.max_lookahead_dist)
+        if self._robot.turning_radius > 0.0:
+            reach = min(reach, max(spec.min_lookahead_dist, BEND * self._robot.turning_radius))
+        return reach
 
     def _should_rotate(self, carrot: tuple[float, float]) -> bool:
         if not self._spec.use_rotate_to_heading or self._robot.turning_radius > 0.0:

@@ -7,12 +7,13 @@ import numpy as np
 
 from simscen.core.geometry import Pose2
 from simscen.core.navigation import Path
+from simscen.stack.cusps import cusps, forward_steps
 
 SEARCH_AHEAD = 1.5
 """Metres of path beyond the last place that are searched for the nearest point, so that a path may cross itself."""
 
 
-AT_CUSP = 0.1
+AT_CUSP = 0.03
 """Metres before a change of direction at which it counts as reached."""
 
 
@@ -29,9 +30,8 @@ class PathTracker:
         lengths = np.hypot(steps[:, 0], steps[:, 1])
         self.along = np.concatenate(([0.0], np.cumsum(lengths)))
         self._metres: list[float] = self.along.tolist()
-        ahead = steps[:, 0] * np.cos(self.points[:-1, 2]) + steps[:, 1] * np.sin(self.points[:-1, 2]) >= -1e-9
-        changes = np.flatnonzero(ahead[1:] != ahead[:-1]) + 1 if len(ahead) else np.zeros(0, dtype=np.int64)
-        self._ends: list[int] = [*changes.tolist(), len(self.points) - 1]
+        ahead = forward_steps(self.points)
+        self._ends: list[int] = [*cusps(self.points).tolist(), len(self.points) - 1]
         self._forward: list[bool] = [bool(ahead[max(0, end - 1)]) if len(ahead) else True for end in self._ends]
         self.index = 0
 

@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 
-from simscen.core.geometry import Pose2
+from simscen.core.geometry import Array, Pose2
 from simscen.core.navigation import ErrorCode, Path
 from simscen.model.stack import Planner as PlannerSpec
+from simscen.stack.cusps import cusps
 from simscen.stack.footprint import Footprint
 from simscen.stack.planners.ends import find_ends
 from simscen.stack.planners.field import Field
@@ -16,10 +17,16 @@ from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
 
 TIGHTEST = 0.2
 """Metres: the arcs of a long robot that could turn in place, but should not have to."""
+ROOM_TO_STEER = 1.15
+"""A car's arcs are this much wider than its tightest: at full lock a controller has nothing left to correct with."""
 ROOM = 0.05
 """Metres beyond the hull that are kept in all attempts but the last."""
 ATTEMPTS = ((0.15, ROOM, 0.1), (0.15, ROOM, 0.1), (0.3, ROOM, 0.1), (0.3, 0.0, 0.2), (2.0, 0.0, 0.5))
 """Slack of the informed set, room, share of the iterations. Cars need wider sets than discs: they swing out."""
+TRIES = 6
+"""Searches in all once there is a path: trees over poses make detours, and each takes only milliseconds."""
+CUSP = 1.0
+"""Metres that a change of direction counts as: about what a car could drive while it stops and steers round."""
 
 
 class PosePlanner:
@@ -27,38 +34,36 @@ class PosePlanner:
 
     def __init__(self, spec: PlannerSpec, robot: RobotModel, footprint: Footprint, space: Space) -> None:
         self._spec, self._inscribed, self._footprint, self._space = spec, robot.inscribed_radius, footprint, space
-        self._turning_radius = max(robot.turning_radius, TIGHTEST)
+        self._turning_radius = max(ROOM_TO_STEER * robot.turning_radius, TIGHTEST)
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
-        """A path of poses in the map frame, 5 cm apart; the shortest of a few searches."""
+        """A path of poses in the map frame, 5 cm apart; the easiest of a few searches."""
         field = Field(costmap)
         ends = find_ends(field, start, goal, self._inscribed, self._spec.tolerance)
         self._hull_fits(costmap, start, ErrorCode.START_OCCUPIED, "start")
         goal = Pose2(*ends.goal, goal.yaw)
         self._hull_fits(costmap, goal, ErrorCode.GOAL_OCCUPIED, "goal")
         informed = InformedSet(field, ends.start, ends.goal, self._inscribed)
-        best: list[Pose2] | None = None
-        for number, (slack, room, share) in enumerate(ATTEMPTS):
-            if best is not None and number >= 2:
-                break
+        for slack, room, share in ATTEMPTS:
             informed.narrow(slack)
-            poses = search_poses(
-                self._spec.type,
-                self._space,
-                self._turning_radius,
-                informed.bounds(),
-                start,
-                goal,
-                self._valid(field, informed, room, (start, goal)),
-                seed + number,
-                max(1, round(share * self._spec.max_iterations)),
-            )
-            if poses is not None and (best is None or len(poses) < len(best)):
-                best = poses
-        if best is None:
-            message = f"{self._spec.type}: no path in {self._spec.max_iterations} iterations"
-            raise NavigationFailure(ErrorCode.NO_VALID_PATH, message)
-        return Path(np.array(best))
+            valid = self._valid(field, informed, room, (start, goal))
+            iterations = max(1, round(share * self._spec.max_iterations))
+            found: list[Array] = []
+            while True:
+                seed += 1
+                poses = search_poses(
+                    self._spec.type, self._space, self._turning_radius, informed.bounds(), start, goal, valid, seed,
+                    iterations,
+                )  # fmt: skip
+                if poses is None:
+                    break
+                found.append(np.array(poses))
+                if len(found) == TRIES:
+                    break
+            if found:
+                return Path(min(found, key=_effort))
+        message = f"{self._spec.type}: no path in {self._spec.max_iterations} iterations"
+        raise NavigationFailure(ErrorCode.NO_VALID_PATH, message)
 
     def _hull_fits(self, costmap: CostmapView, pose: Pose2, code: ErrorCode, what: str) -> None:
         if not self._footprint.free(costmap, np.array([pose]))[0]:
@@ -83,3 +88,8 @@ class PosePlanner:
             return least > tight or bool(free(costmap, np.array([(x, y, yaw)]))[0])
 
         return valid
+
+
+def _effort(poses: Array) -> float:
+    """Metres to drive, and what stopping to change direction costs."""
+    return float(np.hypot(*np.diff(poses[:, :2], axis=0).T).sum()) + CUSP * int(cusps(poses).size)
