@@ -191,9 +191,12 @@ def test_26_nor_as_defaults_or_as_a_base(with_scenario, folder: Path, kind: str)
 
 
 @pytest.fixture
-def everyman():
+def everyman(refused, simscen):
     """A folder that everybody may enter, and no longer the rights of root, who may read everything."""
     before = Path.cwd()
+    # Python itself may lie where only root can read, so that everything must be imported by now.
+    simscen("validate", ".")
+    refused("nowhere.scenario.yaml")
     with tempfile.TemporaryDirectory() as name:
         Path(name).chmod(0o777)
         os.chdir(name)
