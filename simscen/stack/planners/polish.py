@@ -55,12 +55,15 @@ def length(points: list[Point]) -> float:
 
 
 def spaced(points: Array, spacing: float) -> Array:
-    """The polyline (n, 2) resampled at most `spacing` metres apart, both ends kept."""
-    steps = np.hypot(*np.diff(points, axis=0).T)
-    along = np.concatenate(([0.0], np.cumsum(steps)))
-    count = max(2, math.ceil(along[-1] / spacing) + 1)
-    places = np.linspace(0.0, along[-1], count)
-    return np.column_stack((np.interp(places, along, points[:, 0]), np.interp(places, along, points[:, 1])))
+    """The polyline (n, 2) with points at most `spacing` metres apart; its corners are kept, so that none is cut."""
+    steps = np.diff(points, axis=0)
+    lengths = np.hypot(steps[:, 0], steps[:, 1])
+    counts = np.maximum(1, np.ceil(lengths / spacing - 1e-9)).astype(np.int64)
+    counts[lengths == 0.0] = 0
+    first = np.repeat(np.cumsum(counts) - counts, counts)
+    part = (np.arange(counts.sum()) - first + 1) / np.repeat(counts, counts)
+    inner = np.repeat(points[:-1], counts, axis=0) + part[:, None] * np.repeat(steps, counts, axis=0)
+    return np.vstack((points[:1], inner))
 
 
 def with_headings(points: Array, goal: Pose2) -> Array:

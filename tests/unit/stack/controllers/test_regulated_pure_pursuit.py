@@ -1,0 +1,106 @@
+import math
+
+import numpy as np
+import pytest
+from flatland import RATE, Flatland, round_robot
+
+from simscen.core.geometry import Pose2
+from simscen.core.motion import STOP, Twist
+from simscen.core.navigation import ErrorCode, Goal, Path
+from simscen.model.stack import Costmap as CostmapSpec
+from simscen.model.stack import RegulatedPurePursuit as Spec
+from simscen.stack.controllers.regulated_pure_pursuit import RegulatedPurePursuit
+from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.footprint import Footprint
+from simscen.stack.protocols import CostmapView, NavigationFailure, Surroundings
+
+ROBOT = round_robot(speed=1.0)
+FAR = Goal("far", Pose2(8.0, 0.0, 0.0))
+PLAIN = {"use_velocity_scaled_lookahead_dist": False, "lookahead_dist": 0.6}
+
+
+def view_of(*boxes: tuple[float, float, float, float]) -> CostmapView:
+    grid = Flatland(list(boxes)).grid((-3.0, -4.0, 9.0, 4.0))
+    return Costmap(CostmapSpec(), Surroundings(ROBOT, grid, RATE)).view
+
+
+def rpp(path: np.ndarray, **options: object) -> RegulatedPurePursuit:
+    controller = RegulatedPurePursuit(Spec(**{**PLAIN, **options}), ROBOT, Footprint(ROBOT, 0.05), 0.05)
+    controller.set_path(Path(path))
+    return controller
+
+
+def line(length: float = 8.0, y: float = 0.0) -> np.ndarray:
+    x = np.arange(0.0, length + 1e-9, 0.05)
+    return np.column_stack((x, np.full_like(x, y), np.zeros_like(x)))
+
+
+def test_the_curvature_is_twice_the_offset_over_the_square_of_the_distance() -> None:
+    command = rpp(line(y=0.2)).command(Pose2(1, 0, 0), Twist(), view_of(), FAR)
+    assert command.wz / command.vx == pytest.approx(2 * 0.2 / 0.6**2)
+
+
+def test_in_the_open_it_drives_at_the_desired_speed() -> None:
+    assert rpp(line(), desired_linear_vel=0.7).command(Pose2(1, 0, 0), Twist(), view_of(), FAR) == Twist(0.7)
+
+
+def test_a_bend_tighter_than_the_regulated_radius_is_driven_slower_in_proportion() -> None:
+    command = rpp(line(y=0.3)).command(Pose2(1, 0, 0), Twist(), view_of(), FAR)
+    radius = 0.6**2 / (2 * 0.3)
+    assert command.vx == pytest.approx(0.5 * radius / 0.9)
+
+
+def test_near_a_wall_it_is_slower_in_proportion_but_not_below_the_minimum() -> None:
+    wall = view_of((-3.0, 0.42, 9.0, 0.6))
+    row = round(0 / 0.05 + 4.0 / 0.05)
+    near = float(wall.distance[row, 80])
+    assert rpp(line()).command(Pose2(1.01, 0.01, 0), Twist(), wall, FAR).vx == pytest.approx(0.5 * near / 0.6, rel=1e-3)
+    tight = view_of((-3.0, 0.30, 9.0, 0.6))
+    assert rpp(line()).command(Pose2(1.01, 0.01, 0), Twist(), tight, FAR).vx == pytest.approx(0.25, abs=0.01)
+
+
+def test_it_slows_down_towards_the_end() -> None:
+    goal = Goal("g", Pose2(2.0, 0.0))
+    controller = rpp(line(2.0))
+    controller.command(Pose2(1.0, 0.0, 0.0), Twist(0.5), view_of(), goal)
+    command = controller.command(Pose2(1.7, 0.0, 0.0), Twist(0.3), view_of(), goal)
+    assert command.vx == pytest.approx(0.5 * 0.3 / 0.6, rel=0.02)
+
+
+def test_a_path_that_begins_behind_is_turned_to_first_with_bounded_acceleration() -> None:
+    controller = rpp(line())
+    command = controller.command(Pose2(1, 0, math.pi), Twist(), view_of(), FAR)
+    assert command.vx == 0.0
+    assert abs(command.wz) == pytest.approx(3.2 * 0.05)
+
+
+def test_it_does_not_turn_in_place_if_told_not_to() -> None:
+    assert rpp(line(), use_rotate_to_heading=False).command(Pose2(1, 0, 1.2), Twist(), view_of(), FAR).vx > 0.0
+
+
+def test_the_lookahead_grows_with_speed_between_its_bounds() -> None:
+    options = {"use_velocity_scaled_lookahead_dist": True}
+    for speed, reach in ((0.0, 0.3), (0.4, 0.6), (0.9, 0.9)):
+        command = rpp(line(y=0.1), **options).command(Pose2(1, 0, 0), Twist(speed), view_of(), FAR)
+        assert command.wz / command.vx == pytest.approx(2 * 0.1 / reach**2)
+
+
+def test_before_an_obstacle_it_slows_down_and_then_fails() -> None:
+    wall = view_of((3.0, -4.0, 3.2, 4.0))
+    controller = rpp(line(), use_cost_regulated_linear_velocity_scaling=False)
+    speeds = []
+    with pytest.raises(NavigationFailure) as failed:
+        for x in np.arange(1.0, 3.0, 0.05):
+            speeds.append(controller.command(Pose2(float(x), 0.0, 0.0), Twist(0.5), wall, FAR).vx)
+    assert failed.value.code == ErrorCode.NO_VALID_CONTROL
+    assert speeds[0] == 0.5
+    assert 0.1 <= speeds[-1] < 0.2
+    assert speeds == sorted(speeds, reverse=True)
+    assert 1.0 + 0.05 * len(speeds) < 3.0 - 0.22
+
+
+def test_at_the_goal_it_turns_to_the_goals_heading_and_stops_turning_there() -> None:
+    goal = Goal("g", Pose2(2.0, 0.0, 1.0))
+    controller = rpp(line(2.0))
+    assert controller.command(Pose2(1.95, 0, 0), Twist(), view_of(), goal).wz > 0.0
+    assert controller.command(Pose2(1.95, 0, 1.0), Twist(), view_of(), goal) == STOP
