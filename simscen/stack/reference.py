@@ -20,6 +20,8 @@ from simscen.stack.tasks import Task
 from simscen.stack.velocity_smoother import VelocitySmoother
 from simscen.stack.zones import speed_limit
 
+CRAWL = 0.02
+"""m/s and rad/s (times five): what is slower does not count as driving."""
 HELD = 1.0
 """Seconds for which the collision monitor may hold the robot before that counts as a failure: the controller cannot see
 what the monitor sees (an obstacle nearer than a cell), and would try the same until no progress is made."""
@@ -187,7 +189,8 @@ class ReferenceStack:
         allowed = self._monitor.allow(smooth, self._odometry)
         if allowed is not smooth:
             self._smoother.reset(allowed)
-        if allowed != STOP or wanted == STOP:
+        crawls = abs(allowed.vx) + abs(allowed.vy) < CRAWL and abs(allowed.wz) < 5 * CRAWL
+        if not crawls or wanted == STOP:
             self._free_at = self._tick
         return allowed
 

@@ -97,12 +97,9 @@ class RegulatedPurePursuit:
         return self._within_free_way(command, free, horizon)
 
     def _turn(self, angle: float, pose: Pose2, twist: Twist, costmap: CostmapView) -> Twist:
-        """In place, whichever way round there is room; else back out to where there is."""
-        if not self._spec.use_collision_detection:
+        """In place where there is room for all of the turn; else back out to where there is."""
+        if not self._spec.use_collision_detection or self._turning.has_room(angle, pose, costmap):
             return self._goal_pose.turn(angle, twist)
-        way = self._turning.way_round(angle, pose, costmap)
-        if way is not None:
-            return self._goal_pose.turn(way, twist)
         back = self._turning.back_out(pose, costmap)
         if back is None:
             raise NavigationFailure(ErrorCode.NO_VALID_CONTROL, "no room to turn, nor to back out")

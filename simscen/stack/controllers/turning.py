@@ -7,7 +7,7 @@ import numpy as np
 from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
 from simscen.stack.arcs import poses_along
-from simscen.stack.footprint import Footprint
+from simscen.stack.footprint import Footprint, distance_at
 from simscen.stack.lookahead import time_free
 from simscen.stack.protocols import CostmapView
 
@@ -19,7 +19,7 @@ BACK_OUT, AHEAD = 0.15, 1.0
 
 
 class TurningRoom:
-    """Finds out which way round a robot can turn.
+    """Finds out whether a robot can turn where it is.
 
     A turn that is begun without room for all of it wedges the robot: its corners come nearer to obstacles with every
     step, until it can neither turn nor leave.
@@ -28,21 +28,17 @@ class TurningRoom:
     def __init__(self, footprint: Footprint) -> None:
         self._footprint = footprint
 
-    def way_round(self, angle: float, pose: Pose2, costmap: CostmapView) -> float | None:
-        """The angle in rad itself, or the longer turn the other way, whichever has room; None when neither has."""
-        if self._footprint.reach == 0.0:
-            return angle
-        other = angle - math.copysign(2.0 * math.pi, angle)
-        return next((turn for turn in (angle, other) if self._free(turn, pose, costmap)), None)
+    def has_room(self, angle: float, pose: Pose2, costmap: CostmapView) -> bool:
+        """Whether the hull keeps its room, or all that it has now, throughout a turn by `angle` rad."""
+        reach = self._footprint.reach
+        if reach == 0.0 or distance_at(costmap, pose.x, pose.y) > reach + 2.0 * costmap.resolution:
+            return True
+        steps = max(2, math.ceil(abs(angle) * reach / costmap.resolution) + 1)
+        poses = poses_along(pose, Twist(0.0, 0.0, angle), np.linspace(0.0, 1.0, steps))
+        room = self._footprint.clearance(costmap, poses)
+        return bool((room >= min(ROOM * costmap.resolution, float(room[0]))).all())
 
     def back_out(self, pose: Pose2, costmap: CostmapView) -> Twist | None:
         """Straight back, where the robot came from; None when that is blocked, too."""
         back = Twist(-BACK_OUT, 0.0, 0.0)
         return back if time_free(self._footprint, costmap, pose, back, AHEAD) >= AHEAD else None
-
-    def _free(self, angle: float, pose: Pose2, costmap: CostmapView) -> bool:
-        """Whether the hull keeps its room, or all that it has now, throughout the turn."""
-        steps = max(2, math.ceil(abs(angle) * self._footprint.reach / costmap.resolution) + 1)
-        poses = poses_along(pose, Twist(0.0, 0.0, angle), np.linspace(0.0, 1.0, steps))
-        room = self._footprint.clearance(costmap, poses)
-        return bool((room >= min(ROOM * costmap.resolution, float(room[0]))).all())

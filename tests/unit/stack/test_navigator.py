@@ -246,3 +246,14 @@ def test_a_car_drives_to_a_goal_behind_it() -> None:
     assert d.least > 0.02
     assert min(command.vx for command in d.commands) < -0.1
     assert all(abs(c.wz) <= abs(c.vx) / 0.6 * 1.5 + 0.05 for c in d.commands)
+
+
+def test_what_only_the_collision_monitor_sees_is_a_failure_soon_not_after_the_progress_checker() -> None:
+    """The costmap marks nothing beyond 5 cm: the monitor alone stops the robot before the wall that is not mapped."""
+    spec = StackSpec(localizer=TRUTH, costmap=Costmap(obstacle_max_range=0.05))
+    d = start(rooms(DOOR), grid=rooms(), spec=spec).run(14)
+    held = [e for e in d.kinds("recovery.started") if "monitor holds" in str(e.data["message"])]
+    standing = next(k for k, pose in enumerate(d.track) if pose.distance(d.track[min(k + 40, len(d.track) - 1)]) < 0.01)
+    assert held
+    assert held[0].tick / 240 - standing * 14 / len(d.track) < 4.0
+    assert d.least > 0.0

@@ -104,3 +104,17 @@ def test_at_the_goal_it_turns_to_the_goals_heading_and_stops_turning_there() -> 
     controller = rpp(line(2.0))
     assert controller.command(Pose2(1.95, 0, 0), Twist(), view_of(), goal).wz > 0.0
     assert controller.command(Pose2(1.95, 0, 1.0), Twist(), view_of(), goal) == STOP
+
+
+def test_where_the_arc_to_the_carrot_would_cut_a_corner_a_nearer_carrot_keeps_to_the_path() -> None:
+    """The path goes ahead and then left around a pillar; the arc to a far carrot leads through it."""
+    up = np.arange(0.05, 3.0, 0.05)
+    corner = np.vstack((line(1.0), np.column_stack((np.full_like(up, 1.0), up, np.full_like(up, np.pi / 2)))))
+    pillar = view_of((0.45, 0.30, 0.70, 0.55))
+    here = Pose2(0.3, 0.0, 0.0)
+    far = {"lookahead_dist": 1.2, "rotate_to_heading_min_angle": 1.5, "max_allowed_time_to_collision_up_to_carrot": 4.0}
+    cutting = rpp(corner, **far).command(here, Twist(), view_of(), FAR)
+    keeping = rpp(corner, **far).command(here, Twist(), pillar, FAR)
+    assert cutting.wz / cutting.vx > 0.8
+    assert keeping.vx >= 0.25
+    assert keeping.wz / keeping.vx < 0.4

@@ -27,25 +27,27 @@ def room_of(robot: RobotModel) -> TurningRoom:
     return TurningRoom(Footprint(robot, 0.05))
 
 
-def test_in_the_open_the_short_way_round_is_taken() -> None:
-    assert room_of(LONG).way_round(1.0, HERE, seen(Flatland(), LONG)) == 1.0
+@pytest.mark.parametrize(("gap", "room"), [(0.02, False), (0.20, True)])
+def test_a_turn_needs_room_for_the_corners_all_the_way_round(gap: float, room: bool) -> None:
+    corner = math.hypot(0.4, 0.2)
+    beside = seen(Flatland(discs=[(0.0, corner + gap + 0.1, 0.1)]), LONG)
+    assert room_of(LONG).has_room(0.5 * math.pi, HERE, beside) == room
 
 
-def test_where_the_short_way_is_blocked_the_long_way_round_is_taken() -> None:
-    beside_the_front = Flatland(discs=[(0.25, 0.33, 0.05)])
-    # The corner sweeps to 0.45 m: a quarter turn to the left would hit, and so would three quarters to the right.
-    assert room_of(LONG).way_round(0.5 * math.pi, HERE, seen(beside_the_front, LONG)) is None
-    assert room_of(LONG).way_round(-0.5 * math.pi, HERE, seen(Flatland(discs=[(0.0, 0.6, 0.1)]), LONG)) is not None
+def test_a_short_turn_away_from_an_obstacle_is_allowed_beside_it() -> None:
+    beside_the_front_corner = seen(Flatland(discs=[(0.354, 0.354, 0.05)]), LONG)
+    assert not room_of(LONG).has_room(0.5, HERE, beside_the_front_corner)
+    assert room_of(LONG).has_room(-0.3, HERE, beside_the_front_corner)
 
 
 def test_a_long_robot_in_a_slot_backs_out_of_it() -> None:
     turning, view = room_of(LONG), seen(SLOT, LONG)
-    assert turning.way_round(0.5 * math.pi, HERE, view) is None
+    assert not turning.has_room(0.5 * math.pi, HERE, view)
     back = turning.back_out(HERE, view)
     assert back is not None
     assert back.vx == pytest.approx(-0.15)
     outside = Pose2(-1.2, 0.0, 0.0)
-    assert turning.way_round(0.5 * math.pi, outside, view) == 0.5 * math.pi
+    assert turning.has_room(0.5 * math.pi, outside, view)
 
 
 def test_a_robot_with_its_back_to_the_wall_does_not_back_out() -> None:
@@ -54,4 +56,4 @@ def test_a_robot_with_its_back_to_the_wall_does_not_back_out() -> None:
 
 
 def test_a_round_robot_can_always_turn() -> None:
-    assert room_of(ROUND).way_round(3.0, HERE, seen(SLOT, ROUND)) == 3.0
+    assert room_of(ROUND).has_room(3.0, HERE, seen(SLOT, ROUND))
