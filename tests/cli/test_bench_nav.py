@@ -1,0 +1,27 @@
+"""`simscen bench nav` as a user calls it, with the shortest of its experiments."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+PROJECT = Path(__file__).parents[2]
+
+
+def bench(*options: str) -> "subprocess.CompletedProcess[str]":
+    command = [sys.executable, "-m", "simscen.cli.main", "bench", "nav", "--project", str(PROJECT), *options]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+
+
+def test_it_drives_an_experiment_and_prints_its_numbers(tmp_path: Path) -> None:
+    done = bench("--only", "narrow doorway", "--seeds", "1", "--out", str(tmp_path / "out"), "--format", "json")
+    assert done.returncode == 0, done.stderr
+    (row,) = json.loads(done.stdout)["experiments"]
+    assert (row["tally"]["case"], row["tally"]["runs"]) == ("narrow doorway", 1)
+    assert (tmp_path / "out/scenarios/corner_cases/narrow_doorway/seed-1/run.mcap").is_file()
+
+
+def test_data_that_is_not_here_is_skipped_aloud_and_an_unknown_experiment_is_an_error(tmp_path: Path) -> None:
+    done = bench("--only", "nothing", "--barn", str(tmp_path / "none"), "--out", str(tmp_path / "out"))
+    assert done.returncode == 5
+    assert f"BARN: skipped, there is no folder {tmp_path / 'none'}" in done.stderr
