@@ -66,9 +66,11 @@ class Costmap:
         live = self._live[around]
         was = live.copy()
         marked = np.argwhere(live) + corner
-        self._set(marked[crossed(marked, self._frame, scan, base, self._spec)], False)
+        if len(marked):
+            self._set(marked[crossed(marked, self._frame, scan, base, self._spec)], False)
         self._set(self._hit(base, scan), True)
-        self._set(marked[self._under_robot(marked, base)], False)
+        if len(marked):
+            self._set(marked[self._under_robot(marked, base)], False)
         self._newest[scan.sensor] = (base, scan)
         self._refresh(np.argwhere(was != live) + corner)
 

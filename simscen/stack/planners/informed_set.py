@@ -18,6 +18,8 @@ from simscen.stack.planners.search import Point
 
 BLOCK = 0.2
 """Metres, about: the coarse grid's resolution."""
+MOST_BLOCKS = 40_000
+"""Larger maps get larger blocks: Dijkstra on so many takes 10 ms."""
 Mask = npt.NDArray[np.bool_]
 
 
@@ -28,7 +30,8 @@ class InformedSet:
     """
 
     def __init__(self, field: Field, start: Point, goal: Point, radius: float) -> None:
-        self._factor = max(1, round(BLOCK / field.resolution))
+        wanted = round(BLOCK / field.resolution)
+        self._factor = max(1, wanted, math.ceil(math.sqrt(field.height * field.width / MOST_BLOCKS)))
         self._size = self._factor * field.resolution
         self._origin = field.origin
         self._height, self._width = -(-field.height // self._factor), -(-field.width // self._factor)
