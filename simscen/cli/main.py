@@ -1,8 +1,10 @@
 """`simscen`: finds the command, and is the one place where errors become exit codes."""
 
+import gc
 import importlib.util
 import os
 import sys
+from collections.abc import Sequence
 from typing import Annotated, Any
 
 import typer
@@ -32,6 +34,11 @@ LIGHT = frozenset({"validate", "list", "schema", "explain", "new"})
 """Commands that must answer at once. Numpy is a quarter of their start; few of them compute anything."""
 
 
+def is_light(arguments: Sequence[str]) -> bool:
+    """Whether a command line asks for a light command, or only for help or the version."""
+    return not arguments or arguments[0] in LIGHT or arguments[0].startswith("-")
+
+
 class Commands(TyperGroup):
     """Imports a command's module when it is called: `validate` must not wait for pybullet."""
 
@@ -41,11 +48,13 @@ class Commands(TyperGroup):
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """The command itself; its module is imported now."""
-        if cmd_name not in self.list_commands(ctx):
+        if cmd_name not in COMMANDS or not importlib.util.find_spec(_module(cmd_name)):
             return None
         if cmd_name in LIGHT:
             import_later("numpy")
         module = importlib.import_module(_module(cmd_name))
+        gc.freeze()  # what is imported stays: it need never be looked through for garbage
+        gc.enable()
         app = getattr(module, "app", None)
         if app is None:
             app = typer.Typer(rich_markup_mode=None, add_completion=False)
@@ -89,8 +98,10 @@ def _simscen(
 
 def main() -> None:
     """Run the command line. Every foreseen error is told in words; its exit code says who can mend it."""
-    # Plug-ins of pydantic that happen to be installed could change what is valid; looking for them costs 12 ms, too.
+    # Plug-ins of pydantic that happen to be installed could change what is valid; looking for them costs 12 ms, too,
+    # and so does what it imports to look for them.
     os.environ["PYDANTIC_DISABLE_PLUGINS"] = "__all__"
+    import_later("importlib.metadata", "entry_points")
     try:
         app()
     except SimscenError as error:

@@ -36,3 +36,29 @@ def test_a_library_that_is_there_already_stays() -> None:
         ],
         check=True,
     )
+
+
+def test_a_function_can_be_imported_without_the_library_until_it_is_called() -> None:
+    code = """
+import sys
+from simscen.cli.later import import_later
+import_later("importlib.metadata", "entry_points")
+from importlib.metadata import entry_points
+import importlib
+assert "email" not in sys.modules
+assert entry_points(group="console_scripts").names
+assert "email" in sys.modules and importlib.metadata.version("simscen")
+from importlib.metadata import distribution
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_another_name_of_such_a_library_brings_all_of_it() -> None:
+    code = """
+from simscen.cli.later import import_later
+import_later("importlib.metadata", "entry_points")
+import importlib.metadata
+from importlib.metadata import entry_points
+assert importlib.metadata.version("simscen") and entry_points(group="console_scripts").names
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)
