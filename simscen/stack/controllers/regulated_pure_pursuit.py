@@ -10,7 +10,7 @@ from simscen.core.navigation import ErrorCode, Goal, Path
 from simscen.model.stack import RegulatedPurePursuit as RppSpec
 from simscen.stack.arcs import poses_along
 from simscen.stack.controllers.goal_pose import GoalPose
-from simscen.stack.controllers.tracking import PathTracker
+from simscen.stack.controllers.tracking import AT_CUSP, PathTracker
 from simscen.stack.controllers.turning import TurningRoom
 from simscen.stack.footprint import Footprint, distance_at
 from simscen.stack.lookahead import time_free
@@ -87,7 +87,7 @@ class RegulatedPurePursuit:
                 turn = self._bearing(carrot)
                 break
             command = self._drive(carrot, pose, costmap)
-            free, horizon = self._time_free(command, pose, costmap, math.hypot(*carrot))
+            free, horizon = self._time_free(command, pose, costmap, self._as_far_as(carrot))
             if free >= horizon:
                 return command
             arcs.append((free, horizon, command))
@@ -95,6 +95,12 @@ class RegulatedPurePursuit:
             return self._turn(turn, pose, twist, costmap)
         free, horizon, command = max(arcs, key=lambda arc: arc[0])
         return self._within_free_way(command, free, horizon)
+
+    def _as_far_as(self, carrot: tuple[float, float]) -> float:
+        """Metres for which the way must be free: to the carrot; of a car's, that may lie beyond where it stops."""
+        assert self._track is not None
+        away = math.hypot(*carrot)
+        return min(away, max(AT_CUSP, self._track.to_cusp())) if self._robot.turning_radius > 0.0 else away
 
     def _turn(self, angle: float, pose: Pose2, twist: Twist, costmap: CostmapView) -> Twist:
         """In place where there is room for all of the turn; else back out to where there is."""
