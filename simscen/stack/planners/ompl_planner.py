@@ -110,13 +110,26 @@ class OmplPlanner:
         start, goal, radius = room.ends.start, room.ends.goal, room.radius
         if start == goal or field.segment_free(*start, *goal, radius):
             return [start, goal]
-        room.informed.narrow(attempt.slack)
-        has, free = room.informed.has, field.segment_free
+        informed = room.informed
+        stops = informed.stops(field) if attempt.slack < 1.0 else []
+        points, before = [start], 0.0
+        for stop, along in [*stops, (goal, math.inf)]:
+            informed.narrow(attempt.slack, (before, along))
+            leg = self._leg(field, room, points[-1], stop, attempt, seed)
+            if leg is None:
+                return None
+            points, before = points + leg[1:], along
+        return pull_tight(field, spaced(np.array(points), STRING).tolist(), radius)
+
+    def _leg(
+        self, field: Field, room: Room, start: Point, goal: Point, attempt: Attempt, seed: int
+    ) -> list[Point] | None:
+        """One search of OMPL in the informed set as it is now."""
+        has, free, radius = room.informed.has, field.segment_free, room.radius
 
         def motion(ax: float, ay: float, bx: float, by: float) -> bool:
             middle = has(0.5 * (ax + bx), 0.5 * (ay + by))
             return middle and has(bx, by) and has(ax, ay) and free(ax, ay, bx, by, radius)
 
         iterations = max(1, round(attempt.share * self._spec.max_iterations))
-        points = search(self._spec.type, room.informed.bounds(), start, goal, motion, seed, iterations)
-        return None if points is None else pull_tight(field, spaced(np.array(points), STRING).tolist(), radius)
+        return search(self._spec.type, room.informed.bounds(), start, goal, motion, seed, iterations)

@@ -128,3 +128,15 @@ def test_it_squeezes_through_when_there_is_no_other_way() -> None:
     world.boxes += [(4.0, 0.0, 4.1, 2.8), (4.0, 3.25, 4.1, 6.0)]
     path = planner(robot=box_robot()).plan(view_of(world, box_robot(), (8, 6)), Pose2(3, 3), Pose2(5, 3), 1)
     assert path.length() < 2.5
+
+
+def test_a_way_of_hundreds_of_metres_through_many_doors_is_found() -> None:
+    world = Flatland().room(60, 20)
+    for k in range(1, 15):  # a serpentine: doors at the one end and at the other in turn
+        low, high = (0.0, 18.6) if k % 2 else (1.4, 20.0)
+        world.boxes.append((4.0 * k, low, 4.0 * k + 0.1, high))
+    view = view_of(world, size=(60, 20))
+    start, goal = Pose2(2, 2), Pose2(58, 10)
+    path = planner().plan(view, start, goal, 1)
+    assert path.length() > 200
+    assert path.length() < 1.06 * shortest(view, start, goal, 0.22)
