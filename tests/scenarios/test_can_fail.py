@@ -21,16 +21,19 @@ from simscen.run.prepare import prepare
 
 ROOT = Path(__file__).parents[2]
 NO_LOCALIZER = ("stack.localizer", {"type": "odometry"})
+DRIFTING_ODOMETRY = ("faults", [{"sensor": "odom", "bias": {"turn_per_metre": 0.05}}])
 NO_RECOVERY = ("stack.recovery", {"number_of_retries": 0, "behaviors": []})
 
 CHANGES = {
     "navigation/goal": [("clearance", [("pass.2.clearance.min", 1.0)])],
     "navigation/patrol": [
-        ("localization_error", [NO_LOCALIZER, ("faults", [{"sensor": "odom", "bias": {"turn_per_metre": 0.05}}])]),
+        ("localization_error", [NO_LOCALIZER, DRIFTING_ODOMETRY]),
         ("goals_reached", [("goals.0.timeout", 2.0)]),
     ],
     "navigation/path_length": [("path_length", [("pass.1.path_length.max_ratio", 1.0)])],
     "navigation/time_bound": [("time_to_goal", [("pass.1.time_to_goal.max", 5.0)])],
+    "navigation/outdated_map": [("goals_reached", [("stack.costmap", {"obstacle_max_range": 0.05})])],
+    "navigation/ros_map_world": [("localization_error", [NO_LOCALIZER, DRIFTING_ODOMETRY])],
     "navigation/goal_occupied": [("result", [("goals.0.pose", {"x": 3.0, "y": 5.0})])],
     "navigation/goal_outside_map": [("result", [("goals.0.pose", {"x": 3.0, "y": 5.0})])],
     "recovery/corridor_blocked_then_opened": [
@@ -47,6 +50,12 @@ CHANGES = {
     ],
     "faults/lidar_noise": [("localization_error", [("pass.1.localization_error.max", 0.01)])],
     "faults/wheel_slip": [("localization_error", [NO_LOCALIZER])],
+    "robots/car_three_point_turn": [("goals_reached", [("stack.planner", {"state_space": "dubins"})])],
+    "robots/jackal_skids": [("localization_error", [NO_LOCALIZER])],
+    "robots/omni_patrol": [
+        ("localization_error", [NO_LOCALIZER, DRIFTING_ODOMETRY]),
+    ],
+    "robots/amr_aisle": [("time_to_goal", [("stack.controller.desired_linear_vel", 0.3)])],
     "localization/wrong_initial_estimate": [("localization_error", [NO_LOCALIZER])],
 }
 CASES = [(scenario, *change) for scenario, changes in CHANGES.items() for change in changes]
