@@ -24,6 +24,9 @@ NO_LOCALIZER = ("stack.localizer", {"type": "odometry"})
 DRIFTING_ODOMETRY = ("faults", [{"sensor": "odom", "bias": {"turn_per_metre": 0.05}}])
 NO_RECOVERY = ("stack.recovery", {"number_of_retries": 0, "behaviors": []})
 
+SHUT = {"close": {"name": "door meeting room"}}
+CRATE_IN_THE_OTHER_WAY = {"spawn": {"name": "crate", "box": [0.5, 1.4, 1.0], "pose": {"x": 12.0, "y": 1.95}}}
+
 CHANGES = {
     "navigation/goal": [("clearance", [("pass.2.clearance.min", 1.0)])],
     "navigation/patrol": [
@@ -43,7 +46,7 @@ CHANGES = {
     "recovery/blocked_for_good": [("result", [("events", [])])],
     "obstacles/pallet_on_plan": [("replans", [("events", [])])],
     "obstacles/cart_crossing": [("replans", [("events", [])])],
-    "obstacles/door_closes": [("replans", [("events", [])])],
+    "obstacles/door_closes": [("goals_reached", [("events.0.do", [SHUT, CRATE_IN_THE_OTHER_WAY])])],
     "faults/lidar_off": [
         ("stopped_within", [("stack.collision_monitor", {"enabled": False})]),
         ("goals_reached", [("faults.0.for", 85.0)]),

@@ -121,11 +121,6 @@ def test_the_particles_start_at_the_most_and_shrink_to_the_least_as_the_place_be
     assert 100 <= len(subject.belief.particles) < 200
 
 
-def test_more_least_than_most_means_the_least() -> None:
-    subject = localizer(Amcl(min_particles=900, max_particles=300), GUESS, 1)
-    assert len(subject.belief.particles) == 900
-
-
 def weights_after(spec: Amcl, updates: int) -> np.ndarray:
     subject = started(spec)
     for k in range(1, updates):
