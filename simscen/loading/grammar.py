@@ -12,7 +12,7 @@ from pydantic import BaseModel, RootModel, Tag
 
 from simscen.loading.tree import Key
 from simscen.spec.base import Choice
-from simscen.spec.ondemand import type_of
+from simscen.spec.ondemand import OnDemand, type_of
 
 
 def models_at(model: type[BaseModel], loc: Sequence[Key]) -> list[type[BaseModel]]:
@@ -97,7 +97,7 @@ def _metadata(kind: Any) -> tuple[Any, ...]:
 
 def _bare(kind: Any) -> Any:
     while get_origin(kind) is Annotated:
-        kind = get_args(kind)[0]
+        kind = next((mark.load() for mark in _metadata(kind) if isinstance(mark, OnDemand)), get_args(kind)[0])
     return kind
 
 

@@ -1,6 +1,6 @@
 """A scenario as a user writes it (`*.scenario.yaml`)."""
 
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag
 
@@ -8,10 +8,10 @@ from simscen.core.belief import Estimate
 from simscen.core.chance import LARGEST_SEED
 from simscen.core.geometry import Pose2
 from simscen.criteria.criterion import AnyCriterion
-from simscen.model.disturbance import EventEntry, FaultEntry
 from simscen.model.stack import StackSpec
 from simscen.model.world import WorldSpec
 from simscen.spec.base import Spec, by_default
+from simscen.spec.ondemand import OnDemand
 from simscen.spec.places import Name, PlaceName, PoseSpec
 from simscen.spec.quantities import (
     Angle,
@@ -24,6 +24,12 @@ from simscen.spec.quantities import (
     PositiveLength,
 )
 from simscen.spec.references import Refers
+
+if TYPE_CHECKING:
+    from simscen.model.disturbance import EventEntry, FaultEntry
+else:
+    EventEntry = Annotated[Spec, OnDemand("simscen.model.disturbance", "EventEntry")]
+    FaultEntry = Annotated[Spec, OnDemand("simscen.model.disturbance", "FaultEntry")]
 
 
 def _text_or_mapping(value: Any) -> str:
@@ -106,7 +112,8 @@ class ScenarioSpec(Spec):
     seed: Annotated[int, Field(ge=1, le=LARGEST_SEED)] = 1
     """The root of all chance in a run."""
     world: Annotated[
-        Annotated[FilePath, Tag("text")] | Annotated[WorldSpec, Tag("mapping")],
+        Annotated[FilePath, Tag("text")]
+        | Annotated[WorldSpec, OnDemand("simscen.model.world", "WorldSpec"), Tag("mapping")],
         Discriminator(_text_or_mapping),
     ]
     """A `*.world.yaml`, a ROS map `.yaml`, a Gazebo `.sdf`/`.world`, or the world itself."""

@@ -6,7 +6,8 @@ the start of every command.
 
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any
+from types import NoneType
+from typing import Any, get_args
 
 from pydantic import BaseModel, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic.fields import FieldInfo
@@ -16,7 +17,7 @@ from pydantic_core import CoreSchema, core_schema
 
 @dataclass(frozen=True)
 class OnDemand:
-    """Marks an optional field that holds the specification `name` of `module`."""
+    """Marks a type that stands for the specification `name` of `module`."""
 
     module: str
     name: str
@@ -27,12 +28,15 @@ class OnDemand:
         return model
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.nullable_schema(core_schema.no_info_plain_validator_function(self._validate))
+        schema = core_schema.no_info_plain_validator_function(self._validate)
+        return core_schema.nullable_schema(schema) if NoneType in get_args(source) else schema
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         model = self.load()
         model.model_rebuild()
-        return handler(core_schema.nullable_schema(model.__pydantic_core_schema__))
+        # Below a nullable the handler makes a reference of a model; of a model itself it would make a copy.
+        made = handler(core_schema.nullable_schema(model.__pydantic_core_schema__))
+        return made if schema["type"] == "nullable" else made["anyOf"][0]
 
     def _validate(self, value: Any) -> BaseModel:
         """Pydantic takes the problems of the model for problems of the field, each at its place."""

@@ -62,3 +62,15 @@ def test_what_no_file_uses_is_not_imported():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["simscen.criteria", "simscen.criteria.base", "simscen.criteria.criterion"]
+
+
+class Sites(Spec):
+    walls: list[Annotated[Spec, OnDemand("simscen.model.world", "Wall")]]
+
+
+def test_an_item_of_a_list_is_the_specification_and_never_nothing():
+    assert isinstance(Sites.model_validate({"walls": [{"points": [[0, 0], [1, 0]]}]}).walls[0], Wall)
+    with pytest.raises(ValidationError) as raised:
+        Sites.model_validate({"walls": [None]})
+    assert raised.value.errors()[0]["loc"] == ("walls", 0)
+    assert Sites.model_json_schema()["properties"]["walls"]["items"] == {"$ref": "#/$defs/Wall"}
