@@ -17,8 +17,6 @@ from simscen.stack.protocols import CostmapView, Surroundings
 
 BESIDE_A_WALL = 2
 """Hits within one cell (squared distance 2) of a mapped wall are the wall itself: marking them would tell nothing."""
-LIDAR_OFFSET = 1.0
-"""Metres: no lidar is mounted farther from its robot's base."""
 BEYOND_HULL = 0.5
 """Metres beyond the hull up to which distances are told, or the inflation radius if that is more."""
 
@@ -61,7 +59,7 @@ class Costmap:
             before = self._frame
             self._lay(self._layer(base))
             self._show(carried_over(self._live, before, self._frame))
-        around = self._around(base)
+        around = self._around(base, scan)
         corner = np.array((around[0].start, around[1].start))
         live = self._live[around]
         was = live.copy()
@@ -115,11 +113,11 @@ class Costmap:
     def _set(self, cells: Cells, marked: bool) -> None:
         self._live[cells[:, 0], cells[:, 1]] = marked
 
-    def _around(self, base: Pose2) -> tuple[slice, slice]:
-        """The cells that a scan can reach."""
+    def _around(self, base: Pose2, scan: Scan) -> tuple[slice, slice]:
+        """The cells that the scan can reach."""
         row, column = self._frame.cells(np.array([[base.x, base.y]]))[0].tolist()
-        far = max(self._spec.raytrace_max_range, self._spec.obstacle_max_range) + LIDAR_OFFSET
-        return self._frame.window((row, column), (row, column), math.ceil(far / self._frame.resolution))
+        far = max(self._spec.raytrace_max_range, self._spec.obstacle_max_range) + math.hypot(scan.mount.x, scan.mount.y)
+        return self._frame.window((row, column), (row, column), math.ceil(far / self._frame.resolution) + 1)
 
     def _under_robot(self, cells: Cells, base: Pose2) -> npt.NDArray[np.bool_]:
         """Nav2's footprint_clearing_enabled, for the inscribed circle."""

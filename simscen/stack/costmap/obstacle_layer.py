@@ -37,27 +37,25 @@ def crossed(cells: Cells, frame: Frame, scan: Scan, base: Pose2, spec: CostmapSp
     """Which of the cells (n, 2) a beam crosses before it hits anything.
 
     A line crosses a square of half-width h when its distance from the centre is at most h (|cos| + |sin|); each cell
-    is tested against the two beams next to its bearing, which are the nearest to its centre.
+    is tested against the beam nearest to its centre, which crosses it if any does.
     """
     lidar = base.compose(scan.mount)
     offset = frame.centres(cells) - np.array([lidar.x, lidar.y])
     distance = np.hypot(offset[:, 0], offset[:, 1])
     bearing = np.arctan2(offset[:, 1], offset[:, 0])
-    free = free_lengths(scan, spec)
     step = scan.angle_increment
     place = ((bearing - lidar.yaw - scan.angle_min) % (2 * math.pi)) / step
-    lower = np.floor(place).astype(np.int64)
-    result = np.zeros(len(cells), dtype=bool)
+    beam = np.rint(place).astype(np.int64)
+    off = (place - beam) * step
     turn = round(2 * math.pi / abs(step))
+    if abs(turn * abs(step) - 2 * math.pi) < 1e-6:
+        beam %= turn
+    free = free_lengths(scan, spec)
+    known = (beam >= 0) & (beam < len(free))
+    length = np.where(known, free[np.where(known, beam, 0)], 0.0)
+    direction = bearing - off
     half = frame.resolution / 2
-    for beam in (lower, lower + 1):
-        index = beam % turn if abs(turn * abs(step) - 2 * math.pi) < 1e-6 else beam
-        known = (index >= 0) & (index < len(free))
-        index = np.where(known, index, 0)
-        off = (place - beam) * step
-        direction = bearing - off
-        aside = np.abs(distance * np.sin(off))
-        reach = half * (np.abs(np.cos(direction)) + np.abs(np.sin(direction)))
-        along = distance * np.cos(off)
-        result |= known & (aside <= reach) & (along <= free[index] - half) & (along >= spec.raytrace_min_range)
-    return result
+    reach = half * (np.abs(np.cos(direction)) + np.abs(np.sin(direction)))
+    along = distance * np.cos(off)
+    passes = (np.abs(distance * np.sin(off)) <= reach) & (along <= length - half) & (along >= spec.raytrace_min_range)
+    return np.asarray(passes)
