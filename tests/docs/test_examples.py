@@ -26,6 +26,7 @@ def project(tmp_path_factory):
     root = tmp_path_factory.mktemp("docs")
     shutil.copytree(ROOT / "worlds", root / "worlds")
     (root / "scenarios" / "theme").mkdir(parents=True)
+    (root / "scenarios" / "jackal.urdf").write_text("<robot name='jackal'/>")
     return root
 
 
