@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from simscen.core.errors import InvalidInput
-from simscen.core.geometry import Pose2
+from simscen.core.geometry import Pose2, wrap
 from simscen.core.motion import Twist
 from simscen.core.shapes import Box, Mesh
 from simscen.model.robot import RobotSpec
@@ -326,25 +326,43 @@ def jackal():
     simulation.close()
 
 
+def drive_until(simulation, done, command, seconds):
+    """Control at 20 Hz from the true pose; a robot that does not get there in time fails the test, and never hangs."""
+    for _ in range(round(seconds * 20)):
+        if done(simulation.truth().pose.plane):
+            simulation.drive(Twist())
+            simulation.step(120)
+            return
+        simulation.drive(command(simulation.truth().pose.plane))
+        simulation.step(12)
+    pytest.fail(f"not there after {seconds} s: {simulation.truth().pose.plane}")
+
+
 def test_the_jackal_drives_a_square_of_two_metres(jackal):
     """With feedback from the true pose, as a controller would: four sides, four turns in place."""
+    corners, odometer = [], jackal.encoders()
     for side in range(4):
-        begin = jackal.truth().pose.plane
-        heading = side * math.pi / 2
-        while math.hypot(jackal.truth().pose.x - begin.x, jackal.truth().pose.y - begin.y) < 2.0 - 0.04:
-            off = math.remainder(heading - jackal.truth().pose.yaw, 2 * math.pi)
-            jackal.drive(Twist(0.5, 0.0, 2 * off))
-            jackal.step(12)
-        jackal.drive(Twist())
-        jackal.step(120)
-        while (left := math.remainder(heading + math.pi / 2 - jackal.truth().pose.yaw, 2 * math.pi)) > 0.01:
-            jackal.drive(Twist(0.0, 0.0, min(1.0, 2 * left + 0.1)))
-            jackal.step(12)
-        jackal.drive(Twist())
-        jackal.step(60)
-    pose = jackal.truth().pose
-    assert math.hypot(pose.x, pose.y) < 0.15
-    assert math.remainder(pose.yaw, 2 * math.pi) == pytest.approx(0.0, abs=0.05)
+        begin, heading = jackal.truth().pose.plane, side * math.pi / 2
+        drive_until(
+            jackal,
+            lambda pose, begin=begin: begin.distance(pose) >= 2.0 - 0.04,
+            lambda pose, heading=heading: Twist(0.5, 0.0, 2 * wrap(heading - pose.yaw)),
+            seconds=10,
+        )
+        corners.append(jackal.truth().pose.plane)
+        heading += math.pi / 2
+        drive_until(
+            jackal,
+            lambda pose, heading=heading: wrap(heading - pose.yaw) <= 0.01,
+            lambda pose, heading=heading: Twist(0.0, 0.0, min(1.0, 2 * wrap(heading - pose.yaw) + 0.1)),
+            seconds=10,
+        )
+    for corner, (x, y) in zip(corners, ((2, 0), (2, 2), (0, 2), (0, 0)), strict=True):
+        assert math.hypot(corner.x - x, corner.y - y) < 0.15
+    assert wrap(jackal.truth().pose.yaw) == pytest.approx(0.0, abs=0.05)
+    left, right = (now - before for now, before in zip(jackal.encoders(), odometer, strict=True))
+    by_wheels = (right - left) * 0.098 / 0.37559
+    assert by_wheels > 1.15 * 2 * math.pi, "its wheels turn further than the robot does"
 
 
 def test_the_jackal_turns_in_place_and_its_wheels_slip(jackal):
