@@ -41,6 +41,21 @@ goals: [{pose: {x: -2.25, y: 13}, xy_tolerance: 1 m, yaw_tolerance: 3.14, timeou
 pass: [{goals_reached: {}}, {collisions: {max: 0}}]
 """,
     ),
+    "a square of 2 m and a turn in place with a bare URDF": (
+        ["jackal_urdf"],
+        """\
+simscen: 1
+world: {simscen: 1, walls: [{points: [[0, 0], [5, 0], [5, 4], [0, 4], [0, 0]]}]}
+robot: {model: jackal.urdf, pose: {x: 1, y: 1}}
+goals:
+  - {pose: {x: 3, y: 1, yaw: 90 deg}, timeout: 30 s}
+  - {pose: {x: 3, y: 3, yaw: 180 deg}, timeout: 30 s}
+  - {pose: {x: 1, y: 3, yaw: -90 deg}, timeout: 30 s}
+  - {pose: {x: 1, y: 1, yaw: 0}, timeout: 30 s}
+  - {pose: {x: 1, y: 1, yaw: 180 deg}, timeout: 30 s}
+pass: [{goals_reached: {}}, {collisions: {max: 0}}]
+""",
+    ),
 }
 
 

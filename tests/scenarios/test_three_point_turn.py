@@ -1,0 +1,38 @@
+"""The car's scenario is what it says it is: a plan that changes direction, driven forward and backward."""
+
+from pathlib import Path
+
+import numpy as np
+
+from simscen.core.session import Outcome, RunKey
+from simscen.core.time import Clock
+from simscen.loading.scenario import load_scenario
+from simscen.record.trace import TraceBuilder
+from simscen.run.assemble import assemble
+from simscen.run.lockstep import run_lockstep
+from simscen.run.perform import judged
+from simscen.run.prepare import prepare
+from simscen.stack.cusps import cusps
+
+ROOT = Path(__file__).parents[2]
+TURNING_RADIUS = 0.45 / np.tan(0.51)
+MOVING = 0.03
+
+
+def test_a_car_turns_round_in_a_road_too_narrow_for_one_sweep():
+    loaded = load_scenario(ROOT / "scenarios/robots/car_three_point_turn.scenario.yaml", ROOT)
+    prepared = prepare(loaded)
+    rig, builder = assemble(prepared, loaded.spec.seed), TraceBuilder(Clock(240))
+    end = run_lockstep(rig, (builder,))
+    rig.simulation.close()
+    trace = builder.finish(end.tick)
+    assert judged(prepared, RunKey(loaded.id, loaded.spec.seed), trace).outcome is Outcome.PASSED
+
+    assert len(cusps(trace.plans[0].points)) >= 2
+    speed, turn = trace.velocity.values[:, 0], trace.velocity.values[:, 2]
+    ways = np.sign(speed[np.abs(speed) > MOVING])
+    assert np.count_nonzero(np.diff(ways)) >= 2, "forward and backward in turns"
+    driving = np.abs(speed) > 0.1
+    assert (np.abs(turn[driving]) <= np.abs(speed[driving]) / TURNING_RADIUS * 1.1 + 0.05).all()
+    still = np.abs(speed) < 0.01
+    assert np.abs(turn[still]).max() < 0.1, "it never turns on the spot"
