@@ -49,7 +49,10 @@ class Spin:
 
 
 class BackUp:
-    """Drive straight back by `backup_dist`."""
+    """Drive straight back by `backup_dist`, or as far as there is room.
+
+    Nav2's fails unless there is room for simulate_ahead_time; but a few centimetres are often what it takes to turn.
+    """
 
     name = "backup"
 
@@ -62,7 +65,7 @@ class BackUp:
         self._from = pose
 
     def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:
-        """Back on; None when far enough. Raises BACKUP_COLLISION_AHEAD."""
+        """Back on; None when far enough. Raises BACKUP_COLLISION_AHEAD when there is not even a cell of room."""
         left = self._spec.backup_dist - self._from.distance(pose)
         speed = min(self._spec.backup_speed, self._robot.max_reverse)
         if left <= 0.0:
@@ -71,9 +74,12 @@ class BackUp:
             raise NavigationFailure(ErrorCode.BACKUP_COLLISION_AHEAD, "backing up did not move the robot")
         command = Twist(-speed, 0.0, 0.0)
         horizon = min(self._spec.simulate_ahead_time, left / speed)
-        if time_free(self._footprint, costmap, pose, command, horizon) < horizon:
-            raise NavigationFailure(ErrorCode.BACKUP_COLLISION_AHEAD, "no room behind")
-        return command
+        free = time_free(self._footprint, costmap, pose, command, horizon)
+        if free >= horizon or free * speed >= costmap.resolution:
+            return command
+        if self._from.distance(pose) >= costmap.resolution:
+            return None
+        raise NavigationFailure(ErrorCode.BACKUP_COLLISION_AHEAD, "no room behind")
 
 
 class Wait:

@@ -64,8 +64,13 @@ def test_clear_costmap_clears_once_and_is_done() -> None:
 
 def test_backup_fails_where_there_is_something_behind() -> None:
     with pytest.raises(NavigationFailure) as failed:
-        run(BackUp(Spec(), ROUND, Footprint(ROUND, 0.05)), view_of(ROUND, (-0.6, -1.0, -0.4, 1.0)))
+        run(BackUp(Spec(), ROUND, Footprint(ROUND, 0.05)), view_of(ROUND, (-0.6, -1.0, -0.26, 1.0)))
     assert failed.value.code == ErrorCode.BACKUP_COLLISION_AHEAD
+
+
+def test_backup_uses_what_room_there_is() -> None:
+    pose, _, _ = run(BackUp(Spec(), ROUND, Footprint(ROUND, 0.05)), view_of(ROUND, (-0.6, -1.0, -0.4, 1.0)))
+    assert -0.2 < pose.x < -0.05
 
 
 def test_a_long_robot_does_not_spin_beside_a_wall_but_a_round_one_does() -> None:
