@@ -16,7 +16,7 @@ from simscen.core.shapes import Mesh
 from simscen.worlds.sdf import values
 from simscen.worlds.sdf.files import MESH_BYTES, Library, Trouble
 from simscen.worlds.sdf.markup import Element
-from simscen.worlds.sdf.meshfile import read_parts
+from simscen.worlds.sdf.meshcache import READ
 from simscen.worlds.sdf.meshpart import Part, UnusableMesh
 from simscen.worlds.sdf.report import CODE, Report
 
@@ -71,7 +71,7 @@ class MeshShelf:
         if path not in self._parts:
             data = self.library.read(path, uri, MESH_BYTES)
             try:
-                self._parts[path] = read_parts(data, path.suffix.lower(), self.library.shown(path))
+                self._parts[path] = READ.read(data, path.suffix.lower(), self.library.shown(path))
             except UnusableMesh as error:
                 raise uri.unusable(f"{self.library.shown(path)}: {error}") from error
         return self._parts[path]
@@ -94,7 +94,7 @@ def read_mesh(path: Path) -> Mesh:
     real = path.resolve()
     try:
         data = Library(real.parent, ()).open(real, MESH_BYTES)[1]
-        parts = read_parts(data, path.suffix.lower(), path.name)
+        parts = READ.read(data, path.suffix.lower(), path.name)
     except (Trouble, UnusableMesh) as error:
         raise InvalidInput([Problem(str(path), 0, 0, CODE, str(error))]) from error
     return _joined(parts, _Wish(path, (1.0, 1.0, 1.0), "", centred=False))
