@@ -20,6 +20,7 @@ from simscen.stack.footprint import Footprint
 from simscen.stack.goal_checker import GoalChecker
 from simscen.stack.localizers.build import build_localizer
 from simscen.stack.navigator import Navigator
+from simscen.stack.plan_keeper import PlanKeeper
 from simscen.stack.planners.build import build_planner
 from simscen.stack.progress_checker import ProgressChecker
 from simscen.stack.protocols import Behavior, Controller, RobotModel, Stack, Surroundings
@@ -50,19 +51,25 @@ def build_stack(
     footprint = Footprint(robot, costmap.view.resolution)
     controller = build_controller(spec.controller, robot, footprint, seconds, streams.generator("controller"))
     localizer = build_localizer(spec.localizer, surroundings, Estimate(None), streams.generator("localizer"))
-    navigator = Navigator(
+    plans = PlanKeeper(
         spec.planner,
         build_planner(spec.planner, robot, footprint),
+        controller,
+        costmap,
+        lambda number: streams.integer(f"planner#{number}"),
+        robot.inscribed_radius,
+        journal,
+        steered=robot.turning_radius > 0.0,
+    )
+    navigator = Navigator(
+        plans,
         controller,
         RoundRobin(_behaviors(spec.recovery, robot, footprint, costmap), spec.recovery.number_of_retries),
         GoalChecker(spec.goal_checker.stateful),
         ProgressChecker(spec.progress_checker),
         costmap,
-        lambda number: streams.integer(f"planner#{number}"),
         seconds,
-        robot.inscribed_radius,
         journal,
-        steered=robot.turning_radius > 0.0,
     )
     return ReferenceStack(
         surroundings,

@@ -1,0 +1,128 @@
+"""Makes the plan, watches over it while it is followed, and replaces it when need be: half of Nav2's tree."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from simscen.core.events import Event
+from simscen.core.geometry import Pose2
+from simscen.core.navigation import ErrorCode, Goal, Path
+from simscen.model.stack import Planner as PlannerSpec
+from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.protocols import Controller, NavigationFailure, Planner
+from simscen.stack.replanning import PlanInForce
+
+TIGHT_PERIOD = 0.5
+"""Seconds between two looks for a roomier way where the followed one has become tight."""
+MISSED_PERIOD = 1.0
+"""Seconds that a car follows a plan before it may find that it has missed it."""
+BETTER_PERIOD = 2.0
+"""Seconds between two looks for a shorter way after obstacles have gone."""
+RECONSIDER = 2
+"""Every which step the plan is looked at: 10 Hz at the default rate, twice as often as Nav2's costmap is updated."""
+GONE = 8
+"""Cells of live obstacles that must have gone for that; single cells come and go with the lidar's noise."""
+
+
+class PlanKeeper:
+    """Keeps the plan in force for one goal after another; `now` is the navigator's clock in seconds."""
+
+    def __init__(
+        self,
+        spec: PlannerSpec,
+        planner: Planner,
+        controller: Controller,
+        costmap: Costmap,
+        plan_seed: Callable[[int], int],
+        radius: float,
+        journal: list[Event],
+        steered: bool = False,
+    ) -> None:
+        self._spec, self.planner, self._controller, self._costmap = spec, planner, controller, costmap
+        self._plan_seed, self._radius, self._journal, self._steered = plan_seed, radius, journal, steered
+        self._plans = 0
+        self.reset(0.0)
+
+    def reset(self, now: float) -> None:
+        """A new goal."""
+        self.drop("goal")
+        self._checked, self._adopted, self._looked, self._most = -1, now, now, 0
+        self._partial, self._origin = False, (0.0, 0.0)
+        self._steps = 0
+
+    def drop(self, reason: str) -> None:
+        """Make a new plan at the next step, for this reason."""
+        self.plan: PlanInForce | None = None
+        self._reason = reason
+
+    def step(self, tick: int, now: float, goal: Goal, pose: Pose2) -> None:
+        """See to it that there is a plan that can be followed. Raises NavigationFailure when there is none."""
+        if self.plan is None:
+            self._adopt(tick, now, self._compute(tick, goal, pose), self._reason)
+        self._steps += 1
+        if self._steps % RECONSIDER == 0:
+            assert self.plan is not None
+            self.plan.locate(pose)
+            self._reconsider(tick, now, goal, pose, self.plan)
+
+    def _reconsider(self, tick: int, now: float, goal: Goal, pose: Pose2, plan: PlanInForce) -> None:
+        """Replace the plan when it is blocked, outdated, or clearly longer than need be."""
+        reason = self._must_replan(now, pose, plan)
+        if reason:
+            self._adopt(tick, now, self._compute(tick, goal, pose), reason)
+            return
+        wish = self._may_replan(now, plan)
+        if wish:
+            try:
+                other = self._compute(tick, goal, pose)
+            except NavigationFailure:
+                return  # it was only a look: the plan that is being followed is still good
+            if wish == "tight" or plan.worse_than(other):
+                self._adopt(tick, now, other, wish)
+
+    def _must_replan(self, now: float, pose: Pose2, plan: PlanInForce) -> str:
+        """Why the plan cannot be followed any more; "" if it can."""
+        if self._steered and now - self._adopted >= MISSED_PERIOD and plan.missed(pose):
+            return "missed"
+        if self._spec.replanning == "rate":
+            return "rate" if now - self._looked >= 1.0 / self._spec.replanning_rate else ""
+        view = self._costmap.view
+        if view.revision == self._checked:
+            return ""
+        if plan.blocked(view):
+            return "blocked"
+        return "window" if self._partial and view.origin != self._origin else ""
+
+    def _may_replan(self, now: float, plan: PlanInForce) -> str:
+        """Why there may be a better plan by now; "" if nothing speaks for it."""
+        if self._spec.replanning == "rate":
+            return ""
+        view = self._costmap.view
+        if view.revision != self._checked:
+            self._checked = view.revision
+            self._most = max(self._most, self._costmap.obstacle_cells)
+            if now - self._adopted >= TIGHT_PERIOD and plan.tightened(view):
+                return "tight"
+        if now - self._looked < BETTER_PERIOD:
+            return ""
+        self._looked, cells = now, self._costmap.obstacle_cells
+        gone = cells < self._most - GONE
+        self._most = cells if gone else max(self._most, cells)
+        return "better" if gone else ""
+
+    def _compute(self, tick: int, goal: Goal, pose: Pose2) -> Path:
+        self._plans += 1
+        view, aim = self._costmap.view, self._costmap.aim(pose, goal.pose)
+        self._partial, self._origin = aim is not goal.pose, view.origin
+        path = self.planner.plan(view, pose, aim, self._plan_seed(self._plans))
+        x, y, yaw = path.points[-1].tolist()
+        if not self._partial and goal.pose.distance(Pose2(x, y, yaw)) > goal.xy_tolerance:
+            raise NavigationFailure(ErrorCode.GOAL_OCCUPIED, "the robot does not fit within the goal's tolerance")
+        return replace(path, tick=tick)
+
+    def _adopt(self, tick: int, now: float, path: Path, reason: str) -> None:
+        view = self._costmap.view
+        self.plan = PlanInForce(path, self._radius, view)
+        self._controller.set_path(path)
+        self._adopted = self._looked = now
+        self._checked = view.revision
+        self._journal.append(Event(tick, "plan.made", "", {"reason": reason, "length": round(path.length(), 6)}))
