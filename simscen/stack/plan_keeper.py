@@ -124,5 +124,5 @@ class PlanKeeper:
         self.plan = PlanInForce(path, self._radius, view)
         self._controller.set_path(path)
         self._adopted = self._looked = now
-        self._checked = view.revision
+        self._checked, self._most = view.revision, self._costmap.obstacle_cells
         self._journal.append(Event(tick, "plan.made", "", {"reason": reason, "length": round(path.length(), 6)}))

@@ -1,0 +1,140 @@
+import math
+
+import numpy as np
+import pytest
+from flatland import RATE, Flatland, round_robot
+
+from simscen.core.events import Event
+from simscen.core.geometry import Pose2
+from simscen.core.motion import STOP, Twist
+from simscen.core.navigation import ErrorCode, Goal, Path
+from simscen.core.sensing import Scan
+from simscen.model.stack import Costmap as CostmapSpec
+from simscen.model.stack import Planner as PlannerSpec
+from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.plan_keeper import PlanKeeper
+from simscen.stack.protocols import CostmapView, NavigationFailure, Surroundings
+
+GOAL = Goal("g", Pose2(7.0, 3.0))
+HERE = Pose2(1.0, 3.0)
+WORLD = Flatland().room(8, 6)
+
+
+class Scripted:
+    """A planner and a controller that do as told: the straight way, by way of `bulge` metres, or a failure."""
+
+    def __init__(self) -> None:
+        self.seeds: list[int] = []
+        self.bulge, self.broken = 0.0, False
+        self.local_plan = None
+
+    def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
+        self.seeds.append(seed)
+        if self.broken:
+            raise NavigationFailure(ErrorCode.NO_VALID_PATH, "told so")
+        x = np.linspace(start.x, goal.x, 121)
+        y = start.y + self.bulge * np.sin(np.linspace(0, math.pi, 121))
+        return Path(np.column_stack((x, y, np.zeros(121))))
+
+    def set_path(self, path: Path) -> None:
+        pass
+
+    def set_speed_limit(self, limit: float | None) -> None:
+        pass
+
+    def command(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> Twist:
+        return STOP
+
+
+class Bench:
+    """A keeper with its costmap, looked at every tenth of a second."""
+
+    def __init__(self, **options: object) -> None:
+        self.script = Scripted()
+        grid = WORLD.grid((-0.5, -0.5, 8.5, 6.5))
+        self.costmap = Costmap(CostmapSpec(), Surroundings(round_robot(), grid, RATE))
+        self.journal: list[Event] = []
+        self.now = 0.0
+        self.keeper = PlanKeeper(
+            PlannerSpec(**options), self.script, self.script, self.costmap, lambda k: 100 + k, 0.22, self.journal
+        )
+
+    def steps(self, count: int) -> list[object]:
+        """Reasons of the plans made in so many steps of the navigator."""
+        before = len(self.journal)
+        for _ in range(count):
+            self.keeper.step(0, self.now, GOAL, HERE)
+            self.now += 0.05
+        return [event.data["reason"] for event in self.journal[before:]]
+
+    def see(self, *discs: tuple[float, float, float]) -> None:
+        """A scan of the room with discs in it."""
+        step = 2 * math.pi / 360
+        angles = -math.pi + step * np.arange(360)
+        ranges = Flatland(WORLD.boxes, list(discs)).cast((HERE.x, HERE.y), angles)
+        self.costmap.update(HERE, Scan("lidar", 0, ranges, -math.pi, step, 0.05, 12.0))
+
+
+def test_a_plan_is_made_once_and_each_has_its_own_seed() -> None:
+    bench = Bench()
+    assert bench.steps(40) == ["goal"]
+    bench.keeper.drop("recovery")
+    assert bench.steps(40) == ["recovery"]
+    assert bench.script.seeds == [101, 102]
+
+
+def test_a_plan_that_is_blocked_is_replaced_or_the_failure_is_told() -> None:
+    bench = Bench()
+    bench.steps(4)
+    bench.see((2.5, 3.0, 0.2))
+    bench.script.broken = True
+    with pytest.raises(NavigationFailure):
+        bench.steps(4)
+    bench.script.broken, bench.script.bulge = False, 1.0
+    assert bench.steps(4) == ["blocked"]
+
+
+def test_what_stands_beside_the_plan_is_no_reason() -> None:
+    bench = Bench()
+    bench.steps(4)
+    bench.see((2.5, 4.5, 0.2))
+    assert bench.steps(80) == []
+
+
+def test_an_obstacle_that_has_gone_gives_cause_to_look_and_a_clearly_shorter_plan_is_taken() -> None:
+    bench = Bench()
+    bench.script.bulge = 2.5
+    bench.see((2.5, 3.0, 0.4))
+    bench.steps(4)
+    bench.see()
+    assert bench.steps(60) == []  # looked once, but the other was no shorter
+    bench.see((2.5, 3.0, 0.4))
+    bench.steps(4)
+    bench.script.bulge = 0.0
+    bench.see()
+    assert bench.steps(60) == ["better"]
+
+
+def test_a_look_for_a_better_plan_that_fails_is_no_failure() -> None:
+    bench = Bench()
+    bench.script.bulge = 2.5
+    bench.see((2.5, 3.0, 0.4))
+    bench.steps(4)
+    bench.script.broken = True
+    bench.see()
+    assert bench.steps(60) == []
+    assert len(bench.script.seeds) == 2
+    assert bench.keeper.plan is not None
+
+
+def test_at_a_rate_it_replans_whatever_happens() -> None:
+    bench = Bench(replanning="rate", replanning_rate=2.0)
+    assert bench.steps(40) == ["goal", "rate", "rate", "rate"]
+
+
+def test_a_plan_that_ends_too_far_from_the_goal_means_that_the_goal_is_occupied() -> None:
+    bench = Bench()
+    bench.script.plan = lambda *_: Path(np.array([[1.0, 3.0, 0.0], [6.5, 3.0, 0.0]]))
+    with pytest.raises(NavigationFailure) as failed:
+        bench.steps(1)
+    assert failed.value.code == ErrorCode.GOAL_OCCUPIED
