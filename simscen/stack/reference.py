@@ -5,17 +5,19 @@ from typing import Any
 
 import numpy as np
 
-from simscen.core.belief import Belief, Estimate
+from simscen.core.belief import Estimate
 from simscen.core.events import Event
-from simscen.core.geometry import Pose2
 from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import ErrorCode, Goal, Path
 from simscen.core.sensing import Imu, Odometry, Readings, Scan
 from simscen.core.trace import Decision
 from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.localizers.ground_truth import TRUTH
 from simscen.stack.navigator import Navigator
+from simscen.stack.odometry_history import OdometryHistory
 from simscen.stack.protocols import Controller, Localizer, NavigationFailure, Surroundings
+from simscen.stack.publishing import Publishing
 from simscen.stack.tasks import Task
 from simscen.stack.velocity_smoother import VelocitySmoother
 from simscen.stack.zones import speed_limit
@@ -49,18 +51,14 @@ class ReferenceStack:
         self._navigator, self._task, self._smoother, self._monitor = navigator, task, smoother, monitor
         self._tick_rate = surroundings.tick_rate
         self._control_period, self._costmap_period = control_period, costmap_period
-        self._belief_period = math.ceil(surroundings.tick_rate / 10)
-        self._local_plan_period = math.ceil(surroundings.tick_rate / 5)
+        self._publishing = Publishing(surroundings.tick_rate, localizer, controller)
         self._journal = journal
         self._tick = 0
         self._twist, self._command = STOP, STOP
-        self._odometry = Pose2(0.0, 0.0)
+        self._odometry, self._wheels = OdometryHistory(), False
         self._scans: dict[str, Scan] = {}
         self._mapped = -costmap_period
         self._free_at = 0
-        self._told = -self._belief_period
-        self._plan_told: Path | None = None
-        self._arc_told = 0
         self._nothing = Decision(STOP)
 
     def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:
@@ -115,28 +113,40 @@ class ReferenceStack:
             self._update_costmap(tick)
             self._command = self._control(tick)
             events, self._journal[:] = self._journal.copy(), []
-            local_plan = self._fresh_local_plan(tick)
+            local_plan = self._publishing.local_plan(tick, self._navigator.plan is not None)
         self._nothing = Decision(self._command)
-        return Decision(self._command, self._fresh_belief(tick, scanned), self._fresh_plan(), local_plan, tuple(events))
+        belief, plan = self._publishing.belief(tick, scanned), self._publishing.plan(self.plan)
+        return Decision(self._command, belief, plan, local_plan, tuple(events))
 
     def _take(self, readings: Readings) -> bool:
-        scanned = False
+        """Hand the readings on; whether there was a scan among them."""
+        scans: list[Scan] = []
         for reading in readings:
             match reading:
                 case Odometry():
                     self._localizer.on_odometry(reading)
-                    if all(map(math.isfinite, (*reading.pose, *reading.twist))):
-                        self._twist, self._odometry = reading.twist, reading.pose
+                    self._dead_reckon(reading)
                 case Imu():
                     self._localizer.on_imu(reading)
                 case Scan():
                     self._localizer.on_scan(reading)
-                    self._monitor.on_scan(reading, self._odometry)
-                    self._scans[reading.sensor] = reading
-                    scanned = True
+                    scans.append(reading)
                 case _:
                     pass
-        return scanned
+        for scan in scans:  # after all odometry of this beat, wherever that stands among the readings
+            self._monitor.on_scan(scan, self._odometry.at(scan.tick))
+            self._scans[scan.sensor] = scan
+        return bool(scans)
+
+    def _dead_reckon(self, reading: Odometry) -> None:
+        """Remember the way the robot took; the truth only stands in for wheels where there are none."""
+        if reading.sensor == TRUTH and self._wheels:
+            return
+        if reading.sensor != TRUTH and not self._wheels:
+            self._wheels, self._odometry = True, OdometryHistory()
+        if all(map(math.isfinite, (*reading.pose, *reading.twist))):
+            self._twist = reading.twist
+            self._odometry.add(reading.tick, reading.pose)
 
     def _update_costmap(self, tick: int) -> None:
         """Feed the newest scan of each lidar, not older than the costmap's own period."""
@@ -146,7 +156,7 @@ class ReferenceStack:
         pose = self._localizer.belief.pose
         for scan in self._scans.values():
             if not np.isnan(scan.ranges).all():
-                self._costmap.update(pose, scan)
+                self._costmap.update(self._odometry.then(pose, scan.tick), scan)
         self._scans.clear()
 
     def _control(self, tick: int) -> Twist:
@@ -186,7 +196,7 @@ class ReferenceStack:
 
     def _guarded(self, wanted: Twist) -> Twist:
         smooth = self._smoother.smooth(wanted)
-        allowed = self._monitor.allow(smooth, self._odometry)
+        allowed = self._monitor.allow(smooth, self._odometry.now)
         if allowed is not smooth:
             self._smoother.reset(allowed)
         crawls = abs(allowed.vx) + abs(allowed.vy) < CRAWL and abs(allowed.wz) < 5 * CRAWL
@@ -199,22 +209,3 @@ class ReferenceStack:
         self._navigator.stop()
         self._smoother.reset(STOP)
         return STOP
-
-    def _fresh_belief(self, tick: int, scanned: bool) -> Belief | None:
-        if not scanned and tick - self._told < self._belief_period:
-            return None
-        self._told = tick
-        return self._localizer.belief
-
-    def _fresh_plan(self) -> Path | None:
-        plan = self.plan
-        if plan is self._plan_told or plan is None:
-            return None
-        self._plan_told = plan
-        return plan
-
-    def _fresh_local_plan(self, tick: int) -> Path | None:
-        if self._navigator.plan is None or tick - self._arc_told < self._local_plan_period:
-            return None
-        self._arc_told = tick
-        return self._controller.local_plan

@@ -257,3 +257,18 @@ def test_what_only_the_collision_monitor_sees_is_a_failure_soon_not_after_the_pr
     assert held
     assert held[0].tick / 240 - standing * 14 / len(d.track) < 4.0
     assert d.least > 0.0
+
+
+def test_a_lidar_that_is_late_marks_obstacles_where_they_are() -> None:
+    world = Flatland(discs=[(3.0, 0.0, 0.3)])
+    d = drive(world, Pose2(0, 0), Goal("g", Pose2(2.5, 0.0)), grid=None, robot=round_robot(speed=0.5))
+    late: list = []
+    scan, stack = d.scan, d.stack
+    d.scan = lambda: (late.append(scan()), late[max(0, len(late) - 4)])[1]  # 0.3 s old
+    d.run(3.0)
+    view = stack._costmap.view
+    columns = (view.costs == 254).nonzero()[1]
+    x = view.origin[0] + (columns + 0.5) * view.resolution
+    assert len(x)
+    assert x.min() > 2.6  # the disc begins at 2.7; 0.3 s at 0.5 m/s would have put it at 2.85 and later
+    assert x.min() < 2.75
