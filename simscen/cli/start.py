@@ -34,5 +34,5 @@ def _leave(code: int) -> NoReturn:
         sys.stdout.flush()
         sys.stderr.flush()
     except BrokenPipeError:
-        code = Exit.INCOMPLETE
+        code = 1  # as click ends where the output is not buffered
     os._exit(code)

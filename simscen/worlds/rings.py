@@ -22,7 +22,8 @@ class OpenCut(ValueError):
 def rings_of(segments: Array) -> list[Ring]:
     """Closed rings of directed segments (n, 2, 2), anticlockwise around solid; raises OpenCut where one ends.
 
-    Segments of a closed mesh meet in the same bits, so points are compared exactly.
+    Segments of a closed mesh meet in the same bits, so points are compared exactly. Where rings touch at a corner the
+    way is cut there, so that no ring visits a point twice.
     """
     ways: dict[Point, list[Point]] = {}
     for (ax, ay), (bx, by) in segments.tolist():
@@ -30,13 +31,19 @@ def rings_of(segments: Array) -> list[Ring]:
     rings = []
     for start in list(ways):
         while ways[start]:
-            ring, here = [start], ways[start].pop()
-            while here != start:
-                ring.append(here)
+            way: dict[Point, None] = {start: None}  # a dict, because it keeps the order and knows at once what is in it
+            while way:
+                here = next(reversed(way))
                 if not ways.get(here):
                     raise OpenCut
                 here = ways[here].pop()
-            rings.append(_corners(ring))
+                if here in way:
+                    points = list(way)
+                    cut = points.index(here)
+                    rings.append(_corners(points[cut:]))
+                    way = dict.fromkeys(points[: cut + 1]) if cut else {}
+                else:
+                    way[here] = None
     return [ring for ring in rings if len(ring) >= 3]
 
 
@@ -45,7 +52,9 @@ def pieces_of(rings: list[Ring]) -> list[Ring]:
     outer = [ring for ring in rings if area(ring) > 0]
     holes: dict[int, list[Ring]] = {number: [] for number in range(len(outer))}
     for ring in rings:
-        around = [number for number, other in enumerate(outer) if area(ring) < 0 and _holds(other, ring[0])]
+        # The middle of an edge, because a corner may be where the hole touches the ring around it.
+        middle = ((ring[0][0] + ring[1][0]) / 2, (ring[0][1] + ring[1][1]) / 2)
+        around = [number for number, other in enumerate(outer) if area(ring) < 0 and _holds(other, middle)]
         if around:
             holes[min(around, key=lambda number: area(outer[number]))].append(ring)
     pieces: list[Ring] = []

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from shapely import Polygon, union_all
 
@@ -71,7 +71,11 @@ def test_a_ring_with_too_many_corners_is_taken_apart():
     assert sum(map(area, pieces)) == pytest.approx(Polygon(circle(3.0, 400)).area)
 
 
+A_HOLE_THAT_TOUCHES_THE_OUTSIDE = [(0, 0), (0, 1), (0, 2), (0, 4), (1, 0), (1, 2), (2, 0), (2, 1)]
+
+
 @settings(max_examples=30, deadline=None)
+@example(A_HOLE_THAT_TOUCHES_THE_OUTSIDE)
 @given(st.lists(st.tuples(st.integers(0, 5), st.integers(0, 5)), min_size=1, max_size=12, unique=True))
 def test_any_blocks_cover_what_they_covered(cells):
     """Unions of grid cells: rings that touch at corners, holes, islands in holes."""
