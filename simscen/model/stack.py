@@ -20,6 +20,7 @@ from simscen.spec.quantities import (
     PositiveSpeed,
     Probability,
 )
+from simscen.spec.references import RegionName
 
 Noise = Annotated[float, Field(ge=0, le=100)]
 Iterations = Annotated[int, Field(ge=1, le=1_000_000)]
@@ -264,6 +265,15 @@ class CollisionMonitor(Spec):
     """STOP: nothing may be nearer to the footprint than this, in the direction of travel."""
 
 
+class SpeedZone(Spec):
+    """A part of the world with a speed limit (nav2_costmap_2d's SpeedFilter)."""
+
+    region: RegionName
+    """A region of the world, by name."""
+    speed_limit: PositiveSpeed
+    """While the robot believes itself inside."""
+
+
 class StackSpec(Spec):
     """The navigation stack under test: Nav2 in miniature."""
 
@@ -278,3 +288,7 @@ class StackSpec(Spec):
     recovery: Recovery = by_default()
     velocity_smoother: VelocitySmoother = by_default()
     collision_monitor: CollisionMonitor = by_default()
+    keepout: Annotated[list[RegionName], Field(max_length=100)] = []
+    """Regions of the world that the robot must not enter (nav2_costmap_2d's KeepoutFilter)."""
+    speed_zones: Annotated[list[SpeedZone], Field(max_length=100)] = []
+    """Regions of the world with a speed limit."""

@@ -34,6 +34,7 @@ CHANGES = {
         ("goals_reached", [("goals.0.timeout", 2.0)]),
     ],
     "navigation/path_length": [("path_length", [("pass.1.path_length.max_ratio", 1.0)])],
+    "navigation/zones": [("keepout", [("stack.keepout", [])])],
     "navigation/time_bound": [("time_to_goal", [("pass.1.time_to_goal.max", 5.0)])],
     "navigation/outdated_map": [("goals_reached", [("stack.costmap", {"obstacle_max_range": 0.05})])],
     "navigation/ros_map_world": [("localization_error", [NO_LOCALIZER, DRIFTING_ODOMETRY])],
