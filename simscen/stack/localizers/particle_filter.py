@@ -30,8 +30,7 @@ class ParticleFilter:
         self, spec: Amcl, motion: MotionModel, sensor: SensorModel, anywhere: FreeSpace, chance: np.random.Generator
     ) -> None:
         self._spec, self._motion, self._sensor, self._anywhere, self._chance = spec, motion, sensor, anywhere, chance
-        most = max(spec.min_particles, spec.max_particles)
-        self._bound = KldBound(spec.pf_err, spec.pf_z, spec.min_particles, most)
+        self._bound = KldBound(spec.pf_err, spec.pf_z, spec.min_particles, spec.max_particles)
         self.begin(Estimate(None))
 
     def begin(self, estimate: Estimate) -> None:
