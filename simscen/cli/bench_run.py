@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from simscen.cli.run import ZYGOTE
+from simscen.cli.run import WARM_PROCESS
 from simscen.cli.select import checked
 from simscen.core.errors import InvalidInput
-from simscen.core.session import Outcome, RunFinished, RunKey, SessionEvent
+from simscen.core.sessionevents import Outcome, RunFinished, RunKey, SessionEvent
 from simscen.loading.scenario import load_scenario
 from simscen.record.replay import read_log
 from simscen.report.lines import Naming, finished, text_of
@@ -48,7 +48,7 @@ def drive(experiments: Sequence[Experiment], out: Path, workers: int) -> list[Me
     """Do all runs, tell of progress and of what went wrong on stderr, and sum up. Raises InvalidInput."""
     jobs, owners = _planned(experiments, out)
     options = Options(workers=workers)
-    answers, _ = run_session(jobs, options, ZYGOTE, _Progress(len(jobs), {job.key: job for job in jobs}))
+    answers, _ = run_session(jobs, options, WARM_PROCESS, _Progress(len(jobs), {job.key: job for job in jobs}))
     trials: list[list[Trial]] = [[] for _ in experiments]
     for answer in answers:
         number, reference = owners[answer.key]
@@ -76,7 +76,7 @@ def _planned(experiments: Sequence[Experiment], out: Path) -> tuple[list[Job], d
     return jobs, owners
 
 
-def again(job: Job) -> str:
+def repeat_command(job: Job) -> str:
     """The command that repeats a run."""
     scenario = job.scenario
     folders = [part for folder in scenario.world_path for part in ("--world-path", str(folder))]
@@ -96,7 +96,7 @@ class _Progress:
             return
         self._done += 1
         if event.outcome is not Outcome.PASSED:
-            told = replace(event, again=again(self._jobs[event.key]))
+            told = replace(event, again=repeat_command(self._jobs[event.key]))
             print(*(text_of(line) for line in finished(told, Naming(every_seed=True))), sep="\n", file=sys.stderr)
         if sys.stderr.isatty():
             print(f"{self._done} of {self._total} runs", end="\r", file=sys.stderr, flush=True)

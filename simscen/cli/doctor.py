@@ -128,8 +128,8 @@ def room(folder: Path) -> str:
 
 def run_twice() -> str:
     """A second of a real run passes, and its log is the same when it is run again."""
-    from simscen.cli.run import ZYGOTE
-    from simscen.core.session import Outcome
+    from simscen.cli.run import WARM_PROCESS
+    from simscen.core.sessionevents import Outcome
     from simscen.loading.scenario import load_scenario
     from simscen.run.session import Options, plan, run_session
 
@@ -139,7 +139,7 @@ def run_twice() -> str:
         options = Options(workers=2, twice=True, wall_limit=60.0)
         try:
             jobs = plan([load_scenario(folder / "doctor.scenario.yaml", folder)], options, folder / "out")
-            answers, _ = run_session(jobs, options, ZYGOTE, lambda _: None)
+            answers, _ = run_session(jobs, options, WARM_PROCESS, lambda _: None)
         except SimscenError as error:
             raise Ill(str(error)) from error
         for answer in answers:

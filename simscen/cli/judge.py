@@ -9,7 +9,7 @@ import typer
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import Exit, InvalidInput
 from simscen.core.problems import Problem
-from simscen.core.session import Outcome, RunFinished, RunKey
+from simscen.core.sessionevents import Outcome, RunFinished, RunKey
 from simscen.judge.judge import judge
 from simscen.judge.result import run_result, to_json
 from simscen.loading.resolved import spec_of_text

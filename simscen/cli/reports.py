@@ -8,7 +8,7 @@ from pathlib import Path
 from simscen.cli import circumstances
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import Exit, UsageError
-from simscen.core.session import Outcome, RunFinished, SessionFinished
+from simscen.core.sessionevents import Outcome, RunFinished, SessionFinished
 from simscen.report.junit import Family, to_xml
 from simscen.report.page import to_html
 from simscen.report.results import to_json

@@ -15,13 +15,13 @@ from simscen.cli.screen import Format, Screen, screen
 from simscen.cli.select import Selection, load_all, shard_of
 from simscen.cli.work import Work, begin
 from simscen.core.errors import Exit, UsageError
-from simscen.core.session import SessionEvent
+from simscen.core.sessionevents import SessionEvent
 from simscen.report.journal import Journal, require_free
 from simscen.report.rebuild import read_journal
 from simscen.run.outfolder import make_folder
 from simscen.run.session import Options, plan, run_session
 
-ZYGOTE = ("-m", "simscen.cli.zygote")
+WARM_PROCESS = ("-m", "simscen.cli.warm_process")
 
 
 def command(
@@ -98,7 +98,7 @@ def _run(work: Work, options: Options, reports: Reports, shown: Screen) -> Exit:
     for answer in work.kept:
         shown(answer)
     with signals_interrupt():
-        answers, stopped = run_session(work.jobs, options, ZYGOTE, listen)
+        answers, stopped = run_session(work.jobs, options, WARM_PROCESS, listen)
     answers = [*work.kept, *answers]
     work.journal.complete(answers)
     written = reports.write(answers)

@@ -10,7 +10,7 @@ from typing import TextIO
 
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import Exit
-from simscen.core.session import SessionEvent
+from simscen.core.sessionevents import SessionEvent
 from simscen.report.console import Reporter, text_reporter
 from simscen.report.github import github_reporter
 from simscen.report.machine import json_reporter

@@ -8,11 +8,11 @@ from simscen.cli.diagnostics import from_here, harmless
 from simscen.core.errors import InvalidInput, NothingSelected, UsageError
 from simscen.core.problems import Problem
 from simscen.loading.discovery import default_root, discover
+from simscen.loading.keywords import select
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import try_scenario
-from simscen.loading.selection import select
 from simscen.loading.worldfile import load_world_file
-from simscen.run.check import check, notes_of
+from simscen.run.feasibility import check, notes_of
 from simscen.run.worldsource import world_of
 
 

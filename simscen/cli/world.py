@@ -19,7 +19,7 @@ from simscen.loading.discovery import default_root
 from simscen.loading.loaded import LoadedWorld
 from simscen.loading.worldfile import load_world_file, world_text
 from simscen.model.world import WorldSpec
-from simscen.run.check import notes_of
+from simscen.run.feasibility import notes_of
 from simscen.run.outfolder import write_atomically
 from simscen.run.worldsource import world_of
 

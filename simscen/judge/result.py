@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from simscen.core.case import Case
-from simscen.core.session import Outcome, RunFailure, RunKey
+from simscen.core.sessionevents import Outcome, RunFailure, RunKey
 from simscen.core.trace import Trace
 from simscen.core.verdict import Status, Verdict
 from simscen.criteria.bounds import BrokenTrace

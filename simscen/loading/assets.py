@@ -8,13 +8,13 @@ from pydantic import BaseModel
 
 import simscen
 from simscen.core.problems import Problem
-from simscen.loading.check import check
 from simscen.loading.document import Library
 from simscen.loading.loaded import LoadedMap, LoadedRobot, LoadedWorld
 from simscen.loading.messages import quoted, suggestion
 from simscen.loading.paths import Refusal
 from simscen.loading.source import read_text
 from simscen.loading.tree import Fields, Leaf, Node, Place, value_place
+from simscen.loading.validation import check
 from simscen.model.robot import RobotSpec
 from simscen.model.rosmap import RosMapSpec
 from simscen.model.world import WorldSpec

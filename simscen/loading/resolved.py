@@ -3,10 +3,10 @@
 import yaml
 
 from simscen.core.errors import InvalidInput
-from simscen.loading.check import check
 from simscen.loading.compose import compose
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.tree import Fields
+from simscen.loading.validation import check
 from simscen.model.scenario import ScenarioSpec
 
 

@@ -7,12 +7,12 @@ from typing import Literal
 from simscen.core.errors import InvalidInput
 from simscen.core.problems import Problem
 from simscen.loading.assets import Assets
-from simscen.loading.check import check
 from simscen.loading.consistency import inconsistencies
 from simscen.loading.document import Library
 from simscen.loading.loaded import LoadedMap, LoadedScenario, LoadedWorld
 from simscen.loading.paths import Fence
 from simscen.loading.tree import Fields, Leaf, Node, at, child, value_place
+from simscen.loading.validation import check
 from simscen.model.scenario import ScenarioSpec
 from simscen.model.world import WorldSpec
 

@@ -10,10 +10,10 @@ from simscen.record import frames, header, pack_many, pack_rare, topics
 from simscen.record.event_topics import EventTopics
 from simscen.record.header import LogHeader
 from simscen.record.logfile import LogFile
-from simscen.record.selection import Selection
 from simscen.record.sensor_topics import SensorTopics
 from simscen.record.simtime import SimTime
 from simscen.record.stack_topics import StackTopics
+from simscen.record.thinning import Thinning
 from simscen.record.topics import Publisher
 from simscen.record.truth_topics import TruthTopics
 from simscen.record.writer import McapWriter, Sink
@@ -33,11 +33,11 @@ class Recorder:
         assert not isinstance(sink, str | Path)
         self._writer = McapWriter(sink, profile="ros2", library="simscen")
         self._time = SimTime(clock.rate)
-        out, selection = Publisher(self._writer), Selection(clock.rate)
+        out, thinning = Publisher(self._writer), Thinning(clock.rate)
         _write_header(self._writer, out, clock, about)
-        self._truth = TruthTopics(out, self._time, selection)
-        self._sensors = SensorTopics(out, self._time, selection, about.frames)
-        self._stack = StackTopics(out, self._time, selection)
+        self._truth = TruthTopics(out, self._time, thinning)
+        self._sensors = SensorTopics(out, self._time, thinning, about.frames)
+        self._stack = StackTopics(out, self._time, thinning)
         self._events = EventTopics(out, self._time, about.case)
 
     def append(self, moment: Moment) -> None:

@@ -10,8 +10,8 @@ from simscen.core.sensing import Bump, Image, Imu, Odometry, Readings, Scan
 from simscen.record import frames, pack_rare, topics
 from simscen.record.pack import ImuPacker, OdometryPacker
 from simscen.record.pack_many import LaserScanPacker, TransformsPacker
-from simscen.record.selection import Selection
 from simscen.record.simtime import SimTime, Stamp
+from simscen.record.thinning import Thinning
 from simscen.record.topics import Publisher, Topic
 
 _START: Stamp = (0, 0)
@@ -23,8 +23,8 @@ class SensorTopics:
     Messages are written when the stack received them; their header's stamp is when they were measured.
     """
 
-    def __init__(self, out: Publisher, time: SimTime, selection: Selection, mounts: Mapping[str, Pose3]) -> None:
-        self._out, self._time, self._selection = out, time, selection
+    def __init__(self, out: Publisher, time: SimTime, thinning: Thinning, mounts: Mapping[str, Pose3]) -> None:
+        self._out, self._time, self._thinning = out, time, thinning
         self._topics: dict[tuple[str, str], Topic] = {}
         self._plain: set[str] = set()
         self._scans: dict[str, LaserScanPacker] = {}
@@ -62,7 +62,7 @@ class SensorTopics:
         stamp, pose = self._time.stamp(odometry.tick), Pose3.planar(odometry.pose)
         topic = self._topic(odometry.sensor, "odom", topics.ODOMETRY_TYPE)
         self._out.publish(topic, now, self._odometry(stamp, pose, odometry.twist))
-        if not self._selection.keeps_odometry(odometry):
+        if not self._thinning.keeps_odometry(odometry):
             return
         links = [(frames.ODOM, frames.BASE, stamp, pose)]
         if self._correction is not None:

@@ -6,8 +6,8 @@ from simscen.core.trace import Decision
 from simscen.record import frames, topics
 from simscen.record.pack import PoseWithCovariancePacker, TwistPacker
 from simscen.record.pack_many import ParticleCloudPacker, PathPacker
-from simscen.record.selection import Selection, Throttle
 from simscen.record.simtime import SimTime
+from simscen.record.thinning import Thinning, Throttle
 from simscen.record.topics import Publisher
 
 PARTICLE_RATE = 2  # a cloud of 2000 is 128 kB, as much as all other topics say in a second
@@ -17,8 +17,8 @@ LOCAL_PLAN_RATE = 5  # only for the eye
 class StackTopics:
     """Writes decisions."""
 
-    def __init__(self, out: Publisher, time: SimTime, selection: Selection) -> None:
-        self._out, self._time, self._selection = out, time, selection
+    def __init__(self, out: Publisher, time: SimTime, thinning: Thinning) -> None:
+        self._out, self._time, self._thinning = out, time, thinning
         self._belief = PoseWithCovariancePacker(frames.MAP)
         self._particles = ParticleCloudPacker(frames.MAP)
         self._path = PathPacker(frames.MAP)
@@ -36,7 +36,7 @@ class StackTopics:
         if decision.local_plan is not None and self._local_plan_times.passes(tick):
             stamp = self._time.stamp(tick)
             self._out.publish(topics.LOCAL_PLAN, now, self._path(stamp, decision.local_plan.points))
-        if self._selection.keeps_command(tick, decision.command):
+        if self._thinning.keeps_command(tick, decision.command):
             self._out.publish(topics.COMMAND, now, self._command(decision.command))
 
     def _write_belief(self, now: int, tick: int, belief: Belief) -> None:

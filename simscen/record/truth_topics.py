@@ -4,16 +4,16 @@ from simscen.core.trace import Truth
 from simscen.record import frames, topics
 from simscen.record.pack import ClockPacker, Float64Packer, OdometryPacker
 from simscen.record.pack_many import TransformsPacker
-from simscen.record.selection import Selection
 from simscen.record.simtime import SimTime
+from simscen.record.thinning import Thinning
 from simscen.record.topics import Publisher
 
 
 class TruthTopics:
     """Writes truth samples, and the clock with them."""
 
-    def __init__(self, out: Publisher, time: SimTime, selection: Selection) -> None:
-        self._out, self._time, self._selection = out, time, selection
+    def __init__(self, out: Publisher, time: SimTime, thinning: Thinning) -> None:
+        self._out, self._time, self._thinning = out, time, thinning
         self._clock = ClockPacker()
         self._odometry = OdometryPacker(frames.MAP, frames.TRUTH)
         self._clearance = Float64Packer()
@@ -25,7 +25,7 @@ class TruthTopics:
         out.publish(topics.CLOCK, now, self._clock(stamp))
         out.publish(topics.TRUTH, now, self._odometry(stamp, truth.pose, truth.twist))
         out.publish(topics.CLEARANCE, now, self._clearance(truth.clearance))
-        moved = self._selection.moved(tick, truth) if truth.objects else None
+        moved = self._thinning.moved(tick, truth) if truth.objects else None
         if moved:
             links = [(frames.MAP, frames.of_object(name), stamp, pose) for name, pose in moved]
             out.publish(topics.TF, now, self._transforms(links))

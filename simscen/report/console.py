@@ -3,7 +3,14 @@
 from types import TracebackType
 from typing import Protocol, TextIO
 
-from simscen.core.session import RunFinished, RunProgress, RunStarted, SessionEvent, SessionFinished, SessionStarted
+from simscen.core.sessionevents import (
+    RunFinished,
+    RunProgress,
+    RunStarted,
+    SessionEvent,
+    SessionFinished,
+    SessionStarted,
+)
 from simscen.report.lines import Line, Naming, closing, finished, opening, text_of
 from simscen.report.text import ascii_only, no_command
 

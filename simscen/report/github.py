@@ -3,11 +3,11 @@
 from types import TracebackType
 from typing import TextIO
 
-from simscen.core.session import Outcome, RunFinished, SessionEvent, SessionFinished
+from simscen.core.sessionevents import Outcome, RunFinished, SessionEvent, SessionFinished
 from simscen.judge.wording import tightest
+from simscen.report.complaints import broken, complaints, label
 from simscen.report.console import Reporter, text_reporter
 from simscen.report.text import one_line
-from simscen.report.wordsof import broken, complaints, label
 
 _MEANINGFUL = {ord(sign): f"&#{ord(sign)};" for sign in "\\`*_[]|~#@&<>"}
 

@@ -4,7 +4,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from simscen.core.session import Artifacts, RunFinished, RunKey
+from simscen.core.sessionevents import Artifacts, RunFinished, RunKey
 from simscen.judge.result import as_data, from_data
 from simscen.report.results import relative, result_of
 

@@ -10,10 +10,10 @@ from typing import Literal
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
-from simscen.core.session import Outcome, RunFinished
+from simscen.core.sessionevents import Outcome, RunFinished
 from simscen.judge.wording import subject
+from simscen.report.complaints import Complaint, complaints, failure, place
 from simscen.report.text import one_line, visible
-from simscen.report.wordsof import Complaint, complaints, failure, place
 
 Family = Literal["simscen", "xunit2"]
 

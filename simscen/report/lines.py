@@ -4,10 +4,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from simscen.core.session import Outcome, RunFinished, RunKey, SessionFinished, SessionStarted
+from simscen.core.sessionevents import Outcome, RunFinished, RunKey, SessionFinished, SessionStarted
 from simscen.judge.wording import tightest
+from simscen.report.complaints import broken, complaints, failure, label, place
 from simscen.report.text import one_line
-from simscen.report.wordsof import broken, complaints, failure, label, place
 
 Role = Literal["plain", "name", "good", "bad", "odd", "quiet"]
 

@@ -7,7 +7,7 @@ from rich.console import Console, Group
 from rich.live import Live
 from rich.text import Text
 
-from simscen.core.session import (
+from simscen.core.sessionevents import (
     RunFinished,
     RunKey,
     RunProgress,

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
-from simscen.core.session import Outcome, RunFinished
+from simscen.core.sessionevents import Outcome, RunFinished
 from simscen.judge.wording import comparison, subject, tightest
+from simscen.report.complaints import broken, complaints, failure, place
 from simscen.report.text import one_line, visible
-from simscen.report.wordsof import broken, complaints, failure, place
 
 MOST_PICTURES = 400
 """A picture weighs some 40 kB; more of them make a page that no browser likes."""

@@ -8,7 +8,7 @@ from typing import Any
 
 from simscen.core.errors import InvalidInput
 from simscen.core.problems import Problem
-from simscen.core.session import Outcome, RunFailure, RunFinished, RunKey, SessionStarted
+from simscen.core.sessionevents import Outcome, RunFailure, RunFinished, RunKey, SessionStarted
 from simscen.report.journaldata import FORMAT, NAME, Planned, read_planned, read_run
 
 

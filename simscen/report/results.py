@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import PurePath
 from typing import Any
 
-from simscen.core.session import Outcome, RunFinished
+from simscen.core.sessionevents import Outcome, RunFinished
 from simscen.judge.result import RunResult, as_data
 
 FORMAT = 1

@@ -16,7 +16,7 @@ from simscen.core.shapes import Cylinder, Solid
 from simscen.core.time import Clock
 from simscen.loading.scenario import load_scenario
 from simscen.record.recorder import Recorder
-from simscen.record.trace import TraceBuilder
+from simscen.record.tracebuilder import TraceBuilder
 from simscen.run.assemble import assemble
 from simscen.run.lockstep import run_lockstep
 from simscen.run.perform import log_header

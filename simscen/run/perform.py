@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from simscen.core.geometry import Pose3
-from simscen.core.session import RunKey
+from simscen.core.sessionevents import RunKey
 from simscen.core.time import Clock
 from simscen.core.trace import Trace
 from simscen.judge.judge import judge
@@ -16,7 +16,7 @@ from simscen.loading.resolved import resolved_text
 from simscen.model.robot import RobotSpec
 from simscen.record.header import LogHeader
 from simscen.record.recorder import Recorder
-from simscen.record.trace import TraceBuilder
+from simscen.record.tracebuilder import TraceBuilder
 from simscen.run.assemble import assemble
 from simscen.run.lockstep import Log, run_lockstep
 from simscen.run.prepare import Prepared

@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from simscen.core.errors import Exit
-from simscen.core.session import Listener, Outcome, RunFailure, RunFinished, RunKey, RunProgress, RunStarted
+from simscen.core.sessionevents import Listener, Outcome, RunFailure, RunFinished, RunKey, RunProgress, RunStarted
 from simscen.loading.loaded import LoadedScenario
-from simscen.run.again import again, shown
+from simscen.run.answer import answer_to
 from simscen.run.jobs import Job
+from simscen.run.repeat_command import repeat_command, shown
 from simscen.run.supervisor import Advanced, Ended, Interrupted, Started, supervise
-from simscen.run.told import told
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def run_session(
                     listen(RunProgress(job.key, seconds))
                 case Ended(end=end):
                     twin = answers.get(job.number ^ 1) if options.twice else None
-                    answers[job.number] = compared(told(job, end), twin)
+                    answers[job.number] = compared(answer_to(job, end), twin)
                     listen(answers[job.number])
     except Interrupted as interrupted:
         stopped = Exit(128 + interrupted.number)
@@ -99,5 +99,5 @@ def _not_done(job: Job, begun: bool, stopped: Exit | None) -> RunFinished:
     else:
         failure = RunFailure("not-run", "interrupted" if stopped else "another run did not pass (--fail-fast)")
     scenario = job.scenario
-    repeat, file = again(scenario, job.key.seed), shown(scenario.file)
+    repeat, file = repeat_command(scenario, job.key.seed), shown(scenario.file)
     return RunFinished(job.key, scenario.path, 1, Outcome.ERROR, error=failure, again=repeat, file=file)

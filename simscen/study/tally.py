@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
-from simscen.core.session import Outcome, RunFinished
+from simscen.core.sessionevents import Outcome, RunFinished
 from simscen.core.verdict import Status
 from simscen.study.barn import score
 from simscen.study.intervals import wilson

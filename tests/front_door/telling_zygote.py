@@ -5,10 +5,10 @@ import os
 import signal
 import time
 
-from simscen.cli import zygote
+from simscen.cli import warm_process
 
-perform = zygote._perform
-prepared = zygote._WORKSHOP.prepared
+perform = warm_process._perform
+prepared = warm_process._PREPARED.prepared
 
 
 def misbehave(job, tell):
@@ -30,6 +30,6 @@ def slow_to_prepare(scenario):
 
 
 if __name__ == "__main__":
-    zygote._perform = misbehave
-    zygote._WORKSHOP.prepared = slow_to_prepare
-    zygote.main()
+    warm_process._perform = misbehave
+    warm_process._PREPARED.prepared = slow_to_prepare
+    warm_process.main()

@@ -14,9 +14,9 @@ from simscen.cli.diagnostics import as_text
 from simscen.core.errors import UsageError
 from simscen.core.problems import Problem
 from simscen.loading.compose import compose
+from simscen.loading.keywords import keyword_matcher
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import try_scenario
-from simscen.loading.selection import keyword_matcher
 from simscen.report.text import visible
 
 SCENARIO = """\

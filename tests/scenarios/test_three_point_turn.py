@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
-from simscen.core.session import Outcome, RunKey
+from simscen.core.sessionevents import Outcome, RunKey
 from simscen.core.time import Clock
 from simscen.loading.scenario import load_scenario
-from simscen.record.trace import TraceBuilder
+from simscen.record.tracebuilder import TraceBuilder
 from simscen.run.assemble import assemble
 from simscen.run.lockstep import run_lockstep
 from simscen.run.perform import judged

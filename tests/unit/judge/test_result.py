@@ -3,7 +3,7 @@ import math
 
 import pytest
 
-from simscen.core.session import Outcome
+from simscen.core.sessionevents import Outcome
 from simscen.criteria.criterion import AnyCriterion
 from simscen.judge.judge import judge
 from simscen.judge.result import from_json, read_result, run_result, to_json

@@ -21,7 +21,7 @@ from simscen.core.errors import InvalidInput
 from simscen.core.trace import Trace
 from simscen.record.recorder import Recorder
 from simscen.record.replay import Log, read_log
-from simscen.record.trace import TraceBuilder
+from simscen.record.tracebuilder import TraceBuilder
 
 HERE = Path(__file__).parent
 

@@ -10,7 +10,7 @@ from simscen.core.events import Event
 from simscen.core.samples import Samples
 from simscen.core.trace import Trace
 from simscen.record.difference import first_difference
-from simscen.record.trace import TraceBuilder
+from simscen.record.tracebuilder import TraceBuilder
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from simscen.core.samples import Samples
 from simscen.core.trace import Moment, Trace
 from simscen.record.recorder import Recorder
 from simscen.record.replay import read_log
-from simscen.record.trace import TraceBuilder
+from simscen.record.tracebuilder import TraceBuilder
 
 HERE = Path(__file__).parent
 RESULT = '{"status": "pass"}'

@@ -2,7 +2,7 @@
 
 import pytest
 
-from simscen.core.session import (
+from simscen.core.sessionevents import (
     Artifacts,
     Outcome,
     RunFailure,

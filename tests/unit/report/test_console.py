@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from simscen.core.session import RunKey, SessionStarted
+from simscen.core.sessionevents import RunKey, SessionStarted
 from simscen.report.console import text_reporter
 from simscen.report.github import annotations, github_reporter, markdown
 from simscen.report.machine import json_reporter

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from simscen.core.errors import InvalidInput, UsageError
-from simscen.core.session import Outcome, RunStarted, SessionFinished
+from simscen.core.sessionevents import Outcome, RunStarted, SessionFinished
 from simscen.report.journal import Journal, require_free
 from simscen.report.journaldata import NAME, Planned
 from simscen.report.junit import to_xml

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simscen.core.session import Outcome, RunFailure, RunFinished, RunKey
+from simscen.core.sessionevents import Outcome, RunFailure, RunFinished, RunKey
 from simscen.report.junit import to_xml
 
 JENKINS = {  # attributes that Jenkins' junit-10.xsd allows

@@ -4,7 +4,7 @@ from html.parser import HTMLParser
 
 from PIL import Image
 
-from simscen.core.session import Artifacts, RunKey
+from simscen.core.sessionevents import Artifacts, RunKey
 from simscen.report.page import to_html
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from simscen.core.errors import Exit
-from simscen.core.session import Outcome, RunProgress, RunStarted
+from simscen.core.sessionevents import Outcome, RunProgress, RunStarted
 from simscen.loading.scenario import load_scenario
 from simscen.run.session import Options, plan, run_session
 from simscen.run.supervisor import Interrupted

@@ -1,6 +1,6 @@
 import pytest
 
-from simscen.core.session import Outcome, RunFailure, RunFinished, RunKey
+from simscen.core.sessionevents import Outcome, RunFailure, RunFinished, RunKey
 from simscen.core.verdict import Finding, Status, Verdict
 from simscen.study.tally import Fate, Trial, tally
 

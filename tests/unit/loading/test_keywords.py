@@ -3,7 +3,7 @@ from dataclasses import dataclass
 import pytest
 
 from simscen.core.errors import NothingSelected, UsageError
-from simscen.loading.selection import keyword_matcher, select
+from simscen.loading.keywords import keyword_matcher, select
 from simscen.model.scenario import ScenarioSpec
 
 

@@ -1,4 +1,4 @@
-"""The program of the warm process: `python -I -m simscen.cli.zygote FD`. Not for people."""
+"""The program of the warm process: `python -I -m simscen.cli.warm_process FD`. Not for people."""
 
 import sys
 from collections.abc import Callable
@@ -9,21 +9,21 @@ import simscen.stack.build  # noqa: F401 - engines are imported here so that the
 from simscen.report.picture import Scene, write_picture
 from simscen.run.jobs import Job
 from simscen.run.perform import Performed, perform
+from simscen.run.prepared_cache import PreparedCache
 from simscen.run.worker import Progress
-from simscen.run.workshop import Workshop
 from simscen.run.zygote import Zygote
 
-_WORKSHOP = Workshop()
+_PREPARED = PreparedCache()
 
 
 def main() -> None:
     """Serve the supervisor until it closes its end."""
     replies = int(sys.argv[1])
-    Zygote(sys.stdin.buffer, replies, lambda job: _WORKSHOP.prepared(job.scenario), _perform).serve()
+    Zygote(sys.stdin.buffer, replies, lambda job: _PREPARED.prepared(job.scenario), _perform).serve()
 
 
 def _perform(job: Job, tell: Callable[[float], None]) -> dict[str, Any]:
-    prepared = _WORKSHOP.prepared(job.scenario)
+    prepared = _PREPARED.prepared(job.scenario)
     progress = Progress(prepared.spec.physics.tick_rate, tell)
     return perform(prepared, job.key, job.folder, (progress,), _finish)
 

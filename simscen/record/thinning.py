@@ -9,7 +9,7 @@ COMMAND_RATE = 20
 STANDSTILL_RATE = 1
 
 
-class Selection:
+class Thinning:
     """Drops what says nothing new, on a clock of `rate` ticks a second.
 
     A command is kept when it differs from the last one, and else 20 times a second. The pose of a moving thing is

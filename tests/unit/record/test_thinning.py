@@ -4,36 +4,36 @@ from simscen.core.geometry import Pose2, Pose3
 from simscen.core.motion import STOP, Twist
 from simscen.core.sensing import Odometry
 from simscen.core.trace import Truth
-from simscen.record.selection import Selection, Throttle
+from simscen.record.thinning import Thinning, Throttle
 
 
 def test_a_command_is_kept_when_it_changes() -> None:
-    selection = Selection(240)
-    assert [selection.keeps_command(t, Twist(v)) for t, v in enumerate([0.0, 0.0, 1.0, 1.0, 0.0])] == [1, 0, 1, 0, 1]
+    thinning = Thinning(240)
+    assert [thinning.keeps_command(t, Twist(v)) for t, v in enumerate([0.0, 0.0, 1.0, 1.0, 0.0])] == [1, 0, 1, 0, 1]
 
 
 def test_an_unchanged_command_is_kept_twenty_times_a_second() -> None:
-    selection = Selection(240)
-    assert sum(selection.keeps_command(tick, STOP) for tick in range(240)) == 20
+    thinning = Thinning(240)
+    assert sum(thinning.keeps_command(tick, STOP) for tick in range(240)) == 20
 
 
 def test_only_the_first_odometry_is_the_robots() -> None:
-    selection = Selection(240)
+    thinning = Thinning(240)
     readings = [Odometry(name, 0, Pose2(0, 0), STOP) for name in ("wheels", "visual", "wheels")]
-    assert [selection.keeps_odometry(reading) for reading in readings] == [True, False, True]
+    assert [thinning.keeps_odometry(reading) for reading in readings] == [True, False, True]
 
 
 def test_things_that_stand_still_are_kept_once_a_second() -> None:
-    selection = Selection(240)
-    still = [selection.moved(tick, Truth(Pose3(), STOP, 1.0, {"box": Pose3()})) for tick in range(0, 480, 6)]
+    thinning = Thinning(240)
+    still = [thinning.moved(tick, Truth(Pose3(), STOP, 1.0, {"box": Pose3()})) for tick in range(0, 480, 6)]
     assert sum(map(len, still)) == 2
 
 
 def test_things_that_move_are_always_kept() -> None:
-    selection = Selection(240)
+    thinning = Thinning(240)
     for tick in range(5):
         pose = Pose3(x=float(tick))
-        assert selection.moved(tick, Truth(Pose3(), STOP, 1.0, {"cart": pose})) == [("cart", pose)]
+        assert thinning.moved(tick, Truth(Pose3(), STOP, 1.0, {"cart": pose})) == [("cart", pose)]
 
 
 def test_a_throttle_lets_pass_at_its_rate_and_at_once() -> None:

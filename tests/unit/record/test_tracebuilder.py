@@ -9,7 +9,7 @@ from simscen.core.geometry import Pose3, wrap_array
 from simscen.core.motion import STOP
 from simscen.core.sensing import Odometry, Scan
 from simscen.core.trace import Decision, Moment, Trace, Truth
-from simscen.record.trace import TraceBuilder
+from simscen.record.tracebuilder import TraceBuilder
 
 RUN = list(moments(2.0))
 

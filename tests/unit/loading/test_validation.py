@@ -3,8 +3,8 @@
 from pydantic import BaseModel
 
 from simscen.core.problems import Problem
-from simscen.loading.check import check
 from simscen.loading.compose import compose
+from simscen.loading.validation import check
 from simscen.model.robot import RobotSpec
 from simscen.model.rosmap import RosMapSpec
 from simscen.model.scenario import ScenarioSpec

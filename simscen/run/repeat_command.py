@@ -8,7 +8,7 @@ from simscen.loading.discovery import default_root
 from simscen.loading.loaded import LoadedScenario
 
 
-def again(scenario: LoadedScenario, seed: int) -> str:
+def repeat_command(scenario: LoadedScenario, seed: int) -> str:
     """The command that repeats a run, called from the working folder. Options are named only where they matter."""
     words = ["simscen", "run", shown(scenario.file), "--seed", str(seed)]
     if scenario.root != default_root([scenario.file]):

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from simscen.core.session import Outcome, RunFinished, RunKey
+from simscen.core.sessionevents import Outcome, RunFinished, RunKey
 from simscen.core.verdict import Finding, Status, Verdict
 from simscen.judge.wording import sentence, violations
 from simscen.report.text import one_line, visible

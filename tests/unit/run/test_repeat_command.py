@@ -4,7 +4,7 @@ import shlex
 from dataclasses import replace
 
 from simscen.loading.scenario import load_scenario
-from simscen.run.again import again, shown
+from simscen.run.repeat_command import repeat_command, shown
 
 TEXT = "simscen: 1\nworld: {simscen: 1}\nrobot: {pose: {x: 0, y: 0}}\npass: [{collisions: {}}]\n"
 
@@ -13,7 +13,7 @@ def test_a_scenario_of_the_folder_needs_no_options(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a b.scenario.yaml").write_text(TEXT)
     scenario = load_scenario(tmp_path / "a b.scenario.yaml", tmp_path)
-    assert again(scenario, 7) == "simscen run 'a b.scenario.yaml' --seed 7"
+    assert repeat_command(scenario, 7) == "simscen run 'a b.scenario.yaml' --seed 7"
 
 
 def test_the_path_is_seen_from_here_and_what_matters_is_named(tmp_path, monkeypatch):
@@ -22,7 +22,7 @@ def test_the_path_is_seen_from_here_and_what_matters_is_named(tmp_path, monkeypa
     (tmp_path / "sub/a.scenario.yaml").write_text(TEXT)
     monkeypatch.chdir(tmp_path / "models")
     scenario = load_scenario(tmp_path / "sub/a.scenario.yaml", tmp_path, [tmp_path / "models"])
-    told = shlex.split(again(replace(scenario, lenient=True), 1))
+    told = shlex.split(repeat_command(replace(scenario, lenient=True), 1))
     assert told[2:] == ["../sub/a.scenario.yaml", "--seed", "1", "--root", "..", "--world-path", ".", "--lenient"]
 
 

@@ -8,7 +8,7 @@ from simscen.loading.loaded import LoadedScenario
 from simscen.run.prepare import Prepared, build_world, prepare
 
 
-class Workshop:
+class PreparedCache:
     """Prepares scenarios; lives in the warm process, whose forks inherit what is here."""
 
     def __init__(self) -> None:

@@ -3,16 +3,16 @@
 import signal
 from pathlib import Path
 
-from simscen.core.session import Artifacts, Outcome, RunFailure, RunFinished
+from simscen.core.sessionevents import Artifacts, Outcome, RunFailure, RunFinished
 from simscen.judge.result import RunResult, from_json
-from simscen.run.again import again, shown
 from simscen.run.confine import MEMORY_BYTES
 from simscen.run.jobs import Job, ProcessEnd
+from simscen.run.repeat_command import repeat_command, shown
 
 TAIL_LINES = 20
 
 
-def told(job: Job, end: ProcessEnd | None) -> RunFinished:
+def answer_to(job: Job, end: ProcessEnd | None) -> RunFinished:
     """The answer to a run. It passed or failed only if its process ended by itself, with status 0 and a last word."""
     failure = _failure(end, job.folder)
     result = _result(job.folder) if failure is None else failure
@@ -25,7 +25,7 @@ def told(job: Job, end: ProcessEnd | None) -> RunFinished:
             wall=end.wall if end else 0.0,
             artifacts=Artifacts(folder=str(job.folder)),
             error=result,
-            again=again(job.scenario, job.key.seed),
+            again=repeat_command(job.scenario, job.key.seed),
             file=shown(job.scenario.file),
         )
     assert end is not None
@@ -42,7 +42,7 @@ def told(job: Job, end: ProcessEnd | None) -> RunFinished:
         metrics=tuple(sorted(result.metrics.items())),
         error=result.error,
         artifacts=_artifacts(job.folder),
-        again=again(job.scenario, job.key.seed),
+        again=repeat_command(job.scenario, job.key.seed),
         file=shown(job.scenario.file),
         tick_rate=result.tick_rate,
     )

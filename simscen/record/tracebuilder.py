@@ -8,7 +8,7 @@ from simscen.core.trace import Moment, Trace, Truth
 from simscen.record import event_text
 from simscen.record.pack_many import ground_poses
 from simscen.record.rows import Rows
-from simscen.record.selection import Selection
+from simscen.record.thinning import Thinning
 
 
 class TraceBuilder:
@@ -20,7 +20,7 @@ class TraceBuilder:
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
-        self._selection = Selection(clock.rate)
+        self._thinning = Thinning(clock.rate)
         self._rows = Rows()
 
     def append(self, moment: Moment) -> None:
@@ -29,7 +29,7 @@ class TraceBuilder:
         if moment.truth is not None:
             self._truth(tick, moment.truth)
         self._readings(tick, moment.readings)
-        if self._selection.keeps_command(tick, decision.command):
+        if self._thinning.keeps_command(tick, decision.command):
             rows.command.add(tick, decision.command)
         if decision.belief is not None:
             self._belief(tick, decision.belief)
@@ -45,13 +45,13 @@ class TraceBuilder:
     def _truth(self, tick: int, truth: Truth) -> None:
         self._rows.truth.add(tick, (*truth.pose, *truth.twist))
         self._rows.clearance.add(tick, (truth.clearance,))
-        for name, pose in self._selection.moved(tick, truth):
+        for name, pose in self._thinning.moved(tick, truth):
             self._rows.object(name).add(tick, pose)
 
     def _readings(self, tick: int, readings: Readings) -> None:
         for reading in readings:
             if isinstance(reading, Odometry):
-                if self._selection.keeps_odometry(reading):
+                if self._thinning.keeps_odometry(reading):
                     self._rows.odometry.add(tick, Pose3.planar(reading.pose))
             elif isinstance(reading, Scan):
                 self._rows.scans.append(tick)
