@@ -9,7 +9,8 @@ from pathlib import Path
 from simscen.cli.run import WARM_PROCESS
 from simscen.cli.select import checked
 from simscen.core.errors import InvalidInput
-from simscen.core.sessionevents import Outcome, RunFinished, RunKey, SessionEvent
+from simscen.core.result import Outcome, RunKey
+from simscen.core.sessionevents import RunFinished, SessionEvent
 from simscen.loading.scenario import load_scenario
 from simscen.record.replay import read_log
 from simscen.report.lines import Naming, finished, text_of

@@ -129,7 +129,7 @@ def room(folder: Path) -> str:
 def run_twice() -> str:
     """A second of a real run passes, and its log is the same when it is run again."""
     from simscen.cli.run import WARM_PROCESS
-    from simscen.core.sessionevents import Outcome
+    from simscen.core.result import Outcome
     from simscen.loading.scenario import load_scenario
     from simscen.run.session import Options, plan, run_session
 
@@ -143,7 +143,8 @@ def run_twice() -> str:
         except SimscenError as error:
             raise Ill(str(error)) from error
         for answer in answers:
-            if answer.error or answer.outcome is not Outcome.PASSED:
-                raise Ill(answer.error.message if answer.error else "a robot in an empty room hit something")
+            if answer.outcome is not Outcome.PASSED:
+                broken = answer.result.error
+                raise Ill(broken.message if broken else "a robot in an empty room hit something")
         log = Path(answers[0].artifacts.mcap).read_bytes()
     return f"1 s simulated twice, equal logs: sha256 {hashlib.sha256(log).hexdigest()[:16]}"

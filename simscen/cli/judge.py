@@ -9,9 +9,11 @@ import typer
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import Exit, InvalidInput
 from simscen.core.problems import Problem
-from simscen.core.sessionevents import Outcome, RunFinished, RunKey
+from simscen.core.result import Outcome, RunKey
+from simscen.core.sessionevents import RunFinished
 from simscen.judge.judge import judge
-from simscen.judge.result import run_result, to_json
+from simscen.judge.result import run_result
+from simscen.judge.resultdata import to_json
 from simscen.loading.resolved import spec_of_text
 from simscen.loading.source import read_text
 from simscen.record.replay import read_log
@@ -39,17 +41,7 @@ def command(
     if json:
         print(to_json(result), end="")
     else:
-        answer = RunFinished(
-            key,
-            name,
-            1,
-            result.outcome,
-            result.verdicts,
-            simulated=result.simulated,
-            error=result.error,
-            tick_rate=result.tick_rate,
-        )
-        for line in finished(answer, Naming()):
+        for line in finished(RunFinished(result), Naming()):
             print_text(text_of(line))
     sys.exit({Outcome.PASSED: Exit.PASSED, Outcome.FAILED: Exit.FAILED, Outcome.ERROR: Exit.INCOMPLETE}[result.outcome])
 

@@ -11,8 +11,10 @@ from simscen.core.errors import InvalidInput, UsageError
 from simscen.core.geometry import Pose2
 from simscen.core.grid import UNKNOWN, OccupancyGrid
 from simscen.core.problems import Problem
+from simscen.core.result import RunResult
 from simscen.judge.judge import judge
-from simscen.judge.result import RunResult, from_json, run_result
+from simscen.judge.result import run_result
+from simscen.judge.resultdata import from_json
 from simscen.loading.resolved import spec_of_text
 from simscen.record.replay import Log, read_log
 

@@ -8,7 +8,8 @@ from pathlib import Path
 from simscen.cli import circumstances
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import Exit, UsageError
-from simscen.core.sessionevents import Outcome, RunFinished, SessionFinished
+from simscen.core.result import Outcome
+from simscen.core.sessionevents import RunFinished, SessionFinished
 from simscen.report.junit import Family, to_xml
 from simscen.report.page import to_html
 from simscen.report.results import to_json
@@ -59,7 +60,7 @@ class Reports:
             count[Outcome.PASSED],
             count[Outcome.FAILED],
             count[Outcome.ERROR],
-            simulated=sum(answer.simulated for answer in answers),
+            simulated=sum(answer.result.simulated for answer in answers),
             wall=wall,
             interrupted=interrupted,
             junit=str(self.junit),
@@ -71,7 +72,7 @@ def verdict(answers: Sequence[RunFinished]) -> Exit:
     """The exit code of a session that was not interrupted."""
     outcomes = {answer.outcome for answer in answers}
     if Outcome.ERROR in outcomes:
-        only_skipped = all(a.error and a.error.kind == "not-run" for a in answers if a.outcome is Outcome.ERROR)
+        only_skipped = all(a.result.error is None or a.result.error.kind == "not-run" for a in answers)
         return Exit.FAILED if only_skipped and Outcome.FAILED in outcomes else Exit.INCOMPLETE
     return Exit.FAILED if Outcome.FAILED in outcomes else Exit.PASSED
 

@@ -6,7 +6,8 @@ from pathlib import Path
 
 from simscen import __version__
 from simscen.core.errors import InvalidInput, UsageError
-from simscen.core.sessionevents import Outcome, RunFinished, SessionStarted
+from simscen.core.result import Outcome
+from simscen.core.sessionevents import RunFinished, SessionStarted
 from simscen.report.journal import Journal
 from simscen.report.journaldata import Planned
 from simscen.report.rebuild import read_journal
@@ -58,7 +59,7 @@ def begin(journal: Journal, jobs: Sequence[Job], workers: int) -> Work:
 
 def _planned(job: Job, digest: str) -> Planned:
     scenario = job.scenario
-    return Planned(job.key, scenario.path, 1, digest, repeat_command(scenario, job.key.seed), shown(scenario.file))
+    return Planned(job.key, scenario.path, digest, repeat_command(scenario, job.key.seed), shown(scenario.file))
 
 
 def _verdicts(journal: Journal) -> dict[Planned, RunFinished]:

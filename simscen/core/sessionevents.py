@@ -2,31 +2,8 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from enum import Enum
 
-from simscen.core.verdict import Verdict
-
-
-class Outcome(str, Enum):
-    """How a run came out: `error` means that it could not be completed, which is never a verdict on the robot."""
-
-    PASSED = "passed"
-    FAILED = "failed"
-    ERROR = "error"
-
-
-@dataclass(frozen=True, order=True)
-class RunKey:
-    """Names one run: the scenario's id, the seed, and a label of the variation where there are several."""
-
-    scenario: str
-    seed: int
-    variation: str = ""
-
-    @property
-    def folder(self) -> str:
-        """The run's folder inside its scenario's, e.g. "seed-7" or "seed-7-slow"."""
-        return "-".join(part for part in (f"seed-{self.seed}", self.variation) if part)
+from simscen.core.result import Outcome, RunKey, RunResult
 
 
 @dataclass(frozen=True)
@@ -37,19 +14,6 @@ class Artifacts:
     mcap: str = ""
     picture: str = ""
     result: str = ""
-
-
-@dataclass(frozen=True)
-class RunFailure:
-    """Why a run could not be completed.
-
-    `kind` is JUnit's error type: crashed, timeout, out-of-memory, invalid, interrupted, not-run, internal. `tail` is
-    the end of the worker's log: text from outside, to be shown literally.
-    """
-
-    kind: str
-    message: str
-    tail: str = ""
 
 
 @dataclass(frozen=True)
@@ -87,30 +51,27 @@ class RunProgress:
 
 @dataclass(frozen=True)
 class RunFinished:
-    """A run is over.
+    """A run is over: its result, and what only this session knows of it.
 
-    `path` and `line` are where the scenario is written (line from 1). `lines` holds the line of each criterion, in the
-    order of `verdicts`; empty or 0 = unknown. `ended` is why the simulation stopped. `metrics` are numbers by name.
-    `error` is set exactly when the outcome is ERROR. `again` is the command that repeats this run.
-    `tick_rate` turns the findings' ticks into seconds. `file` is the scenario as seen from the working folder, for
-    people to open; "" = `path`.
+    `wall` is in seconds. `again` is the command that repeats the run from the working folder, and `file` the scenario
+    as seen from there, for people to open; "" = the result's own.
     """
 
-    key: RunKey
-    path: str
-    line: int
-    outcome: Outcome
-    verdicts: tuple[Verdict, ...] = ()
-    lines: tuple[int, ...] = ()
-    simulated: float = 0.0
+    result: RunResult
     wall: float = 0.0
-    ended: str = ""
-    metrics: tuple[tuple[str, float | None], ...] = ()
     artifacts: Artifacts = field(default_factory=Artifacts)
-    error: RunFailure | None = None
     again: str = ""
-    tick_rate: int = 240
     file: str = ""
+
+    @property
+    def key(self) -> RunKey:
+        """Which run it is."""
+        return self.result.key
+
+    @property
+    def outcome(self) -> Outcome:
+        """How it came out."""
+        return self.result.outcome
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from simscen.core.case import Case
-from simscen.core.sessionevents import Outcome
+from simscen.core.result import Outcome
 from simscen.core.trace import Trace
 from simscen.core.verdict import Finding, Status, Verdict
 from simscen.criteria.base import Criterion

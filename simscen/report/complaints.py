@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass
 
-from simscen.core.sessionevents import Outcome, RunFinished, RunKey
+from simscen.core.result import Outcome, RunKey
+from simscen.core.sessionevents import RunFinished
 from simscen.core.verdict import Finding, Status, Verdict
 from simscen.judge.wording import sentence, violations
 from simscen.report.text import one_line, visible
@@ -25,10 +26,10 @@ class Complaint:
 
 def complaints(run: RunFinished) -> list[Complaint]:
     """Everything that did not pass, in the order of the scenario."""
-    lines = run.lines or (0,) * len(run.verdicts)
+    lines = run.result.lines or (0,) * len(run.result.verdicts)
     return [
         _complaint(run, verdict, line, finding)
-        for verdict, line in zip(run.verdicts, lines, strict=True)
+        for verdict, line in zip(run.result.verdicts, lines, strict=True)
         for finding in violations(verdict) or _nothing_checked(verdict)
     ]
 
@@ -42,14 +43,14 @@ def label(key: RunKey, every_seed: bool = True, prefix: str = "") -> str:
 
 def place(run: RunFinished, line: int = 0) -> str:
     """path:line of a criterion, or of the scenario."""
-    file = run.file or run.path
-    return one_line(f"{file}:{line or run.line}" if line or run.line else file)
+    file = run.file or run.result.path
+    return one_line(f"{file}:{line or 1}")
 
 
 def failure(run: RunFinished) -> tuple[str, str, str]:
     """Kind, message and tail of a run that could not be completed."""
-    if run.error is not None:
-        return run.error.kind, one_line(run.error.message), visible(run.error.tail)
+    if run.result.error is not None:
+        return run.result.error.kind, one_line(run.result.error.message), visible(run.result.error.tail)
     assert run.outcome is Outcome.ERROR
     return "invalid", "; ".join(c.message for c in complaints(run)) or "nothing judged this run", ""
 
@@ -62,7 +63,7 @@ def broken(run: RunFinished) -> str:
 
 def _complaint(run: RunFinished, verdict: Verdict, line: int, finding: Finding) -> Complaint:
     detail = tuple(one_line(text) for text in finding.detail)
-    return Complaint(verdict, line, one_line(sentence(verdict, finding, run.tick_rate)), detail)
+    return Complaint(verdict, line, one_line(sentence(verdict, finding, run.result.tick_rate)), detail)
 
 
 def _nothing_checked(verdict: Verdict) -> tuple[Finding, ...]:

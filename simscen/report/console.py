@@ -3,15 +3,8 @@
 from types import TracebackType
 from typing import Protocol, TextIO
 
-from simscen.core.sessionevents import (
-    RunFinished,
-    RunProgress,
-    RunStarted,
-    SessionEvent,
-    SessionFinished,
-    SessionStarted,
-)
-from simscen.report.lines import Line, Naming, closing, finished, opening, text_of
+from simscen.core.sessionevents import SessionEvent, SessionStarted
+from simscen.report.lines import Naming, lines_of, text_of
 from simscen.report.text import ascii_only, no_command
 
 
@@ -40,19 +33,6 @@ def text_reporter(out: TextIO, live: bool | None = None) -> Reporter:
     from simscen.report.live import LiveReporter  # rich, which lists and pipes need not wait for
 
     return LiveReporter(out)
-
-
-def lines_of(event: SessionEvent, naming: Naming) -> list[Line]:
-    """What an event is worth."""
-    match event:
-        case SessionStarted():
-            return [opening(event)]
-        case RunFinished():
-            return list(finished(event, naming))
-        case SessionFinished():
-            return list(closing(event))
-        case RunStarted() | RunProgress():
-            return []
 
 
 class _Plain:

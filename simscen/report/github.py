@@ -3,7 +3,8 @@
 from types import TracebackType
 from typing import TextIO
 
-from simscen.core.sessionevents import Outcome, RunFinished, SessionEvent, SessionFinished
+from simscen.core.result import Outcome
+from simscen.core.sessionevents import RunFinished, SessionEvent, SessionFinished
 from simscen.judge.wording import tightest
 from simscen.report.complaints import broken, complaints, label
 from simscen.report.console import Reporter, text_reporter
@@ -62,12 +63,12 @@ def annotations(run: RunFinished) -> list[str]:
 def markdown(runs: list[RunFinished], session: SessionFinished) -> str:
     """A table of all runs, the ones that did not pass first."""
     order = [Outcome.ERROR, Outcome.FAILED, Outcome.PASSED]
-    ordered = sorted(runs, key=lambda run: (order.index(run.outcome), run.path, run.key))
+    ordered = sorted(runs, key=lambda run: (order.index(run.outcome), run.result.path, run.key))
     signs = {Outcome.PASSED: "✅", Outcome.FAILED: "❌", Outcome.ERROR: "⚠️"}
     errors = "error" if session.errors == 1 else "errors"
     head = f"### simscen: {session.passed} passed, {session.failed} failed, {session.errors} {errors}"
     rows = [
-        f"| {signs[run.outcome]} | {_cell(label(run.key))} | {run.simulated:.1f} s | {_cell(_why(run))} |"
+        f"| {signs[run.outcome]} | {_cell(label(run.key))} | {run.result.simulated:.1f} s | {_cell(_why(run))} |"
         for run in ordered
     ]
     return "\n".join([head, "", "| | scenario | simulated | |", "|---|---|---:|---|", *rows, "", ""])
@@ -77,11 +78,11 @@ def _why(run: RunFinished) -> str:
     if run.outcome is Outcome.ERROR:
         return broken(run)
     told = [complaint.message for complaint in complaints(run)]
-    return "; ".join(told) if told else f"tightest: {tightest(run.verdicts)}"
+    return "; ".join(told) if told else f"tightest: {tightest(run.result.verdicts)}"
 
 
 def _command(level: str, run: RunFinished, line: int, title: str, message: str) -> str:
-    where = f"file={_property(run.path)},line={max(line or run.line, 1)},title={_property(title)}"
+    where = f"file={_property(run.result.path)},line={max(line or 1, 1)},title={_property(title)}"
     return f"::{level} {where}::{_data(message)}"
 
 

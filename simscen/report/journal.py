@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from simscen.core.errors import UsageError
-from simscen.core.sessionevents import RunFinished, RunKey, RunStarted, SessionEvent, SessionFinished
+from simscen.core.result import RunKey
+from simscen.core.sessionevents import RunFinished, RunStarted, SessionEvent, SessionFinished
 from simscen.report.journaldata import FORMAT, NAME, Planned, planned_data, run_data
 from simscen.report.rebuild import session_lines
 

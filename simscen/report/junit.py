@@ -10,7 +10,8 @@ from typing import Literal
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
-from simscen.core.sessionevents import Outcome, RunFinished
+from simscen.core.result import Outcome
+from simscen.core.sessionevents import RunFinished
 from simscen.judge.wording import subject
 from simscen.report.complaints import Complaint, complaints, failure, place
 from simscen.report.text import one_line, visible
@@ -21,9 +22,9 @@ Family = Literal["simscen", "xunit2"]
 def to_xml(runs: Sequence[RunFinished], family: Family = "simscen", name: str = "simscen") -> bytes:
     """The whole document in UTF-8, runs sorted by file, scenario and seed; the order they ended in does not show."""
     root = Element("testsuites", {"name": visible(name)})
-    ordered = sorted(runs, key=lambda run: (run.path, run.key))
-    for path in sorted({run.path for run in ordered}):
-        _suite(root, path, [run for run in ordered if run.path == path], family)
+    ordered = sorted(runs, key=lambda run: (run.result.path, run.key))
+    for path in sorted({run.result.path for run in ordered}):
+        _suite(root, path, [run for run in ordered if run.result.path == path], family)
     _count(root, ordered)
     ElementTree.indent(root)
     body: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
@@ -49,8 +50,8 @@ def _count(element: Element, runs: Sequence[RunFinished]) -> None:
 def _case(suite: Element, run: RunFinished, name: str, family: Family) -> None:
     case = SubElement(suite, "testcase", {"classname": _classname(run), "name": name, "time": f"{run.wall:.3f}"})
     if family == "simscen":
-        case.set("file", visible(run.path))
-        case.set("line", str(max(run.line, 1)))
+        case.set("file", visible(run.result.path))
+        case.set("line", "1")
         _properties(case, run)
     match run.outcome:
         case Outcome.FAILED:
@@ -67,11 +68,11 @@ def _properties(case: Element, run: RunFinished) -> None:
     properties = SubElement(case, "properties")
     values = {
         "seed": str(run.key.seed),
-        "simulated_seconds": f"{run.simulated:.3f}",
-        "ended": run.ended,
+        "simulated_seconds": f"{run.result.simulated:.3f}",
+        "ended": run.result.ended,
         "again": run.again,
     }
-    for verdict in run.verdicts:
+    for verdict in run.result.verdicts:
         values[f"status.{verdict.id}"] = verdict.status.value
         for finding in verdict.findings:
             if finding.margin is not None:

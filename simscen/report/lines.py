@@ -4,7 +4,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from simscen.core.sessionevents import Outcome, RunFinished, RunKey, SessionFinished, SessionStarted
+from simscen.core.result import Outcome, RunKey
+from simscen.core.sessionevents import (
+    RunFinished,
+    RunProgress,
+    RunStarted,
+    SessionEvent,
+    SessionFinished,
+    SessionStarted,
+)
 from simscen.judge.wording import tightest
 from simscen.report.complaints import broken, complaints, failure, label, place
 from simscen.report.text import one_line
@@ -56,6 +64,19 @@ def _common_folder(ids: Sequence[str]) -> str:
     return shortest[: shortest.rfind("/", 0, same) + 1]
 
 
+def lines_of(event: SessionEvent, naming: Naming) -> list[Line]:
+    """What an event is worth."""
+    match event:
+        case SessionStarted():
+            return [opening(event)]
+        case RunFinished():
+            return list(finished(event, naming))
+        case SessionFinished():
+            return list(closing(event))
+        case RunStarted() | RunProgress():
+            return []
+
+
 def opening(started: SessionStarted) -> Line:
     """simscen 0.1.0 · 14 scenarios · 2 workers."""
     runs = "" if started.total == started.scenarios else f" · {_count(started.total, 'run')}"
@@ -105,10 +126,10 @@ def text_of(line: Line) -> str:
 
 
 def _summary(run: RunFinished) -> tuple[Piece, ...]:
-    if run.outcome is Outcome.ERROR and not run.simulated:
+    if run.outcome is Outcome.ERROR and not run.result.simulated:
         return (Piece(f"{failure(run)[0]} after {run.wall:.2f} s", "quiet"),)
-    times = f"{run.simulated:6.1f} s simulated in {run.wall:.2f} s"
-    nearest = tightest(run.verdicts) if run.outcome is Outcome.PASSED else ""
+    times = f"{run.result.simulated:6.1f} s simulated in {run.wall:.2f} s"
+    nearest = tightest(run.result.verdicts) if run.outcome is Outcome.PASSED else ""
     return (Piece(times, "quiet"), *((Piece(f"   tightest: {one_line(nearest)}", "quiet"),) if nearest else ()))
 
 

@@ -7,17 +7,16 @@ from rich.console import Console, Group
 from rich.live import Live
 from rich.text import Text
 
+from simscen.core.result import RunKey
 from simscen.core.sessionevents import (
     RunFinished,
-    RunKey,
     RunProgress,
     RunStarted,
     SessionEvent,
     SessionFinished,
     SessionStarted,
 )
-from simscen.report.console import lines_of
-from simscen.report.lines import Line, Naming
+from simscen.report.lines import Line, Naming, lines_of
 from simscen.report.text import one_line
 
 STYLES = {"plain": "", "name": "bold", "good": "green", "bad": "red", "odd": "yellow", "quiet": "dim"}

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
-from simscen.core.sessionevents import Outcome, RunFinished
+from simscen.core.result import Outcome
+from simscen.core.sessionevents import RunFinished
 from simscen.judge.wording import comparison, subject, tightest
 from simscen.report.complaints import broken, complaints, failure, place
 from simscen.report.text import one_line, visible
@@ -34,13 +35,13 @@ pre { background: #f4f5f6; padding: 10px; border-radius: 6px; overflow-x: auto; 
 def to_html(runs: Sequence[RunFinished], title: str = "simscen") -> str:
     """The page; what did not pass comes first and stands open. Pictures are read from the runs' artifacts."""
     order = [Outcome.ERROR, Outcome.FAILED, Outcome.PASSED]
-    ordered = sorted(runs, key=lambda run: (order.index(run.outcome), run.path, run.key))
+    ordered = sorted(runs, key=lambda run: (order.index(run.outcome), run.result.path, run.key))
     counts = ", ".join(
         f"{number} {outcome.value}"
         for outcome in (Outcome.PASSED, Outcome.FAILED, Outcome.ERROR)
         if (number := sum(run.outcome is outcome for run in runs)) or outcome is Outcome.PASSED
     )
-    simulated = sum(run.simulated for run in ordered)
+    simulated = sum(run.result.simulated for run in ordered)
     body = "\n".join(_run(run, number < MOST_PICTURES) for number, run in enumerate(ordered))
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">\n'
@@ -53,13 +54,13 @@ def to_html(runs: Sequence[RunFinished], title: str = "simscen") -> str:
 
 def _run(run: RunFinished, with_picture: bool) -> str:
     label = ", ".join(part for part in (f"seed {run.key.seed}", run.key.variation) if part)
-    nearest = f"tightest: {tightest(run.verdicts)}" if run.outcome is Outcome.PASSED else ""
+    nearest = f"tightest: {tightest(run.result.verdicts)}" if run.outcome is Outcome.PASSED else ""
     opened = "" if run.outcome is Outcome.PASSED else " open"
     return (
         f"<details{opened}><summary>"
         f'<span class="pill {run.outcome.value}">{run.outcome.value}</span>'
         f'<span class="name">{_text(run.key.scenario)}</span><span class="quiet">{_text(label)}</span>'
-        f'<span class="quiet">{run.simulated:.1f} s</span><span class="quiet">{_text(nearest)}</span></summary>'
+        f'<span class="quiet">{run.result.simulated:.1f} s</span><span class="quiet">{_text(nearest)}</span></summary>'
         f'<div class="in">{_why(run)}{_verdicts(run)}{_picture(run) if with_picture else ""}{_metrics(run)}'
         f"{_again(run)}</div></details>"
     )
@@ -73,9 +74,9 @@ def _why(run: RunFinished) -> str:
 
 
 def _verdicts(run: RunFinished) -> str:
-    lines = dict(zip(run.verdicts, run.lines, strict=True)) if run.lines else {}
+    lines = dict(zip(run.result.verdicts, run.result.lines, strict=True)) if run.result.lines else {}
     rows = []
-    for verdict in run.verdicts:
+    for verdict in run.result.verdicts:
         for finding in verdict.findings:
             status = finding.status.value
             look = {"pass": "", "fail": "bad"}.get(status, "odd")
@@ -100,7 +101,7 @@ def _picture(run: RunFinished) -> str:
 
 
 def _metrics(run: RunFinished) -> str:
-    told = [f"{name} {value:.4g}" for name, value in run.metrics if value is not None]
+    told = [f"{name} {value:.4g}" for name, value in sorted(run.result.metrics.items()) if value is not None]
     return f'<p class="quiet">{_text(" · ".join(told))}</p>' if told else ""
 
 

@@ -8,7 +8,8 @@ from typing import Any
 
 from simscen.core.errors import InvalidInput
 from simscen.core.problems import Problem
-from simscen.core.sessionevents import Outcome, RunFailure, RunFinished, RunKey, SessionStarted
+from simscen.core.result import RunFailure, RunKey, unfinished
+from simscen.core.sessionevents import RunFinished, SessionStarted
 from simscen.report.journaldata import FORMAT, NAME, Planned, read_planned, read_run
 
 
@@ -41,7 +42,7 @@ class Past:
         kind = "interrupted" if run.key in self.begun else "not-run"
         why = "before it was finished" if run.key in self.begun else "before it began"
         failure = RunFailure(kind, f"simscen ended {why}")
-        return RunFinished(run.key, run.path, run.line, Outcome.ERROR, error=failure, again=run.again, file=run.file)
+        return RunFinished(unfinished(run.key, run.path, failure), again=run.again, file=run.file)
 
 
 def read_journal(folder: Path) -> Past:
@@ -80,7 +81,7 @@ def _past(lines: list[dict[str, Any]], folder: Path) -> Past:
             begun.add(planned[line["run"]].key)
         elif line["event"] == "finished":
             key = planned[line["run"]].key
-            answered[key] = read_run(line, key, folder)
+            answered[key] = read_run(line, folder)
     last = lines[-1]
     return Past(
         version=first["version"],

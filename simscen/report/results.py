@@ -5,8 +5,9 @@ from collections.abc import Sequence
 from pathlib import PurePath
 from typing import Any
 
-from simscen.core.sessionevents import Outcome, RunFinished
-from simscen.judge.result import RunResult, as_data
+from simscen.core.result import Outcome
+from simscen.core.sessionevents import RunFinished
+from simscen.judge.resultdata import as_data
 
 FORMAT = 1
 
@@ -18,31 +19,15 @@ def to_json(runs: Sequence[RunFinished], folder: str = "") -> str:
 
 def as_document(runs: Sequence[RunFinished], folder: str = "") -> dict[str, Any]:
     """The same as plain data: counts, then one entry for each run in the form of its result.json."""
-    ordered = sorted(runs, key=lambda run: (run.path, run.key))
+    ordered = sorted(runs, key=lambda run: (run.result.path, run.key))
     counts = {outcome.value: sum(run.outcome is outcome for run in runs) for outcome in Outcome}
     return {
         "format": FORMAT,
         "total": len(runs),
         **counts,
-        "simulated_seconds": sum(run.simulated for run in ordered),
-        "runs": [{**as_data(result_of(run)), "artifacts": _artifacts(run, folder)} for run in ordered],
+        "simulated_seconds": sum(run.result.simulated for run in ordered),
+        "runs": [{**as_data(run.result), "artifacts": _artifacts(run, folder)} for run in ordered],
     }
-
-
-def result_of(run: RunFinished) -> RunResult:
-    """What a run says about itself, in the form of its result.json."""
-    return RunResult(
-        key=run.key,
-        path=run.path,
-        outcome=run.outcome,
-        verdicts=run.verdicts,
-        lines=run.lines,
-        metrics=dict(run.metrics),
-        ended=run.ended,
-        simulated=run.simulated,
-        tick_rate=run.tick_rate,
-        error=run.error,
-    )
 
 
 def _artifacts(run: RunFinished, folder: str) -> dict[str, str]:

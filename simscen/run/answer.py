@@ -1,10 +1,12 @@
 """What the end of a process says about its run."""
 
 import signal
+from dataclasses import replace
 from pathlib import Path
 
-from simscen.core.sessionevents import Artifacts, Outcome, RunFailure, RunFinished
-from simscen.judge.result import RunResult, from_json
+from simscen.core.result import RunFailure, RunResult, unfinished
+from simscen.core.sessionevents import Artifacts, RunFinished
+from simscen.judge.resultdata import from_json
 from simscen.run.confine import MEMORY_BYTES
 from simscen.run.jobs import Job, ProcessEnd
 from simscen.run.repeat_command import repeat_command, shown
@@ -15,44 +17,29 @@ TAIL_LINES = 20
 def answer_to(job: Job, end: ProcessEnd | None) -> RunFinished:
     """The answer to a run. It passed or failed only if its process ended by itself, with status 0 and a last word."""
     failure = _failure(end, job.folder)
-    result = _result(job.folder) if failure is None else failure
-    if isinstance(result, RunFailure):
-        return RunFinished(
-            job.key,
-            job.scenario.path,
-            1,
-            Outcome.ERROR,
-            wall=end.wall if end else 0.0,
-            artifacts=Artifacts(folder=str(job.folder)),
-            error=result,
-            again=repeat_command(job.scenario, job.key.seed),
-            file=shown(job.scenario.file),
-        )
-    assert end is not None
+    result = _result(job) if failure is None else unfinished(job.key, job.scenario.path, failure)
     return RunFinished(
-        key=job.key,
-        path=job.scenario.path,
-        line=1,
-        outcome=result.outcome,
-        verdicts=result.verdicts,
-        lines=result.lines,
-        simulated=result.simulated,
-        wall=end.wall,
-        ended=result.ended,
-        metrics=tuple(sorted(result.metrics.items())),
-        error=result.error,
+        result,
+        wall=end.wall if end else 0.0,
         artifacts=_artifacts(job.folder),
         again=repeat_command(job.scenario, job.key.seed),
         file=shown(job.scenario.file),
-        tick_rate=result.tick_rate,
     )
 
 
-def _result(folder: Path) -> RunResult | RunFailure:
+def not_done(job: Job, failure: RunFailure) -> RunFinished:
+    """The answer to a run that was never finished, or never begun."""
+    result = unfinished(job.key, job.scenario.path, failure)
+    return RunFinished(result, again=repeat_command(job.scenario, job.key.seed), file=shown(job.scenario.file))
+
+
+def _result(job: Job) -> RunResult:
+    """What the run says of itself. Its second performance says the same as the first, so the key is ours to give."""
     try:
-        return from_json((folder / "result.json").read_text(encoding="utf-8"))
+        return replace(from_json((job.folder / "result.json").read_text(encoding="utf-8")), key=job.key)
     except (OSError, ValueError) as error:
-        return RunFailure("crashed", f"its result cannot be read: {error}", _tail(folder / "worker.log"))
+        failure = RunFailure("crashed", f"its result cannot be read: {error}", _tail(job.folder / "worker.log"))
+        return unfinished(job.key, job.scenario.path, failure)
 
 
 def _artifacts(folder: Path) -> Artifacts:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
-from simscen.core.sessionevents import RunKey
+from simscen.core.result import RunKey
 from simscen.loading.loaded import LoadedScenario
 
 _LENGTH = struct.Struct("<I")

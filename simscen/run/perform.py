@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from simscen.core.geometry import Pose3
-from simscen.core.sessionevents import RunKey
+from simscen.core.result import RunKey, RunResult
 from simscen.core.time import Clock
 from simscen.core.trace import Trace
 from simscen.judge.judge import judge
-from simscen.judge.result import RunResult, run_result, to_json
+from simscen.judge.result import run_result
+from simscen.judge.resultdata import to_json
 from simscen.loading.resolved import resolved_text
 from simscen.model.robot import RobotSpec
 from simscen.record.header import LogHeader

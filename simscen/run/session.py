@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from simscen.core.errors import Exit
-from simscen.core.sessionevents import Listener, Outcome, RunFailure, RunFinished, RunKey, RunProgress, RunStarted
+from simscen.core.result import Outcome, RunFailure, RunKey
+from simscen.core.sessionevents import Listener, RunFinished, RunProgress, RunStarted
 from simscen.loading.loaded import LoadedScenario
-from simscen.run.answer import answer_to
+from simscen.run.answer import answer_to, not_done
 from simscen.run.jobs import Job
-from simscen.run.repeat_command import repeat_command, shown
 from simscen.run.supervisor import Advanced, Ended, Interrupted, Started, supervise
 
 
@@ -73,7 +73,7 @@ def run_session(
         stopped = Exit(128 + interrupted.number)
     for job in jobs:
         if job.number not in answers:
-            answers[job.number] = _not_done(job, job.number in begun, stopped)
+            answers[job.number] = not_done(job, _why_not_done(job.number in begun, stopped))
             listen(answers[job.number])
     return list(answers.values()), stopped
 
@@ -90,14 +90,10 @@ def compared(run: RunFinished, twin: RunFinished | None) -> RunFinished:
     logs = [read_log(Path(path)).trace for path in (twin.artifacts.mcap, run.artifacts.mcap)]
     where = first_difference(*logs) or "the logs differ in something that is not part of the trace"
     failure = RunFailure("nondeterministic", f"two runs with the same seed differ: {where}")
-    return replace(run, outcome=Outcome.ERROR, error=failure)
+    return replace(run, result=replace(run.result, outcome=Outcome.ERROR, error=failure))
 
 
-def _not_done(job: Job, begun: bool, stopped: Exit | None) -> RunFinished:
+def _why_not_done(begun: bool, stopped: Exit | None) -> RunFailure:
     if begun:
-        failure = RunFailure("interrupted", "interrupted before it was finished")
-    else:
-        failure = RunFailure("not-run", "interrupted" if stopped else "another run did not pass (--fail-fast)")
-    scenario = job.scenario
-    repeat, file = repeat_command(scenario, job.key.seed), shown(scenario.file)
-    return RunFinished(job.key, scenario.path, 1, Outcome.ERROR, error=failure, again=repeat, file=file)
+        return RunFailure("interrupted", "interrupted before it was finished")
+    return RunFailure("not-run", "interrupted" if stopped else "another run did not pass (--fail-fast)")

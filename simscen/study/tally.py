@@ -4,7 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
-from simscen.core.sessionevents import Outcome, RunFinished
+from simscen.core.result import Outcome
+from simscen.core.sessionevents import RunFinished
 from simscen.core.verdict import Status
 from simscen.study.barn import score
 from simscen.study.intervals import wilson
@@ -35,11 +36,11 @@ class Trial:
         """A collision outweighs all else that went wrong; whoever ran out of time did not merely fail."""
         if self.run.outcome is Outcome.ERROR:
             return Fate.ERROR
-        if any(v.criterion == "collisions" and v.status is Status.FAIL for v in self.run.verdicts):
+        if any(v.criterion == "collisions" and v.status is Status.FAIL for v in self.run.result.verdicts):
             return Fate.COLLISION
         if self.run.outcome is Outcome.PASSED:
             return Fate.SUCCESS
-        return Fate.TIMEOUT if self.run.ended == TIME_IS_UP else Fate.FAILED
+        return Fate.TIMEOUT if self.run.result.ended == TIME_IS_UP else Fate.FAILED
 
     @property
     def score(self) -> float | None:
@@ -51,7 +52,7 @@ class Trial:
 
     def metric(self, name: str) -> float | None:
         """A number that the judge measured."""
-        return dict(self.run.metrics).get(name)
+        return dict(self.run.result.metrics).get(name)
 
 
 @dataclass(frozen=True)

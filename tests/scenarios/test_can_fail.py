@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from simscen.core.sessionevents import Outcome, RunKey
+from simscen.core.result import Outcome, RunKey
 from simscen.core.time import Clock
 from simscen.loading.scenario import load_scenario
 from simscen.record.tracebuilder import TraceBuilder

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from simscen.core.sessionevents import Outcome
+from simscen.core.result import Outcome
 from simscen.core.verdict import Status
 from simscen.report.picture.canvas import Colour
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from simscen.core.case import Case
 from simscen.core.geometry import Pose2
 from simscen.core.grid import OccupancyGrid
+from simscen.core.result import RunResult
 from simscen.core.shapes import Body
 from simscen.core.trace import Trace
-from simscen.judge.result import RunResult
 
 
 @dataclass(frozen=True, eq=False)

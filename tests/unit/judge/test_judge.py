@@ -1,6 +1,6 @@
 import pytest
 
-from simscen.core.sessionevents import Outcome
+from simscen.core.result import Outcome
 from simscen.core.verdict import Finding, Status, Verdict
 from simscen.criteria.clearance import Clearance
 from simscen.criteria.criterion import AnyCriterion

@@ -3,10 +3,11 @@ import math
 
 import pytest
 
-from simscen.core.sessionevents import Outcome
+from simscen.core.result import Outcome
 from simscen.criteria.criterion import AnyCriterion
 from simscen.judge.judge import judge
-from simscen.judge.result import from_json, read_result, run_result, to_json
+from simscen.judge.result import run_result
+from simscen.judge.resultdata import from_json, read_result, to_json
 from simscen.judge.sketch import sketch, sketch_case
 
 TRACE = {"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]], "clearance": 0.5, "events": [[1, "plan.made", "", {}]]}

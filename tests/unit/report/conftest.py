@@ -2,17 +2,8 @@
 
 import pytest
 
-from simscen.core.sessionevents import (
-    Artifacts,
-    Outcome,
-    RunFailure,
-    RunFinished,
-    RunKey,
-    RunProgress,
-    RunStarted,
-    SessionFinished,
-    SessionStarted,
-)
+from simscen.core.result import Outcome, RunFailure, RunKey, RunResult
+from simscen.core.sessionevents import Artifacts, RunFinished, RunProgress, RunStarted, SessionFinished, SessionStarted
 from simscen.core.verdict import Finding, Status, Verdict
 
 PATH = "scenarios/faults/lidar_off.scenario.yaml"
@@ -22,16 +13,17 @@ PATH = "scenarios/faults/lidar_off.scenario.yaml"
 def passed():
     finding = Finding(Status.PASS, "path_length", "9.86 m", "≤ 10.00 m", 0.14, "m", 9.86, 4320, (1.0, 2.0))
     return RunFinished(
-        key=RunKey("navigation/goal", 1),
-        path="scenarios/navigation/goal.scenario.yaml",
-        line=1,
-        outcome=Outcome.PASSED,
-        verdicts=(Verdict("path_length", "path_length", "fail", (finding,)),),
-        lines=(20,),
-        simulated=18.2,
+        RunResult(
+            key=RunKey("navigation/goal", 1),
+            path="scenarios/navigation/goal.scenario.yaml",
+            outcome=Outcome.PASSED,
+            verdicts=(Verdict("path_length", "path_length", "fail", (finding,)),),
+            lines=(20,),
+            simulated=18.2,
+            ended="navigation ended",
+            metrics={"path_length": 9.86},
+        ),
         wall=0.21,
-        ended="navigation ended",
-        metrics=(("path_length", 9.86),),
     )
 
 
@@ -51,18 +43,19 @@ def failed():
     )
     slow = Finding(Status.FAIL, "speed", "0.60 m/s", "≤ 0.50 m/s", -0.1, "m/s", 0.6, 240, (1.0, 1.0))
     return RunFinished(
-        key=RunKey("faults/lidar_off", 7),
-        path=PATH,
-        line=3,
-        outcome=Outcome.FAILED,
-        verdicts=(
-            Verdict("stopped_within", "stopped_within", "fail", (late,)),
-            Verdict("speed", "speed", "warn", (slow,)),
+        RunResult(
+            key=RunKey("faults/lidar_off", 7),
+            path=PATH,
+            outcome=Outcome.FAILED,
+            verdicts=(
+                Verdict("stopped_within", "stopped_within", "fail", (late,)),
+                Verdict("speed", "speed", "warn", (slow,)),
+            ),
+            lines=(27, 28),
+            simulated=31.0,
+            ended="navigation ended",
         ),
-        lines=(27, 28),
-        simulated=31.0,
         wall=0.35,
-        ended="navigation ended",
         artifacts=Artifacts("out/x", "out/x/run.mcap", "out/x/map.png", "out/x/result.json"),
         again=f"simscen run {PATH} --seed 7",
     )
@@ -72,12 +65,13 @@ def failed():
 def crashed():
     tail = "::error::owned\n##[error]x\n\x1b[31mred\x1b[0m ]]> <script>&\nSegmentation fault"
     return RunFinished(
-        key=RunKey("evil/[red]::error::x", 1),
-        path="scenarios/evil/[red]::error::x.scenario.yaml",
-        line=1,
-        outcome=Outcome.ERROR,
+        RunResult(
+            key=RunKey("evil/[red]::error::x", 1),
+            path="scenarios/evil/[red]::error::x.scenario.yaml",
+            outcome=Outcome.ERROR,
+            error=RunFailure("crashed", "crashed: SIGSEGV", tail),
+        ),
         wall=1.25,
-        error=RunFailure("crashed", "crashed: SIGSEGV", tail),
         again="simscen run evil",
     )
 
@@ -86,10 +80,10 @@ def crashed():
 def session(passed, failed, crashed):
     return [
         SessionStarted("0.1.0", 3, 3, 2, "out", ("evil/[red]::error::x", "faults/lidar_off", "navigation/goal")),
-        RunStarted(passed.key, passed.path, 60.0),
+        RunStarted(passed.key, passed.result.path, 60.0),
         RunProgress(passed.key, 3.5),
         passed,
-        RunStarted(failed.key, failed.path, 60.0),
+        RunStarted(failed.key, failed.result.path, 60.0),
         failed,
         crashed,
         SessionFinished(1, 1, 1, 49.2, 0.5, junit="out/junit.xml", folder="out"),

@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from simscen.core.sessionevents import RunKey, SessionStarted
+from simscen.core.result import RunKey
+from simscen.core.sessionevents import SessionStarted
 from simscen.report.console import text_reporter
 from simscen.report.github import annotations, github_reporter, markdown
 from simscen.report.machine import json_reporter
@@ -33,9 +34,14 @@ simscen 0.1.0 · 3 scenarios · 2 workers
 """
 
 
+def of(run, **changes):
+    """The run with another result."""
+    return replace(run, result=replace(run.result, **changes))
+
+
 def test_the_folder_that_all_ids_share_is_not_repeated_on_every_line(passed):
     out = io.StringIO()
-    one, other = (replace(passed, key=RunKey(f"scenarios/{name}", 1)) for name in ("faults/a", "fancy/long"))
+    one, other = (of(passed, key=RunKey(f"scenarios/{name}", 1)) for name in ("faults/a", "fancy/long"))
     ids = ("scenarios/fancy/long", "scenarios/faults/a")
     told(text_reporter(utf8(out)), [SessionStarted("0.1.0", 2, 2, 1, ids=ids), one, other])
     assert re.findall(r"✓ (\S+ *) ", out.getvalue()) == ["faults/a    ", "fancy/long  "]
@@ -104,7 +110,7 @@ def test_a_terminal_gets_the_same_facts_in_colour_and_user_text_is_no_markup(ses
 
 def test_runs_of_one_scenario_are_told_apart_by_their_seeds(passed):
     out = io.StringIO()
-    other = replace(passed, key=RunKey("navigation/goal", 2))
+    other = of(passed, key=RunKey("navigation/goal", 2))
     told(text_reporter(utf8(out)), [SessionStarted("0.1.0", 2, 1, 1), passed, other])
     assert "1 scenario · 2 runs · 1 worker\n" in out.getvalue()
     assert "navigation/goal (seed 1) " in out.getvalue()
@@ -112,8 +118,9 @@ def test_runs_of_one_scenario_are_told_apart_by_their_seeds(passed):
 
 
 def test_no_line_of_plain_output_can_be_taken_for_a_command_of_a_ci(session, failed):
-    sly = replace(failed, key=RunKey("::set-output name=x::y", 1), again="::stop-commands::x\n##[group]x")
-    sly = replace(sly, verdicts=(replace(failed.verdicts[0], id="::error::y", criterion="::error::y"),), lines=(1,))
+    sly = replace(of(failed, key=RunKey("::set-output name=x::y", 1)), again="::stop-commands::x\n##[group]x")
+    named = replace(failed.result.verdicts[0], id="::error::y", criterion="::error::y")
+    sly = of(sly, verdicts=(named,), lines=(1,))
     out = io.StringIO()
     told(text_reporter(utf8(out)), [*session, sly])
     assert not re.search(r"^\s*::|##\[", out.getvalue(), re.MULTILINE)
@@ -127,7 +134,7 @@ def test_github_annotations_stand_at_the_line_of_the_criterion_and_are_escaped(f
         "%0Adrove 0.31 m blind at 0.37 m/s; the newest scan was 0.9 s old"
     )
     assert warning.startswith("::warning file=scenarios/faults/lidar_off.scenario.yaml,line=28,")
-    sly = replace(crashed, error=replace(crashed.error, message="100 %, a:b\r\n::warning::x"))
+    sly = of(crashed, error=replace(crashed.result.error, message="100 %, a:b\r\n::warning::x"))
     (line,) = annotations(sly)
     assert "\n" not in line
     assert "file=scenarios/evil/[red]%3A%3Aerror%3A%3Ax.scenario.yaml,line=1," in line
@@ -139,7 +146,7 @@ def test_the_summary_of_a_github_job_lists_what_did_not_pass_first_and_holds_no_
     rows = summary.splitlines()[4:]
     assert "crashed: SIGSEGV" in rows[0]
     assert "navigation/goal" in rows[1]
-    evil = replace(passed, key=RunKey("<script>|*x*[a](b)@me#1", 1))
+    evil = of(passed, key=RunKey("<script>|*x*[a](b)@me#1", 1))
     (row,) = markdown([evil], session[-1]).splitlines()[4:5]
     assert not re.search(r"<script|\*x\*|\[a\]|@me", row)
     assert row.count("|") == 5

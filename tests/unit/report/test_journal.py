@@ -6,7 +6,8 @@ from dataclasses import replace
 import pytest
 
 from simscen.core.errors import InvalidInput, UsageError
-from simscen.core.sessionevents import Outcome, RunStarted, SessionFinished
+from simscen.core.result import Outcome
+from simscen.core.sessionevents import RunStarted, SessionFinished
 from simscen.report.journal import Journal, require_free
 from simscen.report.journaldata import NAME, Planned
 from simscen.report.junit import to_xml
@@ -20,14 +21,14 @@ def runs(passed, failed, crashed):
 
 
 def planned(runs):
-    return [Planned(run.key, run.path, run.line) for run in runs]
+    return [Planned(run.key, run.result.path) for run in runs]
 
 
 def written(folder, runs, finished, ended=True):
     journal = Journal(folder)
     journal.plan(planned(runs), "0.1.0", 2)
     for run in runs:
-        journal(RunStarted(run.key, run.path))
+        journal(RunStarted(run.key, run.result.path))
     for run in finished:
         journal(run)
     if ended:
@@ -61,12 +62,12 @@ def test_what_was_planned_but_not_answered_is_an_error(tmp_path, runs):
     journal = Journal(tmp_path)
     journal.plan(planned(runs), "0.1.0", 2)
     journal(runs[0])
-    journal(RunStarted(runs[1].key, runs[1].path))
+    journal(RunStarted(runs[1].key, runs[1].result.path))
     journal.close()
     past = read_journal(tmp_path)
     assert past.interrupted
     assert [run.outcome for run in past.answers] == [Outcome.PASSED, Outcome.ERROR, Outcome.ERROR]
-    assert [run.error.kind for run in past.answers[1:]] == ["interrupted", "not-run"]
+    assert [run.result.error.kind for run in past.answers[1:]] == ["interrupted", "not-run"]
 
 
 @pytest.mark.parametrize("lost", [1, 10, 200])
@@ -74,7 +75,9 @@ def test_a_line_that_was_cut_short_never_was(tmp_path, runs, lost):
     written(tmp_path, runs, runs, ended=False)
     file = tmp_path / NAME
     file.write_bytes(file.read_bytes()[:-lost])
-    assert [run.error.kind if run.error else "" for run in read_journal(tmp_path).answers][-1] == "interrupted"
+    assert [run.result.error.kind if run.result.error else "" for run in read_journal(tmp_path).answers][
+        -1
+    ] == "interrupted"
 
 
 def test_the_next_session_goes_on_behind_the_last_whole_line(tmp_path, runs):

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simscen.core.sessionevents import Outcome, RunFailure, RunFinished, RunKey
+from simscen.core.result import Outcome, RunFailure, RunKey, RunResult
+from simscen.core.sessionevents import RunFinished
 from simscen.report.junit import to_xml
 
 JENKINS = {  # attributes that Jenkins' junit-10.xsd allows
@@ -21,6 +22,11 @@ JENKINS = {  # attributes that Jenkins' junit-10.xsd allows
     "error": {"type", "message"},
     "system-out": set(),
 }
+
+
+def of(run, **changes):
+    """The run with another result."""
+    return replace(run, result=replace(run.result, **changes))
 
 
 def read(runs, **options):
@@ -34,7 +40,7 @@ def cases(document):
 def test_another_reader_sees_one_case_for_each_run(passed, failed, crashed):
     document = read([failed, crashed, passed])
     assert (document.tests, document.failures, document.errors) == (3, 1, 1)
-    assert [suite.name for suite in document] == sorted(run.path for run in (passed, failed, crashed))
+    assert [suite.name for suite in document] == sorted(run.result.path for run in (passed, failed, crashed))
     found = cases(document)
     assert found["goal [seed 1]"].is_passed
     assert found["goal [seed 1]"].classname == "navigation.goal"
@@ -55,8 +61,8 @@ def test_a_failure_says_where_and_what_for_every_criterion(failed):
 def test_file_line_properties_and_attachments_are_there(failed):
     (case,) = ElementTree.fromstring(to_xml([failed])).iter("testcase")
     properties = {entry.get("name"): entry.get("value") for entry in case.iter("property")}
-    assert case.get("file") == failed.path
-    assert case.get("line") == "3"
+    assert case.get("file") == failed.result.path
+    assert case.get("line") == "1"
     assert case.get("time") == "0.350"
     assert properties["simulated_seconds"] == "31.000"
     assert properties["margin.stopped_within"] == "-0.34 s"
@@ -81,7 +87,7 @@ def test_the_strict_family_keeps_to_what_jenkins_allows(passed, failed, crashed)
     "kind", ["crashed", "timeout", "out-of-memory", "invalid", "interrupted", "not-run", "internal"]
 )
 def test_a_run_that_could_not_be_completed_is_an_error_of_its_kind(crashed, kind):
-    run = replace(crashed, error=RunFailure(kind, "why", "worker's last words"))
+    run = of(crashed, error=RunFailure(kind, "why", "worker's last words"))
     (element,) = ElementTree.fromstring(to_xml([run])).iter("error")
     assert element.get("type") == kind
     assert "worker's last words" in element.text
@@ -99,15 +105,14 @@ def test_the_order_in_which_runs_end_does_not_show(passed, failed, crashed):
 @settings(max_examples=60)
 @given(st.text(max_size=60), st.text(max_size=200), st.text(max_size=40))
 def test_whatever_the_text_the_document_is_well_formed_and_reads_back(name, tail, kind):
-    run = RunFinished(
-        RunKey(name, 1), name, 1, Outcome.ERROR, error=RunFailure(kind, tail, tail), ended=name, again=tail
-    )
+    failure = RunFailure(kind, tail, tail)
+    run = RunFinished(RunResult(RunKey(name, 1), name, Outcome.ERROR, error=failure, ended=name), again=tail)
     root = ElementTree.parse(io.BytesIO(to_xml([run]))).getroot()
     assert len(list(root.iter("testcase"))) == 1
 
 
 def test_escape_sequences_and_lone_surrogates_become_visible(crashed):
-    run = replace(crashed, error=RunFailure("crashed", "\x1b[31m \ud800 \u202e", "\x00"))
+    run = of(crashed, error=RunFailure("crashed", "\x1b[31m \ud800 \u202e", "\x00"))
     text = to_xml([run]).decode()
     assert r"\x1b[31m \ud800 \u202e" in text
     assert r"\x00" in text

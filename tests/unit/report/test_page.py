@@ -4,8 +4,14 @@ from html.parser import HTMLParser
 
 from PIL import Image
 
-from simscen.core.sessionevents import Artifacts, RunKey
+from simscen.core.result import RunKey
+from simscen.core.sessionevents import Artifacts
 from simscen.report.page import to_html
+
+
+def of(run, **changes):
+    """The run with another result."""
+    return replace(run, result=replace(run.result, **changes))
 
 
 class Tags(HTMLParser):
@@ -38,7 +44,7 @@ def test_what_did_not_pass_comes_first_and_stands_open(passed, failed, crashed):
 
 
 def test_text_from_outside_makes_no_live_tag(passed, crashed):
-    evil = replace(passed, key=RunKey("<script>alert(1)</script>", 1), again='"><img src=x onerror=y>')
+    evil = replace(of(passed, key=RunKey("<script>alert(1)</script>", 1)), again='"><img src=x onerror=y>')
     html = to_html([evil, crashed])
     assert {tag for tag, _ in parsed(html)}.isdisjoint({"script", "img"})
     assert "&lt;script&gt;" in html

@@ -1,7 +1,7 @@
 import json
 from dataclasses import replace
 
-from simscen.judge.result import from_data
+from simscen.judge.resultdata import from_data
 from simscen.report.results import to_json
 
 
@@ -13,7 +13,7 @@ def test_every_run_is_in_it_once_with_its_result(passed, failed, crashed):
         "faults/lidar_off",
         "navigation/goal",
     ]
-    assert from_data(document["runs"][1]).verdicts == failed.verdicts
+    assert from_data(document["runs"][1]).verdicts == failed.result.verdicts
 
 
 def test_artifacts_are_relative_to_the_session_so_that_the_folder_may_move(failed):

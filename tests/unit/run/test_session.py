@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from simscen.core.errors import Exit
-from simscen.core.sessionevents import Outcome, RunProgress, RunStarted
+from simscen.core.result import Outcome
+from simscen.core.sessionevents import RunProgress, RunStarted
 from simscen.loading.scenario import load_scenario
 from simscen.run.session import Options, plan, run_session
 from simscen.run.supervisor import Interrupted
@@ -65,20 +66,20 @@ def test_a_run_that_ends_well_is_answered_with_its_result(session):
 def test_a_fault_is_an_error_that_says_what_happened_and_leaves_its_neighbours_alone(session, fault, kind, told):
     answers, _ = session(fault, "fine", workers=2)
     assert answers[fault].outcome is Outcome.ERROR
-    assert answers[fault].error.kind == kind
-    assert told in answers[fault].error.message
+    assert answers[fault].result.error.kind == kind
+    assert told in answers[fault].result.error.message
     assert answers["fine"].outcome is Outcome.PASSED
 
 
 def test_the_log_of_a_crashed_worker_shows_where_it_was(session):
     answers, _ = session("segfault")
-    assert "faulty_zygote.py" in answers["segfault"].error.tail
+    assert "faulty_zygote.py" in answers["segfault"].result.error.tail
 
 
 @pytest.mark.parametrize("fault", ["hang", "deaf"])
 def test_a_run_beyond_its_wall_limit_is_killed_and_told(session, fault):
     answers, _ = session(fault, wall_limit=1.0)
-    assert answers[fault].error.kind == "timeout"
+    assert answers[fault].result.error.kind == "timeout"
 
 
 def test_what_a_worker_prints_goes_to_its_own_log(session, tmp_path, capfd):
@@ -89,7 +90,7 @@ def test_what_a_worker_prints_goes_to_its_own_log(session, tmp_path, capfd):
 
 def test_when_the_warm_process_dies_its_runs_are_errors_and_the_rest_still_runs(session):
     answers, _ = session("kill-parent", "fine")
-    assert answers["kill-parent"].error.kind == "crashed"
+    assert answers["kill-parent"].result.error.kind == "crashed"
     assert answers["fine"].outcome is Outcome.PASSED
 
 
@@ -100,7 +101,7 @@ def test_five_crashes_of_five_are_five_errors(session):
 
 def test_fail_fast_answers_the_rest_as_not_run(session):
     answers, _ = session("exception", "fine", fail_fast=True)
-    assert answers["fine"].error.kind == "not-run"
+    assert answers["fine"].result.error.kind == "not-run"
 
 
 def test_an_interrupted_session_answers_every_run(session):
@@ -122,5 +123,5 @@ def test_an_interrupted_session_answers_every_run(session):
     finally:
         signal.signal(signal.SIGINT, before)
     assert stopped is Exit.INTERRUPTED
-    assert answers["hang"].error.kind == "interrupted"
-    assert answers["fine"].error.kind == "not-run"
+    assert answers["hang"].result.error.kind == "interrupted"
+    assert answers["fine"].result.error.kind == "not-run"

@@ -1,22 +1,18 @@
 import pytest
 
-from simscen.core.sessionevents import Outcome, RunFailure, RunFinished, RunKey
+from simscen.core.result import Outcome, RunFailure, RunKey, RunResult
+from simscen.core.sessionevents import RunFinished
 from simscen.core.verdict import Finding, Status, Verdict
 from simscen.study.tally import Fate, Trial, tally
 
 
 def run(outcome: Outcome, collided: bool = False, ended: str = "navigation ended", seconds: float = 8.0) -> RunFinished:
     status = Status.FAIL if collided else Status.PASS
-    return RunFinished(
-        RunKey("s", 1),
-        "s.scenario.yaml",
-        1,
-        outcome,
-        verdicts=(Verdict("collisions", "collisions", "error", (Finding(status, "collisions", "", ""),)),),
-        ended=ended,
-        metrics=(("time_to_goal", seconds), ("path_ratio", 1.1)),
-        error=RunFailure("crashed", "it crashed") if outcome is Outcome.ERROR else None,
-    )
+    verdict = Verdict("collisions", "collisions", "error", (Finding(status, "collisions", "", ""),))
+    broken = RunFailure("crashed", "it crashed") if outcome is Outcome.ERROR else None
+    metrics = {"time_to_goal": seconds, "path_ratio": 1.1}
+    key = RunKey("s", 1)
+    return RunFinished(RunResult(key, "s.scenario.yaml", outcome, (verdict,), (), metrics, ended=ended, error=broken))
 
 
 ARRIVED, HIT = run(Outcome.PASSED), run(Outcome.FAILED, collided=True)

@@ -1,0 +1,80 @@
+"""What came of one run: the one record that reports, journals, studies and people read."""
+
+import shlex
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+
+from simscen.core.verdict import Verdict
+
+
+class Outcome(str, Enum):
+    """How a run came out: `error` means that it could not be completed, which is never a verdict on the robot."""
+
+    PASSED = "passed"
+    FAILED = "failed"
+    ERROR = "error"
+
+
+@dataclass(frozen=True, order=True)
+class RunKey:
+    """Names one run: the scenario's id, the seed, and a label of the variation where there are several."""
+
+    scenario: str
+    seed: int
+    variation: str = ""
+
+    @property
+    def folder(self) -> str:
+        """The run's folder inside its scenario's, e.g. "seed-7" or "seed-7-slow"."""
+        return "-".join(part for part in (f"seed-{self.seed}", self.variation) if part)
+
+
+@dataclass(frozen=True)
+class RunFailure:
+    """Why a run could not be completed.
+
+    `kind` is JUnit's error type: crashed, timeout, out-of-memory, invalid, interrupted, not-run, internal. `tail` is
+    the end of the worker's log: text from outside, to be shown literally.
+    """
+
+    kind: str
+    message: str
+    tail: str = ""
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """All that a run says about itself; nothing in it depends on the machine, the clock or the working folder.
+
+    `path` is the scenario's file relative to the root, `lines` the line of each criterion in it, in the order of
+    `verdicts` (empty or 0 = unknown). `events` counts what happened, by kind. `ended` is why the simulation stopped,
+    `simulated` is in seconds, `tick_rate` turns the findings' ticks into seconds. `error` is set exactly when the
+    outcome is ERROR.
+    """
+
+    key: RunKey
+    path: str
+    outcome: Outcome
+    verdicts: tuple[Verdict, ...] = ()
+    lines: tuple[int, ...] = ()
+    metrics: Mapping[str, float | None] = field(default_factory=dict)
+    events: Mapping[str, int] = field(default_factory=dict)
+    ended: str = ""
+    simulated: float = 0.0
+    tick_rate: int = 240
+    error: RunFailure | None = None
+
+    def __post_init__(self) -> None:
+        if (self.error is not None) != (self.outcome is Outcome.ERROR):
+            raise ValueError(f"outcome {self.outcome.value} with error {self.error}")
+
+    @property
+    def again(self) -> str:
+        """The command that repeats the run, from the scenario's root."""
+        return shlex.join(["simscen", "run", self.path, "--seed", str(self.key.seed)])
+
+
+def unfinished(key: RunKey, path: str, failure: RunFailure) -> RunResult:
+    """The result of a run that could not be completed."""
+    return RunResult(key, path, Outcome.ERROR, error=failure)

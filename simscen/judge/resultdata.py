@@ -1,0 +1,69 @@
+"""result.json: the result of a run as plain data and back; no wall clock, host or process in it."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from simscen.core.result import Outcome, RunFailure, RunKey, RunResult
+from simscen.judge.verdictdata import number, read_verdict, verdict_data
+
+FORMAT = 1
+
+
+def to_json(result: RunResult) -> str:
+    """Sorted, indented, with a newline at the end: the same result gives the same bytes."""
+    return json.dumps(as_data(result), sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def as_data(result: RunResult) -> dict[str, Any]:
+    """The same as plain data, for results.json and others that hold several."""
+    lines = result.lines or (0,) * len(result.verdicts)
+    error = result.error
+    return {
+        "format": FORMAT,
+        "scenario": result.key.scenario,
+        "seed": result.key.seed,
+        "variation": result.key.variation,
+        "path": result.path,
+        "outcome": result.outcome.value,
+        "ended": result.ended,
+        "simulated_seconds": result.simulated,
+        "tick_rate": result.tick_rate,
+        "again": result.again,
+        "events": dict(result.events),
+        "metrics": {name: number(value) for name, value in result.metrics.items()},
+        "verdicts": [verdict_data(v, line, result.tick_rate) for v, line in zip(result.verdicts, lines, strict=True)],
+        "error": None if error is None else {"kind": error.kind, "message": error.message, "tail": error.tail},
+    }
+
+
+def from_json(text: str) -> RunResult:
+    """The result that `to_json` wrote. Raises ValueError when it is none, or one of another format."""
+    try:
+        return from_data(json.loads(text))
+    except (KeyError, TypeError) as error:
+        raise ValueError(f"not a result of a run: {error!r}") from error
+
+
+def read_result(path: Path) -> RunResult:
+    """Read a result.json. Raises OSError or ValueError."""
+    return from_json(path.read_text(encoding="utf-8"))
+
+
+def from_data(data: dict[str, Any]) -> RunResult:
+    """The result that `as_data` described."""
+    if data["format"] != FORMAT:
+        raise ValueError(f"a result of format {data['format']}; this version reads {FORMAT}")
+    return RunResult(
+        key=RunKey(data["scenario"], data["seed"], data["variation"]),
+        path=data["path"],
+        outcome=Outcome(data["outcome"]),
+        verdicts=tuple(read_verdict(verdict) for verdict in data["verdicts"]),
+        lines=tuple(verdict["line"] for verdict in data["verdicts"]),
+        metrics=data["metrics"],
+        events=data["events"],
+        ended=data["ended"],
+        simulated=data["simulated_seconds"],
+        tick_rate=data["tick_rate"],
+        error=None if data["error"] is None else RunFailure(**data["error"]),
+    )
