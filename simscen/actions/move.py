@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from simscen.actions.base import Action
-from simscen.core.events import Event
+from simscen.core.events import Event, EventKind
 from simscen.core.geometry import Pose2
 from simscen.core.shapes import MotionPath
 from simscen.core.stage import Stage
@@ -38,7 +38,7 @@ class Move(Spec, Action):
         """Set it going; an object that is not there is noted in the log."""
         here = stage.object(self.name)
         if here is None:
-            stage.note(Event(0, "event.note", self.name, {"message": "nothing of this name to move"}))
+            stage.note(Event(0, EventKind.EVENT_NOTE, self.name, {"message": "nothing of this name to move"}))
             return
         stage.move(self.name, route(here, self.through, self.speed, self.repeat))
 

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from simscen.actions.base import Action
-from simscen.core.events import Event
+from simscen.core.events import Event, EventKind
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.navigation import Path
 from simscen.core.shapes import Body
@@ -56,7 +56,8 @@ class Spawn(Shaped, Action):
             return stage.robot.compose(Pose2(self.ahead[0], self.ahead[1], self.yaw))
         assert self.on_plan is not None
         if stage.plan is None or len(stage.plan.points) < 2:
-            stage.note(Event(0, "event.note", self.name, {"message": "no plan to spawn on; spawned ahead instead"}))
+            message = "no plan to spawn on; spawned ahead instead"
+            stage.note(Event(0, EventKind.EVENT_NOTE, self.name, {"message": message}))
             return stage.robot.compose(Pose2(self.on_plan, 0.0, self.yaw))
         return along(stage.plan, stage.robot, self.on_plan).compose(Pose2(0.0, 0.0, self.yaw))
 

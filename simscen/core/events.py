@@ -2,26 +2,47 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from enum import Enum
 
 Value = str | int | float | bool | None | list["Value"] | dict[str, "Value"]
 
 
+class EventKind(str, Enum):
+    """All that can happen. Beside each kind: what the event's name names, and what its data holds."""
+
+    GOAL_ACCEPTED = "goal.accepted"  # goal; x, y, yaw
+    GOAL_REACHED = "goal.reached"  # goal; index
+    GOAL_FAILED = "goal.failed"  # goal; index, error_code, error_name, message
+    GOAL_CANCELED = "goal.canceled"  # goal; index, preempted_by
+    NAVIGATION_ENDED = "navigation.ended"  # result; error_code, error_name
+    PLAN_MADE = "plan.made"  # goal; reason (goal, blocked, …), length
+    PLAN_FAILED = "plan.failed"  # error_code, error_name, message
+    RECOVERY_STARTED = "recovery.started"  # behaviour: spin, wait, backup, clear_costmap; error_code, error_name
+    RECOVERY_ENDED = "recovery.ended"  # behaviour; outcome
+    COLLISION_STARTED = "collision.started"  # what was hit; x, y, impulse (N s), speed (m/s), robot_part
+    COLLISION_ENDED = "collision.ended"  # what was hit
+    FAULT_STARTED = "fault.started"  # label, e.g. "lidar.off"; sensor, fault
+    FAULT_ENDED = "fault.ended"  # label
+    EVENT_STARTED = "event.started"  # the scenario's event; actions
+    EVENT_ENDED = "event.ended"  # the scenario's event
+    EVENT_NOTE = "event.note"  # what an action is about; message
+    OBJECT_SPAWNED = "object.spawned"  # object; its shape and pose
+    OBJECT_REMOVED = "object.removed"  # object
+    OBJECT_MOVED = "object.moved"  # object; waypoints
+    ROBOT_PLACED = "robot.placed"  # x, y, yaw
+    ROBOT_PUSHED = "robot.pushed"  # impulse (N s)
+    RUN_ENDED = "run.ended"  # why: navigation ended, time limit
+
+    def __str__(self) -> str:
+        """As it is written in logs."""
+        return self.value
+
+
 @dataclass(frozen=True)
 class Event:
-    """Something that happened at `tick`: `kind` from the table below, `name` of the thing, `data` that JSON can hold.
-
-    goal.accepted / goal.reached / goal.failed / goal.canceled   name = goal; data: index, error_code, error_name, …
-    plan.made / plan.failed     data: reason (goal, blocked, …), length, error_code, error_name
-    recovery.started / recovery.ended   name = behaviour (spin, wait, backup, clear_costmap); data: outcome
-    collision.started / collision.ended name = what was hit; data: x, y, impulse (N s), speed (m/s), robot_part
-    fault.started / fault.ended  name = "<sensor>.<kind>", e.g. "lidar.off"
-    event.started / event.ended  name = the scenario event
-    object.spawned / object.removed / object.moved   name = object; data: shape and pose
-    navigation.ended             name = result; data: error_code, error_name
-    run.ended                    name = why (goals done, time limit, …)
-    """
+    """Something that happened at `tick`, to the thing called `name`, with `data` that JSON can hold."""
 
     tick: int
-    kind: str
+    kind: EventKind
     name: str = ""
     data: Mapping[str, Value] = field(default_factory=dict)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from simscen.core.belief import Belief
-from simscen.core.events import Event
+from simscen.core.events import Event, EventKind
 from simscen.core.geometry import Pose3
 from simscen.core.motion import Twist
 from simscen.core.navigation import Path
@@ -91,7 +91,7 @@ class Trace:
         """The simulated time of `tick` in seconds."""
         return tick / self.tick_rate
 
-    def of_kind(self, *kinds: str) -> tuple[Event, ...]:
+    def of_kind(self, *kinds: EventKind) -> tuple[Event, ...]:
         """The events of these kinds, in order."""
         return tuple(event for event in self.events if event.kind in kinds)
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from pydantic import Field
 
-from simscen.core.events import Event
+from simscen.core.events import Event, EventKind
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import BrokenTrace, at_most, counted
@@ -54,7 +54,7 @@ class Collisions(Spec, Criterion):
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """The count, then the hardest contact."""
-        hits = [event for event in trace.of_kind("collision.started") if self.object in (None, event.name)]
+        hits = [event for event in trace.of_kind(EventKind.COLLISION_STARTED) if self.object in (None, event.name)]
         if self.caused_by_robot:
             hits = [event for event in hits if _moving(trace, event, case)]
         limit = 0 if self.max is None and self.max_impulse is None else self.max

@@ -6,15 +6,15 @@ from dataclasses import dataclass
 from itertools import zip_longest
 from typing import TYPE_CHECKING
 
-from simscen.core.events import Event
+from simscen.core.events import Event, EventKind
 from simscen.core.navigation import Goal
 
 if TYPE_CHECKING:
     from simscen.core.case import Case
     from simscen.core.trace import Trace
 
-_STARTS = ("fault.started", "event.started")
-_ENDS = ("fault.ended", "event.ended")
+_STARTS = (EventKind.FAULT_STARTED, EventKind.EVENT_STARTED)
+_ENDS = (EventKind.FAULT_ENDED, EventKind.EVENT_ENDED)
 
 
 @dataclass(frozen=True)
@@ -45,13 +45,13 @@ def never_started(trace: Trace, label: str) -> tuple[str, list[str]]:
 
 def ending(trace: Trace) -> str:
     """Why the run ended, in words."""
-    ends = trace.of_kind("run.ended")
+    ends = trace.of_kind(EventKind.RUN_ENDED)
     return ends[-1].name if ends else "the log stops there"
 
 
 def finished(trace: Trace) -> bool:
     """Whether the run came to its own end, be it the time limit; a log that was cut off did not."""
-    return bool(trace.of_kind("run.ended"))
+    return bool(trace.of_kind(EventKind.RUN_ENDED))
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class GoalStory:
     @property
     def reached(self) -> int | None:
         """The tick at which the robot said that it was there."""
-        return self.end.tick if self.end is not None and self.end.kind == "goal.reached" else None
+        return self.end.tick if self.end is not None and self.end.kind == EventKind.GOAL_REACHED else None
 
     @property
     def fate(self) -> str:
@@ -78,8 +78,8 @@ class GoalStory:
 
 def stories(trace: Trace, case: Case) -> list[GoalStory]:
     """The story of each goal of the scenario. The k-th goal of a name is the k-th one reported under that name."""
-    accepted = trace.of_kind("goal.accepted")
-    ended = trace.of_kind("goal.reached", "goal.failed", "goal.canceled")
+    accepted = trace.of_kind(EventKind.GOAL_ACCEPTED)
+    ended = trace.of_kind(EventKind.GOAL_REACHED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED)
     seen: dict[str, int] = {}
     found = []
     for goal in case.goals:

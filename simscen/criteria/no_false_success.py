@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from simscen.core.events import EventKind
 from simscen.core.geometry import Pose2
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
@@ -39,7 +40,7 @@ class NoFalseSuccess(Spec, Criterion):
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """One finding for each goal reported reached, one for the end of navigation."""
         told = stories(trace, case)
-        ended = trace.of_kind("navigation.ended")
+        ended = trace.of_kind(EventKind.NAVIGATION_ENDED)
         if not ended and all(story.end is None for story in told):
             return [undecided("no_false_success", "the robot reported nothing that could be false")]
         findings = []

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field, model_validator
 
+from simscen.core.events import EventKind
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import counted
@@ -46,7 +47,7 @@ class Recoveries(Spec, Criterion):
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """One finding for each bound."""
-        every = trace.of_kind("recovery.started")
+        every = trace.of_kind(EventKind.RECOVERY_STARTED)
         counting = [start for start in every if self.name in (None, start.name)]
         told = [f"t = {trace.seconds(start.tick):.2f} s: {start.name}" for start in every[:8]]
         noun = "recovery" if self.name is None else f"{self.name} recovery"

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field, model_validator
 
+from simscen.core.events import EventKind
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import counted
@@ -46,7 +47,7 @@ class Replans(Spec, Criterion):
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """One finding for each bound."""
-        plans = trace.of_kind("plan.made")
+        plans = trace.of_kind(EventKind.PLAN_MADE)
         again = [plan for plan in plans if plan.data.get("reason", "goal") != "goal"]
         if self.reason is not None:
             again = [plan for plan in again if plan.data.get("reason") == self.reason]

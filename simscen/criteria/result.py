@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal
 
-from simscen.core.events import Event
+from simscen.core.events import Event, EventKind
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import held, missed, undecided
@@ -36,7 +36,7 @@ class Result(Spec, Criterion):
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """One finding for the result, one for the code if it is asked for."""
-        end = _last(trace, "navigation.ended")
+        end = _last(trace, EventKind.NAVIGATION_ENDED)
         if end is None:
             return [_no_answer(trace, "result", self.status)]
         findings = [_compare(trace, end, "result", end.name, self.status)]
@@ -63,7 +63,11 @@ class ErrorCodeIs(Spec, Criterion):
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """One finding."""
-        kinds = ["navigation.ended"] if self.goal is None else ["goal.reached", "goal.failed", "goal.canceled"]
+        kinds = (
+            [EventKind.NAVIGATION_ENDED]
+            if self.goal is None
+            else [EventKind.GOAL_REACHED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED]
+        )
         what = "error code" if self.goal is None else f"error code of goal {self.goal}"
         end = _last(trace, *kinds, name=self.goal)
         if end is None:
@@ -71,7 +75,7 @@ class ErrorCodeIs(Spec, Criterion):
         return [_compare(trace, end, what, code_of(end), self.code.name)]
 
 
-def _last(trace: Trace, *kinds: str, name: str | None = None) -> Event | None:
+def _last(trace: Trace, *kinds: EventKind, name: str | None = None) -> Event | None:
     events = [event for event in trace.of_kind(*kinds) if name in (None, event.name)]
     return events[-1] if events else None
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from simscen.core.events import EventKind
 from simscen.core.geometry import Array, wrap_array
 from simscen.core.samples import Samples, Ticks
 from simscen.criteria.bounds import BrokenTrace
@@ -78,7 +79,7 @@ def drive(trace: Trace) -> Drive:
     Yaw must not enter the norm (as it does in Arena's get_metrics.py, which so adds radians to metres).
     """
     poses = truth(trace)
-    placed = {event.tick for event in trace.of_kind("robot.placed")}
+    placed = {event.tick for event in trace.of_kind(EventKind.ROBOT_PLACED)}
     jumps = set(np.searchsorted(poses.ticks, sorted(placed), side="right").tolist())
     kept, lengths = [0], [0.0]
     xs, ys = poses.values[:, 0].tolist(), poses.values[:, 1].tolist()

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from simscen.core.case import Case
+from simscen.core.events import EventKind
 from simscen.core.geometry import Array, wrap_array
 from simscen.core.trace import Trace
 from simscen.core.verdict import Status
@@ -32,8 +33,8 @@ def measure(trace: Trace, case: Case) -> Metrics:
         **_motion(trace),
         **_contacts(trace),
         **_localization(trace),
-        "replans": float(sum(plan.data.get("reason", "goal") != "goal" for plan in trace.of_kind("plan.made"))),
-        "recoveries": float(len(trace.of_kind("recovery.started"))),
+        "replans": float(sum(plan.data.get("reason", "goal") != "goal" for plan in trace.of_kind(EventKind.PLAN_MADE))),
+        "recoveries": float(len(trace.of_kind(EventKind.RECOVERY_STARTED))),
     }
 
 
@@ -43,7 +44,7 @@ def _navigation(trace: Trace, case: Case) -> Metrics:
     known = not unknown
     success = _success(trace, case)
     ends = [story.reached for story in stories(trace, case)]
-    starts = trace.of_kind("goal.accepted")
+    starts = trace.of_kind(EventKind.GOAL_ACCEPTED)
     arrived = starts and ends and ends[-1] is not None
     return {
         "success": float(success),
@@ -88,15 +89,15 @@ def _motion(trace: Trace) -> Metrics:
 def _contacts(trace: Trace) -> Metrics:
     """Rising edges, and the time during which at least one contact lasts."""
     touching, since, total = 0, 0, 0
-    for event in trace.of_kind("collision.started", "collision.ended"):
-        if event.kind == "collision.started":
+    for event in trace.of_kind(EventKind.COLLISION_STARTED, EventKind.COLLISION_ENDED):
+        if event.kind == EventKind.COLLISION_STARTED:
             since = event.tick if touching == 0 else since
             touching += 1
         elif touching:
             touching -= 1
             total += event.tick - since if touching == 0 else 0
     total += trace.end - since if touching else 0
-    return {"collisions": float(len(trace.of_kind("collision.started"))), "contact_time": trace.seconds(total)}
+    return {"collisions": float(len(trace.of_kind(EventKind.COLLISION_STARTED))), "contact_time": trace.seconds(total)}
 
 
 def _localization(trace: Trace) -> Metrics:

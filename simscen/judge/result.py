@@ -39,7 +39,7 @@ def run_result(
         verdicts=verdicts,
         lines=lines,
         metrics=metrics,
-        events=dict(sorted(Counter(event.kind for event in trace.events).items())),
+        events=dict(sorted(Counter(str(event.kind) for event in trace.events).items())),
         ended=ending(trace),
         simulated=trace.seconds(trace.end),
         tick_rate=trace.tick_rate,

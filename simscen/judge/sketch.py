@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from simscen.core.case import Case
-from simscen.core.events import Event
+from simscen.core.events import Event, EventKind
 from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.core.navigation import Goal, Path
 from simscen.core.samples import Samples, Ticks
@@ -94,7 +94,7 @@ def _events(words: Mapping[str, Any], end: int) -> tuple[Event, ...]:
         name, data = [*rest, "", {}][:2] if len(rest) != 1 else (rest[0], {})
         events.append(Event(round(at * TICK_RATE), kind, name, data))
     ended = words.get("ended", "navigation ended")
-    return (*events, *([] if ended is None else [Event(end, "run.ended", ended)]))
+    return (*events, *([] if ended is None else [Event(end, EventKind.RUN_ENDED, ended)]))
 
 
 def _lifted(points: Sequence[Sequence[float]]) -> Array:

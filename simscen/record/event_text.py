@@ -3,16 +3,16 @@
 import json
 from typing import Any
 
-from simscen.core.events import Event
+from simscen.core.events import Event, EventKind
 
 INFO, WARN, ERROR = 20, 30, 40
 _LEVELS = {
-    "goal.failed": ERROR,
-    "collision.started": ERROR,
-    "goal.canceled": WARN,
-    "plan.failed": WARN,
-    "recovery.started": WARN,
-    "fault.started": WARN,
+    EventKind.GOAL_FAILED: ERROR,
+    EventKind.COLLISION_STARTED: ERROR,
+    EventKind.GOAL_CANCELED: WARN,
+    EventKind.PLAN_FAILED: WARN,
+    EventKind.RECOVERY_STARTED: WARN,
+    EventKind.FAULT_STARTED: WARN,
 }
 
 
@@ -25,7 +25,7 @@ def to_json(event: Event) -> str:
 def from_json(text: str) -> Event:
     """The event that `to_json` wrote. Raises ValueError or KeyError when it is none."""
     record: dict[str, Any] = json.loads(text)
-    return Event(int(record["tick"]), str(record["kind"]), str(record["name"]), dict(record["data"]))
+    return Event(int(record["tick"]), EventKind(record["kind"]), str(record["name"]), dict(record["data"]))
 
 
 def level(event: Event) -> int:

@@ -1,7 +1,7 @@
 """What happened once: /simscen/events, /rosout and /goal_pose."""
 
 from simscen.core.case import Case
-from simscen.core.events import Event
+from simscen.core.events import Event, EventKind
 from simscen.core.geometry import Pose2, Pose3
 from simscen.record import event_text, frames, pack_rare, topics
 from simscen.record.pack import PoseStampedPacker
@@ -22,7 +22,7 @@ class EventTopics:
         stamp, line = self._time.stamp(event.tick), event_text.sentence(event)
         self._out.publish(topics.EVENTS, now, pack_rare.string(event_text.to_json(event)))
         self._out.publish(topics.ROSOUT, now, pack_rare.log(stamp, event_text.level(event), "simscen", line))
-        pose = self._pose(event) if event.kind == "goal.accepted" else None
+        pose = self._pose(event) if event.kind == EventKind.GOAL_ACCEPTED else None
         if pose is not None:
             self._out.publish(topics.GOAL, now, self._goal(stamp, Pose3.planar(pose)))
 

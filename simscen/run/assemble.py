@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from simscen.core.chance import Streams
-from simscen.core.events import Event
+from simscen.core.events import Event, EventKind
 from simscen.core.geometry import Array, Pose3
 from simscen.core.sensing import Odometry
 from simscen.core.shapes import TriangleMesh
@@ -63,7 +63,7 @@ def assemble(prepared: Prepared, seed: int) -> Rig:
     faults = FaultRig(spec.faults, streams, Wheels(getattr(prepared.robot.drive, "wheel_separation", 0.0)))
     stage = LiveStage(world, simulation, stack, clock)
     for body in world.bodies:
-        stage.note(Event(0, "object.spawned", body.name, described(body)))
+        stage.note(Event(0, EventKind.OBJECT_SPAWNED, body.name, described(body)))
     control_period = clock.period(prepared.stack.controller_frequency)
     return Rig(
         simulation=simulation,

@@ -1,7 +1,7 @@
 """The director watches the triggers of a scenario and lets its events and faults happen."""
 
 from simscen.core.chance import Streams
-from simscen.core.events import Event
+from simscen.core.events import Event, EventKind, Value
 from simscen.model.disturbance import EventEntry, FaultEntry
 from simscen.run.faultrig import FaultRig
 from simscen.run.firing import Firing
@@ -40,20 +40,21 @@ class Director:
                 self._begin_fault(index)
 
     def _perform(self, name: str, entry: EventEntry) -> None:
-        self._stage.note(Event(0, "event.started", name, {"actions": [action.kind for action in entry.actions]}))
+        actions: list[Value] = [action.kind for action in entry.actions]
+        self._stage.note(Event(0, EventKind.EVENT_STARTED, name, {"actions": actions}))
         for action in entry.actions:
             action.perform(self._stage)
-        self._stage.note(Event(0, "event.ended", name))
+        self._stage.note(Event(0, EventKind.EVENT_ENDED, name))
 
     def _begin_fault(self, index: int) -> None:
         entry = self._faults[index]
         self._rig.begin(index)
         self._ends[index] = self._stage.seconds + entry.for_ if entry.for_ is not None else float("inf")
-        self._stage.note(Event(0, "fault.started", entry.label, {"sensor": entry.sensor, "fault": entry.kind}))
+        self._stage.note(Event(0, EventKind.FAULT_STARTED, entry.label, {"sensor": entry.sensor, "fault": entry.kind}))
 
     def _end_faults(self) -> None:
         for index, end in sorted(self._ends.items()):
             if self._stage.seconds >= end - 1e-9:
                 del self._ends[index]
                 self._rig.end(index)
-                self._stage.note(Event(0, "fault.ended", self._faults[index].label))
+                self._stage.note(Event(0, EventKind.FAULT_ENDED, self._faults[index].label))

@@ -1,6 +1,6 @@
 """When a run is over."""
 
-from simscen.core.events import Event
+from simscen.core.events import Event, EventKind
 from simscen.core.time import Clock
 from simscen.core.trace import Moment
 
@@ -19,12 +19,12 @@ class Ending:
     def reached(self, moment: Moment) -> Event | None:
         """The event that ends the run at this moment, or None."""
         for event in moment.decision.events:
-            if event.kind == "navigation.ended":
+            if event.kind == EventKind.NAVIGATION_ENDED:
                 self._over = event.tick + self._linger
-            elif event.kind == "goal.accepted":
+            elif event.kind == EventKind.GOAL_ACCEPTED:
                 self._over = None
         if self._over is not None and moment.tick >= self._over:
-            return Event(moment.tick, "run.ended", "navigation ended")
+            return Event(moment.tick, EventKind.RUN_ENDED, "navigation ended")
         if moment.tick >= self._limit:
-            return Event(moment.tick, "run.ended", "time limit")
+            return Event(moment.tick, EventKind.RUN_ENDED, "time limit")
         return None

@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 from simscen.core.belief import Belief
-from simscen.core.events import Event, Value
+from simscen.core.events import Event, EventKind, Value
 from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
 from simscen.core.navigation import Goal, Path
@@ -103,15 +103,15 @@ class LiveStage:
         if self._simulation.object_pose(body.name):
             self.remove(body.name)
         self._simulation.spawn(body)
-        self.note(Event(0, "object.spawned", body.name, described(body)))
+        self.note(Event(0, EventKind.OBJECT_SPAWNED, body.name, described(body)))
 
     def remove(self, name: str) -> None:
         """Take a body out of the world."""
         if self._simulation.object_pose(name) is None:
-            self.note(Event(0, "event.note", name, {"message": "nothing of this name to remove"}))
+            self.note(Event(0, EventKind.EVENT_NOTE, name, {"message": "nothing of this name to remove"}))
             return
         self._simulation.remove(name)
-        self.note(Event(0, "object.removed", name))
+        self.note(Event(0, EventKind.OBJECT_REMOVED, name))
 
     def door(self, name: str) -> tuple[Pose2, Pose2]:
         """The poses of a door's panel when closed and when open."""
@@ -120,17 +120,17 @@ class LiveStage:
     def move(self, name: str, path: MotionPath) -> None:
         """Let a body follow a path that begins now."""
         self._simulation.move(name, path)
-        self.note(Event(0, "object.moved", name, {"waypoints": [[p.x, p.y] for p in path.poses]}))
+        self.note(Event(0, EventKind.OBJECT_MOVED, name, {"waypoints": [[p.x, p.y] for p in path.poses]}))
 
     def place_robot(self, pose: Pose2) -> None:
         """Set the robot down somewhere else."""
         self._simulation.place_robot(pose)
-        self.note(Event(0, "robot.placed", "", {"x": pose.x, "y": pose.y, "yaw": pose.yaw}))
+        self.note(Event(0, EventKind.ROBOT_PLACED, "", {"x": pose.x, "y": pose.y, "yaw": pose.yaw}))
 
     def push(self, impulse: tuple[float, float]) -> None:
         """Push the robot."""
         self._simulation.push(impulse)
-        self.note(Event(0, "robot.pushed", "", {"impulse": list(impulse)}))
+        self.note(Event(0, EventKind.ROBOT_PUSHED, "", {"impulse": list(impulse)}))
 
     def send_goal(self, goal: Goal) -> None:
         """Preempt with a new goal."""

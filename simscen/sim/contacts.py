@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import pybullet
 
-from simscen.core.events import Event
+from simscen.core.events import Event, EventKind
 
 PATIENCE = 0.1
 """Seconds without contact after which a collision is over; a bouncing robot collides once."""
@@ -80,7 +80,7 @@ class Contacts:
         for name in sorted(name for name, seen in self._ongoing.items() if tick - seen.last >= self._patience):
             seen = self._ongoing.pop(name)
             data = {"impulse": seen.impulse, "ticks": seen.last - seen.started + 1}
-            self._events.append(Event(tick, "collision.ended", name, data))
+            self._events.append(Event(tick, EventKind.COLLISION_ENDED, name, data))
 
     def take(self) -> tuple[Event, ...]:
         """The events since last asked."""
@@ -108,7 +108,7 @@ def _started(tick: int, touch: Touch, before: Motion) -> Event:
     approach = -_along(robot, touch.normal)
     return Event(
         tick,
-        "collision.started",
+        EventKind.COLLISION_STARTED,
         touch.name,
         {
             "x": touch.place[0],

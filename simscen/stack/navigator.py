@@ -6,7 +6,7 @@ next behaviour of the round robin is run. After `number_of_retries` behaviours t
 the last failure. A goal outside the map or inside a mapped wall fails after the first retry: no recovery changes that.
 """
 
-from simscen.core.events import Event, Value
+from simscen.core.events import Event, EventKind, Value
 from simscen.core.geometry import Pose2
 from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import ErrorCode, Goal
@@ -109,7 +109,7 @@ class Navigator:
         if not planning and failure.code != ErrorCode.FAILED_TO_MAKE_PROGRESS and self._tolerable():
             return STOP
         if planning:
-            self._note(tick, "plan.failed", "", **_described(failure))
+            self._note(tick, EventKind.PLAN_FAILED, "", **_described(failure))
         if not self._retried:
             self._retried = True
             self._costmap.clear()
@@ -123,7 +123,7 @@ class Navigator:
         if self._behavior is None:
             raise failure
         self._behavior_since = self._clock
-        self._note(tick, "recovery.started", self._behavior.name, **_described(failure))
+        self._note(tick, EventKind.RECOVERY_STARTED, self._behavior.name, **_described(failure))
         self._behavior.start(pose)
         return STOP
 
@@ -143,18 +143,18 @@ class Navigator:
         try:
             command = behavior.step(pose, self._costmap.view, self._clock - self._behavior_since)
         except NavigationFailure as failure:
-            self._note(tick, "recovery.ended", behavior.name, outcome="failed", **_described(failure))
+            self._note(tick, EventKind.RECOVERY_ENDED, behavior.name, outcome="failed", **_described(failure))
             command = None
         else:
             if command is None:
-                self._note(tick, "recovery.ended", behavior.name, outcome="succeeded")
+                self._note(tick, EventKind.RECOVERY_ENDED, behavior.name, outcome="succeeded")
         if command is None:
             self._behavior = None
             self._progress.reset()
             return STOP
         return command
 
-    def _note(self, tick: int, kind: str, name: str, **data: Value) -> None:
+    def _note(self, tick: int, kind: EventKind, name: str, **data: Value) -> None:
         self._events.append(Event(tick, kind, name, data))
 
 

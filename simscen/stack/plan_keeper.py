@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-from simscen.core.events import Event
+from simscen.core.events import Event, EventKind, Value
 from simscen.core.geometry import Pose2
 from simscen.core.navigation import ErrorCode, Goal, Path
 from simscen.model.stack import Planner as PlannerSpec
@@ -125,4 +125,5 @@ class PlanKeeper:
         self._controller.set_path(path)
         self._adopted = self._looked = now
         self._checked, self._most = view.revision, self._costmap.obstacle_cells
-        self._journal.append(Event(tick, "plan.made", "", {"reason": reason, "length": round(path.length(), 6)}))
+        made: dict[str, Value] = {"reason": reason, "length": round(path.length(), 6)}
+        self._journal.append(Event(tick, EventKind.PLAN_MADE, "", made))

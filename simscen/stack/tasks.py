@@ -1,6 +1,6 @@
 """The list of goals: what is accepted, reached, failed, canceled, and how the whole task ended."""
 
-from simscen.core.events import Event, Value
+from simscen.core.events import Event, EventKind, Value
 from simscen.core.navigation import ErrorCode, Goal, TaskResult
 
 
@@ -24,20 +24,19 @@ class Task:
         if self.goal is None and self._waiting:
             self.goal, self.since = self._waiting.pop(0), tick
             pose = self.goal.pose
-            self._note(tick, "goal.accepted", x=float(pose.x), y=float(pose.y), yaw=float(pose.yaw))
+            self._note(tick, EventKind.GOAL_ACCEPTED, x=float(pose.x), y=float(pose.y), yaw=float(pose.yaw))
             self._accepted += 1
         return self.goal
 
     def reached(self, tick: int) -> None:
         """The goal is reached."""
-        self._note(tick, "goal.reached", index=self._accepted - 1)
+        self._note(tick, EventKind.GOAL_REACHED, index=self._accepted - 1)
         self._close(tick, TaskResult.SUCCEEDED)
 
     def failed(self, tick: int, code: ErrorCode, message: str) -> None:
         """The goal has failed; so has the task when it stops on failures."""
-        self._note(
-            tick, "goal.failed", index=self._accepted - 1, error_code=int(code), error_name=code.name, message=message
-        )
+        said: dict[str, Value] = {"error_code": int(code), "error_name": code.name, "message": message}
+        self._note(tick, EventKind.GOAL_FAILED, index=self._accepted - 1, **said)
         self._failure = code
         if self._stop_on_failure:
             self._waiting = []
@@ -47,14 +46,14 @@ class Task:
         """Drop this goal and all after it."""
         if self.goal is None:
             return
-        self._note(tick, "goal.canceled", index=self._accepted - 1)
+        self._note(tick, EventKind.GOAL_CANCELED, index=self._accepted - 1)
         self._waiting = []
         self._close(tick, TaskResult.CANCELED)
 
     def preempt(self, tick: int, goal: Goal) -> None:
         """Drop this goal for another one; those after it follow."""
         if self.goal is not None:
-            self._note(tick, "goal.canceled", index=self._accepted - 1, preempted_by=goal.name)
+            self._note(tick, EventKind.GOAL_CANCELED, index=self._accepted - 1, preempted_by=goal.name)
         self.goal = None
         self._waiting.insert(0, goal)
 
@@ -66,11 +65,11 @@ class Task:
             result = TaskResult.FAILED
         code = self._failure or ErrorCode.NONE
         self._events.append(
-            Event(tick, "navigation.ended", result.value, {"error_code": int(code), "error_name": code.name})
+            Event(tick, EventKind.NAVIGATION_ENDED, result.value, {"error_code": int(code), "error_name": code.name})
         )
         self._failure = None
 
-    def _note(self, tick: int, kind: str, **data: Value) -> None:
+    def _note(self, tick: int, kind: EventKind, **data: Value) -> None:
         assert self.goal is not None
         data.setdefault("index", self._accepted)
         self._events.append(Event(tick, kind, self.goal.name, data))

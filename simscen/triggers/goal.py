@@ -4,6 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from simscen.core.events import EventKind
 from simscen.core.stage import Situation
 from simscen.spec.base import Spec
 from simscen.spec.references import GoalName
@@ -25,5 +26,5 @@ class GoalStatus(Spec, Condition):
 
     def holds(self, now: Situation) -> bool:
         """Enough such reports have come."""
-        seen = [e for e in now.events if e.kind == f"goal.{self.status}" and self.name in (None, e.name)]
-        return len(seen) >= self.count
+        kind = EventKind(f"goal.{self.status}")
+        return sum(e.kind == kind and self.name in (None, e.name) for e in now.events) >= self.count

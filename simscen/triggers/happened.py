@@ -4,6 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from simscen.core.events import EventKind
 from simscen.core.stage import Situation
 from simscen.spec.base import Spec
 from simscen.spec.places import Name
@@ -13,7 +14,7 @@ from simscen.triggers.base import Condition
 Count = Annotated[int, Field(ge=1, le=10_000)]
 
 
-def _seen(now: Situation, kind: str, name: str | None) -> int:
+def _seen(now: Situation, kind: EventKind, name: str | None) -> int:
     return sum(e.kind == kind and name in (None, e.name) for e in now.events)
 
 
@@ -30,7 +31,7 @@ class EventStatus(Spec, Condition):
 
     def holds(self, now: Situation) -> bool:
         """It has."""
-        return _seen(now, f"event.{self.status}", self.name) > 0
+        return _seen(now, EventKind(f"event.{self.status}"), self.name) > 0
 
 
 class Replan(Spec, Condition):
@@ -44,7 +45,7 @@ class Replan(Spec, Condition):
 
     def holds(self, now: Situation) -> bool:
         """Plans beyond the first one of each goal."""
-        return sum(e.kind == "plan.made" and e.data.get("reason") != "goal" for e in now.events) >= self.count
+        return sum(e.kind == EventKind.PLAN_MADE and e.data.get("reason") != "goal" for e in now.events) >= self.count
 
 
 class RecoveryStatus(Spec, Condition):
@@ -62,7 +63,7 @@ class RecoveryStatus(Spec, Condition):
 
     def holds(self, now: Situation) -> bool:
         """Often enough."""
-        return _seen(now, f"recovery.{self.status}", self.name) >= self.count
+        return _seen(now, EventKind(f"recovery.{self.status}"), self.name) >= self.count
 
 
 class Collided(Spec, Condition):
@@ -76,4 +77,4 @@ class Collided(Spec, Condition):
 
     def holds(self, now: Situation) -> bool:
         """It has."""
-        return _seen(now, "collision.started", self.object) > 0
+        return _seen(now, EventKind.COLLISION_STARTED, self.object) > 0

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from simscen.core.events import EventKind
 from simscen.core.geometry import Array, Pose2
 from simscen.core.samples import Samples
 from simscen.core.verdict import Status
@@ -47,7 +48,7 @@ def draw_objects(canvas: Canvas, scene: Scene) -> None:
     A ghost has the colour that the robot's way has where the robot was at that moment.
     """
     shapes = outlines(scene.trace, scene.bodies)
-    spawned = {event.name: pose_of(event) for event in scene.trace.of_kind("object.spawned")}
+    spawned = {event.name: pose_of(event) for event in scene.trace.of_kind(EventKind.OBJECT_SPAWNED)}
     for name in sorted(shapes):
         samples = scene.trace.objects.get(name)
         last = spawned.get(name)
@@ -118,7 +119,7 @@ def draw_robot(canvas: Canvas, scene: Scene) -> None:
 
 def draw_collisions(canvas: Canvas, scene: Scene) -> None:
     """A star at every contact."""
-    for event in scene.trace.of_kind("collision.started"):
+    for event in scene.trace.of_kind(EventKind.COLLISION_STARTED):
         x, y = event.data.get("x"), event.data.get("y")
         if not isinstance(x, int | float) or not isinstance(y, int | float):
             x, y = scene.trace.place(event.tick)

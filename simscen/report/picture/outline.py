@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from simscen.core.events import Event
+from simscen.core.events import Event, EventKind
 from simscen.core.geometry import Array, Pose2
 from simscen.core.shapes import Body, Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Shape, Sphere
 from simscen.core.trace import Trace
@@ -15,7 +15,7 @@ _UNKNOWN_RADIUS = 0.2
 def outlines(trace: Trace, bodies: Sequence[Body]) -> dict[str, Array]:
     """The outline (n, 2) of each object in its own frame: from the world's bodies and from what was spawned."""
     found = {body.name: of_body(body) for body in bodies if body.solids}
-    found.update({event.name: of_event(event) for event in trace.of_kind("object.spawned")})
+    found.update({event.name: of_event(event) for event in trace.of_kind(EventKind.OBJECT_SPAWNED)})
     for name in trace.objects:
         found.setdefault(name, _circle(_UNKNOWN_RADIUS))
     return found

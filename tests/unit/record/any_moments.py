@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from simscen.core.belief import Belief
-from simscen.core.events import Event
+from simscen.core.events import Event, EventKind
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.motion import Twist
 from simscen.core.navigation import Path
@@ -27,7 +27,7 @@ beliefs = st.builds(Belief, poses, matrices, poses)
 points = st.lists(st.tuples(floats, floats, floats), max_size=4).map(lambda rows: np.array(rows).reshape(-1, 3))
 plans = st.builds(Path, points, ticks)
 data = st.dictionaries(st.text(), st.floats() | st.text() | st.none() | st.booleans(), max_size=3)
-events = st.lists(st.builds(Event, ticks, st.text(), st.text(), data), max_size=2).map(tuple)
+events = st.lists(st.builds(Event, ticks, st.sampled_from(EventKind), st.text(), data), max_size=2).map(tuple)
 decisions = st.builds(Decision, twists, st.none() | beliefs, st.none() | plans, st.none() | plans, events)
 
 odometries = st.builds(Odometry, st.sampled_from(["a", "b"]), ticks, poses, twists)
