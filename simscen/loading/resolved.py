@@ -1,12 +1,11 @@
 """A scenario as one self-contained text: what a log and an output folder keep of it."""
 
-import yaml
-
 from simscen.core.errors import InvalidInput
 from simscen.loading.compose import compose
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.tree import Fields
 from simscen.loading.validation import check
+from simscen.loading.writing import to_yaml
 from simscen.model.scenario import ScenarioSpec
 
 
@@ -15,7 +14,7 @@ def resolved_text(loaded: LoadedScenario) -> str:
     own, _ = compose(loaded.text, loaded.path)
     if isinstance(own, Fields) and own.plain == loaded.tree.plain:
         return loaded.text
-    return yaml.safe_dump(loaded.tree.plain, sort_keys=False, allow_unicode=True)
+    return to_yaml(loaded.tree.plain)
 
 
 def spec_of_text(text: str, name: str) -> ScenarioSpec:

@@ -12,6 +12,7 @@ from simscen.loading.assets import Assets
 from simscen.loading.document import Library
 from simscen.loading.loaded import LoadedWorld
 from simscen.loading.paths import Fence
+from simscen.loading.writing import Dumper, to_yaml
 from simscen.model.world import WorldSpec
 
 
@@ -35,7 +36,7 @@ def load_world_file(path: Path, root: Path, world_path: Sequence[Path] = ()) -> 
 def world_text(spec: WorldSpec) -> str:
     """A world as the text of a `*.world.yaml`, without what is as it would be anyway."""
     data = spec.model_dump(mode="json", exclude_defaults=True)
-    return yaml.dump(_in_order(data), Dumper=_Compact, sort_keys=False, allow_unicode=True, width=1000)
+    return to_yaml(_in_order(data), _Compact)
 
 
 def _in_order(value: Any) -> Any:
@@ -48,7 +49,7 @@ def _in_order(value: Any) -> Any:
     return {key: _in_order(value[key]) for key in dict.fromkeys((*first, *value))}
 
 
-class _Compact(yaml.SafeDumper):
+class _Compact(Dumper):
     """Writes a thing with its shape and pose on one line, but one line for each of a list of things."""
 
 

@@ -1,0 +1,78 @@
+"""What simscen writes as YAML, simscen reads back as the same."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from simscen.loading.compose import compose
+from simscen.loading.resolved import resolved_text, spec_of_text
+from simscen.loading.scenario import load_scenario
+from simscen.loading.source import read_text
+from simscen.loading.worldfile import world_text
+from simscen.loading.writing import to_yaml
+from simscen.model.world import WorldSpec
+
+ODD = [
+    *("1e3", "on", "off", "yes", "0o7", "017", "0x1f", "1:30", "12:30:45", "1_000", ".5", ".inf", ".nan", "null", "~"),
+    *("", " ", "true", "2026-11-21", "<<", "=", "!tag", "&a", "*a", "- a", "a: b", "a #b", "#", "%", "@", "`", "'"),
+    *('"', "\\", "a\nb", "\n", " a", "a ", "\t", "\x7f", "\x85", "\xa0", "\u2028", "\u202e", "\ufeff", "\U0001f916"),
+    *("9" * 25, "-", "--- a", "...", "?", "? a", "|", ">", "[", "]", "{", "}", ",", "Ü", "+1", "1.", "0.0", "NULL"),
+]
+TEXTS = st.sampled_from(ODD) | st.text(st.characters(exclude_categories=["Cs"]), max_size=12)
+NUMBERS = st.integers(-(10**17), 10**17) | st.floats(allow_nan=False)
+SCALARS = TEXTS | NUMBERS | st.booleans()
+KEYS = TEXTS.filter(lambda text: text != "<<")
+TREES = st.recursive(
+    SCALARS, lambda inner: st.lists(inner, max_size=4) | st.dictionaries(KEYS, inner, max_size=4), max_leaves=12
+)
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A file to write to."""
+    return tmp_path_factory.mktemp("yaml") / "a.yaml"
+
+
+@given(data=st.dictionaries(KEYS, TREES, max_size=4))
+@settings(max_examples=300, deadline=None)
+def test_what_is_written_is_read_back_equal_and_of_the_same_types(file: Path, data: dict[str, Any]) -> None:
+    """Also when it is written to a file, where the reader refuses control characters."""
+    file.write_text(to_yaml(data), encoding="utf-8", newline="")
+    text = read_text(file, "a")
+    assert isinstance(text, str), text
+    tree, problems = compose(text, "a")
+    assert not problems
+    assert tree is not None and repr(tree.plain) == repr(data)
+
+
+@pytest.mark.parametrize("name", ["1e3", "on", "0o7", "1:30", "no", "017", "2026-11-21"])
+def test_a_name_that_looks_like_something_else_survives_in_a_merged_scenario(tmp_path: Path, name: str) -> None:
+    """A goal named so made the log unjudgeable: YAML 1.1 wrote it plain, YAML 1.2 read a number."""
+    (tmp_path / "base.scenario.yaml").write_text(
+        "simscen: 1\nworld: {simscen: 1, walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]}\n"
+        "robot: {pose: {x: 1, y: 1}}\npass: [{goals_reached: {}}]\n"
+    )
+    file = tmp_path / "a.scenario.yaml"
+    file.write_text(f'extends: base.scenario.yaml\ngoals: [{{name: "{name}", pose: {{x: 5, y: 3}}}}]\n')
+    text = resolved_text(load_scenario(file, tmp_path))
+    assert spec_of_text(text, "log").goals[0].name == name
+
+
+def test_a_world_that_is_written_is_read_back_with_its_names() -> None:
+    """`simscen world convert` writes with the same hand; a world called 0o7 came back as the number 7."""
+    spec = WorldSpec.model_validate({"simscen": 1, "name": "0o7", "places": {"on": {"x": 0, "y": 0}}})
+    tree, problems = compose(world_text(spec), "world")
+    assert not problems
+    assert tree is not None and WorldSpec.model_validate(tree.plain) == spec
+
+
+def test_people_still_read_it_easily() -> None:
+    """Only what must be quoted is."""
+    data = {"name": "lidar dropout", "when": {"time": 10.5}, "goals": ["1e3", "on"], "yaw": "90 deg"}
+    text = to_yaml(data)
+    assert text == "name: lidar dropout\nwhen:\n  time: 10.5\ngoals:\n- '1e3'\n- on\nyaw: 90 deg\n"
+    assert yaml.safe_load(text)["goals"][1] is True  # what YAML 1.1 makes of it
