@@ -11,9 +11,9 @@ from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from simscen.cli.circumstances import PACKAGES, cpu_flags
 from simscen.cli.diagnostics import harmless, print_text
 from simscen.core.errors import Exit, SimscenError
+from simscen.run.versions import PACKAGES, cpu_flags
 
 PYTHONS = ((3, 10), (3, 11))
 LEAST_FREE = 500 << 20

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from simscen.cli.diagnostics import from_here, harmless
 from simscen.core.errors import InvalidInput, NothingSelected, UsageError
+from simscen.core.filesread import files_read
 from simscen.core.problems import Problem
 from simscen.loading.discovery import default_root, discover
 from simscen.loading.keywords import select
@@ -39,9 +40,12 @@ def load_all(
     for file in discover(paths, home):
         scenario = try_scenario(file, home, world_path)
         if isinstance(scenario, LoadedScenario):
-            loaded.append(replace(scenario, lenient=lenient))
-            scenario = [*scenario.notes, *checked(loaded[-1])]
-            warnings[loaded[-1].id] = scenario
+            scenario = replace(scenario, lenient=lenient)
+            with files_read() as read:
+                found = [*scenario.notes, *checked(scenario)]
+            loaded.append(replace(scenario, read=tuple(sorted(read))))
+            warnings[scenario.id] = found
+            scenario = found
         problems.update(dict.fromkeys(scenario))
     if any(problem.severity == "error" for problem in problems):
         raise InvalidInput(from_here(problems, home))

@@ -58,8 +58,8 @@ class LoadedScenario:
     `id` is its path without suffix relative to the root; `file` is absolute, `path` is `file` relative to the root as
     problems show it. `text` is the file as it was read. `map` is the map the robot gets: a ROS map, "none" for mapless
     driving, or None = what the world gives. `sources` holds the texts of all files read, by shown path, and `files`
-    their absolute paths. `notes` are warnings. With `lenient`, what of an SDF world cannot be used is left out and
-    noted.
+    their absolute paths. `read` are the files that the world and the robot were made of besides, once they were built.
+    `notes` are warnings. With `lenient`, what of an SDF world cannot be used is left out and noted.
     """
 
     id: str
@@ -75,6 +75,7 @@ class LoadedScenario:
     tree: Fields = field(repr=False)
     sources: Mapping[str, str] = field(repr=False, default_factory=dict)
     files: Mapping[str, Path] = field(default_factory=dict)
+    read: tuple[Path, ...] = ()
     notes: tuple[Problem, ...] = ()
     lenient: bool = False
 

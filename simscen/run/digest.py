@@ -1,24 +1,38 @@
 """Whether a scenario is still what it was: all that its runs depend on, as one number."""
 
 import hashlib
+import json
+import platform
 from pathlib import Path
 
-from simscen import __version__
 from simscen.loading.loaded import LoadedScenario
+from simscen.run.versions import code, cpu_flags, versions
 
 
 def digest(loaded: LoadedScenario) -> str:
-    """SHA-256 over this version, the texts of all files that were read, and the bytes of those they name.
+    """SHA-256 over the files that were read, the options that change a run, and what it is computed with.
 
-    Meshes that an SDF or URDF file includes are not among them. Raises OSError.
+    Files are those of the language (`extends`, `defaults.yaml`, world, map and robot) and those their content names:
+    map images, SDF and URDF files, what these include, meshes, heightmaps, xacro's includes. A file that moves, or that
+    another folder of --world-path now offers first, changes it too. Raises OSError.
     """
-    sha = hashlib.sha256(__version__.encode())
+    sha = hashlib.sha256(json.dumps(_circumstances(loaded), sort_keys=True).encode())
     for name, text in sorted(loaded.sources.items()):
         _take(sha, name, text.encode())
-    for file in _named(loaded):
-        _take(sha, file.name, file.read_bytes())
-    _take(sha, "lenient", str(loaded.lenient).encode())
+    for file in sorted({*_named(loaded), *loaded.read}):
+        _take(sha, _name(file, loaded), file.read_bytes())
     return sha.hexdigest()
+
+
+def _circumstances(loaded: LoadedScenario) -> dict[str, object]:
+    """What besides files decides how a run goes. The seed is part of a run's key."""
+    return {
+        "versions": versions(),
+        "code": code(),
+        "machine": platform.machine(),
+        "cpu_flags": cpu_flags(),
+        "lenient": loaded.lenient,
+    }
 
 
 def _named(loaded: LoadedScenario) -> list[Path]:
@@ -28,6 +42,11 @@ def _named(loaded: LoadedScenario) -> list[Path]:
         *(found.image for found in maps if found),
         *(file for file in (loaded.world.sdf, loaded.robot.urdf) if file),
     ]
+
+
+def _name(file: Path, loaded: LoadedScenario) -> str:
+    """The file within the root, so that a project that is moved as a whole stays what it was."""
+    return file.relative_to(loaded.root).as_posix() if file.is_relative_to(loaded.root) else str(file)
 
 
 def _take(sha: "hashlib._Hash", name: str, data: bytes) -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from simscen.core.errors import InvalidInput
+from simscen.core.filesread import note_read
 from simscen.core.problems import Problem
 from simscen.sim.urdf.markup import CODE
 
@@ -77,6 +78,7 @@ def read_urdf(path: Path, folders: Folders) -> bytes:
     try:
         real = folders.inside(path)
         check_regular(real, URDF_BYTES)
+        note_read(real)
         data = _expanded(real, folders) if real.suffix == ".xacro" else real.read_bytes()
     except Trouble as trouble:
         raise InvalidInput([Problem(shown, 0, 0, CODE, str(trouble))]) from trouble
@@ -94,11 +96,12 @@ def _expanded(path: Path, folders: Folders) -> bytes:
         raise Trouble(
             "xacro files need the xacro package: pip install 'simscen[xacro]', or write `xacro FILE > robot.urdf`"
         ) from error
+    xacro.all_includes.clear()  # it only ever grows
     try:
         document = xacro.process_file(str(path))
     except Exception as error:  # xacro raises whatever its expressions and includes happen to meet
         raise Trouble(f"xacro cannot expand it: {type(error).__name__}") from error
     for included in xacro.all_includes:
-        folders.inside(Path(included))
+        note_read(folders.inside(Path(included)))
     text: str = document.toxml()
     return text.encode()

@@ -6,6 +6,7 @@ import stat
 from collections.abc import Sequence
 from pathlib import Path
 
+from simscen.core.filesread import note_read
 from simscen.worlds.sdf.markup import Element
 from simscen.worlds.sdf.report import Place, Unusable
 
@@ -39,6 +40,7 @@ class Library:
                 raise Trouble("not a regular file")
             if status.st_size > limit:
                 raise Trouble(f"larger than {limit // 2**20} MiB")
+            note_read(real)
             return real, real.read_bytes()
         except OSError as error:
             raise Trouble(_reason(error)) from error

@@ -1,0 +1,49 @@
+"""Which software and which processor a result comes from: with others, it may differ in its last bits."""
+
+import hashlib
+import platform
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import simscen
+
+PACKAGES = (
+    *("simscen", "pybullet", "ompl", "filterpy", "numpy", "scipy", "embreex", "trimesh", "mapbox-earcut", "pycollada"),
+    *("pillow", "mcap", "zstandard", "pydantic", "pyyaml"),
+)
+"""Every package that simscen needs and that shapes a result or the bytes of a log."""
+OPTIONAL = ("xacro",)
+_LAST_BITS = frozenset({"fma", "avx", "avx2", "avx512f", "sse4_2"})
+"""The instruction sets that change last bits."""
+
+
+def versions() -> dict[str, str]:
+    """Python and the packages that shape results, by name; "" for an optional one that is not installed."""
+    return {"python": platform.python_version(), **{name: _version(name) for name in (*PACKAGES, *OPTIONAL)}}
+
+
+def cpu_flags() -> list[str]:
+    """Which of the instruction sets that change last bits this machine has; nothing where Linux does not say."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return []
+    flags = next((line.split(":", 1)[1].split() for line in lines if line.startswith("flags")), [])
+    return sorted(_LAST_BITS.intersection(flags))
+
+
+@cache
+def code() -> str:
+    """SHA-256 of simscen's own files: an installation from a working copy changes without a new version."""
+    sha, folder = hashlib.sha256(), Path(simscen.__file__).parent
+    for file in sorted(path for path in folder.rglob("*") if path.suffix in (".py", ".yaml", ".json")):
+        sha.update(f"{file.relative_to(folder).as_posix()}\0".encode() + file.read_bytes())
+    return sha.hexdigest()
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return ""

@@ -1,0 +1,191 @@
+"""An old answer is kept only for the very question it was given to: whatever a run reads is in the digest."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from simscen.cli.select import Selection, load_all
+from simscen.run import digest as module
+from simscen.run.digest import digest
+
+SCENARIO = """\
+extends: base.yaml
+world: hall.sdf
+robot: {model: cart.robot.yaml, pose: {x: 1, y: 1}}
+goals: [{pose: {x: 2, y: 1}}]
+"""
+BASE = "simscen: 1\npass: [{goals_reached: {}}]\n"
+DEFAULTS = "time_limit: 30 s\n"
+SDF = """\
+<sdf version="1.9"><world name="hall">
+  <include><uri>model://shelf</uri><pose>4 4 0 0 0 0</pose></include>
+  <model name="crate"><static>true</static><pose>6 6 0 0 0 0</pose><link name="l"><collision name="c">
+    <geometry><mesh><uri>crate.stl</uri></mesh></geometry></collision></link></model>
+  <model name="hill"><static>true</static><pose>20 20 -5 0 0 0</pose><link name="l"><collision name="c">
+    <geometry><heightmap><uri>hill.png</uri><size>4 4 1</size></heightmap></geometry></collision></link></model>
+</world></sdf>
+"""
+SHELF = """\
+<sdf version="1.9"><model name="shelf"><static>true</static><link name="l"><collision name="c">
+  <geometry><box><size>1 1 1</size></box></geometry></collision></link></model></sdf>
+"""
+MODEL_CONFIG = '<model><name>shelf</name><sdf version="1.9">model.sdf</sdf></model>'
+TRIANGLES = """\
+solid crate
+facet normal 0 0 1
+outer loop
+vertex 0 0 0
+vertex 1 0 0
+vertex 0 1 1
+endloop
+endfacet
+endsolid
+"""
+ROBOT = """\
+simscen: 1
+name: cart
+urdf: cart.xacro
+drive: {type: differential, wheel_radius: 5 cm, wheel_separation: 0.25}
+limits: {linear: 0.5, angular: 1, linear_acceleration: 1, angular_acceleration: 2}
+sensors: {lidar: {lidar: {rate: 10 Hz}}, odom: {odometry: {}}}
+"""
+XACRO = """\
+<robot name="cart" xmlns:xacro="http://www.ros.org/wiki/xacro">
+  <xacro:include filename="size.xacro"/>
+  <link name="base_link">
+    <inertial><mass value="5"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><origin xyz="0 0 ${height}"/><geometry><box size="0.3 0.2 0.3"/></geometry></collision>
+    <collision><origin xyz="0 0 0.5"/><geometry><mesh filename="mast.stl" scale="0.1 0.1 0.1"/></geometry></collision>
+  </link>
+  <link name="left"><inertial><mass value="1"/>
+    <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><geometry><cylinder radius="0.05" length="0.02"/></geometry></collision></link>
+  <joint name="left_joint" type="continuous"><parent link="base_link"/><child link="left"/>
+    <origin xyz="0 0.125 0.05" rpy="1.5708 0 0"/><axis xyz="0 0 1"/></joint>
+  <link name="right"><inertial><mass value="1"/>
+    <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><geometry><cylinder radius="0.05" length="0.02"/></geometry></collision></link>
+  <joint name="right_joint" type="continuous"><parent link="base_link"/><child link="right"/>
+    <origin xyz="0 -0.125 0.05" rpy="1.5708 0 0"/><axis xyz="0 0 1"/></joint>
+</robot>
+"""
+SIZE = """\
+<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:property name="height" value="0.2"/></robot>
+"""
+MAP = "image: hall.pgm\nresolution: 0.5\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n"
+FILES = {
+    "p/a.scenario.yaml": SCENARIO + "map: hall.yaml\n",
+    "p/base.yaml": BASE,
+    "p/defaults.yaml": DEFAULTS,
+    "p/hall.sdf": SDF,
+    "p/crate.stl": TRIANGLES,
+    "p/cart.robot.yaml": ROBOT,
+    "p/cart.xacro": XACRO,
+    "p/size.xacro": SIZE,
+    "p/mast.stl": TRIANGLES,
+    "p/hall.yaml": MAP,
+    "p/hall.pgm": "P2 20 20 255\n" + "254 " * 400,
+    "models/shelf/model.config": MODEL_CONFIG,
+    "models/shelf/model.sdf": SHELF,
+}
+Digest = Callable[..., str]
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    """A scenario that reads everything a scenario can."""
+    for name, text in FILES.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    Image.new("L", (3, 3), 100).save(tmp_path / "p/hill.png")
+    return tmp_path
+
+
+@pytest.fixture
+def of(project: Path) -> Digest:
+    """The digest as `simscen run` makes it."""
+
+    def made(*world_path: str, name: str = "a", lenient: bool = False) -> str:
+        folders = [project / folder for folder in world_path or ("models",)]
+        file = project / f"p/{name}.scenario.yaml"
+        (loaded,), _ = load_all([file], project / "p", folders, lenient, Selection())
+        return digest(loaded)
+
+    return made
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new"),
+    [
+        ("p/a.scenario.yaml", "x: 2", "x: 2.1"),
+        ("p/base.yaml", "goals_reached: {}", "collisions: {max: 0}"),
+        ("p/defaults.yaml", "30 s", "31 s"),
+        ("p/hall.sdf", "6 6 0", "6 7 0"),
+        ("models/shelf/model.sdf", "1 1 1", "1 1 2"),
+        ("models/shelf/model.config", "<name>shelf", "<name>rack"),
+        ("p/crate.stl", "1 0 0\nvertex", "2 0 0\nvertex"),
+        ("p/cart.robot.yaml", "linear: 0.5", "linear: 0.6"),
+        ("p/cart.xacro", "0.3 0.2 0.3", "0.4 0.2 0.3"),
+        ("p/size.xacro", "0.2", "0.25"),
+        ("p/mast.stl", "1 0 0\nvertex", "2 0 0\nvertex"),
+        ("p/hall.yaml", "0.65", "0.66"),
+        ("p/hall.pgm", "254 254 254", "254 0 254"),
+    ],
+)
+def test_any_file_that_a_run_reads_changes_the_digest(project: Path, of: Digest, file: str, old: str, new: str) -> None:
+    """However deep it is included; a moved model let --resume say passed where a fresh run failed."""
+    before = of()
+    text = (project / file).read_text()
+    assert old in text
+    (project / file).write_text(text.replace(old, new, 1))
+    assert of() != before
+    (project / file).write_text(text)
+    assert of() == before
+
+
+def test_a_heightmap_changes_the_digest(project: Path, of: Digest) -> None:
+    """An image that an SDF file names is read like a mesh."""
+    before = of()
+    Image.new("L", (3, 3), 0).save(project / "p/hill.png")
+    assert of() != before
+
+
+def test_a_file_that_nothing_reads_changes_nothing(project: Path, of: Digest) -> None:
+    """Or --resume would never keep anything."""
+    before = of()
+    (project / "p/notes.txt").write_text("hello")
+    (project / "models/other").mkdir()
+    assert of() == before
+
+
+def test_the_order_of_the_world_path_matters_where_it_chooses_another_model(project: Path, of: Digest) -> None:
+    """A folder that comes first may hold another shelf."""
+    (project / "mine/shelf").mkdir(parents=True)
+    (project / "mine/shelf/model.config").write_text(MODEL_CONFIG)
+    (project / "mine/shelf/model.sdf").write_text(SHELF.replace("1 1 1", "2 2 2"))
+    assert of("mine", "models") != of("models", "mine")
+    assert of("models", "mine") == of("models")
+
+
+def test_leniency_matters(of: Digest) -> None:
+    """It leaves out what cannot be used."""
+    assert of(lenient=True) != of()
+
+
+def test_every_scenario_in_a_world_knows_all_files_of_it(project: Path, of: Digest) -> None:
+    """Also the second one, whose world another has had built already."""
+    (project / "p/b.scenario.yaml").write_text(FILES["p/a.scenario.yaml"])
+    loaded, _ = load_all([project / "p"], project / "p", [project / "models"], False, Selection())
+    first, second = (scenario.read for scenario in loaded)
+    assert first == second
+    assert {"model.sdf", "crate.stl", "hill.png", "cart.xacro", "size.xacro", "mast.stl"} <= {f.name for f in first}
+
+
+@pytest.mark.parametrize("what", ["versions", "cpu_flags", "code"])
+def test_software_and_processor_matter(of: Digest, monkeypatch: pytest.MonkeyPatch, what: str) -> None:
+    """Another release of Bullet, other vector instructions or another simscen may change last bits."""
+    before = of()
+    monkeypatch.setattr(module, what, lambda: {"pybullet": "0"})
+    assert of() != before
