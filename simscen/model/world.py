@@ -14,13 +14,17 @@ class Wall(Spec):
     """A wall along a polyline."""
 
     name: Name = "wall"
-    """What a collision with it is reported as."""
+    """What a collision with it is reported as; default: wall_1, wall_2, …"""
     points: Annotated[list[Point], Field(min_length=2, max_length=10_000)]
     """Corners [x, y] of its centre line; repeat the first one at the end to close it."""
     thickness: PositiveLength = 0.1
     """Across the centre line."""
     height: PositiveLength = 1.0
     """From the ground."""
+
+    def called(self, number: int) -> str:
+        """Its name, or `wall_3` for the third wall of a world."""
+        return self.name if "name" in self.model_fields_set else f"wall_{number}"
 
 
 class Obstacle(Shaped):
