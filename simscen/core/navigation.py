@@ -10,7 +10,6 @@ import numpy as np
 
 from simscen.core.geometry import Array, Pose2
 
-
 RecoveryBehavior = Literal["clear_costmap", "spin", "wait", "backup"]
 """The behaviours of a recovery, with Nav2's names."""
 
