@@ -6,7 +6,7 @@ from pydantic import Field, model_validator
 
 from simscen.spec.base import Spec
 from simscen.spec.objects import Shaped
-from simscen.spec.places import Name, PlaceName, Point, PoseSpec
+from simscen.spec.places import Name, PlaceName, Point, PoseSpec, Ring
 from simscen.spec.quantities import Duration, Mass, PositiveLength, PositiveSpeed
 
 
@@ -94,8 +94,8 @@ class WorldSpec(Spec):
     doors: Annotated[list[Door], Field(max_length=200)] = []
     places: dict[PlaceName, PoseSpec] = {}
     """Named poses for goals and starts."""
-    regions: dict[PlaceName, Annotated[list[Point], Field(min_length=3, max_length=200)]] = {}
-    """Named areas: polygons over their corners."""
+    regions: dict[PlaceName, Ring] = {}
+    """Named areas: polygons over their corners, which may not cross themselves."""
 
     @model_validator(mode="after")
     def _names_differ(self) -> "WorldSpec":
