@@ -43,6 +43,27 @@ def truth(trace: Trace) -> Samples:
     return finite(trace.truth, "the true pose", trace)
 
 
+def clearance(trace: Trace) -> Samples:
+    """Distance of the hull to the nearest surface (m), (n, 1); space that is free for ever may be infinite."""
+    bad = np.isnan(trace.clearance.values[:, 0]) | np.isneginf(trace.clearance.values[:, 0])
+    if bad.any():
+        at = trace.seconds(int(trace.clearance.ticks[int(np.argmax(bad))]))
+        raise BrokenTrace(f"the clearance is not a number at t = {at:.2f} s")
+    return trace.clearance
+
+
+def check_finite(trace: Trace) -> None:
+    """Raise BrokenTrace for a signal that has to be finite and is not, whatever a criterion looks at.
+
+    Odometry may be anything: it is a reading, and what a fault makes of readings is no defect of the run.
+    """
+    truth(trace), speed(trace), clearance(trace)
+    finite(trace.belief, "the belief", trace)
+    finite(trace.command, "the command", trace)
+    for name, poses in sorted(trace.objects.items()):
+        finite(poses, f"the pose of {name}", trace)
+
+
 def speed(trace: Trace) -> Samples:
     """True speed over ground (m/s), (n, 1)."""
     velocity = finite(trace.velocity, "the true velocity", trace)

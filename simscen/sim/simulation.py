@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 import pybullet
 
+from simscen.core.case import CLEARANCE_RANGE
 from simscen.core.errors import RunError
 from simscen.core.events import Event
 from simscen.core.geometry import Pose2, Pose3
@@ -41,9 +42,11 @@ class Simulation:
         triangulate: engine.Triangulate,
         tick_rate: int = 240,
         solver_iterations: int = 10,
+        clearance_range: float = CLEARANCE_RANGE,
     ) -> None:
         """Build the world with the robot at `pose` at rest.
 
+        Clearance is searched within `clearance_range` metres of the hull.
         `triangulate` gives the surface of a shape, for moving things that the engine has no primitive for.
         """
         self.tick = 0
@@ -59,7 +62,7 @@ class Simulation:
             self._actors.add(body, 0)
         self._contacts = Contacts(tick_rate)
         self._names: dict[int, str | None] = {}
-        self._clearance = Clearance(self._client, tick_rate, static, robot, self._base, self._actors)
+        self._clearance = Clearance(self._client, tick_rate, static, robot, self._base, self._actors, clearance_range)
         self._settle(pose)
         self._changed()
 

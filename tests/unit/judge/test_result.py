@@ -57,6 +57,34 @@ def test_a_broken_signal_makes_the_run_an_error_even_when_no_criterion_looks_at_
     assert "not finite" in result.error.message
 
 
+@pytest.mark.parametrize("broken", [math.nan, -math.inf])
+def test_a_broken_clearance_makes_the_run_an_error_though_nothing_bounds_it(broken):
+    result = conclude({**TRACE, "clearance": [[0, 0.5], [2, broken], [4, 0.5]]}, {"collisions": {}})
+    assert result.outcome is Outcome.ERROR
+    assert "the clearance is not a number at t = " in result.error.message
+
+
+@pytest.mark.parametrize("signal", ["truth", "velocity", "belief", "command"])
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_one_sample_that_is_no_number_breaks_the_run_whatever_judges_it(signal, value):
+    trace = sketch(TRACE)
+    getattr(trace, signal).values[2, 1] = value
+    verdicts = judge([AnyCriterion.model_validate({"collisions": {}})], trace, sketch_case({}))
+    assert run_result("a", "a", 7, verdicts, trace, sketch_case({})).outcome is Outcome.ERROR
+
+
+def test_a_thing_without_a_place_breaks_the_run():
+    result = conclude({**TRACE, "objects": {"cart": [[0, 0, 0], [2, math.nan, 0]]}}, {"collisions": {}})
+    assert result.outcome is Outcome.ERROR
+    assert "the pose of cart is not finite" in result.error.message
+
+
+def test_free_space_without_end_is_no_error_and_its_metric_is_the_range():
+    result = conclude({**TRACE, "clearance": math.inf}, {"collisions": {}})
+    assert result.outcome is Outcome.PASSED
+    assert result.metrics["clearance_min"] == 2.0
+
+
 @pytest.mark.parametrize("text", ["{}", "[]", "3", '{"format": 99}', "nonsense"])
 def test_something_else_is_refused(text):
     with pytest.raises(ValueError, match=r"not a result|format 99|Expecting"):
