@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from simscen.core.events import EventKind
 from simscen.core.polygons import flaw
 from simscen.core.separation import separation
 from simscen.core.verdict import Finding
@@ -87,7 +88,7 @@ def _nearest(trace: Trace, poses: Samples, case: Case, region: Polygon) -> tuple
 
 def _carried(trace: Trace, poses: Samples) -> Flags:
     """Of each stretch between two samples, whether the robot was set down elsewhere in it."""
-    placed = [event.tick for event in trace.of_kind("robot.placed")]
+    placed = [event.tick for event in trace.of_kind(EventKind.ROBOT_PLACED)]
     carried = np.zeros(len(poses) + 1, dtype=bool)
     carried[np.searchsorted(poses.ticks, placed, side="right")] = True
     return carried[1:-1]
