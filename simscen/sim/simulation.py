@@ -107,9 +107,8 @@ class Simulation:
         pose, velocity = self._base.pose(), self._base.velocity()
         if not all(math.isfinite(value) for value in (*pose, *velocity[0], *velocity[1])):
             raise RunError("diverged", f"simulation diverged at t={self.tick / self._rate:.3f} s: the pose is {pose}")
-        return Truth(
-            pose, base_twist(pose, velocity), self._clearance.measure(self.tick), self._actors.poses(self.tick)
-        )
+        clearance, objects = self._clearance.measure(self.tick), self._actors.poses(self.tick)
+        return Truth(pose, base_twist(pose, velocity), clearance, objects)
 
     def _changed(self) -> None:
         """Something was put into or taken out of the world, or set down elsewhere."""
@@ -168,6 +167,10 @@ class Simulation:
     def base_velocity(self) -> tuple[Vector, Vector]:
         """Linear (m/s) and angular (rad/s) velocity of the base frame along the world's axes."""
         return self._base.velocity()
+
+    def base_twist(self) -> Twist:
+        """The robot's velocity in its own frame."""
+        return base_twist(self._base.pose(), self._base.velocity())
 
     def encoders(self) -> tuple[float, ...]:
         """What the drive has rolled so far; see `drives.Drive.encoders`."""
