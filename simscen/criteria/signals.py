@@ -99,14 +99,12 @@ def drive(trace: Trace) -> Drive:
 
     Yaw must not enter the norm (as it does in Arena's get_metrics.py, which so adds radians to metres).
     """
-    poses = truth(trace)
-    placed = {event.tick for event in trace.of_kind(EventKind.ROBOT_PLACED)}
-    jumps = set(np.searchsorted(poses.ticks, sorted(placed), side="right").tolist())
+    poses, carried = truth(trace), set(jumps(trace))
     kept, lengths = [0], [0.0]
     xs, ys = poses.values[:, 0].tolist(), poses.values[:, 1].tolist()
     for k in range(1, len(xs)):
         step = math.hypot(xs[k] - xs[kept[-1]], ys[k] - ys[kept[-1]])
-        if k in jumps:
+        if k in carried:
             kept.append(k)
             lengths.append(0.0)
         elif step >= SMALLEST_MOVE:
@@ -115,6 +113,13 @@ def drive(trace: Trace) -> Drive:
     if not xs:
         return Drive(np.empty(0, dtype=np.int64), np.empty(0))
     return Drive(poses.ticks[kept], np.cumsum(lengths))
+
+
+def jumps(trace: Trace) -> list[int]:
+    """The truth samples before which the robot was set down elsewhere, which is neither driving nor braking."""
+    placed = sorted({event.tick for event in trace.of_kind(EventKind.ROBOT_PLACED)})
+    samples: list[int] = np.searchsorted(trace.truth.ticks, placed, side="right").tolist()
+    return samples
 
 
 def pose_error(trace: Trace) -> Samples:
