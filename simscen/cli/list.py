@@ -17,9 +17,7 @@ def command(
     paths: Annotated[list[Path], typer.Argument(help="Scenario files, or folders to search.")],
     keyword: Annotated[str, typer.Option("-k", help="Parts of ids with and, or, not, as in pytest.")] = "",
     tag: Annotated[list[str] | None, typer.Option(help="Only scenarios with this tag; repeatable.")] = None,
-    root: Annotated[
-        Path | None, typer.Option(help="Files inside scenarios stay in this folder.")
-    ] = None,
+    root: Annotated[Path | None, typer.Option(help="Files inside scenarios stay in this folder.")] = None,
     world_path: Annotated[list[Path] | None, typer.Option(help="Folder with worlds and models; repeatable.")] = None,
 ) -> None:
     """List the scenarios that a selection means.

@@ -56,9 +56,7 @@ def command(
         Path | None, typer.Option(help="Go on in this output folder: only what has no verdict yet, or has changed.")
     ] = None,
     shard: Annotated[str, typer.Option(help="i/n: only every n-th scenario, from the i-th on.")] = "1/1",
-    root: Annotated[
-        Path | None, typer.Option(help="Files inside scenarios stay in this folder.")
-    ] = None,
+    root: Annotated[Path | None, typer.Option(help="Files inside scenarios stay in this folder.")] = None,
     world_path: Annotated[list[Path] | None, typer.Option(help="Folder with worlds and models; repeatable.")] = None,
     lenient: Annotated[
         bool, typer.Option("--lenient", help="Leave out what of an SDF world cannot be used, with a warning.")

@@ -28,9 +28,7 @@ class Format(str, Enum):
 def command(
     paths: Annotated[list[Path], typer.Argument(help="Files, or folders to search.")],
     format_: Annotated[Format, typer.Option("--format", help="How to print problems.")] = Format.TEXT,
-    root: Annotated[
-        Path | None, typer.Option(help="Files inside scenarios stay in this folder.")
-    ] = None,
+    root: Annotated[Path | None, typer.Option(help="Files inside scenarios stay in this folder.")] = None,
     world_path: Annotated[list[Path] | None, typer.Option(help="Folder with worlds and models; repeatable.")] = None,
     lenient: Annotated[
         bool, typer.Option("--lenient", help="What of an SDF world cannot be used is a warning, not an error.")
