@@ -3,10 +3,9 @@ import math
 
 import pytest
 
-from simscen.core.result import Outcome
+from simscen.core.result import Outcome, RunKey
 from simscen.criteria.criterion import AnyCriterion
-from simscen.judge.judge import judge
-from simscen.judge.result import run_result
+from simscen.judge.result import result_of
 from simscen.judge.resultdata import from_json, read_result, to_json
 from simscen.judge.sketch import sketch, sketch_case
 
@@ -15,9 +14,9 @@ TRACE = {"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]], "clearance": 0.5, "event
 
 def conclude(trace, *criteria):
     built, case = sketch(trace), sketch_case({})
-    verdicts = judge([AnyCriterion.model_validate(words) for words in criteria], built, case)
+    asked = [AnyCriterion.model_validate(words) for words in criteria]
     lines = tuple(range(10, 10 + len(criteria)))
-    return run_result("a/b", "scenarios/a/b.scenario.yaml", 7, verdicts, built, case, lines=lines)
+    return result_of(RunKey("a/b", 7), "scenarios/a/b.scenario.yaml", asked, built, case, lines)
 
 
 def test_a_result_survives_its_file(tmp_path):
@@ -69,8 +68,8 @@ def test_a_broken_clearance_makes_the_run_an_error_though_nothing_bounds_it(brok
 def test_one_sample_that_is_no_number_breaks_the_run_whatever_judges_it(signal, value):
     trace = sketch(TRACE)
     getattr(trace, signal).values[2, 1] = value
-    verdicts = judge([AnyCriterion.model_validate({"collisions": {}})], trace, sketch_case({}))
-    assert run_result("a", "a", 7, verdicts, trace, sketch_case({})).outcome is Outcome.ERROR
+    criteria = [AnyCriterion.model_validate({"collisions": {}})]
+    assert result_of(RunKey("a", 7), "a", criteria, trace, sketch_case({})).outcome is Outcome.ERROR
 
 
 def test_a_thing_without_a_place_breaks_the_run():
