@@ -3,7 +3,7 @@
 from simscen.actions.base import Action
 from simscen.core.stage import Stage
 from simscen.spec.base import Spec
-from simscen.spec.references import MovableName
+from simscen.spec.references import ObjectName
 
 
 class Remove(Spec, Action):
@@ -12,7 +12,7 @@ class Remove(Spec, Action):
     Example: `do: {remove: {name: pallet}}`
     """
 
-    name: MovableName
+    name: ObjectName
     """The object to remove."""
 
     def perform(self, stage: Stage) -> None:

@@ -1,5 +1,6 @@
 """The program of the warm process: `python -I -m simscen.cli.warm_process FD`. Not for people."""
 
+import resource
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -7,11 +8,10 @@ from typing import Any
 
 import simscen.sim.simulation
 import simscen.stack.build  # noqa: F401 - engines are imported here so that the forks need not
-from simscen.core.run import Run
 from simscen.report.picture import Scene, write_picture
+from simscen.run.confine import MEMORY_BYTES
 from simscen.run.jobs import Job
-from simscen.run.perform import perform
-from simscen.run.prepare import Prepared
+from simscen.run.perform import Performed, perform
 from simscen.run.prepared_cache import PreparedCache
 from simscen.run.worker import Progress
 from simscen.run.zygote import Zygote
@@ -21,20 +21,32 @@ _PREPARED = PreparedCache()
 
 def main() -> None:
     """Serve the supervisor until it closes its end."""
-    replies = int(sys.argv[1])
-    Zygote(sys.stdin.buffer, replies, lambda job: _PREPARED.prepared(job.scenario), _perform).serve()
+    Zygote(0, int(sys.argv[1]), _warm_up, _perform).serve()
+
+
+def _warm_up(job: Job) -> None:
+    """Prepare the scenario. Before what is kept takes more than half of the memory there is, it is let go."""
+    if _memory() > MEMORY_BYTES / 2:
+        _PREPARED.clear()
+    _PREPARED.prepared(job.scenario)
+
+
+def _memory() -> int:
+    """The address space in use, in bytes, which is what is bounded (Linux: field 1 of /proc/self/statm, in pages)."""
+    return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
 
 
 def _perform(job: Job, tell: Callable[[float], None]) -> dict[str, Any]:
     prepared = _PREPARED.prepared(job.scenario)
     progress = Progress(prepared.spec.physics.tick_rate, tell)
-    return perform(prepared, job.key.seed, job.folder, (progress,), _finish)
+    return perform(prepared, job.key, job.folder, (progress,), _finish)
 
 
-def _finish(prepared: Prepared, run: Run, folder: Path) -> None:
+def _finish(run: Performed) -> None:
+    prepared = run.prepared
     world = prepared.built.world
-    scene = Scene(run.trace, run.case, prepared.built.map, run.result, world.places, world.bodies)
-    write_picture(scene, folder / "map.png")
+    scene = Scene(run.trace, prepared.case, prepared.built.map, run.result, world.places, world.bodies)
+    write_picture(scene, run.folder / "map.png")
 
 
 if __name__ == "__main__":

@@ -4,6 +4,8 @@ import ctypes
 import os
 import resource
 import signal
+from contextlib import suppress
+from pathlib import Path
 
 MEMORY_BYTES = 4 << 30
 FILE_BYTES = 2 << 30
@@ -19,6 +21,19 @@ def die_with_parent(parent: int) -> None:
     ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
     if os.getppid() != parent:
         os._exit(1)
+
+
+def limit_memory() -> None:
+    """Bound the memory of this process and of what it forks; no core dumps."""
+    for what, most in ((resource.RLIMIT_AS, MEMORY_BYTES), (resource.RLIMIT_CORE, 0)):
+        hard = resource.getrlimit(what)[1]
+        resource.setrlimit(what, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
+
+
+def offer_to_the_oom_killer() -> None:
+    """Ask the kernel to end this process rather than the one that watches over it when the machine is out of memory."""
+    with suppress(OSError):  # a kernel or sandbox that does not let itself be asked
+        Path("/proc/self/oom_score_adj").write_text("500")
 
 
 def limit_resources() -> None:

@@ -1,11 +1,12 @@
 """What the supervisor asks the warm process for, and what it hears back."""
 
 import json
+import os
 import pickle
 import struct
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from simscen.core.result import RunKey
 from simscen.loading.loaded import LoadedScenario
@@ -26,7 +27,10 @@ class Job:
 
 @dataclass(frozen=True)
 class ProcessEnd:
-    """How the process of a job ended. `last_word` is the worker's own, None when it had none."""
+    """How the process of a job ended. `last_word` is the worker's own, None when it had none.
+
+    `printed` is the end of what it printed.
+    """
 
     number: int
     code: int | None
@@ -37,24 +41,47 @@ class ProcessEnd:
     cpu: float
     peak_bytes: int
     left_processes: bool
+    printed: str
 
 
-def send_job(stream: IO[bytes], job: Job) -> None:
-    """Write one job; the other side is our own process, so pickle is safe."""
+@dataclass(frozen=True)
+class PreparerDeath:
+    """The warm process died under a job, or was killed because it no longer answered.
+
+    `how` says so in words; `at_fault` = it was preparing this very job; `printed` is the end of what it printed.
+    """
+
+    how: str
+    at_fault: bool
+    timed_out: bool
+    printed: str
+
+
+def packed(job: Job) -> bytes:
+    """One job as bytes; the other side is our own process, so pickle is safe."""
     data = pickle.dumps(job)
-    stream.write(_LENGTH.pack(len(data)) + data)
-    stream.flush()
+    return _LENGTH.pack(len(data)) + data
 
 
-def receive_job(stream: IO[bytes]) -> Job | None:
-    """Read one job; None at the end of the stream."""
-    head = stream.read(_LENGTH.size)
+def receive_job(pipe: int) -> Job | None:
+    """Read one job; None at the end of the stream. Nothing beyond it is read, so that `select` sees the next one."""
+    head = _exactly(pipe, _LENGTH.size)
     if len(head) < _LENGTH.size:
         return None
     (length,) = _LENGTH.unpack(head)
-    job = pickle.loads(stream.read(length))
+    data = _exactly(pipe, length)
+    if len(data) < length:
+        return None
+    job = pickle.loads(data)
     assert isinstance(job, Job)
     return job
+
+
+def _exactly(pipe: int, size: int) -> bytes:
+    data = bytearray()
+    while len(data) < size and (piece := os.read(pipe, size - len(data))):
+        data += piece
+    return bytes(data)
 
 
 def line(message: dict[str, Any]) -> bytes:

@@ -21,6 +21,11 @@ class PreparedCache:
             self._scenarios[loaded.id] = prepare(loaded, self._world)
         return self._scenarios[loaded.id]
 
+    def clear(self) -> None:
+        """Forget everything."""
+        self._worlds.clear()
+        self._scenarios.clear()
+
     def _world(self, loaded: LoadedScenario, height: float) -> BuiltWorld:
         key = hashlib.sha256(pickle.dumps((loaded.world, height))).hexdigest()
         if key not in self._worlds:

@@ -5,18 +5,17 @@ answer: the worker's own last word counts only if its process also exited with s
 """
 
 import json
-import os
 import signal
-import subprocess
-import sys
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from typing import IO, Any
+from typing import Any
 
-from simscen.run.confine import environment
-from simscen.run.jobs import Job, ProcessEnd, send_job
+from simscen.run.jobs import Job, PreparerDeath, ProcessEnd, packed
+from simscen.run.warmprocess import Silent, WarmProcess
+
+SILENCE = 30.0
+"""Seconds without a sign of life after which the warm process is taken for dead; it gives one each second."""
 
 
 @dataclass(frozen=True)
@@ -36,10 +35,10 @@ class Advanced:
 
 @dataclass(frozen=True)
 class Ended:
-    """A job's process has ended; `end` None = the warm process died under it."""
+    """A job's process has ended, or the warm process under it."""
 
     job: Job
-    end: ProcessEnd | None
+    end: ProcessEnd | PreparerDeath
 
 
 class Interrupted(BaseException):
@@ -61,70 +60,98 @@ def supervise(
     `entry` is how Python is called to be the warm process, e.g. `-m module`. `go_on` is asked before each new job.
     When the consumer stops early (or an exception passes through), everything that still runs is killed.
     """
-    waiting, running = deque(jobs), dict[int, Job]()
-    while waiting and go_on():
-        with _warm_process(entry) as (send, hear):
+    return _Supervisor(jobs, workers, entry, go_on).happenings()
+
+
+class _Supervisor:
+    """Jobs wait, run, and are answered.
+
+    When the warm process dies, the job that it was preparing is to blame and its neighbours run again in the next
+    one. When it was preparing none, any of those under way may have killed it: they are `suspects`, each of which
+    runs again by itself, and is to blame when that happens again.
+    """
+
+    def __init__(self, jobs: Iterable[Job], workers: int, entry: Sequence[str], go_on: Callable[[], bool]) -> None:
+        self._waiting, self._suspects = deque(jobs), deque[Job]()
+        self._workers, self._entry, self._go_on = workers, entry, go_on
+        self._running: dict[int, Job] = {}
+        self._preparing: Job | None = None
+        self._begun: set[int] = set()
+        self._tried: set[int] = set()
+        self._alive = False
+
+    def happenings(self) -> Iterator[Happening]:
+        while (self._waiting or self._suspects) and self._go_on():
+            self._alive = False
+            warm = WarmProcess(self._entry)
             try:
-                yield from _converse(waiting, running, workers, send, hear, go_on)
-            except (BrokenPipeError, EOFError):
-                for job in running.values():
-                    yield Ended(job, None)
-                running.clear()
+                yield from self._converse(warm)
+            except EOFError:
+                yield from self._after_death(*warm.autopsy(), silent=False)
+            except Silent:
+                warm.abort()
+                yield from self._after_death(*warm.autopsy(), silent=True)
+            finally:
+                warm.leave()
 
+    def _converse(self, warm: WarmProcess) -> Iterator[Happening]:
+        while True:
+            while self._go_on() and (job := self._next()):
+                self._running[job.number] = job
+                warm.send(packed(job))
+            if not self._running:
+                return
+            happening = self._understood(warm.hear(self._patience()))
+            if happening is not None:
+                yield happening
 
-def _converse(
-    waiting: deque[Job],
-    running: dict[int, Job],
-    workers: int,
-    send: IO[bytes],
-    hear: IO[bytes],
-    go_on: Callable[[], bool],
-) -> Iterator[Happening]:
-    while True:
-        while waiting and len(running) < workers and go_on():
-            job = waiting.popleft()
-            running[job.number] = job
-            send_job(send, job)
-        if not running:
-            return
-        text = hear.readline()
-        if not text:
-            raise EOFError
-        yield _understood(json.loads(text), running)
+    def _next(self) -> Job | None:
+        """The job to start now. A suspect has the warm process to itself."""
+        suspected = self._tried & self._running.keys()
+        if self._suspects and not self._running:
+            return self._suspects.popleft()
+        if self._suspects or suspected or not self._waiting or len(self._running) >= self._workers:
+            return None
+        return self._waiting.popleft()
 
+    def _patience(self) -> float:
+        """Preparing has the wall limit of the job, and nothing else is heard meanwhile."""
+        return SILENCE + (self._preparing.wall_limit if self._preparing else 0.0)
 
-def _understood(message: dict[str, Any], running: dict[int, Job]) -> Happening:
-    if "started" in message:
-        return Started(running[message["started"]])
-    if "seconds" in message:
-        return Advanced(running[message["job"]], message["seconds"])
-    number = message.pop("exit")
-    return Ended(running.pop(number), ProcessEnd(number=number, **message))
+    def _understood(self, text: bytes) -> Happening | None:
+        message: dict[str, Any] = json.loads(text)
+        match message:
+            case {"started": number}:
+                self._preparing = self._running[number]
+                if number not in self._begun:
+                    self._begun.add(number)
+                    return Started(self._running[number])
+            case {"prepared": _}:
+                self._preparing = None
+            case {"job": number, "seconds": seconds}:
+                return Advanced(self._running[number], seconds)
+            case {"exit": number}:
+                del message["exit"]
+                return Ended(self._running.pop(number), ProcessEnd(number=number, **message))
+            case _:
+                self._alive = True
+        return None
 
-
-@contextmanager
-def _warm_process(entry: Sequence[str]) -> Iterator[tuple[IO[bytes], IO[bytes]]]:
-    """Start it; at the end close its input, which makes it kill what is left, and wait for it."""
-    replies_out, replies_in = os.pipe()
-    process = subprocess.Popen(
-        [sys.executable, "-I", *entry, str(replies_in)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        pass_fds=[replies_in],
-        env=environment(),
-        start_new_session=True,
-    )
-    os.close(replies_in)
-    assert process.stdin is not None
-    try:
-        with os.fdopen(replies_out, "rb") as hear:
-            yield process.stdin, hear
-    finally:
-        with suppress(BrokenPipeError):  # it is dead already; that is what we wanted
-            process.stdin.close()
-        try:
-            process.wait(timeout=5)
-        except subprocess.TimeoutExpired:
-            os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
+    def _after_death(self, how: str, printed: str, silent: bool) -> Iterator[Happening]:
+        """Answer the jobs that are to blame; the others run again."""
+        under_way, culprit = list(self._running.values()), self._preparing
+        self._running.clear()
+        self._preparing = None
+        how = "did not answer and " + how if silent else how
+        if not self._alive:  # it cannot even start, and will not for any other
+            under_way += [*self._suspects, *self._waiting]
+            self._suspects.clear()
+            self._waiting.clear()
+        for job in under_way:
+            if job is culprit or job.number in self._tried or not self._alive:
+                yield Ended(job, PreparerDeath(how, job is culprit, silent and job is culprit, printed))
+            elif culprit is not None:
+                self._waiting.appendleft(job)
+            else:
+                self._tried.add(job.number)
+                self._suspects.append(job)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.run import supervisor
+from simscen.run import warmprocess
 
 SIMSCEN = Path(sys.executable).with_name("simscen")
 TELLING = str(Path(__file__).with_name("telling_zygote.py"))
@@ -103,8 +103,8 @@ def test_90_without_fused_multiply_add_the_verdicts_are_the_same(reference, pair
         "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-AVX512F",
         "NPY_DISABLE_CPU_FEATURES": "AVX2 FMA3 AVX512F AVX512CD AVX512_SKX",
     }
-    environment = supervisor.environment()
-    monkeypatch.setattr(supervisor, "environment", lambda: {**environment, **plain})
+    environment = warmprocess.environment()
+    monkeypatch.setattr(warmprocess, "environment", lambda: {**environment, **plain})
     assert simscen("run", ".", "--out", "out").code == 0
     assert isinstance(json.loads((pair / "out/run.json").read_text())["cpu_flags"], list)
     verdicts = {

@@ -4,7 +4,14 @@ from pathlib import Path
 
 import numpy as np
 
-import simscen
+from simscen.core.result import Outcome, RunKey
+from simscen.core.time import Clock
+from simscen.loading.scenario import load_scenario
+from simscen.record.tracebuilder import TraceBuilder
+from simscen.run.assemble import assemble
+from simscen.run.lockstep import run_lockstep
+from simscen.run.perform import judged
+from simscen.run.prepare import prepare
 from simscen.stack.cusps import cusps
 
 ROOT = Path(__file__).parents[2]
@@ -13,9 +20,13 @@ MOVING = 0.03
 
 
 def test_a_car_turns_round_in_a_road_too_narrow_for_one_sweep():
-    run = simscen.simulate(ROOT / "scenarios/robots/car_three_point_turn.scenario.yaml")
-    trace = run.trace
-    assert run.passed
+    loaded = load_scenario(ROOT / "scenarios/robots/car_three_point_turn.scenario.yaml", ROOT)
+    prepared = prepare(loaded)
+    rig, builder = assemble(prepared, loaded.spec.seed), TraceBuilder(Clock(240))
+    end = run_lockstep(rig, (builder,))
+    rig.simulation.close()
+    trace = builder.finish(end.tick)
+    assert judged(prepared, RunKey(loaded.id, loaded.spec.seed), trace).outcome is Outcome.PASSED
 
     assert len(cusps(trace.plans[0].points)) >= 2
     speed, turn = trace.velocity.values[:, 0], trace.velocity.values[:, 2]

@@ -1,5 +1,6 @@
 """A warm process whose runs go wrong the way the scenario's first tag says: the test-only hook for faults."""
 
+import contextlib
 import ctypes
 import os
 import signal
@@ -10,8 +11,38 @@ import time
 from simscen.run.zygote import Zygote
 
 
-def perform(job, tell):
-    fault = job.scenario.spec.tags[0] if job.scenario.spec.tags else "fine"
+def prepare(job):
+    match fault_of(job):
+        case "prepare-segfault":
+            ctypes.string_at(0)
+        case "prepare-exit":
+            sys.exit(0)
+        case "prepare-hang":  # in C, with Python's lock held: no signal handler of Python's runs
+            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGALRM})
+            ctypes.PyDLL(None).sleep(60)
+        case "prepare-memory":
+            print("growing", file=sys.stderr, flush=True)
+            bytearray(8 << 30)
+
+
+def fault_of(job):
+    return job.scenario.spec.tags[0] if job.scenario.spec.tags else "fine"
+
+
+def daemon(seconds):
+    """A process that left group, session and parent behind, as daemons do."""
+    if os.fork() == 0:
+        os.setsid()
+        if os.fork() == 0:
+            for pipe in range(256):
+                with contextlib.suppress(OSError):
+                    os.close(pipe)
+            os.execvp("sleep", ["sleep", seconds])
+        os._exit(0)
+
+
+def perform(job, tell):  # noqa: PLR0915 - a list of faults
+    fault = fault_of(job)
     tell(1.5)
     match fault:
         case "segfault":
@@ -30,13 +61,35 @@ def perform(job, tell):
             signal.signal(signal.SIGTERM, signal.SIG_IGN)
             time.sleep(60)
         case "memory":
-            hoard = [bytearray(1 << 28) for _ in range(64)]
+            hoard = [bytes(1 << 28) for _ in range(64)]
             return {"outcome": f"{len(hoard)}"}
         case "grandchild":
             subprocess.Popen(["sleep", "60"])
+        case "daemon":
+            daemon(DAEMON)
+            time.sleep(0.2)
+        case "daemon-crash":
+            daemon(DAEMON)
+            time.sleep(0.2)
+            ctypes.string_at(0)
+        case "stray-bytes":
+            for pipe in range(3, 256):
+                with contextlib.suppress(OSError):
+                    os.write(pipe, b"\xff[[[ stray {\n" + b"[" * 100_000 + b'\n[1]\n{"end": 1}\n')
+        case "prepare-memory" | "prepare-exit":
+            prepare(job)
+        case "stop-parent":
+            os.kill(os.getppid(), signal.SIGSTOP)
+            time.sleep(60)
+        case "busy":
+            ctypes.PyDLL(None).sleep(60)
+        case "long":
+            time.sleep(1.0)
         case "flood":
+            os.write(1, b"the beginning\n")
             for _ in range(100):
                 os.write(1, b"x" * 1_000_000)
+            os.write(1, b"\nthe end\n")
         case "kill-parent":
             os.kill(os.getppid(), signal.SIGKILL)
             time.sleep(60)
@@ -47,9 +100,11 @@ def perform(job, tell):
     return {"outcome": "passed"}
 
 
+DAEMON = "61.25"
+
 RESULT = """{"format": 1, "scenario": "x", "seed": 1, "variation": "", "path": "x", "outcome": "passed", "ended": "",
 "simulated_seconds": 1.5, "tick_rate": 240, "again": "", "events": {}, "metrics": {}, "verdicts": [], "error": null}"""
 
 
 if __name__ == "__main__":
-    Zygote(sys.stdin.buffer, int(sys.argv[1]), lambda job: None, perform).serve()
+    Zygote(0, int(sys.argv[1]), prepare, perform).serve()

@@ -1,0 +1,61 @@
+"""worker.log: what a run prints, of a flood only the beginning and the end."""
+
+import os
+from pathlib import Path
+
+HEAD = 1 << 20
+TAIL = 1 << 18
+AT_ONCE = 1 << 20
+
+
+class KeptLog:
+    """Takes what a process writes: the first HEAD bytes go to the file at once, of the rest the last TAIL at the end.
+
+    A file that cannot be written costs nothing but the file: `last` still has the end.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._room, self._left_out = HEAD, 0
+        self._end = bytearray()  # the last TAIL bytes of all, written or not
+        self._waiting = 0  # how many of these are not in the file
+        self._file: int | None = None
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o644)
+        except OSError:
+            self._room = 0  # the run meets the same folder, and says so
+
+    def take(self, data: bytes) -> None:
+        """Take in what was printed."""
+        head = data[: self._room]
+        self._room -= len(head)
+        self._write(head)
+        self._waiting += len(data) - len(head)
+        self._end += data
+        if len(self._end) > TAIL:
+            del self._end[:-TAIL]
+        self._left_out += max(0, self._waiting - TAIL)
+        self._waiting = min(self._waiting, TAIL)
+
+    def last(self, most: int) -> bytes:
+        """The end of what was printed."""
+        return bytes(self._end[-most:])
+
+    def close(self) -> None:
+        """Write the end down."""
+        if self._left_out:
+            self._write(f"\n… simscen left out {self._left_out} bytes here …\n".encode())
+        if self._waiting:
+            self._write(bytes(self._end[-self._waiting :]))
+        if self._file is not None:
+            os.close(self._file)
+            self._file = None
+
+    def _write(self, data: bytes) -> None:
+        if self._file is None or not data:
+            return
+        try:
+            os.write(self._file, data)
+        except OSError:  # no space left: the run's own files tell so
+            os.close(self._file)
+            self._file = None
