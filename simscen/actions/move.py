@@ -14,7 +14,7 @@ from simscen.core.stage import Stage
 from simscen.spec.base import Spec
 from simscen.spec.places import Point
 from simscen.spec.quantities import PositiveSpeed
-from simscen.spec.references import ObjectName
+from simscen.spec.references import MovableName
 
 
 class Move(Spec, Action):
@@ -25,7 +25,7 @@ class Move(Spec, Action):
     Example: `do: {move: {name: cart, through: [[4, 1], [4, 5]], speed: 1 m/s, repeat: back_and_forth}}`
     """
 
-    name: ObjectName
+    name: MovableName
     """The object to move."""
     through: Annotated[list[Point], Field(min_length=1, max_length=1000)]
     """Waypoints [x, y] in the world frame."""

@@ -3,7 +3,7 @@
 from simscen.actions.base import Action
 from simscen.core.stage import Stage
 from simscen.spec.base import Spec
-from simscen.spec.references import ObjectName
+from simscen.spec.references import MovableName
 
 
 class Remove(Spec, Action):
@@ -12,7 +12,7 @@ class Remove(Spec, Action):
     Example: `do: {remove: {name: pallet}}`
     """
 
-    name: ObjectName
+    name: MovableName
     """The object to remove."""
 
     def perform(self, stage: Stage) -> None:

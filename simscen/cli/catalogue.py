@@ -47,10 +47,13 @@ class Topic:
     model: type[BaseModel] | None
     text: str
     example: str = ""
+    rows: tuple[Field, ...] = ()
 
     @property
     def fields(self) -> list[Field]:
         """Its keys in order; none for a bare value."""
+        if self.rows:
+            return list(self.rows)
         return fields_of(self.model) if self.model is not None and not issubclass(self.model, RootModel) else []
 
     @property

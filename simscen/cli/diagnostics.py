@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from simscen.core.problems import Problem
+from simscen.report.checkout import in_checkout
 from simscen.report.text import ascii_only, no_marker, no_marker_in_json, one_line
 
 MOST_A_FILE = 50
@@ -113,7 +114,7 @@ def _columns(text: str) -> int:
 
 def _annotation(problem: Problem) -> str:
     level = "error" if problem.severity == "error" else "warning"
-    where = f"file={_property(problem.path)}"
+    where = f"file={_property(in_checkout(problem.path))}"
     if problem.line:
         where += f",line={problem.line},col={problem.col}"
     message = problem.message + (f"\n{problem.hint}" if problem.hint else "")

@@ -8,6 +8,7 @@ import typer
 
 from simscen.cli.catalogue import OPTIONAL, Field, Topic, topics
 from simscen.cli.diagnostics import print_text
+from simscen.cli.signals import signal_topics
 from simscen.core.errors import UsageError
 from simscen.loading.codes import CODES
 from simscen.loading.messages import quoted, suggestion
@@ -16,7 +17,7 @@ from simscen.loading.messages import quoted, suggestion
 def command(
     name: Annotated[str, typer.Argument(help="What to explain; nothing = list what there is.")] = "",
 ) -> None:
-    """Explain a trigger, action, fault, criterion, component or error code.
+    """Explain a trigger, action, fault, criterion, signal, component or error code.
 
     For example `simscen explain stopped_within`, `simscen explain amcl`, `simscen explain SC012`. Where a name means
     several things, all are explained; `simscen explain trigger.localization_error` picks one.
@@ -30,8 +31,12 @@ def command(
         print_text("\n\n".join(_explained(topic, width) for topic in _called(name)))
 
 
+def _everything() -> list[Topic]:
+    return [*topics(), *signal_topics()]
+
+
 def _called(name: str) -> list[Topic]:
-    everything = topics()
+    everything = _everything()
     found = [topic for topic in everything if name in (topic.name, f"{topic.group}.{topic.name}")]
     if not found:
         known = [*dict.fromkeys(topic.name for topic in everything), *CODES]
@@ -45,7 +50,7 @@ def _called(name: str) -> list[Topic]:
 
 def _overview(width: int) -> str:
     groups: dict[str, list[str]] = {}
-    for topic in topics():
+    for topic in _everything():
         groups.setdefault(topic.group, []).append(topic.name)
     lines = [f"{group}:\n{_wrapped(', '.join(names), width, '  ')}" for group, names in groups.items()]
     return "\n".join([*lines, "", "`simscen explain NAME` tells more; error codes such as SC012 are explained, too."])

@@ -11,8 +11,7 @@ from simscen.core.errors import Exit, InvalidInput
 from simscen.core.problems import Problem
 from simscen.core.result import Outcome, RunKey
 from simscen.core.sessionevents import RunFinished
-from simscen.judge.judge import judge
-from simscen.judge.result import run_result
+from simscen.judge.result import result_of
 from simscen.judge.resultdata import to_json
 from simscen.loading.resolved import spec_of_text
 from simscen.loading.source import read_text
@@ -36,8 +35,7 @@ def command(
     name = str(scenario or log)
     spec = spec_of_text(_text(scenario) if scenario else read.about.scenario, name)
     key = RunKey(read.about.name, read.about.seed)
-    verdicts = judge(spec.pass_, read.trace, read.about.case)
-    result = run_result(key.scenario, name, key.seed, verdicts, read.trace, read.about.case)
+    result = result_of(key, name, spec.pass_, read.trace, read.about.case)
     if json:
         print(to_json(result), end="")
     else:

@@ -21,7 +21,7 @@ COMMANDS = {
     "report": "Write the reports of an output folder anew.",
     "plot": "Draw a recorded run.",
     "new": "Write a commented scenario to start from.",
-    "explain": "Explain a trigger, action, fault, criterion, component or error code.",
+    "explain": "Explain a trigger, action, fault, criterion, signal, component or error code.",
     "schema": "Print or write the JSON Schemas that editors use.",
     "world": "Inspect, convert and export worlds.",
     "bench": "Measure how fast simscen runs here.",

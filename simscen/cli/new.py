@@ -5,9 +5,9 @@ from typing import Annotated
 
 import typer
 
-import simscen
 from simscen.cli.diagnostics import harmless, print_text
 from simscen.core.errors import UsageError
+from simscen.core.version import PACKAGE
 from simscen.loading.discovery import SCENARIO
 from simscen.loading.source import reason
 
@@ -20,7 +20,7 @@ def command(
     It is valid and passes as it is. A file that is there already is never overwritten.
     """
     file = Path(name if name.endswith(SCENARIO) else f"{name}{SCENARIO[0]}")
-    starter = (Path(simscen.__file__).parent / "data" / "starter.scenario.yaml").read_text(encoding="utf-8")
+    starter = (PACKAGE / "data" / "starter.scenario.yaml").read_text(encoding="utf-8")
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         with file.open("x", encoding="utf-8") as out:

@@ -11,9 +11,8 @@ from simscen.core.errors import InvalidInput, UsageError
 from simscen.core.geometry import Pose2
 from simscen.core.grid import UNKNOWN, OccupancyGrid
 from simscen.core.problems import Problem
-from simscen.core.result import RunResult
-from simscen.judge.judge import judge
-from simscen.judge.result import run_result
+from simscen.core.result import RunKey, RunResult
+from simscen.judge.result import result_of
 from simscen.judge.resultdata import from_json
 from simscen.loading.resolved import spec_of_text
 from simscen.record.replay import Log, read_log
@@ -66,8 +65,7 @@ def _result(log: Log, file: Path) -> RunResult:
         return from_json(log.result)
     about = log.about
     spec = spec_of_text(about.scenario, str(file))
-    verdicts = judge(spec.pass_, log.trace, about.case)
-    return run_result(about.name, about.name, about.seed, verdicts, log.trace, about.case)
+    return result_of(RunKey(about.name, about.seed), about.name, spec.pass_, log.trace, about.case)
 
 
 def _nothing(log: Log) -> OccupancyGrid:

@@ -15,13 +15,13 @@ from simscen.report.rebuild import read_journal
 
 def command(
     folder: Annotated[Path, typer.Argument(help="The output folder of `simscen run`.")],
-    junit: Annotated[Path | None, typer.Option(help="Write JUnit XML here as well.")] = None,
+    junit: Annotated[Path | None, typer.Option(help="Write JUnit XML here, and nothing else.")] = None,
     junit_family: Annotated[
         JunitFamily, typer.Option(help="xunit2 leaves out what Jenkins' schema forbids.")
     ] = JunitFamily.SIMSCEN,
     format_: Annotated[Format, typer.Option("--format", help="What to print.")] = Format.TEXT,
 ) -> None:
-    """Write the reports of an output folder anew from its journal.
+    """Write the reports of an output folder anew from its journal; with --junit only that file, and the folder stays.
 
     Every run that was planned is in results.json and junit.xml, also when simscen itself was killed: a run that had
     begun is then an error of type `interrupted`, one that had not `not-run`. Nothing is simulated or judged again.
@@ -32,7 +32,7 @@ def command(
     past = read_journal(folder)
     require_free(folder)
     require_writable(junit)
-    reports = Reports(folder, junit, junit_family.value)
+    reports = Reports(folder, junit, junit_family.value, only=junit is not None)
     answers = past.answers
     with screen(format_) as shown:
         shown(past.started(folder))

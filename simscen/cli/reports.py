@@ -24,10 +24,13 @@ class JunitFamily(str, Enum):
 
 
 class Reports:
-    """The reports of one session in `folder`; `junit` is the report that is named at the end."""
+    """The reports of one session in `folder`; `junit` is the report that is named at the end.
 
-    def __init__(self, folder: Path, junit: Path | None, family: Family) -> None:
-        self.folder, self.junit = folder, junit or folder / "junit.xml"
+    With `only`, that one is all that is written.
+    """
+
+    def __init__(self, folder: Path, junit: Path | None, family: Family, only: bool = False) -> None:
+        self.folder, self.junit, self._only = folder, junit or folder / "junit.xml", only
         self._family: Family = family
 
     def begin(self) -> None:
@@ -40,12 +43,12 @@ class Reports:
     def write(self, answers: Sequence[RunFinished]) -> bool:
         """Write the reports; one that cannot be written is told, and the one before it stays whole."""
         junit = to_xml(answers, self._family)
-        documents = {
+        whole = {
             self.folder / "results.json": to_json(answers, str(self.folder)).encode(),
             self.folder / "junit.xml": junit,
             self.folder / "report.html": to_html(answers).encode(),
-            self.junit: junit,
         }
+        documents = {**({} if self._only else whole), self.junit: junit}
         outcomes = [_written(path, data) for path, data in documents.items()]  # every one is tried
         return all(outcomes)
 

@@ -19,7 +19,7 @@ from simscen.core.sessionevents import SessionEvent
 from simscen.report.journal import Journal, require_free
 from simscen.report.rebuild import read_journal
 from simscen.run.outfolder import make_folder
-from simscen.run.session import Options, plan, run_session
+from simscen.run.session import Options, plan, run_session, seeds_of
 
 WARM_PROCESS = ("-m", "simscen.cli.warm_process")
 
@@ -76,6 +76,8 @@ def command(
     if warnings:
         print_text(as_text(warnings), sys.stderr)
     options = Options(workers or _cores(), seed, repeat, check_determinism, fail_fast, wall_limit)
+    for scenario in scenarios:
+        seeds_of(scenario, options)
     require_writable(junit)
     folder, journal = _output_folder(out, resume)
     reports = Reports(folder, junit, junit_family.value)

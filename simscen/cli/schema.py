@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
-import simscen
 from simscen.cli.diagnostics import print_text
+from simscen.core.version import PACKAGE
 
 
 class Kind(str, Enum):
@@ -39,4 +39,4 @@ def command(
 
 def shipped(kind: str) -> str:
     """The schema as it was generated for this version; making it anew would import every model."""
-    return (Path(simscen.__file__).parent / "data" / "schemas" / f"{kind}.schema.json").read_text(encoding="utf-8")
+    return (PACKAGE / "data" / "schemas" / f"{kind}.schema.json").read_text(encoding="utf-8")

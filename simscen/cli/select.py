@@ -34,19 +34,16 @@ def load_all(
     Raises InvalidInput with every problem of every file, selected or not, and NothingSelected.
     """
     home = root if root is not None else default_root(paths)
+    checks = Checks(home, world_path, lenient)
     loaded: list[LoadedScenario] = []
     problems: dict[Problem, None] = {}
     warnings: dict[str, list[Problem]] = {}
     for file in discover(paths, home):
-        scenario = try_scenario(file, home, world_path)
-        if isinstance(scenario, LoadedScenario):
-            scenario = replace(scenario, lenient=lenient)
-            with files_read() as read:
-                found = [*scenario.notes, *checked(scenario)]
-            loaded.append(replace(scenario, read=tuple(sorted(read))))
+        scenario, found = checks.scenario(file)
+        if scenario is not None:
+            loaded.append(scenario)
             warnings[scenario.id] = found
-            scenario = found
-        problems.update(dict.fromkeys(scenario))
+        problems.update(dict.fromkeys(found))
     if any(problem.severity == "error" for problem in problems):
         raise InvalidInput(from_here(problems, home))
     chosen = _shard(select(loaded, wanted.keyword, wanted.tags), *wanted.shard)
@@ -70,18 +67,41 @@ def _shard(scenarios: list[LoadedScenario], number: int, count: int) -> list[Loa
     return share
 
 
+@dataclass(frozen=True)
+class Checks:
+    """Looks at files for all that can be wrong with them; with `fast`, for nothing that geometry is needed for."""
+
+    root: Path
+    world_path: Sequence[Path] = ()
+    lenient: bool = False
+    fast: bool = False
+
+    def scenario(self, file: Path) -> tuple[LoadedScenario | None, list[Problem]]:
+        """The scenario, unless it is unusable, and its problems: a usable one has none that are errors."""
+        loaded = try_scenario(file, self.root, self.world_path)
+        if isinstance(loaded, list):
+            return None, loaded
+        loaded = replace(loaded, lenient=self.lenient)
+        with files_read() as read:
+            problems = [*loaded.notes, *([] if self.fast else checked(loaded))]
+        loaded = replace(loaded, read=tuple(sorted(read)))
+        usable = not any(problem.severity == "error" for problem in problems)
+        return (loaded if usable else None), list(dict.fromkeys(problems))
+
+    def world(self, file: Path) -> list[Problem]:
+        """What only building a world can tell, or why it cannot be used."""
+        try:
+            source = load_world_file(file, self.root, self.world_path)
+            if self.fast:
+                return []
+            return notes_of(world_of(source, self.root, self.world_path, self.lenient), source, self.root)
+        except InvalidInput as error:
+            return error.problems
+
+
 def checked(scenario: LoadedScenario) -> list[Problem]:
     """What only geometry can tell, or why its world cannot be used."""
     try:
         return check(scenario)
-    except InvalidInput as error:
-        return error.problems
-
-
-def checked_world(file: Path, root: Path, world_path: Sequence[Path], lenient: bool) -> list[Problem]:
-    """What only building a world can tell, or why it cannot be used."""
-    try:
-        source = load_world_file(file, root, world_path)
-        return notes_of(world_of(source, root, world_path, lenient), source, root)
     except InvalidInput as error:
         return error.problems

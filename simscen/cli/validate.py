@@ -2,7 +2,7 @@
 
 import sys
 from collections import Counter
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
 from typing import Annotated
@@ -10,11 +10,11 @@ from typing import Annotated
 import typer
 
 from simscen.cli.diagnostics import as_github, as_json, as_text, from_here, print_text
+from simscen.cli.select import Checks
 from simscen.core.errors import Exit
 from simscen.core.problems import Problem
 from simscen.loading.anyfile import kind_of, problems_of
 from simscen.loading.discovery import ROBOT, SCENARIO, WORLD, default_root, discover
-from simscen.loading.scenario import try_scenario
 
 
 class Format(str, Enum):
@@ -33,6 +33,7 @@ def command(
     lenient: Annotated[
         bool, typer.Option("--lenient", help="What of an SDF world cannot be used is a warning, not an error.")
     ] = False,
+    fast: Annotated[bool, typer.Option("--fast", help="Leave out whatever needs the world to be built.")] = False,
 ) -> None:
     """Check scenario, world and robot files without running anything.
 
@@ -40,30 +41,21 @@ def command(
     *.robot.yaml. Exit code 0: all are valid; 2: some are not; 5: there are none.
     """
     home = root if root is not None else default_root(paths)
-    checked = _Checked()
+    checks, checked = Checks(home, world_path or [], lenient, fast), _Checked()
     for file in discover(paths, home, SCENARIO + WORLD + ROBOT):
         kind = kind_of(file, home)
-        checked.add(kind, from_here(_problems(kind, file, home, world_path or [], lenient), home))
+        checked.add(kind, from_here(_problems(kind, file, checks), home))
     _PRINT[format_](checked)
     if checked.wrong:
         sys.exit(Exit.USAGE)
 
 
-def _problems(kind: str, file: Path, root: Path, world_path: list[Path], lenient: bool) -> list[Problem]:
+def _problems(kind: str, file: Path, checks: Checks) -> list[Problem]:
     """What the text tells; where that is nothing, what the geometry tells, which needs numpy."""
     if kind == "scenario":
-        loaded = try_scenario(file, root, world_path)
-        if isinstance(loaded, list):
-            return loaded
-        from simscen.cli.select import checked
-
-        return checked(replace(loaded, lenient=lenient))
-    found = problems_of(kind, file, root, world_path)
-    if found or kind == "robot":
-        return found
-    from simscen.cli.select import checked_world
-
-    return checked_world(file, root, world_path, lenient)
+        return checks.scenario(file)[1]
+    found = problems_of(kind, file, checks.root, checks.world_path)
+    return found if found or kind != "world" else checks.world(file)
 
 
 @dataclass

@@ -8,10 +8,12 @@ from typing import Any
 
 import simscen.sim.simulation
 import simscen.stack.build  # noqa: F401 - engines are imported here so that the forks need not
+from simscen.core.run import Run
 from simscen.report.picture import Scene, write_picture
 from simscen.run.confine import MEMORY_BYTES
 from simscen.run.jobs import Job
-from simscen.run.perform import Performed, perform
+from simscen.run.perform import perform
+from simscen.run.prepare import Prepared
 from simscen.run.prepared_cache import PreparedCache
 from simscen.run.worker import Progress
 from simscen.run.zygote import Zygote
@@ -39,14 +41,13 @@ def _memory() -> int:
 def _perform(job: Job, tell: Callable[[float], None]) -> dict[str, Any]:
     prepared = _PREPARED.prepared(job.scenario)
     progress = Progress(prepared.spec.physics.tick_rate, tell)
-    return perform(prepared, job.key, job.folder, (progress,), _finish)
+    return perform(prepared, job.key.seed, job.folder, (progress,), _finish)
 
 
-def _finish(run: Performed) -> None:
-    prepared = run.prepared
+def _finish(prepared: Prepared, run: Run, folder: Path) -> None:
     world = prepared.built.world
-    scene = Scene(run.trace, prepared.case, prepared.built.map, run.result, world.places, world.bodies)
-    write_picture(scene, run.folder / "map.png")
+    scene = Scene(run.trace, run.case, prepared.built.map, run.result, world.places, world.bodies)
+    write_picture(scene, folder / "map.png")
 
 
 if __name__ == "__main__":

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from simscen import __version__
 from simscen.core.errors import InvalidInput, UsageError
 from simscen.core.result import Outcome
 from simscen.core.sessionevents import RunFinished, SessionStarted
+from simscen.core.version import __version__
 from simscen.report.journal import Journal
 from simscen.report.journaldata import Planned
 from simscen.report.rebuild import read_journal

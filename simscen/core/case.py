@@ -7,6 +7,9 @@ from simscen.core.geometry import Pose2
 from simscen.core.navigation import Goal
 from simscen.core.world import Polygon
 
+CLEARANCE_RANGE = 2.0
+"""Metres around the robot's hull in which clearance is always measured."""
+
 
 @dataclass(frozen=True)
 class Case:
@@ -14,6 +17,8 @@ class Case:
 
     `shortest` maps a goal's name to the length in metres of the shortest way that a disc of the robot's inscribed
     radius has from the goal before it (the start for the first) through the static world; inf when there is none.
+    `clearance_range` is how far around the hull clearance was searched, in metres: a clearance that is not below it was
+    cut off, and is at least that.
     """
 
     start: Pose2
@@ -23,3 +28,4 @@ class Case:
     footprint: Polygon = ()
     inscribed_radius: float = 0.0
     time_limit: float = 0.0
+    clearance_range: float = CLEARANCE_RANGE

@@ -4,10 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import Enum, IntEnum
+from typing import Literal
 
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
+
+RecoveryBehavior = Literal["clear_costmap", "spin", "wait", "backup"]
+"""The behaviours of a recovery, with Nav2's names."""
+
+ReplanReason = Literal["blocked", "missed", "tight", "better", "window", "recovery", "rate"]
+"""Why a plan is made anew while its goal stays: it is blocked, the robot has left it, an obstacle came too near to it,
+obstacles went away, the rolling window moved on, after a recovery, or it was time."""
 
 
 class ErrorCode(IntEnum):

@@ -8,6 +8,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
 from simscen.core.navigation import Goal, Path
 from simscen.core.shapes import Body, MotionPath
+from simscen.core.time import Clock
 from simscen.core.world import Polygon
 
 
@@ -15,8 +16,13 @@ class Situation(Protocol):
     """The run as a trigger sees it at one beat; everything in the world frame."""
 
     @property
-    def seconds(self) -> float:
-        """Simulated time."""
+    def tick(self) -> int:
+        """Simulated time in whole ticks."""
+        ...
+
+    @property
+    def clock(self) -> Clock:
+        """What makes ticks of seconds."""
         ...
 
     @property
@@ -31,7 +37,7 @@ class Situation(Protocol):
 
     @property
     def travelled(self) -> float:
-        """Metres driven so far."""
+        """Metres driven so far; being set down elsewhere is no drive."""
         ...
 
     @property

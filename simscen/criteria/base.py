@@ -19,6 +19,11 @@ class Criterion(ABC):
     yields a finding, so that a criterion without findings has checked nothing.
     """
 
+    @property
+    def clearance_range(self) -> float:
+        """How far around the robot, in metres, it needs clearance to be searched; 0 where it does not look at it."""
+        return 0.0
+
     @abstractmethod
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """One finding for each bound, in the order of the specification."""

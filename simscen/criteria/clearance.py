@@ -8,7 +8,8 @@ import numpy as np
 
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
-from simscen.criteria.bounds import BrokenTrace, at_least, undecided
+from simscen.criteria.bounds import at_least, undecided
+from simscen.criteria.signals import clearance
 from simscen.spec.base import Spec
 from simscen.spec.quantities import NonNegativeLength
 
@@ -16,12 +17,15 @@ if TYPE_CHECKING:
     from simscen.core.case import Case
     from simscen.core.trace import Trace
 
+BEYOND = 0.5
+"""Metres beyond its bound."""
+
 
 class Clearance(Spec, Criterion):
     """The robot kept its distance.
 
     What is measured: the smallest true distance between the robot's hull and the surface of anything solid, over the
-        whole run.
+        whole run. It is searched 2 m around the robot, and further where a bound asks for it.
     When it fails: it is below `min`.
     Why this: a near miss is a collision with better luck; the margin shows it long before the first contact.
     Source: bench-mr's ClearingMetric, but from the true geometry, not from a map or a scan.
@@ -32,14 +36,19 @@ class Clearance(Spec, Criterion):
     min: NonNegativeLength
     """Metres."""
 
+    @property
+    def clearance_range(self) -> float:
+        """Its bound and a little more, so that a margin is left to be seen."""
+        return self.min + BEYOND
+
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """The tightest moment. Free space beyond the searched range may be infinite; nan may not."""
-        distances = trace.clearance.values[:, 0]
+        """The tightest moment. Space that is free as far as was searched may be infinite; nan may not."""
+        distances = clearance(trace).values[:, 0]
         if not len(distances):
             return [undecided("clearance", "no clearance was recorded", f"≥ {self.min:.2f} m")]
-        if np.isnan(distances).any():
-            tick = int(trace.clearance.ticks[int(np.argmax(np.isnan(distances)))])
-            raise BrokenTrace(f"the clearance is not a number at t = {trace.seconds(tick):.2f} s")
         k = int(np.argmin(distances))
+        if case.clearance_range <= distances[k] < self.min:
+            because = f"nothing was nearer than {case.clearance_range:.2f} m, and further was not searched"
+            return [undecided("clearance", because, f"≥ {self.min:.2f} m")]
         at = (trace, int(trace.clearance.ticks[k]))
         return [at_least("clearance", float(distances[k]), self.min, "m", at=at)]

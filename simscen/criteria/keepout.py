@@ -2,29 +2,38 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simscen.core.geometry import Array
+from simscen.core.events import EventKind
+from simscen.core.polygons import flaw
+from simscen.core.separation import separation
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
-from simscen.criteria.bounds import at_least, undecided
-from simscen.criteria.signals import truth
+from simscen.criteria.bounds import BrokenTrace, at_least, undecided
+from simscen.criteria.signals import Flags, truth
 from simscen.spec.base import Spec
 from simscen.spec.quantities import NonNegativeLength
 from simscen.spec.references import RegionName
 
 if TYPE_CHECKING:
     from simscen.core.case import Case
+    from simscen.core.samples import Samples
     from simscen.core.trace import Trace
+    from simscen.core.world import Polygon
+
+FINE = 0.005
+"""Metres to which the nearest moment between two samples is searched."""
 
 
 class Keepout(Spec, Criterion):
     """The robot stayed out of a region, with its whole hull.
 
-    What is measured: the smallest distance between the robot's footprint and the region over the whole run; negative
-        by how deep a corner of one is inside the other.
+    What is measured: the smallest distance between the robot's footprint and the region over the whole run, where
+        between two samples of the truth the robot moves straight; negative by how far it would have to be moved to be
+        out again (out of the deepest convex piece, where one of the two is not convex).
     When it fails: it is below `distance`.
     Why this: a keepout filter in a costmap is advice to a planner; recoveries and controllers leave the plan.
     Source: Nav2's keepout filter tutorial.
@@ -45,39 +54,41 @@ class Keepout(Spec, Criterion):
         poses = truth(trace)
         if not len(poses):
             return [undecided(what, "the robot's way was not recorded", limit)]
-        region = np.array(case.regions[self.region], dtype=np.float64)
-        distances = _distances(poses.values, np.array(case.footprint or [(0.0, 0.0)], dtype=np.float64), region)
-        k = int(np.argmin(distances))
-        at = (trace, int(poses.ticks[k]))
-        return [at_least(what, float(distances[k]), self.distance, "m", at=at)]
+        region = case.regions[self.region]
+        wrong = flaw(region)
+        if wrong:
+            raise BrokenTrace(f"region `{self.region}` {wrong}, so nothing is inside or outside of it")
+        distance, tick = _nearest(trace, poses, case, region)
+        return [at_least(what, distance, self.distance, "m", at=(trace, tick))]
 
 
-def _distances(poses: Array, hull: Array, region: Array) -> Array:
-    """Signed distance (n,) between `hull` (h, 2) carried along `poses` (n, 3) and `region` (r, 2), both filled.
+def _nearest(trace: Trace, poses: Samples, case: Case, region: Polygon) -> tuple[float, int]:
+    """The smallest signed distance on the way, and its tick; being set down elsewhere is no way.
 
-    The nearest points of two polygons that do not overlap are a corner of one and an edge of the other.
+    While the robot moves by m (its furthest point does), a distance changes by no more than m: stretches that cannot
+    lead nearer than the nearest known moment by FINE are left out, the others halved.
     """
-    c, s = np.cos(poses[:, 2])[:, np.newaxis], np.sin(poses[:, 2])[:, np.newaxis]
-    corners = np.stack((c * hull[:, 0] - s * hull[:, 1], s * hull[:, 0] + c * hull[:, 1]), axis=2)
-    corners += poses[:, np.newaxis, :2]
-    apart = region[np.newaxis] - poses[:, np.newaxis, :2]
-    seen = np.stack((c * apart[..., 0] + s * apart[..., 1], c * apart[..., 1] - s * apart[..., 0]), axis=2)
-    nearest: Array = np.minimum(_signed(corners, region).min(axis=1), _signed(seen, hull).min(axis=1))
-    return nearest
+    hull = case.footprint or ((0.0, 0.0),)
+    reach = max(math.hypot(x, y) for x, y in hull)
+    yaw = np.unwrap(poses.values[:, 2])
+    states = np.column_stack((poses.values[:, :2], yaw, separation(poses.values, hull, region), poses.ticks))
+    best = states[np.argmin(states[:, 3])]
+    driven = ~_carried(trace, poses)
+    begin, end = states[:-1][driven], states[1:][driven]
+    while len(begin):
+        moved = np.hypot(*(end - begin)[:, :2].T) + reach * np.abs(end[:, 2] - begin[:, 2])
+        hopeful = (begin[:, 3] + end[:, 3] - moved) / 2 < best[3] - FINE
+        begin, end = begin[hopeful], end[hopeful]
+        middle = (begin + end) / 2
+        middle[:, 3] = separation(middle[:, :3], hull, region)
+        best = min((best, *middle), key=lambda state: float(state[3]))
+        begin, end = np.vstack((begin, middle)), np.vstack((middle, end))
+    return float(best[3]) - (0.0 if case.footprint else case.inscribed_radius), int(best[4])
 
 
-def _signed(points: Array, polygon: Array) -> Array:
-    """Distance (n, k) of points (n, k, 2) to the border of a polygon (m, 2), negative inside it."""
-    ends = np.roll(polygon, -1, axis=0)
-    along = ends - polygon
-    squared = np.maximum((along**2).sum(axis=1), 1e-300)
-    offset = points[:, :, np.newaxis] - polygon
-    share = np.clip((offset * along).sum(axis=3) / squared, 0.0, 1.0)
-    distance = np.hypot(*np.moveaxis(offset - share[..., np.newaxis] * along, 3, 0)).min(axis=2)
-    x, y = points[..., np.newaxis, 0], points[..., np.newaxis, 1]
-    spans = (polygon[:, 1] > y) != (ends[:, 1] > y)
-    rise = np.where(along[:, 1] == 0, 1.0, along[:, 1])
-    crossings = spans & (x < polygon[:, 0] + (y - polygon[:, 1]) / rise * along[:, 0])
-    inside = crossings.sum(axis=2) % 2 == 1
-    signed: Array = np.where(inside, -distance, distance)
-    return signed
+def _carried(trace: Trace, poses: Samples) -> Flags:
+    """Of each stretch between two samples, whether the robot was set down elsewhere in it."""
+    placed = [event.tick for event in trace.of_kind(EventKind.ROBOT_PLACED)]
+    carried = np.zeros(len(poses) + 1, dtype=bool)
+    carried[np.searchsorted(poses.ticks, placed, side="right")] = True
+    return carried[1:-1]

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 from pydantic import Field, model_validator
 
 from simscen.core.events import EventKind
+from simscen.core.navigation import RecoveryBehavior
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import counted
 from simscen.spec.base import Spec
-from simscen.spec.places import Name
 
 if TYPE_CHECKING:
     from simscen.core.case import Case
@@ -36,8 +36,8 @@ class Recoveries(Spec, Criterion):
     """At least so often."""
     max: Count | None = None
     """At most so often."""
-    name: Name | None = None
-    """Only this behaviour: spin, wait, backup, clear_costmap, …"""
+    name: RecoveryBehavior | None = None
+    """Only this behaviour."""
 
     @model_validator(mode="after")
     def _some_bound(self) -> Recoveries:

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 from pydantic import Field, model_validator
 
 from simscen.core.events import EventKind
+from simscen.core.navigation import ReplanReason
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import counted
 from simscen.spec.base import Spec
-from simscen.spec.places import Name
 
 if TYPE_CHECKING:
     from simscen.core.case import Case
@@ -36,8 +36,10 @@ class Replans(Spec, Criterion):
     """At least so often."""
     max: Count | None = None
     """At most so often."""
-    reason: Name | None = None
-    """Only plans made for this reason, e.g. `blocked`."""
+    reason: ReplanReason | None = None
+    """Only plans made for this reason: the plan was `blocked`, the robot had left it (`missed`), an obstacle came too
+    near (`tight`), obstacles went away (`better`), a mapless robot's `window` moved on, after a `recovery`, or at the
+    planner's `rate`."""
 
     @model_validator(mode="after")
     def _some_bound(self) -> Replans:

@@ -43,6 +43,27 @@ def truth(trace: Trace) -> Samples:
     return finite(trace.truth, "the true pose", trace)
 
 
+def clearance(trace: Trace) -> Samples:
+    """Distance of the hull to the nearest surface (m), (n, 1); space that is free for ever may be infinite."""
+    bad = np.isnan(trace.clearance.values[:, 0]) | np.isneginf(trace.clearance.values[:, 0])
+    if bad.any():
+        at = trace.seconds(int(trace.clearance.ticks[int(np.argmax(bad))]))
+        raise BrokenTrace(f"the clearance is not a number at t = {at:.2f} s")
+    return trace.clearance
+
+
+def check_finite(trace: Trace) -> None:
+    """Raise BrokenTrace for a signal that has to be finite and is not, whatever a criterion looks at.
+
+    Odometry may be anything: it is a reading, and what a fault makes of readings is no defect of the run.
+    """
+    truth(trace), speed(trace), clearance(trace)
+    finite(trace.belief, "the belief", trace)
+    finite(trace.command, "the command", trace)
+    for name, poses in sorted(trace.objects.items()):
+        finite(poses, f"the pose of {name}", trace)
+
+
 def speed(trace: Trace) -> Samples:
     """True speed over ground (m/s), (n, 1)."""
     velocity = finite(trace.velocity, "the true velocity", trace)
@@ -78,14 +99,12 @@ def drive(trace: Trace) -> Drive:
 
     Yaw must not enter the norm (as it does in Arena's get_metrics.py, which so adds radians to metres).
     """
-    poses = truth(trace)
-    placed = {event.tick for event in trace.of_kind(EventKind.ROBOT_PLACED)}
-    jumps = set(np.searchsorted(poses.ticks, sorted(placed), side="right").tolist())
+    poses, carried = truth(trace), set(jumps(trace))
     kept, lengths = [0], [0.0]
     xs, ys = poses.values[:, 0].tolist(), poses.values[:, 1].tolist()
     for k in range(1, len(xs)):
         step = math.hypot(xs[k] - xs[kept[-1]], ys[k] - ys[kept[-1]])
-        if k in jumps:
+        if k in carried:
             kept.append(k)
             lengths.append(0.0)
         elif step >= SMALLEST_MOVE:
@@ -94,6 +113,13 @@ def drive(trace: Trace) -> Drive:
     if not xs:
         return Drive(np.empty(0, dtype=np.int64), np.empty(0))
     return Drive(poses.ticks[kept], np.cumsum(lengths))
+
+
+def jumps(trace: Trace) -> list[int]:
+    """The truth samples before which the robot was set down elsewhere, which is neither driving nor braking."""
+    placed = sorted({event.tick for event in trace.of_kind(EventKind.ROBOT_PLACED)})
+    samples: list[int] = np.searchsorted(trace.truth.ticks, placed, side="right").tolist()
+    return samples
 
 
 def pose_error(trace: Trace) -> Samples:

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from simscen.core.case import Case
+from simscen.core.case import CLEARANCE_RANGE, Case
 from simscen.core.events import EventKind
 from simscen.core.geometry import Array, wrap_array
 from simscen.core.trace import Trace
@@ -12,7 +12,7 @@ from simscen.core.verdict import Status
 from simscen.criteria.goals_reached import GoalsReached
 from simscen.criteria.moments import stories
 from simscen.criteria.path_length import shortest_way
-from simscen.criteria.signals import drive, finite, pose_error, speed, truth, turn_rate
+from simscen.criteria.signals import check_finite, drive, finite, pose_error, speed, truth, turn_rate
 
 STANDING_SPEED, STANDING_TURN = 0.01, 0.02
 """m/s and rad/s below which a robot does not move (HuNavSim, which forgot the absolute value of the turn rate)."""
@@ -24,10 +24,12 @@ def measure(trace: Trace, case: Case) -> Metrics:
     """All metrics by name, in SI units; None where a run has none. Raises BrokenTrace when a signal is not finite.
 
     success: every goal truly reached (0 or 1) · spl, soft_spl: Anderson et al. 2018, Habitat · path_length,
-    shortest_length: m · path_ratio · time_to_goal: s · heading_change: rad · clearance_min, clearance_mean: m ·
+    shortest_length: m · path_ratio · time_to_goal: s · heading_change: rad · clearance_min, clearance_mean: m, where
+    more than 2 m count as 2 m, however far was searched ·
     speed_max: m/s · time_standing: s · collisions, contact_time: s · replans, recoveries ·
     localization_{rmse,mean,max,final}: m, localization_yaw_rmse: rad · nees: mean over the run, 3 when consistent.
     """
+    check_finite(trace)
     return {
         **_navigation(trace, case),
         **_motion(trace),
@@ -74,7 +76,7 @@ def _soft_spl(trace: Trace, case: Case, shortest: float, length: float) -> float
 
 def _motion(trace: Trace) -> Metrics:
     poses, fast, turning = truth(trace), speed(trace), turn_rate(trace)
-    near = trace.clearance.values[:, 0]
+    near = np.minimum(trace.clearance.values[:, 0], CLEARANCE_RANGE)
     standing = (fast.values[:, 0] < STANDING_SPEED) & (turning.values[:, 0] < STANDING_TURN)
     lasts = np.diff(np.append(fast.ticks, trace.end)) / trace.tick_rate
     return {

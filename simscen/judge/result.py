@@ -1,30 +1,29 @@
-"""Sums up a run that came to its end."""
+"""Judges a run that came to its end and sums it up."""
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from simscen.core.case import Case
 from simscen.core.result import Outcome, RunFailure, RunKey, RunResult
 from simscen.core.trace import Trace
 from simscen.core.verdict import Status, Verdict
 from simscen.criteria.bounds import BrokenTrace
+from simscen.criteria.criterion import AnyCriterion
 from simscen.criteria.moments import ending
-from simscen.judge.judge import outcome
+from simscen.judge.judge import judge, outcome
 from simscen.judge.metrics import measure
 
 
-def run_result(
-    scenario: str,
+def result_of(
+    key: RunKey,
     path: str,
-    seed: int,
-    verdicts: tuple[Verdict, ...],
+    criteria: Sequence[AnyCriterion],
     trace: Trace,
     case: Case,
-    *,
-    variation: str = "",
     lines: tuple[int, ...] = (),
 ) -> RunResult:
-    """Sum up a run that came to its end: `scenario` is the id, `path` the file as the user would write it."""
+    """Judge a trace and sum it up. `path` is the scenario's file, `lines` where each criterion stands in it."""
+    verdicts = judge(criteria, trace, case)
     came_out = outcome(verdicts)
     failure = _why(verdicts) if came_out is Outcome.ERROR else None
     metrics: Mapping[str, float | None] = {}
@@ -33,7 +32,7 @@ def run_result(
     except BrokenTrace as broken:  # whatever the criteria looked at, a run with such a signal is no run
         came_out, failure = Outcome.ERROR, failure or RunFailure("invalid", str(broken))
     return RunResult(
-        key=RunKey(scenario, seed, variation),
+        key=key,
         path=path,
         outcome=came_out,
         verdicts=verdicts,

@@ -6,8 +6,8 @@ from typing import TypeVar
 
 from pydantic import BaseModel
 
-import simscen
 from simscen.core.problems import Problem
+from simscen.core.version import PACKAGE
 from simscen.loading.document import Library
 from simscen.loading.loaded import LoadedMap, LoadedRobot, LoadedWorld
 from simscen.loading.messages import quoted, suggestion
@@ -142,5 +142,5 @@ def is_ros_map(tree: Node | None) -> bool:
 
 def shipped_robots() -> dict[str, Path]:
     """The robots that ship with simscen, by name."""
-    folder = Path(simscen.__file__).parent / "data" / "robots"
+    folder = PACKAGE / "data" / "robots"
     return {path.name.removesuffix(ROBOT): path for path in sorted(folder.glob(f"*{ROBOT}"))}

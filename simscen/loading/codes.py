@@ -29,6 +29,7 @@ CODES = {
     "SC032": "The fault makes no sense on that sensor.",
     "SC033": "Two things have the same name.",
     "SC034": "A rate does not divide the physics rate, so that it would not be regular.",
+    "SC035": "What is named is a fixed part of the world, but only something that can move makes sense there.",
     "SC040": "Two scenarios have the same id, or would have on a file system that ignores case.",
     "SC301": "A start or goal is inside an obstacle or off the map.",
     "SC310": "Something in an SDF file cannot be used.",

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from simscen.core.problems import Problem
 from simscen.core.time import Clock
+from simscen.core.world import World
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.messages import quoted, suggestion
 from simscen.loading.names import ARTICLES, event_names, known_names
@@ -16,17 +17,21 @@ READINGS = {"lidar": "Scan", "odometry": "Odometry", "imu": "Imu", "bumper": "Bu
 """What each kind of sensor says, by class name in core.sensing: the kinds that faults affect."""
 
 
-def inconsistencies(loaded: LoadedScenario) -> list[Problem]:
-    """Every contradiction within a scenario and the files it names."""
-    checks = (_unknown_names, _unfit_faults, _twice_named, _uneven_rates)
-    return [problem for check in checks for problem in check(loaded)]
+def inconsistencies(loaded: LoadedScenario, world: World | None = None) -> list[Problem]:
+    """Every contradiction within a scenario and the files it names; `world` is what its world file has become."""
+    checks = (_unfit_faults, _twice_named, _uneven_rates)
+    return [*_unknown_names(loaded, world), *(problem for check in checks for problem in check(loaded))]
 
 
-def _unknown_names(loaded: LoadedScenario) -> Iterator[Problem]:
-    known = known_names(loaded)
+def _unknown_names(loaded: LoadedScenario, world: World | None) -> Iterator[Problem]:
+    known = known_names(loaded, world)
     for reference in references(loaded.spec):
         names = known.get(reference.to)
         if names is None or reference.name in names:
+            continue
+        if reference.to == "movable" and reference.name in (known["object"] or ()):
+            message = f"{quoted(reference.name)} is a fixed part of the world: it cannot move, go or be followed"
+            yield loaded.problem(reference.keys, "SC035", message, "name an object, a door or what an event spawns")
             continue
         what = ARTICLES[reference.to]
         hint = suggestion(reference.name, dict.fromkeys(names)) or "there is none at all"

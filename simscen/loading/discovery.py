@@ -15,6 +15,11 @@ SCENARIO = (".scenario.yaml", ".scenario.yml")
 WORLD = (".world.yaml", ".world.yml")
 ROBOT = (".robot.yaml", ".robot.yml")
 
+REPOSITORY = (".git", ".hg", ".jj", ".svn")
+PROJECT = ("pyproject.toml", "package.xml", "setup.py")
+"""What lies at the top of a Python project or a ROS package; an archive or a container image has no repository."""
+SCENARIOS = "scenarios"
+
 
 def discover(paths: Sequence[Path], root: Path, suffixes: tuple[str, ...] = SCENARIO) -> list[Path]:
     """The scenario files that `paths` mean: a file as it is, a folder searched for `*.scenario.yaml`, sorted.
@@ -36,10 +41,31 @@ def discover(paths: Sequence[Path], root: Path, suffixes: tuple[str, ...] = SCEN
 
 
 def default_root(paths: Iterable[Path]) -> Path:
-    """The repository that holds all of `paths`, or else their common folder."""
+    """The project that holds all of `paths`, found by what lies around them, never by what is in the files.
+
+    The nearest folder above with a repository; else with a project's file; else the one that holds the nearest folder
+    called `scenarios`; else the working folder, where it holds them; else their common folder. The file system's root
+    and the user's home are nobody's project unless they hold a repository or a project's file.
+    """
     folders = [Path(os.path.realpath(path if is_folder(path) else path.parent)) for path in paths]
     common = Path(os.path.commonpath(folders)) if folders else Path.cwd()
-    return next((folder for folder in (common, *common.parents) if exists(folder / ".git")), common)
+    above = (common, *common.parents)
+    candidates = (
+        *(folder for folder in above if _holds(folder, REPOSITORY)),
+        *(folder for folder in above if _holds(folder, PROJECT)),
+        *(folder.parent for folder in above if folder.name == SCENARIOS and not _nobodys(folder.parent)),
+        *(folder for folder in (Path.cwd(),) if common.is_relative_to(folder) and not _nobodys(folder)),
+    )
+    return next(iter(candidates), common)
+
+
+def _holds(folder: Path, names: tuple[str, ...]) -> bool:
+    return any(exists(folder / name) for name in names)
+
+
+def _nobodys(folder: Path) -> bool:
+    """Whether a folder is too wide to be somebody's project: `/`, the home folder and what holds that."""
+    return folder == folder.parent or Path(os.path.realpath(Path("~").expanduser())).is_relative_to(folder)
 
 
 def _absent(path: Path) -> Problem | None:

@@ -24,6 +24,7 @@ _BOUNDS = {
     "less_than": ("less than", "lt"),
     "less_than_equal": ("at most", "le"),
 }
+MOST_CHOICES = 40
 _NUMBER = re.compile(r"[-+]?\d+(\.\d*)?")
 _LEADING_ZERO = re.compile(r"[-+]?0\d")
 _TEXTS = {
@@ -72,7 +73,13 @@ def suggestion(word: str, known: Iterable[str]) -> str:
     near = difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)
     if near:
         return f"did you mean `{lowered[near[0]]}`?"
-    return f"expected one of: {', '.join(choices)}" if choices else ""
+    return f"expected one of: {_listed(choices)}" if choices else ""
+
+
+def _listed(choices: list[str]) -> str:
+    """The first ones, where there are too many to read: an imported world has hundreds of names."""
+    more = len(choices) - MOST_CHOICES
+    return f"{', '.join(choices[:MOST_CHOICES])}, and {more} more" if more > 1 else ", ".join(choices)
 
 
 def explain(kind: str, context: Mapping[str, Any], node: Node, text: str) -> Message:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+from simscen.core.world import World
 from simscen.loading.loaded import LoadedScenario
 from simscen.model.world import WorldSpec
 
@@ -10,34 +11,37 @@ ARTICLES = {
     "region": "region of the world",
     "door": "door of the world",
     "object": "object of the world or of an event",
+    "movable": "movable object of the world or of an event",
     "goal": "goal",
     "event": "event",
     "happening": "event or fault",
 }
 
+Names = Mapping[str, list[str] | None]
+"""Kind of reference → the names there are, in the order of the files; None = only the importer of the world knows."""
 
-def known_names(loaded: LoadedScenario) -> Mapping[str, list[str] | None]:
-    """For each kind of reference the names there are, in the order of the files; None = only its importer knows."""
-    world, events = loaded.world.spec, event_names(loaded)
+
+def known_names(loaded: LoadedScenario, world: World | None = None) -> Names:
+    """What there is to refer to. What an imported world holds is known once it has become a `world`."""
     return {
-        "place": list(world.places) if world else [],
-        "region": list(world.regions) if world else [],
-        "door": [door.name for door in world.doors] if world else [],
-        "object": _objects(loaded),
+        **(_of_files(loaded) if world is None else _of_world(loaded, world)),
         "goal": goal_names(loaded),
-        "event": events,
-        "happening": events + [fault.label for fault in loaded.spec.faults],
+        "event": event_names(loaded),
+        "happening": event_names(loaded) + [fault.label for fault in loaded.spec.faults],
     }
 
 
 def goal_names(loaded: LoadedScenario) -> list[str]:
     """The goals of the scenario, then those that its events send."""
-    own = [
+    return own_goal_names(loaded) + _made(loaded, "new_goal")
+
+
+def own_goal_names(loaded: LoadedScenario) -> list[str]:
+    """The goals of the scenario: as written, or after their place, or goal-1, goal-2, …"""
+    return [
         goal.name or (goal.pose if isinstance(goal.pose, str) else f"goal-{number}")
         for number, goal in enumerate(loaded.spec.goals, start=1)
     ]
-    sent = _made(loaded, "new_goal")
-    return own + sent
 
 
 def event_names(loaded: LoadedScenario) -> list[str]:
@@ -45,11 +49,28 @@ def event_names(loaded: LoadedScenario) -> list[str]:
     return [event.name or f"event-{number}" for number, event in enumerate(loaded.spec.events, start=1)]
 
 
-def _objects(loaded: LoadedScenario) -> list[str] | None:
-    world = loaded.world
-    if world.spec is None or world.map is not None or world.sdf is not None:
-        return None
-    return _standing(world.spec) + _made(loaded, "spawn")
+def _of_files(loaded: LoadedScenario) -> Names:
+    world = loaded.world.spec
+    imported = world is None or loaded.world.map is not None or loaded.world.sdf is not None
+    spawned = _made(loaded, "spawn")
+    return {
+        "place": list(world.places) if world else [],
+        "region": list(world.regions) if world else [],
+        "door": [door.name for door in world.doors] if world else [],
+        "object": None if imported or world is None else _distinct(_standing(world), spawned),
+        "movable": None if imported or world is None else _distinct(_moving(world), spawned),
+    }
+
+
+def _of_world(loaded: LoadedScenario, world: World) -> Names:
+    moving, spawned = [body.name for body in world.bodies], _made(loaded, "spawn")
+    return {
+        "place": list(world.places),
+        "region": list(world.regions),
+        "door": list(world.doors),
+        "object": _distinct(moving, [solid.name for solid in world.solids], spawned),
+        "movable": _distinct(moving, spawned),
+    }
 
 
 def _made(loaded: LoadedScenario, kind: str) -> list[str]:
@@ -58,11 +79,17 @@ def _made(loaded: LoadedScenario, kind: str) -> list[str]:
     return [str(getattr(action.chosen, "name", "")) for action in actions if action.kind == kind]
 
 
+def _moving(world: WorldSpec) -> list[str]:
+    return [*(thing.name for thing in world.objects), *(door.name for door in world.doors)]
+
+
 def _standing(world: WorldSpec) -> list[str]:
-    things = [
-        *(thing.name for thing in world.objects),
-        *(door.name for door in world.doors),
+    return [
+        *_moving(world),
         *(obstacle.name for obstacle in world.obstacles),
-        *(wall.name for wall in world.walls),
+        *(wall.called(number) for number, wall in enumerate(world.walls, start=1)),
     ]
-    return list(dict.fromkeys(things))
+
+
+def _distinct(*names: list[str]) -> list[str]:
+    return list(dict.fromkeys(name for part in names for name in part))

@@ -6,7 +6,7 @@ from pydantic import Field, model_validator
 
 from simscen.spec.base import Choice, Ranged, Spec, by_default
 from simscen.spec.objects import Shaped
-from simscen.spec.places import Name, Point, PoseSpec
+from simscen.spec.places import Name, PoseSpec, Ring
 from simscen.spec.quantities import (
     Angle,
     Frequency,
@@ -190,7 +190,7 @@ class RobotSpec(Spec):
     """Of the whole robot; needed with `body`."""
     radius: PositiveLength | None = None
     """Of the footprint, for a round robot."""
-    footprint: Annotated[list[Point], Field(min_length=3, max_length=50)] | None = None
+    footprint: Ring | None = None
     """Corners of the footprint in the base frame, for any other; default: from the shapes."""
     drive: Drive
     limits: Limits

@@ -4,6 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Discriminator, Field, Tag
 
+from simscen.core.navigation import RecoveryBehavior
 from simscen.spec.base import Ranged, Spec, by_default, type_or
 from simscen.spec.quantities import (
     Angle,
@@ -230,7 +231,7 @@ class Recovery(Spec):
     """Behaviours of Nav2's default tree, taken in turn when planning or control fails."""
 
     number_of_retries: Annotated[int, Field(ge=0, le=100)] = 6
-    behaviors: Annotated[list[Literal["clear_costmap", "spin", "wait", "backup"]], Field(max_length=20)] = [
+    behaviors: Annotated[list[RecoveryBehavior], Field(max_length=20)] = [
         "clear_costmap",
         "spin",
         "wait",

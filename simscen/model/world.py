@@ -6,7 +6,7 @@ from pydantic import Field, model_validator
 
 from simscen.spec.base import Spec
 from simscen.spec.objects import Shaped
-from simscen.spec.places import Name, PlaceName, Point, PoseSpec
+from simscen.spec.places import Name, PlaceName, Point, PoseSpec, Ring
 from simscen.spec.quantities import Duration, Mass, PositiveLength, PositiveSpeed
 
 
@@ -14,13 +14,17 @@ class Wall(Spec):
     """A wall along a polyline."""
 
     name: Name = "wall"
-    """What a collision with it is reported as."""
+    """What a collision with it is reported as; default: wall_1, wall_2, …"""
     points: Annotated[list[Point], Field(min_length=2, max_length=10_000)]
     """Corners [x, y] of its centre line; repeat the first one at the end to close it."""
     thickness: PositiveLength = 0.1
     """Across the centre line."""
     height: PositiveLength = 1.0
     """From the ground."""
+
+    def called(self, number: int) -> str:
+        """Its name, or `wall_3` for the third wall of a world."""
+        return self.name if "name" in self.model_fields_set else f"wall_{number}"
 
 
 class Obstacle(Shaped):
@@ -90,8 +94,8 @@ class WorldSpec(Spec):
     doors: Annotated[list[Door], Field(max_length=200)] = []
     places: dict[PlaceName, PoseSpec] = {}
     """Named poses for goals and starts."""
-    regions: dict[PlaceName, Annotated[list[Point], Field(min_length=3, max_length=200)]] = {}
-    """Named areas: polygons over their corners."""
+    regions: dict[PlaceName, Ring] = {}
+    """Named areas: polygons over their corners, which may not cross themselves."""
 
     @model_validator(mode="after")
     def _names_differ(self) -> "WorldSpec":

@@ -43,8 +43,12 @@ def label(key: RunKey, every_seed: bool = True, prefix: str = "") -> str:
 
 def place(run: RunFinished, line: int = 0) -> str:
     """path:line of a criterion, or of the scenario."""
-    file = run.file or run.result.path
-    return one_line(f"{file}:{line or 1}")
+    return one_line(f"{scenario_file(run)}:{line or 1}")
+
+
+def scenario_file(run: RunFinished) -> str:
+    """The scenario's file as seen from the working folder, for people and tools to open."""
+    return run.file or run.result.path
 
 
 def failure(run: RunFinished) -> tuple[str, str, str]:

@@ -6,7 +6,8 @@ from typing import TextIO
 from simscen.core.result import Outcome
 from simscen.core.sessionevents import RunFinished, SessionEvent, SessionFinished
 from simscen.judge.wording import tightest
-from simscen.report.complaints import broken, complaints, label
+from simscen.report.checkout import in_checkout
+from simscen.report.complaints import broken, complaints, label, scenario_file
 from simscen.report.console import Reporter, text_reporter
 from simscen.report.text import one_line
 
@@ -82,7 +83,8 @@ def _why(run: RunFinished) -> str:
 
 
 def _command(level: str, run: RunFinished, line: int, title: str, message: str) -> str:
-    where = f"file={_property(run.result.path)},line={max(line or 1, 1)},title={_property(title)}"
+    file = in_checkout(scenario_file(run))
+    where = f"file={_property(file)},line={max(line or 1, 1)},title={_property(title)}"
     return f"::{level} {where}::{_data(message)}"
 
 

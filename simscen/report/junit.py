@@ -13,7 +13,7 @@ from xml.etree.ElementTree import Element, SubElement
 from simscen.core.result import Outcome
 from simscen.core.sessionevents import RunFinished
 from simscen.judge.wording import subject
-from simscen.report.complaints import Complaint, complaints, failure, place
+from simscen.report.complaints import Complaint, complaints, failure, place, scenario_file
 from simscen.report.text import one_line, visible
 
 Family = Literal["simscen", "xunit2"]
@@ -24,7 +24,8 @@ def to_xml(runs: Sequence[RunFinished], family: Family = "simscen", name: str = 
     root = Element("testsuites", {"name": visible(name)})
     ordered = sorted(runs, key=lambda run: (run.result.path, run.key))
     for path in sorted({run.result.path for run in ordered}):
-        _suite(root, path, [run for run in ordered if run.result.path == path], family)
+        own = [run for run in ordered if run.result.path == path]
+        _suite(root, scenario_file(own[0]), own, family)
     _count(root, ordered)
     ElementTree.indent(root)
     body: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
@@ -50,7 +51,7 @@ def _count(element: Element, runs: Sequence[RunFinished]) -> None:
 def _case(suite: Element, run: RunFinished, name: str, family: Family) -> None:
     case = SubElement(suite, "testcase", {"classname": _classname(run), "name": name, "time": f"{run.wall:.3f}"})
     if family == "simscen":
-        case.set("file", visible(run.result.path))
+        case.set("file", visible(scenario_file(run)))
         case.set("line", "1")
         _properties(case, run)
     match run.outcome:

@@ -40,6 +40,7 @@ def assemble(prepared: Prepared, seed: int) -> Rig:
         triangulate,
         tick_rate=clock.rate,
         solver_iterations=spec.physics.solver_iterations,
+        clearance_range=prepared.case.clearance_range,
     )
     rays = LiveRays(RayScene(prepared.built.mesh), simulation)
     sensors: tuple[Sensor, ...] = build_sensors(prepared.robot, clock, streams, simulation, rays)

@@ -3,8 +3,9 @@
 import gc
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -13,14 +14,10 @@ import numpy as np
 
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.shapes import Cylinder, Solid
-from simscen.core.time import Clock
 from simscen.loading.scenario import load_scenario
-from simscen.record.recorder import Recorder
-from simscen.record.tracebuilder import TraceBuilder
-from simscen.run.assemble import assemble
-from simscen.run.lockstep import run_lockstep
-from simscen.run.perform import log_header
+from simscen.run.lockstep import Log, Rig
 from simscen.run.prepare import Prepared, lidar_height, prepare
+from simscen.run.simulate import simulate
 from simscen.run.stopwatch import Stopwatch
 from simscen.sim.bare import BareWorld
 from simscen.stack.reference import ReferenceStack
@@ -64,39 +61,39 @@ class Field:
 def measure_patrol(rounds: int) -> Patrol:
     """The median of several runs of the patrol, recorded as always; then once more, taken apart."""
     prepared = prepare(load_scenario(PATROL, PATROL.parent))
-    _run(prepared, Stopwatch(), False)  # the first run pays for imports and caches
-    runs = [_run(prepared, Stopwatch(), False) for _ in range(rounds)]
+    _run(prepared)  # the first run pays for imports and caches
+    runs = [_run(prepared) for _ in range(rounds)]
     watch = Stopwatch()
-    simulated, _, whole = _run(prepared, watch, True)
+    simulated, _, whole = _run(prepared, watch)
     cpu = statistics.median(cpu for _, cpu, _ in runs)
     # The stopwatch sees wall time and costs some itself: the parts are scaled to a run without it.
     parts = {name: seconds * cpu / whole for name, seconds in watch.seconds.items()}
-    parts["the lockstep itself"] = cpu - sum(parts.values())
+    parts["lockstep, set-up, verdicts"] = cpu - sum(parts.values())
     return Patrol(simulated, cpu, parts, _bare_patrol(prepared, simulated))
 
 
-def _run(prepared: Prepared, watch: Stopwatch, apart: bool) -> tuple[float, float, float]:
-    """Simulated, CPU and wall seconds of one run."""
-    clock = Clock(prepared.spec.physics.tick_rate)
+def _run(prepared: Prepared, watch: Stopwatch | None = None) -> tuple[float, float, float]:
+    """Simulated, CPU and wall seconds of one run, from setting up to the verdicts; `watch` takes it apart."""
     gc.collect()
-    with TemporaryDirectory() as folder, Recorder(Path(folder, "run.mcap"), clock, log_header(prepared, SEED)) as log:
-        rig, trace = assemble(prepared, SEED), TraceBuilder(clock)
-        if apart:
-            watch.watch("physics", rig.simulation, "step", "drive")
-            watch.watch("truth and contacts", rig.simulation, "truth", "collisions")
-            watch.watch("sensors", rig.senses, "read")
-            if isinstance(rig.stack, ReferenceStack):
-                for name, (component, *methods) in rig.stack.components.items():
-                    watch.watch(name, component, *methods)
-            watch.watch("navigator", rig.stack, "decide")
-            watch.watch("log", log, "append")
-            watch.watch("trace", trace, "append")
+    with TemporaryDirectory() as folder:
         begun, begun_wall = time.process_time(), time.perf_counter()
-        end = run_lockstep(rig, (trace, log))
-        log.close(end.tick)
+        run = simulate(prepared, SEED, log=Path(folder, "run.mcap"), attach=partial(_watched, watch) if watch else None)
         cpu, wall = time.process_time() - begun, time.perf_counter() - begun_wall
-        rig.simulation.close()
-    return clock.seconds(end.tick), cpu, wall
+    return run.result.simulated, cpu, wall
+
+
+def _watched(watch: Stopwatch, rig: Rig, own: Sequence[Log]) -> Sequence[Log]:
+    """Watch the parts of the rig, and the log and the trace that are its `own` listeners."""
+    watch.watch("physics", rig.simulation, "step", "drive")
+    watch.watch("truth and contacts", rig.simulation, "truth", "collisions")
+    watch.watch("sensors", rig.senses, "read")
+    if isinstance(rig.stack, ReferenceStack):
+        for name, (component, *methods) in rig.stack.components.items():
+            watch.watch(name, component, *methods)
+    watch.watch("navigator", rig.stack, "decide")
+    for name, listener in zip(("trace", "log"), own, strict=True):
+        watch.watch(name, listener, "append")
+    return ()
 
 
 def _bare_patrol(prepared: Prepared, simulated: float) -> float:

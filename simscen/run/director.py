@@ -27,7 +27,7 @@ class Director:
             Firing(entry.when or _AT_THE_START, streams.generator(f"fault-start#{number}"))
             for number, entry in enumerate(faults, start=1)
         ]
-        self._ends: dict[int, float] = {}
+        self._ends: dict[int, int | None] = {}
 
     def direct(self) -> None:
         """Let happen what is due at this beat; the stage keeps the record."""
@@ -49,12 +49,13 @@ class Director:
     def _begin_fault(self, index: int) -> None:
         entry = self._faults[index]
         self._rig.begin(index)
-        self._ends[index] = self._stage.seconds + entry.for_ if entry.for_ is not None else float("inf")
+        lasts = None if entry.for_ is None else self._stage.clock.ticks(entry.for_)
+        self._ends[index] = None if lasts is None else self._stage.tick + lasts
         self._stage.note(Event(0, EventKind.FAULT_STARTED, entry.label, {"sensor": entry.sensor, "fault": entry.kind}))
 
     def _end_faults(self) -> None:
         for index, end in sorted(self._ends.items()):
-            if self._stage.seconds >= end - 1e-9:
+            if end is not None and self._stage.tick >= end:
                 del self._ends[index]
                 self._rig.end(index)
                 self._stage.note(Event(0, EventKind.FAULT_ENDED, self._faults[index].label))

@@ -4,7 +4,7 @@ Needs no engine, and for own worlds of simple shapes not even numpy.
 """
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +14,12 @@ from simscen.core.grid import OccupancyGrid
 from simscen.core.problems import Problem
 from simscen.core.shapes import Body, Solid
 from simscen.core.world import World
+from simscen.loading.consistency import inconsistencies
 from simscen.loading.loaded import LoadedScenario, LoadedWorld
 from simscen.model.scenario import ScenarioSpec
 from simscen.run.goals import goals_of, pose_of
 from simscen.run.robotsize import inscribed_radius_of
-from simscen.run.worldsource import load_map, load_world
+from simscen.run.worldsource import load_map, load_robot, load_world
 from simscen.worlds.contain import first_blocking
 from simscen.worlds.mapsize import too_large
 
@@ -32,6 +33,8 @@ def check(loaded: LoadedScenario) -> list[Problem]:
     Raises InvalidInput for unusable files.
     """
     world = load_world(loaded)
+    if contradictions := _once_known(loaded, world):
+        return contradictions
     radius = inscribed_radius_of(loaded)
     ground = _ground(loaded, world)
     misplaced = [
@@ -40,6 +43,16 @@ def check(loaded: LoadedScenario) -> list[Problem]:
         if (where := ground.outside(pose) or _in_the_way(world, pose, radius, at_start=keys[0] == "robot"))
     ]
     return [*_too_large(loaded, world), *misplaced, *notes_of(world, loaded.world, loaded.root)]
+
+
+def _once_known(loaded: LoadedScenario, world: World) -> list[Problem]:
+    """What the text alone could not tell: the names of an imported world, the sensors of a bare URDF."""
+    imported = loaded.world.map is not None or loaded.world.sdf is not None
+    if loaded.robot.spec is None:
+        loaded = replace(loaded, robot=replace(loaded.robot, spec=load_robot(loaded)[0]))
+    elif not imported:
+        return []
+    return sorted(inconsistencies(loaded, world))
 
 
 def notes_of(world: World, source: LoadedWorld, root: Path) -> list[Problem]:

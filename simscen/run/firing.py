@@ -16,14 +16,14 @@ class Firing:
         self._trigger, self._chance = trigger, chance
         self._held = False
         self._left = trigger.times
-        self._due: list[float] = []
+        self._due: list[int] = []
 
     def fires(self, now: Situation) -> int:
         """How often it fires at this beat."""
         if self._left and self._edge(now) and self._lucky():
             self._left -= 1
-            self._due.append(now.seconds + self._trigger.delay)
-        ripe = sum(due <= now.seconds + 1e-9 for due in self._due)
+            self._due.append(now.tick + now.clock.ticks(self._trigger.delay))
+        ripe = sum(due <= now.tick for due in self._due)
         self._due = self._due[ripe:]
         return ripe
 

@@ -1,6 +1,5 @@
 """The running world as triggers see it and as actions change it."""
 
-import math
 from dataclasses import replace
 
 from simscen.core.belief import Belief
@@ -10,7 +9,7 @@ from simscen.core.motion import Twist
 from simscen.core.navigation import Goal, Path
 from simscen.core.shapes import Body, Box, Capsule, Cone, Cylinder, Extrusion, MotionPath, Shape, Sphere
 from simscen.core.time import Clock
-from simscen.core.trace import Decision, Truth
+from simscen.core.trace import Decision
 from simscen.core.world import Polygon, World
 from simscen.sim.simulation import Simulation
 from simscen.stack.protocols import Stack
@@ -20,8 +19,8 @@ class LiveStage:
     """Implements core.stage.Stage on the simulation and the stack, and keeps the events of the run."""
 
     def __init__(self, world: World, simulation: Simulation, stack: Stack, clock: Clock) -> None:
-        self._world, self._simulation, self._stack, self._clock = world, simulation, stack, clock
-        self._truth = simulation.truth()
+        self._world, self._simulation, self._stack, self.clock = world, simulation, stack, clock
+        self._pose, self._twist = simulation.base_pose().plane, simulation.base_twist()
         self._belief: Belief | None = None
         self._travelled = 0.0
         self._history: tuple[Event, ...] = ()
@@ -29,10 +28,13 @@ class LiveStage:
 
     # what the lockstep tells it
 
-    def saw(self, truth: Truth) -> None:
-        """A new truth sample."""
-        before, self._truth = self._truth, truth
-        self._travelled += math.hypot(truth.pose.x - before.pose.x, truth.pose.y - before.pose.y)
+    def begin_beat(self) -> None:
+        """Time has passed: see where the robot is now, and what it has touched."""
+        before, self._pose = self._pose, self._simulation.base_pose().plane
+        self._twist = self._simulation.base_twist()
+        self._travelled += before.distance(self._pose)
+        for collision in self._simulation.collisions():
+            self.note(collision)
 
     def heard(self, decision: Decision) -> None:
         """What the stack decided and published."""
@@ -48,23 +50,23 @@ class LiveStage:
     # what triggers see
 
     @property
-    def seconds(self) -> float:
-        """Simulated time."""
-        return self._clock.seconds(self._simulation.tick)
+    def tick(self) -> int:
+        """Simulated time in whole ticks."""
+        return self._simulation.tick
 
     @property
     def robot(self) -> Pose2:
         """The true pose of the robot."""
-        return self._truth.pose.plane
+        return self._pose
 
     @property
     def twist(self) -> Twist:
         """The true velocity of the robot in its own frame."""
-        return self._truth.twist
+        return self._twist
 
     @property
     def travelled(self) -> float:
-        """Metres driven so far."""
+        """Metres driven so far; being set down elsewhere is no drive."""
         return self._travelled
 
     @property
@@ -125,6 +127,7 @@ class LiveStage:
     def place_robot(self, pose: Pose2) -> None:
         """Set the robot down somewhere else."""
         self._simulation.place_robot(pose)
+        self._pose, self._twist = self._simulation.base_pose().plane, self._simulation.base_twist()
         self.note(Event(0, EventKind.ROBOT_PLACED, "", {"x": pose.x, "y": pose.y, "yaw": pose.yaw}))
 
     def push(self, impulse: tuple[float, float]) -> None:
@@ -134,15 +137,15 @@ class LiveStage:
 
     def send_goal(self, goal: Goal) -> None:
         """Preempt with a new goal."""
-        self._stack.preempt(goal)
+        self._stack.preempt(self.tick, goal)
 
     def cancel_goal(self) -> None:
         """Cancel what the robot is doing."""
-        self._stack.cancel()
+        self._stack.cancel(self.tick)
 
     def note(self, event: Event) -> None:
         """Write an event to the log; one without a tick happened now."""
-        stamped = event if event.tick else replace(event, tick=self._simulation.tick)
+        stamped = event if event.tick else replace(event, tick=self.tick)
         self._fresh.append(stamped)
         self._history += (stamped,)
 

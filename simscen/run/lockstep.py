@@ -49,19 +49,18 @@ def run_lockstep(rig: Rig, logs: Sequence[Log]) -> Event:
     simulation = rig.simulation
     while True:
         tick = simulation.tick
-        truth = simulation.truth() if tick % rig.truth_period == 0 else None
-        if truth is not None:
-            rig.stage.saw(truth)
-            for collision in simulation.collisions():
-                rig.stage.note(collision)
-            rig.director.direct()
+        sampled = tick % rig.truth_period == 0 or rig.ending.due(tick)
+        truth = simulation.truth() if sampled else None
+        rig.stage.begin_beat()
+        rig.director.direct()
 
         readings = rig.faults.disturb(rig.senses.read(tick))
         decision = rig.stack.decide(tick, readings)
         rig.stage.heard(decision)
+        rig.ending.heard(decision)
 
         moment = Moment(tick, truth, readings, decision, rig.stage.take_events())
-        end = rig.ending.reached(moment) if truth is not None else None
+        end = rig.ending.reached(tick) if truth is not None else None
         if end is not None:
             moment = replace(moment, events=(*moment.events, end))
         for log in logs:

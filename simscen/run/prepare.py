@@ -7,11 +7,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from simscen.core.belief import Estimate
-from simscen.core.case import Case
+from simscen.core.case import CLEARANCE_RANGE, Case
 from simscen.core.geometry import Pose2
 from simscen.core.grid import OccupancyGrid
 from simscen.core.navigation import Goal
 from simscen.core.world import BuiltWorld
+from simscen.criteria.base import Criterion
 from simscen.loading.loaded import LoadedScenario
 from simscen.model.robot import RobotSpec
 from simscen.model.scenario import ScenarioSpec, estimate_of
@@ -70,6 +71,7 @@ def prepare(loaded: LoadedScenario, world_of: BuildWorld = build_world) -> Prepa
         footprint=body.footprint,
         inscribed_radius=inscribed_radius(body.radius, body.footprint),
         time_limit=spec.time_limit,
+        clearance_range=_clearance_range(spec),
     )
     return Prepared(
         loaded=loaded,
@@ -87,6 +89,12 @@ def prepare(loaded: LoadedScenario, world_of: BuildWorld = build_world) -> Prepa
 def _shortest(built: BuiltWorld, start: Pose2, goals: tuple[Goal, ...], radius: float) -> dict[str, float]:
     lengths = shortest_lengths(built, start, [goal.pose for goal in goals], radius)
     return {goal.name: length for goal, length in zip(goals, lengths, strict=True)}
+
+
+def _clearance_range(spec: ScenarioSpec) -> float:
+    """As far as any criterion needs it."""
+    asked = [entry.chosen.clearance_range for entry in spec.pass_ if isinstance(entry.chosen, Criterion)]
+    return max([CLEARANCE_RANGE, *asked])
 
 
 def _robot_map(loaded: LoadedScenario, built: BuiltWorld) -> OccupancyGrid | None:

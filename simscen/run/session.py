@@ -5,7 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from simscen.core.errors import Exit
+from simscen.core.chance import LARGEST_SEED
+from simscen.core.errors import Exit, UsageError
 from simscen.core.result import Outcome, RunFailure, RunKey
 from simscen.core.sessionevents import Listener, RunFinished, RunProgress, RunStarted
 from simscen.loading.loaded import LoadedScenario
@@ -29,12 +30,20 @@ class Options:
     wall_limit: float = 300.0
 
 
+def seeds_of(scenario: LoadedScenario, options: Options) -> range:
+    """The seeds that a scenario is run with. Raises UsageError when they lead beyond the largest there is."""
+    first = options.seed if options.seed is not None else scenario.spec.seed
+    if first + options.repeat - 1 > LARGEST_SEED:
+        told = f"{options.repeat} runs of {scenario.id} from seed {first} on"
+        raise UsageError(f"{told} would need seeds beyond the largest, {LARGEST_SEED}")
+    return range(first, first + options.repeat)
+
+
 def plan(scenarios: Sequence[LoadedScenario], options: Options, out: Path) -> list[Job]:
     """All runs of a session in the order they are started: scenario by scenario, seed by seed."""
     jobs: list[Job] = []
     for scenario in scenarios:
-        first = options.seed if options.seed is not None else scenario.spec.seed
-        for seed in range(first, first + options.repeat):
+        for seed in seeds_of(scenario, options):
             for variation in ("", "again") if options.twice else ("",):
                 key = RunKey(scenario.id, seed, variation)
                 folder = out / scenario.id / key.folder

@@ -6,7 +6,7 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-import simscen
+from simscen.core.version import PACKAGE
 
 PACKAGES = (
     *("simscen", "pybullet", "ompl", "filterpy", "numpy", "scipy", "embreex", "trimesh", "mapbox-earcut", "pycollada"),
@@ -36,7 +36,7 @@ def cpu_flags() -> list[str]:
 @cache
 def code() -> str:
     """SHA-256 of simscen's own files: an installation from a working copy changes without a new version."""
-    sha, folder = hashlib.sha256(), Path(simscen.__file__).parent
+    sha, folder = hashlib.sha256(), PACKAGE
     for file in sorted(path for path in folder.rglob("*") if path.suffix in (".py", ".yaml", ".json")):
         sha.update(f"{file.relative_to(folder).as_posix()}\0".encode() + file.read_bytes())
     return sha.hexdigest()

@@ -10,8 +10,6 @@ from simscen.sim.drives import Base
 from simscen.sim.proximity import Proximity
 from simscen.sim.robot_body import RobotBody
 
-REACH = 2.0
-"""How far in metres is searched."""
 HORIZON = 0.1
 """Seconds for which a clearance may at most rule out a contact."""
 TOLERANCE = 0.002
@@ -29,11 +27,20 @@ class Clearance:
     """
 
     def __init__(
-        self, client: int, tick_rate: int, static: TriangleMesh, robot: RobotBody, base: Base, actors: Actors
+        self,
+        client: int,
+        tick_rate: int,
+        static: TriangleMesh,
+        robot: RobotBody,
+        base: Base,
+        actors: Actors,
+        reach: float,
     ) -> None:
+        """`reach` is how far is searched, in metres."""
         self._client, self._rate, self._base, self._actors = client, tick_rate, base, actors
         self._limits, self._radius = robot.limits, robot.circumscribed_radius
-        self._proximity = Proximity(static, robot, REACH)
+        self._proximity = Proximity(static, robot, reach)
+        self._reach = reach
         self._touched: dict[tuple[int, int, int], str] = {}
         self.forget()
 
@@ -43,7 +50,7 @@ class Clearance:
         self._measured_at, self.no_contact_before = -1, 0
 
     def measure(self, tick: int) -> float:
-        """The clearance at `tick`, which is now, in metres; REACH where nothing is nearer."""
+        """The clearance at `tick`, which is now, in metres; the reach where nothing is nearer."""
         if self._measured_at == tick:
             return self._distance
         self._actors.show(tick)
@@ -54,7 +61,7 @@ class Clearance:
         return self._distance
 
     def _search(self) -> float:
-        nearest = min(REACH, self._proximity.distance(self._base.pose()))
+        nearest = min(self._reach, self._proximity.distance(self._base.pose()))
         for other in self._actors.ids():
             for link in self._base.hull_links:
                 points = pybullet.getClosestPoints(self._base.id, other, nearest, link, physicsClientId=self._client)

@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 import pybullet
 
+from simscen.core.case import CLEARANCE_RANGE
 from simscen.core.errors import RunError
 from simscen.core.events import Event
 from simscen.core.geometry import Pose2, Pose3
@@ -41,9 +42,11 @@ class Simulation:
         triangulate: engine.Triangulate,
         tick_rate: int = 240,
         solver_iterations: int = 10,
+        clearance_range: float = CLEARANCE_RANGE,
     ) -> None:
         """Build the world with the robot at `pose` at rest.
 
+        Clearance is searched within `clearance_range` metres of the hull.
         `triangulate` gives the surface of a shape, for moving things that the engine has no primitive for.
         """
         self.tick = 0
@@ -59,7 +62,7 @@ class Simulation:
             self._actors.add(body, 0)
         self._contacts = Contacts(tick_rate)
         self._names: dict[int, str | None] = {}
-        self._clearance = Clearance(self._client, tick_rate, static, robot, self._base, self._actors)
+        self._clearance = Clearance(self._client, tick_rate, static, robot, self._base, self._actors, clearance_range)
         self._settle(pose)
         self._changed()
 
@@ -104,9 +107,8 @@ class Simulation:
         pose, velocity = self._base.pose(), self._base.velocity()
         if not all(math.isfinite(value) for value in (*pose, *velocity[0], *velocity[1])):
             raise RunError("diverged", f"simulation diverged at t={self.tick / self._rate:.3f} s: the pose is {pose}")
-        return Truth(
-            pose, base_twist(pose, velocity), self._clearance.measure(self.tick), self._actors.poses(self.tick)
-        )
+        clearance, objects = self._clearance.measure(self.tick), self._actors.poses(self.tick)
+        return Truth(pose, base_twist(pose, velocity), clearance, objects)
 
     def _changed(self) -> None:
         """Something was put into or taken out of the world, or set down elsewhere."""
@@ -165,6 +167,10 @@ class Simulation:
     def base_velocity(self) -> tuple[Vector, Vector]:
         """Linear (m/s) and angular (rad/s) velocity of the base frame along the world's axes."""
         return self._base.velocity()
+
+    def base_twist(self) -> Twist:
+        """The robot's velocity in its own frame."""
+        return base_twist(self._base.pose(), self._base.velocity())
 
     def encoders(self) -> tuple[float, ...]:
         """What the drive has rolled so far; see `drives.Drive.encoders`."""

@@ -2,9 +2,10 @@
 
 from typing import Annotated
 
-from pydantic import Field, StringConstraints
+from pydantic import AfterValidator, Field, StringConstraints
 
 from simscen.core.geometry import Pose2
+from simscen.core.polygons import flaw
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Angle, Length
 
@@ -15,6 +16,17 @@ Name = Annotated[
 # The length stands apart from the pattern: a Unicode `\w` repeated 119 times takes 25 ms to compile, at every start.
 PlaceName = Annotated[str, StringConstraints(max_length=120, pattern=r"^[A-Za-z_][\w .-]*$")]
 Point = Annotated[list[Length], Field(min_length=2, max_length=2)]
+
+
+def _without_flaw(ring: list[Point]) -> list[Point]:
+    wrong = flaw([(x, y) for x, y in ring])
+    if wrong:
+        raise ValueError(f"the polygon {wrong}")
+    return ring
+
+
+Ring = Annotated[list[Point], Field(min_length=3, max_length=200), AfterValidator(_without_flaw)]
+"""The corners of one area, in order, either way round."""
 
 
 class PoseSpec(Spec):

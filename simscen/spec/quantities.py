@@ -26,6 +26,7 @@ UNITS: dict[str, dict[str, float]] = {
     "angular speed": _per(_RADIANS, {"s": 1.0}),
     "acceleration": _per(_METRES, {"s": 1.0}, "^2"),
     "angular acceleration": _per(_RADIANS, {"s": 1.0}, "^2"),
+    "jerk": {"m/s^3": 1.0},
     "mass": {"kg": 1.0, "g": 0.001, "t": 1000.0},
     "frequency": {"Hz": 1.0, "kHz": 1000.0},
     "impulse": {"N s": 1.0, "Ns": 1.0},

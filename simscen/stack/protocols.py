@@ -180,12 +180,12 @@ class Stack(Protocol):
         """Localise at the estimate, then drive to the goals in order."""
         ...
 
-    def preempt(self, goal: Goal) -> None:
-        """Drive to this goal first, as a new action goal would make it."""
+    def preempt(self, tick: int, goal: Goal) -> None:
+        """Told at `tick`, before its `decide`: drive to this goal first, as a new action goal would make it."""
         ...
 
-    def cancel(self) -> None:
-        """Cancel the current goal and all after it."""
+    def cancel(self, tick: int) -> None:
+        """Told at `tick`, before its `decide`: cancel the current goal and all after it."""
         ...
 
     def decide(self, tick: int, readings: Readings) -> Decision:

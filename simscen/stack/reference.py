@@ -68,14 +68,14 @@ class ReferenceStack:
         self._navigator.stop()
         self._task.start(goals)
 
-    def preempt(self, goal: Goal) -> None:
+    def preempt(self, tick: int, goal: Goal) -> None:
         """Drive to this goal first; it takes the place of the current one."""
-        self._task.preempt(self._tick, goal)
+        self._task.preempt(tick, goal)
         self._navigator.stop()
 
-    def cancel(self) -> None:
+    def cancel(self, tick: int) -> None:
         """Cancel the current goal and all after it."""
-        self._task.cancel(self._tick)
+        self._task.cancel(tick)
         self._navigator.stop()
         self._command, self._nothing = STOP, Decision(STOP)
 
@@ -105,18 +105,17 @@ class ReferenceStack:
         self._tick = tick
         scanned = self._take(readings) if readings else False
         controls = tick % self._control_period == 0
-        if not controls and not scanned and not readings:
+        if not controls and not readings and not self._journal:
             return self._nothing
-        events: list[Event] = []
         local_plan = None
         if controls:
             self._update_costmap(tick)
             self._command = self._control(tick)
-            events, self._journal[:] = self._journal.copy(), []
             local_plan = self._publishing.local_plan(tick, self._navigator.plan is not None)
         self._nothing = Decision(self._command)
+        events, self._journal[:] = tuple(self._journal), []
         belief, plan = self._publishing.belief(tick, scanned), self._publishing.plan(self.plan)
-        return Decision(self._command, belief, plan, local_plan, tuple(events))
+        return Decision(self._command, belief, plan, local_plan, events)
 
     def _take(self, readings: Readings) -> bool:
         """Hand the readings on; whether there was a scan among them."""

@@ -8,7 +8,7 @@ from simscen.core.stage import Situation
 from simscen.spec.base import Spec
 from simscen.spec.places import Point
 from simscen.spec.quantities import NonNegativeLength
-from simscen.spec.references import ObjectName, RegionName
+from simscen.spec.references import MovableName, RegionName
 from simscen.triggers.base import Condition
 
 
@@ -20,7 +20,7 @@ class RobotWithin(Spec, Condition):
 
     of: Point | None = None
     """A point [x, y] in the world."""
-    object: ObjectName | None = None
+    object: MovableName | None = None
     """An object of the world or of the scenario's events, by name; false while it is not there."""
     region: RegionName | None = None
     """A region of the world, by name."""

@@ -13,5 +13,5 @@ class Time(Value[Duration], Condition):
     """
 
     def holds(self, now: Situation) -> bool:
-        """The clock, which counts whole ticks, has reached the time (to the nanosecond)."""
-        return now.seconds >= self.root - 1e-9
+        """The clock, which counts whole ticks, has reached the tick nearest to the time."""
+        return now.tick >= now.clock.ticks(self.root)

@@ -7,7 +7,7 @@ from simscen.triggers.base import Condition
 
 
 class Travelled(Value[NonNegativeLength], Condition):
-    """True once the robot has truly driven this far since the start.
+    """True once the robot has truly driven this far since the start; being kidnapped is no drive.
 
     Example: `when: {travelled: 2.5 m}`
     """

@@ -34,7 +34,7 @@ def build_own(
 
         solids += walls_of(grid, spec.map_height)
     for number, wall in enumerate(spec.walls, start=1):
-        solids += wall_solids(_corners(wall), wall.thickness, wall.height, _wall_name(wall, number))
+        solids += wall_solids(_corners(wall), wall.thickness, wall.height, wall.called(number))
     solids += [_standing(obstacle) for obstacle in spec.obstacles]
     bodies = (*base.bodies, *map(_movable, spec.objects), *map(_door, spec.doors))
     places = {**base.places, **{key: place.pose for key, place in spec.places.items()}}
@@ -66,11 +66,6 @@ def _swing(door: Door) -> tuple[Pose2, Pose2]:
 
 def _corners(wall: Wall) -> list[tuple[float, float]]:
     return [(x, y) for x, y in wall.points]
-
-
-def _wall_name(wall: Wall, number: int) -> str:
-    """Its own name, or `wall_3` for the third wall of the file."""
-    return wall.name if "name" in wall.model_fields_set else f"wall_{number}"
 
 
 def _standing(obstacle: Obstacle) -> Solid:

@@ -10,14 +10,10 @@ from pathlib import Path
 import pytest
 import yaml
 
-from simscen.core.result import Outcome, RunKey
-from simscen.core.time import Clock
+from simscen.core.result import Outcome
 from simscen.loading.scenario import load_scenario
-from simscen.record.tracebuilder import TraceBuilder
-from simscen.run.assemble import assemble
-from simscen.run.lockstep import run_lockstep
-from simscen.run.perform import judged
 from simscen.run.prepare import prepare
+from simscen.run.simulate import simulate
 
 ROOT = Path(__file__).parents[2]
 NO_LOCALIZER = ("stack.localizer", {"type": "odometry"})
@@ -106,8 +102,4 @@ def run(spec: dict, scenario: str, root: Path):
     file.parent.mkdir(parents=True)
     file.write_text(yaml.safe_dump(spec))
     loaded = load_scenario(file, root)
-    prepared, seed = prepare(loaded), loaded.spec.seed
-    rig, builder = assemble(prepared, seed), TraceBuilder(Clock(loaded.spec.physics.tick_rate))
-    end = run_lockstep(rig, (builder,))
-    rig.simulation.close()
-    return judged(prepared, RunKey(loaded.id, seed), builder.finish(end.tick))
+    return simulate(prepare(loaded)).result

@@ -4,14 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from simscen.core.result import Outcome, RunKey
-from simscen.core.time import Clock
-from simscen.loading.scenario import load_scenario
-from simscen.record.tracebuilder import TraceBuilder
-from simscen.run.assemble import assemble
-from simscen.run.lockstep import run_lockstep
-from simscen.run.perform import judged
-from simscen.run.prepare import prepare
+import simscen
 from simscen.stack.cusps import cusps
 
 ROOT = Path(__file__).parents[2]
@@ -20,13 +13,9 @@ MOVING = 0.03
 
 
 def test_a_car_turns_round_in_a_road_too_narrow_for_one_sweep():
-    loaded = load_scenario(ROOT / "scenarios/robots/car_three_point_turn.scenario.yaml", ROOT)
-    prepared = prepare(loaded)
-    rig, builder = assemble(prepared, loaded.spec.seed), TraceBuilder(Clock(240))
-    end = run_lockstep(rig, (builder,))
-    rig.simulation.close()
-    trace = builder.finish(end.tick)
-    assert judged(prepared, RunKey(loaded.id, loaded.spec.seed), trace).outcome is Outcome.PASSED
+    run = simscen.simulate(ROOT / "scenarios/robots/car_three_point_turn.scenario.yaml")
+    trace = run.trace
+    assert run.passed
 
     assert len(cusps(trace.plans[0].points)) >= 2
     speed, turn = trace.velocity.values[:, 0], trace.velocity.values[:, 2]

@@ -17,10 +17,11 @@ from simscen.sim.outline import extremes
 from simscen.sim.robot_body import RobotBody, assemble
 from simscen.sim.undercarriage import Wheel, wheel_inertia
 from simscen.sim.urdf.elements import Meshes, MeshReader
-from simscen.sim.urdf.files import Folders, Trouble, read_urdf
-from simscen.sim.urdf.markup import CODE, parse
+from simscen.sim.urdf.files import Folders, Trouble, read_xml
+from simscen.sim.urdf.markup import CODE
 from simscen.sim.urdf.tree import Tree, tree_of
 from simscen.sim.urdf.wheels import WheelJoint, chosen
+from simscen.sim.urdf.xacro.expand import expand
 
 CASTER = 0.35
 """A caster is smaller than this fraction of the hull's length and width."""
@@ -41,7 +42,10 @@ def body_of_urdf(spec: RobotSpec, file: Path | None, roots: Sequence[Path], read
 
 def read_tree(path: Path, folders: Folders, read_mesh: MeshReader | None) -> Tree:
     """The links and joints of a URDF or xacro file. Raises InvalidInput."""
-    return tree_of(parse(read_urdf(path, folders), folders.shown(path)), Meshes(path.parent, folders, read_mesh))
+    robot = read_xml(path, folders)
+    if path.suffix == ".xacro" or "xmlns:xacro" in robot.attributes:
+        robot = expand(robot, path, folders, lambda included: read_xml(included, folders))
+    return tree_of(robot, Meshes(path.parent, folders, read_mesh))
 
 
 def body_of_tree(spec: RobotSpec, tree: Tree) -> RobotBody:

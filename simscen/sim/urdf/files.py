@@ -10,7 +10,7 @@ from pathlib import Path, PurePosixPath
 from simscen.core.errors import InvalidInput
 from simscen.core.filesread import note_read
 from simscen.core.problems import Problem
-from simscen.sim.urdf.markup import CODE
+from simscen.sim.urdf.markup import CODE, Element, parse
 
 URDF_BYTES = 2 * 2**20
 MESH_BYTES = 20 * 2**20
@@ -72,36 +72,16 @@ def check_regular(path: Path, limit: int) -> None:
         raise Trouble(f"larger than {limit // 2**20} MiB")
 
 
-def read_urdf(path: Path, folders: Folders) -> bytes:
-    """The text of a URDF, or of a xacro file expanded. Raises InvalidInput."""
+def read_xml(path: Path, folders: Folders) -> Element:
+    """The elements of a URDF or of a file that it includes, as written. Raises InvalidInput."""
     shown = folders.shown(path)
     try:
         real = folders.inside(path)
         check_regular(real, URDF_BYTES)
         note_read(real)
-        data = _expanded(real, folders) if real.suffix == ".xacro" else real.read_bytes()
+        data = real.read_bytes()
     except Trouble as trouble:
         raise InvalidInput([Problem(shown, 0, 0, CODE, str(trouble))]) from trouble
     except OSError as error:
         raise InvalidInput([Problem(shown, 0, 0, CODE, (error.strerror or str(error)).lower())]) from error
-    if len(data) > URDF_BYTES:
-        raise InvalidInput([Problem(shown, 0, 0, CODE, f"larger than {URDF_BYTES // 2**20} MiB when expanded")])
-    return data
-
-
-def _expanded(path: Path, folders: Folders) -> bytes:
-    try:
-        import xacro
-    except ImportError as error:
-        raise Trouble(
-            "xacro files need the xacro package: pip install 'simscen[xacro]', or write `xacro FILE > robot.urdf`"
-        ) from error
-    xacro.all_includes.clear()  # it only ever grows
-    try:
-        document = xacro.process_file(str(path))
-    except Exception as error:  # xacro raises whatever its expressions and includes happen to meet
-        raise Trouble(f"xacro cannot expand it: {type(error).__name__}") from error
-    for included in xacro.all_includes:
-        note_read(folders.inside(Path(included)))
-    text: str = document.toxml()
-    return text.encode()
+    return parse(data, shown)

@@ -42,3 +42,12 @@ def test_a_narrow_terminal_is_respected(simscen, monkeypatch) -> None:
     text = [line for line in simscen("explain", "stopped_within").out.splitlines() if not line.startswith("  Example")]
     prose = [line for line in text if ": " not in line]
     assert max(map(len, prose)) <= 50
+
+
+def test_signals_are_listed_with_their_units_and_each_is_explained(simscen) -> None:
+    out = simscen("explain", "signals").out
+    assert "clearance: length in m\n" in out
+    assert "in_region: yes or no\n" in out
+    assert "40\n  Hz" in out or "40 Hz" in out
+    assert "Example: {signal: distance_to, object: cart" in simscen("explain", "distance_to").out
+    assert "clearance (signal)" in simscen("explain", "clearance").out

@@ -59,6 +59,15 @@ def test_reports_come_in_other_forms_and_places(simscen, out: Path) -> None:
     assert b'line="' not in (out.parent / "ci/junit.xml").read_bytes()
 
 
+def test_with_a_junit_file_of_its_own_a_report_writes_that_file_only_and_says_so(simscen, out: Path) -> None:
+    before = {path: (path.read_bytes(), path.stat().st_mtime_ns) for path in out.rglob("*") if path.is_file()}
+    ended = simscen("report", "out", "--junit", "ci.xml", "--junit-family", "xunit2")
+    assert ended.code == 1
+    assert ended.out.rstrip().endswith("· ci.xml")
+    assert {path: (path.read_bytes(), path.stat().st_mtime_ns) for path in out.rglob("*") if path.is_file()} == before
+    assert b'line="' not in (out.parent / "ci.xml").read_bytes()
+
+
 def test_a_full_disk_leaves_the_reports_that_were_there(simscen, out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before = {path: path.read_bytes() for path in out.iterdir() if path.is_file()}
 

@@ -31,6 +31,7 @@ def test_a_folder_that_is_not_empty_stays_untouched(simscen, tmp_path: Path) -> 
         (("--resume", "nowhere"), "nowhere: error[SC810] there is no events.jsonl in it"),
         (("--shard", "3/2"), "cannot read --shard 3/2"),
         (("--shard", "half"), "cannot read --shard half"),
+        (("--seed", "4294967295", "--repeat", "2"), "beyond the largest, 4294967295"),
     ],
 )
 def test_what_cannot_be_is_told_before_anything_runs(simscen, tmp_path: Path, options, told) -> None:
@@ -38,6 +39,7 @@ def test_what_cannot_be_is_told_before_anything_runs(simscen, tmp_path: Path, op
     assert ended.code == 2
     assert told in ended.err
     assert not list(tmp_path.rglob("*.mcap"))
+    assert not (tmp_path / "simscen-out").exists()
 
 
 def test_a_disk_that_is_full_already_is_told_before_anything_runs(simscen, tmp_path: Path, monkeypatch) -> None:

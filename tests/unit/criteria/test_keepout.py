@@ -1,33 +1,131 @@
-"""Distances between polygons against shapely."""
+"""Keepout distances against shapely: apart, touching, crossing, wholly inside, between two samples."""
 
 import numpy as np
 import pytest
 import shapely
 import shapely.affinity
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from simscen.criteria.keepout import _distances
+from simscen.core.verdict import Status
+from simscen.criteria.criterion import AnyCriterion
+from simscen.judge.judge import judge
+from simscen.judge.sketch import sketch, sketch_case
+
+SQUARE = [[-0.3, -0.3], [0.3, -0.3], [0.3, 0.3], [-0.3, 0.3]]
+NOTCHED = [[0, 0], [3, 0], [3, 3], [1.6, 3], [1.6, 1], [1.4, 1], [1.4, 3], [0, 3]]
 
 
-def random_polygon(chance, size):
-    angles = np.sort(chance.uniform(0, 2 * np.pi, 6))
-    radii = chance.uniform(0.4, 1.0, 6) * size
-    return np.column_stack((radii * np.cos(angles), radii * np.sin(angles)))
+def judged(region, truth, footprint=SQUARE, seconds=10, distance=0.0, events=(), radius=0.2):
+    entry = AnyCriterion.model_validate({"keepout": {"region": "wet", "distance": distance}})
+    trace = sketch({"seconds": seconds, "truth": truth, "events": events})
+    case = sketch_case({"regions": {"wet": region}, "footprint": footprint, "inscribed_radius": radius})
+    (verdict,) = judge([entry], trace, case)
+    (finding,) = verdict.findings
+    return finding
 
 
-def test_polygons_apart_are_as_far_apart_as_shapely_says():
-    chance = np.random.default_rng(3)
-    checked = 0
-    for _ in range(40):
-        hull, region = random_polygon(chance, 0.5), random_polygon(chance, 2.0)
-        poses = np.column_stack((chance.uniform(-4, 4, (20, 2)), chance.uniform(-3, 3, 20)))
-        found = _distances(poses, hull, region)
-        for (x, y, yaw), distance in zip(poses, found, strict=True):
-            moved = shapely.affinity.rotate(shapely.Polygon(hull), yaw, origin=(0, 0), use_radians=True)
-            moved = shapely.affinity.translate(moved, x, y)
-            expected = moved.distance(shapely.Polygon(region))
-            if expected > 0:
-                checked += 1
-                assert distance == pytest.approx(expected, abs=1e-9)
-            elif moved.within(shapely.Polygon(region)):
-                assert distance < 0
-    assert checked > 200
+def star(chance, size, corners):
+    angles = np.sort(chance.uniform(0, 2 * np.pi, corners))
+    radii = chance.uniform(0.2, 1.0, corners) * size
+    return np.column_stack((radii * np.cos(angles), radii * np.sin(angles))).tolist()
+
+
+def placed(outline, x, y, yaw):
+    turned = shapely.affinity.rotate(shapely.Polygon(outline), yaw, origin=(0, 0), use_radians=True)
+    return shapely.affinity.translate(turned, x, y)
+
+
+def convex(corners):
+    return [list(corner) for corner in shapely.MultiPoint(corners).convex_hull.exterior.coords[:-1]]
+
+
+def way_out(moved, region):
+    """How far two convex polygons overlap: the origin's distance to the border of their Minkowski difference."""
+    pairs = [(rx - mx, ry - my) for rx, ry in region.exterior.coords for mx, my in moved.exterior.coords]
+    return shapely.MultiPoint(pairs).convex_hull.exterior.distance(shapely.Point(0, 0))
+
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+@given(SEEDS)
+@settings(deadline=None)
+def test_the_sign_and_every_positive_distance_are_those_of_shapely(seed):
+    chance = np.random.default_rng(seed)
+    hull, region = star(chance, 0.8, chance.integers(3, 8)), star(chance, 2.0, chance.integers(3, 12))
+    if not (shapely.Polygon(hull).is_valid and shapely.Polygon(region).is_valid):
+        return
+    x, y, yaw = *chance.uniform(-2.5, 2.5, 2), chance.uniform(-3, 3)
+    found = judged(region, [[0, x, y, yaw]], hull, seconds=0.1)
+    moved = placed(hull, x, y, yaw)
+    overlap = moved.intersection(shapely.Polygon(region)).area
+    if overlap > 1e-9:
+        assert found.status is Status.FAIL
+        assert found.value < 0
+    else:
+        assert found.value == pytest.approx(moved.distance(shapely.Polygon(region)), abs=1e-6)
+
+
+@given(SEEDS)
+@settings(deadline=None)
+def test_convex_polygons_that_overlap_are_as_deep_as_the_shortest_way_out(seed):
+    chance = np.random.default_rng(seed)
+    hull, region = convex(star(chance, 0.8, 6)), convex(star(chance, 2.0, 7))
+    x, y, yaw = *chance.uniform(-1.5, 1.5, 2), chance.uniform(-3, 3)
+    moved = placed(hull, x, y, yaw)
+    if moved.intersection(shapely.Polygon(region)).area > 1e-9:
+        found = judged(region, [[0, x, y, yaw]], hull, seconds=0.1)
+        assert found.value == pytest.approx(-way_out(moved, shapely.Polygon(region)), abs=1e-9)
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.4, np.pi / 2])
+def test_a_footprint_that_straddles_a_narrow_strip_is_in_it(yaw):
+    strip = [[-0.05, -5], [0.05, -5], [0.05, 5], [-0.05, 5]]
+    found = judged(strip, [[0, 0, 0, yaw]])
+    assert found.status is Status.FAIL
+    assert found.value < -0.05
+
+
+def test_a_robot_wholly_inside_is_in_it():
+    assert judged([[-5, -5], [5, -5], [5, 5], [-5, 5]], [[0, 1, 0, 0]]).value == pytest.approx(-4.3)
+
+
+def test_a_notch_in_a_region_is_no_part_of_it():
+    narrow = [[-0.05, -0.3], [0.05, -0.3], [0.05, 0.3], [-0.05, 0.3]]
+    assert judged(NOTCHED, [[0, 1.5, 2, 0]], narrow).value == pytest.approx(0.05)
+    assert judged(NOTCHED, [[0, 1.5, 2, 0]], SQUARE).value < 0
+
+
+def test_a_region_between_two_samples_is_not_jumped_over():
+    dash = [[5.0, -1], [5.02, -1], [5.02, 1], [5.0, 1]]
+    fly = [[-0.01, -0.01], [0.01, -0.01], [0.01, 0.01], [-0.01, 0.01]]
+    found = judged(dash, [[0, 0, 0, 0], [1.0, 13.0, 0, 0]], fly, seconds=1)  # 0.33 m from sample to sample
+    assert found.status is Status.FAIL
+    assert found.value == pytest.approx(-0.02, abs=0.006)
+
+
+def test_a_robot_that_is_set_down_elsewhere_was_nowhere_in_between():
+    wall = [[4, -1], [6, -1], [6, 1], [4, 1]]
+    way = [[0, 5, -5, 0], [5, 5, -5, 0], [5.02, 5, 10, 0], [10, 5, 10, 0]]
+    carried = [[5.0, "robot.placed", ""]]
+    assert judged(wall, way, events=carried).value == pytest.approx(3.7)
+    assert judged(wall, way).status is Status.FAIL
+
+
+def test_turning_through_pi_is_a_small_turn():
+    way = [[0, 0, 0, 3.13], [1, 0, 0, -3.13]]
+    pole = [[0.9, -0.1], [1.1, -0.1], [1.1, 0.1], [0.9, 0.1]]
+    tail = [[-1.5, -0.05], [0.1, -0.05], [0.1, 0.05], [-1.5, 0.05]]
+    west = [[-1.6, -0.5], [-1.55, -0.5], [-1.55, 0.5], [-1.6, 0.5]]
+    assert judged(west, way, tail, seconds=1).value > 1.4
+    assert judged(pole, way, tail, seconds=1).status is Status.FAIL
+
+
+def test_without_a_footprint_the_robot_is_a_disc_of_its_inscribed_radius():
+    assert judged([[1, -1], [2, -1], [2, 1], [1, 1]], [[0, 0, 0, 0]], [], radius=0.3).value == pytest.approx(0.7)
+
+
+@pytest.mark.parametrize("ring", [[[0, 0], [1, 0], [2, 0]], [*NOTCHED, *NOTCHED], [[0, 0], [1, 1], [1, 0], [0, 1]]])
+def test_a_region_that_has_no_inside_of_its_own_is_an_error_never_a_pass(ring):
+    assert judged(ring, [[0, 9, 9, 0]]).status is Status.ERROR

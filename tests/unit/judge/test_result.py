@@ -3,10 +3,9 @@ import math
 
 import pytest
 
-from simscen.core.result import Outcome
+from simscen.core.result import Outcome, RunKey
 from simscen.criteria.criterion import AnyCriterion
-from simscen.judge.judge import judge
-from simscen.judge.result import run_result
+from simscen.judge.result import result_of
 from simscen.judge.resultdata import from_json, read_result, to_json
 from simscen.judge.sketch import sketch, sketch_case
 
@@ -15,9 +14,9 @@ TRACE = {"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]], "clearance": 0.5, "event
 
 def conclude(trace, *criteria):
     built, case = sketch(trace), sketch_case({})
-    verdicts = judge([AnyCriterion.model_validate(words) for words in criteria], built, case)
+    asked = [AnyCriterion.model_validate(words) for words in criteria]
     lines = tuple(range(10, 10 + len(criteria)))
-    return run_result("a/b", "scenarios/a/b.scenario.yaml", 7, verdicts, built, case, lines=lines)
+    return result_of(RunKey("a/b", 7), "scenarios/a/b.scenario.yaml", asked, built, case, lines)
 
 
 def test_a_result_survives_its_file(tmp_path):
@@ -55,6 +54,34 @@ def test_a_broken_signal_makes_the_run_an_error_even_when_no_criterion_looks_at_
     result = conclude({**TRACE, "truth": [[0, 0, 0], [2, math.nan, 0]]}, {"collisions": {}})
     assert result.outcome is Outcome.ERROR
     assert "not finite" in result.error.message
+
+
+@pytest.mark.parametrize("broken", [math.nan, -math.inf])
+def test_a_broken_clearance_makes_the_run_an_error_though_nothing_bounds_it(broken):
+    result = conclude({**TRACE, "clearance": [[0, 0.5], [2, broken], [4, 0.5]]}, {"collisions": {}})
+    assert result.outcome is Outcome.ERROR
+    assert "the clearance is not a number at t = " in result.error.message
+
+
+@pytest.mark.parametrize("signal", ["truth", "velocity", "belief", "command"])
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_one_sample_that_is_no_number_breaks_the_run_whatever_judges_it(signal, value):
+    trace = sketch(TRACE)
+    getattr(trace, signal).values[2, 1] = value
+    criteria = [AnyCriterion.model_validate({"collisions": {}})]
+    assert result_of(RunKey("a", 7), "a", criteria, trace, sketch_case({})).outcome is Outcome.ERROR
+
+
+def test_a_thing_without_a_place_breaks_the_run():
+    result = conclude({**TRACE, "objects": {"cart": [[0, 0, 0], [2, math.nan, 0]]}}, {"collisions": {}})
+    assert result.outcome is Outcome.ERROR
+    assert "the pose of cart is not finite" in result.error.message
+
+
+def test_free_space_without_end_is_no_error_and_its_metric_is_the_range():
+    result = conclude({**TRACE, "clearance": math.inf}, {"collisions": {}})
+    assert result.outcome is Outcome.PASSED
+    assert result.metrics["clearance_min"] == 2.0
 
 
 @pytest.mark.parametrize("text", ["{}", "[]", "3", '{"format": 99}', "nonsense"])

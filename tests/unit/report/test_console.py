@@ -5,6 +5,8 @@ from dataclasses import replace
 
 import pytest
 
+from simscen.cli.diagnostics import as_github
+from simscen.core.problems import Problem
 from simscen.core.result import RunKey
 from simscen.core.sessionevents import SessionStarted
 from simscen.report.console import text_reporter
@@ -139,6 +141,21 @@ def test_github_annotations_stand_at_the_line_of_the_criterion_and_are_escaped(f
     assert "\n" not in line
     assert "file=scenarios/evil/[red]%3A%3Aerror%3A%3Ax.scenario.yaml,line=1," in line
     assert "100 %25, a:b" in line
+
+
+def test_github_annotations_name_files_from_the_checkout_wherever_the_command_was_called(failed, tmp_path, monkeypatch):
+    file = tmp_path / "repo/robots/sim/aisle.scenario.yaml"
+    file.parent.mkdir(parents=True)
+    file.write_text("")
+    monkeypatch.setenv("GITHUB_WORKSPACE", str(tmp_path / "repo"))
+    monkeypatch.chdir(tmp_path / "repo/robots")
+    error = annotations(replace(failed, file="sim/aisle.scenario.yaml"))[0]
+    assert "file=robots/sim/aisle.scenario.yaml,line=27," in error
+    problem = Problem("sim/aisle.scenario.yaml", 2, 1, "SC012", "unknown key")
+    assert as_github([problem]).startswith("::error file=robots/sim/aisle.scenario.yaml,line=2,")
+    monkeypatch.chdir("/")
+    outside = replace(failed, file="etc/hostname")
+    assert "file=etc/hostname,line=27," in annotations(outside)[0]
 
 
 def test_the_summary_of_a_github_job_lists_what_did_not_pass_first_and_holds_no_live_markup(session, passed, crashed):

@@ -62,6 +62,9 @@ def test_file_line_properties_and_attachments_are_there(failed):
     (case,) = ElementTree.fromstring(to_xml([failed])).iter("testcase")
     properties = {entry.get("name"): entry.get("value") for entry in case.iter("property")}
     assert case.get("file") == failed.result.path
+    called_elsewhere = replace(failed, file="../scenarios/lidar_off.scenario.yaml")
+    suite = ElementTree.fromstring(to_xml([called_elsewhere]))[0]
+    assert (suite.get("name"), suite[0].get("file")) == (called_elsewhere.file,) * 2
     assert case.get("line") == "1"
     assert case.get("time") == "0.350"
     assert properties["simulated_seconds"] == "31.000"

@@ -6,10 +6,10 @@ from PIL import Image
 
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.grid import OccupancyGrid
+from simscen.core.result import RunKey
 from simscen.core.shapes import Body, Box, Cylinder, Extrusion, Mesh, Solid, Sphere
 from simscen.criteria.criterion import AnyCriterion
-from simscen.judge.judge import judge
-from simscen.judge.result import run_result
+from simscen.judge.result import result_of
 from simscen.judge.sketch import sketch, sketch_case
 from simscen.report.picture import Scene, draw, palette, write_picture
 from simscen.report.picture.canvas import Canvas
@@ -45,8 +45,8 @@ def scene(**changes):
         {"goals": [{"name": "end", "pose": [8, 4.5, 0]}], "footprint": [[-0.2, -0.2], [0.2, 0], [-0.2, 0.2]]}
     )
     trace = sketch(words)
-    verdicts = judge([AnyCriterion.model_validate({"clearance": {"min": 2.0}})], trace, case)
-    result = run_result("room/cross", "room/cross.scenario.yaml", 3, verdicts, trace, case)
+    criteria = [AnyCriterion.model_validate({"clearance": {"min": 2.0}})]
+    result = result_of(RunKey("room/cross", 3), "room/cross.scenario.yaml", criteria, trace, case)
     return Scene(trace, case, room(), result, {"corner": Pose2(9, 1)})
 
 

@@ -1,21 +1,24 @@
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import pytest
 
+from simscen.core.time import Clock
 from simscen.run.firing import Firing
 from simscen.triggers.trigger import Trigger
 
 
 @dataclass
 class Now:
-    seconds: float
+    tick: int
     travelled: float = 0.0
+    clock: ClassVar[Clock] = Clock(240)
 
 
 def firings(trigger: dict, travelled, seed=1):
     firing = Firing(Trigger.model_validate(trigger), np.random.default_rng(seed))
-    return [firing.fires(Now(beat / 10, value)) for beat, value in enumerate(travelled)]
+    return [firing.fires(Now(24 * beat, value)) for beat, value in enumerate(travelled)]
 
 
 def test_a_rising_trigger_fires_once_when_its_condition_becomes_true():

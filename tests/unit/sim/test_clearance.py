@@ -8,16 +8,22 @@ from shapely.geometry import Point, Polygon
 from shapely.geometry import box as rectangle
 from shapely.ops import unary_union
 
+from simscen.core.case import CLEARANCE_RANGE
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.shapes import Body, Cylinder, Extrusion, Solid
-from simscen.sim.clearance import REACH
 
 RADIUS = 0.22  # of the turtlebot
 MILLIMETRE = 1e-3
 
 
 def test_nothing_around_counts_as_the_reach_of_the_search(simulate):
-    assert simulate().truth().clearance == REACH
+    assert simulate().truth().clearance == CLEARANCE_RANGE
+
+
+def test_the_search_reaches_as_far_as_it_is_asked_to(simulate):
+    wall = box("wall", RADIUS + 3.0 + 0.05, 0, 0.1, 4)
+    assert simulate(solids=[wall], clearance_range=3.5).truth().clearance == pytest.approx(3.0, abs=MILLIMETRE)
+    assert simulate(solids=[wall], clearance_range=2.5).truth().clearance == 2.5
 
 
 @pytest.mark.parametrize("gap", [0.001, 0.02, 0.3, 1.0, 1.9])
@@ -54,7 +60,7 @@ def test_things_that_move_count_and_the_ground_does_not(simulate):
     simulation = simulate(bodies=[cart])
     assert simulation.truth().clearance == pytest.approx(0.8 - RADIUS, abs=MILLIMETRE)
     simulation.remove("cart")
-    assert simulation.truth().clearance == REACH
+    assert simulation.truth().clearance == CLEARANCE_RANGE
     simulation.spawn(Body("prism", (Solid(Extrusion(((-0.1, -1), (0.1, -1), (0.1, 1), (-0.1, 1)), 0.5)),), Pose3(0.7)))
     assert simulation.truth().clearance == pytest.approx(0.6 - RADIUS, abs=MILLIMETRE)
 
@@ -77,7 +83,7 @@ def test_clearance_along_a_drive_is_that_of_the_plane(simulate):
     for _ in range(320):
         simulation.step(6)
         truth = simulation.truth()
-        expected = min(REACH, shapes.distance(Point(truth.pose.x, truth.pose.y)) - RADIUS)
+        expected = min(CLEARANCE_RANGE, shapes.distance(Point(truth.pose.x, truth.pose.y)) - RADIUS)
         assert truth.clearance == pytest.approx(expected, abs=MILLIMETRE)
 
 

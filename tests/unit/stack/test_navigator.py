@@ -165,7 +165,7 @@ def test_a_silent_lidar_stops_the_robot_within_half_a_second_and_it_goes_on_when
 
 def test_cancel_stops_at_once_and_ends_the_task() -> None:
     d = start(rooms()).run(3.0)
-    d.stack.cancel()
+    d.stack.cancel(d.tick)
     before = len(d.commands)
     d.run(1.0, until="")
     assert [e.name for e in d.kinds("goal.canceled")] == ["far"]
@@ -176,7 +176,7 @@ def test_cancel_stops_at_once_and_ends_the_task() -> None:
 
 def test_a_new_goal_preempts_the_current_one_and_the_later_ones_follow() -> None:
     d = start(rooms(), FAR, Goal("last", Pose2(1.0, 1.0))).run(2.0)
-    d.stack.preempt(Goal("new", Pose2(3.0, 5.0)))
+    d.stack.preempt(d.tick, Goal("new", Pose2(3.0, 5.0)))
     d.run(60)
     assert [e.name for e in d.kinds("goal.canceled")] == ["far"]
     assert [e.name for e in d.kinds("goal.reached")] == ["new", "last"]
@@ -184,7 +184,7 @@ def test_a_new_goal_preempts_the_current_one_and_the_later_ones_follow() -> None
 
 def test_a_task_that_has_ended_can_be_given_a_new_goal() -> None:
     d = start(rooms(), Goal("a", Pose2(2.0, 1.0))).run(30)
-    d.stack.preempt(Goal("b", Pose2(1.0, 2.0)))
+    d.stack.preempt(d.tick, Goal("b", Pose2(1.0, 2.0)))
     d.run(30)
     assert [e.name for e in d.kinds("goal.reached")] == ["a", "b"]
 

@@ -3,7 +3,6 @@
 import math
 import os
 import struct
-from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -295,17 +294,6 @@ def test_a_car_is_steered_by_the_wheels_below_upright_joints(load):
     simulation.close()
 
 
-XACRO = '<robot name="c" xmlns:xacro="http://ros.org/wiki/xacro"><link name="a"/></robot>'
-
-
-@pytest.mark.skipif(find_spec("xacro") is not None, reason="the xacro package is installed")
-def test_xacro_files_say_what_they_need(tmp_path):
-    (tmp_path / "robot.urdf.xacro").write_text(XACRO)
-    with pytest.raises(InvalidInput, match=r"need the xacro package: pip install 'simscen\[xacro\]'"):
-        robot_body(spec(urdf="robot.urdf.xacro"), tmp_path / "cart.robot.yaml", [tmp_path])
-
-
-@pytest.mark.skipif(find_spec("xacro") is None, reason="the xacro package is not installed")
 def test_xacro_files_are_expanded(tmp_path):
     (tmp_path / "robot.urdf.xacro").write_text(
         robot().replace("<robot ", '<robot xmlns:xacro="http://ros.org/wiki/xacro" ')

@@ -1,0 +1,34 @@
+"""What came of a run, whether it was simulated just now or read from its log."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from simscen.core.case import Case
+from simscen.core.result import Outcome, RunResult
+from simscen.core.trace import Trace
+from simscen.core.verdict import Verdict
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A run: its `result` (outcome, verdicts, metrics), the `trace` it was judged from, the `case` it was judged by.
+
+    `log` is the MCAP file that holds all of it; None when none was asked for.
+    """
+
+    result: RunResult
+    trace: Trace
+    case: Case
+    log: Path | None = None
+
+    @property
+    def passed(self) -> bool:
+        """Whether everything held; a run that could not be completed never passed."""
+        return self.result.outcome is Outcome.PASSED
+
+    def verdict(self, name: str) -> Verdict:
+        """The verdict of the criterion with this id, e.g. `run.verdict("path_length").status`. Raises KeyError."""
+        found = {verdict.id: verdict for verdict in self.result.verdicts}
+        if name not in found:
+            raise KeyError(f"no criterion is called {name!r}; there are: {', '.join(found)}")
+        return found[name]

@@ -1,0 +1,77 @@
+"""How far two polygons are apart, or how deep they are in each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+
+import numpy as np
+
+from simscen.core.convex import convex_pieces
+from simscen.core.geometry import Array
+from simscen.core.polygons import Corner
+
+
+def separation(poses: Array, moving: Sequence[Corner], fixed: Sequence[Corner]) -> Array:
+    """Signed distance (n,) in metres between `moving`, carried along `poses` (n, 3), and `fixed`, both filled.
+
+    Apart it is the distance of their nearest points. Overlapping it is negative by the shortest way on which `moving`
+    would get clear of `fixed`; where one is not convex, of those two of their convex pieces that are deepest in each
+    other, a lower bound. `moving` may be a single point. Raises ValueError for a ring that crosses itself.
+    """
+    pieces = [_array(piece) for piece in (convex_pieces(moving) if len(moving) > 2 else [moving])]
+    others = [_array(piece) for piece in convex_pieces(fixed)]
+    found = np.full(len(poses), np.inf)
+    for piece, other in product(pieces, others):
+        middle = other.mean(axis=0)
+        reach = np.hypot(*piece.T).max() + np.hypot(*(other - middle).T).max()
+        near = np.flatnonzero(np.hypot(*(poses[:, :2] - middle).T) - reach < found)
+        found[near] = np.minimum(found[near], _convex_separation(_carried(poses[near], piece), other))
+    return found
+
+
+def _array(corners: Sequence[Corner]) -> Array:
+    return np.array(corners, dtype=np.float64).reshape(-1, 2)
+
+
+def _carried(poses: Array, corners: Array) -> Array:
+    """The corners (h, 2) of the robot's frame in the world, (n, h, 2)."""
+    c, s = np.cos(poses[:, 2])[:, np.newaxis], np.sin(poses[:, 2])[:, np.newaxis]
+    turned = np.stack((c * corners[:, 0] - s * corners[:, 1], s * corners[:, 0] + c * corners[:, 1]), axis=2)
+    placed: Array = turned + poses[:, np.newaxis, :2]
+    return placed
+
+
+def _convex_separation(moving: Array, fixed: Array) -> Array:
+    """Of convex anticlockwise polygons (n, h, 2) and (r, 2).
+
+    Two convex polygons overlap unless an edge of one has the whole other outside; the least overlap along the edges'
+    normals is the shortest way out (the edges of their Minkowski difference have no other directions).
+    """
+    still = np.broadcast_to(fixed, (len(moving), *fixed.shape))
+    along = np.maximum(_outside(still, moving), _outside(moving, still))
+    apart = np.minimum(_nearest(moving, still), _nearest(still, moving))
+    signed: Array = np.where(along > 0, apart, along)
+    return signed
+
+
+def _outside(polygon: Array, points: Array) -> Array:
+    """How far the nearest of `points` (n, k, 2) is outside the edge of `polygon` (n, m, 2) that it is furthest from."""
+    if polygon.shape[1] < 2:
+        return np.full(len(points), -np.inf)
+    along = np.roll(polygon, -1, axis=1) - polygon
+    outward = np.stack((along[..., 1], -along[..., 0]), axis=2) / np.hypot(*np.moveaxis(along, 2, 0))[..., np.newaxis]
+    offset = np.einsum("nkj,nmj->nmk", points, outward) - np.einsum("nmj,nmj->nm", polygon, outward)[..., np.newaxis]
+    furthest: Array = offset.min(axis=2).max(axis=1)
+    return furthest
+
+
+def _nearest(points: Array, polygon: Array) -> Array:
+    """Distance of the points (n, k, 2) to the border of `polygon` (n, m, 2)."""
+    along = np.roll(polygon, -1, axis=1) - polygon
+    squared = np.maximum((along**2).sum(axis=2), np.finfo(np.float64).tiny)[:, np.newaxis]
+    offset = points[:, :, np.newaxis] - polygon[:, np.newaxis]
+    share = np.clip(np.einsum("nkmj,nmj->nkm", offset, along) / squared, 0.0, 1.0)
+    gap = offset - share[..., np.newaxis] * along[:, np.newaxis]
+    distance: Array = np.hypot(gap[..., 0], gap[..., 1]).min(axis=(1, 2))
+    return distance

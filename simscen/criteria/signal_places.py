@@ -1,0 +1,115 @@
+"""Signals that measure where the robot is from something that has a place: a thing, a goal, its own plan."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from simscen.core.events import EventKind
+from simscen.core.geometry import Array
+from simscen.core.samples import Ticks
+from simscen.criteria.signal_values import Asked, Unavailable, goal_distance, poses_of
+from simscen.criteria.signals import finite
+
+if TYPE_CHECKING:
+    from simscen.core.trace import Trace
+
+
+def distance_to(asked: Asked) -> Array:
+    """From the centre of the robot to a point, to a goal of the scenario, or to the origin of a thing that moves."""
+    poses, point, goal = poses_of(asked.trace), asked.of.get("point"), asked.of.get("goal")
+    if isinstance(point, Sequence):
+        return np.hypot(poses[:, 0] - float(point[0]), poses[:, 1] - float(point[1]))
+    if goal is None:
+        return _to_object(asked.trace, str(asked.of["object"]), poses)
+    goals = {known.name: known.pose for known in asked.case.goals}
+    if goal not in goals:
+        raise Unavailable(f"the scenario has no goal `{goal}`")
+    pose = goals[str(goal)]
+    return np.hypot(poses[:, 0] - pose.x, poses[:, 1] - pose.y)
+
+
+def _to_object(trace: Trace, name: str, poses: Array) -> Array:
+    """Infinite while the thing is not there."""
+    if name in trace.objects:
+        where = finite(trace.objects[name], f"the pose of {name}", trace).at(trace.truth.ticks)
+    else:
+        where = _standing(trace, name, len(poses))
+    distance = np.hypot(poses[:, 0] - where[:, 0], poses[:, 1] - where[:, 1])
+    there: Array = np.where(_there(trace, name), distance, np.inf)
+    return there
+
+
+def _standing(trace: Trace, name: str, samples: int) -> Array:
+    """The pose with which a thing that never moved was put into the world."""
+    for event in trace.of_kind(EventKind.OBJECT_SPAWNED):
+        x, y = event.data.get("x"), event.data.get("y")
+        if event.name == name and isinstance(x, int | float) and isinstance(y, int | float):
+            return np.tile([float(x), float(y)], (samples, 1))
+    raise Unavailable(f"`{name}` never was there, or does not move")
+
+
+def _there(trace: Trace, name: str) -> Array:
+    """Whether a thing is in the world at each truth sample; what was never put there was there from the start."""
+    clock = trace.truth.ticks
+    changes = [
+        event for event in trace.of_kind(EventKind.OBJECT_SPAWNED, EventKind.OBJECT_REMOVED) if event.name == name
+    ]
+    there = np.ones(len(clock), dtype=bool)
+    if changes and changes[0].kind == EventKind.OBJECT_SPAWNED:
+        there[:] = False
+    for event in changes:
+        there[np.searchsorted(clock, event.tick, side="left") :] = event.kind == EventKind.OBJECT_SPAWNED
+    return there
+
+
+def distance_remaining(asked: Asked) -> Array:
+    """Along the newest plan from where the robot believes to be; before the first plan, as the crow flies in truth."""
+    belief, clock = finite(asked.trace.belief, "the belief", asked.trace), asked.trace.truth.ticks
+    if not len(belief):
+        raise Unavailable("no belief was recorded")
+    believed = belief.at(clock)[:, :2]
+    left = goal_distance(asked)
+    for first, last, points in _plans(asked.trace, clock):
+        left[first:last] = _along(believed[first:last], points)[1]
+    return left
+
+
+def plan_deviation(asked: Asked) -> Array:
+    """From the true position to the nearest point of the newest plan; none before the first plan."""
+    poses = poses_of(asked.trace)
+    off = np.zeros(len(poses))
+    plans = _plans(asked.trace, asked.trace.truth.ticks)
+    if not plans:
+        raise Unavailable("no plan was recorded")
+    for first, last, points in plans:
+        off[first:last] = _along(poses[first:last, :2], points)[0]
+    return off
+
+
+def _plans(trace: Trace, clock: Ticks) -> list[tuple[int, int, Array]]:
+    """(first sample, sample after the last, points) of each plan that was followed for at least a sample."""
+    plans = [plan for plan in trace.plans if len(plan.points)]
+    begins: list[int] = np.searchsorted(clock, [plan.tick for plan in plans], side="left").tolist()
+    ends = [*begins, len(clock)][1:]
+    return [(b, e, plan.points[:, :2]) for b, e, plan in zip(begins, ends, plans, strict=True) if b < e]
+
+
+def _along(points: Array, way: Array) -> tuple[Array, Array]:
+    """Of each point (n, 2): its distance to a way (m, 2), and how much of the way is left from there."""
+    if len(way) == 1:
+        way = np.vstack((way, way))
+    steps = np.diff(way, axis=0)
+    lengths = np.hypot(steps[:, 0], steps[:, 1])
+    squared = np.maximum(lengths**2, math.ulp(0.0))
+    dx, dy = points[:, :1] - way[:-1, 0], points[:, 1:] - way[:-1, 1]
+    share = np.clip((dx * steps[:, 0] + dy * steps[:, 1]) / squared, 0.0, 1.0)
+    off = np.hypot(dx - share * steps[:, 0], dy - share * steps[:, 1])
+    nearest = off.argmin(axis=1)
+    rows = np.arange(len(points))
+    before = np.concatenate(([0.0], np.cumsum(lengths)))
+    left = before[-1] - before[nearest] - share[rows, nearest] * lengths[nearest]
+    return off[rows, nearest], left

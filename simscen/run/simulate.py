@@ -1,0 +1,87 @@
+"""The one way from a description to a result: assemble, step in lockstep, record, judge."""
+
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+from simscen.core.geometry import Pose3
+from simscen.core.result import RunKey
+from simscen.core.run import Run
+from simscen.core.time import Clock
+from simscen.core.trace import Trace
+from simscen.judge.result import result_of
+from simscen.judge.resultdata import to_json
+from simscen.loading.discovery import default_root
+from simscen.loading.resolved import resolved_text
+from simscen.loading.scenario import load_scenario
+from simscen.model.robot import RobotSpec
+from simscen.record.header import LogHeader
+from simscen.record.recorder import Recorder
+from simscen.record.tracebuilder import TraceBuilder
+from simscen.run.assemble import assemble
+from simscen.run.lockstep import Log, Rig, run_lockstep
+from simscen.run.prepare import Prepared, prepare
+
+Attach = Callable[[Rig, Sequence[Log]], Sequence[Log]]
+"""Is shown the rig and its own logs before the first beat; what it returns listens to every moment, too."""
+
+
+def simulate(
+    prepared: Prepared, seed: int | None = None, *, log: Path | None = None, attach: Attach | None = None
+) -> Run:
+    """Run a prepared scenario with this seed (default: its own) and judge it; `log` is the MCAP file to write.
+
+    *Given* the same scenario and seed *then* the same run and the same bytes in `log`, whatever ran before in this
+    process. Raises RunError when the run cannot be completed, OSError when the log cannot be written.
+    """
+    seed = prepared.spec.seed if seed is None else seed
+    clock = Clock(prepared.spec.physics.tick_rate)
+    builder = TraceBuilder(clock)
+    with ExitStack() as closing:
+        recorder = log and closing.enter_context(Recorder(log, clock, log_header(prepared, seed)))
+        rig = assemble(prepared, seed)
+        closing.callback(rig.simulation.close)
+        own: tuple[Log, ...] = (builder, recorder) if recorder else (builder,)
+        end = run_lockstep(rig, (*own, *(attach(rig, own) if attach else ())))
+        run = judged(prepared, seed, builder.finish(end.tick), log)
+        if recorder:
+            recorder.close(end.tick, to_json(run.result))
+    return run
+
+
+def simulate_file(
+    file: Path, seed: int | None, log: Path | None, root: Path | None, world_path: Sequence[Path] = ()
+) -> Run:
+    """Load, prepare and simulate a scenario file. Raises InvalidInput, and what `simulate` raises."""
+    return simulate(prepare(load_scenario(file, root or default_root([file]), world_path)), seed, log=log)
+
+
+def judged(prepared: Prepared, seed: int, trace: Trace, log: Path | None = None) -> Run:
+    """The run that a trace shows."""
+    loaded = prepared.loaded
+    lines = tuple(loaded.place_of("pass", index).line for index in range(len(prepared.spec.pass_)))
+    result = result_of(RunKey(loaded.id, seed), loaded.path, prepared.spec.pass_, trace, prepared.case, lines)
+    return Run(result, trace, prepared.case, log)
+
+
+def log_header(prepared: Prepared, seed: int) -> LogHeader:
+    """What the log says about the run."""
+    return LogHeader(
+        name=prepared.loaded.id,
+        seed=seed,
+        case=prepared.case,
+        scenario=resolved_text(prepared.loaded),
+        map=prepared.map,
+        robot_description=prepared.body.urdf,
+        frames=_sensor_frames(prepared.robot),
+    )
+
+
+def _sensor_frames(robot: RobotSpec) -> dict[str, Pose3]:
+    """Where lidars and cameras sit on the base."""
+    mounts = {name: (s.lidar or s.camera) for name, s in robot.sensors.items()}
+    return {
+        name: Pose3.from_rpy(sensor.mount.x, sensor.mount.y, sensor.mount.z, 0.0, 0.0, sensor.mount.yaw)
+        for name, sensor in mounts.items()
+        if sensor is not None
+    }

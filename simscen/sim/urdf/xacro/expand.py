@@ -1,0 +1,154 @@
+"""A xacro file as the elements that it stands for (wiki.ros.org/xacro), every one with the place it was written at.
+
+Text between elements and comments are passed over: nothing of a robot's body is in them.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from simscen.core.errors import InvalidInput
+from simscen.sim.urdf.files import URDF_BYTES, Folders, Trouble, check_regular
+from simscen.sim.urdf.markup import MOST_ELEMENTS, Element
+from simscen.sim.urdf.xacro.budget import Budget, Refused
+from simscen.sim.urdf.xacro.calls import bind, called
+from simscen.sim.urdf.xacro.macros import Macro, Macros, macro_of
+from simscen.sim.urdf.xacro.properties import define
+from simscen.sim.urdf.xacro.scope import Block, Scope
+from simscen.sim.urdf.xacro.text import Texts, needed
+from simscen.sim.urdf.xacro.values import truth
+
+MOST_FILES = 200
+"""Files that one robot is made of; each is at most as large as a URDF."""
+
+FileReader = Callable[[Path], Element]
+"""Reads a file inside the allowed folders; raises InvalidInput."""
+
+
+def expand(robot: Element, file: Path, folders: Folders, read: FileReader) -> Element:
+    """The `robot` of the xacro `file` with everything expanded. Raises InvalidInput."""
+    whole = replace(robot, tag="", attributes={}, children=[])
+    _Expansion(file, folders, read).element(robot, whole, Scope(), Macros())
+    return whole.children[0]
+
+
+class _Expansion:
+    def __init__(self, file: Path, folders: Folders, read: FileReader) -> None:
+        self._budget = Budget()
+        self._texts = Texts(folders, file, self._budget)
+        self._folders, self._read_file = folders, read
+        self._read: dict[Path, Element] = {}
+        self._calls: list[tuple[Macro, Element]] = []
+        self._elements, self._bytes = 0, 0
+        self._meanings = {
+            "xacro:property": lambda source, _, scope, __: define(source, scope, self._texts),
+            "xacro:macro": self._macro,
+            "xacro:arg": self._argument,
+            "xacro:include": self._include,
+            "xacro:if": self._if,
+            "xacro:unless": self._if,
+            "xacro:insert_block": self._insert,
+            "xacro:attribute": self._attribute,
+            "xacro:element": self._element,
+            "xacro:call": self._call_by_name,
+        }
+
+    def element(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
+        """Append what an element stands for to the children of `into`."""
+        try:
+            with self._budget:
+                self._budget.spend()
+                other = self._call if source.tag.startswith("xacro:") else self._plain
+                self._meanings.get(source.tag, other)(source, into, scope, macros)
+        except Refused as refused:
+            calls = [f"in macro {m.name!r}, called at {e.file}:{e.line}" for m, e in self._calls[-1:]]
+            hint = "; ".join(filter(None, [refused.hint, *calls]))
+            raise InvalidInput([source.problem(refused.message, hint)]) from refused
+
+    def _children(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
+        for child in source.children:
+            self.element(child, into, scope, macros)
+
+    def _plain(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
+        written = {name: text for name, text in source.attributes.items() if not _of_xacro(name)}
+        attributes = {name: self._texts.text(text, scope) for name, text in written.items()}
+        self._elements += 1
+        self._bytes += len(source.tag) + sum(len(name) + len(text) for name, text in attributes.items())
+        if self._elements > MOST_ELEMENTS or self._bytes > URDF_BYTES:
+            raise Refused(f"more than {MOST_ELEMENTS} elements or {URDF_BYTES // 2**20} MiB when expanded")
+        made = replace(source, attributes=attributes, children=[])
+        into.children.append(made)
+        self._children(source, made, scope, macros)
+
+    def _macro(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
+        macro = macro_of(source)
+        macros.macros[macro.name] = macro
+
+    def _argument(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
+        name = needed(source, "name")
+        if name not in self._texts.arguments:
+            self._texts.arguments[name] = self._texts.text(needed(source, "default", empty=True), scope)
+
+    def _if(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
+        if truth(self._texts.value(needed(source, "value"), scope)) is (source.tag == "xacro:if"):
+            self._children(source, into, scope, macros)
+
+    def _attribute(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
+        name = self._texts.text(needed(source, "name"), scope)
+        into.attributes[name] = self._texts.text(needed(source, "value", empty=True), scope)
+
+    def _element(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
+        self.element(replace(source, tag=self._texts.text(needed(source, "xacro:name"), scope)), into, scope, macros)
+
+    def _insert(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
+        name = needed(source, "name")
+        for written in (f"**{name}", f"*{name}"):
+            owner = scope.owner(written)
+            if owner is not None and isinstance(block := owner.held[written], Block):
+                insert = self._plain if block.whole else self._children
+                insert(block.element, into, scope, macros)
+                return
+        raise Refused(f"there is no block {name[:60]!r}")
+
+    def _call_by_name(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
+        name = self._texts.text(needed(source, "macro"), scope)
+        rest = {key: value for key, value in source.attributes.items() if key != "macro"}
+        self._call(replace(source, tag=f"xacro:{name}", attributes=rest), into, scope, macros)
+
+    def _call(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
+        self._budget.spend(10)
+        macro, around, around_macros = called(source.tag.removeprefix("xacro:"), scope, macros)
+        holder = replace(source, attributes={}, children=[])
+        self._children(source, holder, scope, macros)
+        inside = bind(macro, source, holder.children, scope, Scope(around), self._texts)
+        self._calls.append((macro, source))
+        self._children(macro.body, into, inside, Macros(around_macros))
+        self._calls.pop()
+
+    def _include(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
+        written = self._texts.text(needed(source, "filename"), scope)
+        if space := self._texts.text(source.attributes.get("ns", ""), scope):
+            around, scope = scope, Scope(scope, namespace=True)
+            around.held[space] = scope
+            macros.spaces[space] = macros = Macros()
+        try:
+            path = self._folders.inside(self._texts.file.parent / written)
+            if truth(source.attributes.get("optional", "false")) and not path.exists():
+                return
+            check_regular(path, URDF_BYTES)
+        except Trouble as trouble:
+            raise Refused(f"include {written[:200]!r}: {trouble}") from trouble
+        before, self._texts.file = self._texts.file, path
+        self._children(self._parsed(path), into, scope, macros)
+        self._texts.file = before
+
+    def _parsed(self, path: Path) -> Element:
+        if path not in self._read:
+            if len(self._read) >= MOST_FILES:
+                raise Refused(f"more than {MOST_FILES} files are included")
+            self._read[path] = self._read_file(path)
+        return self._read[path]
+
+
+def _of_xacro(attribute: str) -> bool:
+    return attribute.startswith("xacro:") or attribute == "xmlns:xacro"

@@ -1,0 +1,183 @@
+"""Expressions: Python's grammar is read, and what is not arithmetic on plain data is refused."""
+
+import ast
+import operator
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from simscen.sim.urdf.xacro.budget import LONGEST, Budget, Refused
+from simscen.sim.urdf.xacro.functions import GLOBALS, METHODS, NAMESPACES, TYPES, Function
+from simscen.sim.urdf.xacro.values import MOST_BITS, Value, bounded, size
+
+MOST_CHARACTERS = 1000
+
+BINARY: dict[type[ast.operator], Callable[[Any, Any], object]] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
+    ast.FloorDiv: operator.floordiv, ast.Mod: operator.mod, ast.Pow: operator.pow,
+}  # fmt: skip
+UNARY: dict[type[ast.unaryop], Callable[[Any], object]] = {
+    ast.UAdd: operator.pos, ast.USub: operator.neg, ast.Not: operator.not_
+}  # fmt: skip
+COMPARE: dict[type[ast.cmpop], Callable[[Any, Any], object]] = {
+    ast.Eq: operator.eq, ast.NotEq: operator.ne, ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt,
+    ast.GtE: operator.ge, ast.Is: operator.is_, ast.IsNot: operator.is_not,
+    ast.In: lambda one, many: one in many, ast.NotIn: lambda one, many: one not in many,
+}  # fmt: skip
+HINT = "numbers, texts, lists, comparisons, `a if b else c`, math functions and properties are what is expanded"
+
+
+class Names(Protocol):
+    """Where an expression's names are looked up."""
+
+    def value(self, path: tuple[str, ...]) -> Value:
+        """The property of that name, `ns.name` as two; raises KeyError."""
+
+
+def evaluate(text: str, names: Names, budget: Budget) -> Value:
+    """The value of an expression; raises Refused."""
+    if len(text) > MOST_CHARACTERS:
+        raise Refused(f"an expression is longer than {MOST_CHARACTERS} characters")
+    try:
+        tree = ast.parse(text.strip(), mode="eval")
+    except (SyntaxError, ValueError, MemoryError, RecursionError):  # the last two: brackets in brackets
+        raise Refused("not an expression", HINT) from None
+    return _Evaluation(names, budget).value(tree.body)
+
+
+class _Evaluation:
+    def __init__(self, names: Names, budget: Budget) -> None:
+        self._names, self._budget = names, budget
+
+    def value(self, node: ast.expr) -> Value:
+        with self._budget:
+            self._budget.spend()
+            try:
+                value = bounded(self._raw(node))
+            except (ArithmeticError, TypeError, ValueError, LookupError) as error:
+                raise Refused(str(error)[:200] or type(error).__name__) from None
+            self._budget.spend(size(value) // 16)
+            return value
+
+    def _raw(self, node: ast.expr) -> object:
+        match node:
+            case ast.Constant(value):
+                return value
+            case ast.Name() | ast.Attribute():
+                return self._named(node)
+            case ast.List(elts) | ast.Tuple(elts):
+                return [self.value(each) for each in elts]
+            case ast.BinOp(left, kind, right) if type(kind) in BINARY:
+                return _binary(type(kind), self.value(left), self.value(right))
+            case ast.UnaryOp(kind, operand) if type(kind) in UNARY:
+                return UNARY[type(kind)](self.value(operand))
+            case ast.BoolOp(kind, values):
+                return self._first(values, isinstance(kind, ast.Or))
+            case ast.Compare(left, kinds, others):
+                return self._compared(left, kinds, others)
+            case ast.IfExp(test, body, orelse):
+                return self.value(body if self.value(test) else orelse)
+            case ast.Subscript(whole, index):
+                return self._part(self.value(whole), index)
+            case ast.Call(function, arguments, keywords):
+                return self._called(function, arguments, keywords)
+            case _:
+                raise Refused(f"{_told(node)} is not expanded", HINT)
+
+    def _named(self, node: ast.expr) -> object:
+        path = _path(node)
+        try:
+            return self._names.value(path)
+        except KeyError:
+            known = _known(path)
+        if isinstance(known, int | float):
+            return known
+        raise Refused(f"{'.'.join(path)[:60]!r} is not defined" if known is None else f"{path[-1]}() is not called")
+
+    def _first(self, values: list[ast.expr], wanted: bool) -> Value:
+        for each in values:
+            value = self.value(each)
+            if bool(value) is wanted:
+                break
+        return value
+
+    def _compared(self, left: ast.expr, kinds: list[ast.cmpop], others: list[ast.expr]) -> object:
+        before, result = self.value(left), True
+        for kind, other in zip(kinds, others, strict=True):
+            after = self.value(other)
+            result = bool(COMPARE[type(kind)](before, after))
+            if not result:
+                break
+            before = after
+        return result
+
+    def _part(self, whole: Any, index: ast.expr) -> object:
+        if isinstance(index, ast.Slice):
+            ends = [None if end is None else self.value(end) for end in (index.lower, index.upper, index.step)]
+            return whole[slice(*ends)]
+        return whole[self.value(index)]
+
+    def _called(self, function: ast.expr, arguments: list[ast.expr], keywords: list[ast.keyword]) -> object:
+        path = _path(function) if isinstance(function, ast.Name) or _is_namespace(function) else ()
+        if path in (("isinstance",), ("python", "isinstance")) and len(arguments) == 2:
+            kind = _path(arguments[1])[-1]
+            if kind not in TYPES:
+                raise Refused(f"isinstance() of {kind[:60]!r} is not expanded")
+            return isinstance(self.value(arguments[0]), TYPES[kind])
+        known: Function | float | None
+        if path:
+            known, receiver = _known(path), []
+        elif isinstance(function, ast.Attribute):
+            value = self.value(function.value)
+            known, receiver = METHODS.get((type(value), function.attr)), [value]
+        else:
+            known, receiver = None, []
+        if not callable(known):
+            raise Refused(f"{ast.unparse(function)[:60]}() is not called", HINT)
+        named = {keyword.arg: self.value(keyword.value) for keyword in keywords if keyword.arg is not None}
+        if keywords and (known is not dict or len(named) < len(keywords)):
+            raise Refused("arguments by name are not expanded")
+        return known(*receiver, *(self.value(each) for each in arguments), **named)
+
+
+def _binary(kind: type[ast.operator], left: Any, right: Any) -> object:
+    if kind is ast.Mult and isinstance(left, str | list) != isinstance(right, str | list):
+        many, times = (left, right) if isinstance(left, str | list) else (right, left)
+        if isinstance(times, int) and size(many) * times > LONGEST:
+            raise Refused(f"the value is longer than {LONGEST}")
+    if kind is ast.Pow and isinstance(left, int) and isinstance(right, int) and left.bit_length() * right > MOST_BITS:
+        raise Refused("the number is too large")
+    if kind is ast.Mod and isinstance(left, str):
+        raise Refused("texts are not formatted with %", "write ${…} between the words instead")
+    return BINARY[kind](left, right)
+
+
+def _path(node: ast.expr) -> tuple[str, ...]:
+    match node:
+        case ast.Name(name):
+            return (name,)
+        case ast.Attribute(value, name):
+            return (*_path(value), name)
+        case _:
+            raise Refused(f"{_told(node)} has no names that are expanded", HINT)
+
+
+def _is_namespace(node: ast.expr) -> bool:
+    return isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in NAMESPACES
+
+
+def _known(path: tuple[str, ...]) -> Function | float | None:
+    match path:
+        case (name,):
+            return GLOBALS.get(name)
+        case (space, name):
+            return NAMESPACES.get(space, {}).get(name)
+        case _:
+            return None
+
+
+def _told(node: ast.expr) -> str:
+    return {
+        ast.Lambda: "a lambda", ast.ListComp: "a comprehension", ast.SetComp: "a comprehension", ast.Dict: "{…}",
+        ast.DictComp: "a comprehension", ast.GeneratorExp: "a comprehension", ast.JoinedStr: "an f-string",
+        ast.NamedExpr: ":=", ast.BinOp: "this operator", ast.UnaryOp: "this operator",
+    }.get(type(node), "this expression")  # fmt: skip

@@ -1,0 +1,130 @@
+"""Text with `${expressions}` and `$(substitutions)`."""
+
+import re
+from pathlib import Path
+
+from simscen.sim.urdf.files import Folders
+from simscen.sim.urdf.markup import Element
+from simscen.sim.urdf.xacro.budget import LONGEST, Budget, Refused
+from simscen.sim.urdf.xacro.expression import evaluate
+from simscen.sim.urdf.xacro.packages import find_package
+from simscen.sim.urdf.xacro.scope import Block, Lazy, Resolving, Scope
+from simscen.sim.urdf.xacro.values import Value, literal
+
+TOKEN = re.compile(r"\$\$+[{(]|\$\{[^}]*\}|\$\([^)]*\)|[^$]+|\$[^{($]+|\$\Z")
+
+
+class Texts:
+    """Evaluates texts; `file` is the one being expanded, `arguments` are those of `<xacro:arg>`."""
+
+    def __init__(self, folders: Folders, file: Path, budget: Budget) -> None:
+        self.budget, self.file = budget, file
+        self.arguments: dict[str, str] = {}
+        self._folders = folders
+
+    def value(self, text: str, scope: Scope) -> Value:
+        """What a text means in a scope: a lone expression keeps its type; raises Refused."""
+        self.budget.spend(1 + len(text) // 16)
+        if "$" not in text:
+            return text
+        parts: list[Value] = []
+        position = 0
+        while position < len(text):
+            token = TOKEN.match(text, position)
+            if token is None:
+                raise Refused(f"{text[position : position + 60]!r}: a bracket is not closed")
+            parts.append(self._part(token[0], scope))
+            position = token.end()
+        if len(parts) == 1:
+            return parts[0]
+        joined = "".join(map(str, parts))
+        if len(joined) > LONGEST:
+            raise Refused(f"a text is longer than {LONGEST} characters")
+        return joined
+
+    def text(self, text: str, scope: Scope) -> str:
+        """What a text means, as text; raises Refused."""
+        return str(self.value(text, scope))
+
+    def literal(self, text: str, scope: Scope) -> Value:
+        """What a text means, as the number or boolean that it may be; raises Refused."""
+        value = self.value(text, scope)
+        return literal(value) if isinstance(value, str) else value
+
+    def property(self, scope: Scope, name: str) -> "Value | Scope":
+        """A property of a scope, evaluated now if it was not before; raises KeyError, Refused."""
+        owner = scope.owner(name)
+        if owner is None:
+            raise KeyError(name)
+        match owner.held[name]:
+            case Lazy(text) as lazy:
+                owner.held[name] = Resolving()
+                try:
+                    with self.budget:
+                        value = self.literal(text, owner)
+                except Refused:
+                    owner.held[name] = lazy
+                    raise
+                owner.held[name] = value
+                return value
+            case Resolving():
+                raise Refused(f"the property {name!r} is defined by itself")
+            case Block():
+                raise KeyError(name)
+            case found:
+                return found
+
+    def _part(self, token: str, scope: Scope) -> Value:
+        if token.startswith("$$"):
+            return token[1:]
+        if token.startswith("${"):
+            expression = str(self.value(token[2:-1], scope))
+            try:
+                return evaluate(expression, _Scoped(self, scope), self.budget)
+            except Refused as refused:
+                if refused.message.startswith("${"):
+                    raise
+                raise Refused(f"${{{expression[:100]}}}: {refused.message}", refused.hint) from None
+        if token.startswith("$("):
+            return self._substituted(str(self.value(token[2:-1], scope)))
+        return token
+
+    def _substituted(self, command: str) -> str:
+        match command.split():
+            case ["arg", name] if name in self.arguments:
+                return self.arguments[name]
+            case ["arg", name]:
+                raise Refused(f"$(arg {name[:60]}): there is no such argument", 'give it a <xacro:arg default="…">')
+            case ["optenv", _, *default]:
+                return " ".join(default)  # whatever the environment says, a run is that of its files
+            case ["find", package]:
+                return str(find_package(package, self.file.parent, self._folders))
+            case ["dirname"]:
+                return str(self.file.parent)
+            case ["env", *_]:
+                raise Refused(f"$({command[:60]}): the environment is not read", "write the value into the file")
+            case _:
+                raise Refused(f"$({command[:60]}) is not expanded", "arg, find, dirname and optenv are")
+
+
+class _Scoped:
+    def __init__(self, texts: Texts, scope: Scope) -> None:
+        self._texts, self._scope = texts, scope
+
+    def value(self, path: tuple[str, ...]) -> Value:
+        held: Value | Scope = self._scope
+        for name in path:
+            if not isinstance(held, Scope):
+                raise KeyError(name)
+            held = self._texts.property(held, name)
+        if isinstance(held, Scope):
+            raise KeyError(path[-1])
+        return held
+
+
+def needed(element: Element, attribute: str, empty: bool = False) -> str:
+    """An attribute that must be there, as written; raises Refused."""
+    text = element.attributes.get(attribute)
+    if text is None or not (text or empty):
+        raise Refused(f'<{element.tag[:60]}> without {attribute}="…"')
+    return text

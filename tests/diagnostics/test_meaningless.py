@@ -1,0 +1,49 @@
+"""Files that are well-formed and mean nothing, each beside its exact message: `simscen validate` says so of all.
+
+`SIMSCEN_UPDATE=1 pytest tests/diagnostics` writes the messages anew; read the difference before you keep it.
+"""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from simscen.cli.diagnostics import as_text
+from simscen.cli.select import Checks
+from simscen.core.problems import Problem
+
+HERE = Path(__file__).parent / "meaningless"
+CASES = sorted(HERE.glob("*.scenario.yaml"))
+CHECKS = Checks(HERE)
+
+
+@pytest.fixture(scope="module")
+def told() -> dict[Path, list[Problem]]:
+    """What is said of each file; all of them share one small world."""
+    return {case: CHECKS.scenario(case)[1] for case in CASES}
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda path: path.name.split(".")[0])
+def test_says_exactly_what_is_meaningless_and_where(case: Path, told: dict[Path, list[Problem]]) -> None:
+    assert told[case], "nobody would notice that this file means nothing"
+    expected = case.with_name(case.name.replace(".scenario.yaml", ".txt"))
+    text = as_text(told[case]) + "\n"
+    if os.environ.get("SIMSCEN_UPDATE"):
+        expected.write_text(text, encoding="utf-8")
+    assert text == expected.read_text(encoding="utf-8")
+
+
+def test_each_message_belongs_to_a_case() -> None:
+    assert {path.stem for path in HERE.glob("*.txt")} == {path.name.split(".")[0] for path in CASES}
+
+
+@pytest.mark.parametrize("robot", ["turtlebot", "bare.urdf"])
+def test_their_shared_world_and_robots_are_not_to_blame(robot: str, tmp_path: Path) -> None:
+    for file in (HERE / "room.world.yaml", HERE / "bare.urdf"):
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    good = tmp_path / "good.scenario.yaml"
+    good.write_text(
+        f"simscen: 1\nworld: room.world.yaml\nrobot: {{model: {robot}, pose: start}}\n"
+        "goals: [{pose: desk}]\npass: [{goals_reached: {}}]\n"
+    )
+    assert Checks(tmp_path).scenario(good)[1] == []

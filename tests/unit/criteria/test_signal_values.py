@@ -1,0 +1,317 @@
+"""Named signals against closed forms, and where their samples come from."""
+
+import math
+from dataclasses import replace
+from typing import get_args
+
+import numpy as np
+import pytest
+
+from simscen.core.navigation import Path
+from simscen.core.samples import Samples
+from simscen.core.trace import Trace
+from simscen.criteria.bounds import BrokenTrace
+from simscen.criteria.signal_table import SIGNALS, SignalName, read
+from simscen.criteria.signal_values import Unavailable
+from simscen.judge.sketch import sketch, sketch_case
+
+STEP = 6 / 240
+
+
+def signal(name, words, case=None, **of):
+    return read(name, sketch(words), sketch_case(case or {}), of)
+
+
+def at(values, seconds):
+    return values[round(seconds / STEP)]
+
+
+def driving(velocity):
+    """A trace whose recorded velocity is exactly this."""
+    trace = sketch({"seconds": (len(velocity) - 1) * STEP, "truth": [[0, 0, 0]]})
+    return replace(trace, velocity=Samples(trace.truth.ticks, np.array(velocity, dtype=np.float64)))
+
+
+def test_every_name_has_a_signal_and_every_signal_a_name():
+    assert tuple(SIGNALS) == get_args(SignalName)
+
+
+@pytest.mark.parametrize("name", SIGNALS)
+def test_a_signal_has_one_finite_value_for_each_truth_sample_within_its_range(name):
+    words = {
+        "seconds": 4,
+        "truth": [[0, 0, 0], [4, 2, 1, 1]],
+        "plans": [[1, [[0, 0], [2, 1]]]],
+        "objects": {"cart": [[0, 3, 3]]},
+        "events": [[0.5, "goal.accepted", "shelf"], [1, "fault.started", "off"], [1, "event.started", "off"]],
+    }
+    case = {"goals": [{"name": "shelf", "pose": [2, 1, 0]}], "regions": {"dock": [[0, 0], [1, 0], [1, 1]]}}
+    of = {"object": "cart", "region": "dock", "fault": "off", "event": "off"}
+    wanted = {key: of[key] for key in SIGNALS[name].about[:1]}
+    values = read(name, sketch(words), sketch_case(case), wanted)
+    assert values.shape == (161,)
+    assert np.isfinite(values).all()
+    assert values.min() >= SIGNALS[name].least
+    assert values.max() <= SIGNALS[name].most
+
+
+def test_speed_is_over_ground_and_its_parts_have_signs():
+    trace = driving([[-3.0, 4.0, -0.5]] * 5)
+    assert read("speed", trace, sketch_case({}), {}).tolist() == [5.0] * 5
+    assert read("forward_speed", trace, sketch_case({}), {}).tolist() == [-3.0] * 5
+    assert read("turn_rate", trace, sketch_case({}), {}).tolist() == [0.5] * 5
+    assert read("yaw_rate", trace, sketch_case({}), {}).tolist() == [-0.5] * 5
+
+
+def test_acceleration_is_divided_by_the_time_between_samples():
+    """Arena's get_metrics.py divides neither acceleration nor jerk by dt."""
+    trace = driving([[0.05 * k * k, 0, 0.1 * k] for k in range(9)])
+    case = sketch_case({})
+    expected = [0.05 / STEP, *(0.05 * (2 * k + 1) / STEP for k in range(8))]
+    assert read("acceleration", trace, case, {}) == pytest.approx(expected)
+    assert read("angular_acceleration", trace, case, {}) == pytest.approx([0.1 / STEP] * 9)
+
+
+def test_jerk_is_the_second_difference_of_speed_not_the_first():
+    """HuNavSim's jerk is the first difference, divided by dt twice."""
+    case = sketch_case({})
+    ramp = driving([[0.1 * k, 0, 0] for k in range(9)])
+    assert read("jerk", ramp, case, {}) == pytest.approx([0.0] * 9, abs=1e-9)
+    parabola = driving([[-0.05 * k * k, 0, 0] for k in range(9)])
+    assert read("jerk", parabola, case, {}) == pytest.approx([0.1 / STEP**2] * 9)
+
+
+def test_jerk_needs_three_samples_and_acceleration_two():
+    case = sketch_case({})
+    assert len(read("acceleration", driving([[0, 0, 0], [1, 0, 0]]), case, {})) == 2
+    with pytest.raises(Unavailable, match="too short: 2 samples"):
+        read("jerk", driving([[0, 0, 0], [1, 0, 0]]), case, {})
+    with pytest.raises(Unavailable, match="too short: 1 samples"):
+        read("acceleration", driving([[0, 0, 0]]), case, {})
+
+
+def test_being_set_down_elsewhere_is_neither_braking_nor_jerk():
+    trace = driving([[1, 0, 0]] * 4 + [[0, 0, 0]] * 4)
+    carried = sketch({"seconds": 7 * STEP, "truth": [[0, 0, 0]], "events": [[3 * STEP, "robot.placed"]]})
+    trace, stays = replace(trace, events=carried.events), replace(trace, events=())
+    case = sketch_case({})
+    assert read("acceleration", trace, case, {}).tolist() == [0.0] * 8
+    assert read("jerk", trace, case, {}).tolist() == [0.0] * 8
+    assert np.count_nonzero(read("acceleration", stays, case, {})) == 1
+    assert np.count_nonzero(read("jerk", stays, case, {})) == 2
+
+
+def test_a_kidnapped_robot_has_not_travelled():
+    events = [[2, "robot.placed"]]
+    truth = [[0, 0, 0], [2, 1, 0], [2.025, 9, 0], [4, 10, 0]]
+    values = signal("travelled", {"seconds": 4, "truth": truth, "events": events})
+    assert values[0] == 0.0
+    assert values[-1] == pytest.approx(2.0, abs=0.02)
+
+
+def test_unevenly_spaced_samples_are_refused():
+    trace = driving([[0, 0, 0]] * 5)
+    ticks = trace.truth.ticks + np.array([0, 0, 1, 0, 0])
+    uneven = replace(trace, truth=Samples(ticks, trace.truth.values))
+    with pytest.raises(BrokenTrace, match="evenly"):
+        read("acceleration", uneven, sketch_case({}), {})
+
+
+def test_the_goal_is_the_one_accepted_last_also_one_that_an_event_sent():
+    words = {
+        "seconds": 6,
+        "truth": [[0, 0, 0, 0.5]],
+        "events": [[1, "goal.accepted", "shelf"], [3, "goal.accepted", "sent", {"x": 0.0, "y": 7.0, "yaw": -0.5}]],
+    }
+    case = {"goals": [{"name": "shelf", "pose": [3, 4, 0.25]}]}
+    distance, heading = signal("goal_distance", words, case), signal("goal_heading_error", words, case)
+    assert [at(distance, t) for t in (0, 1, 2.975, 3, 6)] == [5.0, 5.0, 5.0, 7.0, 7.0]
+    assert [at(heading, t) for t in (0, 3)] == pytest.approx([0.25, 1.0])
+
+
+def test_the_first_goal_counts_before_any_is_accepted_and_without_goals_there_is_no_distance():
+    words = {"seconds": 1, "truth": [[0, 0, 0]]}
+    goals = [{"name": "a", "pose": [3, 4, 0]}, {"name": "b", "pose": [1, 0, 0]}]
+    assert signal("goal_distance", words, {"goals": goals})[0] == 5.0
+    with pytest.raises(Unavailable, match="no goal"):
+        signal("goal_distance", words)
+
+
+def test_scans_grow_old_from_the_start_and_from_the_newest():
+    age = signal("scan_age", {"seconds": 4, "truth": [[0, 0, 0]], "scans": [[1, 2]]})
+    assert [at(age, t) for t in (0, 0.5, 1.0, 1.05, 2.0, 4.0)] == pytest.approx([0, 0.5, 0, 0.05, 0, 2.0])
+
+
+def test_the_belief_error_is_held_from_one_belief_to_the_next():
+    words = {"seconds": 2, "truth": [[0, 0, 0], [2, 2, 0]], "belief": {"offset": [0.3, 0.4, -0.2]}}
+    assert signal("localization_error", words) == pytest.approx([0.5] * 81)
+    assert signal("localization_yaw_error", words) == pytest.approx([0.2] * 81)
+    assert at(signal("belief_age", words), 0.175) == pytest.approx(0.075)
+
+
+def test_the_position_is_as_unsure_as_its_worst_direction():
+    trace = sketch({"seconds": 1, "truth": [[0, 0, 0]]})
+    turn, variances = 0.7, np.diag([0.09, 0.01])
+    rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+    (xx, xy), (_, yy) = rotation @ variances @ rotation.T
+    values = trace.belief.values.copy()
+    values[:, 3:9] = [xx, xy, 0.0, yy, 0.0, 0.04]
+    trace = replace(trace, belief=Samples(trace.belief.ticks, values))
+    assert read("position_std", trace, sketch_case({}), {})[0] == pytest.approx(0.3)
+    assert read("yaw_std", trace, sketch_case({}), {})[0] == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(("std", "known"), [(0.5, 1.0), (0.51, 0.0)])
+def test_a_robot_that_is_unsure_is_not_localized(std, known):
+    trace = sketch({"seconds": 1, "truth": [[0, 0, 0]]})
+    values = trace.belief.values.copy()
+    values[:, 3] = values[:, 6] = std * std
+    unsure = replace(trace, belief=Samples(trace.belief.ticks, values))
+    assert set(read("localized", unsure, sketch_case({}), {})) == {known}
+
+
+def test_a_robot_is_localized_from_its_first_belief_until_a_second_after_its_last():
+    trace = sketch({"seconds": 6, "truth": [[0, 0, 0]]})
+    some = (trace.belief.ticks >= 240) & (trace.belief.ticks <= 480)
+    trace = replace(trace, belief=Samples(trace.belief.ticks[some], trace.belief.values[some]))
+    values = read("localized", trace, sketch_case({}), {})
+    assert [at(values, t) for t in (0.975, 1.0, 2.0, 3.0, 3.025)] == [0, 1, 1, 1, 0]
+
+
+def test_without_a_belief_a_robot_is_not_localized_and_has_no_error():
+    words = {"seconds": 1, "truth": [[0, 0, 0]], "belief": None}
+    assert not signal("localized", words).any()
+    for name in ("localization_error", "position_std", "nees", "distance_remaining"):
+        with pytest.raises(Unavailable, match="recorded"):
+            signal(name, words, {"goals": [{"name": "a", "pose": [1, 0, 0]}]})
+
+
+def test_a_command_is_held_and_none_counts_as_zero_before_the_first():
+    trace = sketch({"seconds": 1, "truth": [[0, 0, 0]]})
+    command = Samples(np.array([120, 180]), np.array([[0.3, 0.4, -1.0], [0.0, 0.0, 0.0]]))
+    trace = replace(trace, command=command)
+    speed, turn = (read(name, trace, sketch_case({}), {}) for name in ("command_speed", "command_turn_rate"))
+    assert [at(speed, t) for t in (0, 0.475, 0.5, 0.725, 0.75)] == [0, 0, 0.5, 0.5, 0]
+    assert [at(turn, t) for t in (0.475, 0.5, 0.75)] == [0, 1, 0]
+
+
+def test_an_object_is_infinitely_far_while_it_is_not_there():
+    words = {
+        "seconds": 4,
+        "truth": [[0, 0, 0]],
+        "objects": {"cart": [[0, 3, 4]]},
+        "events": [[1, "object.spawned", "cart"], [3, "object.removed", "cart"]],
+    }
+    values = signal("distance_to", words, object="cart")
+    assert [at(values, t) for t in (0.975, 1.0, 2.975, 3.0)] == [math.inf, 5.0, 5.0, math.inf]
+
+
+def test_distances_to_what_does_not_move():
+    words = {"seconds": 1, "truth": [[0, 0, 0]], "events": [[0, "object.spawned", "box", {"x": 0.0, "y": 2.0}]]}
+    case = {"goals": [{"name": "shelf", "pose": [3, 4, 0]}]}
+    assert signal("distance_to", words, case, goal="shelf")[0] == 5.0
+    assert signal("distance_to", words, case, point=[6, 8])[0] == 10.0
+    assert signal("distance_to", words, case, object="box")[0] == 2.0
+    with pytest.raises(Unavailable, match="`cart` never was there"):
+        signal("distance_to", words, case, object="cart")
+    with pytest.raises(Unavailable, match="no goal `self`"):
+        signal("distance_to", words, case, goal="self")
+
+
+def test_what_is_left_of_the_plan_is_measured_along_it_from_the_believed_place():
+    words = {
+        "seconds": 4,
+        "truth": [[0, 9, 9], [4, 9, 8]],
+        "belief": [[0, 0, 0.5], [2, 2, 0.5], [4, 2, 2]],
+        "plans": [[1, [[0, 0], [2, 0], [2, 3]]]],
+    }
+    left = signal("distance_remaining", words, {"goals": [{"name": "a", "pose": [9, 0, 0]}]})
+    assert at(left, 0) == 9.0
+    assert at(left, 1.0) == pytest.approx(4.0)
+    assert at(left, 4.0) == pytest.approx(1.0)
+
+
+def test_a_newer_plan_takes_the_place_of_the_old_one():
+    words = {"seconds": 4, "truth": [[0, 1, 1]], "plans": [[1, [[0, 0], [2, 0]]], [2, [[0, 4], [2, 4]]]]}
+    assert [at(signal("plan_deviation", words), t) for t in (0.975, 1.0, 1.975, 2.0)] == [0, 1, 1, 3]
+    with pytest.raises(Unavailable, match="no plan"):
+        signal("plan_deviation", {"seconds": 1, "truth": [[0, 0, 0]]})
+
+
+def test_a_plan_of_one_point_is_a_place():
+    trace = sketch({"seconds": 1, "truth": [[0, 3, 4]]})
+    trace = replace(trace, plans=(Path(np.array([[0.0, 0.0, 0.0]]), 0), Path()))
+    assert set(read("plan_deviation", trace, sketch_case({}), {})) == {5.0}
+
+
+def test_a_robot_is_in_a_region_with_its_centre():
+    case = {"regions": {"hall": [[1, -1], [3, -1], [3, 1], [2, 0], [1, 1]]}}
+    values = signal("in_region", {"seconds": 4, "truth": [[0, 0, 0.5], [4, 4, 0.5]]}, case, region="hall")
+    assert [at(values, t) for t in (0.5, 1.2, 2.0, 2.8, 3.5)] == [0, 1, 0, 1, 0]
+    with pytest.raises(Unavailable, match="no region `hal`"):
+        signal("in_region", {"seconds": 4, "truth": [[0, 0, 0.5]]}, case, region="hal")
+
+
+def test_a_fault_is_active_from_its_start_to_before_its_end_and_an_event_without_one_to_the_last_sample():
+    events = [[1, "fault.started", "lidar.off"], [2, "fault.ended", "lidar.off"], [1.5, "event.started", "cart"]]
+    words = {"seconds": 3, "truth": [[0, 0, 0]], "events": events}
+    fault, event = signal("fault_active", words, fault="lidar.off"), signal("event_active", words, event="cart")
+    assert [at(fault, t) for t in (0.975, 1, 1.975, 2)] == [0, 1, 1, 0]
+    assert [at(event, t) for t in (1.475, 1.5, 3)] == [0, 1, 1]
+    assert np.flatnonzero(signal("started", words, event="cart")).tolist() == [60]
+    assert np.flatnonzero(signal("started", words, fault="lidar.off")).tolist() == [40]
+
+
+def test_what_is_shorter_than_a_sample_counts_at_the_next_one():
+    events = [[1.01, "collision.started", "box"], [1.02, "collision.ended", "box"]]
+    words = {"seconds": 3, "truth": [[0, 0, 0]], "events": events}
+    assert np.flatnonzero(signal("in_collision", words)).tolist() == [41]
+    assert np.flatnonzero(signal("in_collision", words, object="box")).tolist() == [41]
+    assert not signal("in_collision", words, object="wall").any()
+
+
+def test_contacts_with_two_things_end_each_for_itself():
+    events = [
+        [1, "collision.started", "a"],
+        [2, "collision.started", "b"],
+        [2.5, "collision.ended", "b"],
+        [3, "collision.ended", "a"],
+    ]
+    words = {"seconds": 4, "truth": [[0, 0, 0]], "events": events}
+    values = signal("in_collision", words)
+    assert [at(values, t) for t in (0.975, 1, 2.7, 2.975, 3)] == [0, 1, 1, 1, 0]
+    assert [at(signal("collision_count", words), t) for t in (0.975, 1, 2)] == [0, 1, 2]
+
+
+def test_a_goal_is_active_until_it_ends_or_another_takes_its_place():
+    events = [
+        [1, "goal.accepted", "a"],
+        [2, "goal.accepted", "b"],
+        [3, "goal.reached", "b"],
+        [3.5, "recovery.started", "spin"],
+        [3.75, "recovery.ended", "spin"],
+        [3.8, "plan.made", "", {"reason": "blocked"}],
+        [3.8, "plan.made", "", {"reason": "goal"}],
+    ]
+    words = {"seconds": 4, "truth": [[0, 0, 0]], "events": events}
+    first, some = signal("goal_active", words, goal="a"), signal("goal_active", words)
+    assert [at(first, t) for t in (0.975, 1, 1.975, 2)] == [0, 1, 1, 0]
+    assert [at(some, t) for t in (0.975, 1, 2, 2.975, 3)] == [0, 1, 1, 1, 0]
+    assert np.flatnonzero(signal("recovery_active", words, recovery="spin")).tolist() == list(range(140, 150))
+    assert not signal("recovery_active", words, recovery="wait").any()
+    assert signal("replan_count", words)[-1] == signal("recovery_count", words)[-1] == 1
+
+
+def test_a_signal_that_is_not_finite_names_itself_and_the_time():
+    truth = [[0, 0, 0], [2, math.nan, 0], [4, 0, 0]]
+    with pytest.raises(BrokenTrace, match=r"the true pose is not finite at t = 0.03 s"):
+        signal("travelled", {"seconds": 4, "truth": truth})
+
+
+@pytest.mark.parametrize("name", ["clearance", "speed", "time", "goal_distance", "scan_age"])
+def test_without_the_truth_there_is_no_clock(name):
+    trace = sketch({"seconds": 1, "truth": [[0, 0, 0]]})
+    nothing = Samples(np.empty(0, dtype=np.int64), np.empty((0, 3)))
+    blind: Trace = replace(trace, truth=nothing)
+    with pytest.raises(Unavailable, match="true pose"):
+        read(name, blind, sketch_case({"goals": [{"name": "a", "pose": [1, 0, 0]}]}), {})

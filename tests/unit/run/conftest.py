@@ -1,0 +1,48 @@
+"""Whole runs of small scenarios, in this process."""
+
+from pathlib import Path
+
+import pytest
+
+from simscen.core.time import Clock
+from simscen.loading.scenario import load_scenario
+from simscen.record.tracebuilder import TraceBuilder
+from simscen.run.assemble import assemble
+from simscen.run.lockstep import run_lockstep
+from simscen.run.prepare import prepare
+
+ROOM = """\
+simscen: 1
+walls: [{points: [[0, 0], [8, 0], [8, 6], [0, 6], [0, 0]]}]
+obstacles: [{name: crate, box: [1, 1, 1], pose: {x: 5, y: 4.5}}]
+regions: {corner: [[0, 0], [2, 0], [2, 2], [0, 2]]}
+"""
+SCENARIO = """\
+simscen: 1
+world: room.world.yaml
+robot: {pose: {x: 1, y: 1, yaw: 0}}
+goals: [{name: desk, pose: {x: 3, y: 1, yaw: 0}}]
+time_limit: 30
+pass: [{goals_reached: {}}]
+"""
+
+
+@pytest.fixture
+def play(tmp_path: Path):
+    """Runs a scenario given as the lines that it has besides or instead of the usual ones; returns its trace."""
+
+    def run(extra: str = "", seed: int = 1, **instead: str):
+        lines = {line.split(":")[0]: line for line in SCENARIO.splitlines()}
+        lines |= {key: f"{key}: {value}" for key, value in instead.items()}
+        (tmp_path / "room.world.yaml").write_text(ROOM)
+        (tmp_path / "a.scenario.yaml").write_text("\n".join(lines.values()) + "\n" + extra)
+        prepared = prepare(load_scenario(tmp_path / "a.scenario.yaml", tmp_path))
+        clock = Clock(prepared.spec.physics.tick_rate)
+        rig, builder = assemble(prepared, seed), TraceBuilder(clock)
+        try:
+            end = run_lockstep(rig, (builder,))
+        finally:
+            rig.simulation.close()
+        return builder.finish(end.tick)
+
+    return run

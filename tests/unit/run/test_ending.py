@@ -1,0 +1,50 @@
+"""A run ends a while after its task, whatever is sampled how often."""
+
+import pytest
+
+from simscen.core.events import Event, EventKind
+from simscen.core.motion import STOP
+from simscen.core.time import Clock
+from simscen.core.trace import Decision
+from simscen.run.ending import Ending
+
+RATES = [
+    (240, 40, 20),
+    (240, 10, 20),
+    (240, 30, 20),
+    (240, 40, 30),
+    (240, 0.5, 20),
+    (240, 48, 30),
+    (120, 1, 24),
+    (1000, 8, 20),
+]
+
+
+@pytest.mark.parametrize(("tick_rate", "truth_rate", "controller"), RATES)
+def test_a_run_ends_soon_after_its_task_at_all_rates_and_with_a_sample_of_the_truth(
+    play, tick_rate, truth_rate, controller
+):
+    trace = play(
+        physics=f"{{tick_rate: {tick_rate}, truth_rate: {truth_rate} Hz}}",
+        stack=f"{{controller_frequency: {controller} Hz, localizer: {{type: ground_truth}}}}",
+    )
+    (navigated,), (ended,) = trace.of_kind("navigation.ended"), trace.of_kind("run.ended")
+    assert ended.name == "navigation ended"
+    assert trace.seconds(ended.tick - navigated.tick) == pytest.approx(0.5, abs=0.1)
+    assert trace.truth.ticks[-1] == trace.end == ended.tick
+
+
+def test_a_run_that_goes_nowhere_ends_at_its_time_limit_with_a_sample_of_the_truth(play):
+    trace = play(goals="[]", time_limit="1.3", physics="{truth_rate: 1 Hz}", **{"pass": "[{collisions: {max: 0}}]"})
+    assert trace.of_kind("run.ended")[0].name == "time limit"
+    assert trace.truth.ticks.tolist() == [0, 240, 312]
+
+
+def test_a_new_goal_takes_the_ending_back():
+    ending = Ending(Clock(240), 60.0, 0.5)
+    ending.heard(Decision(STOP, events=(Event(100, EventKind.NAVIGATION_ENDED),)))
+    assert not ending.due(219)
+    assert ending.due(220)
+    ending.heard(Decision(STOP, events=(Event(120, EventKind.GOAL_ACCEPTED),)))
+    assert not ending.due(220)
+    assert ending.due(60 * 240)

@@ -1,0 +1,40 @@
+"""A folder to expand xacro files in."""
+
+import pytest
+
+from simscen.core.errors import InvalidInput
+from simscen.sim.urdf.files import Folders, read_xml
+from simscen.sim.urdf.xacro.expand import expand as expand_xacro
+
+
+@pytest.fixture
+def expand(tmp_path):
+    def expand(text, **files):
+        """What the inside of a <robot> expands to; `files` lie beside it, `pkg__name` in a folder pkg."""
+        for name, content in {"main": text, **files}.items():
+            path = tmp_path / f"{name.replace('__', '/')}.xacro"
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(f'<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro">{content}</robot>')
+        folders = Folders.of([tmp_path])
+        path = tmp_path / "main.xacro"
+        return expand_xacro(read_xml(path, folders), path, folders, lambda included: read_xml(included, folders))
+
+    return expand
+
+
+@pytest.fixture
+def value(expand):
+    def value(expression, before=""):
+        return expand(f'{before}<a v="{expression}"/>').children[-1].attributes["v"]
+
+    return value
+
+
+@pytest.fixture
+def refusal(expand):
+    def refusal(text, **files):
+        with pytest.raises(InvalidInput) as caught:
+            expand(text, **files)
+        return caught.value.problems[0]
+
+    return refusal

@@ -1,0 +1,140 @@
+# ruff: noqa: E501 (a case reads best on one line)
+"""A robot file is data: it runs nothing, reads nothing outside, and ends (CWE-94, CWE-22, CWE-400)."""
+
+import pytest
+
+TYPICAL = [
+    "(lambda: 1)()",
+    "().__class__.__base__.__subclasses__()",
+    "''.__class__",
+    "[].__class__.__mro__",
+    "__import__('os')",
+    "python.type('a')",
+    "python.vars()",
+    "str.mro()",
+    "math.__dict__",
+    "xacro.load_yaml('/etc/passwd')",
+    "load_yaml('/etc/passwd')",
+    "open('/etc/passwd')",
+    "[x for x in [1]]",
+    "f'a'",
+    "(x := 1)",
+    "'a'.format(1)",
+    "map(str, [1])",
+    "max([1, 2], key=str)",
+    "len.__self__",
+    "dict(**dict(a=1))",
+    "print(*[1])",
+    "1 &lt;&lt; 99999999",
+    "1j",
+    "b'a'",
+    "...",
+]
+ENDLESS = [
+    "9**9**9",
+    "2**-2**2**2**2**2**9",
+    "10**300",
+    "'a'*10**9",
+    "10**9*'a'",
+    "[0]*10**9",
+    "range(10**9)",
+    "range(10**12)",
+    "round(1, -10**9)",
+    "'%999999999d' % 1",
+    "'a'.replace('', 'b'*60000).replace('', 'b'*60000)",
+    "('b'*60000).join(str(range(30000)))",
+    "math.factorial(10**7)",
+    "(" * 300 + "1" + ")" * 300,
+    "-" * 990 + "1",
+    "1" + "+1" * 490 + "**9**9**9",
+    "0" * 5000,
+    "int('9'*60000)",
+    "1e308*10**200",
+    "[[1]*60000]*60000",
+]
+
+
+@pytest.mark.parametrize("expression", TYPICAL)
+def test_an_expression_reaches_no_python(refusal, expression):
+    problem = refusal(f'<a v="${{{expression}}}"/>')
+
+    assert problem.code == "SC400"
+    assert (problem.path, problem.line, problem.col) == ("main.xacro", 1, 57)
+    assert problem.message.startswith(f"${{{expression.replace('&lt;', '<')}}}: ")
+
+
+@pytest.mark.parametrize("expression", ENDLESS)
+def test_an_expression_takes_neither_long_nor_much(refusal, expression):
+    assert refusal(f'<a v="${{{expression}}}"/>').code == "SC400"
+
+
+def test_the_environment_is_not_read(refusal, value, monkeypatch):
+    monkeypatch.setenv("SECRET", "hunter2")
+
+    problem = refusal('<a v="$(env SECRET)"/>')
+    assert problem.message == "$(env SECRET): the environment is not read"
+    assert problem.hint == "write the value into the file"
+    assert value("$(optenv SECRET 0 0 1)") == "0 0 1"
+    assert value("$(optenv SECRET)") == ""
+
+
+@pytest.mark.parametrize("command", ["eval 1", "eval __import__('os')", "anon a", "cwd", "nonsense", ""])
+def test_other_substitutions_are_refused(refusal, command):
+    assert "is not expanded" in refusal(f'<a v="$({command})"/>').message
+
+
+@pytest.mark.parametrize(
+    "written",
+    ["/etc/passwd", "../outside.xacro", "link.xacro", "$(find ..)/x", "$(dirname)/../outside.xacro", "a/../../b"],
+)
+def test_an_include_outside_the_root_is_not_read(refusal, tmp_path, written):
+    (tmp_path.parent / "outside.xacro").write_text("<robot/>")
+    (tmp_path / "link.xacro").symlink_to(tmp_path.parent / "outside.xacro")
+
+    told = refusal(f'<xacro:include filename="{written}"/>').message
+    assert "outside the scenario root" in told or "not the name of a package" in told
+
+
+def test_whether_an_optional_file_outside_exists_is_not_told(refusal):
+    for written in ("/etc/passwd", "/etc/no-such-file"):
+        problem = refusal(f'<xacro:include filename="{written}" optional="true"/>')
+        assert problem.message == f"include '{written}': outside the scenario root"
+
+
+def test_a_link_out_of_the_root_is_no_package(refusal, tmp_path):
+    (tmp_path / "pkg").symlink_to(tmp_path.parent)
+    assert "there is no such package" in refusal('<xacro:include filename="$(find pkg)/x.xacro"/>').message
+
+
+BOMBS = {
+    "a macro that calls itself": '<xacro:macro name="m"><xacro:m/></xacro:macro><xacro:m/>',
+    "macros that double": "".join(
+        f'<xacro:macro name="m{n}"><xacro:m{n + 1}/><xacro:m{n + 1}/></xacro:macro>' for n in range(40)
+    )
+    + '<xacro:macro name="m40"><a/></xacro:macro><xacro:m0/>',
+    "macros that double and make nothing": "".join(
+        f'<xacro:macro name="m{n}"><xacro:m{n + 1}/><xacro:m{n + 1}/></xacro:macro>' for n in range(40)
+    )
+    + '<xacro:macro name="m40"/><xacro:m0/>',
+    "texts that double": "".join(
+        f'<xacro:property name="p{n}" value="${{p{n + 1}}}${{p{n + 1}}}"/>' for n in range(40)
+    )
+    + '<xacro:property name="p40" value="xx"/><a v="${p0}"/>',
+    "arguments that double": '<xacro:arg name="a0" default="xx"/>'
+    + "".join(f'<xacro:arg name="a{n + 1}" default="$(arg a{n})$(arg a{n})"/>' for n in range(40)),
+    "a chain of properties": "".join(f'<xacro:property name="p{n}" value="${{p{n + 1}}}"/>' for n in range(5000))
+    + '<xacro:property name="p5000" value="1"/><a v="${p0}"/>',
+    "properties in a circle": '<xacro:property name="p" value="${q}"/><xacro:property name="q" value="${p}"/><a v="${p}"/>',
+    "a file that includes itself": '<xacro:include filename="main.xacro"/>',
+    "many long attributes": '<xacro:property name="p" value="${\'x\' * 60000}"/>' + '<a v="${p}"/>' * 100,
+    "blocks that double": "".join(
+        f'<xacro:macro name="m{n}" params="*b"><xacro:m{n + 1}><e><xacro:insert_block name="b"/>'
+        f'<xacro:insert_block name="b"/></e></xacro:m{n + 1}></xacro:macro>' for n in range(40)
+    ) + '<xacro:macro name="m40" params="*b"><xacro:insert_block name="b"/></xacro:macro><xacro:m0><a/></xacro:m0>',
+    "quotes in parameters": f'<xacro:macro name="m" params="p:={"a" * 50000}\'"/>',
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BOMBS)
+def test_expansion_ends(refusal, name):
+    assert refusal(BOMBS[name]).code == "SC400"
