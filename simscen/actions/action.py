@@ -7,7 +7,7 @@ from simscen.spec.base import Choice
 from simscen.spec.ondemand import OnDemand
 
 if TYPE_CHECKING:
-    from simscen.core.stage import Stage
+    from simscen.core.stage import Effect, Stage
 
 
 class AnyAction(Choice):
@@ -23,8 +23,8 @@ class AnyAction(Choice):
     new_goal: Annotated[Action | None, OnDemand("simscen.actions.goals", "NewGoal")] = None
     cancel_goal: Annotated[Action | None, OnDemand("simscen.actions.goals", "CancelGoal")] = None
 
-    def perform(self, stage: "Stage") -> None:
-        """Do it now."""
+    def perform(self, stage: "Stage") -> "Effect":
+        """Do it now, and say what came of it."""
         action = self.chosen
         assert isinstance(action, Action)
-        action.perform(stage)
+        return action.perform(stage)

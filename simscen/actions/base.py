@@ -6,12 +6,12 @@ from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from simscen.core.stage import Stage
+    from simscen.core.stage import Effect, Stage
 
 
 class Action(ABC):
     """Something a scenario does to the running world."""
 
     @abstractmethod
-    def perform(self, stage: Stage) -> None:
-        """Do it now. Everything it does is in the log by way of the stage."""
+    def perform(self, stage: Stage) -> Effect:
+        """Do it now, and say what came of it. Everything it does is in the log by way of the stage."""

@@ -2,7 +2,7 @@
 
 from simscen.actions.base import Action
 from simscen.core.navigation import Goal
-from simscen.core.stage import Stage
+from simscen.core.stage import Effect, Stage
 from simscen.spec.base import Spec
 from simscen.spec.places import Name, PoseSpec
 from simscen.spec.quantities import PositiveDuration
@@ -21,9 +21,10 @@ class NewGoal(Spec, Action):
     timeout: PositiveDuration | None = None
     """Simulated time it may take."""
 
-    def perform(self, stage: Stage) -> None:
+    def perform(self, stage: Stage) -> Effect:
         """Send it."""
         stage.send_goal(Goal(self.name, self.pose.pose, timeout=self.timeout))
+        return Effect(True, f"sent goal {self.name}")
 
 
 class CancelGoal(Spec, Action):
@@ -32,6 +33,10 @@ class CancelGoal(Spec, Action):
     Example: `do: {cancel_goal: {}}`
     """
 
-    def perform(self, stage: Stage) -> None:
-        """Cancel it."""
+    def perform(self, stage: Stage) -> Effect:
+        """Cancel it; nothing comes of it when the robot drives to no goal."""
+        goal = stage.goal
+        if goal is None:
+            return Effect(False, "the robot was driving to no goal")
         stage.cancel_goal()
+        return Effect(True, f"canceled goal {goal.name}")

@@ -7,10 +7,9 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from simscen.actions.base import Action
-from simscen.core.events import Event, EventKind
 from simscen.core.geometry import Pose2
 from simscen.core.shapes import MotionPath
-from simscen.core.stage import Stage
+from simscen.core.stage import Effect, Stage
 from simscen.spec.base import Spec
 from simscen.spec.places import Point
 from simscen.spec.quantities import PositiveSpeed
@@ -34,13 +33,16 @@ class Move(Spec, Action):
     repeat: Literal["once", "loop", "back_and_forth"] = "once"
     """At the last waypoint: stay, start over from the first position, or turn around."""
 
-    def perform(self, stage: Stage) -> None:
-        """Set it going; an object that is not there is noted in the log."""
+    def perform(self, stage: Stage) -> Effect:
+        """Set it going; nothing comes of it when it is not there, or stands at its only waypoint."""
         here = stage.object(self.name)
         if here is None:
-            stage.note(Event(0, EventKind.EVENT_NOTE, self.name, {"message": "nothing of this name to move"}))
-            return
-        stage.move(self.name, route(here, self.through, self.speed, self.repeat))
+            return Effect(False, f"there is nothing called {self.name}")
+        path = route(here, self.through, self.speed, self.repeat)
+        if len(path.poses) == 1:
+            return Effect(False, f"{self.name} stands at its waypoint already")
+        stage.move(self.name, path)
+        return Effect(True, f"moved {self.name}")
 
 
 def route(start: Pose2, through: list[list[float]], speed: float, repeat: str) -> MotionPath:

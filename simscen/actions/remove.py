@@ -1,7 +1,7 @@
 """`remove`: take an object out of the world."""
 
 from simscen.actions.base import Action
-from simscen.core.stage import Stage
+from simscen.core.stage import Effect, Stage
 from simscen.spec.base import Spec
 from simscen.spec.references import MovableName
 
@@ -15,6 +15,9 @@ class Remove(Spec, Action):
     name: MovableName
     """The object to remove."""
 
-    def perform(self, stage: Stage) -> None:
-        """Remove it."""
+    def perform(self, stage: Stage) -> Effect:
+        """Remove it; nothing comes of it when it is not there."""
+        if stage.object(self.name) is None:
+            return Effect(False, f"there is nothing called {self.name}")
         stage.remove(self.name)
+        return Effect(True, f"removed {self.name}")

@@ -8,11 +8,10 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from simscen.actions.base import Action
-from simscen.core.events import Event, EventKind
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.navigation import Path
 from simscen.core.shapes import Body
-from simscen.core.stage import Stage
+from simscen.core.stage import Effect, Stage
 from simscen.spec.objects import Shaped
 from simscen.spec.places import Name, PoseSpec
 from simscen.spec.quantities import Angle, Length, Mass, NonNegativeLength
@@ -33,7 +32,8 @@ class Spawn(Shaped, Action):
     ahead: Annotated[list[Length], Field(min_length=2, max_length=2)] | None = None
     """In the robot's frame: [metres ahead, metres to the left]."""
     on_plan: NonNegativeLength | None = None
-    """On the robot's plan, so far ahead along it, turned across it; at its end where the plan is shorter."""
+    """On the robot's plan, so far ahead along it, turned across it; at its end where the plan is shorter. Where the
+    robot has no plan, ahead of it by as much, which does not count as having happened."""
     yaw: Angle = 0.0
     """Turn relative to the robot's heading or the plan's direction."""
     mass: Mass = 0.0
@@ -45,9 +45,13 @@ class Spawn(Shaped, Action):
             raise ValueError("expected exactly one of: pose, ahead, on_plan")
         return self
 
-    def perform(self, stage: Stage) -> None:
-        """Spawn it; without a plan to put it on, say so in the log and put it ahead of the robot."""
-        stage.spawn(Body(self.name, (self.solid(self.name),), Pose3.planar(self._place(stage)), self.mass))
+    def perform(self, stage: Stage) -> Effect:
+        """Spawn it; without a plan to put it on, it is put ahead of the robot instead."""
+        planned = self.on_plan is None or _has_plan(stage)
+        pose = self._place(stage)
+        stage.spawn(Body(self.name, (self.solid(self.name),), Pose3.planar(pose), self.mass))
+        what = f"spawned {self.name} at ({pose.x:.2f}, {pose.y:.2f})"
+        return Effect(planned, what if planned else f"{what} as the robot had no plan to put it on")
 
     def _place(self, stage: Stage) -> Pose2:
         if self.pose is not None:
@@ -55,11 +59,13 @@ class Spawn(Shaped, Action):
         if self.ahead is not None:
             return stage.robot.compose(Pose2(self.ahead[0], self.ahead[1], self.yaw))
         assert self.on_plan is not None
-        if stage.plan is None or len(stage.plan.points) < 2:
-            message = "no plan to spawn on; spawned ahead instead"
-            stage.note(Event(0, EventKind.EVENT_NOTE, self.name, {"message": message}))
+        if stage.plan is None or not _has_plan(stage):
             return stage.robot.compose(Pose2(self.on_plan, 0.0, self.yaw))
         return along(stage.plan, stage.robot, self.on_plan).compose(Pose2(0.0, 0.0, self.yaw))
+
+
+def _has_plan(stage: Stage) -> bool:
+    return stage.plan is not None and len(stage.plan.points) > 1
 
 
 def along(plan: Path, robot: Pose2, ahead: float) -> Pose2:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from simscen.core.disturbance import Disturbance
 from simscen.core.geometry import Pose2
 from simscen.core.navigation import Goal
 from simscen.core.world import Polygon
@@ -19,6 +20,7 @@ class Case:
     radius has from the goal before it (the start for the first) through the static world; inf when there is none.
     `clearance_range` is how far around the hull clearance was searched, in metres: a clearance that is not below it was
     cut off, and is at least that.
+    `disturbances` are what has to happen: the scenario's events, then its faults.
     """
 
     start: Pose2
@@ -29,3 +31,4 @@ class Case:
     inscribed_radius: float = 0.0
     time_limit: float = 0.0
     clearance_range: float = CLEARANCE_RANGE
+    disturbances: tuple[Disturbance, ...] = ()

@@ -21,11 +21,11 @@ class EventKind(str, Enum):
     RECOVERY_ENDED = "recovery.ended"  # behaviour; outcome
     COLLISION_STARTED = "collision.started"  # what was hit; x, y, impulse (N s), speed (m/s), robot_part
     COLLISION_ENDED = "collision.ended"  # what was hit
-    FAULT_STARTED = "fault.started"  # label, e.g. "lidar.off"; sensor, fault
-    FAULT_ENDED = "fault.ended"  # label
-    EVENT_STARTED = "event.started"  # the scenario's event; actions
-    EVENT_ENDED = "event.ended"  # the scenario's event
-    EVENT_NOTE = "event.note"  # what an action is about; message
+    FAULT_STARTED = "fault.started"  # label, e.g. "lidar.off"; entry (number of the fault, from 0), sensor, fault
+    FAULT_TOOK_EFFECT = "fault.took_effect"  # label, at the first message or command it changed; entry
+    FAULT_ENDED = "fault.ended"  # label; entry, touched (how many messages and commands it changed)
+    EVENT_STARTED = "event.started"  # the scenario's event; entry (number of the event, from 0), actions
+    EVENT_ENDED = "event.ended"  # the scenario's event; entry, effects (happened, what: of each action)
     OBJECT_SPAWNED = "object.spawned"  # object; its shape and pose
     OBJECT_REMOVED = "object.removed"  # object
     OBJECT_MOVED = "object.moved"  # object; waypoints

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 
+from simscen.core.disturbance import Happening
 from simscen.core.verdict import Verdict
 
 
@@ -47,10 +48,11 @@ class RunFailure:
 class RunResult:
     """All that a run says about itself; nothing in it depends on the machine, the clock or the working folder.
 
-    `path` is the scenario's file relative to the root, `lines` the line of each criterion in it, in the order of
-    `verdicts` (empty or 0 = unknown). `events` counts what happened, by kind. `ended` is why the simulation stopped,
-    `simulated` is in seconds, `tick_rate` turns the findings' ticks into seconds. `error` is set exactly when the
-    outcome is ERROR.
+    `path` is the scenario's file relative to the root, `lines` the line of each verdict in it, in the order of
+    `verdicts` (empty or 0 = unknown). `events` counts what happened, by kind. `disturbances` is what became of each
+    event and fault of the scenario; each that had to happen and did not has a verdict of its own, before those of the
+    criteria. `ended` is why the simulation stopped, `simulated` is in seconds, `tick_rate` turns the findings' ticks
+    into seconds. `error` is set exactly when the outcome is ERROR.
     """
 
     key: RunKey
@@ -60,6 +62,7 @@ class RunResult:
     lines: tuple[int, ...] = ()
     metrics: Mapping[str, float | None] = field(default_factory=dict)
     events: Mapping[str, int] = field(default_factory=dict)
+    disturbances: tuple[Happening, ...] = ()
     ended: str = ""
     simulated: float = 0.0
     tick_rate: int = 240

@@ -1,5 +1,6 @@
 """What triggers may look at and what actions may touch while a scenario runs."""
 
+from dataclasses import dataclass
 from typing import Protocol
 
 from simscen.core.belief import Belief
@@ -10,6 +11,14 @@ from simscen.core.navigation import Goal, Path
 from simscen.core.shapes import Body, MotionPath
 from simscen.core.time import Clock
 from simscen.core.world import Polygon
+
+
+@dataclass(frozen=True)
+class Effect:
+    """What came of an action: whether anything is different now, and what, or why nothing is."""
+
+    happened: bool
+    what: str
 
 
 class Situation(Protocol):
@@ -77,7 +86,7 @@ class Stage(Situation, Protocol):
         ...
 
     def remove(self, name: str) -> None:
-        """Take a body out of the world; unknown names are ignored with an event."""
+        """Take a body out of the world; it has to be there."""
         ...
 
     def door(self, name: str) -> tuple[Pose2, Pose2]:

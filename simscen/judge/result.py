@@ -10,6 +10,7 @@ from simscen.core.verdict import Status, Verdict
 from simscen.criteria.bounds import BrokenTrace
 from simscen.criteria.criterion import AnyCriterion
 from simscen.criteria.moments import ending
+from simscen.judge.disturbances import happenings, missing
 from simscen.judge.judge import judge, outcome
 from simscen.judge.metrics import measure
 
@@ -22,8 +23,14 @@ def result_of(
     case: Case,
     lines: tuple[int, ...] = (),
 ) -> RunResult:
-    """Judge a trace and sum it up. `path` is the scenario's file, `lines` where each criterion stands in it."""
-    verdicts = judge(criteria, trace, case)
+    """Judge a trace and sum it up. `path` is the scenario's file, `lines` where each criterion stands in it.
+
+    What had to happen and did not is a verdict, too; it comes first, for it is the reason of what follows.
+    """
+    verdicts, happened = judge(criteria, trace, case), happenings(trace, case)
+    lacking = missing(trace, happened, verdicts)
+    lines = (*(line for _, line in lacking), *(lines or (0,) * len(verdicts)))
+    verdicts = (*(verdict for verdict, _ in lacking), *verdicts)
     came_out = outcome(verdicts)
     failure = _why(verdicts) if came_out is Outcome.ERROR else None
     metrics: Mapping[str, float | None] = {}
@@ -39,6 +46,7 @@ def result_of(
         lines=lines,
         metrics=metrics,
         events=dict(sorted(Counter(str(event.kind) for event in trace.events).items())),
+        disturbances=happened,
         ended=ending(trace),
         simulated=trace.seconds(trace.end),
         tick_rate=trace.tick_rate,

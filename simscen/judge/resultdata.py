@@ -1,13 +1,15 @@
 """result.json: the result of a run as plain data and back; no wall clock, host or process in it."""
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from simscen.core.disturbance import Disturbance, Happening
 from simscen.core.result import Outcome, RunFailure, RunKey, RunResult
 from simscen.judge.verdictdata import number, read_verdict, verdict_data
 
-FORMAT = 1
+FORMAT = 2
 
 
 def to_json(result: RunResult) -> str:
@@ -31,6 +33,7 @@ def as_data(result: RunResult) -> dict[str, Any]:
         "tick_rate": result.tick_rate,
         "again": result.again,
         "events": dict(result.events),
+        "disturbances": [_happening_data(one, result.tick_rate) for one in result.disturbances],
         "metrics": {name: number(value) for name, value in result.metrics.items()},
         "verdicts": [verdict_data(v, line, result.tick_rate) for v, line in zip(result.verdicts, lines, strict=True)],
         "error": None if error is None else {"kind": error.kind, "message": error.message, "tail": error.tail},
@@ -62,8 +65,25 @@ def from_data(data: dict[str, Any]) -> RunResult:
         lines=tuple(verdict["line"] for verdict in data["verdicts"]),
         metrics=data["metrics"],
         events=data["events"],
+        disturbances=tuple(_read_happening(one) for one in data["disturbances"]),
         ended=data["ended"],
         simulated=data["simulated_seconds"],
         tick_rate=data["tick_rate"],
         error=None if data["error"] is None else RunFailure(**data["error"]),
     )
+
+
+def _happening_data(one: Happening, tick_rate: int) -> dict[str, Any]:
+    return {
+        **asdict(one.ordered),
+        "fired": list(one.fired),
+        "times": [tick / tick_rate for tick in one.fired],
+        "happened": one.happened,
+        "effect": one.effect,
+        "tick": one.tick,
+    }
+
+
+def _read_happening(data: dict[str, Any]) -> Happening:
+    ordered = Disturbance(data["name"], data["kind"], data["when"], data["required"], data["line"])
+    return Happening(ordered, tuple(data["fired"]), data["happened"], data["effect"], data["tick"])

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from simscen.core.case import CLEARANCE_RANGE, Case
+from simscen.core.disturbance import Disturbance
 from simscen.core.events import Event, EventKind
 from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.core.navigation import Goal, Path
@@ -117,6 +118,7 @@ def sketch_case(words: Mapping[str, Any]) -> Case:
         inscribed_radius=words.get("inscribed_radius", 0.2),
         time_limit=words.get("time_limit", 60.0),
         clearance_range=words.get("clearance_range", CLEARANCE_RANGE),
+        disturbances=tuple(Disturbance(**ordered) for ordered in words.get("disturbances", [])),
     )
 
 

@@ -2,8 +2,13 @@
 
 from collections.abc import Sequence
 
+from simscen.core.disturbance import Happening
 from simscen.core.verdict import Finding, Status, Verdict
 
+DISTURBANCE = "disturbance"
+"""What the verdicts on events and faults are called that did not happen; the id is the name of the event or fault."""
+SHOWN = 5
+"""So many times of a disturbance that came again and again are told."""
 _RELATIONS = {"≤ ": ("≤ ", "> "), "≥ ": ("≥ ", "< ")}
 
 
@@ -15,7 +20,8 @@ def comparison(finding: Finding) -> str:
     if holds:
         relation = holds if finding.status is Status.PASS else violated
         return f"{finding.measured} {relation}{finding.limit[2:]}"
-    return finding.measured if finding.status is Status.PASS else f"{finding.measured}; expected {finding.limit}"
+    told = finding.status is Status.PASS or not finding.limit
+    return finding.measured if told else f"{finding.measured}; expected {finding.limit}"
 
 
 def spot(finding: Finding, tick_rate: int) -> str:
@@ -28,6 +34,8 @@ def spot(finding: Finding, tick_rate: int) -> str:
 
 def subject(verdict: Verdict, finding: Finding) -> str:
     """The criterion and, where it checks several things, which: "goals_reached: goal shelf"."""
+    if verdict.criterion == DISTURBANCE:  # its id is a name that an author gave, and would read as a criterion
+        return finding.what
     rest = finding.what.removeprefix(verdict.criterion).removeprefix(":").strip()
     return f"{verdict.id}: {rest}" if rest else verdict.id
 
@@ -36,6 +44,19 @@ def sentence(verdict: Verdict, finding: Finding, tick_rate: int) -> str:
     """The whole line: "stopped_within: 0.84 s > 0.50 s after lidar.off, at t = 10.84 s, (2.10, 3.41)"."""
     parts = (f"{subject(verdict, finding)}: {comparison(finding)}", spot(finding, tick_rate))
     return ", ".join(part for part in parts if part)
+
+
+def when(one: Happening, tick_rate: int) -> str:
+    """When an event or fault began, e.g. "t = 10.00 s, 12.50 s and 3 more"; "never"."""
+    times = [f"{tick / tick_rate:.2f} s" for tick in one.fired[:SHOWN]]
+    more = f" and {len(one.fired) - SHOWN} more" if len(one.fired) > SHOWN else ""
+    return f"t = {', '.join(times)}{more}" if times else "never"
+
+
+def told(one: Happening, tick_rate: int) -> str:
+    """The whole line: "pallet falls: t = 10.00 s, spawned pallet at (2.00, 2.00)"."""
+    came = (when(one, tick_rate) if one.fired else "", one.effect, "" if one.happened else "so it did not happen")
+    return f"{one.ordered.name}: {', '.join(part for part in came if part)}"
 
 
 def violations(verdict: Verdict) -> tuple[Finding, ...]:

@@ -31,6 +31,9 @@ class EventEntry(Spec):
     when: Trigger
     do: Actions
     """One action, or several in order."""
+    required: bool = True
+    """Whether the run fails when this never happened: its trigger never fired, an action of it changed nothing, or
+    its `probability` was not drawn. `false` where it may stay away."""
 
     @property
     def actions(self) -> list[AnyAction]:
@@ -41,7 +44,7 @@ class EventEntry(Spec):
 class FaultEntry(AnyFault):
     """Something that goes wrong with a sensor or the wheels."""
 
-    modifiers: ClassVar[frozenset[str]] = frozenset({"sensor", "when", "for_", "name"})
+    modifiers: ClassVar[frozenset[str]] = frozenset({"sensor", "when", "for_", "name", "required"})
 
     sensor: Name
     """The instance it affects, by its name in the robot's `sensors`."""
@@ -51,6 +54,9 @@ class FaultEntry(AnyFault):
     """When it begins; default: at the start."""
     for_: PositiveDuration | None = Field(default=None, alias="for")
     """How long it lasts; default: to the end."""
+    required: bool = True
+    """Whether the run fails when this never happened: its trigger never fired, its `probability` was not drawn, or it
+    was over before it changed a message or a command. `false` where it may stay away."""
 
     @property
     def label(self) -> str:

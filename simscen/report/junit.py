@@ -12,7 +12,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from simscen.core.result import Outcome
 from simscen.core.sessionevents import RunFinished
-from simscen.judge.wording import subject
+from simscen.judge.wording import subject, told
 from simscen.report.complaints import Complaint, complaints, failure, place, scenario_file
 from simscen.report.text import one_line, visible
 
@@ -109,10 +109,11 @@ def _told(run: RunFinished, about: list[Complaint]) -> str:
 
 
 def _output(run: RunFinished) -> str:
-    """Warnings, then attachments as Jenkins and GitLab read them."""
+    """Warnings, what fired when, then attachments as Jenkins and GitLab read them."""
     warnings = [complaint for complaint in complaints(run) if complaint.warning]
     lines = [f"{place(run, warning.line)}: warning: {warning.message}" for warning in warnings]
     files = (run.artifacts.picture, run.artifacts.mcap, run.artifacts.result)
+    lines += [one_line(f"{one.ordered.kind} {told(one, run.result.tick_rate)}") for one in run.result.disturbances]
     return "\n".join([*lines, *(f"[[ATTACHMENT|{one_line(file)}]]" for file in files if file)])
 
 

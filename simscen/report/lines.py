@@ -13,13 +13,14 @@ from simscen.core.sessionevents import (
     SessionFinished,
     SessionStarted,
 )
-from simscen.judge.wording import tightest
+from simscen.judge.wording import tightest, told
 from simscen.report.complaints import broken, complaints, failure, label, place
 from simscen.report.text import one_line
 
 Role = Literal["plain", "name", "good", "bad", "odd", "quiet"]
 
 TAIL = 12
+MOST_HAPPENINGS = 8
 SIGNS = {Outcome.PASSED: ("✓", "good"), Outcome.FAILED: ("✗", "bad"), Outcome.ERROR: ("!", "odd")}
 
 
@@ -101,6 +102,7 @@ def finished(run: RunFinished, naming: Naming) -> Iterator[Line]:
         yield (Piece("      "), Piece(f"{word}{complaint.message}", _role(role)))
         yield from (((Piece(f"        {text}", "quiet")),) for text in complaint.detail)
     if run.outcome is not Outcome.PASSED:
+        yield from _happened(run)
         yield from _pointers(run)
 
 
@@ -136,6 +138,14 @@ def _summary(run: RunFinished) -> tuple[Piece, ...]:
 def _broken(run: RunFinished) -> Iterator[Line]:
     yield (Piece("      "), Piece(broken(run), "odd"))
     yield from ((Piece(f"        | {line}", "quiet"),) for line in failure(run)[2].splitlines()[-TAIL:])
+
+
+def _happened(run: RunFinished) -> Iterator[Line]:
+    """What fired and when; what did not is among the complaints, or may stay away."""
+    fired = [one_line(told(one, run.result.tick_rate)) for one in run.result.disturbances if one.happened]
+    more = [f"and {len(fired) - MOST_HAPPENINGS} more"] if len(fired) > MOST_HAPPENINGS else []
+    for number, text in enumerate((*fired[:MOST_HAPPENINGS], *more)):
+        yield (Piece(f"      {'' if number else 'happened':9} ", "quiet"), Piece(text))
 
 
 def _pointers(run: RunFinished) -> Iterator[Line]:

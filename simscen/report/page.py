@@ -7,7 +7,7 @@ from pathlib import Path
 
 from simscen.core.result import Outcome
 from simscen.core.sessionevents import RunFinished
-from simscen.judge.wording import comparison, subject, tightest
+from simscen.judge.wording import comparison, subject, tightest, when
 from simscen.report.complaints import broken, complaints, failure, place
 from simscen.report.text import one_line, visible
 
@@ -61,8 +61,8 @@ def _run(run: RunFinished, with_picture: bool) -> str:
         f'<span class="pill {run.outcome.value}">{run.outcome.value}</span>'
         f'<span class="name">{_text(run.key.scenario)}</span><span class="quiet">{_text(label)}</span>'
         f'<span class="quiet">{run.result.simulated:.1f} s</span><span class="quiet">{_text(nearest)}</span></summary>'
-        f'<div class="in">{_why(run)}{_verdicts(run)}{_picture(run) if with_picture else ""}{_metrics(run)}'
-        f"{_again(run)}</div></details>"
+        f'<div class="in">{_why(run)}{_verdicts(run)}{_disturbances(run)}{_picture(run) if with_picture else ""}'
+        f"{_metrics(run)}{_again(run)}</div></details>"
     )
 
 
@@ -88,6 +88,18 @@ def _verdicts(run: RunFinished) -> str:
                 f'<td class="quiet">{_text(place(run, lines.get(verdict, 0)))}</td></tr>'
             )
     head = "<tr><th></th><th>criterion</th><th>measured</th><th>margin</th><th>written in</th></tr>"
+    return f"<table>{head}{''.join(rows)}</table>" if rows else ""
+
+
+def _disturbances(run: RunFinished) -> str:
+    """Each event and fault, when it began and what it changed."""
+    rows = [
+        f'<tr class="{"bad" if one.missing else ""}"><td>{"happened" if one.happened else "did not happen"}</td>'
+        f"<td>{_text(one.ordered.name)}</td><td>{_text(one.ordered.trigger)}</td>"
+        f"<td>{_text(when(one, run.result.tick_rate))}</td><td>{_text(one.effect)}</td></tr>"
+        for one in run.result.disturbances
+    ]
+    head = "<tr><th></th><th>event or fault</th><th>ordered</th><th>began</th><th>effect</th></tr>"
     return f"<table>{head}{''.join(rows)}</table>" if rows else ""
 
 

@@ -61,8 +61,9 @@ def assemble(prepared: Prepared, seed: int) -> Rig:
     stack = build_stack(prepared.stack, surroundings, streams, clock, stop_on_failure=spec.on_goal_failure == "stop")
     stack.start(prepared.estimate, prepared.case.goals)
 
-    faults = FaultRig(spec.faults, streams, Wheels(getattr(prepared.robot.drive, "wheel_separation", 0.0)))
     stage = LiveStage(world, simulation, stack, clock)
+    wheels = Wheels(getattr(prepared.robot.drive, "wheel_separation", 0.0))
+    faults = FaultRig(spec.faults, streams, wheels, stage.note)
     for body in world.bodies:
         stage.note(Event(0, EventKind.OBJECT_SPAWNED, body.name, described(body)))
     control_period = clock.period(prepared.stack.controller_frequency)

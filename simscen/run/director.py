@@ -31,31 +31,33 @@ class Director:
 
     def direct(self) -> None:
         """Let happen what is due at this beat; the stage keeps the record."""
-        for name, entry, firing in self._events:
+        for number, (name, entry, firing) in enumerate(self._events):
             for _ in range(0 if firing.spent else firing.fires(self._stage)):
-                self._perform(name, entry)
+                self._perform(number, name, entry)
         self._end_faults()
         for index, firing in enumerate(self._starts):
             if not firing.spent and firing.fires(self._stage) and index not in self._ends:
                 self._begin_fault(index)
 
-    def _perform(self, name: str, entry: EventEntry) -> None:
-        actions: list[Value] = [action.kind for action in entry.actions]
-        self._stage.note(Event(0, EventKind.EVENT_STARTED, name, {"actions": actions}))
-        for action in entry.actions:
-            action.perform(self._stage)
-        self._stage.note(Event(0, EventKind.EVENT_ENDED, name))
+    def _perform(self, number: int, name: str, entry: EventEntry) -> None:
+        kinds: list[Value] = [action.kind for action in entry.actions]
+        self._stage.note(Event(0, EventKind.EVENT_STARTED, name, {"entry": number, "actions": kinds}))
+        effects = [action.perform(self._stage) for action in entry.actions]
+        told: list[Value] = [{"happened": effect.happened, "what": effect.what} for effect in effects]
+        self._stage.note(Event(0, EventKind.EVENT_ENDED, name, {"entry": number, "effects": told}))
 
     def _begin_fault(self, index: int) -> None:
         entry = self._faults[index]
         self._rig.begin(index)
         lasts = None if entry.for_ is None else self._stage.clock.ticks(entry.for_)
         self._ends[index] = None if lasts is None else self._stage.tick + lasts
-        self._stage.note(Event(0, EventKind.FAULT_STARTED, entry.label, {"sensor": entry.sensor, "fault": entry.kind}))
+        about: dict[str, Value] = {"entry": index, "sensor": entry.sensor, "fault": entry.kind}
+        self._stage.note(Event(0, EventKind.FAULT_STARTED, entry.label, about))
 
     def _end_faults(self) -> None:
         for index, end in sorted(self._ends.items()):
             if end is not None and self._stage.tick >= end:
                 del self._ends[index]
-                self._rig.end(index)
-                self._stage.note(Event(0, EventKind.FAULT_ENDED, self._faults[index].label))
+                touched = self._rig.end(index)
+                about: dict[str, Value] = {"entry": index, "touched": touched}
+                self._stage.note(Event(0, EventKind.FAULT_ENDED, self._faults[index].label, about))

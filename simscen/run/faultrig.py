@@ -1,25 +1,39 @@
 """The faults of a scenario, between the sensors and the stack, and between the stack and the wheels."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+
+import numpy as np
 
 from simscen.core.chance import Streams
+from simscen.core.events import Event, EventKind
 from simscen.core.motion import Twist
 from simscen.core.sensing import Reading, Readings
 from simscen.faults.base import Disturbance, Wheels
 from simscen.model.disturbance import FaultEntry
 
+ROUNDING = 1e-9
+"""What a fault that changes nothing may still change in a number, by adding increments up."""
+
 
 @dataclass
 class _Active:
+    """A fault at work; `touched` counts the messages and commands that it changed or kept back."""
+
     sensor: str
     disturbance: Disturbance
+    touched: int = 0
+    over: bool = False
 
 
 class FaultRig:
     """Disturbs readings and commands with the faults that are under way, in the order of the scenario."""
 
-    def __init__(self, faults: list[FaultEntry], streams: Streams, wheels: Wheels) -> None:
-        self._faults, self._streams, self._wheels = faults, streams, wheels
+    def __init__(
+        self, faults: list[FaultEntry], streams: Streams, wheels: Wheels, note: Callable[[Event], None]
+    ) -> None:
+        """`note` takes a fault.took_effect when a fault changes its first message or command."""
+        self._faults, self._streams, self._wheels, self._note = faults, streams, wheels, note
         self._active: dict[int, _Active] = {}
 
     def begin(self, index: int) -> None:
@@ -28,11 +42,12 @@ class FaultRig:
         chance = self._streams.generator(f"fault.{entry.label}#{index}")
         self._active[index] = _Active(entry.sensor, entry.fault.begin(chance, self._wheels))
 
-    def end(self, index: int) -> None:
-        """End it; what it leaves behind stays at work."""
+    def end(self, index: int) -> int:
+        """End it; what it leaves behind stays at work. Returns how many messages and commands it has touched."""
         active = self._active.pop(index)
         if rest := active.disturbance.end():
-            self._active[index] = _Active(active.sensor, rest)
+            self._active[index] = _Active(active.sensor, rest, over=True)
+        return active.touched
 
     def disturb(self, readings: Readings) -> Readings:
         """The readings as the stack gets them."""
@@ -43,13 +58,34 @@ class FaultRig:
 
     def command(self, command: Twist) -> Twist:
         """The command as the wheels get it."""
-        for _, active in sorted(self._active.items()):
-            command = active.disturbance.command(command)
+        for index, active in sorted(self._active.items()):
+            disturbed = active.disturbance.command(command)
+            if not np.allclose(disturbed, command, rtol=0.0, atol=ROUNDING):
+                self._count(index, active)
+            command = disturbed
         return command
 
     def _reading(self, reading: Reading) -> Reading | None:
         current: Reading | None = reading
-        for _, active in sorted(self._active.items()):
+        for index, active in sorted(self._active.items()):
             if current is not None and active.sensor == reading.sensor:
-                current = active.disturbance.reading(current)
+                disturbed = active.disturbance.reading(current)
+                if disturbed is None or not _equal(disturbed, current):
+                    self._count(index, active)
+                current = disturbed
         return current
+
+    def _count(self, index: int, active: _Active) -> None:
+        if active.over:
+            return
+        if not active.touched:
+            self._note(Event(0, EventKind.FAULT_TOOK_EFFECT, self._faults[index].label, {"entry": index}))
+        active.touched += 1
+
+
+def _equal(one: Reading, other: Reading) -> bool:
+    """Whether two readings of one sensor say the same but for rounding; beams without an answer (nan) do."""
+    if one is other:
+        return True
+    said = [(getattr(one, field.name), getattr(other, field.name)) for field in fields(one) if field.name != "sensor"]
+    return all(np.allclose(a, b, rtol=0.0, atol=ROUNDING, equal_nan=True) for a, b in said)

@@ -109,9 +109,6 @@ class LiveStage:
 
     def remove(self, name: str) -> None:
         """Take a body out of the world."""
-        if self._simulation.object_pose(name) is None:
-            self.note(Event(0, EventKind.EVENT_NOTE, name, {"message": "nothing of this name to remove"}))
-            return
         self._simulation.remove(name)
         self.note(Event(0, EventKind.OBJECT_REMOVED, name))
 

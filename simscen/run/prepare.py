@@ -13,6 +13,7 @@ from simscen.core.grid import OccupancyGrid
 from simscen.core.navigation import Goal
 from simscen.core.world import BuiltWorld
 from simscen.criteria.base import Criterion
+from simscen.loading.disturbances import disturbances_of
 from simscen.loading.loaded import LoadedScenario
 from simscen.model.robot import RobotSpec
 from simscen.model.scenario import ScenarioSpec, estimate_of
@@ -72,6 +73,7 @@ def prepare(loaded: LoadedScenario, world_of: BuildWorld = build_world) -> Prepa
         inscribed_radius=inscribed_radius(body.radius, body.footprint),
         time_limit=spec.time_limit,
         clearance_range=_clearance_range(spec),
+        disturbances=disturbances_of(loaded),
     )
     return Prepared(
         loaded=loaded,

@@ -102,8 +102,9 @@ def perform(job, tell):  # noqa: PLR0915 - a list of faults
 
 DAEMON = "61.25"
 
-RESULT = """{"format": 1, "scenario": "x", "seed": 1, "variation": "", "path": "x", "outcome": "passed", "ended": "",
-"simulated_seconds": 1.5, "tick_rate": 240, "again": "", "events": {}, "metrics": {}, "verdicts": [], "error": null}"""
+RESULT = """{"format": 2, "scenario": "x", "seed": 1, "variation": "", "path": "x", "outcome": "passed", "ended": "",
+"simulated_seconds": 1.5, "tick_rate": 240, "again": "", "events": {}, "disturbances": [], "metrics": {},
+"verdicts": [], "error": null}"""
 
 
 if __name__ == "__main__":

@@ -1,0 +1,43 @@
+"""What a scenario orders to happen, and what came of it."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """An event or a fault as the scenario orders it.
+
+    `when` is its trigger as written, "" for a fault from the start. `required` says that the run fails unless it
+    happens. `line` is where the entry stands in the scenario's own file; 0 = unknown.
+    """
+
+    name: str
+    kind: Literal["event", "fault"]
+    when: str = ""
+    required: bool = True
+    line: int = 0
+
+    @property
+    def trigger(self) -> str:
+        """The trigger in words: "when time: 10 s"."""
+        return f"when {self.when}" if self.when else "from the start"
+
+
+@dataclass(frozen=True)
+class Happening:
+    """What became of a disturbance: the ticks at which it `fired`, and whether it changed anything at any of them.
+
+    `effect` tells in a line what it changed, or why nothing; `tick` is the first at which it did, or tried to.
+    """
+
+    ordered: Disturbance
+    fired: tuple[int, ...]
+    happened: bool
+    effect: str
+    tick: int | None = None
+
+    @property
+    def missing(self) -> bool:
+        """Whether it had to happen and did not."""
+        return self.ordered.required and not self.happened

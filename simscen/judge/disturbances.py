@@ -1,0 +1,120 @@
+"""What did not happen is not green: each event and fault of a scenario has to change something, or the run fails.
+
+That a trigger fired is not enough. An action may find nothing to act on, a fault may be over before a message of its
+sensor comes, and what comes with the last beat of a run has nobody left to disturb.
+"""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+
+from simscen.core.case import Case
+from simscen.core.disturbance import Disturbance, Happening
+from simscen.core.events import Event, EventKind
+from simscen.core.trace import Trace
+from simscen.core.verdict import Finding, Verdict
+from simscen.criteria.bounds import missed, undecided
+from simscen.criteria.moments import ending, finished
+from simscen.judge.wording import DISTURBANCE
+
+WHAT = "disturbance did not happen"
+
+
+def happenings(trace: Trace, case: Case) -> tuple[Happening, ...]:
+    """What became of each disturbance of the scenario, in its order: events, then faults."""
+    return tuple(
+        _event(trace, ordered, entry) if ordered.kind == "event" else _fault(trace, ordered, entry)
+        for entry, ordered in _numbered(case.disturbances)
+    )
+
+
+def missing(
+    trace: Trace, happened: Sequence[Happening], others: Sequence[Verdict] = ()
+) -> tuple[tuple[Verdict, int], ...]:
+    """A verdict for each required disturbance that did not happen, and the line it is written in.
+
+    It is inconclusive where the log was cut off: it might have happened later. An id that one of the `others` has, or
+    one before it, gets a number.
+    """
+    lacking = [one for one in happened if one.missing]
+    seen = Counter(verdict.id for verdict in others)
+    found = []
+    for one in lacking:
+        name = one.ordered.name
+        seen[name] += 1
+        unique = name if seen[name] == 1 else f"{name}#{seen[name]}"
+        found.append((Verdict(DISTURBANCE, unique, "fail", (_finding(trace, one),)), one.ordered.line))
+    return tuple(found)
+
+
+def _numbered(ordered: Sequence[Disturbance]) -> Iterator[tuple[int, Disturbance]]:
+    """Each with its number among those of its kind, by which events of the log name the entry."""
+    counts = {"event": 0, "fault": 0}
+    for one in ordered:
+        yield counts[one.kind], one
+        counts[one.kind] += 1
+
+
+def _finding(trace: Trace, one: Happening) -> Finding:
+    told = f"{one.ordered.name} ({one.ordered.trigger})"
+    if not finished(trace):
+        because = f"{told}, until the log stops at t = {trace.seconds(trace.end):.2f} s"
+        return undecided(WHAT, because, detail=(one.effect,))
+    return missed(WHAT, told, "", None if one.tick is None else (trace, one.tick), (one.effect,))
+
+
+def _of_entry(trace: Trace, kind: EventKind, entry: int) -> list[Event]:
+    return [event for event in trace.of_kind(kind) if event.data.get("entry") == entry]
+
+
+def _event(trace: Trace, ordered: Disturbance, entry: int) -> Happening:
+    """Each of its actions has to have changed something at least once, and the run to have gone on after that."""
+    started = _of_entry(trace, EventKind.EVENT_STARTED, entry)
+    fired = tuple(event.tick for event in started)
+    ended = _of_entry(trace, EventKind.EVENT_ENDED, entry)
+    if not started:
+        return Happening(ordered, (), False, _never(trace))
+    in_time = [event for event in ended if event.tick < trace.end]
+    if not in_time:
+        return Happening(ordered, fired, False, _too_late(trace), fired[0])
+    told = [_effects(event) for event in in_time]
+    for number in range(len(told[0])):
+        if not any(effects[number][0] for effects in told):
+            return Happening(ordered, fired, False, told[0][number][1], in_time[0].tick)
+    first = next(k for k, effects in enumerate(told) if any(did for did, _ in effects))
+    what = "; ".join(what for did, what in told[first] if did)
+    return Happening(ordered, fired, True, what, in_time[first].tick)
+
+
+def _effects(ended: Event) -> list[tuple[bool, str]]:
+    """Whether each action of an event took effect, and what came of it."""
+    effects = ended.data.get("effects")
+    assert isinstance(effects, list)
+    return [(bool(one["happened"]), str(one["what"])) for one in effects if isinstance(one, dict)]
+
+
+def _fault(trace: Trace, ordered: Disturbance, entry: int) -> Happening:
+    started = _of_entry(trace, EventKind.FAULT_STARTED, entry)
+    fired = tuple(event.tick for event in started)
+    if not started:
+        return Happening(ordered, (), False, _never(trace))
+    sensor, ended = started[0].data.get("sensor"), _of_entry(trace, EventKind.FAULT_ENDED, entry)
+    touched = [event.tick for event in _of_entry(trace, EventKind.FAULT_TOOK_EFFECT, entry) if event.tick < trace.end]
+    if touched:
+        counts = [event.data.get("touched") for event in ended]
+        number = sum(count for count in counts if isinstance(count, int))
+        times = (" once" if number == 1 else f" {number} times") if len(ended) == len(started) else ""
+        later = f", first at t = {trace.seconds(touched[0]):.2f} s" if touched[0] > fired[0] else ""
+        return Happening(ordered, fired, True, f"disturbed {sensor}{times}{later}", touched[0])
+    if fired[0] >= trace.end:
+        return Happening(ordered, fired, False, _too_late(trace), fired[0])
+    until = f"to t = {trace.seconds(ended[0].tick):.2f} s" if ended else "on"
+    why = f"it changed no message of {sensor} from t = {trace.seconds(fired[0]):.2f} s {until}"
+    return Happening(ordered, fired, False, why, fired[0])
+
+
+def _never(trace: Trace) -> str:
+    return f"it never began; the run ended at t = {trace.seconds(trace.end):.2f} s ({ending(trace)})"
+
+
+def _too_late(trace: Trace) -> str:
+    return f"it came with the end of the run at t = {trace.seconds(trace.end):.2f} s ({ending(trace)})"

@@ -1,0 +1,130 @@
+"""What did not happen is not green: every event and fault of a scenario changes something, or the run fails."""
+
+from pathlib import Path
+
+import pytest
+
+from simscen.core.result import Outcome, RunResult
+from simscen.loading.scenario import load_scenario
+from simscen.run.prepare import prepare
+from simscen.run.simulate import simulate
+
+HEAD = """\
+simscen: 1
+world:
+  simscen: 1
+  walls: [{name: outer wall, points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]
+  objects: [{name: bin, box: [0.2, 0.2, 0.3], pose: {x: 5.5, y: 0.5}}]
+  doors: [{name: hatch, points: [[0.4, 3.9], [0.9, 3.9]], closed: true}]
+robot: {pose: {x: 1, y: 1}}
+stack: {localizer: {type: ground_truth}}
+goals: [{pose: {x: 4.5, y: 1}}]
+time_limit: 20 s
+pass: [{goals_reached: {}}]
+"""
+
+
+def run(text: str, folder: Path) -> tuple[RunResult, dict[str, str]]:
+    """The result, and of each event and fault what became of it, after a + where it happened and a - where not."""
+    file = folder / "own.scenario.yaml"
+    file.write_text(HEAD + text)
+    result = simulate(prepare(load_scenario(file, folder))).result
+    return result, {one.ordered.name: f"{'-+'[one.happened]} {one.effect}" for one in result.disturbances}
+
+
+def complaints(result: RunResult) -> dict[str, int]:
+    """The ids of what failed, and the lines they are written in."""
+    pairs = zip(result.verdicts, result.lines, strict=True)
+    return {verdict.id: line for verdict, line in pairs if verdict.status.value != "pass"}
+
+
+ACTIONS = """\
+events:
+  - {name: far away, when: {robot_within: {of: [50, 50], distance: 1 m}}, do: {push: {impulse: [0, 1]}}}
+  - {name: remove what never was, when: {time: 1 s}, do: {remove: {name: later}}}
+  - {name: remove, when: {time: 1 s}, do: {remove: {name: bin}}}
+  - {name: remove again, when: {time: 2 s}, do: {remove: {name: bin}}}
+  - {name: move what is gone, when: {time: 2 s}, do: {move: {name: bin, through: [[5, 1]], speed: 1}}}
+  - {name: spawn, when: {time: 2 s}, do: {spawn: {name: crate, box: [0.2, 0.2, 0.3], pose: {x: 5.5, y: 3.5}}}}
+  - {name: move, when: {time: 3 s}, do: {move: {name: crate, through: [[5.5, 3]], speed: 1}}}
+  - {name: move to where it is, when: {time: 5 s}, do: {move: {name: crate, through: [[5.5, 3]], speed: 1}}}
+  - {name: shut what is shut, when: {time: 1 s}, do: {close: {name: hatch}}}
+  - {name: open, when: {time: 2 s}, do: {open: {name: hatch}}}
+  - {name: open what is open, when: {time: 5 s}, do: {open: {name: hatch}}}
+  - {name: no push, when: {time: 1 s}, do: {push: {impulse: [0, 0]}}}
+  - {name: push, when: {time: 1 s}, do: {push: {impulse: [0, 0.5]}}}
+  - {name: kidnapped to where it is, when: {time: 0 s}, do: {kidnap: {pose: {x: 1, y: 1}}}}
+  - {name: kidnapped, when: {time: 0 s}, do: {kidnap: {pose: {x: 1, y: 1.2}}}}
+  - name: no plan to spawn on
+    when: {goal: {status: reached}}
+    do: {spawn: {name: later, box: [0.1, 0.1, 0.3], on_plan: 0.5 m}}
+  - {name: nothing to cancel, when: {goal: {status: reached}, delay: 0.2 s}, do: {cancel_goal: {}}}
+  - {name: half of two, when: {time: 1 s}, do: [{push: {impulse: [0, 0.1]}}, {push: {impulse: [0, 0]}}]}
+  - {name: second time, when: {time: 1 s}, do: {push: {impulse: [0, 0]}}, required: false}
+"""
+
+
+def test_an_event_happened_when_every_action_of_it_changed_something(tmp_path):
+    result, told = run(ACTIONS, tmp_path)
+    happened = {"remove", "spawn", "move", "open", "push", "kidnapped"}
+    assert {name for name, effect in told.items() if effect.startswith("+")} == happened
+    assert result.outcome is Outcome.FAILED
+    lines = (HEAD + ACTIONS).split("\n")
+    line = {name: next(k for k, text in enumerate(lines, 1) if f"name: {name}," in f"{text},") for name in told}
+    assert complaints(result) == {name: line[name] for name in told if name not in {*happened, "second time"}}
+    assert told["remove"] == "+ removed bin"
+    assert told["move to where it is"] == "- crate stands at its waypoint already"
+    assert told["open what is open"] == "- hatch was open already"
+    assert told["nothing to cancel"] == "- the robot was driving to no goal"
+    assert told["no plan to spawn on"].endswith("as the robot had no plan to put it on")
+    assert told["far away"].startswith("- it never began; the run ended at t = ")
+
+
+FAULTS = """\
+faults:
+  - {sensor: lidar, off: {}, when: {time: 2.01 s}, for: 0.01 s}
+  - {sensor: lidar, name: one message, off: {}, when: {time: 3.0 s}, for: 0.02 s}
+  - {sensor: odom, bias: {linear_scale: 1.0}}
+  - {sensor: odom, name: before it drives, bias: {linear_scale: 1.5}, for: 0.02 s}
+  - {sensor: odom, slip: {left: 5 %}, when: {time: 2 s}}
+  - {sensor: lidar, dropout: {probability: 0}}
+  - {sensor: lidar, beam_dropout: {probability: 0}}
+  - {sensor: lidar, name: dead, off: {}, when: {time: 4 s}, for: 1 s}
+  - {sensor: lidar, name: noise of the dead, noise: {std: 1 cm}, when: {time: 4 s}, for: 1 s}
+  - {sensor: lidar, name: noise, noise: {std: 1 cm}, when: {time: 5 s}, for: 1 s}
+  - {sensor: lidar, name: to the end, off: {}, when: {time: 6 s}}
+"""
+
+
+def test_a_fault_happened_when_it_changed_a_message_or_a_command(tmp_path):
+    result, told = run(FAULTS, tmp_path)
+    assert {name for name, effect in told.items() if effect.startswith("+")} == {
+        "one message", "odom.slip", "dead", "noise", "to the end",
+    }  # fmt: skip
+    assert told["one message"] == "+ disturbed lidar once"
+    assert told["dead"] == "+ disturbed lidar 10 times"
+    assert told["noise of the dead"] == "- it changed no message of lidar from t = 4.00 s to t = 5.00 s"
+    assert set(complaints(result)) >= {"lidar.off", "odom.bias", "lidar.dropout", "lidar.beam_dropout"}
+
+
+def test_what_comes_with_the_last_beat_disturbs_nobody(tmp_path):
+    text = """\
+events: [{name: too late, when: {time: 20 s}, do: {push: {impulse: [0, 1]}}}]
+faults: [{sensor: lidar, off: {}, when: {time: 20 s}}]
+linger: 60
+"""
+    result, told = run(text, tmp_path)
+    assert complaints(result).keys() == {"too late", "lidar.off"}
+    assert told["too late"] == told["lidar.off"] == "- it came with the end of the run at t = 20.00 s (time limit)"
+
+
+CHANCE = "events: [{{name: maybe, when: {{time: 1 s, probability: {}}}, do: {{push: {{impulse: [0, 0.1]}}}}{}}}]\n"
+
+
+@pytest.mark.parametrize(
+    ("probability", "required", "outcome"),
+    [("1 %", "", Outcome.FAILED), ("1 %", ", required: false", Outcome.PASSED), ("99 %", "", Outcome.PASSED)],
+)
+def test_what_was_not_drawn_did_not_happen(probability, required, outcome, tmp_path):
+    result, _ = run(CHANCE.format(probability, required), tmp_path)
+    assert result.outcome is outcome

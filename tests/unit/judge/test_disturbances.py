@@ -1,0 +1,123 @@
+import json
+
+import pytest
+
+from simscen.core.disturbance import Disturbance
+from simscen.core.result import Outcome, RunKey
+from simscen.core.verdict import Status
+from simscen.criteria.criterion import AnyCriterion
+from simscen.judge.disturbances import happenings
+from simscen.judge.result import result_of
+from simscen.judge.resultdata import from_json, to_json
+from simscen.judge.sketch import sketch, sketch_case
+
+WORDS = {"seconds": 10, "truth": [[0, 0, 0], [10, 5, 0]]}
+EVENT = {"name": "pallet falls", "kind": "event", "when": "time: 3 s", "line": 7}
+FAULT = {"name": "lidar.off", "kind": "fault", "when": "time: 3 s", "line": 9}
+
+
+def event(at, happened=True, what="spawned pallet", entry=0):
+    return [
+        [at, "event.started", "pallet falls", {"entry": entry}],
+        [at, "event.ended", "pallet falls", {"entry": entry, "effects": [{"happened": happened, "what": what}]}],
+    ]
+
+
+def fault(begins, touches=None, ends=None, touched=0, entry=0):
+    told = [[begins, "fault.started", "lidar.off", {"entry": entry, "sensor": "lidar"}]]
+    told += [[touches, "fault.took_effect", "lidar.off", {"entry": entry}]] if touches is not None else []
+    told += [[ends, "fault.ended", "lidar.off", {"entry": entry, "touched": touched}]] if ends is not None else []
+    return told
+
+
+def judged(events, *ordered, **changes):
+    trace, case = sketch({**WORDS, "events": events, **changes}), sketch_case({"disturbances": ordered})
+    criteria = [AnyCriterion.model_validate({"collisions": {}})]
+    return result_of(RunKey("a", 1), "a.scenario.yaml", criteria, trace, case, lines=(20,))
+
+
+@pytest.mark.parametrize(
+    ("ordered", "events", "effect"),
+    [
+        (EVENT, event(3), "spawned pallet"),
+        (EVENT, [*event(3, False, "nothing there"), *event(5)], "spawned pallet"),
+        (FAULT, fault(3, 3, 5, 20), "disturbed lidar 20 times"),
+        (FAULT, fault(3, 3.5, 5, 1), "disturbed lidar once, first at t = 3.50 s"),
+        (FAULT, fault(3, 3), "disturbed lidar"),
+        (FAULT, [*fault(1, None, 1.1), *fault(3, 3, 5, 20)], "disturbed lidar 20 times, first at t = 3.00 s"),
+    ],
+)
+def test_what_changed_something_happened(ordered, events, effect):
+    result = judged(events, ordered)
+    assert result.outcome is Outcome.PASSED
+    (happened,) = result.disturbances
+    assert (happened.happened, happened.effect) == (True, effect)
+
+
+@pytest.mark.parametrize(
+    ("ordered", "events", "why", "tick"),
+    [
+        (EVENT, [], "it never began; the run ended at t = 10.00 s (navigation ended)", None),
+        (EVENT, event(3, False, "there is nothing called pallet"), "there is nothing called pallet", 720),
+        (EVENT, event(10), "it came with the end of the run at t = 10.00 s (navigation ended)", 2400),
+        (EVENT, event(3, entry=1), "it never began; the run ended at t = 10.00 s (navigation ended)", None),
+        (FAULT, [], "it never began; the run ended at t = 10.00 s (navigation ended)", None),
+        (FAULT, fault(3, None, 3.05), "it changed no message of lidar from t = 3.00 s to t = 3.05 s", 720),
+        (FAULT, fault(3), "it changed no message of lidar from t = 3.00 s on", 720),
+        (FAULT, fault(10, 10), "it came with the end of the run at t = 10.00 s (navigation ended)", 2400),
+        (FAULT, fault(3, 3, entry=1), "it never began; the run ended at t = 10.00 s (navigation ended)", None),
+    ],
+)
+def test_what_changed_nothing_fails_the_run_at_its_own_line_before_the_criteria(ordered, events, why, tick):
+    result = judged(events, ordered)
+    assert result.outcome is Outcome.FAILED
+    verdict, collisions = result.verdicts
+    assert (verdict.criterion, verdict.id, verdict.status) == ("disturbance", ordered["name"], Status.FAIL)
+    assert collisions.status is Status.PASS
+    assert result.lines == (ordered["line"], 20)
+    (finding,) = verdict.findings
+    assert (finding.detail, finding.tick) == ((why,), tick)
+    (told,) = json.loads(to_json(result))["verdicts"][0]["findings"]
+    assert told["message"].startswith(f"disturbance did not happen: {ordered['name']} (when time: 3 s)")
+    assert "expected" not in told["message"]
+
+
+@pytest.mark.parametrize("ordered", [EVENT, FAULT])
+def test_what_need_not_happen_is_told_and_fails_nothing(ordered):
+    result = judged([], {**ordered, "required": False})
+    assert result.outcome is Outcome.PASSED
+    assert [(one.happened, one.missing) for one in result.disturbances] == [(False, False)]
+
+
+def test_a_log_that_was_cut_off_leaves_it_open():
+    result = judged([], EVENT, ended=None)
+    assert [verdict.status for verdict in result.verdicts] == [Status.INCONCLUSIVE, Status.INCONCLUSIVE]
+    assert result.outcome is Outcome.FAILED
+
+
+def test_every_action_of_an_event_has_to_take_effect_but_not_each_time():
+    def twice(first, second):
+        effects = [{"happened": did, "what": what} for did, what in zip((first, second), "ab", strict=True)]
+        return [
+            [3, "event.started", "pallet falls", {"entry": 0}],
+            [3, "event.ended", "pallet falls", {"entry": 0, "effects": effects}],
+        ]
+
+    assert [one.happened for one in judged(twice(True, True), EVENT).disturbances] == [True]
+    (half,) = judged(twice(True, False), EVENT).disturbances
+    assert (half.happened, half.effect) == (False, "b")
+    assert [one.happened for one in judged([*twice(True, False), *twice(False, True)], EVENT).disturbances] == [True]
+
+
+def test_entries_of_one_name_are_told_apart():
+    trace = sketch({**WORDS, "events": fault(3, 3, 4, 10, entry=1)})
+    case = sketch_case({"disturbances": [FAULT, EVENT, {**FAULT, "line": 10}]})
+    assert [(one.ordered.line, one.happened) for one in happenings(trace, case)] == [(9, False), (7, False), (10, True)]
+    result = judged([], FAULT, {**FAULT, "line": 10}, {**EVENT, "name": "collisions"})
+    assert [verdict.id for verdict in result.verdicts] == ["lidar.off", "lidar.off#2", "collisions#2", "collisions"]
+
+
+def test_disturbances_survive_their_file():
+    result = judged([*event(3), *fault(3)], EVENT, {**FAULT, "when": "", "required": False})
+    assert from_json(to_json(result)) == result
+    assert result.disturbances[1].ordered == Disturbance("lidar.off", "fault", required=False, line=9)

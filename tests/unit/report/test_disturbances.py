@@ -1,0 +1,74 @@
+"""What a session tells of events and faults: everything where something failed, one line where nothing did."""
+
+import io
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import pytest
+
+from simscen.core.disturbance import Disturbance, Happening
+from simscen.core.verdict import Finding, Status, Verdict
+from simscen.report.console import text_reporter
+from simscen.report.github import annotations
+from simscen.report.junit import to_xml
+from simscen.report.page import to_html
+
+FELL = Happening(Disturbance("pallet falls", "event", "time: 3 s", line=7), (720,), True, "spawned pallet", 720)
+AGAIN = Happening(Disturbance("push", "event", "…", line=8), tuple(range(240, 2000, 240)), True, "pushed", 240)
+NEVER = Happening(Disturbance("<b>::error::", "fault", "time: 90 s", line=9), (), False, "it never began")
+
+
+@pytest.fixture
+def disturbed(failed):
+    finding = Finding(Status.FAIL, "disturbance did not happen", "<b>::error:: (when time: 90 s)", "")
+    verdict = Verdict("disturbance", NEVER.ordered.name, "fail", (finding,))
+    result = failed.result
+    return replace(failed, result=replace(
+        result,
+        disturbances=(FELL, AGAIN, NEVER),
+        verdicts=(verdict, *result.verdicts),
+        lines=(9, *result.lines),
+    ))  # fmt: skip
+
+
+def printed(run) -> list[str]:
+    out = io.TextIOWrapper(io.BytesIO(), encoding="utf-8")
+    with text_reporter(out) as listen:
+        listen(run)
+    out.seek(0)
+    return out.read().splitlines()
+
+
+def test_the_console_tells_of_a_failed_run_what_happened_when(disturbed):
+    lines = printed(disturbed)
+    assert lines[1] == "      disturbance did not happen: <b>::error:: (when time: 90 s)"
+    assert lines[5:8] == [
+        "      happened  pallet falls: t = 3.00 s, spawned pallet",
+        "                push: t = 1.00 s, 2.00 s, 3.00 s, 4.00 s, 5.00 s and 3 more, pushed",
+        "      scenario  scenarios/faults/lidar_off.scenario.yaml:9",
+    ]
+
+
+def test_a_run_that_passed_stays_one_line(passed):
+    assert len(printed(replace(passed, result=replace(passed.result, disturbances=(FELL, AGAIN, NEVER))))) == 1
+
+
+def test_junit_tells_all_of_them_and_names_the_one_that_failed(disturbed):
+    case = next(ElementTree.fromstring(to_xml([disturbed])).iter("testcase"))
+    assert case.find("failure").get("type") == "disturbance"
+    assert "lidar_off.scenario.yaml:9: disturbance did not happen" in case.find("failure").text
+    assert case.find("system-out").text.splitlines()[1:4] == [
+        "event pallet falls: t = 3.00 s, spawned pallet",
+        "event push: t = 1.00 s, 2.00 s, 3.00 s, 4.00 s, 5.00 s and 3 more, pushed",
+        "fault <b>::error::: it never began, so it did not happen",
+    ]
+
+
+def test_an_annotation_stands_at_the_line_of_the_entry(disturbed):
+    assert any("line=9" in line and "disturbance did not happen" in line for line in annotations(disturbed))
+
+
+def test_the_page_lists_them_as_text(disturbed):
+    page = to_html([disturbed])
+    assert "<td>happened</td><td>pallet falls</td><td>when time: 3 s</td><td>t = 3.00 s</td>" in page
+    assert '<tr class="bad"><td>did not happen</td><td>&lt;b&gt;::error::</td>' in page
