@@ -1,15 +1,17 @@
 """`new_goal`, `cancel_goal`: what an operator would do."""
 
 from simscen.actions.base import Action
-from simscen.core.navigation import Goal
 from simscen.core.stage import Effect, Stage
 from simscen.spec.base import Spec
 from simscen.spec.places import Name, PoseSpec
-from simscen.spec.quantities import PositiveDuration
+from simscen.spec.quantities import PositiveAngle, PositiveDuration, PositiveLength
 
 
 class NewGoal(Spec, Action):
     """Send another goal; it preempts the one the robot is driving to, and the goals after it follow.
+
+    Criteria judge it like any other goal of the scenario, and the one it preempts as preempted. Every goal that events
+    send has a name of its own; sent twice, it has to be reached twice.
 
     Example: `do: {new_goal: {name: detour, pose: {x: 1, y: 4}}}`
     """
@@ -20,10 +22,14 @@ class NewGoal(Spec, Action):
     """In the map frame."""
     timeout: PositiveDuration | None = None
     """Simulated time it may take."""
+    xy_tolerance: PositiveLength | None = None
+    """How far off the position may be; default: that of the stack's goal checker."""
+    yaw_tolerance: PositiveAngle | None = None
+    """How far off the heading may be; default: that of the stack's goal checker."""
 
     def perform(self, stage: Stage) -> Effect:
         """Send it."""
-        stage.send_goal(Goal(self.name, self.pose.pose, timeout=self.timeout))
+        stage.send_goal(self.name)
         return Effect(True, f"sent goal {self.name}")
 
 

@@ -18,6 +18,7 @@ class Case:
 
     `shortest` maps a goal's name to the length in metres of the shortest way that a disc of the robot's inscribed
     radius has from the goal before it (the start for the first) through the static world; inf when there is none.
+    `sent` are the goals that events may send on the way.
     `clearance_range` is how far around the hull clearance was searched, in metres: a clearance that is not below it was
     cut off, and is at least that.
     `disturbances` are what has to happen: the scenario's events, then its faults.
@@ -32,3 +33,9 @@ class Case:
     time_limit: float = 0.0
     clearance_range: float = CLEARANCE_RANGE
     disturbances: tuple[Disturbance, ...] = ()
+    sent: tuple[Goal, ...] = ()
+
+    @property
+    def every_goal(self) -> tuple[Goal, ...]:
+        """The goals in order, then those that events may send."""
+        return *self.goals, *self.sent

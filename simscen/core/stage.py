@@ -105,8 +105,8 @@ class Stage(Situation, Protocol):
         """Push the robot: an impulse in N s in the world frame, at its centre."""
         ...
 
-    def send_goal(self, goal: Goal) -> None:
-        """Preempt what the robot is doing with a new goal."""
+    def send_goal(self, name: str) -> None:
+        """Preempt what the robot is doing with one of the goals that the scenario's events send."""
         ...
 
     def cancel_goal(self) -> None:

@@ -9,9 +9,9 @@ import numpy as np
 from pydantic import Field
 
 from simscen.core.geometry import Pose2, wrap
-from simscen.core.verdict import Finding
+from simscen.core.verdict import Finding, Status
 from simscen.criteria.base import Criterion
-from simscen.criteria.bounds import at_most, missed, undecided
+from simscen.criteria.bounds import at_most, held, missed, undecided
 from simscen.criteria.moments import GoalStory, ending, finished, stories
 from simscen.criteria.signals import finite, truth
 from simscen.spec.base import Spec
@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 class GoalsReached(Spec, Criterion):
     """Every goal was reached: the robot says so, and at that moment it truly was there.
 
+    Goals that events send count from when they are sent. A goal that such a goal preempted is dropped, as in Nav2: it
+    is told as preempted and need not be reached, but those that remain must be. Named in `goals`, it is inconclusive.
+
     What is measured: distance and heading error between the goal and the robot's true pose at the tick of the
         robot's report, for each goal.
     When it fails: a goal was not reported reached, or was reported while the true pose was out of tolerance, or later
@@ -38,7 +41,7 @@ class GoalsReached(Spec, Criterion):
     """
 
     goals: Annotated[list[GoalName], Field(min_length=1, max_length=1000)] | None = None
-    """Only these, by name; default: all."""
+    """Only these, by name; default: all of the scenario, and all that events have sent."""
     tolerance: PositiveLength | None = None
     """How far the true position may be off; default: the goal's own tolerance."""
     yaw_tolerance: PositiveAngle | None = None
@@ -49,17 +52,35 @@ class GoalsReached(Spec, Criterion):
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Distance, heading and, if asked for, time of each goal; one finding for a goal that was not reached."""
         chosen = [story for story in stories(trace, case) if self.goals is None or story.goal.name in self.goals]
-        names = [goal.name for goal in case.goals]
-        findings = [
-            undecided(f"goal {name}", f"the scenario has no goal `{name}`", "reached", [f"goals: {', '.join(names)}"])
-            for name in self.goals or ()
-            if name not in names
-        ]
+        findings = self._untold(trace, case, {story.goal.name for story in chosen})
         if not chosen and not findings:
             return [undecided("goals_reached", "the scenario has no goals", "reached")]
         for story in chosen:
-            findings += self._reached(trace, story) if story.reached is not None else [_not_reached(trace, story)]
+            findings += self._reached(trace, story) if story.reached is not None else [self._missing(trace, story)]
+        if all(story.preempted for story in chosen) and not any(f.status is not Status.PASS for f in findings):
+            findings.append(undecided("goals_reached", "every goal was preempted", "reached"))
         return findings
+
+    def _untold(self, trace: Trace, case: Case, told: set[str]) -> list[Finding]:
+        """What there is to say of goals that are asked for by name and have no story."""
+        names = [goal.name for goal in case.every_goal]
+        findings = []
+        for name in dict.fromkeys(self.goals or ()):
+            if name not in names:
+                because, detail = f"the scenario has no goal `{name}`", [f"goals: {', '.join(names)}"]
+                findings.append(undecided(f"goal {name}", because, "reached", detail))
+            elif name not in told:
+                tell = missed if finished(trace) else undecided
+                findings.append(tell(f"goal {name}", "never sent", "reached"))
+        return findings
+
+    def _missing(self, trace: Trace, story: GoalStory) -> Finding:
+        if not story.preempted:
+            return _not_reached(trace, story)
+        assert story.end is not None
+        if self.goals is None:
+            return held(f"goal {story.goal.name}", story.fate, "reached", (trace, story.end.tick))
+        return undecided(f"goal {story.goal.name}", story.fate, "reached")
 
     def _reached(self, trace: Trace, story: GoalStory) -> list[Finding]:
         goal, tick = story.goal, story.reached

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import zip_longest
 from typing import TYPE_CHECKING
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from simscen.core.trace import Trace
 
 _STARTS = (EventKind.FAULT_STARTED, EventKind.EVENT_STARTED)
+_GOAL_ENDS = (EventKind.GOAL_REACHED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED)
 _ENDS = (EventKind.FAULT_ENDED, EventKind.EVENT_ENDED)
 
 
@@ -68,25 +70,63 @@ class GoalStory:
         return self.end.tick if self.end is not None and self.end.kind == EventKind.GOAL_REACHED else None
 
     @property
+    def preempted(self) -> bool:
+        """Whether another goal was sent before it was reached: Nav2 drops a goal then, and nobody waits for it."""
+        return self.end is not None and bool(self.end.data.get("preempted_by"))
+
+    @property
     def fate(self) -> str:
         """In words, for a goal that was not reached."""
         if self.end is None:
             return "never accepted" if self.accepted is None else "still under way"
+        if self.preempted:
+            return f"preempted by {self.end.data['preempted_by']}"
         code = self.end.data.get("error_name") or self.end.data.get("error_code")
         return self.end.kind.removeprefix("goal.") + (f" with {code}" if code else "")
 
 
 def stories(trace: Trace, case: Case) -> list[GoalStory]:
-    """The story of each goal of the scenario. The k-th goal of a name is the k-th one reported under that name."""
-    accepted = trace.of_kind(EventKind.GOAL_ACCEPTED)
-    ended = trace.of_kind(EventKind.GOAL_REACHED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED)
-    seen: dict[str, int] = {}
-    found = []
-    for goal in case.goals:
-        k = seen[goal.name] = seen.get(goal.name, 0) + 1
-        starts = [event.tick for event in accepted if event.name == goal.name]
-        ends = [event for event in ended if event.name == goal.name]
-        found.append(
-            GoalStory(goal, starts[k - 1] if len(starts) >= k else None, ends[k - 1] if len(ends) >= k else None)
-        )
-    return found
+    """The story of each goal of the scenario and of each that an event sent, in the order in which they were accepted.
+
+    The k-th goal of a name is the k-th one reported under that name; a goal of the scenario that was never accepted
+    comes last, and one that no event sent has no story.
+    """
+    told = _reports(trace)
+    found = [
+        GoalStory(goal, *_nth(told.get(goal.name, []), [g.name for g in case.goals[:k]].count(goal.name)))
+        for k, goal in enumerate(case.goals)
+    ]
+    for goal in case.sent:
+        reports = told.get(goal.name, [])
+        sent = max(len(reports), sum(event.data.get("preempted_by") == goal.name for event in trace.events))
+        found += [GoalStory(goal, *_nth(reports, k)) for k in range(sent)]
+    return sorted(found, key=began)
+
+
+_Report = tuple[int | None, Event | None]
+"""When a goal was accepted, and the event that ended it."""
+
+
+def _reports(trace: Trace) -> dict[str, list[_Report]]:
+    """Of each name the goals that were reported under it, in order."""
+    told: dict[str, list[_Report]] = {}
+    for event in trace.of_kind(EventKind.GOAL_ACCEPTED, *_GOAL_ENDS):
+        reports = told.setdefault(event.name, [])
+        if event.kind == EventKind.GOAL_ACCEPTED:
+            reports.append((event.tick, None))
+        elif reports and reports[-1][1] is None:
+            reports[-1] = (reports[-1][0], event)
+        else:
+            reports.append((None, event))
+    return told
+
+
+def _nth(reports: list[_Report], k: int) -> _Report:
+    return reports[k] if k < len(reports) else (None, None)
+
+
+def began(story: GoalStory) -> float:
+    """The tick at which the robot accepted it, or else first said something of it; inf when it never did."""
+    if story.accepted is not None:
+        return story.accepted
+    return math.inf if story.end is None else story.end.tick

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simscen.core.events import EventKind
+from simscen.core.events import Event, EventKind
 from simscen.core.geometry import Pose2
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import at_most, held, missed, undecided
-from simscen.criteria.moments import stories
+from simscen.criteria.moments import GoalStory, began, stories
 from simscen.criteria.signals import truth
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveLength
@@ -25,7 +25,7 @@ class NoFalseSuccess(Spec, Criterion):
     """The robot never says that it is at a goal when it is not; that it fails honestly is fine.
 
     What is measured: the true distance to the goal whenever the robot reports it reached; and whether navigation was
-        reported SUCCEEDED with every goal reached.
+        reported SUCCEEDED with every goal reached that was not preempted by another.
     When it fails: a goal was reported reached from further away than `tolerance`, or SUCCEEDED with a goal missing.
     Why this: a failed delivery is retried; one that was reported done is not even noticed. Arena's result says
         GOAL_REACHED without ever checking the goal.
@@ -41,21 +41,40 @@ class NoFalseSuccess(Spec, Criterion):
         """One finding for each goal reported reached, one for the end of navigation."""
         told = stories(trace, case)
         ended = trace.of_kind(EventKind.NAVIGATION_ENDED)
-        if not ended and all(story.end is None for story in told):
+        strange = [event for event in trace.of_kind(EventKind.GOAL_REACHED) if event.name not in _names(case)]
+        if not ended and not strange and all(story.end is None for story in told):
             return [undecided("no_false_success", "the robot reported nothing that could be false")]
-        findings = []
-        poses = truth(trace)
-        for story in told:
-            if story.reached is not None:
-                pose = Pose2(*poses.at(np.array([story.reached]))[0].tolist())
-                away = pose.distance(story.goal.pose)
-                what, at = f"goal {story.goal.name}", (trace, story.reached)
-                context = "from the goal when the robot said it was there"
-                findings.append(at_most(what, away, self.tolerance, "m", at=at, context=context))
-        missing = [story.goal.name for story in told if story.reached is None]
-        if ended and ended[-1].name == "SUCCEEDED" and missing:
-            what, expected = "result", "SUCCEEDED only with every goal reached"
-            findings.append(
-                missed(what, "SUCCEEDED", expected, (trace, ended[-1].tick), [f"not reached: {', '.join(missing)}"])
-            )
+        findings = [self._at_goal(trace, story) for story in told if story.reached is not None]
+        findings += [
+            undecided(f"goal {event.name}", "reported reached, but the scenario has no such goal") for event in strange
+        ]
+        findings += [finding for k in range(len(ended)) if (finding := _success(trace, case, ended, k)) is not None]
         return findings or [held("no_false_success", "no success was claimed", "no false success")]
+
+    def _at_goal(self, trace: Trace, story: GoalStory) -> Finding:
+        assert story.reached is not None
+        pose = Pose2(*truth(trace).at(np.array([story.reached]))[0].tolist())
+        what, at = f"goal {story.goal.name}", (trace, story.reached)
+        context = "from the goal when the robot said it was there"
+        return at_most(what, pose.distance(story.goal.pose), self.tolerance, "m", at=at, context=context)
+
+
+def _names(case: Case) -> set[str]:
+    return {goal.name for goal in case.every_goal}
+
+
+def _success(trace: Trace, case: Case, ended: tuple[Event, ...], k: int) -> Finding | None:
+    """What is wrong with the k-th end of navigation: it answers for the goals since the one before it.
+
+    The first answers for all goals of the scenario, which its task held, accepted by then or not.
+    """
+    end, since = ended[k], ended[k - 1].tick if k else -1
+    if end.name != "SUCCEEDED":
+        return None
+    own = [s for s in stories(trace, case) if since < began(s) <= end.tick or (k == 0 and s.goal in case.goals)]
+    late = [s for s in own if not s.preempted and (s.reached is None or s.reached > end.tick)]
+    if not late:
+        return None
+    names = ", ".join(story.goal.name for story in late)
+    expected = "SUCCEEDED only with every goal reached"
+    return missed("result", "SUCCEEDED", expected, (trace, end.tick), [f"not reached: {names}"])

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pydantic import model_validator
 
+from simscen.core.events import EventKind
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import at_most, undecided
@@ -56,7 +57,7 @@ class PathLength(Spec, Criterion):
     def _ratio(self, trace: Trace, case: Case, way: Drive) -> Finding:
         assert self.max_ratio is not None
         what = "path_length ratio"
-        shortest, because = shortest_way(case)
+        shortest, because = shortest_way(trace, case)
         if because:
             return undecided(what, because, f"≤ {self.max_ratio:g}")
         limit = self.max_ratio * shortest
@@ -68,12 +69,16 @@ class PathLength(Spec, Criterion):
         return _bound(trace, way, what, limit, context)
 
 
-def shortest_way(case: Case) -> tuple[float, str]:
+def shortest_way(trace: Trace, case: Case) -> tuple[float, str]:
     """The length in metres of the shortest way through all goals; or nan, and why there is none to compare with."""
     names = [goal.name for goal in case.goals]
     twice = sorted({name for name in names if names.count(name) > 1})
     without = [name for name in names if not math.isfinite(case.shortest.get(name, math.nan))]
     length = sum(case.shortest.get(name, math.nan) for name in names)
+    sent = trace.of_kind(EventKind.GOAL_ACCEPTED)
+    on_the_way = sorted({event.name for event in sent} & {goal.name for goal in case.sent})
+    if on_the_way:
+        return math.nan, f"{', '.join(on_the_way)} was sent on the way, from where nobody could know before"
     if twice:
         return math.nan, f"several goals are called {', '.join(twice)}: their shortest ways cannot be told apart"
     if without:

@@ -21,7 +21,8 @@ class TimeToGoal(Spec, Criterion):
     """The robot was at its goal in time.
 
     What is measured: simulated time from the first goal's acceptance to the report that the last one is reached; with
-        `goal`, from that goal's acceptance to the report that it is reached.
+        `goal`, from that goal's acceptance to the report that it is reached. Goals that events send count too; those
+        that they preempt need not be reached.
     When it fails: it took longer, or the goal was never reached.
     Why this: a robot that dithers arrives, too. That it truly arrived is what goals_reached asks.
     Source: the time of the BARN challenge and of Nav2's own benchmarks (nav2#3239).
@@ -40,18 +41,25 @@ class TimeToGoal(Spec, Criterion):
         if self.goal is not None:
             named = [story for story in told if story.goal.name == self.goal]
             if not named:
-                return [undecided(f"goal {self.goal}", f"the scenario has no goal `{self.goal}`")]
+                known = self.goal in [goal.name for goal in case.every_goal]
+                because = "never sent" if known else f"the scenario has no goal `{self.goal}`"
+                return [undecided(f"goal {self.goal}", because)]
             return [self._timed(trace, f"goal {self.goal}", story.accepted, story) for story in named]
         if not told:
             return [undecided("time_to_goal", "the scenario has no goals")]
         start = next((story.accepted for story in told if story.accepted is not None), None)
-        unreached = [story for story in told if story.reached is None]
-        return [self._timed(trace, "time_to_goal", start, unreached[0] if unreached else told[-1])]
+        awaited = [story for story in told if not story.preempted]
+        if not awaited:
+            return [undecided("time_to_goal", "every goal was preempted")]
+        unreached = [story for story in awaited if story.reached is None]
+        return [self._timed(trace, "time_to_goal", start, unreached[0] if unreached else awaited[-1])]
 
     def _timed(self, trace: Trace, what: str, start: int | None, story: GoalStory) -> Finding:
         begun = start or 0
         if story.reached is not None:
             return at_most(what, trace.seconds(story.reached - begun), self.max, "s", at=(trace, story.reached))
+        if story.preempted:
+            return undecided(what, story.fate)
         expected = f"to be there within {self.max:.2f} s"
         so_far = trace.seconds(trace.end - begun)
         if story.end is None and so_far > self.max:

@@ -42,10 +42,10 @@ def measure(trace: Trace, case: Case) -> Metrics:
 
 def _navigation(trace: Trace, case: Case) -> Metrics:
     length = drive(trace).length
-    shortest, unknown = shortest_way(case)
+    shortest, unknown = shortest_way(trace, case)
     known = not unknown
     success = _success(trace, case)
-    ends = [story.reached for story in stories(trace, case)]
+    ends = [story.reached for story in stories(trace, case) if not story.preempted]
     starts = trace.of_kind(EventKind.GOAL_ACCEPTED)
     arrived = starts and ends and ends[-1] is not None
     return {

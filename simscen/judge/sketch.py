@@ -107,11 +107,15 @@ def _lifted(points: Sequence[Sequence[float]]) -> Array:
 
 
 def sketch_case(words: Mapping[str, Any]) -> Case:
-    """A case: start [x, y, yaw] · goals [{name, pose: [x, y, yaw], xy_tolerance, …}] · shortest {goal: metres} · …"""
-    goals = tuple(Goal(**{**goal, "pose": _pose(goal["pose"])}) for goal in words.get("goals", []))
+    """A case: start [x, y, yaw] · goals [{name, pose: [x, y, yaw], xy_tolerance, …}] · sent ·
+    shortest {goal: metres} · …"""
+    goals, sent = (
+        tuple(Goal(**{**goal, "pose": _pose(goal["pose"])}) for goal in words.get(key, [])) for key in ("goals", "sent")
+    )
     return Case(
         start=_pose(words.get("start", [0, 0])),
         goals=goals,
+        sent=sent,
         shortest=words.get("shortest", {}),
         regions={name: tuple((x, y) for x, y in corners) for name, corners in words.get("regions", {}).items()},
         footprint=tuple((x, y) for x, y in words.get("footprint", [])),

@@ -7,7 +7,7 @@ from simscen.core.time import Clock
 from simscen.core.world import World
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.messages import quoted, suggestion
-from simscen.loading.names import ARTICLES, event_names, known_names
+from simscen.loading.names import ARTICLES, event_names, known_names, own_goal_names
 from simscen.loading.references import references
 from simscen.loading.tree import Fields, Key, key_place, real_keys, value_place
 from simscen.model.robot import RobotSpec
@@ -71,10 +71,24 @@ def _twice_named(loaded: LoadedScenario) -> Iterator[Problem]:
                 first = loaded.place_of(key, names.index(name), "name")
                 message = f"{key[:-1]} {quoted(name)} is there already (first at {first.line}:{first.col})"
                 yield loaded.problem((key, index, "name"), "SC033", message, "give it another name")
+    yield from _goals_sent_twice(loaded)
     for index, fault in enumerate(loaded.spec.faults):
         if fault.name is not None and fault.name in event_names(loaded):
             message = f"an event is called {quoted(fault.name)}, too: criteria could not tell them apart"
             yield loaded.problem(("faults", index, "name"), "SC033", message, "give one of them another name")
+
+
+def _goals_sent_twice(loaded: LoadedScenario) -> Iterator[Problem]:
+    taken = own_goal_names(loaded)
+    for index, event in enumerate(loaded.spec.events):
+        for number, action in enumerate(event.actions):
+            name = getattr(action.chosen, "name", "") if action.kind == "new_goal" else ""
+            if name in taken:
+                several = (number,) if isinstance(event.do, list) else ()
+                keys = ("events", index, "do", *several, "new_goal", "name")
+                message = f"a goal is called {quoted(name)} already: criteria could not tell them apart"
+                yield loaded.problem(keys, "SC033", message, "give it another name")
+            taken += [name] if name else []
 
 
 def _uneven_rates(loaded: LoadedScenario) -> Iterator[Problem]:

@@ -14,7 +14,7 @@ class EventTopics:
 
     def __init__(self, out: Publisher, time: SimTime, case: Case) -> None:
         self._out, self._time = out, time
-        self._goals = {goal.name: goal.pose for goal in case.goals}
+        self._goals = {goal.name: goal.pose for goal in case.every_goal}
         self._goal = PoseStampedPacker(frames.MAP)
 
     def write(self, now: int, event: Event) -> None:

@@ -61,7 +61,7 @@ def assemble(prepared: Prepared, seed: int) -> Rig:
     stack = build_stack(prepared.stack, surroundings, streams, clock, stop_on_failure=spec.on_goal_failure == "stop")
     stack.start(prepared.estimate, prepared.case.goals)
 
-    stage = LiveStage(world, simulation, stack, clock)
+    stage = LiveStage(world, simulation, stack, clock, prepared.case.sent)
     wheels = Wheels(getattr(prepared.robot.drive, "wheel_separation", 0.0))
     faults = FaultRig(spec.faults, streams, wheels, stage.note)
     for body in world.bodies:

@@ -17,7 +17,8 @@ from simscen.core.world import World
 from simscen.loading.consistency import inconsistencies
 from simscen.loading.loaded import LoadedScenario, LoadedWorld
 from simscen.model.scenario import ScenarioSpec
-from simscen.run.goals import goals_of, pose_of
+from simscen.run.expectation import expects_bad_start, expects_failure
+from simscen.run.goals import goals_of, pose_of, sent_goals
 from simscen.run.robotsize import inscribed_radius_of
 from simscen.run.worldsource import load_map, load_robot, load_world
 from simscen.worlds.contain import first_blocking
@@ -68,18 +69,13 @@ def _too_large(loaded: LoadedScenario, world: World) -> Iterator[Problem]:
 
 
 def _poses(spec: ScenarioSpec, world: World) -> Iterator[tuple[tuple[str | int, ...], str, Pose2, str]]:
-    yield ("robot", "pose"), "the robot's start", pose_of(spec.robot.pose, world), "move it to free space"
-    if expects_unreachable_goal(spec):
-        return
+    if not expects_bad_start(spec):
+        yield ("robot", "pose"), "the robot's start", pose_of(spec.robot.pose, world), "move it to free space"
+    own = {("goals", index): goal for index, goal in enumerate(goals_of(spec, world))}
     hint = "move it, or expect the failure with `result: {status: FAILED, error_code: GOAL_OCCUPIED}`"
-    for index, goal in enumerate(goals_of(spec, world)):
-        yield ("goals", index, "pose"), f"goal `{goal.name}`", goal.pose, hint
-
-
-def expects_unreachable_goal(spec: ScenarioSpec) -> bool:
-    """Whether the scenario passes when the robot refuses its goal."""
-    results = [entry.result for entry in spec.pass_ if entry.result is not None]
-    return any(getattr(result, "status", None) == "FAILED" for result in results)
+    for keys, goal in [*own.items(), *sent_goals(spec).items()]:
+        if not expects_failure(spec, goal.name):
+            yield (*keys, "pose"), f"goal `{goal.name}`", goal.pose, hint
 
 
 def _ground(loaded: LoadedScenario, world: World) -> "_Ground":

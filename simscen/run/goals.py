@@ -1,5 +1,6 @@
 """Where a scenario starts and what it is sent to, as its world places them."""
 
+from simscen.actions.goals import NewGoal
 from simscen.core.geometry import Pose2
 from simscen.core.navigation import Goal
 from simscen.core.world import World
@@ -16,6 +17,25 @@ def pose_of(place: str | PoseSpec, world: World) -> Pose2:
 def goals_of(spec: ScenarioSpec, world: World) -> tuple[Goal, ...]:
     """The goals in order, named, with their tolerances."""
     return tuple(_goal(number, entry, spec.stack, world) for number, entry in enumerate(spec.goals, start=1))
+
+
+def sent_goals(spec: ScenarioSpec) -> dict[tuple[str | int, ...], Goal]:
+    """The goals that events send, by where each is written, in the order of the file."""
+    checker = spec.stack.goal_checker
+    found: dict[tuple[str | int, ...], Goal] = {}
+    for index, event in enumerate(spec.events):
+        for number, action in enumerate(event.actions):
+            if isinstance(sent := action.chosen, NewGoal):
+                several = (number,) if isinstance(event.do, list) else ()
+                keys = ("events", index, "do", *several, "new_goal")
+                found[keys] = Goal(
+                    name=sent.name,
+                    pose=sent.pose.pose,
+                    xy_tolerance=sent.xy_tolerance or checker.xy_goal_tolerance,
+                    yaw_tolerance=sent.yaw_tolerance or checker.yaw_goal_tolerance,
+                    timeout=sent.timeout,
+                )
+    return found
 
 
 def _goal(number: int, entry: GoalEntry, stack: StackSpec, world: World) -> Goal:

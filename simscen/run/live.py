@@ -1,5 +1,6 @@
 """The running world as triggers see it and as actions change it."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 from simscen.core.belief import Belief
@@ -18,8 +19,10 @@ from simscen.stack.protocols import Stack
 class LiveStage:
     """Implements core.stage.Stage on the simulation and the stack, and keeps the events of the run."""
 
-    def __init__(self, world: World, simulation: Simulation, stack: Stack, clock: Clock) -> None:
+    def __init__(self, world: World, simulation: Simulation, stack: Stack, clock: Clock, goals: Iterable[Goal]) -> None:
+        """`goals` are those that events may send."""
         self._world, self._simulation, self._stack, self.clock = world, simulation, stack, clock
+        self._goals = {goal.name: goal for goal in goals}
         self._pose, self._twist = simulation.base_pose().plane, simulation.base_twist()
         self._belief: Belief | None = None
         self._travelled = 0.0
@@ -132,9 +135,9 @@ class LiveStage:
         self._simulation.push(impulse)
         self.note(Event(0, EventKind.ROBOT_PUSHED, "", {"impulse": list(impulse)}))
 
-    def send_goal(self, goal: Goal) -> None:
+    def send_goal(self, name: str) -> None:
         """Preempt with a new goal."""
-        self._stack.preempt(self.tick, goal)
+        self._stack.preempt(self.tick, self._goals[name])
 
     def cancel_goal(self) -> None:
         """Cancel what the robot is doing."""

@@ -18,7 +18,7 @@ from simscen.loading.loaded import LoadedScenario
 from simscen.model.robot import RobotSpec
 from simscen.model.scenario import ScenarioSpec, estimate_of
 from simscen.model.stack import Amcl, OdometryOnly, StackSpec
-from simscen.run.goals import goals_of, pose_of
+from simscen.run.goals import goals_of, pose_of, sent_goals
 from simscen.run.robotsize import inscribed_radius
 from simscen.run.worldsource import load_map, load_robot, load_world
 from simscen.sim.robot_body import RobotBody
@@ -68,6 +68,7 @@ def prepare(loaded: LoadedScenario, world_of: BuildWorld = build_world) -> Prepa
     case = Case(
         start=start,
         goals=goals,
+        sent=tuple(sent_goals(spec).values()),
         regions=world.regions,
         footprint=body.footprint,
         inscribed_radius=inscribed_radius(body.radius, body.footprint),

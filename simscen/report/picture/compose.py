@@ -53,7 +53,7 @@ def _map(scene: Scene) -> Image.Image:
 
 def _shown(scene: Scene) -> Array:
     """Points that must be on the picture. Where things are parked far away until they are needed is not."""
-    goals = np.array([(goal.pose.x, goal.pose.y) for goal in scene.case.goals]).reshape(-1, 2)
+    goals = np.array([(goal.pose.x, goal.pose.y) for goal in scene.case.every_goal]).reshape(-1, 2)
     return np.vstack((goals, scene.trace.truth.values[:, :2]))
 
 

@@ -24,7 +24,7 @@ _BANDS = 48
 
 def draw_places(canvas: Canvas, scene: Scene) -> None:
     """Named places that are no goals: a small diamond and the name."""
-    taken = {(round(goal.pose.x, 3), round(goal.pose.y, 3)) for goal in scene.case.goals}
+    taken = {(round(goal.pose.x, 3), round(goal.pose.y, 3)) for goal in scene.case.every_goal}
     for name, pose in sorted(scene.places.items()):
         if (round(pose.x, 3), round(pose.y, 3)) in taken or not _visible(canvas, pose):
             continue
@@ -89,9 +89,9 @@ def draw_truth(canvas: Canvas, scene: Scene) -> None:
 def draw_goals(canvas: Canvas, scene: Scene) -> None:
     """Each goal: its tolerance as a ring, its heading, its name."""
     names: dict[tuple[float, float], list[str]] = {}
-    for goal in scene.case.goals:
+    for goal in scene.case.every_goal:
         names.setdefault((goal.pose.x, goal.pose.y), []).append(goal.name)
-    for goal in scene.case.goals:
+    for goal in scene.case.every_goal:
         x, y, yaw = goal.pose
         reach = max(goal.xy_tolerance * canvas.scale, 5.0)
         canvas.disc(x, y, reach, (*palette.GOAL, 46), palette.GOAL, 1.8)
