@@ -1,0 +1,55 @@
+"""Whole runs whose verdict hangs on what reaches the judge: goals that events send, how far clearance is searched."""
+
+from pathlib import Path
+
+import pytest
+
+from simscen.core.verdict import Status
+from simscen.loading.scenario import load_scenario
+from simscen.run.prepare import prepare
+from simscen.run.simulate import simulate
+
+SCENARIO = """
+simscen: 1
+world: {{simscen: 1, walls: [{{points: [[-6, -6], [6, -6], [6, 6], [-6, 6], [-6, -6]]}}]}}
+robot: {{pose: {{x: 0, y: 0}}}}
+goals: [{{name: far, pose: {{x: 1.5, y: 0}}, timeout: 20 s}}]
+stack: {{localizer: {{type: ground_truth}}, goal_checker: {{xy_goal_tolerance: 0.3 m}}}}
+time_limit: 30
+{more}
+"""
+
+
+@pytest.fixture
+def verdicts(tmp_path: Path):
+    def run(more: str):
+        (tmp_path / "a.scenario.yaml").write_text(SCENARIO.format(more=more))
+        done = simulate(prepare(load_scenario(tmp_path / "a.scenario.yaml", tmp_path)))
+        return {verdict.id: verdict for verdict in done.result.verdicts}, done
+
+    return run
+
+
+def test_a_goal_that_an_event_sends_is_judged_with_the_tolerances_of_the_stack(verdicts):
+    found, done = verdicts(
+        "events: [{name: redirect, when: {time: 1 s}, do: {new_goal: {name: detour, pose: {x: 0, y: 1}}}}]\n"
+        "pass: [{goals_reached: {}}, {id: named, goals_reached: {goals: [detour]}}, {time_to_goal: {max: 25 s}}]"
+    )
+    assert [finding.measured for finding in found["goals_reached"].findings][:1] == ["preempted by detour"]
+    assert [verdict.status for verdict in found.values()] == [Status.PASS] * 3
+    near = found["named"].findings[0]
+    assert near.value + near.margin == pytest.approx(0.3)
+    assert done.result.metrics["success"] == 1.0
+
+
+def test_clearance_is_searched_as_far_as_a_criterion_asks(verdicts):
+    found, done = verdicts("pass: [{clearance: {min: 3 m}}]")
+    assert found["clearance"].status is Status.PASS
+    assert done.trace.clearance.values.max() == 3.5
+    assert done.result.metrics["clearance_min"] == 2.0
+
+
+def test_a_wall_beyond_the_usual_search_is_near_enough_to_fail_a_far_bound(verdicts):
+    found, _ = verdicts("pass: [{clearance: {min: 5 m}}]")
+    assert found["clearance"].status is Status.FAIL
+    assert found["clearance"].findings[0].value == pytest.approx(6 - 1.5 - 0.2, abs=0.4)
