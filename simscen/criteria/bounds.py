@@ -16,6 +16,10 @@ class BrokenTrace(ValueError):
     """A signal that has to be a number is not; nothing can be judged from it."""
 
 
+class NotRecorded(ValueError):
+    """What a criterion has to look at is not in the trace: neither a pass nor a failure."""
+
+
 def at_most(
     what: str,
     value: float,

@@ -11,7 +11,7 @@ from pydantic import Field
 from simscen.core.events import Event, EventKind
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
-from simscen.criteria.bounds import BrokenTrace, at_most, counted
+from simscen.criteria.bounds import BrokenTrace, at_most, counted, undecided
 from simscen.criteria.signals import speed, turn_rate
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Impulse
@@ -54,6 +54,8 @@ class Collisions(Spec, Criterion):
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """The count, then the hardest contact."""
+        if not len(trace.truth) and not trace.of_kind(EventKind.COLLISION_STARTED):
+            return [undecided("collisions", "neither the robot's way nor what it touched was recorded")]
         hits = [event for event in trace.of_kind(EventKind.COLLISION_STARTED) if self.object in (None, event.name)]
         if self.caused_by_robot:
             hits = [event for event in hits if _moving(trace, event, case)]

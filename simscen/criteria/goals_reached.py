@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from pydantic import Field
 
-from simscen.core.geometry import Pose2, wrap
+from simscen.core.geometry import wrap
 from simscen.core.verdict import Finding, Status
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import at_most, held, missed, undecided
 from simscen.criteria.moments import GoalStory, ending, finished, stories
-from simscen.criteria.signals import finite, truth
+from simscen.criteria.signals import finite, true_pose
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveAngle, PositiveDuration, PositiveLength
 from simscen.spec.references import GoalName
@@ -85,7 +85,7 @@ class GoalsReached(Spec, Criterion):
     def _reached(self, trace: Trace, story: GoalStory) -> list[Finding]:
         goal, tick = story.goal, story.reached
         assert tick is not None
-        what, pose = f"goal {goal.name}", _true_pose(trace, tick)
+        what, pose = f"goal {goal.name}", true_pose(trace, tick)
         believed = _believed(trace, story)
         findings = [
             at_most(
@@ -118,14 +118,11 @@ def _not_reached(trace: Trace, story: GoalStory) -> Finding:
     if story.end is None and not finished(trace):
         return undecided(what, f"the log stops at t = {trace.seconds(trace.end):.2f} s, {story.fate}", "reached")
     tick = trace.end if story.end is None else story.end.tick
-    away = _true_pose(trace, tick).distance(story.goal.pose)
     why = f"the run ended at t = {trace.seconds(trace.end):.2f} s: {ending(trace)}"
-    details = [f"{away:.2f} m from the goal then", *([why] if story.end is None else [])]
+    details = [why] if story.end is None else []
+    if len(trace.truth):
+        details.insert(0, f"{true_pose(trace, tick).distance(story.goal.pose):.2f} m from the goal then")
     return missed(what, story.fate, "reached", (trace, tick), details)
-
-
-def _true_pose(trace: Trace, tick: int) -> Pose2:
-    return Pose2(*truth(trace).at(np.array([tick]))[0].tolist())
 
 
 def _believed(trace: Trace, story: GoalStory) -> list[str]:

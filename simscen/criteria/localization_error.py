@@ -12,6 +12,7 @@ from simscen.core.samples import Samples
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import at_most, undecided
+from simscen.criteria.moments import finished
 from simscen.criteria.signals import pose_error
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Duration, PositiveAngle, PositiveLength
@@ -69,13 +70,22 @@ class LocalizationError(Spec, Criterion):
             findings.append(_worst(trace, error, off, "localization_error", self.max, "m"))
         if self.rmse is not None:
             rmse = float(np.sqrt(np.mean(off**2)))
-            findings.append(at_most("localization_error rmse", rmse, self.rmse, "m", context="(not aligned)"))
+            bound = at_most("localization_error rmse", rmse, self.rmse, "m", context="(not aligned)")
+            findings.append(_of_a_whole_run(trace, bound))
         if self.final is not None:
             at = (trace, int(error.ticks[-1]))
-            findings.append(at_most("localization_error final", float(off[-1]), self.final, "m", at=at))
+            bound = at_most("localization_error final", float(off[-1]), self.final, "m", at=at)
+            findings.append(_of_a_whole_run(trace, bound))
         if self.max_yaw is not None:
             findings.append(_worst(trace, error, turned, "localization_error yaw", self.max_yaw, "rad"))
         return findings
+
+
+def _of_a_whole_run(trace: Trace, finding: Finding) -> Finding:
+    """A log that was cut off might have ended better than it was until then."""
+    if finished(trace):
+        return finding
+    return undecided(finding.what, f"{finding.measured} so far", finding.limit)
 
 
 def _worst(trace: Trace, error: Samples, values: Array, what: str, limit: float, unit: str) -> Finding:

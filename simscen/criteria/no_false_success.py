@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from simscen.core.events import Event, EventKind
-from simscen.core.geometry import Pose2
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import at_most, held, missed, undecided
 from simscen.criteria.moments import GoalStory, began, stories
-from simscen.criteria.signals import truth
+from simscen.criteria.signals import true_pose
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveLength
 
@@ -53,10 +50,11 @@ class NoFalseSuccess(Spec, Criterion):
 
     def _at_goal(self, trace: Trace, story: GoalStory) -> Finding:
         assert story.reached is not None
-        pose = Pose2(*truth(trace).at(np.array([story.reached]))[0].tolist())
         what, at = f"goal {story.goal.name}", (trace, story.reached)
         context = "from the goal when the robot said it was there"
-        return at_most(what, pose.distance(story.goal.pose), self.tolerance, "m", at=at, context=context)
+        return at_most(
+            what, true_pose(trace, story.reached).distance(story.goal.pose), self.tolerance, "m", at=at, context=context
+        )
 
 
 def _names(case: Case) -> set[str]:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simscen.core.events import EventKind
-from simscen.core.geometry import Array, wrap_array
+from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.core.samples import Samples, Ticks
-from simscen.criteria.bounds import BrokenTrace
+from simscen.criteria.bounds import BrokenTrace, NotRecorded
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -41,6 +41,14 @@ def finite(samples: Samples, name: str, trace: Trace) -> Samples:
 def truth(trace: Trace) -> Samples:
     """x, y, yaw of the robot in the world."""
     return finite(trace.truth, "the true pose", trace)
+
+
+def true_pose(trace: Trace, tick: int) -> Pose2:
+    """Where the robot really was at `tick`. Raises NotRecorded for a trace without the truth."""
+    poses = truth(trace)
+    if not len(poses):
+        raise NotRecorded("the robot's true way was not recorded")
+    return Pose2(*poses.at(np.array([tick]))[0].tolist())
 
 
 def clearance(trace: Trace) -> Samples:

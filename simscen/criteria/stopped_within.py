@@ -9,7 +9,7 @@ import numpy as np
 
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
-from simscen.criteria.bounds import at_most, held, missed, undecided
+from simscen.criteria.bounds import NotRecorded, at_most, held, missed, undecided
 from simscen.criteria.moments import Span, ending, never_started, spans
 from simscen.criteria.signals import Flags, drive, first_lasting, speed, turn_rate
 from simscen.spec.base import Spec
@@ -55,6 +55,8 @@ class StoppedWithin(Spec, Criterion):
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """One finding each time it happened, and one more with `stay`."""
+        if not len(trace.velocity):
+            raise NotRecorded("the robot's true velocity was not recorded")
         happened = spans(trace, self.after)
         if not happened:
             because, detail = never_started(trace, self.after)

@@ -4,10 +4,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from simscen.core.case import Case
+from simscen.core.events import EventKind
 from simscen.core.result import Outcome
 from simscen.core.trace import Trace
 from simscen.core.verdict import Finding, Status, Verdict
 from simscen.criteria.base import Criterion
+from simscen.criteria.bounds import NotRecorded, undecided
 from simscen.criteria.criterion import AnyCriterion
 from simscen.criteria.moments import finished
 
@@ -15,8 +17,8 @@ from simscen.criteria.moments import finished
 def judge(criteria: Sequence[AnyCriterion], trace: Trace, case: Case) -> tuple[Verdict, ...]:
     """One verdict for each criterion, in order. An id that is given twice gets a number: speed, speed#2.
 
-    An exception inside a criterion is its verdict, an error that names it. On a log that was cut off nothing passes:
-    what came after might have failed.
+    An exception inside a criterion is its verdict, an error that names it; what it needs and was not recorded leaves it
+    inconclusive. On a log that was cut off nothing passes, for what came after might have failed, nor on an empty one.
     """
     seen: dict[str, int] = {}
     verdicts = []
@@ -45,15 +47,28 @@ def _findings(entry: AnyCriterion, trace: Trace, case: Case) -> tuple[Finding, .
     assert isinstance(criterion, Criterion)
     try:
         findings = criterion.judge(trace, case)
+    except NotRecorded as missing:
+        return (undecided(entry.kind, str(missing)),)
     except Exception as error:  # the boundary: one criterion must not silence the others
         return (Finding(Status.ERROR, entry.kind, f"{type(error).__name__}: {error}", "a judgement"),)
     if not findings:
         return (Finding(Status.ERROR, entry.kind, "it checked nothing", "a judgement"),)
-    return tuple(findings) if finished(trace) else tuple(_reserved(finding, trace) for finding in findings)
+    if not finished(trace):
+        return _reserved(findings, f"so far, but the log stops at t = {trace.seconds(trace.end):.2f} s")
+    return _reserved(findings, "in a log with nothing in it") if _empty(trace) else tuple(findings)
 
 
-def _reserved(finding: Finding, trace: Trace) -> Finding:
-    if finding.status is not Status.PASS:
-        return finding
-    because = f"{finding.measured} so far, but the log stops at t = {trace.seconds(trace.end):.2f} s"
-    return replace(finding, status=Status.INCONCLUSIVE, measured=because)
+def _reserved(findings: Sequence[Finding], because: str) -> tuple[Finding, ...]:
+    """The same without a pass."""
+    return tuple(
+        replace(finding, status=Status.INCONCLUSIVE, measured=f"{finding.measured} {because}")
+        if finding.status is Status.PASS
+        else finding
+        for finding in findings
+    )
+
+
+def _empty(trace: Trace) -> bool:
+    """Whether nothing was recorded but the end of the run."""
+    signals = (trace.truth, trace.belief, trace.odometry, trace.command)
+    return not any(map(len, signals)) and all(event.kind == EventKind.RUN_ENDED for event in trace.events)

@@ -78,13 +78,20 @@ def test_on_a_log_that_was_cut_off_nothing_passes(kind):
     assert verdict.status is not Status.PASS
 
 
+def nothing_in(seconds):
+    """A whole log, to its proper end, in which nothing was recorded."""
+    trace = sketch({"seconds": seconds, "truth": [[0, 0, 0]], "belief": None, "scans": []})
+    none = Samples(np.empty(0, dtype=np.int64), np.empty((0, 3)))
+    far = Samples(none.ticks, np.empty((0, 1)))
+    return replace(trace, truth=none, velocity=none, clearance=far, odometry=none, command=none)
+
+
 @pytest.mark.parametrize("kind", CHOICES)
-def test_an_empty_trace_is_never_a_pass_and_never_an_exception_that_escapes(kind):
-    trace = sketch({"seconds": 0, "truth": [[0, 0, 0]], "ended": None, "belief": None})
-    nothing = Samples(np.empty(0, dtype=np.int64), np.empty((0, 3)))
-    empty = replace(trace, truth=nothing, velocity=nothing, clearance=Samples(nothing.ticks, np.empty((0, 1))))
-    (verdict,) = judge([example(kind)], empty, sketch_case({}))
-    assert verdict.status is not Status.PASS
+@pytest.mark.parametrize("seconds", [0, 8])
+@pytest.mark.parametrize("case", [CASE, {}], ids=["with goals", "without goals"])
+def test_a_whole_log_with_nothing_in_it_is_never_a_pass_nor_a_crash(kind, seconds, case):
+    (verdict,) = judge([example(kind)], nothing_in(seconds), sketch_case(case))
+    assert verdict.status in (Status.FAIL, Status.INCONCLUSIVE), verdict
 
 
 @pytest.mark.parametrize("kind", ["path_length", "speed", "stopped_within", "localization_error", "goals_reached"])
