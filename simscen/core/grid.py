@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,9 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
+
+MOST_CELLS = 2**24
+"""What a large coarse map may be refined to; costs and distances of so many cells take some 200 MB."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +35,20 @@ class OccupancyGrid:
     def shape(self) -> tuple[int, int]:
         """(height, width) in cells."""
         return self.cells.shape[0], self.cells.shape[1]
+
+    def refined(self, finest: float) -> OccupancyGrid:
+        """The same map in whole parts of its cells, none larger than `finest` metres as long as there are not too many.
+
+        A cell as large as a robot is a poor place to plan to, and half of it a poor bound on where its wall begins.
+        """
+        rows, columns = self.shape
+        most = math.isqrt(MOST_CELLS // max(1, rows * columns))
+        parts = min(most, math.ceil(self.resolution / finest - 1e-6))
+        if parts <= 1:
+            return self
+        return OccupancyGrid(
+            self.cells.repeat(parts, axis=0).repeat(parts, axis=1), self.resolution / parts, self.origin
+        )
 
     def cell_of(self, points: Array) -> npt.NDArray[np.int64]:
         """Cells (n, 2) as (row, column) of map points (n, 2); may lie outside the grid."""

@@ -110,6 +110,7 @@ class Costmap(Ranged):
     """nav2_costmap_2d: static, obstacle and inflation layers."""
 
     resolution: PositiveLength = 0.05
+    """Edge of the largest cell: those of a coarser map are split, those of a finer one stay as they are."""
     inflation_radius: NonNegativeLength = 0.70
     cost_scaling_factor: Annotated[float, Field(gt=0, le=100)] = 3.0
     update_frequency: Frequency = 5.0

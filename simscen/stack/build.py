@@ -1,6 +1,7 @@
 """From a specification to a stack."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from typing_extensions import assert_never
@@ -38,11 +39,13 @@ def build_stack(
     *,
     stop_on_failure: bool = True,
 ) -> Stack:
-    """The stack of a specification, ready to `start`.
+    """The stack of a specification, ready to `start`. It works on its map in cells no larger than the costmap's.
 
     Its random streams are "localizer", "controller" and "planner#1", "planner#2", … for the plans of a run. Raises
     ValueError when a rate does not divide the clock.
     """
+    if surroundings.map is not None:
+        surroundings = replace(surroundings, map=surroundings.map.refined(spec.costmap.resolution))
     robot = surroundings.robot
     period = clock.period(spec.controller_frequency)
     seconds = clock.seconds(period)
