@@ -3,14 +3,17 @@
 import math
 from dataclasses import dataclass, replace
 
+import numpy as np
 import pybullet
 
 from simscen.core.geometry import Pose3, wrap
-from simscen.core.shapes import Body, MotionPath
+from simscen.core.shapes import Body, Mesh, MotionPath
 from simscen.sim import engine
+from simscen.sim.astray import astray
+from simscen.sim.enclosure import winds_around
 from simscen.sim.inertia import GRAVITY, of_solids
 from simscen.sim.motion_path import pose_at, top_speed
-from simscen.sim.outline import footprint
+from simscen.sim.outline import reach
 
 FRICTION = 0.6
 """Of pushable things on the ground: about that of wood or cardboard on concrete."""
@@ -23,7 +26,8 @@ JUMP = 50.0
 class Actor:
     """A body in the engine: `shown` is where the engine has it, `path` began at tick `since`.
 
-    `speed` is the fastest that any part of it ever moves along its path, in m/s.
+    `speed` is the fastest that any part of it ever moves along its path, in m/s, `size` how far from its origin it
+    extends, in metres. Where the engine has it as a surface without an inside, `surface` is that, in the body's frame.
     """
 
     id: int
@@ -33,6 +37,8 @@ class Actor:
     path: MotionPath | None
     since: int
     speed: float
+    size: float
+    surface: Mesh | None
 
     @property
     def pushable(self) -> bool:
@@ -71,8 +77,12 @@ class Actors:
             frame,
             FRICTION,
         )
-        speed = 0.0 if body.path is None else top_speed(body.path, _reach(body))
-        self._actors[body.name] = Actor(number, body, frame[1].inverse(), body.pose, body.path, tick, speed)
+        radius, height = reach(body.solids)
+        speed = 0.0 if body.path is None else top_speed(body.path, radius)
+        surface = engine.fused(body.solids, self._triangulate) if engine.hollow(body.solids, pushable) else None
+        centre = frame[1].inverse()
+        self._actors[body.name] = Actor(number, body, centre, body.pose, body.path, tick, speed,
+                                         math.hypot(radius, height), surface)  # fmt: skip
         self._sort()
 
     def remove(self, name: str) -> None:
@@ -143,6 +153,24 @@ class Actors:
         position, turn = pybullet.getBasePositionAndOrientation(actor.id, physicsClientId=self._client)
         return Pose3(*position, *turn).compose(actor.centre_from_base)
 
+    def around(self, place: Vector, tick: int) -> str | None:
+        """The first thing that a place is inside of, of those that the engine knows as a surface only."""
+        for name, actor in self._actors.items():
+            if actor.surface is not None:
+                x, y, z = self._pose(actor, tick).inverse().apply(np.array(place)).tolist()
+                if winds_around(actor.surface.vertices[actor.surface.faces], (x, y, z)):
+                    return name
+        return None
+
+    def astray(self) -> str | None:
+        """What has become of the first thing that the engine has lost, or None."""
+        for name, actor in self._actors.items():
+            if actor.pushable:
+                place, turn = pybullet.getBasePositionAndOrientation(actor.id, physicsClientId=self._client)
+                if trouble := astray(f'object "{name}"', *place, *turn):
+                    return trouble
+        return None
+
     def ids(self) -> dict[int, str | None]:
         """Names by the engine's numbers."""
         return {actor.id: name for name, actor in self._actors.items()}
@@ -156,9 +184,4 @@ class Actors:
             return actor.speed
         linear, angular = pybullet.getBaseVelocity(actor.id, physicsClientId=self._client)
         # What it may gain by falling for 0.1 s.
-        return math.hypot(*linear) + math.hypot(*angular) + 0.1 * GRAVITY
-
-
-def _reach(body: Body) -> float:
-    """How far in metres it extends from its own origin, seen from above."""
-    return max(math.hypot(x, y) for x, y in footprint(body.solids))
+        return math.hypot(*linear) + math.hypot(*angular) * actor.size + 0.1 * GRAVITY

@@ -1,4 +1,4 @@
-"""How near the robot's hull is to anything, and how long it therefore cannot touch anything."""
+"""How near the robot is to anything, and how long it therefore cannot touch anything."""
 
 import math
 
@@ -7,6 +7,8 @@ import pybullet
 from simscen.core.shapes import TriangleMesh
 from simscen.sim.actors import Actors
 from simscen.sim.drives import Base
+from simscen.sim.outline import extremes
+from simscen.sim.outline import reach as reach_of
 from simscen.sim.proximity import Proximity
 from simscen.sim.robot_body import RobotBody
 
@@ -38,16 +40,24 @@ class Clearance:
     ) -> None:
         """`reach` is how far is searched, in metres."""
         self._client, self._rate, self._base, self._actors = client, tick_rate, base, actors
-        self._limits, self._radius = robot.limits, robot.circumscribed_radius
+        self._limits, (self._radius, self._height) = robot.limits, reach_of(robot.solid)
         self._proximity = Proximity(static, robot, reach)
         self._reach = reach
         self._touched: dict[tuple[int, int, int], str] = {}
+        first = robot.hull[0]
+        self._core = first.pose.apply(extremes(first.shape).mean(axis=0))
+        # A closed concave surface around the start is a building, not an obstacle: nobody may start inside of one.
+        self._buildings = [k for k in self._proximity.around(self._place()) if not self._proximity.convex(k)]
         self.forget()
 
     def forget(self) -> None:
         """Something was put into or taken out of the world, or set down elsewhere: measure anew."""
         self._distance = 0.0
         self._measured_at, self.no_contact_before = -1, 0
+        self.enclosed_by: str | None = None
+        """The solid that the robot is wholly inside of, where it touches no surface."""
+        self.unsure = True
+        """Whether the robot may be inside something: nothing gets there but by being set down, or by appearing."""
 
     def measure(self, tick: int) -> float:
         """The clearance at `tick`, which is now, in metres; the reach where nothing is nearer."""
@@ -56,6 +66,11 @@ class Clearance:
         self._actors.show(tick)
         self._distance = self._search()
         self._measured_at = tick
+        if self.unsure:
+            self.enclosed_by = self._enclosing(tick)
+            self.unsure = self.enclosed_by is not None
+        if self.enclosed_by is not None:
+            self._distance = -abs(self._distance)
         free = min(HORIZON, max(0.0, self._distance - TOLERANCE) / self._fastest())
         self.no_contact_before = tick + math.floor(free * self._rate)
         return self._distance
@@ -68,12 +83,23 @@ class Clearance:
                 nearest = min((point[8] for point in points), default=nearest)
         return nearest
 
+    def _place(self) -> Vector:
+        """A place inside the hull, in the world."""
+        x, y, z = self._base.pose().apply(self._core).tolist()
+        return x, y, z
+
+    def _enclosing(self, tick: int) -> str | None:
+        place = self._place()
+        around = [self._proximity.name(k) for k in self._proximity.around(place) if k not in self._buildings]
+        return next(iter(around), None) or self._actors.around(place, tick)
+
     def _fastest(self) -> float:
-        """The greatest speed in m/s at which the hull and anything else can approach each other for a while."""
+        """The greatest speed in m/s at which the robot and anything else can approach each other for a while."""
         limits, (linear, angular) = self._limits, self._base.velocity()
         forward = max(limits.linear, limits.reverse or 0.0, limits.lateral or 0.0, math.hypot(*linear))
         turning = max(limits.angular, math.hypot(*angular)) * self._radius
-        return 1.25 * (forward + turning) + self._actors.top_speed() + 0.1
+        tipping = math.hypot(*angular[:2]) * self._height
+        return 1.25 * (forward + turning + tipping) + self._actors.top_speed() + 0.1
 
     def owner(self, place: Vector) -> str:
         """The static solid that is touched at a place; remembered by the centimetre, since contacts last."""

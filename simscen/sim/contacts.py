@@ -17,6 +17,9 @@ STANDING = 0.02
 What never moves is touched because the robot moves, in whatever direction: it may graze.
 """
 
+NOBODY = -1
+"""No number of the engine's."""
+
 Vector = tuple[float, float, float]
 Owner = Callable[[Vector], str]
 
@@ -61,6 +64,11 @@ class Contacts:
         self._events: list[Event] = []
 
     @property
+    def last(self) -> int:
+        """The tick of the last touch; -1 before the first, or once its collision is over."""
+        return max((seen.last for seen in self._ongoing.values()), default=-1)
+
+    @property
     def touching(self) -> bool:
         """Whether anything was touched lately."""
         return bool(self._ongoing)
@@ -100,6 +108,11 @@ def touches(client: int, robot: int, names: Mapping[int, str | None], owner: Own
         impulse = force * seconds + (known.impulse if known else 0.0)
         found[name] = Touch(name, other, place, normal, impulse, names[other] is None)
     return [found[name] for name in sorted(found)]
+
+
+def inside(name: str, place: Vector) -> Touch:
+    """The robot is wholly inside something, at a place of it: a touch from below, so that nobody moved towards it."""
+    return Touch(name, NOBODY, place, (0.0, 0.0, 1.0), 0.0, fixed=True)
 
 
 def _started(tick: int, touch: Touch, before: Motion) -> Event:

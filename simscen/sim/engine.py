@@ -3,9 +3,10 @@
 from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
+import numpy.typing as npt
 import pybullet
 
-from simscen.core.geometry import Pose3
+from simscen.core.geometry import Array, Pose3
 from simscen.core.shapes import Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere, TriangleMesh
 from simscen.sim.camera import visible
 from simscen.sim.inertia import GRAVITY
@@ -16,6 +17,11 @@ FACES_AT_ONCE = 40_000
 FLOOR = 0.005
 """Faces that lie wholly below this height in m are left to the ground plane, on which wheels roll smoothly."""
 
+CONVEX_FACES = 400
+"""A mesh of more faces is taken as concave without a look."""
+FLAT = 1e-6
+"""m by which corners may stand out of a face of a convex mesh."""
+
 GROUND, HULL, WHEEL = 64, 32, 16
 """Collision groups of the ground and of a robot's parts; everything else is in Bullet's own 1 and 2."""
 EVERYTHING = -1
@@ -25,6 +31,7 @@ PRIMITIVES = (Box, Cylinder, Sphere, Capsule)
 
 Triangulate = Callable[[Shape], Mesh]
 Frame = tuple[tuple[float, float, float], Pose3]
+Faces = npt.NDArray[np.int32]
 
 
 def connect(tick_rate: int, solver_iterations: int) -> int:
@@ -76,14 +83,37 @@ def touch(client: int, body: int, link: int, group: int, others: int) -> None:
 
 def static_mesh(client: int, mesh: TriangleMesh) -> list[int]:
     """What never moves, as few bodies: concave meshes without the faces that lie on the ground."""
-    faces = mesh.faces[(mesh.vertices[mesh.faces, 2] > FLOOR).any(axis=1)]
+    faces = above_floor(mesh.vertices, mesh.faces)
     chunks = [faces[k : k + FACES_AT_ONCE] for k in range(0, len(faces), FACES_AT_ONCE)]
     return [_concave(client, mesh, chunk) for chunk in chunks]
 
 
-def _concave(client: int, mesh: TriangleMesh, faces: "np.ndarray[tuple[int, int], np.dtype[np.int32]]") -> int:
+def above_floor(vertices: Array, faces: Faces) -> Faces:
+    """Those faces that do not lie on the ground."""
+    standing: Faces = faces[(vertices[faces, 2] > FLOOR).any(axis=1)]
+    return standing
+
+
+def compact(vertices: Array, faces: Faces) -> Mesh:
+    """Some faces with the vertices that they use."""
     used, indices = np.unique(faces, return_inverse=True)
-    body = fixed(client, concave_shape(client, Mesh(mesh.vertices[used], indices.reshape(-1, 3).astype(np.int32))))
+    return Mesh(vertices[used], indices.reshape(-1, 3).astype(np.int32))
+
+
+def is_convex(mesh: Mesh) -> bool:
+    """Whether a mesh is its own convex hull; one of many faces is not even looked at."""
+    if len(mesh.faces) > CONVEX_FACES:
+        return False
+    a, b, c = mesh.vertices[mesh.faces].swapaxes(0, 1)
+    normals = np.cross(b - a, c - a)
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = normals / np.maximum(lengths, 1e-12)
+    heights = normals @ mesh.vertices.T - np.sum(normals * a, axis=1, keepdims=True)
+    return bool((heights <= FLAT).all())
+
+
+def _concave(client: int, mesh: TriangleMesh, faces: Faces) -> int:
+    body = fixed(client, concave_shape(client, compact(mesh.vertices, faces)))
     # Bullet would thicken the triangles by 1 mm.
     pybullet.changeDynamics(body, -1, collisionMargin=0.0, physicsClientId=client)
     return body
@@ -153,19 +183,25 @@ def body_shape(client: int, solids: Sequence[Solid], pushable: bool, triangulate
     """
     if _simple(solids):
         return compound_shape(client, solids)
-    return hull_shape(client, solids) if pushable else concave_shape(client, _fused(solids, triangulate))
+    return hull_shape(client, solids) if pushable else concave_shape(client, fused(solids, triangulate))
+
+
+def hollow(solids: Sequence[Solid], pushable: bool) -> bool:
+    """Whether the collision shape of something that moves is a surface without an inside."""
+    return not _simple(solids) and not pushable
 
 
 def body_visual(client: int, solids: Sequence[Solid], triangulate: Triangulate) -> int:
     """What the renderer shows of it; -1 where that is the collision shape itself."""
-    return -1 if _simple(solids) else visible(client, _fused(solids, triangulate))
+    return -1 if _simple(solids) else visible(client, fused(solids, triangulate))
 
 
 def _simple(solids: Sequence[Solid]) -> bool:
     return all(isinstance(solid.shape, PRIMITIVES) for solid in solids)
 
 
-def _fused(solids: Sequence[Solid], triangulate: Triangulate) -> Mesh:
+def fused(solids: Sequence[Solid], triangulate: Triangulate) -> Mesh:
+    """The surfaces of solids as one."""
     meshes = [(triangulate(solid.shape), solid.pose) for solid in solids]
     starts = np.cumsum([0, *(len(mesh.vertices) for mesh, _ in meshes)])
     vertices = np.concatenate([pose.apply(mesh.vertices) for mesh, pose in meshes])

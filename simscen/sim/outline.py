@@ -46,6 +46,12 @@ def extremes(shape: Shape) -> Array:
             return vertices
 
 
+def reach(solids: Iterable[Solid]) -> tuple[float, float]:
+    """How far solids extend from the z axis, and how high above or below the origin, in metres."""
+    points = np.concatenate([solid.pose.apply(extremes(solid.shape)) for solid in solids])
+    return float(np.hypot(points[:, 0], points[:, 1]).max()), float(np.abs(points[:, 2]).max())
+
+
 def convex_hull(points: Array) -> Polygon:
     """The convex hull of points (n, 2), anticlockwise (Andrew's monotone chain, 1979)."""
     ordered = sorted({(round(x, 9), round(y, 9)) for x, y in points.tolist()})

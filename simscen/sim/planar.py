@@ -26,7 +26,7 @@ class PlanarBase:
         self._client = client
         moments, base_from_centre = body.chassis.principal()
         sleds = 2
-        hulls = engine.hull_shapes(client, (*body.hull, *body.casters))
+        hulls = engine.hull_shapes(client, body.solid)
         extra = len(hulls) - 1
         self.id: int = pybullet.createMultiBody(
             0,

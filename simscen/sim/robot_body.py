@@ -23,8 +23,8 @@ MeshReader = Callable[[Path], Mesh]
 class RobotBody:
     """Everything needed to build a robot, in its base frame: on the ground under the middle of its axle.
 
-    `hull` is what touches obstacles; `casters` glide on the ground without friction; wheels roll on it. `chassis` is
-    the mass of all but the wheels. `footprint` is anticlockwise; `radius` is set for a round robot.
+    `hull` and `casters` touch obstacles; `casters` also glide on the ground without friction; wheels only roll on it.
+    `chassis` is the mass of all but the wheels. `footprint` is anticlockwise; `radius` is set for a round robot.
     """
 
     name: str
@@ -48,6 +48,11 @@ class RobotBody:
     def mass(self) -> float:
         """Of the whole robot in kg."""
         return self.chassis.mass + sum(wheel.inertia.mass for wheel in self.wheels)
+
+    @property
+    def solid(self) -> tuple[Solid, ...]:
+        """What can touch an obstacle, in the order in which the engine gets it."""
+        return (*self.casters, *self.hull)
 
     @property
     def circumscribed_radius(self) -> float:

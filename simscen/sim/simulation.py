@@ -1,6 +1,5 @@
 """The world in motion: one robot, what stands, what moves. Time is whole ticks."""
 
-import math
 from collections.abc import Iterable, Mapping
 
 import numpy as np
@@ -16,9 +15,10 @@ from simscen.core.shapes import Body, MotionPath, TriangleMesh
 from simscen.core.trace import Truth
 from simscen.sim import engine
 from simscen.sim.actors import Actors
+from simscen.sim.astray import astray
 from simscen.sim.camera import picture, show_static
 from simscen.sim.clearance import Clearance
-from simscen.sim.contacts import Contacts, Motion, touches
+from simscen.sim.contacts import Contacts, Motion, inside, touches
 from simscen.sim.drives import build
 from simscen.sim.robot_body import RobotBody
 from simscen.sim.vehicle import base_twist
@@ -79,22 +79,29 @@ class Simulation:
         while self.tick < until:
             if self.tick % self._firmware == 0:
                 self._drive.advance()
-            if self.tick < self._clearance.no_contact_before and not self._actors.pushing:
+            if self.tick < self._clearance.no_contact_before and not self._watched():
                 pybullet.stepSimulation(client)
                 self.tick += 1
             else:
                 self._careful_step()
 
+    def _watched(self) -> bool:
+        """Whether every step counts: a contact is open, and has to end in time, or something pushes something."""
+        return self._contacts.touching or self._actors.pushing
+
     def _careful_step(self) -> None:
         """A step in which something might touch something; scripted bodies need to be in place only here."""
         self._actors.begin(self.tick)
-        if self.tick >= self._clearance.no_contact_before and not self._contacts.touching:
+        if self._clearance.unsure or (self.tick >= self._clearance.no_contact_before and not self._contacts.touching):
             self._clearance.measure(self.tick)
         before = Motion(self._base.pose().position, *self._base.velocity(), self._actors.velocities(self.tick))
         pybullet.stepSimulation(self._client)
         self.tick += 1
         if self._contacts.touching or self.tick > self._clearance.no_contact_before:
             touched = touches(self._client, self._base.id, self._names, self._clearance.owner, 1 / self._rate)
+            around = self._clearance.enclosed_by
+            if around is not None and around not in {touch.name for touch in touched}:
+                touched.append(inside(around, before.origin))
             self._contacts.note(self.tick, touched, before)
         self._actors.show(self.tick)
 
@@ -103,11 +110,14 @@ class Simulation:
         self._drive.command(command)
 
     def truth(self) -> Truth:
-        """The robot as it really is. Raises RunError when the physics has diverged."""
+        """The robot as it really is. Raises RunError when the physics has lost it or anything else."""
         pose, velocity = self._base.pose(), self._base.velocity()
-        if not all(math.isfinite(value) for value in (*pose, *velocity[0], *velocity[1])):
-            raise RunError("diverged", f"simulation diverged at t={self.tick / self._rate:.3f} s: the pose is {pose}")
+        trouble = astray("the robot", *pose, *velocity[0], *velocity[1]) or self._actors.astray()
+        if trouble is not None:
+            raise RunError("diverged", f"simulation diverged at t={self.tick / self._rate:.3f} s: {trouble}")
         clearance, objects = self._clearance.measure(self.tick), self._actors.poses(self.tick)
+        if self._contacts.last == self.tick:
+            clearance = min(clearance, 0.0)  # surfaces that press on each other may be a hair apart
         return Truth(pose, base_twist(pose, velocity), clearance, objects)
 
     def _changed(self) -> None:

@@ -111,7 +111,7 @@ def _build(client: int, body: RobotBody) -> tuple[int, tuple[int, ...], tuple[in
     for wheel in body.wheels:
         joints.append(len(links))
         links += _links(client, wheel, len(links))
-    first, *others = engine.hull_shapes(client, (*body.casters, *body.hull))
+    first, *others = engine.hull_shapes(client, body.solid)
     hull = (-1, *range(len(links), len(links) + len(others)))
     links += [_Link(HULL_PIECE, shape, (0.0, 0.0, 0.0), 0, pybullet.JOINT_FIXED, (0, 0, 1)) for shape in others]
     _, centre = body.chassis.principal()

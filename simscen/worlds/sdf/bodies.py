@@ -17,6 +17,8 @@ from simscen.worlds.sdf.report import Report
 from simscen.worlds.sdf.tree import Model
 
 MOST_BODIES = 2000
+HEAVIEST = 1e6
+"""kg: physics holds up to a thousand times more; from 1e12 on things fall through the floor."""
 
 
 @dataclass
@@ -85,8 +87,20 @@ def _connect(owner: Model, joint: Element, numbers: dict[int, int], groups: Grou
 def _body(name: str, pose: Pose3, group: list[LinkContent], report: Report) -> Body:
     inverse = pose.inverse()
     solids = tuple(replace(s, pose=inverse.compose(s.pose)) for content in group for s in content.solids)
-    mass = 0.0 if _is_kinematic(group, report) else sum(content.mass for content in group)
+    mass = 0.0 if _is_kinematic(group, report) else _mass(group, report)
     return Body(name, solids, pose, mass)
+
+
+def _mass(group: list[LinkContent], report: Report) -> float:
+    """The mass of links that move as one; what is too heavy goes to the report and moves no more."""
+    mass = sum(content.mass for content in group)
+    movable = mass <= HEAVIEST
+    with report.skipping():
+        if not movable:
+            heaviest = max(group, key=lambda content: content.mass).link.frame.element
+            hint = "if nothing moves it, make its model <static>"
+            raise heaviest.unusable(f"has a mass of {mass:g} kg; at most {HEAVIEST:g} kg can move", hint)
+    return mass if movable else 0.0
 
 
 def _is_kinematic(group: list[LinkContent], report: Report) -> bool:

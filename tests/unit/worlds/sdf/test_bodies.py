@@ -127,3 +127,11 @@ def test_order_is_that_of_the_document(load):
         link("z"), "b"
     )
     assert [solid.name for solid in load(text).solids] == ["cart::n::x::c", "cart::a::c"]
+
+
+def test_what_is_too_heavy_for_physics_is_refused_unless_it_stands(load, refuse):
+    heavy = model(link("a", 1, "1e12"))
+    (problem,) = refuse(heavy)
+    assert "model[cart]/link[a]: has a mass of 1e+12 kg; at most 1e+06 kg can move" in problem.message
+    assert load(heavy, lenient=True).bodies[0].mass == 0
+    assert len(load(model(link("a", 1, "1e12"), rest="<static>1</static>")).solids) == 1

@@ -1,0 +1,22 @@
+"""What the engine has lost: fallen through the floor, hurled away, or nowhere at all."""
+
+import math
+
+SUNK = 0.05
+"""m below the floor at which a thing has fallen through it: what rests or lands sinks in by far less."""
+FAR = 1e5
+"""m from the origin of the world at which nothing can be any more: worlds reach to 10 km."""
+
+
+def astray(what: str, x: float, y: float, z: float, *others: float) -> str | None:
+    """Why something whose centre is at a place in the world cannot be right, or None.
+
+    `others` are more numbers that have to be finite, such as its velocity.
+    """
+    if not all(map(math.isfinite, (x, y, z, *others))):
+        return f"{what} is nowhere: its pose is not finite"
+    if z < -SUNK:
+        return f"{what} is below the floor, at z = {z:.2f} m"
+    if max(abs(x), abs(y), z) > FAR:
+        return f"{what} has left the world, to ({x:.4g}, {y:.4g}, {z:.4g})"
+    return None

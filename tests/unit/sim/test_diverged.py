@@ -1,0 +1,59 @@
+"""What falls through the floor, flies off or is nowhere ends the run as an error."""
+
+import math
+
+import pybullet
+import pytest
+from playground import box
+
+from simscen.core.errors import RunError
+from simscen.core.geometry import Pose3
+from simscen.core.shapes import Body
+
+BOX = (box("box", 0, 0, 0.5, 0.5, 0.5),)
+
+
+def put(simulation, name, place):
+    """Let the engine have lost a thing, or the robot ("")."""
+    number = simulation._actors._actors[name].id if name else simulation._base.id
+    pybullet.resetBasePositionAndOrientation(number, place, (0, 0, 0, 1), physicsClientId=simulation._client)
+
+
+@pytest.mark.parametrize("name", ["box", ""])
+@pytest.mark.parametrize(
+    ("place", "told"),
+    [
+        ((2.0, 0.0, -0.5), "is below the floor"),
+        ((2e5, 0.0, 0.3), "has left the world"),
+        ((math.nan, 0.0, 0.3), "is not finite"),
+    ],
+)
+def test_what_has_left_the_world_is_a_run_that_diverged(simulate, name, place, told):
+    simulation = simulate(bodies=[Body("box", BOX, Pose3(2.0), 3.0)])
+    simulation.step(24)
+    simulation.truth()
+    put(simulation, name, place)
+    with pytest.raises(RunError, match=r"simulation diverged at t=0\.100 s") as error:
+        simulation.truth()
+    assert error.value.kind == "diverged"
+    assert told in str(error.value)
+    assert ('"box"' if name else "the robot") in str(error.value)
+
+
+def test_a_thing_too_heavy_for_the_engine_is_an_error_rather_than_gone(simulate):
+    simulation = simulate(bodies=[Body("anvil", BOX, Pose3(2.0), 1e12)])
+    with pytest.raises(RunError, match='"anvil" is below the floor'):
+        for _ in range(40):
+            simulation.step(6)
+            simulation.truth()
+
+
+def test_things_that_fall_lie_and_are_pushed_over_are_still_in_the_world(simulate):
+    plate = (box("plate", 0, 0, 0.4, 0.4, 0.01),)
+    falling = Body("falling", BOX, Pose3(3.0, 0.0, 1.0), 5.0)
+    tall = Body("tall", (box("tall", 0, 0, 0.1, 0.1, 1.2),), Pose3(0.5), 1.0)
+    simulation = simulate("amr", bodies=[Body("plate", plate, Pose3(-2.0), 1.0), falling, tall], drive=(0.5, 0.0, 0.0))
+    for _ in range(80):
+        simulation.step(12)
+        simulation.truth()
+    assert simulation.object_pose("falling").z == pytest.approx(0.0, abs=2e-3)
