@@ -10,7 +10,7 @@ from simscen.core.motion import Twist
 from simscen.core.navigation import Goal, Path
 from simscen.core.shapes import Body, Box, Capsule, Cone, Cylinder, Extrusion, MotionPath, Shape, Sphere
 from simscen.core.time import Clock
-from simscen.core.trace import Decision
+from simscen.core.trace import Decision, Truth
 from simscen.core.world import Polygon, World
 from simscen.sim.simulation import Simulation
 from simscen.stack.protocols import Stack
@@ -23,7 +23,7 @@ class LiveStage:
         """`goals` are those that events may send."""
         self._world, self._simulation, self._stack, self.clock = world, simulation, stack, clock
         self._goals = {goal.name: goal for goal in goals}
-        self._pose, self._twist = simulation.base_pose().plane, simulation.base_twist()
+        self._look()
         self._belief: Belief | None = None
         self._travelled = 0.0
         self._history: tuple[Event, ...] = ()
@@ -31,13 +31,19 @@ class LiveStage:
 
     # what the lockstep tells it
 
-    def begin_beat(self) -> None:
-        """Time has passed: see where the robot is now, and what it has touched."""
-        before, self._pose = self._pose, self._simulation.base_pose().plane
-        self._twist = self._simulation.base_twist()
+    def begin_beat(self, truth: Truth | None) -> None:
+        """Time has passed: see where the robot is now, by the truth where it was sampled, and what it has touched."""
+        before = self._pose
+        self._look(truth)
         self._travelled += before.distance(self._pose)
         for collision in self._simulation.collisions():
             self.note(collision)
+
+    def _look(self, truth: Truth | None = None) -> None:
+        if truth is not None:
+            self._pose, self._twist = truth.pose.plane, truth.twist
+        else:
+            self._pose, self._twist = self._simulation.base_pose().plane, self._simulation.base_twist()
 
     def heard(self, decision: Decision) -> None:
         """What the stack decided and published."""
@@ -127,7 +133,7 @@ class LiveStage:
     def place_robot(self, pose: Pose2) -> None:
         """Set the robot down somewhere else."""
         self._simulation.place_robot(pose)
-        self._pose, self._twist = self._simulation.base_pose().plane, self._simulation.base_twist()
+        self._look()
         self.note(Event(0, EventKind.ROBOT_PLACED, "", {"x": pose.x, "y": pose.y, "yaw": pose.yaw}))
 
     def push(self, impulse: tuple[float, float]) -> None:

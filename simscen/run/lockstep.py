@@ -51,7 +51,7 @@ def run_lockstep(rig: Rig, logs: Sequence[Log]) -> Event:
         tick = simulation.tick
         sampled = tick % rig.truth_period == 0 or rig.ending.due(tick)
         truth = simulation.truth() if sampled else None
-        rig.stage.begin_beat()
+        rig.stage.begin_beat(truth)
         rig.director.direct()
 
         readings = rig.faults.disturb(rig.senses.read(tick))
