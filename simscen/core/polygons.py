@@ -15,7 +15,7 @@ THINNEST = 1e-6
 def distance_to_polygon(point: Pose2, corners: Sequence[tuple[float, float]]) -> float:
     """Distance in metres from a point to a filled polygon; 0 inside."""
     edges = list(zip(corners, [*corners[1:], corners[0]], strict=True))
-    if sum(_crosses(point, a, b) for a, b in edges) % 2:
+    if holds(corners, (point.x, point.y)):
         return 0.0
     return min(distance_to_segment(point.x, point.y, a, b) for a, b in edges)
 
@@ -83,8 +83,44 @@ def distance_to_segment(x: float, y: float, a: tuple[float, float], b: tuple[flo
     return math.hypot(x - a[0] - along * dx, y - a[1] - along * dy)
 
 
-def _crosses(point: Pose2, a: tuple[float, float], b: tuple[float, float]) -> bool:
+def holds(corners: Sequence[tuple[float, float]], point: tuple[float, float]) -> bool:
+    """Whether a point is inside a polygon; on its edge, either answer may come."""
+    return sum(_is_left_of(point, a, b) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)) % 2 == 1
+
+
+def crosses(
+    a: tuple[float, float], b: tuple[float, float], c: tuple[float, float], d: tuple[float, float]
+) -> bool:
+    """Whether the segments a-b and c-d cross inside of both; to touch is not to cross."""
+    return _side(a, b, c) * _side(a, b, d) < 0 and _side(c, d, a) * _side(c, d, b) < 0
+
+
+def area(corners: Sequence[tuple[float, float]]) -> float:
+    """Of a polygon, in m²; negative for a clockwise one, and of no use for one that crosses itself."""
+    ends = [*corners[1:], corners[0]]
+    return sum(ax * by - bx * ay for (ax, ay), (bx, by) in zip(corners, ends, strict=True)) / 2
+
+
+def first_crossing(corners: Sequence[tuple[float, float]]) -> tuple[int, int] | None:
+    """The numbers of two edges of a polygon that cross each other, the first such pair; None for a simple one.
+
+    Edge k runs from corner k to the next one.
+    """
+    edges = list(zip(corners, [*corners[1:], corners[0]], strict=True))
+    for j, one in enumerate(edges):
+        for k in range(j + 2, len(edges)):
+            if crosses(*one, *edges[k]):
+                return j, k
+    return None
+
+
+def _side(a: tuple[float, float], b: tuple[float, float], point: tuple[float, float]) -> float:
+    """Positive on the left of the line from a to b."""
+    return (b[0] - a[0]) * (point[1] - a[1]) - (b[1] - a[1]) * (point[0] - a[0])
+
+
+def _is_left_of(point: tuple[float, float], a: tuple[float, float], b: tuple[float, float]) -> bool:
     """Whether a ray from the point along +x crosses the edge (half-open, so that corners count once)."""
-    if (a[1] > point.y) == (b[1] > point.y):
+    if (a[1] > point[1]) == (b[1] > point[1]):
         return False
-    return point.x < a[0] + (point.y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
+    return point[0] < a[0] + (point[1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0])

@@ -27,7 +27,7 @@ def blocking_solid(world: World, point: tuple[float, float], radius: float, z_ra
 def first_blocking(solids: Iterable[Solid], point: tuple[float, float], radius: float, z_range: ZRange) -> str | None:
     """Like `blocking_solid`, among some solids."""
     for solid in solids:
-        if _near(solid, point, radius) and _distance(solid, point, z_range, radius) < radius:
+        if is_near(solid, point, radius) and _distance(solid, point, z_range, radius) < radius:
             return solid.name
     return None
 
@@ -43,7 +43,8 @@ def _distance(solid: Solid, point: tuple[float, float], z_range: ZRange, within:
     return distance_in_plan(fuse([solid]), point, z_range, within)
 
 
-def _near(solid: Solid, point: tuple[float, float], radius: float) -> bool:
+def is_near(solid: Solid, point: tuple[float, float], radius: float) -> bool:
+    """Whether the ball that holds a solid comes as near as `radius` metres to a point, in plan."""
     return math.hypot(solid.pose.x - point[0], solid.pose.y - point[1]) <= radius + _reach(solid.shape)
 
 

@@ -22,7 +22,7 @@ def distance_in_plan(
     if bottom >= high or top <= low:
         return math.inf
     middle = (max(bottom, low) + min(top, high)) / 2
-    if _winds_about(outlines(mesh, middle), point):
+    if winds_about(outlines(mesh, middle), point):
         return 0.0
     corners, valid = _clipped(_close(mesh, point, within), low, high)
     corners, valid = corners[valid.any(axis=1)] - point, valid[valid.any(axis=1)]
@@ -40,7 +40,7 @@ def _close(mesh: TriangleMesh, point: tuple[float, float], within: float) -> Arr
     return near
 
 
-def _winds_about(segments: Array, point: tuple[float, float]) -> bool:
+def winds_about(segments: Array, point: tuple[float, float]) -> bool:
     """Whether outlines wind anticlockwise about a point, as seen both towards +x and towards -x.
 
     For closed outlines both counts are the same; where a mesh has holes, one alone would find insides that leak.

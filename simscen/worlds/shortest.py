@@ -42,6 +42,7 @@ class ShortestWays:
         resolution = max(0.05, math.sqrt((x1 - x0 + 2 * room + 2) * (y1 - y0 + 2 * room + 2) / MOST_CELLS))
         grid = empty_grid(bounds, resolution, "shortest way")
         self._radius = max(radius, 0.71 * resolution)
+        self._too_small = radius < self._radius
         self._field = clearance_field(mesh, grid, z_range)
         self._allowed = self._radius - 0.1 * resolution
 
@@ -61,6 +62,13 @@ class ShortestWays:
         if bold is None or self._is_clear(bold):
             return bold
         return self._over(self._strict_lattice, ends)
+
+    def may_reach(self, start: Pose2, goal: Pose2) -> bool:
+        """Whether a way may lead from one position to the other; False is a proof that there is none for the disc."""
+        if self._too_small:
+            return True
+        first, last = (self._free_cell(self._bold_lattice, np.array(end[:2])) for end in (start, goal))
+        return not first or not last or self._bold_lattice.way(first, last) is not None
 
     @cached_property
     def _bold_lattice(self) -> Lattice:

@@ -1,0 +1,98 @@
+"""Where the widest way between two places is narrowest: the gap that a robot does not fit through."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.geometry import Array, Pose2
+from simscen.core.grid import OccupancyGrid
+from simscen.core.shapes import TriangleMesh
+from simscen.worlds.clearance import ClearanceField, clearance_field
+from simscen.worlds.slicing import empty_grid
+
+MOST_CELLS = 1_000_000
+UNRESOLVED = 0.71
+"""Cells: a gap of less than this to either side cannot be told from a thin wall."""
+OPPOSITE = -0.5
+"""Cosine of the angle beyond which two things stand on different sides of a gap."""
+
+
+@dataclass(frozen=True)
+class Gap:
+    """The narrowest point of the widest way: its middle and `width` in metres; 0 where there is no gap at all.
+
+    `sides` are the points of the solids on either side.
+    """
+
+    x: float
+    y: float
+    width: float
+    sides: tuple[tuple[float, float], ...] = ()
+
+
+def narrowest(
+    mesh: TriangleMesh,
+    bounds: tuple[float, float, float, float],
+    ends: tuple[Pose2, Pose2],
+    radius: float,
+    z_range: tuple[float, float],
+) -> Gap:
+    """What keeps a disc of `radius` metres from getting from one end to the other; widths are exact to some 2 cm."""
+    x0, y0, x1, y1 = bounds
+    room = 2 * radius
+    area = (x1 - x0 + 2 * room + 2) * (y1 - y0 + 2 * room + 2)
+    grid = empty_grid((x0 - room, y0 - room, x1 + room, y1 + room), max(0.05, math.sqrt(area / MOST_CELLS)), "gap")
+    field = clearance_field(mesh, grid, z_range)
+    clearance = _clearances(field, 2 * radius)
+    cell = _bottleneck(clearance, grid.cell_of(np.array([ends[0][:2], ends[1][:2]])))
+    place: Array = grid.centre_of(cell[None])[0]
+    if clearance[tuple(cell)] < UNRESOLVED * grid.resolution:
+        return Gap(float(place[0]), float(place[1]), 0.0)
+    return _measured(field, place, 4 * radius)
+
+
+def _clearances(field: ClearanceField, most: float) -> Array:
+    """Of the middle of each cell, negative in solids, and at most `most`, as more does not matter."""
+    clearance: Array = np.minimum(field.rough, most)
+    near = field.rough < most
+    clearance[near] = np.minimum(field.exact(_centres(field.grid, near)), most)
+    return clearance
+
+
+def _centres(grid: OccupancyGrid, cells: npt.NDArray[np.bool_]) -> Array:
+    return grid.centre_of(np.argwhere(cells))
+
+
+def _bottleneck(clearance: Array, ends: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """The cell (row, column) of least clearance on the way between two cells that has the most of it."""
+    from scipy import ndimage
+
+    first, last = (tuple(end) for end in ends)
+    levels = np.unique(clearance)
+    low, high = 0, len(levels)  # joined at levels[low], and at no level from levels[high] on
+    while high - low > 1:
+        middle = (low + high) // 2
+        labels, _ = ndimage.label(clearance >= levels[middle], structure=np.ones((3, 3)))
+        joined = labels[first] == labels[last] > 0
+        low, high = (middle, high) if joined else (low, middle)
+    cells: npt.NDArray[np.int64] = np.argwhere(clearance == levels[low])
+    return cells[0]
+
+
+def _measured(field: ClearanceField, place: Array, reach: float) -> Gap:
+    """The gap about a place: between the points of the solids that are nearest to each other across it."""
+    assert field.outline is not None
+    points = field.outline.data[field.outline.query_ball_point(place, reach)]
+    apart = points - place
+    distances = np.linalg.norm(apart, axis=1)
+    towards = apart[int(np.argmin(distances))] / distances.min()
+    cosines = (apart @ towards) / distances
+    near, far = points[cosines > -OPPOSITE], points[cosines < OPPOSITE]
+    if not len(far):
+        return Gap(float(place[0]), float(place[1]), 2 * float(distances.min()))
+    between = np.linalg.norm(near[:, None] - far[None], axis=2)
+    j, k = np.unravel_index(int(np.argmin(between)), between.shape)
+    (ax, ay), (bx, by) = near[j].tolist(), far[k].tolist()
+    return Gap((ax + bx) / 2, (ay + by) / 2, float(between[j, k]), ((ax, ay), (bx, by)))
