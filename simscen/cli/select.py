@@ -1,7 +1,7 @@
 """From paths on the command line to scenarios that can run."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from simscen.cli.diagnostics import from_here, harmless
@@ -14,6 +14,7 @@ from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import try_scenario
 from simscen.loading.worldfile import load_world_file
 from simscen.run.feasibility import check, notes_of
+from simscen.run.worldcache import WorldCache
 from simscen.run.worldsource import world_of
 
 
@@ -75,6 +76,7 @@ class Checks:
     world_path: Sequence[Path] = ()
     lenient: bool = False
     fast: bool = False
+    cache: WorldCache = field(default_factory=WorldCache)
 
     def scenario(self, file: Path) -> tuple[LoadedScenario | None, list[Problem]]:
         """The scenario, unless it is unusable, and its problems: a usable one has none that are errors."""
@@ -83,7 +85,7 @@ class Checks:
             return None, loaded
         loaded = replace(loaded, lenient=self.lenient)
         with files_read() as read:
-            problems = [*loaded.notes, *([] if self.fast else checked(loaded))]
+            problems = [*loaded.notes, *([] if self.fast else checked(loaded, self.cache))]
         loaded = replace(loaded, read=tuple(sorted(read)))
         usable = not any(problem.severity == "error" for problem in problems)
         return (loaded if usable else None), list(dict.fromkeys(problems))
@@ -99,9 +101,9 @@ class Checks:
             return error.problems
 
 
-def checked(scenario: LoadedScenario) -> list[Problem]:
+def checked(scenario: LoadedScenario, cache: WorldCache | None = None) -> list[Problem]:
     """What only geometry can tell, or why its world cannot be used."""
     try:
-        return check(scenario)
+        return check(scenario, cache)
     except InvalidInput as error:
         return error.problems

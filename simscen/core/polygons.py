@@ -88,35 +88,9 @@ def holds(corners: Sequence[tuple[float, float]], point: tuple[float, float]) ->
     return sum(_is_left_of(point, a, b) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)) % 2 == 1
 
 
-def crosses(
-    a: tuple[float, float], b: tuple[float, float], c: tuple[float, float], d: tuple[float, float]
-) -> bool:
+def crosses(a: Corner, b: Corner, c: Corner, d: Corner) -> bool:
     """Whether the segments a-b and c-d cross inside of both; to touch is not to cross."""
-    return _side(a, b, c) * _side(a, b, d) < 0 and _side(c, d, a) * _side(c, d, b) < 0
-
-
-def area(corners: Sequence[tuple[float, float]]) -> float:
-    """Of a polygon, in m²; negative for a clockwise one, and of no use for one that crosses itself."""
-    ends = [*corners[1:], corners[0]]
-    return sum(ax * by - bx * ay for (ax, ay), (bx, by) in zip(corners, ends, strict=True)) / 2
-
-
-def first_crossing(corners: Sequence[tuple[float, float]]) -> tuple[int, int] | None:
-    """The numbers of two edges of a polygon that cross each other, the first such pair; None for a simple one.
-
-    Edge k runs from corner k to the next one.
-    """
-    edges = list(zip(corners, [*corners[1:], corners[0]], strict=True))
-    for j, one in enumerate(edges):
-        for k in range(j + 2, len(edges)):
-            if crosses(*one, *edges[k]):
-                return j, k
-    return None
-
-
-def _side(a: tuple[float, float], b: tuple[float, float], point: tuple[float, float]) -> float:
-    """Positive on the left of the line from a to b."""
-    return (b[0] - a[0]) * (point[1] - a[1]) - (b[1] - a[1]) * (point[0] - a[0])
+    return turn(a, b, c) * turn(a, b, d) < 0 and turn(c, d, a) * turn(c, d, b) < 0
 
 
 def _is_left_of(point: tuple[float, float], a: tuple[float, float], b: tuple[float, float]) -> bool:

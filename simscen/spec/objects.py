@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 from simscen.core.geometry import Pose3
 from simscen.core.shapes import Box, Cylinder, Extrusion, Shape, Solid
 from simscen.spec.base import Spec
-from simscen.spec.places import Point
+from simscen.spec.places import Ring
 from simscen.spec.quantities import NonNegativeLength, PositiveLength
 
 
@@ -18,7 +18,7 @@ class Shaped(Spec):
     """A box: length along x, width along y, height."""
     cylinder: Annotated[list[PositiveLength], Field(min_length=2, max_length=2)] | None = None
     """An upright cylinder: radius, height."""
-    polygon: Annotated[list[Point], Field(min_length=3, max_length=200)] | None = None
+    polygon: Ring | None = None
     """An upright prism over these corners, `height` tall."""
     height: PositiveLength = 1.0
     """Height of the prism over `polygon`."""
@@ -30,6 +30,11 @@ class Shaped(Spec):
         if sum(shape is not None for shape in (self.box, self.cylinder, self.polygon)) != 1:
             raise ValueError("expected exactly one of: box, cylinder, polygon")
         return self
+
+    @property
+    def tall(self) -> float:
+        """Its own height in metres."""
+        return self.box[2] if self.box is not None else self.cylinder[1] if self.cylinder is not None else self.height
 
     def solid(self, name: str) -> Solid:
         """The shape in the object's own frame, which is on the ground below it."""

@@ -1,6 +1,7 @@
 """Shortest ways over the cells of a grid: Dijkstra on moves in 16 directions, by scipy."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -51,6 +52,14 @@ class Lattice:
         while way[-1] != first:
             way.append(int(before[0, way[-1]]))
         return np.column_stack(np.divmod(self._cells[way[::-1]], self._width))
+
+    def joined(self, cells: Sequence[tuple[int, int] | None]) -> Numbers:
+        """The free cells (n, 2) that a way joins with one of `cells`."""
+        from scipy.sparse.csgraph import connected_components
+
+        _, labels = connected_components(self._graph, directed=False)
+        wanted = [labels[self._index(cell)] for cell in cells if cell is not None and self._index(cell) >= 0]
+        return np.column_stack(np.divmod(self._cells[np.isin(labels, wanted)], self._width))
 
     def is_free(self, cells: Numbers) -> Cells:
         """Which of the cells (n, 2) of the grid are free."""

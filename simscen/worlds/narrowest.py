@@ -15,6 +15,8 @@ from simscen.worlds.slicing import empty_grid
 MOST_CELLS = 1_000_000
 UNRESOLVED = 0.71
 """Cells: a gap of less than this to either side cannot be told from a thin wall."""
+AS_THICK = 0.3
+"""Cells: walls that differ by less are equally thin, and the one between the two ends is told."""
 OPPOSITE = -0.5
 """Cosine of the angle beyond which two things stand on different sides of a gap."""
 
@@ -48,8 +50,11 @@ def narrowest(
     clearance = _clearances(field, 2 * radius)
     cell = _bottleneck(clearance, grid.cell_of(np.array([ends[0][:2], ends[1][:2]])))
     place: Array = grid.centre_of(cell[None])[0]
-    if clearance[tuple(cell)] < UNRESOLVED * grid.resolution:
-        return Gap(float(place[0]), float(place[1]), 0.0)
+    least = clearance[tuple(cell)]
+    if least < UNRESOLVED * grid.resolution:
+        walls = grid.centre_of(np.argwhere(np.abs(clearance - least) < AS_THICK * grid.resolution))
+        x, y = walls[np.argmin(np.linalg.norm(walls - np.mean([ends[0][:2], ends[1][:2]], axis=0), axis=1))].tolist()
+        return Gap(x, y, 0.0)
     return _measured(field, place, 4 * radius)
 
 
@@ -77,8 +82,8 @@ def _bottleneck(clearance: Array, ends: npt.NDArray[np.int64]) -> npt.NDArray[np
         labels, _ = ndimage.label(clearance >= levels[middle], structure=np.ones((3, 3)))
         joined = labels[first] == labels[last] > 0
         low, high = (middle, high) if joined else (low, middle)
-    cells: npt.NDArray[np.int64] = np.argwhere(clearance == levels[low])
-    return cells[0]
+    cell: npt.NDArray[np.int64] = np.argwhere(clearance == levels[low])[0]
+    return cell
 
 
 def _measured(field: ClearanceField, place: Array, reach: float) -> Gap:

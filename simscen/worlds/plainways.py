@@ -6,7 +6,7 @@ and scipy, which take longer to import than all of this.
 
 import heapq
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from itertools import product
 
 from simscen.core.shapes import Solid
@@ -44,6 +44,21 @@ class PlainWays:
         """Metres of a way from start to goal, perhaps not the shortest; inf when none was found."""
         if self._is_clear(start, goal):
             return math.dist(start, goal)
+
+        def last_leg(here: Point) -> float:
+            near = math.dist(here, goal) < 2 * STEP and self._is_clear(here, goal)
+            return math.dist(here, goal) if near else math.inf
+
+        return self._search(start, goal, last_leg)
+
+    def comes_to(self, start: Point, towards: Point, arrived: Callable[[Point], bool]) -> bool:
+        """Whether a way was found to where the disc's middle has arrived; the search looks `towards` a point first."""
+        return (
+            arrived(start) or self._search(start, towards, lambda here: 0.0 if arrived(here) else math.inf) < math.inf
+        )
+
+    def _search(self, start: Point, goal: Point, last_leg: Callable[[Point], float]) -> float:
+        """A* over a lattice about the start until a point has a last leg."""
         driven: dict[Cell, float] = {(0, 0): 0.0}
         queue = [(math.dist(start, goal), (0, 0))]
         done: set[Cell] = set()
@@ -53,8 +68,8 @@ class PlainWays:
                 continue
             done.add(cell)
             here = _point(start, cell)
-            if math.dist(here, goal) < 2 * STEP and self._is_clear(here, goal):
-                return driven[cell] + math.dist(here, goal)
+            if (rest := last_leg(here)) < math.inf:
+                return driven[cell] + rest
             for move in MOVES:
                 to = cell[0] + move[0], cell[1] + move[1]
                 there, length = _point(start, to), driven[cell] + STEP * math.hypot(*move)

@@ -1,7 +1,7 @@
 """The shortest way of a disc through the static world: what a driven path is measured against."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from itertools import pairwise
 
@@ -69,6 +69,20 @@ class ShortestWays:
             return True
         first, last = (self._free_cell(self._bold_lattice, np.array(end[:2])) for end in (start, goal))
         return not first or not last or self._bold_lattice.way(first, last) is not None
+
+    def may_come_to(self, starts: Sequence[Pose2], arrived: Callable[[Pose2], float]) -> bool:
+        """Whether the disc's middle may get from one of the starts to where `arrived` (a distance) is 0.
+
+        False is a proof that it may not.
+        """
+        if self._too_small:
+            return True
+        grid = self._field.grid
+        cells = self._bold_lattice.joined(
+            [self._free_cell(self._bold_lattice, np.array(start[:2])) for start in starts]
+        )
+        slack = HALF_DIAGONAL * grid.resolution
+        return any(arrived(Pose2(x, y)) <= slack for x, y in grid.centre_of(cells).tolist())
 
     @cached_property
     def _bold_lattice(self) -> Lattice:

@@ -1,0 +1,62 @@
+"""The worlds of one command, each built once however many scenarios are in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from simscen.core.filesread import files_read, note_read
+from simscen.core.geometry import Pose2
+from simscen.core.shapes import Solid
+from simscen.core.world import World
+from simscen.loading.loaded import LoadedScenario, LoadedWorld
+from simscen.run.worldsource import load_world
+
+if TYPE_CHECKING:
+    from simscen.worlds.shortest import ShortestWays
+
+Bounds = tuple[float, float, float, float]
+
+
+@dataclass
+class WorldCache:
+    """Remembers worlds by what their files say, and where a robot of some size gets in them."""
+
+    _worlds: list[tuple[LoadedWorld, World, set[Path]]] = field(default_factory=list)
+    _ways: list[tuple[tuple[Solid, ...], Bounds, float, tuple[float, float], ShortestWays]] = field(
+        default_factory=list
+    )
+
+    def world(self, loaded: LoadedScenario) -> World:
+        """The world of a scenario; files that it was made of are noted as read. Raises InvalidInput."""
+        known = next((entry for entry in self._worlds if entry[0] == loaded.world), None)
+        if known is None:
+            with files_read() as read:
+                world = load_world(loaded)
+            known = loaded.world, world, read
+            self._worlds.append(known)
+        for file in sorted(known[2]):
+            note_read(file)
+        return known[1]
+
+    def ways(
+        self, solids: tuple[Solid, ...], bounds: Bounds, radius: float, z_range: tuple[float, float]
+    ) -> ShortestWays:
+        """The ways of a disc between solids."""
+        for known in self._ways:
+            if known[0] is solids and known[1:4] == (bounds, radius, z_range):
+                return known[4]
+        from simscen.worlds.meshing import fuse
+        from simscen.worlds.shortest import ShortestWays
+
+        ways = ShortestWays(fuse(solids), bounds, radius, z_range)
+        self._ways = [*self._ways[-3:], (solids, bounds, radius, z_range, ways)]  # large: only the last few
+        return ways
+
+
+def around(bounds: Bounds, places: list[Pose2]) -> Bounds:
+    """Bounds that hold the places, too."""
+    left, low, right, high = bounds
+    xs, ys = [place.x for place in places], [place.y for place in places]
+    return min([left, *xs]), min([low, *ys]), max([right, *xs]), max([high, *ys])
