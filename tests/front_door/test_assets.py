@@ -430,9 +430,13 @@ def test_49_a_goal_off_the_map_that_the_robot_gets(with_scenario, folder: Path) 
 
 
 def test_49_without_a_map_a_goal_may_lie_beyond_the_obstacles(simscen, folder: Path) -> None:
-    text = (folder / "a.scenario.yaml").read_text()
-    (folder / "a.scenario.yaml").write_text(text.replace("seed: 7", "map: none").replace("x: 1.5", "x: 60"))
-    assert simscen("validate", "a.scenario.yaml").code == 0
+    for name, old, new in (
+        ("room.world.yaml", ", [0, 4], [0, 0]]", ", [0, 4]]"),  # open to the west
+        ("a.scenario.yaml", "seed: 7", "map: none"),
+        ("a.scenario.yaml", "x: 1.5", "x: -3"),
+    ):
+        (folder / name).write_text((folder / name).read_text().replace(old, new))
+    assert simscen("validate", "a.scenario.yaml").out == "1 scenario is valid\n"
 
 
 def test_49_is_told_without_waiting(cost, folder: Path) -> None:
