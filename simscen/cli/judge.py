@@ -15,7 +15,7 @@ from simscen.judge.result import result_of
 from simscen.judge.resultdata import to_json
 from simscen.loading.resolved import spec_of_text
 from simscen.loading.source import read_text
-from simscen.record.replay import read_log
+from simscen.record.replay import read_run
 from simscen.report.lines import Naming, finished, text_of
 
 
@@ -31,7 +31,7 @@ def command(
     The log holds the truth, the goals and the scenario, so nothing else is needed; with --scenario other criteria and
     bounds can be tried on it. Exit code 0: all hold; 1: one fails; 2: not a usable log; 3: one could not be judged.
     """
-    read = read_log(log)
+    read = read_run(log)
     name = str(scenario or log)
     spec = spec_of_text(_text(scenario) if scenario else read.about.scenario, name)
     key = RunKey(read.about.name, read.about.seed)

@@ -20,6 +20,7 @@ COMMANDS = {
     "judge": "Judge a recorded run again, without simulating it.",
     "report": "Write the reports of an output folder anew.",
     "plot": "Draw a recorded run.",
+    "log": "Mend the logs of runs that broke off.",
     "new": "Write a commented scenario to start from.",
     "explain": "Explain a trigger, action, fault, criterion, signal, component or error code.",
     "schema": "Print or write the JSON Schemas that editors use.",

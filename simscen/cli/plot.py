@@ -15,7 +15,7 @@ from simscen.core.result import RunKey, RunResult
 from simscen.judge.result import result_of
 from simscen.judge.resultdata import from_json
 from simscen.loading.resolved import spec_of_text
-from simscen.record.replay import Log, read_log
+from simscen.record.replay import Log, read_run
 
 LOGS = ("run.mcap", "run.partial.mcap")
 
@@ -31,7 +31,7 @@ def command(
     (run.partial.mcap) is drawn as far as it goes. Exit code 0; 2: not a usable log, or the picture cannot be written.
     """
     file = _log(run)
-    log = read_log(file)
+    log = read_run(file)
     picture = out or file.with_name("map.png")
     _draw(log, file, picture)
     print_text(harmless(str(picture)))

@@ -1,8 +1,10 @@
 """Writes a run to an MCAP log that ROS 2 tools open."""
 
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
+from simscen.core.errors import RunError
 from simscen.core.geometry import Pose3
 from simscen.core.time import Clock
 from simscen.core.trace import Moment
@@ -22,9 +24,9 @@ from simscen.record.writer import McapWriter, Sink
 class Recorder:
     """Eats moments in the order of their ticks. Equal moments give equal bytes; nothing in it is a wall clock.
 
-    Given a path it writes beside it under a partial name until `close`; leaving the context without `close` leaves
-    the partial file, which `replay.read_log` can still read. Given a sink it writes there. Raises RunError of kind
-    "output" when the disk does not take it.
+    Given a path it writes beside it under a partial name until `close`; leaving the context without `close` leaves the
+    partial file, with the index that readers ask for unless the disk is full. Given a sink it writes there. Raises
+    RunError of kind "output" when the disk does not take it.
     """
 
     def __init__(self, target: "str | Path | Sink", clock: Clock, about: LogHeader) -> None:
@@ -70,6 +72,9 @@ class Recorder:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if self._file is not None:
+            if not self._file.failed:
+                with suppress(RunError):  # why the run broke off is worth more than that its log did, too
+                    self._writer.finish()
             self._file.abandon()
 
 

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
-from mcap.exceptions import EndOfFile, McapError
-from mcap.stream_reader import StreamReader
+from mcap.exceptions import McapError
 from zstandard import ZstdError
 
 from simscen.core.errors import InvalidInput
@@ -15,12 +14,11 @@ from simscen.core.trace import Trace
 from simscen.record.contents import Contents, Foreign
 from simscen.record.header import LogHeader
 from simscen.record.logfile import PARTIAL_SUFFIX
+from simscen.record.openlog import WholeRecords, open_log
 from simscen.record.writer import MAGIC
 
-LARGEST_RECORD = 1 << 28
-
 # What the libraries and our own readers raise on bytes that no Recorder wrote.
-_DAMAGE = (
+DAMAGE = (
     McapError,
     ZstdError,
     struct.error,
@@ -46,6 +44,14 @@ class Log:
     complete: bool
 
 
+def read_run(path: Path) -> Log:
+    """Read a log to judge or draw its run. Raises InvalidInput as `read_log` does, and where there is no truth."""
+    log = read_log(path)
+    if not len(log.trace.truth):
+        raise invalid(path, "SC803", "the log holds no truth: its run broke off before it began")
+    return log
+
+
 def read_log(path: "str | Path", partial: bool | None = None) -> Log:
     """Read a log that a Recorder wrote.
 
@@ -57,19 +63,19 @@ def read_log(path: "str | Path", partial: bool | None = None) -> Log:
     forgiving = path.name.endswith(PARTIAL_SUFFIX) if partial is None else partial
     contents = Contents()
     try:
-        with path.open("rb") as stream:
+        with open_log(path) as stream:
             whole = _read(stream, contents)
         about = contents.header()
         if not whole and not forgiving:
             hint = "to read what there is, name it *.partial.mcap"
-            raise _invalid(path, "SC803", "the log ends too early: its run broke off", hint)
+            raise invalid(path, "SC803", "the log ends too early: its run broke off", hint)
         return Log(about, contents.trace(), contents.result(), whole)
     except OSError as error:
-        raise _invalid(path, "SC800", f"cannot read the log: {error.strerror}") from error
+        raise invalid(path, "SC800", f"cannot read the log: {error.strerror}") from error
     except Foreign as error:
-        raise _invalid(path, "SC801", f"not a log of simscen: {error}") from error
-    except _DAMAGE as error:
-        raise _invalid(path, "SC802", f"the log is damaged: {error or type(error).__name__}") from error
+        raise invalid(path, "SC801", f"not a log of simscen: {error}") from error
+    except DAMAGE as error:
+        raise invalid(path, "SC802", f"the log is damaged: {error or type(error).__name__}") from error
 
 
 def _read(stream: IO[bytes], contents: Contents) -> bool:
@@ -77,28 +83,12 @@ def _read(stream: IO[bytes], contents: Contents) -> bool:
     if stream.read(len(MAGIC)) != MAGIC:
         raise Foreign("it is not an MCAP file")
     stream.seek(0)
-    # The library cannot see a record that is cut short; StreamReader takes anything that can `read`.
-    reader = StreamReader(_Exact(stream), validate_crcs=True, record_size_limit=LARGEST_RECORD)  # type: ignore[arg-type]
-    try:
-        for record in reader.records:
-            contents.take(record)
-    except EndOfFile:
-        return False
-    return contents.end is not None
+    records = WholeRecords(stream)
+    for record in records:
+        contents.take(record)
+    return contents.end is not None and not records.cut
 
 
-class _Exact:
-    """A stream that gives as many bytes as it is asked for, or raises EndOfFile."""
-
-    def __init__(self, stream: IO[bytes]) -> None:
-        self._stream = stream
-
-    def read(self, size: int) -> bytes:
-        data = self._stream.read(size)
-        if len(data) < size:
-            raise EndOfFile
-        return data
-
-
-def _invalid(path: Path, code: str, message: str, hint: str = "") -> InvalidInput:
+def invalid(path: Path, code: str, message: str, hint: str = "") -> InvalidInput:
+    """A problem with a log."""
     return InvalidInput([Problem(str(path), 0, 0, code, message, hint)])

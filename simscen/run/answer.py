@@ -4,18 +4,23 @@ import signal
 from dataclasses import replace
 from pathlib import Path
 
+from simscen.core.errors import InvalidInput, RunError
 from simscen.core.result import RunFailure, RunResult, unfinished
 from simscen.core.sessionevents import Artifacts, RunFinished
 from simscen.judge.resultdata import from_json
+from simscen.record.logfile import PARTIAL_SUFFIX
 from simscen.run.confine import MEMORY_BYTES
 from simscen.run.jobs import Job, PreparerDeath, ProcessEnd
 from simscen.run.laststack import innermost, tail
 from simscen.run.repeat_command import repeat_command, shown
 
+LARGEST_TO_RECOVER = 64 << 20
+"""Bytes of a log that is made whole while other runs wait to be heard: a second or two."""
+
 
 def answer_to(job: Job, end: ProcessEnd | PreparerDeath) -> RunFinished:
     """The answer to a run. It passed or failed only if its process ended by itself, with status 0 and a last word."""
-    failure = _failure(end)
+    failure = _with_log(_failure(end), job.folder)
     printed = tail(end.printed)
     result = _result(job, printed) if failure is None else unfinished(job.key, job.scenario.path, failure)
     return RunFinished(
@@ -70,6 +75,24 @@ def _failure(end: ProcessEnd | PreparerDeath) -> RunFailure | None:
     if end.left_processes:
         return _fault(end, "left a process behind, which was killed")
     return None
+
+
+def _with_log(failure: RunFailure | None, folder: Path) -> RunFailure | None:
+    """The same, with where the log of what happened until then is. What the worker could not finish is finished now."""
+    log = folder / f"run{PARTIAL_SUFFIX}"
+    if failure is None or not log.exists():
+        return failure
+    from simscen.record.recover import recover
+
+    how = ""
+    if log.stat().st_size > LARGEST_TO_RECOVER:
+        how = ", which `simscen log recover` makes whole"
+    else:
+        try:
+            recover(log)
+        except (InvalidInput, RunError) as error:
+            how = f" ({error})"
+    return replace(failure, message=f"{failure.message}; its log until then is {log.name}{how}")
 
 
 def _fault(end: ProcessEnd, message: str, kind: str = "crashed") -> RunFailure:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from simscen.run.jobs import Job, PreparerDeath, ProcessEnd, packed
-from simscen.run.warmprocess import Silent, WarmProcess
+from simscen.run.warmprocess import Death, Silent, WarmProcess
 
 SILENCE = 30.0
 """Seconds without a sign of life after which the warm process is taken for dead; it gives one each second."""
@@ -66,9 +66,9 @@ def supervise(
 class _Supervisor:
     """Jobs wait, run, and are answered.
 
-    When the warm process dies, the job that it was preparing is to blame and its neighbours run again in the next
-    one. When it was preparing none, any of those under way may have killed it: they are `suspects`, each of which
-    runs again by itself, and is to blame when that happens again.
+    When the warm process dies by itself, the job that it was preparing is to blame, and its neighbours run again in
+    the next one. Otherwise any of those under way may have killed it: they are `suspects`, each of which runs again by
+    itself, and is to blame when that happens again.
     """
 
     def __init__(self, jobs: Iterable[Job], workers: int, entry: Sequence[str], go_on: Callable[[], bool]) -> None:
@@ -87,10 +87,10 @@ class _Supervisor:
             try:
                 yield from self._converse(warm)
             except EOFError:
-                yield from self._after_death(*warm.autopsy(), silent=False)
+                yield from self._after_death(warm.autopsy(), silent=False)
             except Silent:
                 warm.abort()
-                yield from self._after_death(*warm.autopsy(), silent=True)
+                yield from self._after_death(warm.autopsy(), silent=True)
             finally:
                 warm.leave()
 
@@ -137,19 +137,21 @@ class _Supervisor:
                 self._alive = True
         return None
 
-    def _after_death(self, how: str, printed: str, silent: bool) -> Iterator[Happening]:
+    def _after_death(self, death: Death, silent: bool) -> Iterator[Happening]:
         """Answer the jobs that are to blame; the others run again."""
-        under_way, culprit = list(self._running.values()), self._preparing
+        under_way, prepared = list(self._running.values()), self._preparing
         self._running.clear()
         self._preparing = None
-        how = "did not answer and " + how if silent else how
+        # A SIGKILL comes from outside, perhaps from a neighbour; everything else it did by itself.
+        culprit = prepared if silent or death.code != -signal.SIGKILL or len(under_way) == 1 else None
+        how = f"did not answer and {death.how}" if silent else death.how
         if not self._alive:  # it cannot even start, and will not for any other
             under_way += [*self._suspects, *self._waiting]
             self._suspects.clear()
             self._waiting.clear()
         for job in under_way:
             if job is culprit or job.number in self._tried or not self._alive:
-                yield Ended(job, PreparerDeath(how, job is culprit, silent and job is culprit, printed))
+                yield Ended(job, PreparerDeath(how, job is prepared, silent and job is culprit, death.printed))
             elif culprit is not None:
                 self._waiting.appendleft(job)
             else:

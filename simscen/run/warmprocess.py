@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Sequence
 from tempfile import TemporaryFile
+from typing import NamedTuple
 
 from simscen.run.confine import environment
 
@@ -17,6 +18,14 @@ AT_ONCE = 1 << 16
 
 class Silent(Exception):
     """It has said nothing for too long."""
+
+
+class Death(NamedTuple):
+    """How it ended, in words and as Popen's return code, and the end of what it printed."""
+
+    how: str
+    code: int
+    printed: str
 
 
 class WarmProcess:
@@ -67,8 +76,8 @@ class WarmProcess:
     def _post(self) -> None:
         try:
             del self._outbox[: os.write(self._send, self._outbox[:AT_ONCE])]
-        except BrokenPipeError:
-            raise EOFError from None
+        except BrokenPipeError:  # it is dead; what it said before that is still to be heard
+            self._outbox.clear()
 
     def _received(self) -> bytes:
         data = os.read(self._hear, AT_ONCE)
@@ -90,8 +99,8 @@ class WarmProcess:
         """Let it dump its stack and die."""
         self._process.send_signal(signal.SIGABRT)
 
-    def autopsy(self) -> tuple[str, str]:
-        """Of one that is dead, or should be in a second: how it ended, and the end of what it printed."""
+    def autopsy(self) -> Death:
+        """Look at one that is dead, or should be in a second."""
         try:
             self._process.wait(timeout=1)
         except subprocess.TimeoutExpired:
@@ -100,7 +109,7 @@ class WarmProcess:
         printed = os.pread(self._printed.fileno(), TAIL_BYTES, max(0, size - TAIL_BYTES))
         code = self._process.returncode
         how = f"was killed ({signal.Signals(-code).name})" if code < 0 else f"exited {code}"
-        return how, printed.decode(errors="replace")
+        return Death(how, code, printed.decode(errors="replace"))
 
     def _kill(self) -> None:
         os.killpg(self._process.pid, signal.SIGKILL)

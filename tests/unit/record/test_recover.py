@@ -1,0 +1,86 @@
+"""The log of a run that broke off is made whole for readers that begin with the index."""
+
+import os
+import signal
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+from moments import CLOCK, about, moments
+
+from simscen.core.errors import InvalidInput
+from simscen.record.recorder import Recorder
+from simscen.record.recover import recover
+from simscen.record.replay import read_log
+
+
+def messages(path: Path) -> list[tuple[str, int, bytes]]:
+    with path.open("rb") as stream:
+        reader = make_reader(stream)
+        assert reader.get_summary() is not None
+        return [(channel.topic, message.log_time, message.data) for _, channel, message in reader.iter_messages()]
+
+
+def killed(folder: Path, seconds: float) -> Path:
+    """The log of a process that a SIGKILL ended after so many simulated seconds."""
+    child = os.fork()
+    if child == 0:
+        recorder = Recorder(folder / "run.mcap", CLOCK, about())
+        for moment in moments(seconds):
+            recorder.append(moment)
+        os.kill(os.getpid(), signal.SIGKILL)
+    os.waitpid(child, 0)
+    return folder / "run.partial.mcap"
+
+
+@pytest.fixture
+def whole(tmp_path: Path) -> Path:
+    path = tmp_path / "whole.mcap"
+    with Recorder(path, CLOCK, about()) as recorder:
+        for moment in moments(5.0):
+            recorder.append(moment)
+        recorder.close(CLOCK.ticks(5.0))
+    return path
+
+
+def test_71_a_log_cut_anywhere_opens_in_a_reader_that_begins_with_the_index(tmp_path: Path, whole: Path) -> None:
+    expected, size = messages(whole), whole.stat().st_size
+    for kept in (0.9, 0.7, 0.31):
+        cut = tmp_path / "cut.partial.mcap"
+        cut.write_bytes(whole.read_bytes()[: int(size * kept)])
+        before = read_log(cut).trace
+        assert recover(cut)
+        found = messages(cut)
+        assert found == expected[: len(found)]
+        assert not read_log(cut).complete
+        assert read_log(cut).trace.truth.values.tolist() == before.truth.values.tolist()
+        assert not recover(cut), "it is whole now"
+        assert [path.name for path in tmp_path.iterdir() if path.name.startswith(".")] == []
+
+
+def test_71_a_killed_log_keeps_95_percent_for_other_readers(tmp_path: Path, whole: Path) -> None:
+    cut = killed(tmp_path, 5.0)
+    recover(cut)
+    assert len(messages(cut)) >= 0.95 * len(messages(whole))
+
+
+def test_a_run_that_breaks_off_by_itself_leaves_a_log_that_opens(tmp_path: Path) -> None:
+    with pytest.raises(ZeroDivisionError), Recorder(tmp_path / "run.mcap", CLOCK, about()) as recorder:
+        for moment in moments(1.0):
+            recorder.append(moment)
+        raise ZeroDivisionError
+    partial = tmp_path / "run.partial.mcap"
+    assert len(messages(partial)) > 100
+    log = read_log(partial)
+    assert not log.complete
+    assert log.trace.end == CLOCK.ticks(1.0)
+
+
+@pytest.mark.parametrize("content", [b"", b"no log", b"\x89MCAP0\r\n", b"\x89MCAP0\r\n" + bytes(100)])
+def test_what_is_no_log_is_left_as_it_is(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "x.partial.mcap"
+    path.write_bytes(content)
+    with pytest.raises(InvalidInput):
+        recover(path)
+    assert path.read_bytes() == content
+    assert list(tmp_path.iterdir()) == [path]
