@@ -94,9 +94,10 @@ class Checks:
         """What only building a world can tell, or why it cannot be used."""
         try:
             source = load_world_file(file, self.root, self.world_path)
+            notes = list(source.map.notes) if source.map else []
             if self.fast:
-                return []
-            return notes_of(world_of(source, self.root, self.world_path, self.lenient), source, self.root)
+                return notes
+            return [*notes, *notes_of(world_of(source, self.root, self.world_path, self.lenient), source, self.root)]
         except InvalidInput as error:
             return error.problems
 

@@ -55,7 +55,7 @@ def _problems(kind: str, file: Path, checks: Checks) -> list[Problem]:
     if kind == "scenario":
         return checks.scenario(file)[1]
     found = problems_of(kind, file, checks.root, checks.world_path)
-    return found if found or kind != "world" else checks.world(file)
+    return found if found or kind == "robot" else checks.world(file)
 
 
 @dataclass

@@ -13,7 +13,7 @@ from simscen.loading.loaded import LoadedMap, LoadedRobot, LoadedWorld
 from simscen.loading.messages import quoted, suggestion
 from simscen.loading.paths import Refusal
 from simscen.loading.source import read_text
-from simscen.loading.tree import Fields, Leaf, Node, Place, value_place
+from simscen.loading.tree import Fields, Leaf, Node, Place, key_place, value_place
 from simscen.loading.validation import check
 from simscen.model.robot import RobotSpec
 from simscen.model.rosmap import RosMapSpec
@@ -105,7 +105,7 @@ class Assets:
         if spec is None or tree is None:
             return None
         image = self._find(spec.image, value_place(tree, ("image",)))
-        return LoadedMap(path, spec, image) if image else None
+        return LoadedMap(path, spec, image, tuple(self.library.with_source(_unread(tree)))) if image else None
 
     def _tree(self, path: Path) -> Node | None:
         tree, problems = self.library.read(path)
@@ -138,6 +138,22 @@ class Assets:
 def is_ros_map(tree: Node | None) -> bool:
     """Whether a YAML file is a map of map_server rather than a world of ours."""
     return isinstance(tree, Fields) and "image" in tree.entries and "resolution" in tree.entries
+
+
+def _unread(tree: Node) -> list[Problem]:
+    """The keys that map_server does not read: its files are published with all sorts of them."""
+    if not isinstance(tree, Fields):
+        return []
+    unread = [key for key in tree.entries if key not in RosMapSpec.model_fields]
+    return [
+        Problem(*key_place(tree, (key,)), "SC311", f"{quoted(key)} means nothing in a ROS map", _meant(key), "warning")
+        for key in unread
+    ]
+
+
+def _meant(key: str) -> str:
+    near = suggestion(key, RosMapSpec.model_fields)
+    return near if near.startswith("did you mean") else "it is ignored, as map_server ignores it"
 
 
 def shipped_robots() -> dict[str, Path]:

@@ -15,11 +15,12 @@ from simscen.model.world import WorldSpec
 
 @dataclass(frozen=True)
 class LoadedMap:
-    """A ROS map: `path` of its yaml, `image` of its pixels."""
+    """A ROS map: `path` of its yaml, `image` of its pixels; `notes` are warnings about keys that mean nothing."""
 
     path: Path
     spec: RosMapSpec
     image: Path
+    notes: tuple[Problem, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -76,6 +76,9 @@ def _with_assets(spec: ScenarioSpec, tree: Fields, library: Library, file: Path)
         tree=tree,
         sources=dict(library.texts),
         files=dict(library.files),
+        notes=tuple(
+            dict.fromkeys(note for used in (world.map, robot_map) if used and used != "none" for note in used.notes)
+        ),
     )
     return sorted(inconsistencies(loaded)) or loaded
 

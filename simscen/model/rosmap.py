@@ -2,14 +2,16 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import ConfigDict, Field, ValidationInfo, field_validator
 
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Length, PositiveLength, Probability
 
 
 class RosMapSpec(Spec):
-    """A ROS map: an image and what its greys mean (nav2_map_server, map_io.cpp)."""
+    """A ROS map: an image and what its greys mean (nav2_map_server, map_io.cpp, which reads no other keys)."""
+
+    model_config = ConfigDict(extra="ignore")
 
     image: Annotated[str, Field(min_length=1, max_length=4096)]
     """The image file (pgm, png, bmp), relative to this file."""
