@@ -45,6 +45,7 @@ _EXAMPLES = {
     "event": "cart appears",
     "goal": "shelf",
     "recovery": "spin",
+    "with": "cart",
 }
 
 

@@ -116,7 +116,7 @@ def _bound(
 ) -> Finding:
     if math.isnan(value):
         raise BrokenTrace(f"{what} is not a number")
-    digits = _digits(value, limit)
+    digits = decimals(value, limit)
     text = f"{relation} {quantity(limit, unit, digits)} {context}".rstrip()
     return Finding(
         _status(margin),
@@ -146,7 +146,7 @@ def _spot(at: tuple[Trace, int] | None) -> tuple[int | None, tuple[float, float]
     return tick, trace.place(tick) if len(trace.truth) else None
 
 
-def _digits(value: float, limit: float) -> int:
+def decimals(value: float, limit: float) -> int:
     """As many decimals as tell the two apart: "0.50 s > 0.50 s" would explain nothing."""
     if value == limit or not math.isfinite(value) or not math.isfinite(limit):
         return 2

@@ -2,6 +2,8 @@
 
 from typing import Annotated, ClassVar, Literal
 
+from pydantic import BaseModel, model_validator
+
 from simscen.criteria.base import Criterion
 from simscen.spec.base import Choice
 from simscen.spec.ondemand import OnDemand
@@ -11,12 +13,14 @@ from simscen.spec.places import Name
 class AnyCriterion(Choice):
     """One pass criterion."""
 
-    modifiers: ClassVar[frozenset[str]] = frozenset({"id", "severity"})
+    modifiers: ClassVar[frozenset[str]] = frozenset({"id", "severity", "then"})
 
     id: Name | None = None
     """What the verdict is called in reports; default: the criterion's key."""
     severity: Literal["fail", "warn"] = "fail"
     """Whether a violation fails the run or is only reported."""
+    then: Annotated[BaseModel | None, OnDemand("simscen.criteria.condition", "Condition")] = None
+    """Beside `whenever` alone: the condition that must hold then."""
 
     goals_reached: Annotated[Criterion | None, OnDemand("simscen.criteria.goals_reached", "GoalsReached")] = None
     result: Annotated[Criterion | None, OnDemand("simscen.criteria.result", "Result")] = None
@@ -40,3 +44,22 @@ class AnyCriterion(Choice):
     ] = None
     replans: Annotated[Criterion | None, OnDemand("simscen.criteria.replans", "Replans")] = None
     recoveries: Annotated[Criterion | None, OnDemand("simscen.criteria.recoveries", "Recoveries")] = None
+    always: Annotated[Criterion | None, OnDemand("simscen.criteria.always", "Always")] = None
+    eventually: Annotated[Criterion | None, OnDemand("simscen.criteria.eventually", "Eventually")] = None
+    until: Annotated[Criterion | None, OnDemand("simscen.criteria.until", "Until")] = None
+    whenever: Annotated[BaseModel | None, OnDemand("simscen.criteria.whenever", "Whenever")] = None
+
+    @model_validator(mode="after")
+    def _whenever_then(self) -> "AnyCriterion":
+        if (self.whenever is None) != (self.then is None):
+            raise ValueError("`whenever` and `then` belong together")
+        return self
+
+    @property
+    def chosen(self) -> BaseModel:
+        """The criterion; of `whenever` the two halves in one."""
+        if self.whenever is None:
+            return super().chosen
+        from simscen.criteria.whenever import Response
+
+        return Response.of(self.whenever, self.then)

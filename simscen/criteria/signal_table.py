@@ -136,7 +136,7 @@ SIGNALS: dict[SignalName, Signal] = {
         values.localized,
     ),
     "in_region": _yes_or_no("The robot's centre is truly in a region of the world.", values.in_region, ("region",)),
-    "in_collision": _yes_or_no("The robot touches something, or this object.", values.in_collision, (), "object"),
+    "in_collision": _yes_or_no("The robot touches something, or this thing.", values.in_collision, (), "with"),
     "goal_active": _yes_or_no("The robot drives to a goal, or to this one.", values.goal_active, (), "goal"),
     "recovery_active": _yes_or_no("A recovery is under way, or this one.", values.recovery_active, (), "recovery"),
     "fault_active": _yes_or_no("The fault is at work.", values.active, ("fault",)),

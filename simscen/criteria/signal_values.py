@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from simscen.core.trace import Trace
 
 Of = Mapping[str, object]
-"""What a signal is about: object, point, goal, region, fault, event or recovery, as the condition names it."""
+"""What a signal is about: object, point, goal, region, fault, event, recovery or with, as the condition names it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,7 +178,7 @@ def in_region(asked: Asked) -> Array:
 def in_collision(asked: Asked) -> Array:
     """Between the begin and the end of a contact."""
     return _truths(
-        _between(asked.trace, EventKind.COLLISION_STARTED, (EventKind.COLLISION_ENDED,), asked.of.get("object"))
+        _between(asked.trace, EventKind.COLLISION_STARTED, (EventKind.COLLISION_ENDED,), asked.of.get("with"))
     )
 
 

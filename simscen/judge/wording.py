@@ -9,7 +9,7 @@ DISTURBANCE = "disturbance"
 """What the verdicts on events and faults are called that did not happen; the id is the name of the event or fault."""
 SHOWN = 5
 """So many times of a disturbance that came again and again are told."""
-_RELATIONS = {"≤ ": ("≤ ", "> "), "≥ ": ("≥ ", "< ")}
+_RELATIONS = {"≤ ": ("≤ ", "> "), "≥ ": ("≥ ", "< "), "< ": ("< ", "≥ "), "> ": ("> ", "≤ ")}
 
 
 def comparison(finding: Finding) -> str:
@@ -80,5 +80,5 @@ def tightest(verdicts: Sequence[Verdict]) -> str:
 def _slack(finding: Finding) -> float:
     """The margin as a share of the limit."""
     margin, value = finding.margin or 0.0, finding.value or 0.0
-    limit = value - margin if finding.limit.startswith("≥") else value + margin
+    limit = value - margin if finding.limit.startswith(("≥", ">")) else value + margin
     return margin / abs(limit) if limit else margin

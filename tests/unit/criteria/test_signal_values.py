@@ -266,8 +266,8 @@ def test_what_is_shorter_than_a_sample_counts_at_the_next_one():
     events = [[1.01, "collision.started", "box"], [1.02, "collision.ended", "box"]]
     words = {"seconds": 3, "truth": [[0, 0, 0]], "events": events}
     assert np.flatnonzero(signal("in_collision", words)).tolist() == [41]
-    assert np.flatnonzero(signal("in_collision", words, object="box")).tolist() == [41]
-    assert not signal("in_collision", words, object="wall").any()
+    assert np.flatnonzero(signal("in_collision", words, **{"with": "box"})).tolist() == [41]
+    assert not signal("in_collision", words, **{"with": "wall"}).any()
 
 
 def test_contacts_with_two_things_end_each_for_itself():

@@ -1,0 +1,255 @@
+"""What a condition is worth on a run: how well it holds at each sample, and which moment decides that.
+
+Every comparison becomes its distance to the bound, positive where it holds. Where the two are equal, the distance is
+the smallest number with the right sign, so that `>=` and `>`, and with `not` also `<` and `<=`, keep their difference
+and the sign alone is the verdict. Yes or no is infinitely far from its bound: it decides, and leaves the margin to
+others.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from simscen.core.geometry import Array
+from simscen.criteria import monitor
+from simscen.criteria.bounds import BrokenTrace
+from simscen.criteria.condition import Condition, Window
+from simscen.criteria.monitor import Ahead
+from simscen.criteria.signal_table import read
+
+if TYPE_CHECKING:
+    from simscen.core.case import Case
+    from simscen.core.trace import Trace
+
+TIE = float(np.finfo(np.float64).tiny)
+"""Stands for a distance of zero, with the sign of the answer."""
+
+BROKEN, DUE = "what had to hold until then was broken", "the answer was due"
+
+Side = Literal["low", "high"]
+
+
+@dataclass(frozen=True)
+class Witness:
+    """The comparison that decides, the sample at which it does, and the signal there; `negated` below a `not`.
+
+    `notes` are other samples that belong to the story, with what was there.
+    """
+
+    comparison: Condition
+    sample: int
+    value: float
+    negated: bool = False
+    notes: tuple[tuple[str, int], ...] = ()
+
+    def noting(self, what: str, sample: int) -> Witness:
+        """The same with one more note."""
+        return replace(self, notes=((what, sample), *self.notes))
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """How well a condition holds at each sample: from `low`, if what is not known is as bad as can be, to `high`."""
+
+    low: Array
+    high: Array
+
+    def side(self, side: Side) -> Array:
+        """One of the two."""
+        return self.low if side == "low" else self.high
+
+    def witness(self, sample: int, side: Side) -> Witness:
+        """What decides the value at a sample that is known."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, eq=False)
+class _Compared(Judged):
+    comparison: Condition
+    values: Array
+
+    def witness(self, sample: int, side: Side) -> Witness:
+        return Witness(self.comparison, sample, float(self.values[sample]))
+
+
+@dataclass(frozen=True, eq=False)
+class _Not(Judged):
+    part: Judged
+
+    def witness(self, sample: int, side: Side) -> Witness:
+        found = self.part.witness(sample, "high" if side == "low" else "low")
+        return replace(found, negated=not found.negated)
+
+
+@dataclass(frozen=True, eq=False)
+class _Combined(Judged):
+    parts: Sequence[Judged]
+
+    def witness(self, sample: int, side: Side) -> Witness:
+        decides = next(part for part in self.parts if part.side(side)[sample] == self.side(side)[sample])
+        return decides.witness(sample, side)
+
+
+@dataclass(frozen=True, eq=False)
+class _InTime(Judged):
+    """Always or eventually: the first sample of the window that has the value decides."""
+
+    part: Judged
+    window: monitor.Window
+
+    def witness(self, sample: int, side: Side) -> Witness:
+        return self.part.witness(_first(self.part.side(side), self.side(side)[sample], sample, self.window), side)
+
+
+@dataclass(frozen=True, eq=False)
+class _Until(Judged):
+    hold: Judged
+    release: Judged
+    window: monitor.Window
+
+    def witness(self, sample: int, side: Side) -> Witness:
+        """The best release, or what breaks the hold before it."""
+        held, freed = self.hold.side(side)[sample:], self.release.side(side)[sample:]
+        before = np.concatenate(([math.inf], np.minimum.accumulate(held)[:-1]))
+        best = np.minimum(before, freed)
+        end = None if self.window.last is None else self.window.last + 1
+        at = self.window.first + int(np.argmax(best[self.window.first : end]))
+        if freed[at] <= before[at]:
+            decides = self.release.witness(sample + at, side)
+        else:
+            decides = self.hold.witness(sample + int(np.argmin(held[:at])), side)
+        broken = np.flatnonzero(held[:end] < 0)
+        return decides.noting(BROKEN, sample + int(broken[0])) if best[at] < 0 and len(broken) else decides
+
+
+@dataclass(frozen=True, eq=False)
+class _Response(Judged):
+    """Always: the premise does not hold or the response does."""
+
+    part: Judged
+    window: monitor.Window
+
+    def witness(self, sample: int, side: Side) -> Witness:
+        at = _first(self.part.side(side), self.side(side)[sample], sample, self.window)
+        return self.part.witness(at, side).noting(DUE, at)
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A run as formulas see it: samples of the truth, `period` ticks apart."""
+
+    trace: Trace
+    case: Case
+    period: int
+    over: bool
+
+    @classmethod
+    def of(cls, trace: Trace, case: Case, over: bool) -> Scene:
+        """Raises BrokenTrace when the samples are not evenly spaced."""
+        steps = np.diff(trace.truth.ticks)
+        if len(steps) and (steps != steps[0]).any():
+            at = trace.seconds(int(trace.truth.ticks[int(np.argmax(steps != steps[0]))]))
+            raise BrokenTrace(f"the samples of the truth are not evenly spaced after t = {at:.2f} s")
+        return cls(trace, case, int(steps[0]) if len(steps) else 1, over)
+
+    def window(self, window: Window) -> monitor.Window:
+        """In samples. Raises BrokenTrace when there is none in it."""
+        begin, end = window.stretch
+        first = -(-round(begin * self.trace.tick_rate) // self.period)
+        last = None if end is None else round(end * self.trace.tick_rate) // self.period
+        if last is not None and last < max(first, 1):
+            apart = self.trace.seconds(self.period)
+            raise BrokenTrace(f"the window up to {end:g} s ahead holds no sample: they are {apart:g} s apart")
+        return monitor.Window(first, last)
+
+
+def judged(condition: Condition, scene: Scene) -> Judged:
+    """The value of a condition at each sample. Raises Unavailable or BrokenTrace for its signals."""
+    if condition.signal is not None:
+        return _compared(condition, scene)
+    if condition.not_ is not None:
+        part = judged(condition.not_, scene)
+        return _Not(-part.high, -part.low, part)
+    if condition.all is not None:
+        return _combined([judged(part, scene) for part in condition.all], "all")
+    if condition.any is not None:
+        return _combined([judged(part, scene) for part in condition.any], "any")
+    if condition.always is not None:
+        return in_time(judged(condition.always, scene), scene.window(condition.always), scene, "always")
+    if condition.eventually is not None:
+        return in_time(judged(condition.eventually, scene), scene.window(condition.eventually), scene, "eventually")
+    if condition.until is not None:
+        until = condition.until
+        return released(judged(until.hold, scene), judged(until.release, scene), scene.window(until), scene)
+    assert condition.whenever is not None and condition.then is not None
+    return response(judged(condition.whenever, scene), judged(condition.then, scene), monitor.Window(0, None), scene)
+
+
+def in_time(part: Judged, window: monitor.Window, scene: Scene, operator: Literal["always", "eventually"]) -> Judged:
+    """Always or eventually in a window."""
+    over = monitor.always if operator == "always" else monitor.eventually
+    low, high = (over(part.side(side), window, ahead) for side, ahead in _continuations(scene))
+    return _InTime(low, high, part, window)
+
+
+def released(hold: Judged, release: Judged, window: monitor.Window, scene: Scene) -> Judged:
+    """`hold` until `release` in a window."""
+    sides = _continuations(scene)
+    low, high = (monitor.until(hold.side(side), release.side(side), window, ahead) for side, ahead in sides)
+    return _Until(low, high, hold, release, window)
+
+
+def response(premise: Judged, answer: Judged, window: monitor.Window, scene: Scene) -> Judged:
+    """Whenever `premise` holds in the window, `answer` does."""
+    implied = _combined([_Not(-premise.high, -premise.low, premise), answer], "any")
+    always = in_time(implied, window, scene, "always")
+    return _Response(always.low, always.high, implied, window)
+
+
+def _continuations(scene: Scene) -> list[tuple[Side, Ahead]]:
+    return [("low", Ahead(-math.inf, scene.over)), ("high", Ahead(math.inf, scene.over))]
+
+
+def _combined(parts: Sequence[Judged], how: Literal["all", "any"]) -> Judged:
+    pick = np.minimum if how == "all" else np.maximum
+    low, high = reduce(pick, [part.low for part in parts]), reduce(pick, [part.high for part in parts])
+    return _Combined(low, high, parts)
+
+
+def _compared(condition: Condition, scene: Scene) -> Judged:
+    assert condition.signal is not None
+    values = read(condition.signal, scene.trace, scene.case, condition.about)
+    if np.isnan(values).any():
+        at = scene.trace.seconds(int(scene.trace.truth.ticks[int(np.argmax(np.isnan(values)))]))
+        raise BrokenTrace(f"{condition.signal} is not a number at t = {at:.2f} s")
+    if condition.measured.asks:
+        sure = np.where(values > 0.5, math.inf, -math.inf)
+        return _Compared(sure, sure, condition, values)
+    distances = _distances(condition, values)
+    if condition.signal != "clearance":
+        return _Compared(distances, distances, condition, values)
+    further = _distances(condition, np.where(values >= scene.case.clearance_range, math.inf, values))
+    return _Compared(np.minimum(distances, further), np.maximum(distances, further), condition, values)
+
+
+def _distances(condition: Condition, values: Array) -> Array:
+    """To the bound, in scales where there is one; positive where the comparison holds."""
+    assert condition.value is not None
+    above = condition.op in (">=", ">")
+    distances = (values - condition.value if above else condition.value - values) / (condition.scale or 1.0)
+    tie = TIE if condition.op in (">=", "<=") else -TIE
+    signed: Array = np.where(values == condition.value, tie, distances)
+    return signed
+
+
+def _first(values: Array, wanted: float, sample: int, window: monitor.Window) -> int:
+    """The first sample in the window that has a value."""
+    begin = sample + window.first
+    end = None if window.last is None else sample + window.last + 1
+    return begin + int(np.argmax(values[begin:end] == wanted))

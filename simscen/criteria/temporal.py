@@ -1,0 +1,76 @@
+"""How a temporal formula becomes a finding: verdict, margin, and the moment that decided."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from simscen.core.verdict import Finding, Status
+from simscen.criteria import condition_words
+from simscen.criteria.bounds import undecided
+from simscen.criteria.formula import TIE, Judged, Scene, Side, Witness
+from simscen.criteria.moments import ending, finished
+from simscen.criteria.signal_values import Unavailable
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from simscen.core.case import Case
+    from simscen.core.trace import Trace
+    from simscen.criteria.condition import Condition
+
+
+def finding(
+    trace: Trace, case: Case, told: str, comparisons: Iterable[Condition], judge: Callable[[Scene], Judged]
+) -> Finding:
+    """The verdict at the first sample. `told` is the formula in words, `judge` evaluates it."""
+    compared = list(comparisons)
+    try:
+        answer = judge(Scene.of(trace, case, finished(trace)))
+    except Unavailable as missing:
+        return undecided("", str(missing), told)
+    low, high = float(answer.low[0]), float(answer.high[0])
+    if low > 0:
+        return _decided(trace, told, compared, answer, "low", low)
+    if high < 0:
+        return _decided(trace, told, compared, answer, "high", high)
+    return undecided("", f"the run ended at t = {trace.seconds(trace.end):.2f} s ({ending(trace)}), too soon", told)
+
+
+def _decided(trace: Trace, told: str, compared: list[Condition], answer: Judged, side: Side, value: float) -> Finding:
+    witness = answer.witness(0, side)
+    tick = int(trace.truth.ticks[witness.sample])
+    asks = witness.comparison.measured.asks
+    unit = _unit(compared)
+    return Finding(
+        status=Status.PASS if value > 0 else Status.FAIL,
+        what=condition_words.subject(witness.comparison),
+        measured=condition_words.measured(witness),
+        limit=condition_words.limit(witness),
+        margin=None if unit is None or math.isinf(value) else _margin(value),
+        unit=unit or "",
+        value=None if asks else witness.value,
+        tick=tick,
+        place=trace.place(tick),
+        detail=_detail(trace, told, witness),
+    )
+
+
+def _margin(value: float) -> float:
+    """A tie that holds has a margin of zero; one that does not keeps its sign."""
+    return 0.0 if value == TIE else value
+
+
+def _detail(trace: Trace, told: str, witness: Witness) -> tuple[str, ...]:
+    times = [(what, trace.seconds(int(trace.truth.ticks[sample]))) for what, sample in witness.notes]
+    return (f"asked: {told}", *(f"{what} at t = {seconds:.2f} s" for what, seconds in times))
+
+
+def _unit(compared: list[Condition]) -> str | None:
+    """The unit of the margin: the signals' own, "" for scales, None where metres would be compared with seconds."""
+    measured = [one for one in compared if not one.measured.asks]
+    if measured and all(one.scale is not None for one in measured):
+        return ""
+    units = {one.measured.unit for one in measured}
+    return units.pop() if len(units) == 1 and all(one.scale is None for one in measured) else None
