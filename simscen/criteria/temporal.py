@@ -41,16 +41,16 @@ def finding(
 def _decided(trace: Trace, told: str, compared: list[Condition], answer: Judged, side: Side, value: float) -> Finding:
     witness = answer.witness(0, side)
     tick = int(trace.truth.ticks[witness.sample])
-    asks = witness.comparison.measured.asks
-    unit = _unit(compared)
+    signal, unit = witness.comparison.measured, _unit(compared)
+    margin = None if unit is None or math.isinf(value) else _margin(value)
     return Finding(
         status=Status.PASS if value > 0 else Status.FAIL,
         what=condition_words.subject(witness.comparison),
         measured=condition_words.measured(witness),
         limit=condition_words.limit(witness),
-        margin=None if unit is None or math.isinf(value) else _margin(value),
-        unit=unit or "",
-        value=None if asks else witness.value,
+        margin=margin,
+        unit=signal.unit if margin is None or unit is None else unit,
+        value=None if signal.asks else witness.value,
         tick=tick,
         place=trace.place(tick),
         detail=_detail(trace, told, witness),
