@@ -6,6 +6,7 @@ from simscen.model.disturbance import EventEntry, FaultEntry
 from simscen.run.faultrig import FaultRig
 from simscen.run.firing import Firing
 from simscen.run.live import LiveStage
+from simscen.run.streamnames import stream_names
 from simscen.triggers.time import Time
 from simscen.triggers.trigger import Trigger
 
@@ -20,12 +21,12 @@ class Director:
     ) -> None:
         self._stage, self._rig, self._faults = stage, rig, faults
         self._events = [
-            (entry.name or f"event-{number}", entry, Firing(entry.when, streams.generator(f"event#{number}")))
-            for number, entry in enumerate(events, start=1)
+            (entry.name or f"event-{number}", entry, Firing(entry.when, streams.generator(f"event{stream}")))
+            for number, (entry, stream) in enumerate(zip(events, stream_names(events), strict=True), start=1)
         ]
         self._starts = [
-            Firing(entry.when or _AT_THE_START, streams.generator(f"fault-start#{number}"))
-            for number, entry in enumerate(faults, start=1)
+            Firing(entry.when or _AT_THE_START, streams.generator(f"fault-start{stream}"))
+            for entry, stream in zip(faults, stream_names(faults), strict=True)
         ]
         self._ends: dict[int, int | None] = {}
 

@@ -1,5 +1,6 @@
 """The faults of a scenario, between the sensors and the stack, and between the stack and the wheels."""
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 
@@ -11,6 +12,7 @@ from simscen.core.motion import Twist
 from simscen.core.sensing import Reading, Readings
 from simscen.faults.base import Disturbance, Wheels
 from simscen.model.disturbance import FaultEntry
+from simscen.run.streamnames import stream_names
 
 ROUNDING = 1e-9
 """What a fault that changes nothing may still change in a number, by adding increments up."""
@@ -34,19 +36,24 @@ class FaultRig:
     ) -> None:
         """`note` takes a fault.took_effect when a fault changes its first message or command."""
         self._faults, self._streams, self._wheels, self._note = faults, streams, wheels, note
-        self._active: dict[int, _Active] = {}
+        self._names = stream_names(faults)
+        self._begun: Counter[int] = Counter()
+        # By number of the fault and count of its activations: what one activation leaves behind, the next builds on.
+        self._active: dict[tuple[int, int], _Active] = {}
 
     def begin(self, index: int) -> None:
-        """Start the scenario's fault number `index`; its chance is a stream of its own."""
+        """Start the scenario's fault number `index`; each time its chance is a stream of its own."""
         entry = self._faults[index]
-        chance = self._streams.generator(f"fault.{entry.label}#{index}")
-        self._active[index] = _Active(entry.sensor, entry.fault.begin(chance, self._wheels))
+        self._begun[index] += 1
+        chance = self._streams.generator(f"fault{self._names[index]}#{self._begun[index]}")
+        self._active[index, self._begun[index]] = _Active(entry.sensor, entry.fault.begin(chance, self._wheels))
 
     def end(self, index: int) -> int:
         """End it; what it leaves behind stays at work. Returns how many messages and commands it has touched."""
-        active = self._active.pop(index)
+        key = index, self._begun[index]
+        active = self._active.pop(key)
         if rest := active.disturbance.end():
-            self._active[index] = _Active(active.sensor, rest, over=True)
+            self._active[key] = _Active(active.sensor, rest, over=True)
         return active.touched
 
     def disturb(self, readings: Readings) -> Readings:
@@ -58,16 +65,19 @@ class FaultRig:
 
     def command(self, command: Twist) -> Twist:
         """The command as the wheels get it."""
-        for index, active in sorted(self._active.items()):
+        for (index, _), active in self._at_work():
             disturbed = active.disturbance.command(command)
             if not np.allclose(disturbed, command, rtol=0.0, atol=ROUNDING):
                 self._count(index, active)
             command = disturbed
         return command
 
+    def _at_work(self) -> list[tuple[tuple[int, int], _Active]]:
+        return sorted(self._active.items(), key=lambda item: item[0])
+
     def _reading(self, reading: Reading) -> Reading | None:
         current: Reading | None = reading
-        for index, active in sorted(self._active.items()):
+        for (index, _), active in self._at_work():
             if current is not None and active.sensor == reading.sensor:
                 disturbed = active.disturbance.reading(current)
                 if disturbed is None or not _equal(disturbed, current):

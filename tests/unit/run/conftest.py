@@ -1,7 +1,5 @@
 """Whole runs of small scenarios, in this process."""
 
-from pathlib import Path
-
 import pytest
 
 from simscen.core.time import Clock
@@ -27,16 +25,17 @@ pass: [{goals_reached: {}}]
 """
 
 
-@pytest.fixture
-def play(tmp_path: Path):
+@pytest.fixture(scope="module")
+def play(tmp_path_factory: pytest.TempPathFactory):
     """Runs a scenario given as the lines that it has besides or instead of the usual ones; returns its trace."""
 
     def run(extra: str = "", seed: int = 1, **instead: str):
+        folder = tmp_path_factory.mktemp("play")
         lines = {line.split(":")[0]: line for line in SCENARIO.splitlines()}
         lines |= {key: f"{key}: {value}" for key, value in instead.items()}
-        (tmp_path / "room.world.yaml").write_text(ROOM)
-        (tmp_path / "a.scenario.yaml").write_text("\n".join(lines.values()) + "\n" + extra)
-        prepared = prepare(load_scenario(tmp_path / "a.scenario.yaml", tmp_path))
+        (folder / "room.world.yaml").write_text(ROOM)
+        (folder / "a.scenario.yaml").write_text("\n".join(lines.values()) + "\n" + extra)
+        prepared = prepare(load_scenario(folder / "a.scenario.yaml", folder))
         clock = Clock(prepared.spec.physics.tick_rate)
         rig, builder = assemble(prepared, seed), TraceBuilder(clock)
         try:

@@ -1,0 +1,160 @@
+"""What is random about one entry is nobody else's business."""
+
+import math
+
+import numpy as np
+import pytest
+
+from simscen.core.chance import Streams
+from simscen.core.geometry import Pose2
+from simscen.core.motion import Twist
+from simscen.core.sensing import Odometry, Scan
+from simscen.faults.base import Wheels
+from simscen.model.disturbance import EventEntry, FaultEntry
+from simscen.run.faultrig import FaultRig
+from simscen.run.streamnames import stream_names
+
+FAULTS = [
+    "{sensor: lidar, noise: {std: 5 cm}%s}",
+    "{sensor: lidar, beam_dropout: {probability: 30 %%}%s}",
+    "{sensor: lidar, dropout: {probability: 30 %%}%s}",
+    "{sensor: odom, bias: {linear_scale: 1.1}%s}",
+    "{sensor: odom, slip: {left: 0.2, right: 0.1}%s}",
+    "{sensor: lidar, off: {}%s, for: 0.5 s}",
+    "{sensor: odom, dropout: {probability: 50 %%}%s}",
+]
+EVENTS = [
+    "{%s, do: {push: {impulse: [0, 2]}}}",
+    "{%s, do: {spawn: {name: extra, box: [0.3, 0.3, 0.3], ahead: [1, 0.3]}}}",
+    "{%s, do: {kidnap: {pose: {x: 2, y: 3}}}}",
+    "{%s, do: {cancel_goal: {}}}",
+    "{%s, do: {new_goal: {name: elsewhere, pose: {x: 1, y: 4}}}}",
+]
+RANDOM = """\
+events:
+%s  - {name: a, when: {time: 0.2 s, probability: 0.5}, do: {push: {impulse: [0, 1]}}, required: false}
+  - {name: b, when: {time: 0.3 s, probability: 0.5}, do: {push: {impulse: [0, 1]}}, required: false}
+  - {name: c, when: {time: 0.4 s, probability: 0.5}, do: {push: {impulse: [0, 1]}}, required: false}
+  - {name: d, when: {time: 0.5 s, probability: 0.5}, do: {push: {impulse: [0, 1]}}, required: false}
+  - {name: e, when: {time: 0.6 s, probability: 0.5}, do: {push: {impulse: [0, 1]}}, required: false}
+  - {name: f, when: {time: 0.7 s, probability: 0.5}, do: {push: {impulse: [0, 1]}}, required: false}
+faults:
+%s  - {sensor: lidar, noise: {std: 3 cm}}
+  - {sensor: odom, dropout: {probability: 20 %%}, when: {time: 0.5 s}, for: 1 s}
+  - {sensor: imu, dropout: {probability: 20 %%}}
+"""
+TAKES_EFFECT = 240
+
+
+def before(trace, end=TAKES_EFFECT):
+    """Everything of a trace before a tick; which number an entry has in its list is no part of what happened."""
+    samples = [trace.truth, trace.velocity, trace.clearance, trace.belief, trace.odometry, trace.command]
+    events = [
+        (event.tick, str(event.kind), event.name, {k: v for k, v in event.data.items() if k != "entry"})
+        for event in trace.events
+        if event.tick < end
+    ]
+    return [s.values[s.ticks < end].tolist() for s in samples], trace.scans[trace.scans < end].tolist(), events
+
+
+@pytest.fixture(scope="module")
+def plain(play):
+    """The run without any more entries."""
+    return before(play(RANDOM % ("", "")))
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_adding_a_fault_changes_nothing_before_it_takes_effect(play, plain, fault):
+    assert before(play(RANDOM % ("", "  - " + fault % ", when: {time: 1 s}" + "\n"))) == plain
+
+
+@pytest.mark.parametrize("event", EVENTS)
+def test_adding_an_event_changes_nothing_before_it_takes_effect(play, plain, event):
+    assert before(play(RANDOM % ("  - " + event % "when: {time: 1 s}" + "\n", ""))) == plain
+
+
+def rig(*faults):
+    entries = [FaultEntry.model_validate(fault, by_alias=True, by_name=False) for fault in faults]
+    return FaultRig(entries, Streams(7), Wheels(0.3), lambda event: None)
+
+
+def scan(tick=0):
+    return Scan("lidar", tick, np.full(50, 2.0), -math.pi, 0.01, 0.1, 12.0)
+
+
+def seen(rig, ticks=20):
+    """What comes of some scans; None for those that never arrive."""
+    got = [rig.disturb((scan(tick),)) for tick in range(ticks)]
+    return [reading[0].ranges.tolist() if reading else None for reading in got]
+
+
+KINDS = [{"noise": {"std": 0.1}}, {"dropout": {"probability": 0.5}}, {"beam_dropout": {"probability": 0.5}}]
+LATER = {"sensor": "lidar", "when": {"time": "5 s"}}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("other", KINDS)
+@pytest.mark.parametrize("name", [None, "mine"])
+def test_a_fault_that_is_over_leaves_the_draws_of_all_others_alone(kind, other, name):
+    mine = {**LATER, **kind} | ({"name": name} if name else {})
+    alone, beside = rig(mine), rig({"sensor": "lidar", "for": "1 s", **other}, mine)
+    beside.begin(0)
+    seen(beside)
+    beside.end(0)
+    alone.begin(0)
+    beside.begin(1)
+    np.testing.assert_equal(seen(alone), seen(beside))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_fault_that_begins_again_draws_anew(kind):
+    again = rig({**LATER, **kind})
+    drawn = []
+    for _ in range(3):
+        again.begin(0)
+        drawn.append(repr(seen(again)))
+        again.end(0)
+    assert len(set(drawn)) == 3
+
+
+def odometry(k):
+    return Odometry("odom", k, Pose2(0.01 * k, 0.0, 0.0), Twist(0.5, 0.0, 0.0))
+
+
+DISTORTIONS = [{"bias": {"linear_scale": 1.5}}, {"slip": {"left": 0.3, "right": 0.2}}]
+
+
+@pytest.mark.parametrize("first", DISTORTIONS)
+@pytest.mark.parametrize("second", [None, *DISTORTIONS])
+@pytest.mark.parametrize("order", [1, -1])
+def test_the_error_of_odometry_stays_when_the_same_or_another_fault_begins(first, second, order):
+    """The reported pose never jumps by more than a step, and what has been reported too much is never taken back."""
+    entries = [{"sensor": "odom", **kind} for kind in (first, second) if kind]
+    faults = rig(*entries[::order])
+    indices = list(range(len(entries)))[::order]
+    xs = []
+    for k in range(100):
+        if k % 20 == 5:
+            faults.begin(indices[k // 20 % len(indices)])
+        if k % 20 == 15:
+            faults.end(indices[k // 20 % len(indices)])
+        (reading,) = faults.disturb((odometry(k),))
+        xs.append(math.hypot(reading.pose.x, reading.pose.y))
+    steps = np.diff(xs)
+    assert steps.min() > 0
+    assert steps.max() < 0.02
+    assert faults.disturb((odometry(100),))[0].pose.distance(odometry(100).pose) > 0.1
+
+
+def test_streams_are_named_by_what_entries_are_called_or_say_never_by_their_place():
+    def names(*entries):
+        made = [EventEntry.model_validate(entry, by_alias=True, by_name=False) for entry in entries]
+        return stream_names(made)
+
+    push = {"when": {"time": "1 s"}, "do": {"push": {"impulse": [0, 1]}}}
+    pull = {"when": {"time": 1.0, "delay": 0}, "do": {"push": {"impulse": [0, -1]}}}
+    named = {**push, "name": "wind"}
+    assert len(set(names(push, pull, named, push))) == 4
+    assert names(push, pull, named)[0] == names(pull, named, push)[2]
+    assert names(named) == names({**pull, "name": "wind"})
+    assert names(push, pull)[1:] == names({**pull, "when": {"time": "1000 ms"}})
