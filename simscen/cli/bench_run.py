@@ -15,6 +15,7 @@ from simscen.loading.scenario import load_scenario
 from simscen.record.replay import read_log
 from simscen.report.lines import Naming, finished, text_of
 from simscen.run.jobs import Job
+from simscen.run.outfolder import run_folder
 from simscen.run.session import Options, run_session
 from simscen.study.consistency import anees, bounds, nees_at
 from simscen.study.experiments import Experiment
@@ -71,8 +72,7 @@ def _planned(experiments: Sequence[Experiment], out: Path) -> tuple[list[Job], d
                 raise InvalidInput(problems)
             for seed in planned.seeds:
                 key = RunKey(scenario.id, seed)
-                folder = out / scenario.id / key.folder
-                jobs.append(Job(len(jobs), scenario, key, folder, Options().wall_limit))
+                jobs.append(Job(len(jobs), scenario, key, run_folder(out, key), Options().wall_limit))
                 owners[key] = number, planned.reference_length
     return jobs, owners
 

@@ -9,6 +9,7 @@ from simscen.cli.diagnostics import harmless, print_text
 from simscen.core.errors import UsageError
 from simscen.core.version import PACKAGE
 from simscen.loading.discovery import SCENARIO
+from simscen.loading.scenario import unusable_name
 from simscen.loading.source import reason
 
 
@@ -19,6 +20,9 @@ def command(
 
     It is valid and passes as it is. A file that is there already is never overwritten.
     """
+    last = name.rpartition("/")[2]
+    if unusable_name(next((last.removesuffix(suffix) for suffix in SCENARIO if last.endswith(suffix)), last)):
+        raise UsageError(f"{name!r} is no name for a scenario")
     file = Path(name if name.endswith(SCENARIO) else f"{name}{SCENARIO[0]}")
     starter = (PACKAGE / "data" / "starter.scenario.yaml").read_text(encoding="utf-8")
     try:

@@ -7,7 +7,8 @@ import numpy as np
 import typer
 
 from simscen.cli.diagnostics import harmless, print_text
-from simscen.core.errors import InvalidInput, UsageError
+from simscen.cli.outputs import save
+from simscen.core.errors import InvalidInput
 from simscen.core.geometry import Pose2
 from simscen.core.grid import UNKNOWN, OccupancyGrid
 from simscen.core.problems import Problem
@@ -43,7 +44,7 @@ def _log(run: Path) -> Path:
         return run
     found = [run / name for name in LOGS if (run / name).is_file()]
     if not found:
-        hint = "name the folder of one run, e.g. simscen-out/latest/SCENARIO/seed-1"
+        hint = "name the folder of one run, e.g. simscen-out/latest/runs/SCENARIO/seed-1"
         raise InvalidInput([Problem(str(run), 0, 0, "SC800", f"there is no {LOGS[0]} in it", hint)])
     return found[0]
 
@@ -52,11 +53,7 @@ def _draw(log: Log, file: Path, picture: Path) -> None:
     from simscen.report.picture import Scene, write_picture
 
     scene = Scene(log.trace, log.about.case, log.about.map or _nothing(log), _result(log, file))
-    try:
-        write_picture(scene, picture)
-    except (OSError, ValueError) as error:  # Pillow: a suffix that it does not know
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else error
-        raise UsageError(f"cannot write {picture}: {reason}") from error
+    save(picture, lambda path: write_picture(scene, path), [file])
 
 
 def _result(log: Log, file: Path) -> RunResult:

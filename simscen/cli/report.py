@@ -31,7 +31,7 @@ def command(
     """
     past = read_journal(folder)
     require_free(folder)
-    require_writable(junit)
+    require_writable(junit, folder)
     reports = Reports(folder, junit, junit_family.value, only=junit is not None)
     answers = past.answers
     with screen(format_) as shown:

@@ -1,19 +1,26 @@
 """What a session leaves behind: results.json, junit.xml, report.html, run.json; and its exit code."""
 
+import errno
+import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from enum import Enum
 from pathlib import Path
 
 from simscen.cli import circumstances
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import Exit, UsageError
+from simscen.core.outputs import require_no_input
 from simscen.core.result import Outcome
 from simscen.core.sessionevents import RunFinished, SessionFinished
+from simscen.report.journaldata import NAME
 from simscen.report.junit import Family, to_xml
 from simscen.report.page import to_html
 from simscen.report.results import to_json
-from simscen.run.outfolder import probe_writable, write_atomically
+from simscen.run.outfolder import RUNS, probe_writable, write_atomically
+
+OWN = ("results.json", "report.html", "run.json", NAME, RUNS)
+"""What a session writes into its folder beside junit.xml."""
 
 
 class JunitFamily(str, Enum):
@@ -80,15 +87,29 @@ def verdict(answers: Sequence[RunFinished]) -> Exit:
     return Exit.FAILED if Outcome.FAILED in outcomes else Exit.PASSED
 
 
-def require_writable(junit: Path | None) -> None:
-    """Raise UsageError for a report that cannot be written: that should be known before anything runs."""
+def require_writable(junit: Path | None, folder: Path | None, inputs: Iterable[Path] = ()) -> None:
+    """Raise UsageError for a report that cannot be written: that should be known before anything runs.
+
+    Nor may it be one of the `inputs`, or what else simscen writes in its output `folder`.
+    """
     if junit is None:
         return
     try:
+        _require_free_name(junit, folder)
+        require_no_input(junit, inputs)
         junit.parent.mkdir(parents=True, exist_ok=True)
         probe_writable(junit)
     except OSError as error:
         raise UsageError(f"cannot write {junit}: {error.strerror}") from error
+
+
+def _require_free_name(junit: Path, folder: Path | None) -> None:
+    """Raise OSError where simscen writes something else of that name, in this session's folder or another's."""
+    real = Path(os.path.realpath(junit))
+    for home in real.parents:
+        is_output = home == (folder and Path(os.path.realpath(folder))) or (home / NAME).exists()
+        if is_output and real.relative_to(home).parts[0] in OWN:
+            raise OSError(errno.EINVAL, "the output folder has something else of that name")
 
 
 def _written(path: Path, data: bytes) -> bool:

@@ -78,7 +78,7 @@ def command(
     options = Options(workers or _cores(), seed, repeat, check_determinism, fail_fast, wall_limit)
     for scenario in scenarios:
         seeds_of(scenario, options)
-    require_writable(junit)
+    require_writable(junit, out or resume, {file for each in scenarios for file in (*each.files.values(), *each.read)})
     folder, journal = _output_folder(out, resume)
     reports = Reports(folder, junit, junit_family.value)
     reports.begin()

@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-from simscen.cli.diagnostics import print_text
+from simscen.cli.diagnostics import harmless, print_text
+from simscen.cli.outputs import save
 from simscen.core.version import PACKAGE
 
 
@@ -30,11 +31,11 @@ def command(
     if write is None:
         print_text(shipped(kind.value).rstrip())
         return
-    write.mkdir(parents=True, exist_ok=True)
     for each in Kind:
+        text = shipped(each.value)
         file = write / f"{each.value}.schema.json"
-        file.write_text(shipped(each.value), encoding="utf-8")
-        print_text(str(file))
+        save(file, lambda path, text=text: path.write_text(text, encoding="utf-8"))  # type: ignore[misc]
+        print_text(harmless(str(file)))
 
 
 def shipped(kind: str) -> str:

@@ -2,7 +2,6 @@
 
 import json
 import os
-from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Annotated
@@ -11,8 +10,9 @@ import typer
 from pydantic import ValidationError
 
 from simscen.cli.diagnostics import as_text, from_here, harmless, print_text
+from simscen.cli.outputs import save
 from simscen.cli.worldtext import described
-from simscen.core.errors import InvalidInput, UsageError
+from simscen.core.errors import InvalidInput
 from simscen.core.problems import Problem
 from simscen.core.world import World
 from simscen.loading.discovery import default_root
@@ -70,7 +70,7 @@ def inspect(
     if png is not None:
         from simscen.worlds.picture import picture
 
-        _save(png, lambda file: picture(built, height).save(file, format="PNG"))
+        save(png, lambda file: picture(built, height).save(file, format="PNG"), [path])
 
 
 @app.command()
@@ -94,7 +94,7 @@ def export(
     home = root or default_root([path])
     source = load_world_file(path, home, world_path or ())
     grid = build(_built(source, home, world_path or [], lenient), height, resolution).map
-    _save(map_, lambda file: save_map(grid, file))
+    save(map_, lambda file: save_map(grid, file), [path])
     rows, columns = grid.shape
     print_text(f"{harmless(str(map_))}: {columns} x {rows} cells of {grid.resolution:g} m")
 
@@ -120,7 +120,7 @@ def convert(
     if source.map is not None:
         spec = spec.model_copy(update={"map": _relative(source.map.path, out)})
     write = world_text(spec).encode()
-    _save(out, lambda file: write_atomically(file, write))
+    save(out, lambda file: write_atomically(file, write), [path])
     for change in changes:
         print_text(f"changed: {harmless(change)}")
     things = len(spec.walls) + len(spec.obstacles) + len(spec.objects) + len(spec.doors)
@@ -155,12 +155,3 @@ def _built(source: LoadedWorld, home: Path, world_path: list[Path], lenient: boo
 def _relative(file: Path, out: Path) -> str:
     """How a file is named in `out`."""
     return Path(os.path.relpath(file.resolve(), out.resolve().parent)).as_posix()
-
-
-def _save(path: Path, write: Callable[[Path], None]) -> None:
-    """Write a file of the user's choice. Raises UsageError where that cannot be done."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write(path)
-    except OSError as error:
-        raise UsageError(f"cannot write {path}: {error.strerror}") from error

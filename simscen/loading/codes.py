@@ -31,6 +31,7 @@ CODES = {
     "SC034": "A rate does not divide the physics rate, so that it would not be regular.",
     "SC035": "What is named is a fixed part of the world, but only something that can move makes sense there.",
     "SC040": "Two scenarios have the same id, or would have on a file system that ignores case.",
+    "SC041": "A scenario's id cannot be a folder of its own in the output.",
     "SC301": "A start or goal is inside an obstacle or off the map.",
     "SC302": "No way leads to a goal: a room is sealed, or a gap is narrower than the robot.",
     "SC303": "A bound cannot be kept: the way to the goals takes longer, or is longer, than it allows.",

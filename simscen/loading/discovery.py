@@ -35,8 +35,9 @@ def discover(paths: Sequence[Path], root: Path, suffixes: tuple[str, ...] = SCEN
         where = ", ".join(quoted(str(path)) for path in paths)
         raise NothingSelected(f"no scenarios found in {where}; a folder is searched for *{suffixes[0]}")
     files = sorted(found, key=lambda file: file.parts)
-    if problems := list(_same_ids(files, Path(os.path.realpath(root)))):
-        raise InvalidInput(problems)
+    home = Path(os.path.realpath(root))
+    if problems := [*_no_folders(files, home), *_same_ids(files, home)]:
+        raise InvalidInput(sorted(problems))
     return files
 
 
@@ -91,14 +92,27 @@ def _files(path: Path, suffixes: tuple[str, ...], problems: list[Problem]) -> It
         yield from (Path(folder) / name for name in sorted(names) if name.endswith(suffixes))
 
 
+def _no_folders(files: list[Path], root: Path) -> Iterator[Problem]:
+    """Ids become folders of the output, in which those of runs are called seed-…"""
+    ids = {scenario_id(file, root).casefold() for file in files}
+    for file in files:
+        name = scenario_id(file, root).casefold()
+        above = name.split("/")[:-1]
+        for depth, part in enumerate(above[1:], start=1):
+            if part.startswith("seed-") and (other := "/".join(above[:depth])) in ids:
+                message = f"its folder in the output would be that of a run of {quoted(other)}"
+                yield Problem(_shown(file, root), 0, 0, "SC041", message, "rename one of them")
+
+
+def _shown(file: Path, root: Path) -> str:
+    return str(file.relative_to(root)) if file.is_relative_to(root) else str(file)
+
+
 def _same_ids(files: list[Path], root: Path) -> Iterator[Problem]:
     """Ids become folders of the output, and some file systems do not tell case apart."""
     seen: dict[str, Path] = {}
     for file in files:
         other = seen.setdefault(scenario_id(file, root).casefold(), file)
         if other != file:
-            mine, its = (
-                str(path.relative_to(root)) if path.is_relative_to(root) else str(path) for path in (file, other)
-            )
-            message = f"has the same id as {quoted(its)}, but for upper and lower case or suffix"
-            yield Problem(mine, 0, 0, "SC040", message, "rename one of them")
+            message = f"has the same id as {quoted(_shown(other, root))}, but for upper and lower case or suffix"
+            yield Problem(_shown(file, root), 0, 0, "SC040", message, "rename one of them")

@@ -37,6 +37,9 @@ def try_scenario(path: Path, root: Path, world_path: Sequence[Path] = ()) -> Loa
     file = fence.entered(path)
     if isinstance(file, Problem):
         return [file]
+    if unusable_name(name := scenario_id(file, fence.root).rpartition("/")[2]):
+        message, hint = f"its id would end in {name!r}, which is no folder", "give the file a name before its suffix"
+        return [Problem(fence.shown(file), 0, 0, "SC041", message, hint)]
     tree, problems = library.read(file, defaults=True)
     if not problems and tree is not None:
         spec = check(ScenarioSpec, tree)
@@ -95,6 +98,11 @@ def _map(spec: ScenarioSpec, tree: Fields, assets: Assets) -> LoadedMap | Litera
     if spec.map is None or spec.map == "none" or not isinstance(node, Leaf):
         return "none" if spec.map == "none" else None
     return assets.map(node)
+
+
+def unusable_name(name: str) -> bool:
+    """Whether a scenario of that name could have no folder of its own in the output."""
+    return name in ("", ".", "..")
 
 
 def scenario_id(file: Path, root: Path) -> str:

@@ -7,8 +7,12 @@ from datetime import datetime, timezone
 from pathlib import Path
 
 from simscen.core.errors import UsageError
+from simscen.core.outputs import require_plain
+from simscen.core.result import RunKey
 
 DEFAULT = Path("simscen-out")
+RUNS = "runs"
+"""What every run's folder lies below, so that no scenario's name is that of a report."""
 
 
 def make_folder(out: Path | None) -> Path:
@@ -29,8 +33,14 @@ def make_folder(out: Path | None) -> Path:
     return folder
 
 
+def run_folder(folder: Path, key: RunKey) -> Path:
+    """Where a run of the session in `folder` leaves its files."""
+    return folder / RUNS / key.scenario / key.folder
+
+
 def probe_writable(path: Path) -> None:
-    """Raise OSError unless a file can be written at `path`; leaves no trace."""
+    """Raise OSError unless a plain file can be written at `path`; leaves no trace."""
+    require_plain(path)
     existed = path.exists()
     with path.open("ab"):
         pass
@@ -39,7 +49,11 @@ def probe_writable(path: Path) -> None:
 
 
 def write_atomically(path: Path, data: bytes) -> None:
-    """Replace a file as a whole: whoever reads it sees the old one or the new one, even after a crash."""
+    """Replace a file as a whole: whoever reads it sees the old one or the new one, even after a crash.
+
+    Raises OSError, also where something other than a plain file would be replaced.
+    """
+    require_plain(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
@@ -58,6 +72,11 @@ def _link_latest(folder: Path) -> None:
     """`latest` beside the folder; a file system without links does without."""
     link = folder.parent / "latest"
     part = folder.parent / f".latest.{os.getpid()}"
+    if link.exists() and not link.is_symlink():
+        return  # someone's own
     with suppress(OSError):
         part.symlink_to(folder.name)
-        part.replace(link)
+        try:
+            part.replace(link)
+        except OSError:
+            part.unlink()

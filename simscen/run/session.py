@@ -12,6 +12,7 @@ from simscen.core.sessionevents import Listener, RunFinished, RunProgress, RunSt
 from simscen.loading.loaded import LoadedScenario
 from simscen.run.answer import answer_to, not_done
 from simscen.run.jobs import Job
+from simscen.run.outfolder import run_folder
 from simscen.run.supervisor import Advanced, Ended, Interrupted, Started, supervise
 
 
@@ -46,8 +47,7 @@ def plan(scenarios: Sequence[LoadedScenario], options: Options, out: Path) -> li
         for seed in seeds_of(scenario, options):
             for variation in ("", "again") if options.twice else ("",):
                 key = RunKey(scenario.id, seed, variation)
-                folder = out / scenario.id / key.folder
-                jobs.append(Job(len(jobs), scenario, key, folder, options.wall_limit))
+                jobs.append(Job(len(jobs), scenario, key, run_folder(out, key), options.wall_limit))
     return jobs
 
 

@@ -9,6 +9,7 @@ import numpy.typing as npt
 from simscen.core.errors import InvalidInput
 from simscen.core.geometry import Pose2
 from simscen.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from simscen.core.outputs import require_plain
 from simscen.core.problems import Problem
 from simscen.model.rosmap import RosMapSpec
 from simscen.worlds.mapimage import CODE, read_image
@@ -75,11 +76,12 @@ def _doubts(spec: RosMapSpec, table: npt.NDArray[np.int8], unknown_greys: int) -
 
 
 def save_map(grid: OccupancyGrid, yaml_path: Path) -> None:
-    """Write a map as `yaml_path` and a PGM beside it, which load as exactly this grid.
+    """Write a map as `yaml_path` and a PGM beside it, which load as exactly this grid. Raises OSError.
 
     Trinary with map_saver's greys and thresholds, or raw where cells hold more than free, occupied and unknown.
     """
     image_path = yaml_path.with_suffix(".pgm")
+    require_plain(image_path)
     trinary = bool(np.isin(grid.cells, (FREE, OCCUPIED, UNKNOWN)).all())
     height, width = grid.shape
     header = f"P5\n{width} {height}\n255\n".encode()

@@ -18,7 +18,7 @@ def test_it_drives_an_experiment_and_prints_its_numbers(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     (row,) = json.loads(done.stdout)["experiments"]
     assert (row["tally"]["case"], row["tally"]["runs"]) == ("narrow doorway", 1)
-    assert (tmp_path / "out/scenarios/corner_cases/narrow_doorway/seed-1/run.mcap").is_file()
+    assert (tmp_path / "out/runs/scenarios/corner_cases/narrow_doorway/seed-1/run.mcap").is_file()
 
 
 def test_data_that_is_not_here_is_skipped_aloud_and_an_unknown_experiment_is_an_error(tmp_path: Path) -> None:

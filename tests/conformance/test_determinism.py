@@ -75,7 +75,7 @@ def test_88_a_run_after_one_that_crashed_is_as_if_alone(reference, pair: Path, s
     assert simscen("run", ".", "-j", 1, "--out", "out").code == 3
     document = json.loads((pair / "out/results.json").read_text())
     assert (document["error"], document["passed"]) == (1, 1)
-    assert results(pair / "out")["b/seed-7"] == reference["b/seed-7"]
+    assert results(pair / "out")["runs/b/seed-7"] == reference["runs/b/seed-7"]
 
 
 def test_a_world_that_takes_forever_to_prepare_is_a_timeout_of_its_own_run(pair: Path, simscen, monkeypatch) -> None:
@@ -92,7 +92,7 @@ def test_a_world_that_takes_forever_to_prepare_is_a_timeout_of_its_own_run(pair:
 
 def test_89_another_seed_is_another_run_and_0_is_none(reference, pair: Path, simscen) -> None:
     assert simscen("run", "b.scenario.yaml", "--seed", 8, "--out", "out").code == 0
-    assert results(pair / "out")["b/seed-8"][1] != reference["b/seed-7"][1]
+    assert results(pair / "out")["runs/b/seed-8"][1] != reference["runs/b/seed-7"][1]
     ended = simscen("run", "b.scenario.yaml", "--seed", 0, "--out", "none")
     assert ended.code == 2
     assert not (pair / "none").exists()

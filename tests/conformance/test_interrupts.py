@@ -107,7 +107,7 @@ def begun(folder: Path, *events: str) -> bool:
 
 
 def under_way(folder: Path) -> bool:
-    return bool(list(folder.glob("out/*/*/run.partial.mcap")))
+    return bool(list(folder.glob("out/runs/*/*/run.partial.mcap")))
 
 
 @pytest.fixture
@@ -143,14 +143,14 @@ def test_a_killed_session_leaves_no_process_and_all_runs_in_its_reports_and_can_
     report.communicate(timeout=PATIENCE)
     assert report.returncode == 3
     assert outcomes(three / "out") == {"a": "passed", "b": "interrupted", "c": "not-run"}
-    first = (three / "out/a/seed-1/run.mcap").stat().st_mtime_ns
+    first = (three / "out/runs/a/seed-1/run.mcap").stat().st_mtime_ns
     scenario("b", "quick")
     scenario("c", "failing")
     more = start("run", ".", "--resume", "out")
     more.communicate(timeout=PATIENCE)
     assert more.returncode == 1
     assert outcomes(three / "out") == {"a": "passed", "b": "passed", "c": "failed"}
-    assert (three / "out/a/seed-1/run.mcap").stat().st_mtime_ns == first
+    assert (three / "out/runs/a/seed-1/run.mcap").stat().st_mtime_ns == first
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])

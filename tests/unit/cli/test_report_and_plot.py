@@ -96,7 +96,7 @@ def test_other_folders_hold_nothing_to_report(simscen, tmp_path: Path) -> None:
 
 
 def test_a_run_is_drawn_from_its_log_alone(simscen, out: Path, tmp_path: Path) -> None:
-    log = out / "short/seed-1/run.mcap"
+    log = out / "runs/short/seed-1/run.mcap"
     shutil.move(log, tmp_path / "alone.mcap")
     shutil.rmtree(out)
     ended = simscen("plot", "alone.mcap", "--out", "alone.png")
@@ -108,19 +108,19 @@ def test_a_run_is_drawn_from_its_log_alone(simscen, out: Path, tmp_path: Path) -
 
 def test_the_picture_is_that_of_the_run(simscen, out: Path) -> None:
     """This world has no places and no objects, which a log would not hold."""
-    before = (out / "short/seed-1/map.png").read_bytes()
-    (out / "short/seed-1/map.png").unlink()
-    assert simscen("plot", "out/short/seed-1").code == 0
-    assert (out / "short/seed-1/map.png").read_bytes() == before
+    before = (out / "runs/short/seed-1/map.png").read_bytes()
+    (out / "runs/short/seed-1/map.png").unlink()
+    assert simscen("plot", "out/runs/short/seed-1").code == 0
+    assert (out / "runs/short/seed-1/map.png").read_bytes() == before
 
 
 def test_a_log_that_broke_off_is_drawn_as_far_as_it_goes(simscen, out: Path) -> None:
-    folder = out / "short/seed-1"
+    folder = out / "runs/short/seed-1"
     data = (folder / "run.mcap").read_bytes()
     (folder / "run.mcap").unlink()
     (folder / "map.png").unlink()
     (folder / "run.partial.mcap").write_bytes(data[: len(data) * 3 // 4])
-    assert simscen("plot", "out/short/seed-1").code == 0
+    assert simscen("plot", "out/runs/short/seed-1").code == 0
     assert (folder / "map.png").exists()
 
 
@@ -130,7 +130,7 @@ def test_a_log_that_broke_off_is_drawn_as_far_as_it_goes(simscen, out: Path) -> 
         (("nowhere",), "nowhere: error[SC800] cannot read the log: No such file or directory"),
         (("out",), "out: error[SC800] there is no run.mcap in it"),
         (("good.scenario.yaml",), "error[SC801] not a log of simscen"),
-        (("out/short/seed-1", "--out", "good.scenario.yaml/x.png"), "cannot write good.scenario.yaml/x.png"),
+        (("out/runs/short/seed-1", "--out", "good.scenario.yaml/x.png"), "cannot write good.scenario.yaml/x.png"),
     ],
 )
 def test_what_cannot_be_drawn_is_told(simscen, out: Path, arguments, told) -> None:

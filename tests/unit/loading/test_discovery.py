@@ -129,3 +129,18 @@ def test_a_loop_of_folders_is_not_followed(tmp_path: Path) -> None:
     _touch(tmp_path, "a/x.scenario.yaml")
     (tmp_path / "a/again").symlink_to(tmp_path / "a")
     assert len(discover([tmp_path], tmp_path)) == 1
+
+
+def test_runs_of_two_scenarios_have_no_folder_in_common(tmp_path: Path) -> None:
+    _touch(
+        tmp_path,
+        "a.scenario.yaml",
+        "a/seed-1/map.png.scenario.yaml",
+        "b/seed-1/x.scenario.yaml",
+        "seed-2.scenario.yaml",
+    )
+    with pytest.raises(InvalidInput) as raised:
+        discover([tmp_path], tmp_path)
+    (problem,) = raised.value.problems
+    assert (problem.path, problem.code) == ("a/seed-1/map.png.scenario.yaml", "SC041")
+    assert problem.message == "its folder in the output would be that of a run of `a`"

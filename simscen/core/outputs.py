@@ -1,0 +1,31 @@
+"""Files of the user's choice are written over plain files only, and never over what was read."""
+
+import errno
+import os
+import stat
+from collections.abc import Iterable
+from pathlib import Path
+
+
+def require_plain(path: Path) -> None:
+    """Raise OSError unless `path` is a plain file or nothing.
+
+    To replace a device or a link breaks what others rely on, and a pipe that nobody reads is waited for.
+    """
+    try:
+        mode = path.lstat().st_mode
+    except FileNotFoundError:
+        return
+    if stat.S_ISLNK(mode):
+        raise OSError(errno.EINVAL, "it is a symbolic link; name the file itself")
+    if stat.S_ISDIR(mode):
+        raise OSError(errno.EISDIR, os.strerror(errno.EISDIR))
+    if not stat.S_ISREG(mode):
+        raise OSError(errno.EINVAL, "it is not a plain file")
+
+
+def require_no_input(path: Path, inputs: Iterable[Path]) -> None:
+    """Raise OSError when writing `path` would overwrite one of the files that were read."""
+    real = os.path.realpath(path)
+    if any(os.path.realpath(each) == real for each in inputs):
+        raise OSError(errno.EINVAL, "it is one of the files that are read")

@@ -1,0 +1,143 @@
+"""What simscen writes goes where it should: below --out, and over nothing but plain files that nobody reads."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from simscen.core.result import RunKey
+from simscen.run.outfolder import make_folder, run_folder, write_atomically
+
+NOT_PLAIN = ("device", "fifo", "link", "dangling", "folder")
+
+
+@pytest.fixture
+def odd(tmp_path: Path):
+    """Something that is not a plain file, by name."""
+
+    def odd(kind: str) -> Path:
+        path = tmp_path / f"odd-{kind}.png"
+        match kind:
+            case "device":
+                return Path("/dev/null")
+            case "fifo":
+                os.mkfifo(path)
+            case "link":
+                (tmp_path / "precious").write_text("keep me")
+                path.symlink_to("precious")
+            case "dangling":
+                path.symlink_to("nowhere")
+            case "folder":
+                path.mkdir()
+        return path
+
+    return odd
+
+
+@pytest.mark.parametrize("name", ["...scenario.yaml", "..scenario.yaml", ".scenario.yaml"])
+@pytest.mark.parametrize("command", ["run", "validate"])
+def test_a_file_name_that_gives_no_id_is_refused(simscen, tmp_path: Path, name, command) -> None:
+    (tmp_path / "in").mkdir()
+    (tmp_path / "good.scenario.yaml").rename(tmp_path / "in" / name)
+    ended = simscen(command, f"in/{name}")
+    assert ended.code == 2
+    assert f"in/{name}: error[SC041] its id would end in" in ended.out + ended.err
+    assert not list(tmp_path.rglob("*.mcap"))
+
+
+@pytest.mark.parametrize("scenario", ["junit.xml", "results.json/x", "run.json", "events.jsonl", "runs"])
+def test_no_run_lies_where_a_report_does(scenario: str) -> None:
+    assert run_folder(Path("out"), RunKey(scenario, 3)) == Path("out/runs") / scenario / "seed-3"
+
+
+@pytest.mark.parametrize("kind", NOT_PLAIN)
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("run", "good.scenario.yaml", "--out", "out", "--junit"),
+        ("world", "inspect", "room.world.yaml", "--png"),
+        ("world", "export", "room.world.yaml", "--map"),
+        ("world", "convert", "room.world.yaml"),
+    ],
+)
+def test_only_plain_files_are_written_over(simscen, tmp_path: Path, odd, kind, command) -> None:
+    (tmp_path / "room.world.yaml").write_text(
+        "{simscen: 1, walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]}"
+    )
+    path = odd(kind)
+    before = path.lstat()
+    ended = simscen(*command, str(path))
+    assert ended.code == 2
+    assert ended.err.startswith(f"simscen: cannot write {path}: ")
+    assert path.lstat().st_mode == before.st_mode
+    assert kind != "link" or (tmp_path / "precious").read_text() == "keep me"
+    assert not list(tmp_path.rglob("*.mcap"))
+
+
+def test_schemas_are_not_written_through_a_link(simscen, tmp_path: Path) -> None:
+    (tmp_path / "precious").write_text("keep me")
+    (tmp_path / "schemas").mkdir()
+    (tmp_path / "schemas/scenario.schema.json").symlink_to("../precious")
+    ended = simscen("schema", "--write", "schemas")
+    assert (ended.code, ended.err) == (
+        2, "simscen: cannot write schemas/scenario.schema.json: it is a symbolic link; name the file itself\n"
+    )  # fmt: skip
+    assert (tmp_path / "precious").read_text() == "keep me"
+
+
+def test_a_folder_for_schemas_that_cannot_be_made_is_told(simscen) -> None:
+    ended = simscen("schema", "--write", "good.scenario.yaml")
+    assert (ended.code, ended.out) == (2, "")
+    assert ended.err.startswith("simscen: cannot write good.scenario.yaml/scenario.schema.json: ")
+
+
+def test_what_is_read_is_not_written_over(simscen, tmp_path: Path) -> None:
+    world = "{simscen: 1, walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]}"
+    (tmp_path / "room.world.yaml").write_text(world)
+    (tmp_path / "defaults.yaml").write_text("tags: [nightly]\n")
+    scenario = (tmp_path / "good.scenario.yaml").read_text()
+    for command in (
+        ("run", "good.scenario.yaml", "--junit", "good.scenario.yaml"),
+        ("run", "good.scenario.yaml", "--junit", "defaults.yaml"),
+        ("world", "inspect", "room.world.yaml", "--png", "room.world.yaml"),
+        ("world", "convert", "room.world.yaml", "room.world.yaml"),
+    ):
+        ended = simscen(*command)
+        assert ended.code == 2
+        assert ended.err.endswith("it is one of the files that are read\n")
+    assert (tmp_path / "room.world.yaml").read_text() == world
+    assert (tmp_path / "good.scenario.yaml").read_text() == scenario
+
+
+@pytest.mark.parametrize("name", ["results.json", "events.jsonl", "run.json", "report.html", "runs/good/junit.xml"])
+@pytest.mark.parametrize("before", [False, True])
+def test_junit_takes_no_name_of_the_output_folder(simscen, tmp_path: Path, name, before) -> None:
+    options = ("--out", "new") if before else ("--out", "out")
+    if before:
+        (tmp_path / "out").mkdir()
+        (tmp_path / "out/events.jsonl").write_text("{}\n")
+    ended = simscen("run", "good.scenario.yaml", *options, "--junit", f"out/{name}")
+    assert ended.code == 2
+    assert ended.err == f"simscen: cannot write out/{name}: the output folder has something else of that name\n"
+
+
+@pytest.mark.parametrize("name", [".", "..", "", "deep/", "deep/.", ".scenario.yaml"])
+def test_new_makes_nothing_that_run_refuses(simscen, tmp_path: Path, name) -> None:
+    ended = simscen("new", name)
+    assert ended.code == 2
+    assert [path.name for path in tmp_path.iterdir()] == ["good.scenario.yaml"]
+
+
+def test_latest_that_is_someones_own_stays(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("simscen-out").mkdir()
+    Path("simscen-out/latest").write_text("keep me")
+    folder = make_folder(None)
+    assert Path("simscen-out/latest").read_text() == "keep me"
+    assert set(Path("simscen-out").iterdir()) == {folder, Path("simscen-out/latest")}
+
+
+def test_nothing_but_a_plain_file_is_replaced(odd) -> None:
+    for kind in NOT_PLAIN:
+        with pytest.raises(OSError, match=r"not a plain file|symbolic link|directory"):
+            write_atomically(odd(kind), b"")
