@@ -21,6 +21,7 @@ from simscen.record.tracebuilder import TraceBuilder
 from simscen.run.assemble import assemble
 from simscen.run.lockstep import Log, Rig, run_lockstep
 from simscen.run.prepare import Prepared, prepare
+from simscen.sim.urdf.describe import describe
 
 Attach = Callable[[Rig, Sequence[Log]], Sequence[Log]]
 """Is shown the rig and its own logs before the first beat; what it returns listens to every moment, too."""
@@ -72,7 +73,7 @@ def log_header(prepared: Prepared, seed: int) -> LogHeader:
         case=prepared.case,
         scenario=resolved_text(prepared.loaded),
         map=prepared.map,
-        robot_description=prepared.body.urdf,
+        robot_description=describe(prepared.body),
         frames=_sensor_frames(prepared.robot),
     )
 

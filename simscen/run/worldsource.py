@@ -63,7 +63,7 @@ def _read_mesh(path: Path) -> Mesh:
 
 def load_robot(loaded: LoadedScenario) -> tuple[RobotSpec, RobotBody]:
     """The robot as specified (a bare URDF as far as it makes plain), and made ready for physics."""
-    from simscen.sim.robot_body import robot_body
+    from simscen.sim.embody import robot_body
 
     robot, roots = loaded.robot, (loaded.root, *loaded.world_path)
     spec = robot.spec or _inferred(robot.path, roots)

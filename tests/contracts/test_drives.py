@@ -9,7 +9,7 @@ import yaml
 from simscen.core.geometry import Pose2
 from simscen.core.motion import STOP, Twist
 from simscen.model.robot import RobotSpec
-from simscen.sim.robot_body import robot_body
+from simscen.sim.embody import robot_body
 from simscen.sim.simulation import Simulation
 from simscen.worlds.meshing import fuse, triangulate
 

@@ -16,7 +16,7 @@ from simscen.core.shapes import Box, Solid
 from simscen.core.time import Clock
 from simscen.model.robot import RobotSpec
 from simscen.sensors.build import build_sensors
-from simscen.sim.robot_body import robot_body
+from simscen.sim.embody import robot_body
 from simscen.sim.simulation import Simulation
 from simscen.worlds.meshing import fuse, triangulate
 from simscen.worlds.rays import RayScene

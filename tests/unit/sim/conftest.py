@@ -7,7 +7,7 @@ import pytest
 
 from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
-from simscen.sim.robot_body import robot_body
+from simscen.sim.embody import robot_body
 from simscen.sim.simulation import Simulation
 from simscen.worlds.meshing import fuse, triangulate
 

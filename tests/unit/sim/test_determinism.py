@@ -13,7 +13,7 @@ from playground import box, shipped
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.motion import Twist
 from simscen.core.shapes import Body, MotionPath
-from simscen.sim.robot_body import robot_body
+from simscen.sim.embody import robot_body
 from simscen.sim.simulation import Simulation
 from simscen.worlds.meshing import fuse, triangulate
 

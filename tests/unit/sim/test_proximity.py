@@ -7,8 +7,8 @@ from playground import box, shipped
 
 from simscen.core.geometry import Pose3
 from simscen.core.shapes import Box, Cylinder, Extrusion, Solid
+from simscen.sim.embody import robot_body
 from simscen.sim.proximity import Proximity, point_to_triangles
-from simscen.sim.robot_body import robot_body
 from simscen.worlds.meshing import fuse
 
 

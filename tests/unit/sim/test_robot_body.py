@@ -5,7 +5,7 @@ from shapely.geometry import Point, Polygon
 from simscen.core.errors import InvalidInput
 from simscen.core.shapes import Sphere
 from simscen.model.robot import RobotSpec
-from simscen.sim.robot_body import robot_body
+from simscen.sim.embody import robot_body
 
 NAMES = ["turtlebot", "amr", "jackal", "car", "omni"]
 

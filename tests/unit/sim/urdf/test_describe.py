@@ -4,15 +4,16 @@ import numpy as np
 import pytest
 from playground import shipped
 
+from simscen.sim.embody import robot_body
 from simscen.sim.outline import extremes
-from simscen.sim.robot_body import robot_body
+from simscen.sim.urdf.describe import describe
 
 
 @pytest.mark.parametrize("name", ["turtlebot", "amr", "jackal"])
 def test_a_description_read_again_gives_the_same_robot(tmp_path, name):
     spec = shipped(name)
     body = robot_body(spec)
-    (tmp_path / "robot.urdf").write_text(body.urdf)
+    (tmp_path / "robot.urdf").write_text(describe(body))
     written = {"body": None, "mass": None, "urdf": "robot.urdf"}
     again = robot_body(spec.model_copy(update=written), tmp_path / "x.robot.yaml", [tmp_path])
     assert again.mass == pytest.approx(body.mass)
@@ -28,7 +29,7 @@ def test_a_description_read_again_gives_the_same_robot(tmp_path, name):
 
 def test_an_omnidirectional_urdf_stands_on_its_lowest_point_and_goes_sideways(tmp_path, simulate):
     spec = shipped("omni")
-    (tmp_path / "robot.urdf").write_text(robot_body(spec).urdf)
+    (tmp_path / "robot.urdf").write_text(describe(robot_body(spec)))
     written = {"body": None, "mass": None, "urdf": "robot.urdf"}
     body = robot_body(spec.model_copy(update=written), tmp_path / "x.robot.yaml", [tmp_path])
     assert min((s.pose.apply(extremes(s.shape))[:, 2]).min() for s in body.hull) == pytest.approx(0.0)

@@ -4,7 +4,8 @@ import pytest
 from playground import shipped
 
 from simscen.core.errors import InvalidInput
-from simscen.sim.robot_body import robot_body
+from simscen.sim.embody import robot_body
+from simscen.sim.urdf.describe import describe
 from simscen.sim.urdf.infer import spec_of_urdf
 
 JACKAL = Path(__file__).parents[5] / "shared/data/jackal_urdf/jackal.urdf"
@@ -22,7 +23,7 @@ def infer(tmp_path):
 @pytest.mark.parametrize("name", ["turtlebot", "amr", "jackal"])
 def test_the_drive_of_a_shipped_robot_is_found_in_its_description(infer, name):
     spec = shipped(name)
-    found = infer(robot_body(spec).urdf)
+    found = infer(describe(robot_body(spec)))
     assert found.drive.type == spec.drive.type
     assert found.drive.wheel_radius == pytest.approx(spec.drive.wheel_radius)
     assert found.drive.wheel_separation == pytest.approx(spec.drive.wheel_separation)
@@ -30,7 +31,7 @@ def test_the_drive_of_a_shipped_robot_is_found_in_its_description(infer, name):
 
 
 def test_the_lidar_sits_on_its_link_or_on_top(infer):
-    text = robot_body(shipped("amr")).urdf
+    text = describe(robot_body(shipped("amr")))
     assert infer(text).sensors["lidar"].lidar.mount.z == pytest.approx(0.32 + 0.02)
     link = (
         '<link name="base_scan"/><joint name="s" type="fixed"><parent link="base_link"/><child link="base_scan"/>'
@@ -41,7 +42,7 @@ def test_the_lidar_sits_on_its_link_or_on_top(infer):
 
 
 def test_wheel_joints_that_know_their_speed_limit_the_robot(infer):
-    text = robot_body(shipped("amr")).urdf.replace(
+    text = describe(robot_body(shipped("amr"))).replace(
         '<axis xyz="0 1 0" />', '<axis xyz="0 1 0"/><limit effort="1" velocity="5"/>'
     )
     assert infer(text).limits.linear == pytest.approx(0.5)
@@ -49,7 +50,7 @@ def test_wheel_joints_that_know_their_speed_limit_the_robot(infer):
 
 def test_a_robot_without_wheels_is_not_guessed(infer):
     with pytest.raises(InvalidInput, match="cannot tell from its wheels"):
-        infer(robot_body(shipped("omni")).urdf)
+        infer(describe(robot_body(shipped("omni"))))
 
 
 @pytest.mark.skipif(not JACKAL.exists(), reason="shared/data/jackal_urdf is not here")

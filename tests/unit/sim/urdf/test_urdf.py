@@ -12,7 +12,7 @@ from simscen.core.geometry import Pose2, wrap
 from simscen.core.motion import Twist
 from simscen.core.shapes import Box, Mesh
 from simscen.model.robot import RobotSpec
-from simscen.sim.robot_body import robot_body
+from simscen.sim.embody import robot_body
 from simscen.sim.simulation import Simulation
 from simscen.worlds.meshing import fuse, triangulate
 from simscen.worlds.sdf.meshfile import UnusableMesh, read_parts
