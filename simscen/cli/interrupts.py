@@ -1,4 +1,4 @@
-"""SIGINT and SIGTERM end a session in good order."""
+"""SIGINT, SIGTERM and SIGHUP end a session in good order."""
 
 import signal
 from collections.abc import Iterator
@@ -10,14 +10,22 @@ from simscen.run.supervisor import Interrupted
 
 @contextmanager
 def signals_interrupt() -> Iterator[None]:
-    """Raise Interrupted for the first SIGINT or SIGTERM; more of them change nothing, so that reports are written."""
+    """Raise Interrupted for the first of these signals; more of them change nothing, so that reports are written.
+
+    A SIGHUP that is ignored, as under nohup, stays so.
+    """
 
     def interrupt(number: int, _: FrameType | None) -> None:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        for each in before:
+            signal.signal(each, signal.SIG_IGN)
         raise Interrupted(number)
 
-    before = {number: signal.signal(number, interrupt) for number in (signal.SIGINT, signal.SIGTERM)}
+    heeded = [signal.SIGINT, signal.SIGTERM]
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
+        heeded.append(signal.SIGHUP)
+    before = {number: signal.getsignal(number) for number in heeded}
+    for number in heeded:
+        signal.signal(number, interrupt)
     try:
         yield
     finally:

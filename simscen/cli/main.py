@@ -11,6 +11,7 @@ import typer
 from typer.core import TyperGroup
 
 from simscen.cli.later import import_later
+from simscen.cli.surroundings import NO_ROOM, flushed, occupy_descriptors, output_lost, require_folder
 from simscen.core.errors import Exit, InvalidInput, SimscenError
 
 COMMANDS = {
@@ -99,23 +100,34 @@ def _simscen(
 
 def main() -> None:
     """Run the command line. Every foreseen error is told in words; its exit code says who can mend it."""
+    occupy_descriptors()
     # Plug-ins of pydantic that happen to be installed could change what is valid; looking for them costs 12 ms, too,
     # and so does what it imports to look for them.
     os.environ["PYDANTIC_DISABLE_PLUGINS"] = "__all__"
     import_later("importlib.metadata", "entry_points")
+    sys.exit(flushed(_called()))
+
+
+def _called() -> int:
+    """Call the command: its exit code, or that of the error which it ends with."""
     try:
-        app()
-    except SimscenError as error:
-        sys.exit(_told(error))
+        try:
+            if sys.argv[1:2] and not sys.argv[1].startswith("-"):
+                require_folder()
+            app()
+        except SimscenError as error:
+            return _told(error)
+    except SystemExit as end:
+        return end.code if isinstance(end.code, int) else Exit.PASSED
     except KeyboardInterrupt:
-        sys.exit(Exit.INTERRUPTED)
+        return Exit.INTERRUPTED
     except BrokenPipeError:
-        # The reader of our output has gone (`simscen list | head`): nobody is left to tell. Keep the interpreter
-        # from failing on the same pipe when it flushes at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(Exit.INCOMPLETE)
+        return Exit.INCOMPLETE
+    except OSError as error:
+        return output_lost(error) if error.errno in NO_ROOM and not error.filename else _internal()
     except Exception:
-        sys.exit(_internal())
+        return _internal()
+    return Exit.PASSED
 
 
 def _told(error: SimscenError) -> Exit:

@@ -20,6 +20,7 @@ EXITS = {
     Exit.INCOMPLETE: "A run could not be completed (crash, timeout, out of memory), or a result could not be written.",
     Exit.INTERNAL: "A bug in simscen.",
     Exit.NOTHING_SELECTED: "Nothing was selected.",
+    Exit.HUNG_UP: "Interrupted by SIGHUP: the terminal has gone.",
     Exit.INTERRUPTED: "Interrupted by Ctrl-C (SIGINT).",
     Exit.TERMINATED: "Interrupted by SIGTERM.",
 }
@@ -70,7 +71,7 @@ def section(words: str, function: Callable[..., Any]) -> str:
 def exits() -> str:
     """The table of exit codes."""
     rows = "\n".join(f"| {code.value} | {text} |" for code, text in EXITS.items())
-    text = "Of several that apply, the first of 130 and 143, 4, 3, 1 is returned."
+    text = "Of several that apply, the first of 129, 130 and 143, 4, 3, 1 is returned."
     return f"## Exit codes\n\n{text}\n\n| code | meaning |\n|---|---|\n{rows}\n"
 
 

@@ -69,7 +69,7 @@ def command(
     makes these from the journal, and --resume goes on where it stopped.
 
     Exit code 0: all passed; 1: a criterion failed; 2: an invalid scenario or an unusable output folder (nothing was
-    run); 3: a run could not be completed; 5: nothing selected; 130 and 143: interrupted.
+    run); 3: a run could not be completed; 5: nothing selected; 129, 130 and 143: interrupted.
     """
     wanted = Selection(keyword, tag or [], shard_of(shard))
     scenarios, warnings = load_all(paths, root, world_path or [], lenient, wanted)

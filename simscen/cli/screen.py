@@ -5,15 +5,19 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from enum import Enum
+from io import StringIO
 from pathlib import Path
 from typing import TextIO
 
 from simscen.cli.diagnostics import print_text
-from simscen.core.errors import Exit
+from simscen.core.errors import Exit, UsageError
 from simscen.core.sessionevents import SessionEvent
 from simscen.report.console import Reporter, text_reporter
 from simscen.report.github import github_reporter
 from simscen.report.machine import json_reporter
+from simscen.run.outfolder import probe_writable
+
+STEP_SUMMARY = "GITHUB_STEP_SUMMARY"
 
 
 class Format(str, Enum):
@@ -25,11 +29,12 @@ class Format(str, Enum):
 
 
 class Screen:
-    """Passes events on until the printer fails; `lost` is why."""
+    """Passes events on until the printer fails; `lost` is why, `lost_summary` why there is no summary of the step."""
 
     def __init__(self, printer: Reporter) -> None:
         self._printer = printer
         self.lost: OSError | None = None
+        self.lost_summary: OSError | None = None
 
     def __call__(self, event: SessionEvent) -> None:
         """Print what the event is worth."""
@@ -48,26 +53,43 @@ class Screen:
             os.dup2(nowhere, sys.stdout.fileno())
             os.close(nowhere)
 
+    def sum_up(self, text: str) -> None:
+        """Add to the file that GitHub Actions shows as the summary of a step."""
+        try:
+            with Path(os.environ[STEP_SUMMARY]).open("a", encoding="utf-8") as file:
+                file.write(text)
+        except OSError as error:
+            self.lost_summary = error
+
     def exit(self, code: Exit) -> Exit:
         """The exit code of the session, or that of output that was lost. Who closes a pipe has read enough."""
-        if self.lost is None or isinstance(self.lost, BrokenPipeError):
-            return code
-        print_text(f"simscen: cannot write to stdout: {self.lost.strerror}", sys.stderr)
-        return max(code, Exit.INCOMPLETE)
+        lost = {STEP_SUMMARY: self.lost_summary}
+        if not isinstance(self.lost, BrokenPipeError):
+            lost["to stdout"] = self.lost
+        for what, error in lost.items():
+            if error is not None:
+                print_text(f"simscen: cannot write {what}: {error.strerror}", sys.stderr)
+                code = max(code, Exit.INCOMPLETE)
+        return code
 
 
 @contextmanager
 def screen(format_: Format) -> Iterator[Screen]:
-    """Print a session on stdout, and on GitHub also as the summary of the step."""
-    with _step_summary() as summary:
-        printer = _printer(format_, summary)
-        shown = Screen(printer)
-        printer.__enter__()
-        try:
-            yield shown
-        finally:
-            with shown.forgiving():
-                printer.__exit__(*sys.exc_info())
+    """Print a session on stdout, and on GitHub also as the summary of the step.
+
+    Raises UsageError when that cannot be written: it should be known before anything runs.
+    """
+    summary = _step_summary() if format_ is Format.GITHUB else None
+    printer = _printer(format_, summary)
+    shown = Screen(printer)
+    printer.__enter__()
+    try:
+        yield shown
+    finally:
+        with shown.forgiving():
+            printer.__exit__(*sys.exc_info())
+        if summary is not None:
+            shown.sum_up(summary.getvalue())
 
 
 def _printer(format_: Format, summary: TextIO | None) -> Reporter:
@@ -80,12 +102,13 @@ def _printer(format_: Format, summary: TextIO | None) -> Reporter:
             return github_reporter(sys.stdout, summary)
 
 
-@contextmanager
-def _step_summary() -> Iterator[TextIO | None]:
-    """The file that GitHub Actions shows as the summary of a step, where there is one."""
-    path = os.environ.get("GITHUB_STEP_SUMMARY")
+def _step_summary() -> StringIO | None:
+    """Where the summary of the step is put together, where there is one."""
+    path = os.environ.get(STEP_SUMMARY)
     if not path:
-        yield None
-        return
-    with Path(path).open("a", encoding="utf-8") as file:
-        yield file
+        return None
+    try:
+        probe_writable(Path(path))
+    except OSError as error:
+        raise UsageError(f"cannot write {STEP_SUMMARY} {path}: {error.strerror}") from error
+    return StringIO()

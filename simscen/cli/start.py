@@ -2,10 +2,12 @@
 
 import gc
 import os
+import signal
 import sys
 from typing import NoReturn
 
-from simscen.core.errors import Exit
+INTERRUPTED = 130
+"""As Exit.INTERRUPTED, which is not imported yet."""
 
 
 def start() -> None:
@@ -17,22 +19,20 @@ def start() -> None:
     gc.disable()
     from simscen.cli.main import is_light, main
 
-    light = is_light(sys.argv[1:])
+    if signal.getsignal(signal.SIGINT) is _leave_at_once:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         main()
     except SystemExit as end:
-        if light and isinstance(end.code, int):
-            _leave(end.code)
+        if is_light(sys.argv[1:]) and isinstance(end.code, int):
+            os._exit(end.code)  # without taking anything apart, as mypy does: all is printed
         raise
-    if light:
-        _leave(Exit.PASSED)
 
 
-def _leave(code: int) -> NoReturn:
-    """End without taking anything apart, as mypy does: nothing is left to do but to print."""
-    try:
-        sys.stdout.flush()
-        sys.stderr.flush()
-    except BrokenPipeError:
-        code = 1  # as click ends where the output is not buffered
-    os._exit(code)
+def _leave_at_once(*_: object) -> NoReturn:
+    """Ctrl-C while Python still imports: there is nothing to put in order, and no traceback to show."""
+    os._exit(INTERRUPTED)
+
+
+if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+    signal.signal(signal.SIGINT, _leave_at_once)

@@ -14,6 +14,7 @@ class Exit(IntEnum):
     INCOMPLETE = 3
     INTERNAL = 4
     NOTHING_SELECTED = 5
+    HUNG_UP = 129
     INTERRUPTED = 130
     TERMINATED = 143
 

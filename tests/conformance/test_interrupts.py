@@ -153,7 +153,7 @@ def test_a_killed_session_leaves_no_process_and_all_runs_in_its_reports_and_can_
     assert (three / "out/runs/a/seed-1/run.mcap").stat().st_mtime_ns == first
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)])
 def test_an_interrupted_session_lists_all_and_leaves_no_process(start, three, number, code):
     run = start("run", ".", "--out", "out", "-j", "1")
     wait_for(lambda: begun(three, "finished") and under_way(three))

@@ -1,0 +1,152 @@
+"""Whatever surrounds simscen is broken or goes away: proper exit codes, whole reports, never a traceback."""
+
+import json
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from simscen.core.time import Clock
+from simscen.record.recorder import Recorder
+from simscen.record.replay import read_log
+
+SIMSCEN = str(Path(sys.executable).with_name("simscen"))
+SIGINT_AT_IMPORT = """
+import os, signal, sys
+class Interrupting:
+    def find_spec(self, name, path=None, target=None):
+        if name == {module!r}:
+            os.kill(os.getpid(), signal.SIGINT)
+sys.argv = ["simscen", *{arguments!r}]
+sys.meta_path.insert(0, Interrupting())
+from simscen.cli.start import start
+start()
+"""
+
+
+def shell(script: str, folder: Path, **environment: str) -> "subprocess.CompletedProcess[str]":
+    """What a shell makes of `script`; $simscen is the command."""
+    surroundings = {**os.environ, "simscen": SIMSCEN, **environment}
+    return subprocess.run(
+        ["sh", "-c", script], cwd=folder, capture_output=True, text=True, timeout=60, check=False, env=surroundings
+    )
+
+
+def outcomes(out: Path) -> list[str]:
+    return [run["outcome"] for run in json.loads((out / "results.json").read_text())["runs"]]
+
+
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&-", ">&- 2>&- <&-"])
+def test_91_a_closed_descriptor_costs_nothing(folder: Path, closed: str) -> None:
+    done = shell(f'"$simscen" run . --out out {closed}', folder)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert outcomes(folder / "out") == ["passed"]
+    journal = (folder / "out/events.jsonl").read_text().splitlines()
+    assert all(json.loads(line) for line in journal), "nothing else got its descriptor"
+
+
+@pytest.mark.parametrize("words", ["validate .", "list .", "--help", "schema"])
+def test_91_nor_for_commands_that_only_print(folder: Path, words: str) -> None:
+    done = shell(f'"$simscen" {words} >&-', folder)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_92_a_step_summary_that_cannot_be_opened_is_told_before_anything_runs(folder: Path) -> None:
+    done = shell('"$simscen" run . --format github --out out', folder, GITHUB_STEP_SUMMARY=str(folder))
+    assert done.returncode == 2
+    assert done.stderr == f"simscen: cannot write GITHUB_STEP_SUMMARY {folder}: Is a directory\n"
+    assert not list(folder.rglob("run.mcap"))
+
+
+def test_92_and_is_no_matter_for_other_formats(folder: Path) -> None:
+    assert shell('"$simscen" run . --out out', folder, GITHUB_STEP_SUMMARY=str(folder)).returncode == 0
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_92_a_full_step_summary_costs_the_exit_code_but_no_report(folder: Path) -> None:
+    done = shell('"$simscen" run . --format github --out out', folder, GITHUB_STEP_SUMMARY="/dev/full")
+    assert (done.returncode, done.stderr) == (3, "simscen: cannot write GITHUB_STEP_SUMMARY: No space left on device\n")
+    assert outcomes(folder / "out") == ["passed"]
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+@pytest.mark.parametrize("words", ["validate .", "list .", "--help", "schema", "judge out/a/seed-7/run.mcap"])
+def test_77_a_full_stdout_is_told_by_commands_that_only_print(folder: Path, words: str) -> None:
+    if words.startswith("judge"):
+        assert shell('"$simscen" run . --out out', folder).returncode == 0
+    done = shell(f'"$simscen" {words} >/dev/full', folder)
+    assert (done.returncode, done.stderr) == (3, "simscen: cannot write the output: No space left on device\n")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_77_a_full_stderr_does_not_hide_what_was_wrong(folder: Path) -> None:
+    assert shell('"$simscen" run nowhere --out out 2>/dev/full', folder).returncode == 3
+
+
+@pytest.mark.parametrize("words", ["run {a}", "validate {a}", "list {a}", "new x", "report out", "doctor"])
+def test_93_a_working_folder_that_was_deleted_is_told(folder: Path, words: str) -> None:
+    (folder / "gone").mkdir()
+    command = words.format(a=shlex.quote(str(folder / "a.scenario.yaml")))
+    done = shell(f'cd gone && rmdir ../gone && "$simscen" {command}', folder)
+    assert (done.returncode, done.stderr) == (2, "simscen: the working folder no longer exists\n")
+
+
+@pytest.mark.parametrize(
+    "module",
+    ["simscen.core.errors", "simscen.cli.main", "typer", "simscen.cli.run", "pydantic", "simscen.loading.scenario"],
+)
+def test_94_ctrl_c_while_it_starts_ends_it_without_a_traceback(folder: Path, module: str) -> None:
+    code = SIGINT_AT_IMPORT.format(module=module, arguments=["run", ".", "--out", "out"])
+    done = subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
+
+
+@pytest.mark.parametrize("command", ["judge", "plot"])
+def test_95_a_log_without_truth_is_no_usable_log(simscen, folder: Path, command: str) -> None:
+    assert simscen("run", "a.scenario.yaml", "--out", "out").code == 0
+    (log,) = folder.rglob("run.mcap")
+    with Recorder(folder / "empty.mcap", Clock(240), read_log(log).about) as recorder:
+        recorder.close(0)
+    ended = simscen(command, "empty.mcap")
+    assert ended.code == 2
+    assert ended.err.startswith("empty.mcap: error[SC803] the log holds no truth")
+
+
+@pytest.mark.parametrize("command", ["judge", "plot", "log recover"])
+@pytest.mark.parametrize("kind", ["fifo", "device", "folder"])
+def test_96_what_is_not_a_regular_file_is_no_log(simscen, folder: Path, command: str, kind: str) -> None:
+    odd = folder / "run.mcap"
+    if kind == "fifo":
+        os.mkfifo(odd)
+    elif kind == "device":
+        odd.symlink_to("/dev/zero")
+    else:
+        odd.mkdir()
+    ended = simscen(*command.split(), "run.mcap")
+    assert ended.code == 2
+    assert "error[SC800]" in ended.err
+
+
+def test_97_the_command_that_repeats_a_run_is_quoted_for_a_shell(simscen, folder: Path) -> None:
+    name = "a;touch marker;$(touch marker) b.scenario.yaml"
+    (folder / "a.scenario.yaml").rename(folder / name)
+    assert simscen("run", name, "--out", "out").code == 0
+    (again,) = [run["again"] for run in json.loads((folder / "out/results.json").read_text())["runs"]]
+    assert shlex.split(again) == ["simscen", "run", name, "--seed", "7"]
+    done = shell(again, folder, PATH=f"{Path(SIMSCEN).parent}:{os.environ['PATH']}")
+    assert done.returncode == 0
+    assert not (folder / "marker").exists()
+
+
+def test_71_a_killed_log_is_made_whole_by_hand(simscen, folder: Path) -> None:
+    assert simscen("run", "a.scenario.yaml", "--out", "out").code == 0
+    (log,) = folder.rglob("run.mcap")
+    (folder / "run.partial.mcap").write_bytes(log.read_bytes()[:-20_000])
+    assert simscen("log", "recover", "run.partial.mcap").out == "run.partial.mcap: made whole\n"
+    assert simscen("log", "recover", "run.partial.mcap").out == "run.partial.mcap: nothing to mend, it is whole\n"
+    shutil.copy(log, folder / "other.mcap")
+    assert simscen("log", "recover", "a.scenario.yaml").code == 2
