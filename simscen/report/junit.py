@@ -114,7 +114,8 @@ def _output(run: RunFinished) -> str:
     lines = [f"{place(run, warning.line)}: warning: {warning.message}" for warning in warnings]
     files = (run.artifacts.picture, run.artifacts.mcap, run.artifacts.result)
     lines += [one_line(f"{one.ordered.kind} {told(one, run.result.tick_rate)}") for one in run.result.disturbances]
-    return "\n".join([*lines, *(f"[[ATTACHMENT|{one_line(file)}]]" for file in files if file)])
+    told_of = [line.replace("[[ATTACHMENT|", "[ [ATTACHMENT|") for line in lines]  # names are no files to attach
+    return "\n".join([*told_of, *(f"[[ATTACHMENT|{one_line(file)}]]" for file in files if file)])
 
 
 def _classname(run: RunFinished) -> str:

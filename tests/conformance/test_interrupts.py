@@ -20,7 +20,7 @@ goals: [{pose: {x: 5, y: 3}}]
 time_limit: 1 s
 pass: [{collisions: {max: 0}}]
 """
-FAILING = QUICK.replace("collisions: {max: 0}", "goals_reached: {}")
+FAILING = QUICK.replace("collisions: {max: 0}", "clearance: {min: 2}")
 LONG = QUICK.replace("time_limit: 1 s", "time_limit: 600 s").replace(
     "goals: [{pose: {x: 5, y: 3}}]", "goals: [" + ", ".join(["{pose: {x: 5, y: 3}}, {pose: {x: 1, y: 1}}"] * 40) + "]"
 )
