@@ -90,8 +90,8 @@ class Clearance:
 
     def _enclosing(self, tick: int) -> str | None:
         place = self._place()
-        around = [self._proximity.name(k) for k in self._proximity.around(place) if k not in self._buildings]
-        return next(iter(around), None) or self._actors.around(place, tick)
+        around = self._proximity.around(place, but=self._buildings)
+        return self._proximity.name(around[0]) if around else self._actors.around(place, tick)
 
     def _fastest(self) -> float:
         """The greatest speed in m/s at which the robot and anything else can approach each other for a while."""

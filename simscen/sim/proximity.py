@@ -6,6 +6,7 @@ an engine of its own that is never stepped, built when the robot first comes nea
 """
 
 import math
+from collections.abc import Collection
 
 import numpy as np
 import numpy.typing as npt
@@ -100,10 +101,11 @@ class Proximity:
     def _faces(self, owner: int) -> npt.NDArray[np.int32]:
         return self._mesh.faces[self._order[self._starts[owner] : self._starts[owner + 1]]]
 
-    def around(self, place: tuple[float, float, float]) -> list[int]:
-        """The solids that a place is inside of, by number."""
+    def around(self, place: tuple[float, float, float], but: Collection[int] = ()) -> list[int]:
+        """The solids that a place is inside of, by number, without those in `but`."""
         held = np.flatnonzero(((self._low <= place) & (place <= self._high)).all(axis=1)).tolist()
-        return [owner for owner in held if winds_around(self._mesh.vertices[self._faces(owner)], place)]
+        asked = [owner for owner in held if owner not in but]
+        return [owner for owner in asked if winds_around(self._mesh.vertices[self._faces(owner)], place)]
 
     def convex(self, owner: int) -> bool:
         """Whether a solid is convex."""

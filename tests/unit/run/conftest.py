@@ -2,12 +2,9 @@
 
 import pytest
 
-from simscen.core.time import Clock
 from simscen.loading.scenario import load_scenario
-from simscen.record.tracebuilder import TraceBuilder
-from simscen.run.assemble import assemble
-from simscen.run.lockstep import run_lockstep
 from simscen.run.prepare import prepare
+from simscen.run.simulate import simulate
 
 ROOM = """\
 simscen: 1
@@ -29,19 +26,12 @@ pass: [{goals_reached: {}}]
 def play(tmp_path_factory: pytest.TempPathFactory):
     """Runs a scenario given as the lines that it has besides or instead of the usual ones; returns its trace."""
 
-    def run(extra: str = "", seed: int = 1, **instead: str):
+    def run(extra: str = "", seed: int = 1, room: str = ROOM, **instead: str):
         folder = tmp_path_factory.mktemp("play")
         lines = {line.split(":")[0]: line for line in SCENARIO.splitlines()}
         lines |= {key: f"{key}: {value}" for key, value in instead.items()}
-        (folder / "room.world.yaml").write_text(ROOM)
+        (folder / "room.world.yaml").write_text(room)
         (folder / "a.scenario.yaml").write_text("\n".join(lines.values()) + "\n" + extra)
-        prepared = prepare(load_scenario(folder / "a.scenario.yaml", folder))
-        clock = Clock(prepared.spec.physics.tick_rate)
-        rig, builder = assemble(prepared, seed), TraceBuilder(clock)
-        try:
-            end = run_lockstep(rig, (builder,))
-        finally:
-            rig.simulation.close()
-        return builder.finish(end.tick)
+        return simulate(prepare(load_scenario(folder / "a.scenario.yaml", folder)), seed).trace
 
     return run
