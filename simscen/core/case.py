@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from simscen.core.disturbance import Disturbance
 from simscen.core.geometry import Pose2
 from simscen.core.navigation import Goal
+from simscen.core.passage import Passage
 from simscen.core.world import Polygon
 
 CLEARANCE_RANGE = 2.0
@@ -21,6 +22,7 @@ class Case:
     `sent` are the goals that events may send on the way.
     `clearance_range` is how far around the hull clearance was searched, in metres: a clearance that is not below it was
     cut off, and is at least that.
+    `passages` are what these ways lead through, goal by goal, each in the direction of its way.
     `disturbances` are what has to happen: the scenario's events, then its faults.
     """
 
@@ -34,6 +36,7 @@ class Case:
     clearance_range: float = CLEARANCE_RANGE
     disturbances: tuple[Disturbance, ...] = ()
     sent: tuple[Goal, ...] = ()
+    passages: tuple[Passage, ...] = ()
 
     @property
     def every_goal(self) -> tuple[Goal, ...]:

@@ -26,7 +26,7 @@ class EventKind(str, Enum):
     FAULT_ENDED = "fault.ended"  # label; entry, touched (how many messages and commands it changed)
     EVENT_STARTED = "event.started"  # the scenario's event; entry (number of the event, from 0), actions
     EVENT_ENDED = "event.ended"  # the scenario's event; entry, effects (happened, what: of each action)
-    OBJECT_SPAWNED = "object.spawned"  # object; its shape and pose
+    OBJECT_SPAWNED = "object.spawned"  # object; its pose, shape, and parts (outlines in its own frame)
     OBJECT_REMOVED = "object.removed"  # object
     OBJECT_MOVED = "object.moved"  # object; waypoints
     ROBOT_PLACED = "robot.placed"  # x, y, yaw

@@ -10,6 +10,7 @@ from simscen.core.verdict import Status, Verdict
 from simscen.criteria.bounds import BrokenTrace
 from simscen.criteria.criterion import AnyCriterion
 from simscen.criteria.moments import ending
+from simscen.judge.cause import explained
 from simscen.judge.disturbances import happenings, missing
 from simscen.judge.judge import judge, outcome
 from simscen.judge.metrics import measure
@@ -27,7 +28,7 @@ def result_of(
 
     What had to happen and did not is a verdict, too; it comes first, for it is the reason of what follows.
     """
-    verdicts, happened = judge(criteria, trace, case), happenings(trace, case)
+    verdicts, happened = explained(judge(criteria, trace, case), trace, case), happenings(trace, case)
     lacking = missing(trace, happened, verdicts)
     lines = (*(line for _, line in lacking), *(lines or (0,) * len(verdicts)))
     verdicts = (*(verdict for verdict, _ in lacking), *verdicts)

@@ -12,8 +12,10 @@ from simscen.core.shapes import Body, Box, Capsule, Cone, Cylinder, Extrusion, M
 from simscen.core.time import Clock
 from simscen.core.trace import Decision, Truth
 from simscen.core.world import Polygon, World
+from simscen.sim.outline import parts
 from simscen.sim.simulation import Simulation
 from simscen.stack.protocols import Stack
+from simscen.worlds.shortest import Z_RANGE
 
 
 class LiveStage:
@@ -157,10 +159,13 @@ class LiveStage:
 
 
 def described(body: Body) -> dict[str, Value]:
-    """Pose and first shape of a body, as event data for pictures and logs."""
+    """Pose, first shape, and the outlines in its own frame of what a robot may touch, for pictures and judging."""
     pose = body.pose.plane
     place: dict[str, Value] = {"x": pose.x, "y": pose.y, "yaw": pose.yaw, "mass": body.mass}
-    return {**place, **_outline(body.solids[0].shape)}
+    outlines: list[Value] = [
+        [[round(x, 3), round(y, 3)] for x, y in outline] for outline in parts(body.solids, Z_RANGE)
+    ]
+    return {**place, **_outline(body.solids[0].shape), "parts": outlines}
 
 
 def _outline(shape: Shape) -> dict[str, Value]:

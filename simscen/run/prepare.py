@@ -10,7 +10,6 @@ from simscen.core.belief import Estimate
 from simscen.core.case import CLEARANCE_RANGE, Case
 from simscen.core.geometry import Pose2
 from simscen.core.grid import OccupancyGrid
-from simscen.core.navigation import Goal
 from simscen.core.world import BuiltWorld
 from simscen.criteria.base import Criterion
 from simscen.loading.disturbances import disturbances_of
@@ -23,7 +22,7 @@ from simscen.run.robotsize import inscribed_radius
 from simscen.run.worldsource import load_map, load_robot, load_world
 from simscen.sim.robot_body import RobotBody
 from simscen.worlds.build import build
-from simscen.worlds.shortest import shortest_lengths
+from simscen.worlds.shortest import shortest_legs
 
 DEFAULT_LIDAR_HEIGHT = 0.2
 
@@ -85,13 +84,18 @@ def prepare(loaded: LoadedScenario, world_of: BuildWorld = build_world) -> Prepa
         stack=stack_of(spec),
         start=start,
         estimate=estimate_of(spec.robot, start),
-        case=replace(case, shortest=_shortest(built, start, goals, case.inscribed_radius)),
+        case=with_ways(case, built),
     )
 
 
-def _shortest(built: BuiltWorld, start: Pose2, goals: tuple[Goal, ...], radius: float) -> dict[str, float]:
-    lengths = shortest_lengths(built, start, [goal.pose for goal in goals], radius)
-    return {goal.name: length for goal, length in zip(goals, lengths, strict=True)}
+def with_ways(case: Case, built: BuiltWorld) -> Case:
+    """The case with the shortest ways to its goals, and what they pass between."""
+    legs = shortest_legs(built, case.start, case.goals, case.inscribed_radius)
+    return replace(
+        case,
+        shortest={goal.name: leg.length for goal, leg in zip(case.goals, legs, strict=True)},
+        passages=tuple(passage for leg in legs for passage in leg.passages),
+    )
 
 
 def _clearance_range(spec: ScenarioSpec) -> float:

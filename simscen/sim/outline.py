@@ -1,4 +1,4 @@
-"""What a robot covers of the ground."""
+"""What robots and things cover of the ground."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -22,6 +22,22 @@ def circle(radius: float, corners: int = 32) -> Polygon:
 def footprint(solids: Iterable[Solid]) -> Polygon:
     """The convex outline of solids seen from above, anticlockwise."""
     return convex_hull(np.concatenate([solid.pose.apply(extremes(solid.shape))[:, :2] for solid in solids]))
+
+
+def parts(solids: Iterable[Solid], z_range: tuple[float, float]) -> list[Polygon]:
+    """The outlines of solids seen from above, those that reach into the heights; of a mesh or tilted one, its hull."""
+    found = []
+    for solid in solids:
+        corners = solid.pose.apply(extremes(solid.shape))
+        if corners[:, 2].min() < z_range[1] and corners[:, 2].max() > z_range[0]:
+            upright = isinstance(solid.shape, Extrusion) and solid.pose.qx == solid.pose.qy == 0
+            outline = _bottom(corners) if upright else convex_hull(corners[:, :2])
+            found += [outline] if len(outline) > 2 else []
+    return found
+
+
+def _bottom(corners: Array) -> Polygon:
+    return tuple((x, y) for x, y in corners[: len(corners) // 2, :2].tolist())
 
 
 def extremes(shape: Shape) -> Array:

@@ -30,13 +30,16 @@ class ClearanceField:
     """The distance to the nearest solid, roughly for cells and exactly for points; negative inside of solids.
 
     `rough` (rows, columns) are metres from the middle of a cell to that of the nearest cell that a solid reaches into:
-    the truth is at most HALF_DIAGONAL cells away from it. `inside` are the cells whose middle is in a solid.
+    the truth is at most HALF_DIAGONAL cells away from it. `inside` are the cells whose middle is in a solid. Point k of
+    the outline is on the solid `names[owners[k]]`.
     """
 
     grid: OccupancyGrid
     rough: Array
     inside: Cells
     outline: "cKDTree | None"
+    owners: npt.NDArray[np.int32]
+    names: tuple[str, ...] = ()
 
     def exact(self, points: Array) -> Array:
         """Clearance (n,) in metres at points (n, 2)."""
@@ -91,11 +94,11 @@ def clearance_field(mesh: TriangleMesh, grid: OccupancyGrid, z_range: tuple[floa
         local = Section((cut.segments - (grid.origin.x, grid.origin.y)) / grid.resolution, cut.owners)
         blocked |= touched(local, grid.shape)
         inside |= filled(local, grid.shape)
-    samples = _along(np.concatenate([cut.segments for cut in cuts]))
+    samples, owners = _along(*(np.concatenate([getattr(cut, part) for cut in cuts]) for part in ("segments", "owners")))
     if not blocked.any():
-        return ClearanceField(grid, np.full(grid.shape, NOTHING), inside, None)
+        return ClearanceField(grid, np.full(grid.shape, NOTHING), inside, None, owners)
     rough = ndimage.distance_transform_edt(~blocked) * grid.resolution
-    return ClearanceField(grid, rough, inside, spatial.cKDTree(samples))
+    return ClearanceField(grid, rough, inside, spatial.cKDTree(samples), owners, mesh.names)
 
 
 def standing_outlines(mesh: TriangleMesh, z_range: tuple[float, float]) -> list[Section]:
@@ -109,8 +112,11 @@ def standing_outlines(mesh: TriangleMesh, z_range: tuple[float, float]) -> list[
     return [section(mesh, height) for height in middles.tolist()]
 
 
-def _along(segments: Array) -> Array:
-    """Points (n, 2) along segments (m, 2, 2), at most SPACING apart, ends included; the same point only once."""
+def _along(segments: Array, owners: npt.NDArray[np.int32]) -> tuple[Array, npt.NDArray[np.int32]]:
+    """Points (n, 2) along segments (m, 2, 2), at most SPACING apart, ends included; the same point only once.
+
+    With them the owner (n,) of each, given those (m,) of the segments.
+    """
     step = segments[:, 1] - segments[:, 0]
     pieces = np.maximum(np.ceil(np.linalg.norm(step, axis=1) / SPACING), 1).astype(np.int64)
     which, number = ranges(np.zeros_like(pieces), pieces + 1)
@@ -120,4 +126,4 @@ def _along(segments: Array) -> Array:
     new = np.ones(len(order), dtype=np.bool_)
     new[1:] = np.any(np.diff(keys[order], axis=0) != 0, axis=1)
     distinct: Array = points[order[new]]
-    return distinct
+    return distinct, owners[which][order[new]]

@@ -2,16 +2,20 @@
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
+from simscen.core.navigation import Goal
+from simscen.core.passage import Passage
 from simscen.core.shapes import TriangleMesh
 from simscen.core.world import BuiltWorld
 from simscen.worlds.clearance import HALF_DIAGONAL, clearance_field
 from simscen.worlds.lattice import Lattice, Numbers
+from simscen.worlds.passages import passages
 from simscen.worlds.slicing import empty_grid
 from simscen.worlds.taut import is_clear, length, tighten
 
@@ -19,6 +23,14 @@ Z_RANGE = (0.03, 0.4)
 """What a robot may touch: above thresholds it rolls over, below what it passes under."""
 MOST_CELLS = 1_000_000
 """Of the search; larger worlds are searched more coarsely."""
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A shortest way to a goal: metres, inf where there is none, and what it passes between."""
+
+    length: float
+    passages: tuple[Passage, ...] = ()
 
 
 class ShortestWays:
@@ -50,6 +62,11 @@ class ShortestWays:
         """Metres of the shortest way between two positions; inf if there is none or the disc does not fit there."""
         way = self.way(start, goal)
         return math.inf if way is None else length(way)
+
+    def leg(self, start: Pose2, goal: Pose2, name: str) -> Leg:
+        """The shortest way to the goal called `name`."""
+        way = self.way(start, goal)
+        return Leg(math.inf) if way is None else Leg(length(way), passages(way, name, self._field))
 
     def way(self, start: Pose2, goal: Pose2) -> Array | None:
         """The corners (n, 2) of the shortest way, arcs as short chords; None if there is none."""
@@ -118,13 +135,13 @@ class ShortestWays:
         return row, column
 
 
-def shortest_lengths(
-    built: BuiltWorld, start: Pose2, goals: Sequence[Pose2], radius: float, z_range: tuple[float, float] = Z_RANGE
-) -> list[float]:
-    """Metres of the shortest way of a disc from each goal's predecessor (the start for the first) to that goal."""
-    stops = [start, *goals]
+def shortest_legs(
+    built: BuiltWorld, start: Pose2, goals: Sequence[Goal], radius: float, z_range: tuple[float, float] = Z_RANGE
+) -> list[Leg]:
+    """The shortest way of a disc from each goal's predecessor (the start for the first) to that goal."""
+    stops = [start, *(goal.pose for goal in goals)]
     ways = ShortestWays(built.mesh, _around(built, stops), radius, z_range)
-    return [ways.length(a, b) for a, b in pairwise(stops)]
+    return [ways.leg(a, b, goal.name) for (a, b), goal in zip(pairwise(stops), goals, strict=True)]
 
 
 def _around(built: BuiltWorld, stops: Sequence[Pose2]) -> tuple[float, float, float, float]:

@@ -48,8 +48,11 @@ def of_shape(shape: Shape) -> Array:
 
 
 def of_event(event: Event) -> Array:
-    """The outline that an object.spawned event describes: `shape` box, cylinder or polygon, with `size` or `points`."""
+    """The outline that an object.spawned event describes: its largest part, or `shape` with `size` or `points`."""
     size, points = _floats(event.data, "size"), event.data.get("points")
+    parts = event.data.get("parts")
+    if isinstance(parts, list) and parts:
+        return max((np.array(part, dtype=np.float64) for part in parts), key=_area)
     match event.data.get("shape"):
         case "box" if len(size) >= 2:
             return _rectangle(size[0], size[1])

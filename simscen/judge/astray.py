@@ -1,0 +1,49 @@
+"""Why a robot is not where it believes to be."""
+
+import numpy as np
+
+from simscen.core.events import EventKind
+from simscen.core.trace import Trace
+
+ODOMETRY = frozenset({"bias", "slip"})
+"""Faults whose error stays in the odometry when they are over."""
+LOST = 0.5
+"""Metres between belief and truth from which a robot is lost: two radii of a small one."""
+
+
+def astray(trace: Trace, tick: int, known: bool = False) -> tuple[list[str], set[str]]:
+    """How far off it was, if far and not `known`; how that came about; and which events and faults did it."""
+    off = _off(trace, tick)
+    if not off >= LOST:  # nan, too
+        return [], set()
+    lines = [] if known else [f"it believed itself {off:.2f} m from where it was"]
+    named: set[str] = set()
+    doing = ""
+    for event in trace.events:
+        if event.tick > tick:
+            break
+        if event.kind is EventKind.EVENT_STARTED:
+            doing = event.name
+        elif event.kind is EventKind.EVENT_ENDED:
+            doing = ""
+        elif event.kind is EventKind.ROBOT_PLACED:
+            ago = trace.seconds(tick - event.tick)
+            lines.append(f"event `{doing}` had set it down elsewhere {ago:.2f} s before")
+            named.add(doing)
+        elif event.kind is EventKind.FAULT_TOOK_EFFECT and _fault(trace, event.name) in ODOMETRY:
+            lines.append(f"{event.name} falsified its odometry from t = {trace.seconds(event.tick):.2f} s on")
+            named.add(event.name)
+    return lines, named
+
+
+def _off(trace: Trace, tick: int) -> float:
+    if not len(trace.belief) or not len(trace.truth):
+        return 0.0
+    bx, by = trace.belief.at(np.array([tick]))[0, :2].tolist()
+    x, y = trace.place(tick)
+    return float(np.hypot(bx - x, by - y))
+
+
+def _fault(trace: Trace, label: str) -> str:
+    kinds = [event.data.get("fault") for event in trace.of_kind(EventKind.FAULT_STARTED) if event.name == label]
+    return str(kinds[0]) if kinds else ""
