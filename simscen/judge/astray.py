@@ -21,16 +21,16 @@ def astray(trace: Trace, tick: int, known: bool = False) -> tuple[list[str], set
     doing = ""
     for event in trace.events:
         if event.tick > tick:
-            break
-        if event.kind is EventKind.EVENT_STARTED:
+            continue
+        if event.kind == EventKind.EVENT_STARTED:
             doing = event.name
-        elif event.kind is EventKind.EVENT_ENDED:
+        elif event.kind == EventKind.EVENT_ENDED:
             doing = ""
-        elif event.kind is EventKind.ROBOT_PLACED:
+        elif event.kind == EventKind.ROBOT_PLACED:
             ago = trace.seconds(tick - event.tick)
             lines.append(f"event `{doing}` had set it down elsewhere {ago:.2f} s before")
             named.add(doing)
-        elif event.kind is EventKind.FAULT_TOOK_EFFECT and _fault(trace, event.name) in ODOMETRY:
+        elif event.kind == EventKind.FAULT_TOOK_EFFECT and _fault(trace, event.name) in ODOMETRY:
             lines.append(f"{event.name} falsified its odometry from t = {trace.seconds(event.tick):.2f} s on")
             named.add(event.name)
     return lines, named

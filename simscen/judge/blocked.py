@@ -12,8 +12,10 @@ from simscen.core.polygons import distance_to_segment
 from simscen.core.trace import Trace
 from simscen.judge.things import Thing
 
-STEP = 0.02
+STEP = 0.005
 """Metres between the places in a passage that are tried."""
+NOTHING = 0.02
+"""Metres that are as good as nothing, and as no change: passages are measured to that."""
 ON_THE_WAY = 0.5
 """Metres from a passage within which a robot is on the way that leads through it; passages lie 0.25 m apart."""
 
@@ -25,16 +27,16 @@ def blocked(trace: Trace, case: Case, goal: str, tick: int, there: Sequence[Thin
     """
     needed, turning = 2 * case.inscribed_radius, 2 * _reach(case)
     rooms = [(room(passage, there), passage) for passage in _ahead(trace, case, goal, tick)]
-    worse = [(left, passage) for left, passage in rooms if left < min(turning, passage.width - STEP)]
+    worse = [(left, passage) for left, passage in rooms if left < min(turning, passage.width - NOTHING)]
     if not worse:
         return [], set()
     left, passage = min(worse, key=lambda pair: (pair[0], pair[1].width))
-    guilty = _guilty(passage, there, max(needed, left + STEP))
+    guilty = _guilty(passage, there, max(needed, left + NOTHING))
     verb = "closes" if left < needed else "narrows"
     named = " and ".join(thing.told(trace) for thing in guilty)
     text = (
         f"{named} {verb if len(guilty) == 1 else verb[:-1]} {_told(passage)} on the shortest way: "
-        f"{f'{left:.2f} m are' if left >= STEP else 'nothing is'} left, the robot is {needed:.2f} m wide"
+        f"{f'{left:.2f} m are' if left >= NOTHING else 'nothing is'} left, the robot is {needed:.2f} m wide"
     )
     return [text], {thing.event for thing in guilty}
 
@@ -52,7 +54,7 @@ def room(passage: Passage, there: Sequence[Thing]) -> float:
 def _guilty(passage: Passage, there: Sequence[Thing], needed: float) -> list[Thing]:
     """The one thing that does it alone, or all that have a part in it."""
     alone = [thing for thing in there if room(passage, [thing]) < needed]
-    return alone[-1:] or [thing for thing in there if room(passage, [thing]) < passage.width - STEP]
+    return alone[-1:] or [thing for thing in there if room(passage, [thing]) < passage.width - NOTHING]
 
 
 def _ahead(trace: Trace, case: Case, goal: str, tick: int) -> list[Passage]:

@@ -48,7 +48,7 @@ def _goal(trace: Trace, case: Case, tick: int) -> Goal | None:
 def _failed(trace: Trace, case: Case, tick: int) -> Goal | None:
     """The goal whose failure ended the navigation before `tick`."""
     ends = [e for e in trace.of_kind(EventKind.GOAL_REACHED, EventKind.GOAL_FAILED) if e.tick <= tick]
-    if not ends or ends[-1].kind is not EventKind.GOAL_FAILED:
+    if not ends or ends[-1].kind != EventKind.GOAL_FAILED:
         return None
     return next((goal for goal in case.every_goal if goal.name == ends[-1].name), None)
 

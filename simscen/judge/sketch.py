@@ -10,6 +10,7 @@ from simscen.core.disturbance import Disturbance
 from simscen.core.events import Event, EventKind
 from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.core.navigation import Goal, Path
+from simscen.core.passage import Passage
 from simscen.core.samples import Samples, Ticks
 from simscen.core.trace import Trace
 
@@ -108,7 +109,7 @@ def _lifted(points: Sequence[Sequence[float]]) -> Array:
 
 def sketch_case(words: Mapping[str, Any]) -> Case:
     """A case: start [x, y, yaw] · goals [{name, pose: [x, y, yaw], xy_tolerance, …}] · sent ·
-    shortest {goal: metres} · …"""
+    shortest {goal: metres} · passages [[goal, [x, y], [x, y], name, name]] · disturbances [{name, kind, …}] · …"""
     goals, sent = (
         tuple(Goal(**{**goal, "pose": _pose(goal["pose"])}) for goal in words.get(key, [])) for key in ("goals", "sent")
     )
@@ -122,6 +123,10 @@ def sketch_case(words: Mapping[str, Any]) -> Case:
         inscribed_radius=words.get("inscribed_radius", 0.2),
         time_limit=words.get("time_limit", 60.0),
         clearance_range=words.get("clearance_range", CLEARANCE_RANGE),
+        passages=tuple(
+            Passage(goal, ((ax, ay), (bx, by)), (one, other))
+            for goal, (ax, ay), (bx, by), one, other in words.get("passages", [])
+        ),
         disturbances=tuple(Disturbance(**ordered) for ordered in words.get("disturbances", [])),
     )
 

@@ -74,7 +74,7 @@ def _thing(trace: Trace, tick: int, spawned: Event, by: str, last: Event) -> Thi
     pose, parts = pose_at(trace, spawned, tick), spawned.data["parts"]
     assert isinstance(parts, list)
     outlines = tuple(pose.apply(np.array(part, dtype=np.float64)) for part in parts)
-    return Thing(spawned.name, outlines, by, last.tick, last.kind is EventKind.OBJECT_MOVED)
+    return Thing(spawned.name, outlines, by, last.tick, last.kind == EventKind.OBJECT_MOVED)
 
 
 def _distance(points: Array, corners: Array) -> Array:

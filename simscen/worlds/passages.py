@@ -28,16 +28,18 @@ def passages(way: Array, goal: str, field: ClearanceField) -> tuple[Passage, ...
     if field.outline is None:
         return ()
     points = resample(way, max(SPACING, length(way) / MOST))
-    seen, found = set[tuple[Point, Point]](), []
+    found: dict[tuple[int, int], float] = {}
     for point in points:
-        pair = next((pair for pair in _pairs(point, field) if _crossed(field.outline.data[list(pair)], points)), None)
-        if pair is None:
-            continue
-        ends = _end(pair[0], field), _end(pair[1], field)
-        if ends not in seen and ends[::-1] not in seen:
-            seen.add(ends)
-            found.append(Passage(goal, ends, (_name(pair[0], field), _name(pair[1], field))))
-    return tuple(found)
+        places = ((pair, _crossed(field.outline.data[list(pair)], points)) for pair in _pairs(point, field))
+        pair, place = next(((pair, place) for pair, place in places if place is not None), (None, None))
+        if pair is not None and place is not None:
+            found.setdefault((min(pair), max(pair)), place)
+    return tuple(_passage(goal, pair, field) for pair in sorted(found, key=lambda pair: found[pair]))
+
+
+def _passage(goal: str, pair: tuple[int, int], field: ClearanceField) -> Passage:
+    one, other = pair
+    return Passage(goal, (_end(one, field), _end(other, field)), (_name(one, field), _name(other, field)))
 
 
 def _pairs(point: Array, field: ClearanceField) -> Iterator[tuple[int, int]]:
@@ -71,13 +73,18 @@ def _hits(point: Array, side: Array, distance: float, field: ClearanceField) -> 
     return hits
 
 
-def _crossed(ends: Array, way: Array) -> bool:
-    """Whether the line between two points crosses the way."""
+def _crossed(ends: Array, way: Array) -> float | None:
+    """Where the line between two points first crosses the way, in pieces of it from its start; None if nowhere."""
     (ax, ay), (bx, by) = ends.tolist()
     across = (bx - ax) * (way[:, 1] - ay) - (by - ay) * (way[:, 0] - ax)
     step = np.diff(way, axis=0)
     one, other = (step[:, 0] * (y - way[:-1, 1]) - step[:, 1] * (x - way[:-1, 0]) for x, y in ((ax, ay), (bx, by)))
-    return bool(np.any((across[:-1] * across[1:] <= 0) & (one * other <= 0)))
+    pieces = np.flatnonzero((across[:-1] * across[1:] <= 0) & (one * other <= 0))
+    if not len(pieces):
+        return None
+    first = int(pieces[0])
+    before, after = abs(float(across[first])), abs(float(across[first + 1]))
+    return first + (before / (before + after) if before + after else 0.0)
 
 
 def _narrowest(one: int, other: int, field: ClearanceField) -> tuple[int, int]:

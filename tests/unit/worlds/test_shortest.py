@@ -8,11 +8,12 @@ import shapely
 from scipy.sparse.csgraph import dijkstra
 
 from simscen.core.geometry import Pose2, Pose3
+from simscen.core.navigation import Goal
 from simscen.core.shapes import Box, Cylinder, Extrusion, Solid, Sphere
 from simscen.core.world import World
 from simscen.worlds.build import build
 from simscen.worlds.meshing import fuse
-from simscen.worlds.shortest import ShortestWays, shortest_lengths
+from simscen.worlds.shortest import ShortestWays, shortest_legs
 
 R = 0.25
 
@@ -133,8 +134,9 @@ def test_a_point_cannot_pass_through_a_sheet():
 
 def test_lengths_are_given_from_stop_to_stop_also_beyond_the_bounds():
     built = build(World("w", (Solid(Extrusion(((0, 0), (1, 0), (1, 1)), 1.0)),)), 0.2)
-    legs = shortest_lengths(built, Pose2(-3, 3), [Pose2(-3, 8), Pose2(6, 8), Pose2(0.7, 0.3)], R)
-    assert legs == pytest.approx([5.0, 9.0, math.inf])
+    goals = [Goal(str(place), place) for place in (Pose2(-3, 8), Pose2(6, 8), Pose2(0.7, 0.3))]
+    legs = shortest_legs(built, Pose2(-3, 3), goals, R)
+    assert [leg.length for leg in legs] == pytest.approx([5.0, 9.0, math.inf])
 
 
 def test_a_house_of_twenty_metres_takes_a_fraction_of_a_second():

@@ -1,0 +1,83 @@
+"""Why a run failed is told from end to end, and a log judged again says the same."""
+
+from pathlib import Path
+
+import pytest
+
+from simscen.judge.result import result_of
+from simscen.judge.resultdata import to_json
+from simscen.loading.resolved import spec_of_text
+from simscen.loading.scenario import load_scenario
+from simscen.record.replay import read_log
+from simscen.run.prepare import prepare
+from simscen.run.simulate import simulate
+
+HEAD = """\
+simscen: 1
+world:
+  simscen: 1
+  walls:
+    - {name: outer wall, points: [[0, 0], [8, 0], [8, 4], [0, 4], [0, 0]]}
+    - {name: south of the door, points: [[4, 0], [4, 1.5]]}
+    - {name: north of the door, points: [[4, 2.5], [4, 4]]}
+robot: {pose: {x: 1, y: 1}}
+stack: {recovery: {number_of_retries: 1}}
+goals: [{name: far room, pose: {x: 7, y: 3}, timeout: 20 s}]
+time_limit: 25 s
+"""
+
+CASES = {
+    "a crate in the only door": (
+        """\
+events: [{name: crate falls, when: {time: 1 s}, do: {spawn: {name: crate, box: [0.3, 0.8, 1], pose: {x: 4, y: 2}}}}]
+pass: [{goals_reached: {}}]
+""",
+        "goals_reached",
+        "why: crate (spawned by event `crate falls` at t = 1.00 s) closes the passage of 1.00 m between "
+        "`south of the door` and `north of the door` at (3.95, 2.00) on the shortest way: "
+        "0.10 m are left, the robot is 0.44 m wide",
+    ),
+    "a robot that was carried off": (
+        """\
+events: [{name: carried off, when: {travelled: 1 m}, do: {kidnap: {pose: {x: 5, y: 1}}}}]
+pass: [{localization_error: {max: 0.5 m}}]
+""",
+        "localization_error",
+        "why: event `carried off` had set it down elsewhere ",
+    ),
+    "a box dropped before a robot at speed": (
+        """\
+events: [{name: box falls, when: {travelled: 1 m}, do: {spawn: {name: box, box: [0.3, 0.3, 0.4], ahead: [0.45, 0]}}}]
+pass: [{collisions: {max: 0}}]
+""",
+        "collisions",
+        "why: box: event `box falls` had put it 0.30 m from the robot's middle ",
+    ),
+    "a lidar that is silent": (
+        """\
+faults: [{sensor: lidar, off: {}, when: {time: 4 s}}]
+pass: [{goals_reached: {}}]
+""",
+        "goals_reached",
+        "meanwhile: lidar.off was at work since t = 4.00 s, for ",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_cause_stands_before_the_symptom_live_and_judged_again(name, tmp_path):
+    text, criterion, expected = CASES[name]
+    file, log = tmp_path / "own.scenario.yaml", tmp_path / "run.mcap"
+    file.write_text(HEAD + text)
+    run = simulate(prepare(load_scenario(file, tmp_path)), log=log)
+    finding = run.verdict(criterion).tightest
+    assert finding.detail[0].startswith(expected), finding.detail
+    assert all(one.happened for one in run.result.disturbances)
+    assert again(log, run.result) == to_json(run.result)
+
+
+def again(log: Path, result) -> str:
+    read = read_log(log)
+    criteria = spec_of_text(read.about.scenario, "log").pass_
+    lines = result.lines[-len(criteria) :]
+    return to_json(result_of(result.key, result.path, criteria, read.trace, read.about.case, lines))
