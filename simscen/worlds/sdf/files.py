@@ -7,13 +7,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from simscen.core.filesread import note_read
+from simscen.worlds.sdf.addresses import SCHEMES, fuel, places
 from simscen.worlds.sdf.markup import Element
-from simscen.worlds.sdf.report import Place, Unusable
+from simscen.worlds.sdf.neighbours import neighbour
+from simscen.worlds.sdf.report import Missing, Place, Unusable
 
 LONGEST_PATH = 1000
 WORLD_BYTES = 20 * 2**20
 MESH_BYTES = 20 * 2**20
-SCHEMES = ("model://", "package://", "file://")
 
 
 class Trouble(Exception):
@@ -63,34 +64,35 @@ class Library:
             raise Trouble("outside the scenario root and the world paths")
 
     def locate(self, element: Element) -> Path:
-        """The real path of what a `<uri>` means; raises Unusable.
-
-        model:// and package:// are looked up in the search folders; file:// and bare paths beside the file that
-        names them, then in the search folders (as GZ_SIM_RESOURCE_PATH).
-        """
+        """The real path of what a `<uri>` means, see addresses.places; raises Unusable."""
         uri = element.text
         if not uri or not uri.isprintable():
             raise element.unusable("control character in the uri" if uri else "the uri is empty")
         if len(uri) > LONGEST_PATH:
             raise element.unusable("not a usable path")
-        if "://" in uri and not uri.startswith(SCHEMES):
-            raise element.unusable(f"{uri}: only model://, package://, file:// and relative paths are read",
+        if "://" in uri and not uri.startswith(SCHEMES) and fuel(uri) is None:
+            raise element.unusable(f"{uri}: only model://, package://, file://, Fuel and relative paths are read",
                                    "download it and name its folder with --world-path")  # fmt: skip
-        scheme = next((s for s in SCHEMES if uri.startswith(s)), "")
-        rest = uri.removeprefix(scheme)
-        local = scheme in ("", "file://")
-        folders = [*([Path(element.source.folder)] if local else []), *self.search]
-        if not local and rest.startswith("/"):
+        if uri in SCHEMES or (uri.startswith(("model://", "package://")) and not uri.partition("://")[2].strip("/")):
             raise element.unusable(f"{uri}: the name of a model is missing")
-        for folder in folders:
-            candidate = folder / rest
+        tried: list[tuple[Path, Path]] = []
+        for folder, candidate in places(uri, Path(element.source.folder), self.search):
+            tried.append((folder, candidate))
             try:
                 return self.resolve(candidate)
             except Trouble as trouble:
                 if str(trouble) != _ABSENT:
                     raise element.unusable(f"{uri}: {trouble}") from trouble
-        looked = ", ".join(dict.fromkeys(self.shown(folder) or "." for folder in folders)) or "no folder"
-        raise element.unusable(f"{uri}: {_ABSENT}", f"looked in {looked}; allow its folder with --world-path")
+        raise Missing(element.place, f"{uri}: {_ABSENT}", self._hint(uri, tried), uri)
+
+    def _hint(self, uri: str, tried: list[tuple[Path, Path]]) -> str:
+        near = next((found for folder, path in tried if (found := neighbour(folder, path))), None)
+        if near:
+            return f"did you mean `{near}`?"
+        if fuel(uri) and not self.search:
+            return "allow Fuel's cache with --world-path ~/.gz/fuel, or a folder that holds the downloaded model"
+        looked = ", ".join(dict.fromkeys(self.shown(folder) or "." for folder, _ in tried)) or "no folder"
+        return f"looked in {looked}; allow its folder with --world-path"
 
     def read(self, path: Path, element: Element, limit: int) -> bytes:
         """The bytes of a located file; raises Unusable at the element that asked for it."""

@@ -4,15 +4,16 @@ import os
 from pathlib import Path
 
 from simscen.worlds.sdf import markup
+from simscen.worlds.sdf.addresses import standard
 from simscen.worlds.sdf.files import WORLD_BYTES, Library
 from simscen.worlds.sdf.markup import Element
-from simscen.worlds.sdf.report import Unusable
+from simscen.worlds.sdf.report import Report, Unusable
 
 NEWEST = (1, 12)
 OLDEST = (1, 3)
 BUILT_IN = {
-    "model://sun": "<sdf version='1.6'><light name='sun' type='directional'/></sdf>",
-    "model://ground_plane": "<sdf version='1.6'><model name='ground_plane'><static>1</static><link name='link'>"
+    "sun": "<sdf version='1.6'><light name='sun' type='directional'/></sdf>",
+    "ground_plane": "<sdf version='1.6'><model name='ground_plane'><static>1</static><link name='link'>"
     "<collision name='collision'><geometry><plane><normal>0 0 1</normal><size>100 100</size></plane></geometry>"
     "</collision></link></model></sdf>",
 }
@@ -45,8 +46,8 @@ def check_root(root: Element) -> None:
 class Shelf:
     """Opens included files once each and refuses circles."""
 
-    def __init__(self, library: Library) -> None:
-        self.library = library
+    def __init__(self, library: Library, report: Report) -> None:
+        self.library, self._report = library, report
         self._roots: dict[str, Element] = {}
         self._chain: list[str] = []
 
@@ -94,19 +95,27 @@ class Shelf:
         try:
             found = self.library.locate(uri)
         except Unusable:
-            if uri.text.rstrip("/") in BUILT_IN:
-                return uri.text.rstrip("/")
-            raise
+            own = standard(uri.text)
+            if own is None:
+                raise
+            return own
         return str(self._in_folder(found, uri) if found.is_dir() else found)
 
     def _in_folder(self, folder: Path, uri: Element) -> Path:
+        """The model in a folder; what is wrong with its model.config does not matter where there is a model.sdf."""
         config, plain = folder / "model.config", folder / "model.sdf"
-        if os.path.lexists(config):
-            root = markup.parse(self.library.read(config, uri, WORLD_BYTES), self.library.shown(config), str(folder))
-            return self.library.locate(best_version(root))
-        if not os.path.lexists(plain):
+        if not os.path.lexists(config):
+            if os.path.lexists(plain):
+                return plain
             raise uri.unusable(f"{self.library.shown(folder)}: neither model.config nor model.sdf in this folder")
-        return plain
+        try:
+            data = self.library.read(config, uri, WORLD_BYTES)
+            return self.library.locate(best_version(markup.parse(data, self.library.shown(config), str(folder))))
+        except Unusable as error:
+            if not os.path.lexists(plain):
+                raise
+            self._report.note(error.place, f"{error.message}; model.sdf beside it is used")
+            return plain
 
 
 def best_version(config: Element) -> Element:

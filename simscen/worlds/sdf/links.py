@@ -1,7 +1,7 @@
 """What a link is made of: its collision solids and its mass."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from simscen.core.geometry import Pose3
 from simscen.core.shapes import Solid
@@ -9,6 +9,7 @@ from simscen.worlds.sdf import values
 from simscen.worlds.sdf.markup import Element
 from simscen.worlds.sdf.placing import PlacedLink
 from simscen.worlds.sdf.report import Report
+from simscen.worlds.sdf.scaling import scaled
 from simscen.worlds.sdf.shapes import ShapeReader
 from simscen.worlds.sdf.vocabulary import judge_children, judge_unknown
 from simscen.worlds.sdf.weight import DEFAULT_MASS, mass_of
@@ -50,7 +51,7 @@ def _collision(element: Element, link: PlacedLink, reader: ShapeReader, report: 
     pose = link.pose.compose(_in_link(element.child("pose"), link))
     name = f"{link.name}::{element.name}" if element.name else link.name
     for solid in reader.solids(geometry, pose):
-        yield replace(solid, pose=pose.compose(solid.pose), name=name)
+        yield Solid(scaled(solid.shape, link.scale), pose.compose(solid.pose), name)
 
 
 def _in_link(given: Element | None, link: PlacedLink) -> Pose3:

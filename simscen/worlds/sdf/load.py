@@ -11,6 +11,7 @@ from simscen.core.geometry import Array
 from simscen.core.shapes import Body, Solid
 from simscen.core.world import World
 from simscen.worlds.extents import plan_extents
+from simscen.worlds.mapsize import Bounds
 from simscen.worlds.sdf.actors import read_actor
 from simscen.worlds.sdf.bodies import distinct, split
 from simscen.worlds.sdf.files import Library
@@ -18,6 +19,7 @@ from simscen.worlds.sdf.floor import floor_height
 from simscen.worlds.sdf.includes import Shelf
 from simscen.worlds.sdf.links import read_link
 from simscen.worlds.sdf.markup import Element
+from simscen.worlds.sdf.outliers import outliers
 from simscen.worlds.sdf.placing import place
 from simscen.worlds.sdf.report import Report, Unusable
 from simscen.worlds.sdf.shapes import ShapeReader
@@ -46,7 +48,7 @@ def load_sdf(path: Path, *, search: Sequence[Path] = (), root: Path, lenient: bo
 
 
 def _read(path: Path, library: Library, report: Report) -> World:
-    shelf = Shelf(library)
+    shelf = Shelf(library, report)
     document = shelf.open_world(path)
     try:
         element = _top(document, report)
@@ -105,17 +107,38 @@ class _Builder:
     def _world(self) -> World:
         element = self.whole.element
         if not self.solids and not self.bodies and not self.report.failed:
-            self.report.unusable(element.unusable(self._why_empty(), "load it leniently if an empty floor is meant"))
-        bodies = distinct(self.bodies, self.report, element)
-        extents = [plan_extents(solid) for solid in self.solids]
-        extents += [plan_extents(solid, body.pose) for body in bodies for solid in body.solids]
+            self._refuse_emptiness(element)
         name = element.name or Path(element.source.name).stem
-        bounds = _around(extents)
-        height = floor_height(self.solids, bounds)
+        solids, bodies, bounds = self._within_reach(distinct(self.bodies, self.report, element))
+        height = floor_height(solids, bounds)
         if height:
             self.report.note(element.place, f"its floor lies {height:.3f} m high; the world is lowered by as much")
-        solids, bodies = _lowered(self.solids, height), _lowered(bodies, height)
+        solids, bodies = _lowered(solids, height), _lowered(bodies, height)
         return World(name, solids, bodies, bounds=bounds, notes=self.report.notes)
+
+    def _within_reach(self, bodies: tuple[Body, ...]) -> tuple[tuple[Solid, ...], tuple[Body, ...], Bounds]:
+        """The solids and bodies without those parked far away from all others, and the rectangle around them."""
+        covered: dict[str, list[Array]] = {}
+        for solid in self.solids:
+            covered.setdefault(_model_of(solid), []).append(plan_extents(solid))
+        for body in bodies:
+            covered.setdefault(body.name, []).extend(plan_extents(solid, body.pose) for solid in body.solids)
+        far = outliers({name: np.array(_around(corners)).reshape(2, 2) for name, corners in covered.items()})
+        for name, distance in far.items():
+            told = f"left out: {name!r} lies {distance:.0f} m away from the middle of all, too far for a map of them"
+            self.report.note(self.whole.element.place, told)
+        return (
+            tuple(solid for solid in self.solids if _model_of(solid) not in far),
+            tuple(body for body in bodies if body.name not in far),
+            _around([corners for name, all_corners in covered.items() if name not in far for corners in all_corners]),
+        )
+
+    def _refuse_emptiness(self, element: Element) -> None:
+        """An empty floor may be meant, but not where things were skipped until nothing was left."""
+        if self.report.skipped:
+            told = f"nothing is left of this world: {self.report.skipped} things in it were skipped"
+            raise element.unusable(told, "load it without --lenient to see what is missing")
+        self.report.unusable(element.unusable(self._why_empty(), "load it leniently if an empty floor is meant"))
 
     def _why_empty(self) -> str:
         models = [m for part in self.whole.parts if isinstance(part, Model) for m in part.models()]
@@ -129,6 +152,11 @@ class _Builder:
         return "no collision geometry in this world: its links have visuals at most"
 
 
+def _model_of(solid: Solid) -> str:
+    """The outermost model that a solid belongs to, by its scoped name."""
+    return solid.name.partition("::")[0]
+
+
 Placed = TypeVar("Placed", Solid, Body)
 
 
@@ -136,7 +164,7 @@ def _lowered(things: Sequence[Placed], height: float) -> tuple[Placed, ...]:
     return tuple(replace(thing, pose=thing.pose._replace(z=thing.pose.z - height)) for thing in things)
 
 
-def _around(extents: list[Array]) -> tuple[float, float, float, float]:
+def _around(extents: list[Array]) -> Bounds:
     """The rectangle around rectangles (2, 2); zeros when there is none."""
     if not extents:
         return 0.0, 0.0, 0.0, 0.0

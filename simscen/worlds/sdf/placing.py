@@ -6,18 +6,22 @@ from dataclasses import dataclass
 from simscen.core.geometry import Pose3
 from simscen.worlds.sdf.frames import Frame
 from simscen.worlds.sdf.report import Report
-from simscen.worlds.sdf.state import ModelState
+from simscen.worlds.sdf.state import ModelState, Scale
 from simscen.worlds.sdf.tree import Model
 
 
 @dataclass(frozen=True, eq=False)
 class PlacedLink:
-    """A link at `pose` in the world; `name` is scoped as Gazebo's: model::nested::link."""
+    """A link at `pose` in the world; `name` is scoped as Gazebo's: model::nested::link.
+
+    `scale` is how much larger its shapes are than written.
+    """
 
     name: str
     frame: Frame
     model: Model
     pose: Pose3
+    scale: Scale = (1.0, 1.0, 1.0)
 
 
 def place(model: Model, pose: Pose3, report: Report, state: ModelState | None = None) -> Iterator[PlacedLink]:
@@ -35,12 +39,13 @@ def _below(model: Model, given: Pose3, scoped: str, report: Report, state: Model
             if isinstance(part, Model):
                 yield from _below(part, placed, name, report, state.models.get(part.name, _inlined(state, part)))
             else:
-                yield PlacedLink(name, part, model, state.links.get(part.name, placed))
+                yield PlacedLink(name, part, model, state.links.get(part.name, placed), state.scale)
 
 
 def _inlined(state: ModelState, part: Model) -> ModelState:
     """Older Classic worlds call the links of an included model `model::link` in the state of its owner."""
     prefix = f"{part.name}::"
     return ModelState(
-        links={name.removeprefix(prefix): pose for name, pose in state.links.items() if name.startswith(prefix)}
+        scale=state.scale,
+        links={name.removeprefix(prefix): pose for name, pose in state.links.items() if name.startswith(prefix)},
     )

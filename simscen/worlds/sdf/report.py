@@ -25,9 +25,26 @@ class Place:
 class Unusable(Exception):
     """A piece of a file that cannot be used and whose loss changes the geometry."""
 
+    harmless = False
+    """Whether nobody will miss it."""
+
     def __init__(self, place: Place, message: str, hint: str = "") -> None:
         self.place, self.message, self.hint = place, message, hint
         super().__init__(f"{place.file}:{place.line}: {message}")
+
+
+class OutOfReach(Unusable):
+    """Something so far away that no robot gets there."""
+
+    harmless = True
+
+
+class Missing(Unusable):
+    """A file or model that is nowhere in the allowed folders; `what` is its uri."""
+
+    def __init__(self, place: Place, message: str, hint: str, what: str) -> None:
+        super().__init__(place, message, hint)
+        self.what = what
 
 
 class Report:
@@ -38,9 +55,10 @@ class Report:
     """
 
     def __init__(self, *, lenient: bool = False) -> None:
-        self.lenient = lenient
+        self.lenient, self.skipped = lenient, 0
         self._problems: dict[Problem, None] = {}
         self._notes: dict[str, None] = {}
+        self._missing: dict[str, list[Missing]] = {}
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -55,17 +73,19 @@ class Report:
         """The error to raise when nothing can be read at all, lenient or not."""
         self.lenient = False
         self.unusable(error)
-        return InvalidInput(list(self._problems))
+        return InvalidInput(self._all())
 
     def unusable(self, error: Unusable) -> None:
         """Tell something that does."""
-        place = error.place
-        if self.lenient:
-            self.note(place, f"skipped: {error.message}")
-            return
-        message = f"{place.element}: {error.message}" if place.element else error.message
-        problem = Problem(place.file, place.line, place.col, CODE, message, hint=error.hint, source=place.source)
-        self._problems[problem] = None
+        if error.harmless:
+            self.note(error.place, f"left out: {error.message}")
+        elif self.lenient:
+            self.skipped += 1
+            self.note(error.place, f"skipped: {error.message}")
+        elif isinstance(error, Missing):
+            self._missing.setdefault(error.what, []).append(error)
+        else:
+            self._problems[_problem(error)] = None
 
     @contextmanager
     def skipping(self) -> Iterator[None]:
@@ -78,9 +98,25 @@ class Report:
     @property
     def failed(self) -> bool:
         """Whether anything changes the geometry and may not be skipped."""
-        return bool(self._problems)
+        return bool(self._problems or self._missing)
 
     def raise_problems(self) -> None:
         """Raise InvalidInput with everything that was found, if anything was."""
-        if self._problems:
-            raise InvalidInput(list(self._problems))
+        if self.failed:
+            raise InvalidInput(self._all())
+
+    def _all(self) -> list[Problem]:
+        return [*self._problems, *(_missing(errors) for errors in self._missing.values())]
+
+
+def _problem(error: Unusable, more: str = "") -> Problem:
+    place = error.place
+    message = f"{place.element}: {error.message}{more}" if place.element else f"{error.message}{more}"
+    return Problem(place.file, place.line, place.col, CODE, message, hint=error.hint, source=place.source)
+
+
+def _missing(errors: list[Missing]) -> Problem:
+    """A missing asset, told once however often it is asked for."""
+    places = dict.fromkeys(error.place for error in errors)
+    more = "" if len(places) == 1 else f" (and at {len(places) - 1} more place{'s' if len(places) > 2 else ''})"
+    return _problem(errors[0], more)

@@ -12,14 +12,20 @@ from simscen.worlds.sdf import values
 from simscen.worlds.sdf.markup import Element
 from simscen.worlds.sdf.report import Report
 
+Scale = tuple[float, float, float]
+
 
 @dataclass(frozen=True)
 class ModelState:
-    """Where a model, its links and nested models were, all in the world frame; None = nothing said."""
+    """Where a model, its links and nested models were, all in the world frame; None = nothing said.
+
+    `scale` is how much larger the shapes of its links are than its geometry says; their places stay.
+    """
 
     pose: Pose3 | None = None
     links: dict[str, Pose3] = field(default_factory=dict)
     models: "dict[str, ModelState]" = field(default_factory=dict)
+    scale: Scale = (1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -50,7 +56,7 @@ def read_state(world: Element, report: Report) -> WorldState:
 def _model(element: Element, report: Report) -> ModelState:
     links: dict[str, Pose3] = {}
     models: dict[str, ModelState] = {}
-    pose = None
+    pose, scale = None, (1.0, 1.0, 1.0)
     for child in element.children:
         with report.skipping():
             match child.tag:
@@ -62,11 +68,13 @@ def _model(element: Element, report: Report) -> ModelState:
                 case "model":
                     models[child.name] = _model(child, report)
                 case "scale":
-                    _refuse_scale(child)
-    return ModelState(pose, links, models)
+                    scale = _scale(child)
+    return ModelState(pose, links, models, scale)
 
 
-def _refuse_scale(element: Element) -> None:
-    """A saved world holds the scaled sizes too, and Classic scales them again; so nobody knows what was meant."""
-    if any(abs(factor - 1) > 1e-6 for factor in values.numbers(element, 3)):
-        raise element.unusable(f"a model scaled by {element.text} is not supported", "give the size in its geometry")
+def _scale(element: Element) -> Scale:
+    """How much larger the collisions are than written: Classic saves their sizes divided by the scale it saves."""
+    x, y, z = values.numbers(element, 3)
+    if min(x, y, z) <= 0:
+        raise element.unusable(f"a scale must be positive, got {element.text}")
+    return x, y, z

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 from simscen.core.geometry import Pose3
 from simscen.worlds.sdf.markup import Element
+from simscen.worlds.sdf.report import OutOfReach
 
 FARTHEST = 1e4
 """Metres: no coordinate and no size may be larger."""
@@ -120,7 +121,7 @@ def pose(element: Element | None) -> Pose3:
     else:
         raise element.unusable(f"unknown rotation_format {kind[:40]!r}: expected euler_rpy or quat_xyzw")
     if any(abs(coordinate) > FARTHEST for coordinate in result.position):
-        raise element.unusable(f"farther than {FARTHEST:g} m from its frame")
+        raise OutOfReach(element.place, f"farther than {FARTHEST:g} m from its frame")
     return result
 
 

@@ -142,8 +142,13 @@ def test_an_include_is_not_half_understood(refuse, models, tag, message):
 
 
 def test_online_models_are_not_fetched(refuse):
+    (problem,) = refuse(include("https://example.org/models/Coke"))
+    assert "only model://, package://, file://, Fuel and relative paths are read" in problem.message
     (problem,) = refuse(include("https://fuel.gazebosim.org/1.0/OpenRobotics/models/Coke"))
-    assert "only model://, package://, file:// and relative paths are read" in problem.message
+    assert problem.message.endswith("models/Coke: no such file or directory")
+    assert (
+        problem.hint == "allow Fuel's cache with --world-path ~/.gz/fuel, or a folder that holds the downloaded model"
+    )
 
 
 def test_a_circle_of_includes_is_refused_with_its_chain(tmp_path, load, refuse):

@@ -1,5 +1,7 @@
 import pytest
 
+from simscen.core.shapes import Box, Cylinder, Sphere
+
 BOX = "<collision name='c'><geometry><box><size>1 1 1</size></box></geometry></collision>"
 
 
@@ -68,9 +70,27 @@ def test_only_the_first_state_counts(load):
 @pytest.mark.parametrize(
     ("saved", "message"),
     [
-        ("<model name='m'><scale>2 1 1</scale></model>", "a model scaled by 2 1 1 is not supported"),
+        ("<model name='m'><scale>2 0 1</scale></model>", "a scale must be positive, got 2 0 1"),
         ("<model name='m'><pose>x</pose></model>", "expected 6 numbers"),
     ],
 )
 def test_what_cannot_be_applied_is_an_error(refuse, saved, message):
     assert message in refuse(model() + state(saved))[0].message
+
+
+@pytest.mark.parametrize(
+    ("written", "expected"),
+    [
+        ("<box><size>1 2 3</size></box>", Box((2.0, 6.0, 12.0))),
+        ("<cylinder><radius>1</radius><length>2</length></cylinder>", Cylinder(2.0, 8.0)),
+        ("<sphere><radius>1</radius></sphere>", Sphere(2.0)),
+    ],
+)
+def test_a_saved_scale_multiplies_sizes_and_moves_nothing(load, written, expected):
+    shape = f"<collision name='c'><pose>0.5 0 0 0 0 0</pose><geometry>{written}</geometry></collision>"
+    world = load(
+        model(content=f"<link name='a'>{shape}</link>") + state("<model name='m'><scale>2 3 4</scale></model>")
+    )
+    (solid,) = world.solids
+    assert solid.shape == expected
+    assert solid.pose.position == (1.5, 0, 0)

@@ -1,0 +1,88 @@
+"""What the uris of Gazebo mean: which names to look for in which folders."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import unquote
+
+SCHEMES = ("model://", "package://", "file://")
+_FUEL = re.compile(
+    r"https?://(?P<server>(?:fuel|app|api)\.(?:gazebosim|ignitionrobotics)\.org)/(?:\d+\.\d+/)?"
+    r"(?P<owner>[^/]+)/(?P<kind>models|worlds)/(?P<name>[^/]+)(?:/(?P<version>\d+|tip))?(?:/(?:files/)?(?P<rest>.*))?"
+)
+_STANDARD = {"sun", "ground_plane"}
+
+
+@dataclass(frozen=True)
+class Fuel:
+    """A model on Gazebo Fuel, which is never asked: what of it lies in a folder is used, as its cache has it."""
+
+    server: str
+    owner: str
+    kind: str
+    name: str
+    version: str
+    rest: str
+
+    def places(self, folder: Path) -> Iterator[Path]:
+        """Where it can be inside a folder: as in Fuel's cache (~/.gz/fuel), newest version first, or by its name."""
+        spellings = [self.name, self.name.lower()]
+        for name in dict.fromkeys([*spellings, *(name.replace(" ", "_") for name in spellings)]):
+            for owner in dict.fromkeys((self.owner, self.owner.lower())):
+                cached = folder / self.server / owner / self.kind / name
+                yield from (version / self.rest for version in self._versions(cached))
+            yield folder / name / self.rest
+
+    def _versions(self, cached: Path) -> list[Path]:
+        if self.version not in ("", "tip"):
+            return [cached / self.version]
+        try:
+            numbers = sorted(int(entry.name) for entry in cached.iterdir() if entry.name.isdecimal())
+        except OSError:
+            return []
+        return [cached / str(number) for number in reversed(numbers)]
+
+
+def fuel(uri: str) -> Fuel | None:
+    """The Fuel address that a uri is, if it is one."""
+    match = _FUEL.fullmatch(uri.rstrip("/"))
+    if match is None:
+        return None
+    parts = {key: unquote(value or "") for key, value in match.groupdict().items()}
+    return None if any(unsafe in parts.values() for unsafe in (".", "..")) else Fuel(**parts)
+
+
+def standard(uri: str) -> str | None:
+    """The name of the model that every Gazebo brings along, if the uri means one: `sun` or `ground_plane`."""
+    address = fuel(uri)
+    if address is None:
+        name = uri.removeprefix("model://").strip("/") if uri.startswith("model://") else ""
+    else:
+        name = address.name if address.owner.lower().replace(" ", "") == "openrobotics" and not address.rest else ""
+    name = name.lower().replace(" ", "_")
+    return name if name in _STANDARD else None
+
+
+def places(uri: str, beside: Path, search: tuple[Path, ...]) -> Iterator[tuple[Path, Path]]:
+    """Pairs of an allowed folder and a path in it, in the order in which a uri is looked up.
+
+    model:// and package:// start at the search folders; file:// and bare paths beside the file that names them, then
+    at the search folders, whose own name may stand first (`file://models/crate` in a folder called `models`).
+    """
+    address = fuel(uri)
+    if address is not None:
+        for folder in search:
+            yield from ((folder, place) for place in address.places(folder))
+        return
+    scheme = next((scheme for scheme in SCHEMES if uri.startswith(scheme)), "")
+    rest = uri.removeprefix(scheme)
+    if scheme in ("", "file://"):
+        yield beside, beside / rest
+    else:
+        rest = rest.lstrip("/")
+    first, _, below = rest.partition("/")
+    for folder in search:
+        yield folder, folder / rest
+        if scheme == "file://" and below and folder.name == first:
+            yield folder, folder / below

@@ -1,0 +1,34 @@
+"""What lies where a missing file was looked for: files are published with the wrong case or the wrong suffix."""
+
+from pathlib import Path, PurePath
+
+MESHES = (".dae", ".stl", ".obj")
+
+
+def neighbour(folder: Path, path: Path) -> str | None:
+    """The file or folder below `folder` that `path` probably means, relative to it; None when nothing comes near.
+
+    Symbolic links are not followed: they may lead to where nobody is to be told what there is.
+    """
+    here, parts = folder, path.relative_to(folder).parts if path.is_relative_to(folder) else ("..",)
+    for part in parts:
+        found = None if part == ".." else _spelt(here, part)
+        if found is None or (here / found).is_symlink():
+            return None
+        here /= found
+    return here.relative_to(folder).as_posix()
+
+
+def _spelt(folder: Path, name: str) -> str | None:
+    """The entry of a folder with this name; else in another case, else the mesh of this name in another format."""
+    try:
+        entries = sorted(entry.name for entry in folder.iterdir())
+    except OSError:
+        return None
+    if name in entries:
+        return name
+    wanted = PurePath(name.casefold())
+    meant = [wanted.name]
+    if wanted.suffix in MESHES:
+        meant += [wanted.with_suffix(suffix).name for suffix in MESHES]
+    return next((entry for spelling in meant for entry in entries if entry.casefold() == spelling), None)

@@ -1,0 +1,155 @@
+"""Worlds as they are published: addresses of Fuel, neighbours of missing files, things parked far away."""
+
+import pytest
+
+from simscen.core.errors import InvalidInput
+
+BOX = "<geometry><box><size>1 1 1</size></box></geometry>"
+LINK = f"<link name='a'><collision name='c'>{BOX}</collision></link>"
+CRATE = f"<sdf version='1.6'><model name='crate'><static>1</static>{LINK}</model></sdf>"
+FUEL = "https://fuel.gazebosim.org/1.0/OpenRobotics/models"
+
+
+def crate(folder):
+    folder.mkdir(parents=True)
+    (folder / "model.sdf").write_text(CRATE)
+
+
+def include(uri, rest=""):
+    return f"<include><uri>{uri}</uri>{rest}</include>"
+
+
+def box(name, x, y=0.0, static=1):
+    return f"<model name='{name}'><static>{static}</static><pose>{x} {y} 0 0 0 0</pose>{LINK}</model>"
+
+
+@pytest.mark.parametrize(
+    "uri",
+    [
+        f"{FUEL}/Sun",
+        f"{FUEL}/Ground Plane",
+        f"{FUEL}/Ground%20Plane/2",
+        "https://fuel.ignitionrobotics.org/1.0/openrobotics/models/sun",
+        "https://app.gazebosim.org/OpenRobotics/models/Ground Plane",
+        "model:///sun",
+        "model://ground_plane/",
+    ],
+)
+def test_sun_and_ground_plane_are_known_whatever_their_address(load, uri):
+    world = load(include(uri) + box("m", 0))
+    assert [solid.name for solid in world.solids] == ["m::a::c"]
+
+
+@pytest.mark.parametrize(
+    ("place", "uri"),
+    [
+        ("fuel.gazebosim.org/openrobotics/models/big crate/2", f"{FUEL}/Big Crate"),
+        ("fuel.gazebosim.org/openrobotics/models/big crate/2", f"{FUEL}/Big%20Crate/2"),
+        ("fuel.gazebosim.org/openrobotics/models/big crate/10", f"{FUEL}/Big Crate/tip"),
+        ("Big Crate", f"{FUEL}/Big Crate"),
+        ("big_crate", f"{FUEL}/Big Crate/3"),
+        ("crate", "model:///crate"),
+        ("crate", "file://models/crate"),
+    ],
+)
+def test_a_model_is_found_in_an_allowed_folder_as_a_cache_or_a_person_stores_it(load, tmp_path, place, uri):
+    crate(tmp_path / "models" / place)
+    assert len(load(include(uri), search=[tmp_path / "models"]).solids) == 1
+
+
+def test_the_newest_cached_version_is_used(load, tmp_path):
+    cache = tmp_path / "fuel" / "fuel.gazebosim.org" / "openrobotics" / "models" / "crate"
+    crate(cache / "9")
+    crate(cache / "10")
+    (cache / "9" / "model.sdf").write_text("broken")
+    assert len(load(include(f"{FUEL}/crate"), search=[tmp_path / "fuel"]).solids) == 1
+
+
+@pytest.mark.parametrize("uri", [f"{FUEL}/../../secret", f"{FUEL}/..", f"{FUEL}/%2e%2e/files/../../x", "model:///../x"])
+def test_no_address_leads_out_of_the_allowed_folders(refuse, tmp_path, uri):
+    crate(tmp_path.parent / "secret") if not (tmp_path.parent / "secret").exists() else None
+    (tmp_path / "models").mkdir()
+    (problem,) = refuse(include(uri), search=[tmp_path / "models"])
+    assert "no such file" in problem.message or "outside" in problem.message or "are read" in problem.message
+
+
+@pytest.mark.parametrize(
+    ("there", "asked", "hint"),
+    [
+        ("meshes/Map.dae", "model://hall/meshes/map.dae", "did you mean `hall/meshes/Map.dae`?"),
+        ("Meshes/map.DAE", "model://hall/meshes/map.dae", "did you mean `hall/Meshes/map.DAE`?"),
+        ("meshes/map.dae", "model://hall/meshes/map.stl", "did you mean `hall/meshes/map.dae`?"),
+        ("meshes/other.dae", "model://hall/meshes/map.dae", "looked in models; allow its folder with --world-path"),
+    ],
+)
+def test_what_lies_beside_a_missing_mesh_is_named(refuse, tmp_path, there, asked, hint):
+    mesh = tmp_path / "models" / "hall" / there
+    mesh.parent.mkdir(parents=True)
+    mesh.write_bytes(b"")
+    shape = f"<collision name='c'><geometry><mesh><uri>{asked}</uri></mesh></geometry></collision>"
+    (problem,) = refuse(f"<model name='m'><link name='a'>{shape}</link></model>", search=[tmp_path / "models"])
+    assert problem.hint == hint
+
+
+def test_names_behind_a_link_are_not_told(refuse, tmp_path):
+    (tmp_path / "private").mkdir()
+    (tmp_path / "private" / "Key.dae").write_bytes(b"")
+    (tmp_path / "models").mkdir()
+    (tmp_path / "models" / "hall").symlink_to(tmp_path / "private")
+    (problem,) = refuse(include("model://hall/key.dae"), search=[tmp_path / "models"])
+    assert "Key" not in problem.hint
+
+
+def test_a_missing_model_is_told_once_with_the_number_of_its_places(refuse):
+    problems = refuse(
+        "\n".join(include("model://crate", f"<name>c{k}</name>") for k in range(4)) + include("model://box")
+    )
+    assert [problem.message.split(": ", 1)[1] for problem in problems] == [
+        "model://crate: no such file or directory (and at 3 more places)",
+        "model://box: no such file or directory",
+    ]
+
+
+@pytest.mark.parametrize(
+    "config", ["<model>", "<model><name>x</name></model>", "<model><sdf>gone.sdf</sdf></model>", "\x00"]
+)
+def test_a_broken_model_config_does_not_matter_where_there_is_a_model_sdf(load, tmp_path, config):
+    crate(tmp_path / "models" / "crate")
+    (tmp_path / "models" / "crate" / "model.config").write_text(config)
+    world = load(include("model://crate"), search=[tmp_path / "models"])
+    assert len(world.solids) == 1
+    assert world.notes[0].endswith("; model.sdf beside it is used")
+
+
+def test_a_broken_model_config_alone_is_an_error(refuse, tmp_path):
+    (tmp_path / "models" / "crate").mkdir(parents=True)
+    (tmp_path / "models" / "crate" / "model.config").write_text("<model><name>x</name></model>")
+    (problem,) = refuse(include("model://crate"), search=[tmp_path / "models"])
+    assert "no <sdf> of version 1.12 or older" in problem.message
+
+
+@pytest.mark.parametrize("static", [0, 1])
+@pytest.mark.parametrize(
+    ("x", "told"), [(9_000, "'far' lies 8998 m away from the middle"), (20_000, "farther than 10000 m")]
+)
+def test_a_thing_that_was_parked_far_away_is_left_out_with_a_note(load, x, told, static):
+    world = load("".join(box(f"m{k}", k, k) for k in range(5)) + box("far", x, static=static))
+    assert sorted({solid.name[:2] for solid in world.solids}) == ["m0", "m1", "m2", "m3", "m4"]
+    assert world.bodies == ()
+    assert world.bounds == (-0.5, -0.5, 4.5, 4.5)
+    assert any(told in note for note in world.notes)
+
+
+def test_a_world_that_is_large_throughout_is_left_as_it_is(load):
+    world = load("".join(box(f"m{k}", 300 * k) for k in range(20)))
+    assert len(world.solids) == 20
+
+
+def test_a_world_of_which_nothing_is_left_is_an_error_even_leniently(load):
+    with pytest.raises(InvalidInput, match="nothing is left of this world: 2 things in it were skipped"):
+        load(include("model://gone") + include("model://lost"), lenient=True)
+
+
+def test_an_empty_floor_is_allowed_leniently(load):
+    world = load(include("model://ground_plane"), lenient=True)
+    assert world.solids == ()
