@@ -1,51 +1,103 @@
 """`simscen judge`."""
 
 import sys
+from enum import Enum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from simscen.cli.diagnostics import print_text
-from simscen.core.errors import Exit, InvalidInput
-from simscen.core.problems import Problem
-from simscen.core.result import Outcome, RunKey
+from simscen.cli.diagnostics import harmless, print_text
+from simscen.cli.judging import Judging, runs_without_log
+from simscen.cli.logs import logs_of
+from simscen.cli.reports import verdict
+from simscen.core.errors import UsageError
 from simscen.core.sessionevents import RunFinished
-from simscen.judge.result import result_of
 from simscen.judge.resultdata import to_json
-from simscen.loading.resolved import spec_of_text
-from simscen.loading.source import read_text
-from simscen.record.replay import read_run
-from simscen.report.lines import Naming, finished, text_of
+from simscen.record.foreign.wanted import TOPICS, Clock, Wanted
+from simscen.report.judged import in_a_line, in_full, summary, table
+from simscen.report.lines import text_of
+from simscen.report.results import to_json as all_to_json
+
+
+class Time(str, Enum):
+    """Which time of a message counts."""
+
+    HEADER = "header"
+    LOG = "log"
 
 
 def command(
-    log: Annotated[Path, typer.Argument(help="The run.mcap of a run.")],
+    logs: Annotated[
+        list[Path], typer.Argument(help="Logs (run.mcap, *.mcap, rosbag2 folders), or folders to search for them.")
+    ],
     scenario: Annotated[
-        Path | None, typer.Option(help="Judge by the criteria of this file instead of those in the log.")
+        Path | None, typer.Option(help="Judge by the criteria of this file; `pass:` is all that it needs.")
     ] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print result.json instead of lines.")] = False,
+    truth: Annotated[
+        str | None,
+        typer.Option(help="What counts as the truth in a log of others: a topic, or two frames as map:base_link."),
+    ] = None,
+    topic: Annotated[
+        list[str] | None,
+        typer.Option(help="NAME=TOPIC: what a standard topic is called, e.g. odom=/my/odom; repeatable."),
+    ] = None,
+    time: Annotated[
+        Time, typer.Option(help="Which time of the messages of others counts: their headers', or that of logging.")
+    ] = Time.HEADER,
+    tick_rate: Annotated[int, typer.Option(min=1, max=10_000, help="Ticks a second for logs of others.")] = 1000,
+    same_frame: Annotated[
+        bool, typer.Option("--same-frame", help="The truth's frame is the map's, although it is called otherwise.")
+    ] = False,
+    root: Annotated[Path | None, typer.Option(help="Files that the scenario names stay in this folder.")] = None,
+    world_path: Annotated[list[Path] | None, typer.Option(help="Folder with worlds and models; repeatable.")] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print result.json, of several logs results.json.")] = False,
 ) -> None:
-    """Judge a recorded run again, without simulating it.
+    """Judge recorded runs, without simulating them.
 
-    The log holds the truth, the goals and the scenario, so nothing else is needed; with --scenario other criteria and
-    bounds can be tried on it. Exit code 0: all hold; 1: one fails; 2: not a usable log; 3: one could not be judged.
+    A log of simscen holds the truth, the goals and the scenario, so nothing else is needed; with --scenario other
+    criteria and bounds can be tried on it. In a folder every log is judged. The logs of real robots, with the standard
+    topics of ROS 2, need --scenario, and --truth for whatever asks where the robot truly was; a criterion that the log
+    does not decide is inconclusive, never passed.
+
+    Exit code 0: all hold; 1: one fails or is inconclusive; 2: not a usable log or scenario; 3: one could not be judged,
+    or one of several logs cannot be used; 5: no logs found.
     """
-    read = read_run(log)
-    name = str(scenario or log)
-    spec = spec_of_text(_text(scenario) if scenario else read.about.scenario, name)
-    key = RunKey(read.about.name, read.about.seed)
-    result = result_of(key, name, spec.pass_, read.trace, read.about.case)
+    clock: Clock = "log" if time is Time.LOG else "header"
+    wanted = Wanted(truth, _topics(topic or []), tick_rate, clock, same_frame)
+    files = logs_of(logs)
+    judging = Judging(wanted, scenario, root, world_path or [])
+    lost = runs_without_log(logs)
+    runs = [*((str(file), judging.judged(file, alone=len(files) + len(lost) == 1)) for file in files), *lost]
+    for note in judging.notes:
+        print_text(f"note: {harmless(note)}", sys.stderr)
     if json:
-        print(to_json(result), end="")
+        answers = [run for _, run in runs]
+        print(to_json(answers[0].result) if len(runs) == 1 else all_to_json(answers), end="")
     else:
-        for line in finished(RunFinished(result), Naming()):
-            print_text(text_of(line))
-    sys.exit({Outcome.PASSED: Exit.PASSED, Outcome.FAILED: Exit.FAILED, Outcome.ERROR: Exit.INCOMPLETE}[result.outcome])
+        _print(runs, scenario is not None)
+    sys.exit(verdict([run for _, run in runs]))
 
 
-def _text(file: Path) -> str:
-    text = read_text(file, str(file))
-    if isinstance(text, Problem):
-        raise InvalidInput([text])
-    return text
+def _print(runs: list[tuple[str, RunFinished]], one_scenario: bool) -> None:
+    if len(runs) == 1:
+        lines = list(in_full(runs[0][1], runs[0][0]))
+    elif one_scenario:
+        lines = [*table(runs), summary([run for _, run in runs])]
+    else:
+        width = max(len(name) for name, _ in runs)
+        lines = [*(in_a_line(run, f"{name:{width}}") for name, run in runs), summary([run for _, run in runs])]
+    for line in lines:
+        print_text(text_of(line))
+
+
+def _topics(written: list[str]) -> dict[str, str]:
+    """The names of topics by what they stand for. Raises UsageError."""
+    found = {}
+    for text in written:
+        name, equals, topic = text.partition("=")
+        if not equals or name not in TOPICS or not topic.startswith("/"):
+            known = ", ".join(TOPICS)
+            raise UsageError(f"cannot read --topic {harmless(text)}: expected NAME=/TOPIC with one of {known}")
+        found[name] = topic
+    return found

@@ -18,7 +18,7 @@ COMMANDS = {
     "run": "Run scenarios and report what passed.",
     "validate": "Check scenario, world and robot files without running anything.",
     "list": "List the scenarios that a selection means.",
-    "judge": "Judge a recorded run again, without simulating it.",
+    "judge": "Judge recorded runs, without simulating them.",
     "report": "Write the reports of an output folder anew.",
     "plot": "Draw a recorded run.",
     "log": "Mend the logs of runs that broke off.",

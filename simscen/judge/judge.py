@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from simscen.core.case import Case
 from simscen.core.events import EventKind
+from simscen.core.evidence import WHOLE, Coverage
 from simscen.core.result import Outcome
 from simscen.core.trace import Trace
 from simscen.core.verdict import Finding, Status, Verdict
@@ -12,13 +13,17 @@ from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import NotRecorded, undecided
 from simscen.criteria.criterion import AnyCriterion
 from simscen.criteria.moments import finished
+from simscen.judge.needs import doubt, undecidable
 
 
-def judge(criteria: Sequence[AnyCriterion], trace: Trace, case: Case) -> tuple[Verdict, ...]:
+def judge(
+    criteria: Sequence[AnyCriterion], trace: Trace, case: Case, coverage: Coverage = WHOLE
+) -> tuple[Verdict, ...]:
     """One verdict for each criterion, in order. An id that is given twice gets a number: speed, speed#2.
 
-    An exception inside a criterion is its verdict, an error that names it; what it needs and was not recorded leaves it
-    inconclusive. On a log that was cut off nothing passes, for what came after might have failed, nor on an empty one.
+    An exception inside a criterion is its verdict, an error that names it; what it needs and was not recorded, or what
+    the log lacks (`coverage`), leaves it inconclusive. On a log that was cut off nothing passes, for what came after
+    might have failed, nor on an empty one.
     """
     seen: dict[str, int] = {}
     verdicts = []
@@ -26,7 +31,7 @@ def judge(criteria: Sequence[AnyCriterion], trace: Trace, case: Case) -> tuple[V
         name = entry.id or entry.kind
         seen[name] = seen.get(name, 0) + 1
         unique = name if seen[name] == 1 else f"{name}#{seen[name]}"
-        verdicts.append(Verdict(entry.kind, unique, entry.severity, _findings(entry, trace, case)))
+        verdicts.append(Verdict(entry.kind, unique, entry.severity, _findings(entry, trace, case, coverage)))
     return tuple(verdicts)
 
 
@@ -42,7 +47,9 @@ def outcome(verdicts: Sequence[Verdict]) -> Outcome:
     return Outcome.PASSED if all(verdict.status is Status.PASS for verdict in decisive) else Outcome.FAILED
 
 
-def _findings(entry: AnyCriterion, trace: Trace, case: Case) -> tuple[Finding, ...]:
+def _findings(entry: AnyCriterion, trace: Trace, case: Case, coverage: Coverage) -> tuple[Finding, ...]:
+    if (unknown := undecidable(entry, coverage)) is not None:
+        return (unknown,)
     criterion = entry.chosen
     assert isinstance(criterion, Criterion)
     try:
@@ -55,6 +62,8 @@ def _findings(entry: AnyCriterion, trace: Trace, case: Case) -> tuple[Finding, .
         return (Finding(Status.ERROR, entry.kind, "it checked nothing", "a judgement"),)
     if not finished(trace):
         return _reserved(findings, f"so far, but the log stops at t = {trace.seconds(trace.end):.2f} s")
+    if doubts := doubt(entry, coverage):
+        return _reserved(findings, f"so far, but {doubts}")
     return _reserved(findings, "in a log with nothing in it") if _empty(trace) else tuple(findings)
 
 

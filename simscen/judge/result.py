@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from simscen.core.case import Case
+from simscen.core.evidence import WHOLE, Coverage
 from simscen.core.result import Outcome, RunFailure, RunKey, RunResult
 from simscen.core.trace import Trace
 from simscen.core.verdict import Status, Verdict
@@ -14,6 +15,7 @@ from simscen.judge.cause import explained
 from simscen.judge.disturbances import happenings, missing
 from simscen.judge.judge import judge, outcome
 from simscen.judge.metrics import measure
+from simscen.judge.needs import known
 
 
 def result_of(
@@ -23,12 +25,14 @@ def result_of(
     trace: Trace,
     case: Case,
     lines: tuple[int, ...] = (),
+    coverage: Coverage = WHOLE,
 ) -> RunResult:
     """Judge a trace and sum it up. `path` is the scenario's file, `lines` where each criterion stands in it.
 
     What had to happen and did not is a verdict, too; it comes first, for it is the reason of what follows.
     """
-    verdicts, happened = explained(judge(criteria, trace, case), trace, case), happenings(trace, case)
+    verdicts = explained(judge(criteria, trace, case, coverage), trace, case)
+    happened = happenings(trace, case)
     lacking = missing(trace, happened, verdicts)
     lines = (*(line for _, line in lacking), *(lines or (0,) * len(verdicts)))
     verdicts = (*(verdict for verdict, _ in lacking), *verdicts)
@@ -36,7 +40,7 @@ def result_of(
     failure = _why(verdicts) if came_out is Outcome.ERROR else None
     metrics: Mapping[str, float | None] = {}
     try:
-        metrics = measure(trace, case)
+        metrics = known(measure(trace, case), coverage)
     except BrokenTrace as broken:  # whatever the criteria looked at, a run with such a signal is no run
         came_out, failure = Outcome.ERROR, failure or RunFailure("invalid", str(broken))
     return RunResult(

@@ -48,6 +48,7 @@ CODES = {
     "SC801": "The file is not a log of simscen.",
     "SC802": "The log is damaged.",
     "SC803": "The log ends too early: its run broke off.",
+    "SC804": "A log that simscen did not write cannot be judged.",
     "SC810": "The folder has no journal of a session, or one that cannot be understood.",
 }
 """Code → what it means."""

@@ -37,6 +37,11 @@ def _text_or_mapping(value: Any) -> str:
 
 
 FilePath = Annotated[str, Field(min_length=1, max_length=4096)]
+WorldOrFile = Annotated[
+    Annotated[FilePath, Tag("text")]
+    | Annotated[WorldSpec, OnDemand("simscen.model.world", "WorldSpec"), Tag("mapping")],
+    Discriminator(_text_or_mapping),
+]
 PlaceOrPose = Annotated[
     Annotated[PlaceName, Refers("place"), Tag("text")] | Annotated[PoseSpec, Tag("mapping")],
     Discriminator(_text_or_mapping),
@@ -111,11 +116,7 @@ class ScenarioSpec(Spec):
     """For `--tag`."""
     seed: Annotated[int, Field(ge=1, le=LARGEST_SEED)] = 1
     """The root of all chance in a run."""
-    world: Annotated[
-        Annotated[FilePath, Tag("text")]
-        | Annotated[WorldSpec, OnDemand("simscen.model.world", "WorldSpec"), Tag("mapping")],
-        Discriminator(_text_or_mapping),
-    ]
+    world: WorldOrFile
     """A `*.world.yaml`, a ROS map `.yaml`, a Gazebo `.sdf`/`.world`, or the world itself."""
     map: FilePath | None = None
     """The map the robot gets, if it is not that of the world; `none` = no map, odometry only."""

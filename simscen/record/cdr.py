@@ -51,15 +51,24 @@ class Template:
 
 
 class Cursor:
-    """Reads a message field by field, in the order of its definition. Raises struct.error past its end."""
+    """Reads a message field by field, in the order of its definition. Raises struct.error past its end.
 
-    def __init__(self, data: bytes) -> None:
+    `order` is "<" for little endian, as ROS 2 writes on all that it runs on, or ">".
+    """
+
+    def __init__(self, data: bytes, order: str = "<") -> None:
         self._data = data
+        self._order = order
         self._offset = len(HEADER)
+
+    @property
+    def left(self) -> int:
+        """How many bytes have not been read."""
+        return len(self._data) - self._offset
 
     def take(self, codes: str) -> tuple[float, ...]:
         """The next values of one width, e.g. "7d"."""
-        layout = struct.Struct("<" + codes)
+        layout = struct.Struct(self._order + codes)
         self._align(struct.calcsize("<" + codes[-1]))
         values = layout.unpack_from(self._data, self._offset)
         self._offset += layout.size

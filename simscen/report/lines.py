@@ -94,6 +94,11 @@ def finished(run: RunFinished, naming: Naming) -> Iterator[Line]:
         Piece(f" {naming.name(run.key)} ", "name"),
         *_summary(run),
     )
+    yield from complained(run)
+
+
+def complained(run: RunFinished) -> Iterator[Line]:
+    """What was violated, where, and how to see it again; nothing but warnings for a run that passed."""
     if run.outcome is Outcome.ERROR:
         yield from _broken(run)
     for complaint in complaints(run):

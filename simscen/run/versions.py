@@ -13,14 +13,13 @@ PACKAGES = (
     *("pillow", "mcap", "zstandard", "pydantic", "pyyaml"),
 )
 """Every package that simscen needs and that shapes a result or the bytes of a log."""
-OPTIONAL = ("xacro",)
 _LAST_BITS = frozenset({"fma", "avx", "avx2", "avx512f", "sse4_2"})
 """The instruction sets that change last bits."""
 
 
 def versions() -> dict[str, str]:
-    """Python and the packages that shape results, by name; "" for an optional one that is not installed."""
-    return {"python": platform.python_version(), **{name: _version(name) for name in (*PACKAGES, *OPTIONAL)}}
+    """Python and the packages that shape results, by name; "" for one that is not installed."""
+    return {"python": platform.python_version(), **{name: _version(name) for name in PACKAGES}}
 
 
 def cpu_flags() -> list[str]:

@@ -10,7 +10,7 @@ from simscen.core.errors import InvalidInput
 from simscen.core.grid import OccupancyGrid
 from simscen.core.shapes import Mesh
 from simscen.core.world import World
-from simscen.loading.loaded import LoadedMap, LoadedScenario, LoadedWorld
+from simscen.loading.loaded import LoadedMap, LoadedRobot, LoadedScenario, LoadedWorld
 from simscen.model.robot import RobotSpec
 from simscen.model.world import WorldSpec
 from simscen.worlds.own import build_own
@@ -63,9 +63,13 @@ def _read_mesh(path: Path) -> Mesh:
 
 def load_robot(loaded: LoadedScenario) -> tuple[RobotSpec, RobotBody]:
     """The robot as specified (a bare URDF as far as it makes plain), and made ready for physics."""
+    return robot_of(loaded.robot, (loaded.root, *loaded.world_path))
+
+
+def robot_of(robot: LoadedRobot, roots: tuple[Path, ...]) -> tuple[RobotSpec, RobotBody]:
+    """The same of a robot whose files lie in `roots`."""
     from simscen.sim.embody import robot_body
 
-    robot, roots = loaded.robot, (loaded.root, *loaded.world_path)
     spec = robot.spec or _inferred(robot.path, roots)
     return spec, robot_body(spec, robot.path, roots, _read_mesh)
 

@@ -18,7 +18,7 @@ simscen: 1
 world: {simscen: 1, walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]}
 robot: {pose: {x: 1, y: 1}}
 goals: [{pose: {x: 5, y: 3}}]
-time_limit: 2 s
+time_limit: 9 s
 pass: [{collisions: {max: 0}}, {goals_reached: {}}]
 """
 

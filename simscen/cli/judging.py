@@ -1,0 +1,116 @@
+"""Judges one log after the other, each by its own criteria or all by those of a file."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from simscen.cli.diagnostics import from_here
+from simscen.cli.logs import BROKEN_OFF, WHOLE
+from simscen.core.case import Case
+from simscen.core.errors import InvalidInput
+from simscen.core.evidence import Coverage, Evidence
+from simscen.core.problems import Problem
+from simscen.core.result import RunFailure, RunKey, unfinished
+from simscen.core.sessionevents import RunFinished
+from simscen.core.trace import Trace
+from simscen.judge.result import result_of
+from simscen.loading.criteria_file import LoadedCriteria, load_criteria
+from simscen.loading.discovery import default_root
+from simscen.loading.resolved import spec_of_text
+from simscen.record.foreign.mcapfile import is_own
+from simscen.record.foreign.read import read_foreign
+from simscen.record.foreign.wanted import Wanted
+from simscen.record.replay import read_run
+from simscen.report.journaldata import NAME
+from simscen.report.rebuild import read_journal
+from simscen.run.outfolder import run_folder
+
+
+class Judging:
+    """Judges logs by `scenario`, or each by its own; `notes` are what is odd about them."""
+
+    def __init__(self, wanted: Wanted, scenario: Path | None, root: Path | None, world_path: Sequence[Path]) -> None:
+        self.notes: list[str] = []
+        self._wanted, self._scenario, self._world_path = wanted, scenario, world_path
+        self._case: Case | None = None
+        self._criteria: LoadedCriteria | None = None
+        if scenario is not None:
+            home = root if root is not None else default_root([scenario])
+            try:
+                self._criteria = load_criteria(scenario, home, world_path)
+            except InvalidInput as error:
+                raise InvalidInput(from_here(error.problems, home)) from error
+
+    def judged(self, log: Path, alone: bool) -> RunFinished:
+        """What a log says. One that cannot be used is an error of its own among several; alone it is the command's."""
+        try:
+            return self._own(log) if not log.is_dir() and is_own(log) else self._foreign(log)
+        except InvalidInput as error:
+            if alone or isinstance(error, UnusableScenario):
+                raise
+            told = "; ".join(problem.message for problem in error.problems)
+            return RunFinished(unfinished(RunKey(log.stem, 0), str(log), RunFailure("invalid", told)), file=str(log))
+
+    def _own(self, log: Path) -> RunFinished:
+        read = read_run(log)
+        about, case = read.about, read.about.case
+        key = RunKey(about.name, about.seed)
+        if self._criteria is None:
+            spec = spec_of_text(about.scenario, str(log))
+            return RunFinished(result_of(key, str(log), spec.pass_, read.trace, case), file=str(log))
+        # What had to happen stands in the scenario of the log, at lines that the file of criteria does not have.
+        case = replace(case, disturbances=tuple(replace(one, line=0) for one in case.disturbances))
+        return self._finished(key, read.trace, case, Coverage())
+
+    def _foreign(self, log: Path) -> RunFinished:
+        if self._criteria is None:
+            hint = "say with --scenario what must hold; a file with `pass:` is enough"
+            raise InvalidInput([Problem(str(log), 0, 0, "SC801", "not a log of simscen", hint)])
+        case = self._foreign_case()
+        read = read_foreign(log, replace(self._wanted, goals=tuple(goal.name for goal in case.goals)))
+        self.notes += [f"{log}: {note}" for note in read.notes]
+        missing = dict(read.coverage.missing)
+        if case.footprint:
+            del missing[Evidence.FOOTPRINT]
+        return self._finished(RunKey(log.stem, 0), read.trace, case, Coverage(missing, read.coverage.partial))
+
+    def _foreign_case(self) -> Case:
+        """What the file of criteria says about the robot's surroundings; read once."""
+        assert self._criteria is not None
+        if self._case is None:
+            from simscen.run.foreigncase import case_of
+
+            home = self._criteria.library.fence.root
+            try:
+                self._case = case_of(self._criteria, self._world_path)
+            except InvalidInput as error:
+                raise UnusableScenario(from_here(error.problems, home)) from error
+        return self._case
+
+    def _finished(self, key: RunKey, trace: Trace, case: Case, coverage: Coverage) -> RunFinished:
+        """Judged by the file of criteria."""
+        criteria, file = self._criteria, str(self._scenario)
+        assert criteria is not None
+        result = result_of(key, file, criteria.spec.pass_, trace, case, criteria.lines, coverage)
+        return RunFinished(result, file=file)
+
+
+class UnusableScenario(InvalidInput):
+    """The file of criteria is wrong, whatever the log."""
+
+
+def runs_without_log(folders: Sequence[Path]) -> list[tuple[str, RunFinished]]:
+    """The runs of output folders that left no log: a session must not look better judged than it was."""
+    return [
+        (str(run_folder(folder, answer.key)), _without_log(answer))
+        for folder in folders
+        if (folder / NAME).is_file()
+        for answer in read_journal(folder).answers
+        if not any((run_folder(folder, answer.key) / log).exists() for log in (WHOLE, BROKEN_OFF))
+    ]
+
+
+def _without_log(answer: RunFinished) -> RunFinished:
+    error = answer.result.error
+    failure = RunFailure(error.kind if error else "crashed", "it left no log" + (f": {error.message}" if error else ""))
+    return RunFinished(unfinished(answer.key, answer.result.path, failure), file=answer.file)

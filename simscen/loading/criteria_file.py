@@ -1,0 +1,62 @@
+"""Read what must hold from a scenario, or from a file that says nothing else."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from simscen.core.errors import InvalidInput
+from simscen.core.problems import Problem
+from simscen.loading.assets import Assets
+from simscen.loading.document import Library
+from simscen.loading.loaded import LoadedRobot, LoadedWorld
+from simscen.loading.paths import Fence
+from simscen.loading.tree import Fields, Leaf, at, value_place
+from simscen.loading.validation import check
+from simscen.model.criteria_file import CriteriaSpec
+from simscen.model.world import WorldSpec
+
+
+@dataclass(frozen=True)
+class LoadedCriteria:
+    """Criteria with where they are written: `lines` in `file`, 0 for one that comes from a file it extends."""
+
+    file: Path
+    spec: CriteriaSpec
+    lines: tuple[int, ...]
+    tree: Fields = field(repr=False)
+    library: Library = field(repr=False)
+
+    def surroundings(self) -> tuple[LoadedWorld | None, LoadedRobot | None]:
+        """The world and the robot that the file names, if any. Raises InvalidInput."""
+        assets, world, robot = Assets(self.library), None, None
+        node = at(self.tree, ("world",))
+        if isinstance(self.spec.world, WorldSpec):
+            world = assets.own_world(self.spec.world, node, self.file)
+        elif self.spec.world is not None and isinstance(node, Leaf):
+            world = assets.world(node)
+        if self.spec.robot is not None:
+            robot = assets.robot(self.spec.robot.model, value_place(self.tree, ("robot", "model")))
+        if assets.problems:
+            raise InvalidInput(self.library.with_source(assets.problems))
+        return world, robot
+
+
+def load_criteria(path: Path, root: Path, world_path: Sequence[Path] = ()) -> LoadedCriteria:
+    """The criteria in `path`, with what it `extends` and the `defaults.yaml` beside it, as for any scenario.
+
+    Raises InvalidInput with every problem, at the line and in the file where it is written.
+    """
+    library = Library(Fence.around(root, world_path))
+    file = library.fence.entered(path)
+    if isinstance(file, Problem):
+        raise InvalidInput([file])
+    tree, problems = library.read(file, defaults=True)
+    if problems or not isinstance(tree, Fields):
+        spec = [] if problems or tree is None else check(CriteriaSpec, tree)
+        raise InvalidInput(library.with_source([*problems, *(spec if isinstance(spec, list) else ())]))
+    spec = check(CriteriaSpec, tree)
+    if isinstance(spec, list):
+        raise InvalidInput(library.with_source(spec))
+    shown = library.fence.shown(file)
+    places = [value_place(tree, ("pass", index)) for index in range(len(spec.pass_))]
+    return LoadedCriteria(file, spec, tuple(p.line if p.path == shown else 0 for p in places), tree, library)

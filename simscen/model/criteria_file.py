@@ -1,0 +1,16 @@
+"""What must hold, without all of the scenario around it."""
+
+from typing import Literal
+
+from simscen.model.scenario import RobotEntry, ScenarioSpec, WorldOrFile
+
+
+class CriteriaSpec(ScenarioSpec):
+    """A scenario of which only `pass` need be there: enough to judge a log that exists already."""
+
+    simscen: Literal[1] = 1
+    """Version of this language."""
+    world: WorldOrFile | None = None  # type: ignore[assignment]
+    """Whose places and regions are meant; only a log that is not simscen's own needs it."""
+    robot: RobotEntry | None = None  # type: ignore[assignment]
+    """Whose footprint it is; only a log that is not simscen's own needs it."""

@@ -1,0 +1,69 @@
+"""The messages of a rosbag2 folder. Its MCAP files we read ourselves; SQLite and compressed files rosbags does."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from simscen.record.foreign.mcapfile import McapMessages, Raw
+from simscen.record.foreign.unusable import Unusable
+
+INSTALL = "pip install 'simscen[rosbags]'"
+
+
+class BagMessages:
+    """Gives a folder's messages, file after file; then `complete` says whether all are there that it speaks of."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self.complete = False
+        self.topics: dict[str, str] = {}
+
+    def __iter__(self) -> Iterator[Raw]:
+        """Read the folder once. Raises Unusable."""
+        files = sorted(self._folder.glob("*.mcap"), key=_numbered)
+        return self._own(files) if files else self._through_rosbags()
+
+    def _own(self, files: list[Path]) -> Iterator[Raw]:
+        whole = []
+        for file in files:
+            messages = McapMessages(file)
+            yield from messages
+            self.topics.update(messages.topics)
+            whole.append(messages.complete)
+        self.complete = all(whole)
+
+    def _through_rosbags(self) -> Iterator[Raw]:
+        try:
+            from rosbags.rosbag2 import Reader
+        except ImportError as error:
+            raise Unusable("only the rosbags package reads SQLite and compressed bags", INSTALL) from error
+        count = 0
+        try:
+            with Reader(self._folder) as reader:
+                self.topics = {one.topic: one.msgtype for one in reader.connections}
+                for connection, time, data in reader.messages():
+                    count += 1
+                    yield Raw(connection.topic, connection.msgtype, "cdr", time, bytes(data))
+                self.complete = count == reader.message_count
+        except (Unusable, OSError):
+            raise
+        except Exception as error:  # rosbags lets what SQLite, YAML and zstd raise fall through
+            told = f"rosbags cannot read it: {error or type(error).__name__}"
+            raise Unusable(told, "try `ros2 bag reindex`") from error
+
+
+def messages_of(path: Path) -> McapMessages | BagMessages:
+    """The messages of an MCAP file or of a rosbag2 folder. Raises Unusable for what is neither."""
+    if path.is_dir():
+        return BagMessages(path)
+    if path.suffix == ".bag":
+        raise Unusable("it is a bag of ROS 1", "convert it, e.g. with `rosbags-convert`, whose bags are of ROS 2")
+    if path.suffix == ".db3":
+        raise Unusable("a rosbag2 is a folder with a metadata.yaml", "name the folder; see `ros2 bag reindex`")
+    return McapMessages(path)
+
+
+def _numbered(file: Path) -> tuple[int, str]:
+    """rosbag2 numbers its files: name_0, name_1, …, name_10."""
+    number = re.search(r"_(\d+)$", file.stem)
+    return (int(number[1]) if number else -1, file.name)

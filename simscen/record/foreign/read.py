@@ -1,0 +1,51 @@
+"""Reads a log of others into a Trace, and says what it lacks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from simscen.core.events import Event, EventKind
+from simscen.core.evidence import Coverage
+from simscen.core.trace import Trace
+from simscen.record.foreign.bagfolder import messages_of
+from simscen.record.foreign.collected import collect
+from simscen.record.foreign.reading import Reading
+from simscen.record.foreign.unusable import Unusable
+from simscen.record.foreign.wanted import Wanted
+from simscen.record.replay import DAMAGE, invalid
+
+
+@dataclass(frozen=True, eq=False)
+class ForeignLog:
+    """A log of others: its trace, what it lacks, and what about it is odd, in words for its owner."""
+
+    trace: Trace
+    coverage: Coverage
+    notes: Sequence[str]
+
+
+def read_foreign(path: Path, wanted: Wanted) -> ForeignLog:
+    """Read an MCAP file or a rosbag2 folder of a real robot.
+
+    The trace lasts from the first to the last message that is wanted. One that was cut off has no `run.ended`, so that
+    nothing passes on it. Raises InvalidInput, with the reason, for what cannot be used.
+    """
+    try:
+        messages = messages_of(path)
+        found = collect(messages, wanted)
+        reading = Reading(found, messages.topics, wanted)
+        end = reading.time.end
+        if messages.complete:
+            reading.rows.events.append(Event(end, EventKind.RUN_ENDED, "the recording ends"))
+        else:
+            reading.notes.append("the log breaks off, so nothing passes on it")
+        trace = reading.rows.trace(wanted.tick_rate, end)
+        return ForeignLog(trace, Coverage(reading.missing, reading.partial), reading.notes)
+    except Unusable as error:
+        raise invalid(path, "SC804", str(error), error.hint) from error
+    except OSError as error:
+        raise invalid(path, "SC800", f"cannot read the log: {error.strerror or error}") from error
+    except DAMAGE as error:
+        raise invalid(path, "SC802", f"the log is damaged: {error or type(error).__name__}") from error
