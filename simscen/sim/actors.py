@@ -176,8 +176,13 @@ class Actors:
         return {actor.id: name for name, actor in self._actors.items()}
 
     def top_speed(self) -> float:
-        """How fast anything may come along within a tenth of a second, in m/s."""
-        return max((self._speed(actor) for actor in self._actors.values()), default=0.0)
+        """How fast anything may come along within a tenth of a second, in m/s.
+
+        A thing that is hit by a heavier one leaves with up to twice its speed.
+        """
+        speeds = [self._speed(actor) for actor in self._actors.values()]
+        several = sum(actor.pushable for actor in self._actors.values()) > 1
+        return max(speeds, default=0.0) * (2 if several else 1)
 
     def _speed(self, actor: Actor) -> float:
         if not actor.pushable:

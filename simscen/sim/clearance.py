@@ -43,6 +43,7 @@ class Clearance:
         self._limits, (self._radius, self._height) = robot.limits, reach_of(robot.solid)
         self._proximity = Proximity(static, robot, reach)
         self._reach = reach
+        self._shaken_at = -1
         self._touched: dict[tuple[int, int, int], str] = {}
         first = robot.hull[0]
         self._core = first.pose.apply(extremes(first.shape).mean(axis=0))
@@ -59,6 +60,11 @@ class Clearance:
         self.unsure = True
         """Whether the robot may be inside something: nothing gets there but by being set down, or by appearing."""
 
+    def shaken(self, tick: int) -> None:
+        """A push will change the robot's velocity during the step from `tick` on: how it moves now says nothing."""
+        self._shaken_at = tick
+        self._measured_at, self.no_contact_before = -1, tick
+
     def measure(self, tick: int) -> float:
         """The clearance at `tick`, which is now, in metres; the reach where nothing is nearer."""
         if self._measured_at == tick:
@@ -72,7 +78,7 @@ class Clearance:
         if self.enclosed_by is not None:
             self._distance = -abs(self._distance)
         free = min(HORIZON, max(0.0, self._distance - TOLERANCE) / self._fastest())
-        self.no_contact_before = tick + math.floor(free * self._rate)
+        self.no_contact_before = tick + (math.floor(free * self._rate) if tick != self._shaken_at else 0)
         return self._distance
 
     def _search(self) -> float:

@@ -168,7 +168,7 @@ class Simulation:
     def push(self, impulse: tuple[float, float]) -> None:
         """Push the robot during the next tick: an impulse in N s in the world frame, at its centre of mass."""
         self._base.push(impulse, 1 / self._rate)
-        self._changed()
+        self._clearance.shaken(self.tick)
 
     def base_pose(self) -> Pose3:
         """The robot's base frame in the world."""

@@ -138,3 +138,17 @@ def test_a_house_in_which_a_run_begins_is_no_obstacle(simulate):
     events, samples = watch(simulation, 48)
     assert events == []
     assert min(clearance for _, clearance, _ in samples) > 1.9
+
+
+@pytest.mark.parametrize("gap", [0.05, 0.15, 0.3])
+def test_a_push_does_not_carry_the_robot_into_something_unseen(simulate, monkeypatch, gap):
+    def run():
+        simulation = simulate(solids=[box("wall", 0.22 + gap + 0.05, 0, 0.1, 4)])
+        watch(simulation, 24)
+        simulation.push((8.0, 0.0))
+        return watch(simulation, 48, 24)
+
+    ruled_out = run()
+    monkeypatch.setattr("simscen.sim.clearance.HORIZON", -1.0)
+    assert ruled_out == run()
+    assert kinds(ruled_out[0])[0] == EventKind.COLLISION_STARTED
