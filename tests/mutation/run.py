@@ -1,0 +1,94 @@
+"""Mutation check of what decides verdicts: `make mutation`, or with names of modules for those alone.
+
+Every mutant is killed by a test, or listed in equivalent.yaml with the reason why it cannot be. The run fails when one
+that is not listed survives, and when one that is listed is killed or gone. `--write` writes the table into the docs.
+"""
+
+import ast
+import importlib
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import yaml
+from mutants import Mutant, mutants
+from rooms import ROOT, module_name, modules, tests_of
+from trial import survives
+
+EQUIVALENT = Path(__file__).with_name("equivalent.yaml")
+TABLE = ROOT / "docs/design/mutation.md"
+BEGIN, END = "<!-- table -->\n", "<!-- end of table -->\n"
+WARM = ("numpy", "pydantic", "hypothesis", "shapely", "shapely.affinity", "yaml", "_pytest.assertion.rewrite",
+        "simscen.core.trace", "simscen.core.case", "simscen.core.separation")  # fmt: skip
+"""What every trial would import again."""
+
+
+@dataclass
+class Tally:
+    """What became of a module's mutants; `stale` are listed ones that are not there or not alive."""
+
+    total: int = 0
+    killed: int = 0
+    equivalent: int = 0
+    alive: list[Mutant] = field(default_factory=list)
+    stale: list[str] = field(default_factory=list)
+
+
+def check(file: Path, listed: dict[str, str]) -> Tally:
+    """Try every mutant of a module. `listed` maps changes to the reason why they change nothing."""
+    name, stages, tally = module_name(file), tests_of(file), Tally()
+    for tests in stages:
+        if not survives(name, file, ast.parse(file.read_text(encoding="utf-8")), tests):
+            raise SystemExit(f"{name}: its tests fail without any mutant: {' '.join(tests)}")
+    unseen = dict(listed)
+    for mutant in mutants(file):
+        tally.total += 1
+        expected = unseen.pop(mutant.change, None) is not None
+        if all(survives(name, file, mutant.tree, tests) for tests in stages):
+            tally.equivalent += expected
+            tally.alive += [] if expected else [mutant]
+        else:
+            tally.killed += 1
+            tally.stale += [f"killed, though listed: {mutant.change}"] if expected else []
+    tally.stale += [f"listed, but no such mutant: {change}" for change in unseen]
+    return tally
+
+
+def main(arguments: list[str]) -> int:
+    """Run the check; 1 when a mutant survives that should not."""
+    for module in WARM:
+        importlib.import_module(module)
+    wanted = [argument for argument in arguments if not argument.startswith("--")]
+    listed = yaml.safe_load(EQUIVALENT.read_text(encoding="utf-8")) if EQUIVALENT.exists() else {}
+    rows, failed = [], False
+    for file in modules():
+        short = file.relative_to(ROOT / "simscen").as_posix()
+        if wanted and short not in wanted and file.stem not in wanted:
+            continue
+        tally = check(file, (listed or {}).get(short, {}))
+        rows.append((short, tally.total, tally.killed, tally.equivalent, len(tally.alive)))
+        print(f"{short:42} {tally.total:5} {tally.killed:5} killed {tally.equivalent:4} equivalent", flush=True)
+        for mutant in tally.alive:
+            print(f"  SURVIVED {short}:{mutant.line} {mutant.change}", flush=True)
+        for line in tally.stale:
+            print(f"  STALE {line}", flush=True)
+        failed |= bool(tally.alive or tally.stale)
+    if "--write" in arguments and not failed:
+        write(rows)
+    sums = [sum(row[k] for row in rows) for k in range(1, 5)]
+    print(f"{sums[0]} mutants: {sums[1]} killed, {sums[2]} equivalent with a reason, {sums[3]} survived")
+    return int(failed)
+
+
+def write(rows: list[tuple[str, int, int, int, int]]) -> None:
+    """The table of docs/design/mutation.md."""
+    total = ("**all**", *(sum(row[k] for row in rows) for k in range(1, 5)))
+    lines = ["| module | mutants | killed | equivalent | survived |", "|---|---|---|---|---|"]
+    lines += ["| " + " | ".join(map(str, row)) + " |" for row in [*rows, total]]
+    before, rest = TABLE.read_text(encoding="utf-8").split(BEGIN)
+    after = rest.split(END)[1]
+    TABLE.write_text(before + BEGIN + "\n".join(lines) + "\n" + END + after, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
