@@ -13,9 +13,10 @@ from types import ModuleType
 
 import pytest
 
-PYTEST = (
-    "-o addopts= -o filterwarnings= --import-mode=importlib --assert=plain -p no:xdist -p no:cacheprovider -x -q"
-).split()
+PYTEST = [
+    *("-o", "addopts=", "-o", "filterwarnings=", "--import-mode=importlib", "--assert=plain"),
+    *("-p", "no:xdist", "-p", "no:cacheprovider", "-x", "-q"),
+]
 EXAMPLES = 25
 """Of Hypothesis, drawn in the same way each time: a mutant is killed or not, not by chance."""
 TIMEOUT = 60
