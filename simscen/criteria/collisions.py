@@ -11,7 +11,7 @@ from pydantic import Field
 from simscen.core.events import Event, EventKind
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
-from simscen.criteria.bounds import BrokenTrace, at_most, counted, undecided
+from simscen.criteria.bounds import BrokenTrace, NotRecorded, at_most, counted, undecided
 from simscen.criteria.signals import speed, turn_rate
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Impulse
@@ -71,6 +71,10 @@ class Collisions(Spec, Criterion):
 
     def _hardest(self, trace: Trace, hits: list[Event]) -> Finding:
         assert self.max_impulse is not None
+        silent = next((hit for hit in hits if "impulse" not in hit.data), None)
+        if silent is not None:
+            because = f"how hard it touched {silent.name or 'something'} was not recorded"
+            return undecided("collision impulse", because, f"≤ {self.max_impulse:.2f} N s")
         worst = max(hits, key=_impulse, default=None)
         value = 0.0 if worst is None else _impulse(worst)
         at = None if worst is None else (trace, worst.tick)
@@ -79,7 +83,7 @@ class Collisions(Spec, Criterion):
 
 
 def _impulse(hit: Event) -> float:
-    value = hit.data.get("impulse", 0.0)
+    value = hit.data["impulse"]
     if not isinstance(value, int | float) or math.isnan(value):
         raise BrokenTrace(f"the impulse of the collision with {hit.name} is not a number")
     return float(value)
@@ -89,10 +93,14 @@ def _moving(trace: Trace, hit: Event, case: Case) -> bool:
     """Whether any point of the robot's hull moved faster than OWN_FAULT just before."""
     reach = max((math.hypot(x, y) for x, y in case.footprint), default=case.inscribed_radius)
     linear, turning = speed(trace), turn_rate(trace)
-    since = hit.tick - LOOK_BACK * trace.tick_rate
-    window = (linear.ticks >= since) & (linear.ticks <= hit.tick)
+    if not len(linear):
+        raise NotRecorded("the robot's true velocity was not recorded, so whose fault a contact was is not known")
+    # From the newest sample before the window on: where samples are rare, none may lie within it.
+    since = round(hit.tick - LOOK_BACK * trace.tick_rate)
+    first, last = np.searchsorted(linear.ticks, (since, hit.tick), side="right").tolist()
+    window = slice(max(first - 1, 0), max(last, 1))
     fastest = linear.values[window] + reach * turning.values[window]
-    return bool(np.any(fastest > OWN_FAULT))
+    return bool(fastest.max() > OWN_FAULT)
 
 
 def _told(trace: Trace, hit: Event) -> str:

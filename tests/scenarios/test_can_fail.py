@@ -11,6 +11,7 @@ import pytest
 import yaml
 
 from simscen.core.result import Outcome
+from simscen.core.verdict import Status
 from simscen.loading.scenario import load_scenario
 from simscen.run.prepare import prepare
 from simscen.run.simulate import simulate
@@ -71,7 +72,8 @@ def test_every_shipped_scenario_is_in_the_table():
 def test_a_broken_scenario_fails_for_the_stated_reason(scenario, criterion, changes, tmp_path):
     result = run(changed(scenario, changes), scenario, tmp_path)
     assert result.outcome is Outcome.FAILED
-    assert criterion in [verdict.criterion for verdict in result.verdicts if verdict.status.value != "pass"]
+    statuses = {verdict.status for verdict in result.verdicts if verdict.criterion == criterion}
+    assert Status.FAIL in statuses, [(verdict.id, verdict.status.value) for verdict in result.verdicts]
 
 
 class Loader(yaml.SafeLoader):

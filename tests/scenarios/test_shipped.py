@@ -8,6 +8,12 @@ from pathlib import Path
 
 import pytest
 
+from simscen.judge.result import result_of
+from simscen.judge.resultdata import read_result, to_json
+from simscen.loading.resolved import spec_of_text
+from simscen.record.difference import first_difference
+from simscen.record.replay import read_log
+
 ROOT = Path(__file__).parents[2]
 
 
@@ -16,8 +22,8 @@ def simscen(*arguments, cwd=ROOT):
     return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=600, check=False)
 
 
-def hashes(folder: Path) -> dict[str, str]:
-    logs = sorted(folder.rglob("run.mcap"))
+def hashes(folder: Path, name: str) -> dict[str, str]:
+    logs = sorted(folder.rglob(name))
     return {log.parent.relative_to(folder).as_posix(): hashlib.sha256(log.read_bytes()).hexdigest() for log in logs}
 
 
@@ -43,27 +49,42 @@ def test_every_run_leaves_its_log_its_result_its_picture_and_its_scenario(togeth
         assert left >= {"run.mcap", "result.json", "map.png", "scenario.yaml", "worker.log"}
 
 
-def test_one_at_a_time_in_another_folder_gives_the_same_bytes(together, tmp_path):
-    folder, _ = together
-    done = simscen("run", ROOT / "scenarios" / "obstacles", "-j", 1, "--out", tmp_path / "out", cwd=tmp_path)
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory):
+    """All of them once more, one at a time, from another folder."""
+    folder = tmp_path_factory.mktemp("alone")
+    done = simscen("run", ROOT / "scenarios", "-j", 1, "--out", folder / "out", cwd=folder)
     assert done.returncode == 0, done.stdout + done.stderr
-    alone = hashes(tmp_path / "out")
-    assert alone
-    assert alone == {run: sha for run, sha in hashes(folder).items() if run in alone}
+    return folder / "out"
 
 
-def test_results_are_equal_whatever_ran_beside(together, tmp_path):
+def test_one_at_a_time_from_another_folder_every_log_and_every_result_is_the_same_to_the_byte(together, alone):
     folder, _ = together
-    simscen("run", "scenarios/faults/wheel_slip.scenario.yaml", "--out", tmp_path / "out")
-    (alone,) = (tmp_path / "out").rglob("result.json")
-    assert alone.read_bytes() == (folder / alone.relative_to(tmp_path / "out")).read_bytes()
+    for name in ("run.mcap", "result.json"):
+        logs = hashes(folder, name)
+        assert len(logs) == len(list((ROOT / "scenarios").rglob("*.scenario.yaml")))
+        assert hashes(alone, name) == logs
 
 
-def test_another_seed_gives_another_log(together, tmp_path):
+def test_verdicts_live_replayed_and_judged_again_are_the_same(together):
+    folder, _ = together
+    logs = sorted(folder.rglob("run.mcap"))
+    assert logs
+    for file in logs:
+        live, log = read_result(file.with_name("result.json")), read_log(file)
+        criteria = spec_of_text(log.about.scenario, file.name).pass_
+        again = result_of(live.key, live.path, criteria, log.trace, log.about.case, live.lines)
+        assert to_json(again) == file.with_name("result.json").read_text(encoding="utf-8") == log.result, file
+
+
+def test_another_seed_gives_another_trace(together, tmp_path):
     folder, _ = together
     simscen("run", "scenarios/navigation/goal.scenario.yaml", "--seed", 2, "--out", tmp_path / "out")
-    (other,) = hashes(tmp_path / "out").values()
-    assert other not in hashes(folder).values()
+    (other,) = (tmp_path / "out").rglob("run.mcap")
+    (usual,) = folder.rglob("goal/seed-1/run.mcap")
+    difference = first_difference(read_log(usual).trace, read_log(other).trace)
+    assert difference is not None
+    assert first_difference(read_log(usual).trace, read_log(usual).trace) is None
 
 
 def test_check_determinism_compares_the_logs_of_two_runs(tmp_path):

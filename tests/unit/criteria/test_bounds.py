@@ -1,0 +1,58 @@
+"""What a bound says: digits that tell value and limit apart, and why only when it is violated."""
+
+import math
+
+import pytest
+
+from simscen.criteria.bounds import at_least, at_most, counted, missed, quantity
+from simscen.judge.sketch import sketch
+
+
+@pytest.mark.parametrize(
+    ("value", "limit", "measured", "told"),
+    [
+        (0.5, 0.25, "0.50 m", "≤ 0.25 m"),
+        (0.5, 0.5, "0.50 m", "≤ 0.50 m"),
+        (0.501, 0.5, "0.501 m", "≤ 0.500 m"),
+        (0.5 + 1e-7, 0.5, "0.5000001 m", "≤ 0.5000000 m"),
+        (0.5 + 1e-8, 0.5, "0.50000001 m", "≤ 0.50000000 m"),
+        (0.5 + 1e-9, 0.5, "0.500000001 m", "≤ 0.500000000 m"),
+        (0.5 + 1e-12, 0.5, "0.500000000 m", "≤ 0.500000000 m"),
+        (0.0, 0.001, "0.000 m", "≤ 0.001 m"),
+        (0.001, 0.0, "0.001 m", "≤ 0.000 m"),
+        (math.inf, 0.5, "inf m", "≤ 0.50 m"),
+        (0.5, math.inf, "0.50 m", "≤ inf m"),
+    ],
+)
+def test_as_many_digits_as_tell_the_two_apart(value, limit, measured, told):
+    finding = at_most("x", value, limit, "m")
+    assert (finding.measured, finding.limit) == (measured, told)
+
+
+@pytest.mark.parametrize(("value", "detail"), [(0.4, ()), (0.5, ()), (0.6, ("why",))])
+def test_the_reason_is_told_only_for_a_violation(value, detail):
+    assert at_most("x", value, 0.5, "m", detail=["why"]).detail == detail
+    assert at_least("x", -value, -0.5, "m", detail=["why"]).detail == detail
+
+
+def test_what_the_limit_holds_for_follows_it():
+    assert at_most("x", 1.0, 2.0, "s", context="after lidar.off").limit == "≤ 2.00 s after lidar.off"
+    assert at_least("x", 1.0, 2.0, "").limit == "≥ 2.00"
+
+
+def test_counts_are_words():
+    (few,) = counted("x", 1, "recovery", 2, None)
+    (many,) = counted("x", 2, "recovery", None, 3)
+    assert (few.measured, few.limit, few.margin, few.value) == ("1 recovery", "≥ 2", -1.0, 1.0)
+    assert (many.measured, many.limit, many.margin, many.value) == ("2 recoveries", "≤ 3", 1.0, 2.0)
+    assert counted("x", 0, "replan", 0, None)[0].measured == "0 replans"
+
+
+def test_a_place_is_that_of_the_moment():
+    trace = sketch({"seconds": 4, "truth": [[0, 0, 0], [4, 4, 2]]})
+    finding = missed("x", "a", "b", (trace, 480), ["why"])
+    assert (finding.tick, finding.place, finding.detail) == (480, (2.0, 1.0), ("why",))
+
+
+def test_a_quantity_has_its_unit():
+    assert (quantity(1.234, "s"), quantity(1.234, "", 1)) == ("1.23 s", "1.2")
