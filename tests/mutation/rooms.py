@@ -30,7 +30,9 @@ def tests_of(file: Path) -> list[list[str]]:
     own = [f"tests/unit/{room}/test_{kind}.py"]
     stages = []
     if (ROOT / f"tests/cases/{kind}.yaml").exists():
-        stages.append(["tests/unit/judge/test_golden_cases.py", "-k", f"{kind}:"])
+        stages.append(["golden", kind])
+    elif room in ("criteria", "judge"):
+        stages.append(["golden", ""])
     if (ROOT / own[0]).exists():
         stages.append(own)
     return [*stages, [test for test in ALL_TESTS[room] if (ROOT / test).exists()]]

@@ -11,7 +11,7 @@ from simscen.judge.judge import judge
 from simscen.judge.sketch import sketch, sketch_case
 
 FILES = sorted((Path(__file__).parents[2] / "cases").glob("*.yaml"))
-CASES = [(file.stem, case) for file in FILES for case in yaml.safe_load(file.read_text(encoding="utf-8"))]
+CASES = [(file.stem, case) for file in FILES for case in yaml.load(file.read_text(encoding="utf-8"), yaml.CSafeLoader)]
 
 
 @pytest.mark.parametrize(("kind", "golden"), CASES, ids=[f"{kind}: {case['name']}" for kind, case in CASES])
