@@ -1,0 +1,203 @@
+"""What holds for every verdict, on traces and criteria drawn at random."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from simscen.core.events import Event, EventKind
+from simscen.core.samples import Samples
+from simscen.core.trace import Trace
+from simscen.core.verdict import Status
+from simscen.criteria.criterion import AnyCriterion
+from simscen.judge.judge import judge
+from simscen.judge.sketch import sketch, sketch_case
+
+SECONDS = 8
+SQUARE = [[-0.3, -0.2], [0.3, -0.2], [0.3, 0.2], [-0.3, 0.2]]
+CASE = {
+    "goals": [{"name": "a", "pose": [2, 0, 0]}, {"name": "b", "pose": [0, 2, 1]}],
+    "sent": [{"name": "detour", "pose": [1, 1, 0]}],
+    "shortest": {"a": 2.0, "b": 2.8},
+    "regions": {"wet": [[1, 1], [3, 1], [3, 2], [1, 3]]},
+    "footprint": SQUARE,
+}
+LIMITS = {
+    "goals_reached": ("tolerance", "yaw_tolerance", "within"),
+    "no_false_success": ("tolerance",),
+    "collisions": ("max", "max_impulse"),
+    "time_to_goal": ("max",),
+    "path_length": ("max", "max_ratio"),
+    "speed": ("max", "max_turn_rate"),
+    "stuck": ("max",),
+    "localization_error": ("max", "rmse", "final", "max_yaw"),
+    "relocalized_within": ("time",),
+    "stopped_within": ("time",),
+    "replans": ("max",),
+    "recoveries": ("max",),
+}
+"""Of each criterion the bounds that are loosened by raising them."""
+LOWERED = {"clearance": ("min",), "keepout": ("distance",), "replans": ("min",), "recoveries": ("min",)}
+"""And those that are loosened by lowering them."""
+FIXED = {
+    "stopped_within": {"after": "lidar.off"},
+    "relocalized_within": {"after": "kidnapped"},
+    "keepout": {"region": "wet"},
+    "result": {"status": "SUCCEEDED", "error_code": "NONE"},
+    "error_code": {"code": "NONE", "goal": "a"},
+}
+TEMPORAL = {"always", "eventually", "until", "whenever", "smoothness", "localization_consistency"}
+"""Drawn in test_temporal.py."""
+COUNTS = {("collisions", "max"), ("replans", "min"), ("replans", "max"), ("recoveries", "min"), ("recoveries", "max")}
+
+
+def eighths(low, high):
+    """Numbers that floats hold exactly, so that values lie on their bounds now and then."""
+    return st.integers(low, high).map(lambda n: n / 8)
+
+
+COORDINATE, BOUND, TIME = eighths(-24, 24), eighths(1, 48), eighths(0, 8 * SECONDS)
+
+
+@st.composite
+def waypoints(draw):
+    times = sorted({0.0, *draw(st.lists(TIME, max_size=4))})
+    return [[t, *draw(st.tuples(COORDINATE, COORDINATE, COORDINATE))] for t in times]
+
+
+@st.composite
+def traces(draw) -> Trace:
+    times = sorted(draw(st.lists(TIME, min_size=9, max_size=9)))
+    kinds = [
+        ("goal.accepted", "a", {}),
+        draw(st.sampled_from([("goal.reached", "a", {}), ("goal.canceled", "a", {"preempted_by": "detour"})])),
+        ("goal.accepted", draw(st.sampled_from(["b", "detour"])), {}),
+        ("fault.started", "lidar.off", {}),
+        ("event.started", "kidnapped", {}),
+        ("plan.made", "a", {"reason": "blocked"}),
+        ("collision.started", "wall", {"impulse": draw(BOUND)}),
+        ("recovery.started", "spin", {}),
+        ("navigation.ended", draw(st.sampled_from(["SUCCEEDED", "FAILED"])), {"error_code": 0}),
+    ]
+    chosen = draw(st.lists(st.booleans(), min_size=9, max_size=9))
+    words = {
+        "seconds": SECONDS,
+        "truth": draw(waypoints()),
+        "belief": draw(waypoints()),
+        "clearance": [[0, draw(BOUND)], [SECONDS, draw(BOUND)]],
+        "events": [[t, *kind] for t, kind, there in zip(times, kinds, chosen, strict=True) if there],
+    }
+    return sketch(words)
+
+
+@st.composite
+def criteria(draw):
+    """The kind of a criterion and its words, with all its bounds."""
+    kind = draw(st.sampled_from(sorted({*LIMITS, *LOWERED, *FIXED})))
+    words = dict(FIXED.get(kind, {}))
+    for key in (*LIMITS.get(kind, ()), *LOWERED.get(kind, ())):
+        words[key] = draw(st.integers(0, 3)) if (kind, key) in COUNTS else draw(BOUND)
+    if {"min", "max"} <= words.keys():
+        words["min"], words["max"] = sorted((words["min"], words["max"]))
+    if kind == "path_length":
+        words["max_ratio"] = max(1.0, words["max_ratio"])
+    return kind, words
+
+
+def verdict(kind, words, trace, case=CASE):
+    (found,) = judge([AnyCriterion.model_validate({kind: words})], trace, sketch_case(case))
+    return found
+
+
+def test_every_criterion_is_drawn():
+    assert {*LIMITS, *LOWERED, *FIXED, *TEMPORAL} >= set(AnyCriterion.choices())
+
+
+@given(traces(), criteria())
+@settings(deadline=None)
+def test_the_sign_of_a_margin_is_the_verdict(trace, criterion):
+    found = verdict(*criterion, trace)
+    for finding in found.findings:
+        if finding.margin is not None:
+            assert finding.status is (Status.PASS if finding.margin >= 0 else Status.FAIL), finding
+    if found.status is Status.PASS:
+        assert all(finding.status is Status.PASS for finding in found.findings)
+
+
+@given(traces(), criteria(), st.data())
+@settings(deadline=None)
+def test_loosening_a_bound_never_turns_a_pass_into_anything_else(trace, criterion, data):
+    kind, words = criterion
+    raised, lowered = LIMITS.get(kind, ()), LOWERED.get(kind, ())
+    assume(raised or lowered)
+    key = data.draw(st.sampled_from([*raised, *lowered]))
+    more = data.draw(st.integers(0, 3)) if (kind, key) in COUNTS else data.draw(BOUND)
+    if key in lowered:
+        looser = max(words[key] - more, 0)
+    else:
+        looser = words[key] + more
+    strict, loose = verdict(kind, words, trace), verdict(kind, {**words, key: looser}, trace)
+    if strict.status is Status.PASS:
+        assert loose.status is Status.PASS
+    if loose.status is Status.FAIL:
+        assert strict.status is Status.FAIL
+
+
+def shifted(trace: Trace, ticks: int) -> Trace:
+    """The same run, `ticks` later."""
+
+    def later(samples: Samples) -> Samples:
+        return Samples(samples.ticks + ticks, samples.values)
+
+    signals = ("truth", "velocity", "clearance", "belief", "odometry", "command")
+    return replace(
+        trace,
+        **{name: later(getattr(trace, name)) for name in signals},
+        scans=trace.scans + ticks,
+        plans=tuple(replace(plan, tick=plan.tick + ticks) for plan in trace.plans),
+        events=tuple(replace(event, tick=event.tick + ticks) for event in trace.events),
+        objects={name: later(poses) for name, poses in trace.objects.items()},
+        end=trace.end + ticks,
+    )
+
+
+@given(traces(), criteria(), st.integers(1, 10_000))
+@settings(deadline=None)
+def test_a_run_that_is_moved_in_time_has_the_same_verdict_at_moved_ticks(trace, criterion, ticks):
+    kind, words = criterion
+    assume(kind != "relocalized_within" or "after" in words)
+    now, then = verdict(kind, words, trace), verdict(kind, words, shifted(trace, ticks))
+    assert [(f.status, f.what, f.value, f.margin) for f in now.findings] == [
+        (f.status, f.what, f.value, f.margin) for f in then.findings
+    ]
+    assert [f.tick if f.tick is None else f.tick + ticks for f in now.findings] == [f.tick for f in then.findings]
+
+
+@given(traces(), criteria(), st.integers(1, 400))
+@settings(deadline=None)
+def test_what_was_not_decided_or_failed_when_a_log_was_cut_off_is_never_a_pass_there(trace, criterion, cut):
+    end = trace.end - cut
+    events = tuple(e for e in trace.events if e.tick <= end and e.kind is not EventKind.RUN_ENDED)
+    assert verdict(*criterion, replace(trace, events=events)).status is not Status.PASS
+
+
+@pytest.mark.parametrize("column", [0, 1, 2])
+@given(criteria(), st.integers(0, 300), st.sampled_from([np.nan, np.inf, -np.inf]))
+@settings(deadline=None)
+def test_a_pose_that_is_no_number_never_lets_what_looks_at_it_pass(column, criterion, k, value):
+    trace = sketch({"seconds": SECONDS, "truth": [[0, 0, 0], [SECONDS, 4, 0]], "events": LOOKED_AT})
+    trace.truth.values[k, column] = value
+    kind, words = criterion
+    if kind in ("keepout", "path_length", "stuck", "localization_error", "relocalized_within"):
+        assert verdict(kind, words, trace).status is not Status.PASS
+
+
+LOOKED_AT = [[0.5, "goal.accepted", "a"], [1, "event.started", "kidnapped"], [6, "goal.reached", "a"]]
+
+
+def test_events_of_the_same_tick_keep_their_order():
+    both = (Event(5, EventKind.GOAL_ACCEPTED, "a"), Event(5, EventKind.GOAL_REACHED, "a"))
+    trace = replace(sketch({"seconds": 1, "truth": [[0, 2, 0, 0]]}), events=(*both, Event(240, EventKind.RUN_ENDED)))
+    assert verdict("goals_reached", {"goals": ["a"]}, trace).status is Status.PASS

@@ -1,0 +1,217 @@
+"""Each condition on both sides of its edge."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from simscen.core.belief import Belief
+from simscen.core.events import Event, EventKind
+from simscen.core.geometry import Pose2
+from simscen.core.motion import Twist
+from simscen.core.navigation import Goal
+from simscen.core.time import Clock
+from simscen.triggers.trigger import Trigger
+
+STILL, CLOCK = Twist(0.0), Clock(240)
+HALL = ((0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0))
+
+
+@dataclass
+class Now:
+    """A situation as a test arranges it."""
+
+    tick: int = 0
+    robot: Pose2 = Pose2(0.0, 0.0)
+    twist: Twist = STILL
+    travelled: float = 0.0
+    belief: Belief | None = None
+    goal: Goal | None = None
+    events: tuple[Event, ...] = ()
+    objects: dict = field(default_factory=dict)
+    clock: Clock = CLOCK
+
+    def region(self, name):
+        return {"hall": HALL}[name]
+
+    def object(self, name):
+        return self.objects.get(name)
+
+
+def holds(words, **now) -> bool:
+    return Trigger.model_validate(words).holds(Now(**now))
+
+
+@pytest.mark.parametrize(("tick", "expected"), [(239, False), (240, True), (241, True)])
+def test_a_time_is_reached_at_its_tick(tick, expected):
+    assert holds({"time": "1 s"}, tick=tick) is expected
+
+
+@pytest.mark.parametrize(("metres", "expected"), [(1.99, False), (2.0, True), (2.01, True)])
+def test_a_way_is_travelled_when_it_is_as_long(metres, expected):
+    assert holds({"travelled": 2.0}, travelled=metres) is expected
+
+
+@pytest.mark.parametrize(
+    ("twist", "below", "above"),
+    [
+        (Twist(0.29, 0.4), True, False),
+        (Twist(0.3, 0.4), False, False),
+        (Twist(0.31, 0.4), False, True),
+        (Twist(-0.31, -0.4), False, True),
+        (Twist(0.0, 0.0, 3.0), True, False),
+    ],
+)
+def test_a_speed_is_over_ground_and_neither_below_nor_above_itself(twist, below, above):
+    assert holds({"speed_below": 0.5}, twist=twist) is below
+    assert holds({"speed_above": 0.5}, twist=twist) is above
+
+
+@pytest.mark.parametrize(("x", "expected"), [(0.99, False), (1.0, True), (1.01, True), (5.01, False)])
+def test_what_remains_is_measured_to_the_goal_as_the_crow_flies(x, expected):
+    goal = Goal("desk", Pose2(3.0, 2.0))
+    assert holds({"distance_remaining": 2}, robot=Pose2(x, 2.0), goal=goal) is expected
+
+
+def test_without_a_goal_nothing_remains():
+    assert not holds({"distance_remaining": 100})
+
+
+@pytest.mark.parametrize(("off", "expected"), [(0.49, False), (0.5, False), (0.51, True)])
+def test_an_error_of_localization_is_more_than_the_bound(off, expected):
+    belief = Belief(Pose2(1.0, 1.0 + off), np.eye(3))
+    assert holds({"localization_error": 0.5}, robot=Pose2(1.0, 1.0), belief=belief) is expected
+
+
+def test_without_a_belief_nothing_is_in_error():
+    assert not holds({"localization_error": 0})
+
+
+@pytest.mark.parametrize(("x", "expected"), [(1.0, True), (2.0, True), (2.001, False)])
+def test_a_region_has_its_edge(x, expected):
+    assert holds({"robot_in": {"region": "hall"}}, robot=Pose2(x, 1.0)) is expected
+
+
+@pytest.mark.parametrize(("x", "expected"), [(3.49, True), (3.5, True), (3.51, False)])
+def test_near_is_at_most_the_distance(x, expected):
+    assert holds({"robot_within": {"region": "hall", "distance": 1.5}}, robot=Pose2(x, 1.0)) is expected
+    assert holds({"robot_within": {"of": [2, 1], "distance": 1.5}}, robot=Pose2(x, 1.0)) is expected
+    there = {"cart": Pose2(2.0, 1.0)}
+    assert holds({"robot_within": {"object": "cart", "distance": 1.5}}, robot=Pose2(x, 1.0), objects=there) is expected
+
+
+def test_a_point_has_both_its_coordinates():
+    assert holds({"robot_within": {"of": [5, 7], "distance": 0}}, robot=Pose2(5.0, 7.0))
+    assert not holds({"robot_within": {"of": [5, 7], "distance": 1}}, robot=Pose2(7.0, 5.0))
+
+
+def test_nothing_is_near_an_object_that_is_not_there():
+    assert not holds({"robot_within": {"object": "cart", "distance": 1000}})
+
+
+@pytest.mark.parametrize("words", [{}, {"of": [1, 1], "object": "cart"}, {"object": "cart", "region": "hall"}])
+def test_near_to_one_thing_only(words):
+    with pytest.raises(ValidationError, match="exactly one of: of, object, region"):
+        Trigger.model_validate({"robot_within": {**words, "distance": 1}})
+
+
+LOGGED = {
+    "goal": ({"name": "a", "status": "reached"}, EventKind.GOAL_REACHED),
+    "event": ({"name": "a"}, EventKind.EVENT_STARTED),
+    "recovery": ({"name": "spin"}, EventKind.RECOVERY_STARTED),
+    "collision": ({"with": "a"}, EventKind.COLLISION_STARTED),
+}
+
+
+@pytest.mark.parametrize("kind", LOGGED)
+def test_what_was_logged_counts_by_kind_and_name(kind):
+    words, logged = LOGGED[kind]
+    name = next(value for key, value in words.items() if key in ("name", "with"))
+    assert not holds({kind: words})
+    assert not holds({kind: words}, events=(Event(1, EventKind.RUN_ENDED, name),))
+    assert not holds({kind: words}, events=(Event(1, logged, "other"),))
+    assert holds({kind: words}, events=(Event(1, logged, "other"), Event(2, logged, name)))
+
+
+@pytest.mark.parametrize("kind", ["goal", "recovery", "collision"])
+def test_without_a_name_any_counts(kind):
+    words, logged = LOGGED[kind]
+    bare = {key: value for key, value in words.items() if key == "status"}
+    assert holds({kind: bare}, events=(Event(1, logged, "whatever"),))
+    assert not holds({kind: bare})
+
+
+@pytest.mark.parametrize("kind", ["goal", "recovery"])
+def test_as_often_as_is_asked(kind):
+    words, logged = LOGGED[kind]
+    name = words["name"]
+    once, twice = (tuple(Event(k, logged, name) for k in range(n)) for n in (1, 2))
+    assert not holds({kind: {**words, "count": 2}}, events=once)
+    assert holds({kind: {**words, "count": 2}}, events=twice)
+    assert holds({kind: words}, events=once)
+
+
+def test_an_end_is_no_start():
+    ended = (Event(1, EventKind.EVENT_ENDED, "a"),)
+    assert not holds({"event": {"name": "a"}}, events=ended)
+    assert holds({"event": {"name": "a", "status": "ended"}}, events=ended)
+
+
+def test_a_replan_is_a_plan_that_is_not_for_a_new_goal():
+    first, again = (
+        Event(1, EventKind.PLAN_MADE, "", {"reason": "goal"}),
+        Event(2, EventKind.PLAN_MADE, "", {"reason": "blocked"}),
+    )
+    other = Event(3, EventKind.PLAN_FAILED, "", {"reason": "blocked"})
+    assert not holds({"replan": {}}, events=(first, first, other))
+    assert holds({"replan": {}}, events=(first, again))
+    assert not holds({"replan": {"count": 2}}, events=(first, again))
+    assert holds({"replan": {"count": 2}}, events=(again, again))
+
+
+SOON, LATE = {"time": 1}, {"time": 2}
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ({"all": [SOON, SOON]}, True),
+        ({"all": [SOON, LATE]}, False),
+        ({"any": [SOON, LATE]}, True),
+        ({"any": [LATE, LATE]}, False),
+        ({"not": SOON}, False),
+        ({"not": LATE}, True),
+        ({"all": [SOON, {"not": {"any": [LATE]}}]}, True),
+    ],
+)
+def test_conditions_combine(words, expected):
+    assert holds(words, tick=240) is expected
+
+
+def test_unless_it_is_said_otherwise_a_trigger_fires_once_at_once_and_for_sure():
+    usual = Trigger.model_validate({"time": 1})
+    assert (usual.edge, usual.delay, usual.times, usual.probability) == ("rising", 0.0, 1, 1.0)
+
+
+@pytest.mark.parametrize("words", [{"times": 0}, {"times": 10_001}, {"delay": -1}, {"probability": 1.5}])
+def test_what_no_trigger_can_do_is_refused(words):
+    with pytest.raises(ValidationError):
+        Trigger.model_validate({"time": 1, **words})
+
+
+@pytest.mark.parametrize("kind", ["goal", "replan", "recovery"])
+@pytest.mark.parametrize("count", [0, 10_001])
+def test_counts_are_at_least_one(kind, count):
+    words = {"goal": {"status": "reached"}, "replan": {}, "recovery": {}}[kind]
+    with pytest.raises(ValidationError, match="count"):
+        Trigger.model_validate({kind: {**words, "count": count}})
+    assert Trigger.model_validate({kind: {**words, "count": 10_000}}).kind == kind
+
+
+@pytest.mark.parametrize("key", ["all", "any"])
+def test_combinations_have_one_to_fifty_parts(key):
+    assert Trigger.model_validate({key: [SOON] * 50}).kind == key
+    for parts in ([], [SOON] * 51):
+        with pytest.raises(ValidationError):
+            Trigger.model_validate({key: parts})
