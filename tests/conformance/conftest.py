@@ -53,12 +53,18 @@ Simscen = Callable[..., Ended]
 Refused = Callable[..., str]
 
 
+@pytest.fixture(scope="session")
+def texts() -> dict[str, str]:
+    """Small valid files by name."""
+    return {"room.world.yaml": WORLD, "cube.robot.yaml": ROBOT, "a.scenario.yaml": SCENARIO}
+
+
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, texts: dict[str, str]) -> Path:
     """The working folder: a world, a robot and a scenario, all of them valid."""
     home = tmp_path / "home"
     home.mkdir()
-    for name, text in (("room.world.yaml", WORLD), ("cube.robot.yaml", ROBOT), ("a.scenario.yaml", SCENARIO)):
+    for name, text in texts.items():
         (home / name).write_text(text)
     monkeypatch.chdir(home)
     return home

@@ -1,31 +1,138 @@
-"""A warm process whose runs do what the scenario's first tag says before they are done as ever."""
+"""A warm process whose runs do what the scenario's first tag says: before they begin, or mid-run where a time is given.
 
+`segfault` strikes at once, `segfault.at.5` as soon as five simulated seconds have been driven, from inside the lockstep.
+"""
+
+import contextlib
 import ctypes
+import itertools
 import os
 import signal
+import subprocess
+import sys
 import time
 
-from simscen.cli import warm_process
+import numpy as np
+import pybullet
 
+from simscen.cli import warm_process
+from simscen.stack.localizers import likelihood_field
+
+FLOOD = 200  # MiB
 perform = warm_process._perform
 prepared = warm_process._PREPARED.prepared
 
 
+def spin():
+    """A loop in C that holds Python's lock and never looks for signals."""
+    sum(itertools.repeat(1))
+
+
+def swell():
+    """Memory as an engine in C++ takes it: until malloc gives no more, and then as if it had."""
+    while ctypes.CDLL(None).malloc(ctypes.c_size_t(1 << 28)):
+        pass
+    ctypes.CDLL(None).abort()
+
+
+def flood():
+    os.write(1, b"the beginning\n")
+    for _ in range(FLOOD):
+        os.write(1, b"x" * (1 << 20))
+
+
+def fork_a_daemon():
+    """A process that left group, session and parent behind."""
+    if os.fork() == 0:
+        os.setsid()
+        if os.fork() == 0:
+            os.closerange(3, 256)
+            os.execvp("sleep", ["sleep", "61.5"])
+        os._exit(0)
+    time.sleep(0.1)
+
+
+def be_deaf():
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    while True:
+        time.sleep(1)
+
+
+def lose_the_robot():
+    """The pose that an engine gives after dividing by zero."""
+    pybullet.getBasePositionAndOrientation = lambda *_, **__: ((float("nan"),) * 3, (0.0, 0.0, 0.0, 1.0))
+
+
+def lose_all_weight():
+    likelihood_field.LikelihoodField.log_likelihood = lambda self, poses, *_: np.full(len(poses), -np.inf)
+
+
+def make_weights_nan():
+    likelihood_field.LikelihoodField.log_likelihood = lambda self, poses, *_: np.full(len(poses), np.nan)
+
+
+def chatter():
+    os.write(2, b"::set-output name=x::y\n##[error]boo\n]]>\x1b[31m</system-err><script>\xff\n")
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def stray_bytes():
+    for pipe in range(3, 256):
+        with contextlib.suppress(OSError):
+            os.write(pipe, b"\xff[[[ stray {\n" + b"[" * 100_000 + b'\n[1]\n{"end": 1}\n')
+
+
+FAULTS = {
+    "environment": lambda: print(dict(os.environ)),
+    "chatter": chatter,
+    "crash": lambda: ctypes.string_at(0),
+    "segfault": lambda: ctypes.string_at(0),
+    "sigkill": lambda: os.kill(os.getpid(), signal.SIGKILL),
+    "exit-0": lambda: os._exit(0),
+    "sys-exit": lambda: sys.exit(0),
+    "spin": spin,
+    "deaf": be_deaf,
+    "hang": lambda: time.sleep(600),
+    "memory": lambda: [bytes(1 << 28) for _ in range(1 << 10)],
+    "swell": swell,
+    "grandchild": lambda: subprocess.Popen(["sleep", "61.5"]),
+    "daemon": fork_a_daemon,
+    "flood": flood,
+    "exception": lambda: 1 / 0,
+    "nan": lose_the_robot,
+    "weightless": lose_all_weight,
+    "nan-weights": make_weights_nan,
+    "stray-bytes": stray_bytes,
+    "kill-preparer": lambda: os.kill(os.getppid(), signal.SIGKILL),
+    "stop-preparer": lambda: os.kill(os.getppid(), signal.SIGSTOP),
+}
+
+
 def misbehave(job, tell):
-    tag = next(iter(job.scenario.spec.tags), "")
-    if tag == "environment":
-        print(dict(os.environ))
-    if tag == "chatter":
-        os.write(2, b"::set-output name=x::y\n##[error]boo\n]]>\x1b[31m</system-err><script>\xff\n")
-        os.kill(os.getpid(), signal.SIGKILL)
-    if tag == "crash":
-        ctypes.string_at(0)
-    return perform(job, tell)
+    fault, _, at = next(iter(job.scenario.spec.tags), "").partition(".at.")
+    if fault not in FAULTS:
+        return perform(job, tell)
+    if not at:
+        FAULTS[fault]()
+        return perform(job, tell)
+    left = [FAULTS[fault]]
+
+    def tell_and_fail(seconds):
+        tell(seconds)
+        if seconds >= float(at) and left:
+            left.pop()()
+
+    return perform(job, tell_and_fail)
 
 
 def slow_to_prepare(scenario):
-    if "slow-to-prepare" in scenario.spec.tags:
-        time.sleep(60)
+    match next(iter(scenario.spec.tags), ""):
+        case "slow-to-prepare":
+            time.sleep(60)
+        case "crash-to-prepare":
+            ctypes.string_at(0)
+        case "swell-to-prepare":
+            swell()
     return prepared(scenario)
 
 

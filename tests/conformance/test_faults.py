@@ -1,0 +1,145 @@
+"""Runs that crash, hang, swell and litter: one session with all of them, each answered as what it is."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+from junitparser import JUnitXml
+
+TELLING = Path(__file__).with_name("telling_zygote.py")
+WITH_FAULTS = f"""
+import sys
+import simscen.cli.run
+from simscen.cli.main import main
+simscen.cli.run.WARM_PROCESS = ({str(TELLING)!r},)
+main()
+"""
+LIMIT = 10.0
+
+
+class Case(NamedTuple):
+    """A fault, and the kind and words of the error that its run must become; "" = the verdict that is its due."""
+
+    number: int
+    name: str
+    fault: str
+    kind: str
+    words: str
+
+
+CASES = [
+    Case(52, "SIGSEGV", "segfault.at.0", "crashed", r"^crashed: SIGSEGV, in string_at \(__init__.py:\d+\)"),
+    Case(53, "SIGKILL", "sigkill.at.0", "crashed", r"killed \(SIGKILL; possibly out of memory; peak memory \d+ MiB"),
+    Case(54, "exit 0", "exit-0.at.0", "crashed", "^exited 0 without a result"),
+    Case(55, "sys.exit(0)", "sys-exit.at.0", "crashed", r"^exited 0 by itself \(telling_zygote.py:\d+\)"),
+    Case(56, "a loop in C", "spin.at.0", "timeout", r"^stopped after 1[0-3] s of wall time, in spin \(telling_zygote.py:\d+\)"),
+    Case(57, "deaf to SIGTERM", "deaf.at.0", "timeout", r"^stopped after 1[0-4] s of wall time, in be_deaf"),
+    Case(58, "memory in Python", "memory.at.0", "out-of-memory", "more memory than it may"),
+    Case(58, "memory in C", "swell.at.0", "crashed", r"^crashed: SIGABRT, in swell .*peak memory \d+ MiB of 4096 MiB"),
+    Case(59, "a grandchild", "grandchild.at.0", "crashed", "left a process behind"),
+    Case(59, "a daemon", "daemon.at.0", "crashed", "left a process behind"),
+    Case(60, "a flood", "flood.at.0", "", ""),
+    Case(61, "an exception", "exception.at.0", "crashed", r"ZeroDivisionError: division by zero \(telling_zygote.py:\d+\)"),
+    Case(62, "a pose that is not finite", "nan.at.0", "diverged", r"simulation diverged at t=\d"),
+    Case(64, "no particle has weight", "weightless.at.0", "", ""),
+    Case(64, "weights that are not finite", "nan-weights.at.0", "", ""),
+    Case(98, "a crash while its world is prepared", "crash-to-prepare", "crashed", r"\(SIGSEGV\) while it prepared this"),
+    Case(99, "memory while its world is prepared", "swell-to-prepare", "crashed", r"\(SIGABRT\) while it prepared this"),
+    Case(100, "stray bytes on its pipes", "stray-bytes.at.0", "", ""),
+    Case(101, "it kills the process that prepares", "kill-preparer.at.0", "crashed", r"prepares runs was killed \(SIGKILL\)"),
+    Case(66, "nothing at all", "fine", "", ""),
+    Case(66, "nothing either", "fine-too", "", ""),
+]
+SHUT_IN = """\
+events:
+  - when: {time: 0.1}
+    do: {spawn: {name: lid, box: [0.1, 4, 1], pose: {x: 2, y: 2}}}
+"""
+
+
+class Session(NamedTuple):
+    """What came of it, by scenario."""
+
+    code: int
+    out: Path
+    runs: dict[str, dict[str, Any]]
+    printed: str
+
+
+@pytest.fixture(scope="session")
+def session(tmp_path_factory: pytest.TempPathFactory, texts: dict[str, str]) -> Session:
+    home = tmp_path_factory.mktemp("faults")
+    for name in ("room.world.yaml", "cube.robot.yaml"):
+        (home / name).write_text(texts[name])
+    text = texts["a.scenario.yaml"]
+    for case in CASES:
+        tagged = text.replace("seed: 7", f"seed: 7\ntags: [{case.fault}]")
+        if case.number == 64:
+            tagged += "stack: {localizer: {type: amcl, max_particles: 500}}\n"
+        (home / f"{case.number}-{case.fault}.scenario.yaml").write_text(tagged)
+    shut_in = text.replace("goals: [{pose: {x: 1.5, y: 1}}]", "goals: [{pose: {x: 3, y: 1}, timeout: 6 s}]")
+    (home / "63-no-way.scenario.yaml").write_text(shut_in + SHUT_IN)
+    command = [sys.executable, "-c", WITH_FAULTS, "run", ".", "--out", "out", "-j", "2", "--wall-limit", str(LIMIT)]
+    done = subprocess.run(command, cwd=home, capture_output=True, text=True, timeout=300, check=False)
+    assert done.stderr == ""
+    runs = json.loads((home / "out/results.json").read_text())["runs"]
+    return Session(done.returncode, home / "out", {run["scenario"]: run for run in runs}, done.stdout)
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case.number} {case.name}")
+def test_a_fault_is_answered_as_what_it_is(session: Session, case: Case) -> None:
+    run = session.runs[f"{case.number}-{case.fault}"]
+    if not case.kind:
+        assert (run["outcome"], run["error"]) == ("passed", None)
+        return
+    assert (run["outcome"], run["error"]["kind"]) == ("error", case.kind)
+    assert re.search(case.words, run["error"]["message"])
+
+
+def test_63_no_way_to_the_goal_is_a_failure_and_no_error(session: Session) -> None:
+    run = session.runs["63-no-way"]
+    assert (run["outcome"], run["error"]) == ("failed", None)
+
+
+def test_65_every_run_is_answered_once_and_the_exit_code_says_that_some_broke_off(session: Session) -> None:
+    assert session.code == 3
+    assert len(session.runs) == len(CASES) + 1
+    cases = [case for suite in JUnitXml.fromfile(str(session.out / "junit.xml")) for case in suite]
+    assert len(cases) == len(CASES) + 1
+    assert len({case.name + case.classname for case in cases}) == len(CASES) + 1
+
+
+def test_52_the_stack_of_a_crash_is_in_its_log_and_in_the_report(session: Session) -> None:
+    assert "lockstep.py" in session.runs["52-segfault.at.0"]["error"]["tail"]
+
+
+def test_60_of_a_flood_the_log_keeps_little(session: Session) -> None:
+    (log,) = session.out.rglob("60-flood.at.0/*/worker.log")
+    assert log.stat().st_size < 2 << 20
+    assert log.read_bytes().startswith(b"the beginning\n")
+
+
+def test_59_nothing_is_left_behind(session: Session) -> None:
+    told = [path.read_bytes() for path in Path("/proc").glob("[0-9]*/cmdline") if path.exists()]
+    assert [line for line in told if b"61.5" in line.split(b"\0")] == []
+
+
+@pytest.mark.parametrize("fault", ["52-segfault.at.0", "53-sigkill.at.0", "54-exit-0.at.0", "61-exception.at.0"])
+def test_71_the_log_of_a_run_that_broke_off_opens_everywhere(session: Session, fault: str) -> None:
+    from mcap.reader import make_reader
+
+    (log,) = session.out.rglob(f"{fault}/*/run.partial.mcap")
+    with log.open("rb") as stream:
+        assert make_reader(stream).get_summary() is not None
+    assert "its log until then is run.partial.mcap" in session.runs[fault]["error"]["message"]
+
+
+def test_66_the_neighbours_of_all_this_have_the_bytes_they_have_alone(session: Session) -> None:
+    (fine,), (too,) = session.out.rglob("66-fine/*/run.mcap"), session.out.rglob("66-fine-too/*/run.mcap")
+    flooded = next(session.out.rglob("60-flood.at.0/*/run.mcap"))
+    lengths = {path.stat().st_size // 4096 for path in (fine, too, flooded)}
+    assert len(lengths) == 1
