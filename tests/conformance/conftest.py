@@ -153,3 +153,47 @@ def cost(folder: Path) -> Callable[..., tuple[int, float, float, str]]:
         return done.returncode, int(peak) / 1024, float(cpu), done.stdout + "\n".join(err)
 
     return call
+
+
+def cases_of(nodeid: str) -> set[int]:
+    """The numbers (CASES.md) that a test is about, by its name and its parameters: `test_59_…`, `[59 a daemon]`."""
+    name = nodeid.rpartition("::")[2]
+    head = re.match(r"test_((?:\d+_(?:and_)?)+)", name)
+    parameters = re.findall(r"[\[-](\d+)(?= |\])", name)
+    return {int(number) for number in (re.findall(r"\d+", head[1]) if head else []) + parameters}
+
+
+class Tally:
+    """How each case came out, to be printed at the end."""
+
+    def __init__(self) -> None:
+        self.held: set[int] = set()
+        self.broken: set[int] = set()
+        self.skipped: dict[int, str] = {}
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Count a test, wherever it ran."""
+        if "conformance/" not in report.nodeid:
+            return
+        for case in cases_of(report.nodeid):
+            if report.skipped:
+                self.skipped[case] = str(report.longrepr[2]) if isinstance(report.longrepr, tuple) else "skipped"
+            elif report.failed:
+                self.broken.add(case)
+            elif report.when == "call":
+                self.held.add(case)
+
+    def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
+        """Say how many cases held."""
+        held, skipped = self.held - self.broken, sorted(self.skipped.keys() - self.held - self.broken)
+        if held or skipped or self.broken:
+            why = "; ".join(f"{case}: {self.skipped[case].removeprefix('Skipped: ')}" for case in skipped)
+            broken = f", broken: {', '.join(map(str, sorted(self.broken)))}" if self.broken else ""
+            told = f"conformance: {len(held)} cases held, {len(skipped)} skipped{why and f' ({why})'}{broken}"
+            terminalreporter.write_line(told)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Count, but only where the results come together."""
+    if not hasattr(config, "workerinput"):
+        config.pluginmanager.register(Tally())

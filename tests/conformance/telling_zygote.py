@@ -1,6 +1,6 @@
-"""A warm process whose runs do what the scenario's first tag says: before they begin, or mid-run where a time is given.
+"""A warm process whose runs do what the scenario's first tag says, before they begin or mid-run.
 
-`segfault` strikes at once, `segfault.at.5` as soon as five simulated seconds have been driven, from inside the lockstep.
+`segfault` strikes before the run, `segfault.at.5` from inside the lockstep when five simulated seconds have gone by.
 """
 
 import contextlib

@@ -126,7 +126,7 @@ def two(folder, scenario):
     return folder
 
 
-def test_a_killed_session_leaves_no_process_and_all_runs_in_its_reports_and_can_go_on(start, three, scenario):
+def test_69_and_76_and_79_a_killed_session_leaves_no_process_and_all_runs_and_can_go_on(start, three, scenario):
     run = start("run", ".", "--out", "out", "-j", "1")
     wait_for(lambda: begun(three, "finished") and under_way(three))
     below = descendants(run.pid)
@@ -153,8 +153,15 @@ def test_a_killed_session_leaves_no_process_and_all_runs_in_its_reports_and_can_
     assert (three / "out/runs/a/seed-1/run.mcap").stat().st_mtime_ns == first
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)])
-def test_an_interrupted_session_lists_all_and_leaves_no_process(start, three, number, code):
+@pytest.mark.parametrize(
+    ("number", "code"),
+    [
+        pytest.param(signal.SIGINT, 130, id="67 SIGINT"),
+        pytest.param(signal.SIGTERM, 143, id="68 SIGTERM"),
+        pytest.param(signal.SIGHUP, 129, id="68 SIGHUP"),
+    ],
+)
+def test_70_an_interrupted_session_lists_all_and_leaves_no_process(start, three, number, code):
     run = start("run", ".", "--out", "out", "-j", "1")
     wait_for(lambda: begun(three, "finished") and under_way(three))
     below = descendants(run.pid)
@@ -167,7 +174,7 @@ def test_an_interrupted_session_lists_all_and_leaves_no_process(start, three, nu
     assert "interrupted" in out
 
 
-def test_a_changed_scenario_is_run_again(start, two, scenario):
+def test_80_a_changed_scenario_is_run_again(start, two, scenario):
     start("run", ".", "--out", "out").communicate(timeout=PATIENCE)
     assert outcomes(two / "out") == {"quick": "passed", "quick2": "passed"}
     scenario("quick2", "failing")
@@ -178,7 +185,7 @@ def test_a_changed_scenario_is_run_again(start, two, scenario):
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
-def test_a_full_stdout_costs_the_exit_code_but_no_report(start, two):
+def test_77_a_full_stdout_costs_the_exit_code_but_no_report(start, two):
     with Path("/dev/full").open("w") as full:
         run = start("run", "quick.scenario.yaml", "--out", "out", stdout=full)
         err = run.communicate(timeout=PATIENCE)[1]
@@ -187,7 +194,7 @@ def test_a_full_stdout_costs_the_exit_code_but_no_report(start, two):
     assert outcomes(two / "out") == {"quick": "passed"}
 
 
-def test_a_closed_pipe_costs_nothing(start, two):
+def test_77_a_closed_pipe_costs_nothing(start, two):
     reading, writing = os.pipe()
     os.close(reading)
     run = start("run", "quick.scenario.yaml", "--out", "out", stdout=writing)

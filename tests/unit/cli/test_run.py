@@ -1,25 +1,10 @@
 """What `simscen run` refuses before it runs anything."""
 
 import errno
-import hashlib
 import os
 from pathlib import Path
 
 import pytest
-
-
-def contents(folder: Path) -> list[tuple[str, str]]:
-    files = sorted(path for path in folder.rglob("*") if path.is_file())
-    return [(str(path), hashlib.sha256(path.read_bytes()).hexdigest()) for path in files]
-
-
-def test_a_folder_that_is_not_empty_stays_untouched(simscen, tmp_path: Path) -> None:
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out/mine.txt").write_text("keep me")
-    before = contents(tmp_path / "out")
-    ended = simscen("run", "good.scenario.yaml", "--out", "out")
-    assert (ended.code, ended.err) == (2, "simscen: the output folder out is not empty; nothing in it was touched\n")
-    assert contents(tmp_path / "out") == before
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,132 @@
+"""Where results go there is no room or no right: told before anything runs, or as an error of the run."""
+
+import hashlib
+import json
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from simscen.record.replay import read_log
+
+SIMSCEN = str(Path(sys.executable).with_name("simscen"))
+TELLING = Path(__file__).with_name("telling_zygote.py")
+IMPATIENT = f"""
+import simscen.cli.run
+from simscen.cli.main import main
+from simscen.run import supervisor
+simscen.cli.run.WARM_PROCESS = ({str(TELLING)!r},)
+supervisor.SILENCE = 5.0
+main()
+"""
+Mounted = Callable[[str, str], "subprocess.CompletedProcess[str]"]
+
+
+@pytest.fixture
+def mounted(folder: Path) -> Mounted:
+    """Runs a script with a small disk of its own at `disk`; `saved` keeps what the script copies there."""
+    can_mount = ["unshare", "-rm", "mount", "-t", "tmpfs", "none", "/mnt"]
+    if subprocess.run(can_mount, capture_output=True, check=False).returncode:
+        pytest.skip("needs a user namespace in which it may mount")
+    (folder / "disk").mkdir()
+
+    def call(options: str, script: str) -> "subprocess.CompletedProcess[str]":
+        whole = f"mount -t tmpfs -o {options} none disk && {script}"
+        return subprocess.run(
+            ["unshare", "-rm", "sh", "-c", whole], cwd=folder, capture_output=True, text=True, timeout=120,
+            check=False, env={**os.environ, "simscen": SIMSCEN},
+        )  # fmt: skip
+
+    return call
+
+
+def contents(folder: Path) -> dict[str, str]:
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    return {str(path): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
+
+
+def test_72_a_read_only_disk_is_told_before_anything_runs(mounted: Mounted) -> None:
+    done = mounted("ro", '"$simscen" run . --out disk/out')
+    told = "simscen: cannot use the output folder disk/out: Read-only file system\n"
+    assert (done.returncode, done.stderr) == (2, told)
+
+
+@pytest.mark.parametrize("out", ["a.scenario.yaml/out", "/proc/out", "/dev/null/out"])
+def test_72_a_folder_that_cannot_be_made_is_told_before_anything_runs(simscen, folder: Path, out: str) -> None:
+    ended = simscen("run", "a.scenario.yaml", "--out", out)
+    assert ended.code == 2
+    assert ended.err.startswith(f"simscen: cannot use the output folder {out}: ")
+    assert not list(folder.rglob("*.mcap"))
+
+
+def test_73_a_disk_that_fills_up_is_an_error_that_says_so_of_every_run_it_hits(mounted: Mounted, folder: Path) -> None:
+    text = (folder / "a.scenario.yaml").read_text()
+    for name in "bc":
+        (folder / f"{name}.scenario.yaml").write_text(text.replace("x: 1.5, y: 1", "x: 5, y: 3"))
+    script = '"$simscen" run . --out disk/out -j 1 --format json > told.json; code=$?; cp -r disk/out saved; exit $code'
+    done = mounted("size=1500k", script)
+    assert done.returncode == 3
+    runs = {run["scenario"]: run for run in json.loads((folder / "told.json").read_text())["runs"]}
+    assert [run["outcome"] for run in runs.values()] == ["passed", "error", "error"]
+    for name in "bc":
+        assert runs[name]["error"]["kind"] == "output"
+        assert re.match("no space left (on device )?writing ", runs[name]["error"]["message"].lower())
+    (log,) = (folder / "saved").rglob("a/*/run.mcap")
+    assert read_log(log).complete
+
+
+def test_74_a_full_disk_leaves_the_reports_that_were_there(mounted: Mounted, folder: Path) -> None:
+    script = (
+        '"$simscen" run . --out disk/out > /dev/null; cp disk/out/junit.xml before.xml; head -c 9m /dev/zero > disk/x;'
+        ' "$simscen" report disk/out; code=$?; cp disk/out/junit.xml after.xml; exit $code'
+    )
+    done = mounted("size=8m", script)
+    assert done.returncode == 3
+    assert "simscen: cannot write disk/out/junit.xml: No space left on device\n" in done.stderr
+    before = (folder / "before.xml").read_bytes()
+    assert before
+    assert (folder / "after.xml").read_bytes() == before
+
+
+def test_92_a_full_step_summary_costs_the_exit_code_but_no_report(mounted: Mounted, folder: Path) -> None:
+    script = (
+        "touch disk/summary; head -c 2m /dev/zero > disk/x; export GITHUB_STEP_SUMMARY=disk/summary;"
+        ' "$simscen" run . --format github --out out'
+    )
+    done = mounted("size=1m", script)
+    assert done.returncode == 3
+    assert done.stderr.endswith("simscen: cannot write GITHUB_STEP_SUMMARY: No space left on device\n")
+    assert json.loads((folder / "out/results.json").read_text())["passed"] == 1
+
+
+def test_75_a_folder_that_is_not_empty_stays_untouched(simscen, folder: Path) -> None:
+    (folder / "out").mkdir()
+    (folder / "out/mine.txt").write_text("keep me")
+    before = contents(folder / "out")
+    ended = simscen("run", "a.scenario.yaml", "--out", "out")
+    assert (ended.code, ended.err) == (2, "simscen: the output folder out is not empty; nothing in it was touched\n")
+    assert contents(folder / "out") == before
+
+
+@pytest.mark.parametrize("junit", ["a.scenario.yaml/junit.xml", "/proc/junit.xml", "."])
+def test_78_a_report_that_cannot_be_written_is_told_before_anything_runs(simscen, folder: Path, junit: str) -> None:
+    ended = simscen("run", "a.scenario.yaml", "--junit", junit, "--out", "out")
+    assert ended.code == 2
+    assert ended.err.startswith(f"simscen: cannot write {junit}: ")
+    assert not list(folder.rglob("*.mcap"))
+
+
+def test_102_a_warm_process_that_is_stopped_is_noticed_and_replaced(folder: Path) -> None:
+    text = (folder / "a.scenario.yaml").read_text()
+    (folder / "a.scenario.yaml").write_text(text.replace("seed: 7", "tags: [stop-preparer]"))
+    (folder / "b.scenario.yaml").write_text(text)
+    command = [sys.executable, "-c", IMPATIENT, "run", ".", "--out", "out", "-j", "1"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120, check=False)
+    assert (done.returncode, done.stderr) == (3, "")
+    runs = {run["scenario"]: run for run in json.loads((folder / "out/results.json").read_text())["runs"]}
+    assert "did not answer and was killed (SIGKILL)" in runs["a"]["error"]["message"]
+    assert runs["b"]["outcome"] == "passed"
