@@ -109,7 +109,7 @@ def _measured(experiment: Experiment, trials: list[Trial]) -> Measured:
 
 
 def _localized(trials: list[Trial]) -> Localized:
-    errors = [value for trial in trials if (value := trial.metric("localization_rmse")) is not None]
+    errors = [value for trial in trials if (value := trial.metric("ape_trans_rmse")) is not None]
     traces = [read_log(Path(trial.run.artifacts.mcap)).trace for trial in trials if trial.run.artifacts.mcap]
     at = {seconds: [v for trace in traces if (v := nees_at(trace, seconds)) is not None] for seconds in MOMENTS}
     return Localized(

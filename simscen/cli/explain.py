@@ -8,6 +8,7 @@ import typer
 
 from simscen.cli.catalogue import OPTIONAL, Field, Topic, topics
 from simscen.cli.diagnostics import print_text
+from simscen.cli.metrics import metric_topics
 from simscen.cli.signals import signal_topics
 from simscen.core.errors import UsageError
 from simscen.loading.codes import CODES
@@ -17,7 +18,7 @@ from simscen.loading.messages import quoted, suggestion
 def command(
     name: Annotated[str, typer.Argument(help="What to explain; nothing = list what there is.")] = "",
 ) -> None:
-    """Explain a trigger, action, fault, criterion, signal, component or error code.
+    """Explain a trigger, action, fault, criterion, signal, metric, component or error code.
 
     For example `simscen explain stopped_within`, `simscen explain amcl`, `simscen explain SC012`. Where a name means
     several things, all are explained; `simscen explain trigger.localization_error` picks one.
@@ -32,7 +33,7 @@ def command(
 
 
 def _everything() -> list[Topic]:
-    return [*topics(), *signal_topics()]
+    return [*topics(), *signal_topics(), *metric_topics()]
 
 
 def _called(name: str) -> list[Topic]:

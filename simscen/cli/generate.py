@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 
 from simscen.cli.jsonschema import MODELS, as_text, schema_of
-from simscen.cli.reference import commands_page, language_page, problems_page, signals_reference
+from simscen.cli.reference import commands_page, language_page, metrics_reference, problems_page, signals_reference
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -17,6 +17,7 @@ def generated() -> dict[str, str]:
         "docs/reference/language.md": language_page(),
         "docs/reference/problems.md": problems_page(),
         "docs/reference/commands.md": commands_page(),
+        "docs/reference/metrics.md": metrics_reference(),
         "docs/reference/signals.md": signals_reference(),
     }
 

@@ -23,7 +23,7 @@ COMMANDS = {
     "plot": "Draw a recorded run.",
     "log": "Mend the logs of runs that broke off.",
     "new": "Write a commented scenario to start from.",
-    "explain": "Explain a trigger, action, fault, criterion, signal, component or error code.",
+    "explain": "Explain a trigger, action, fault, criterion, signal, metric, component or error code.",
     "schema": "Print or write the JSON Schemas that editors use.",
     "world": "Inspect, convert and export worlds.",
     "bench": "Measure how fast simscen runs here.",

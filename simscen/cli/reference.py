@@ -4,6 +4,7 @@ from itertools import groupby
 
 from simscen.cli.catalogue import OPTIONAL, Field, Topic, topics
 from simscen.cli.main import COMMANDS
+from simscen.cli.metrics import metrics_page
 from simscen.cli.options import commands_of, exits, section
 from simscen.cli.signals import signals_page
 from simscen.loading.codes import CODES
@@ -50,6 +51,11 @@ def commands_page() -> str:
     sections = [section(words, function) for name in COMMANDS for words, function in commands_of(name)]
     table = f"| command | what it does |\n|---|---|\n{rows}\n"
     return "\n".join([f"{_MADE}{intro}\n\n{table}", *sections, exits()])
+
+
+def metrics_reference() -> str:
+    """docs/reference/metrics.md."""
+    return _MADE + metrics_page()
 
 
 def signals_reference() -> str:

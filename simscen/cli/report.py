@@ -6,9 +6,11 @@ from typing import Annotated
 
 import typer
 
+from simscen.cli.diagnostics import print_text
 from simscen.cli.reports import JunitFamily, Reports, require_writable, verdict
 from simscen.cli.screen import Format, screen
 from simscen.core.errors import Exit
+from simscen.judge.suite import suite, told
 from simscen.report.journal import require_free
 from simscen.report.rebuild import read_journal
 
@@ -40,5 +42,7 @@ def command(
             shown(answer)
         written = reports.write(answers)
         shown(reports.closing(answers, past.wall, past.interrupted))
+    if format_ is Format.TEXT:
+        print_text(told(suite(answer.result for answer in answers)))
     code = verdict(answers) if written else Exit.INCOMPLETE
     sys.exit(shown.exit(code))

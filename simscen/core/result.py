@@ -49,10 +49,10 @@ class RunResult:
     """All that a run says about itself; nothing in it depends on the machine, the clock or the working folder.
 
     `path` is the scenario's file relative to the root, `lines` the line of each verdict in it, in the order of
-    `verdicts` (empty or 0 = unknown). `events` counts what happened, by kind. `disturbances` is what became of each
-    event and fault of the scenario; each that had to happen and did not has a verdict of its own, before those of the
-    criteria. `ended` is why the simulation stopped, `simulated` is in seconds, `tick_rate` turns the findings' ticks
-    into seconds. `error` is set exactly when the outcome is ERROR.
+    `verdicts` (empty or 0 = unknown). `undefined` says of each metric that is None why. `events` counts what happened,
+    by kind. `disturbances` is what became of each event and fault of the scenario; each that had to happen and did not
+    has a verdict of its own, before those of the criteria. `ended` is why the simulation stopped, `simulated` is in
+    seconds, `tick_rate` turns the findings' ticks into seconds. `error` is set exactly when the outcome is ERROR.
     """
 
     key: RunKey
@@ -61,6 +61,7 @@ class RunResult:
     verdicts: tuple[Verdict, ...] = ()
     lines: tuple[int, ...] = ()
     metrics: Mapping[str, float | None] = field(default_factory=dict)
+    undefined: Mapping[str, str] = field(default_factory=dict)
     events: Mapping[str, int] = field(default_factory=dict)
     disturbances: tuple[Happening, ...] = ()
     ended: str = ""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
@@ -200,12 +199,6 @@ def _check_decidable(op: Op, value: float, name: str, signal: Signal) -> None:
         where = f"below {least:g}{unit}" if never_below else f"above {most:g}{unit}"
         sure = "always" if (op in (">=", ">")) == never_below else "never"
         raise ValueError(f"`{name}` is never {where}, so `{op} {value:g}{unit}` {sure} holds")
-
-
-def reach(condition: Condition) -> float:
-    """The largest bound on the clearance in it, in metres; 0 without any."""
-    bounds = [part.value for part in condition.comparisons() if part.signal == "clearance"]
-    return max((bound for bound in bounds if bound is not None and math.isfinite(bound)), default=0.0)
 
 
 for _model in (Condition, Windowed, Release):

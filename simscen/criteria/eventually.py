@@ -6,18 +6,16 @@ from typing import TYPE_CHECKING
 
 from simscen.core.verdict import Finding
 from simscen.criteria import condition_words as words
-from simscen.criteria.base import Criterion
-from simscen.criteria.clearance import BEYOND
-from simscen.criteria.condition import Windowed, reach
+from simscen.criteria.condition import Condition, Windowed
 from simscen.criteria.formula import in_time, judged
-from simscen.criteria.temporal import finding
+from simscen.criteria.temporal import Temporal, finding
 
 if TYPE_CHECKING:
     from simscen.core.case import Case
     from simscen.core.trace import Trace
 
 
-class Eventually(Windowed, Criterion):
+class Eventually(Windowed, Temporal):
     """A condition held at some moment of the run, or of a stretch of it.
 
     What is measured: how far each signal is from its bound at each sample of the truth; the margin is that of the
@@ -31,10 +29,9 @@ class Eventually(Windowed, Criterion):
     Example: `eventually: {signal: goal_distance, op: "<=", value: 0.25 m, within: 60 s}`
     """
 
-    @property
-    def clearance_range(self) -> float:
-        """The largest bound on the clearance, and a little more."""
-        return reach(self) + BEYOND if reach(self) else 0.0
+    def compared(self) -> list[Condition]:
+        """Every comparison in it."""
+        return list(self.comparisons())
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """The moment at which it held best, or came nearest to it."""
@@ -44,7 +41,7 @@ class Eventually(Windowed, Criterion):
                 trace,
                 case,
                 told,
-                self.comparisons(),
+                self.compared(),
                 lambda scene: in_time(judged(self, scene), scene.window(self), scene, "eventually"),
             )
         ]

@@ -9,6 +9,7 @@ others.
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from simscen.core.case import Case
     from simscen.core.trace import Trace
 
-TIE = float(np.finfo(np.float64).tiny)
+TIE = sys.float_info.min
 """Stands for a distance of zero, with the sign of the answer."""
 
 BROKEN, DUE = "what had to hold until then was broken", "the answer was due"

@@ -25,7 +25,7 @@ def distance_to(asked: Asked) -> Array:
         return np.hypot(poses[:, 0] - float(point[0]), poses[:, 1] - float(point[1]))
     if goal is None:
         return _to_object(asked.trace, str(asked.of["object"]), poses)
-    goals = {known.name: known.pose for known in asked.case.goals}
+    goals = {known.name: known.pose for known in asked.case.every_goal}
     if goal not in goals:
         raise Unavailable(f"the scenario has no goal `{goal}`")
     pose = goals[str(goal)]

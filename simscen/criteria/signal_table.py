@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
+from simscen.core.evidence import Evidence
 from simscen.core.geometry import Array
 from simscen.criteria import signal_places as places
 from simscen.criteria import signal_values as values
@@ -150,6 +151,31 @@ SIGNALS: dict[SignalName, Signal] = {
     ),
 }  # fmt: skip
 """Every signal by name, in the order of the reference."""
+
+
+_TRUTH, _VELOCITY, _BELIEF, _GOALS = Evidence.TRUTH, Evidence.VELOCITY, Evidence.BELIEF, Evidence.NAVIGATION
+
+_EVIDENCE: dict[SignalName, frozenset[Evidence]] = {
+    "clearance": frozenset({Evidence.CLEARANCE}),
+    **dict.fromkeys(("speed", "forward_speed", "turn_rate", "yaw_rate"), frozenset({_VELOCITY})),
+    **dict.fromkeys(("acceleration", "angular_acceleration", "jerk"), frozenset({_VELOCITY})),
+    **dict.fromkeys(("travelled", "time", "scan_age", "command_speed", "command_turn_rate"), frozenset()),
+    **dict.fromkeys(("goal_distance", "goal_heading_error"), frozenset({Evidence.ALIGNMENT, _GOALS})),
+    "distance_remaining": frozenset({Evidence.ALIGNMENT, _BELIEF, _GOALS}),
+    **dict.fromkeys(("plan_deviation", "distance_to", "in_region"), frozenset({Evidence.ALIGNMENT})),
+    **dict.fromkeys(("localization_error", "localization_yaw_error", "nees"), frozenset({Evidence.ALIGNMENT, _BELIEF})),
+    **dict.fromkeys(("position_std", "yaw_std", "belief_age", "localized"), frozenset({_BELIEF})),
+    **dict.fromkeys(("collision_count", "in_collision"), frozenset({Evidence.CONTACTS})),
+    "replan_count": frozenset({Evidence.PLANNING}),
+    **dict.fromkeys(("recovery_count", "recovery_active"), frozenset({Evidence.RECOVERIES})),
+    "goal_active": frozenset({_GOALS}),
+    **dict.fromkeys(("fault_active", "event_active", "started"), frozenset({Evidence.DISTURBANCES})),
+}
+
+
+def evidence(name: SignalName) -> frozenset[Evidence]:
+    """What a log must hold for the signal to be known; the truth is its clock."""
+    return _EVIDENCE[name] | {_TRUTH}
 
 
 def read(name: SignalName, trace: Trace, case: Case, of: values.Of) -> Array:

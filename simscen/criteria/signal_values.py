@@ -310,7 +310,7 @@ def _age(trace: Trace, came: Ticks) -> Array:
 def _current_goals(trace: Trace, case: Case) -> Array:
     """x, y, yaw of the goal accepted last; of the first one before it is accepted."""
     clock = _clock(trace)
-    named = {goal.name: goal.pose for goal in reversed(case.goals)}
+    named = {goal.name: goal.pose for goal in reversed(case.every_goal)}
     ticks, poses = [], []
     for event in trace.of_kind(EventKind.GOAL_ACCEPTED):
         pose = tuple(event.data.get(key) for key in ("x", "y", "yaw"))

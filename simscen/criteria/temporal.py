@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from abc import abstractmethod
 from typing import TYPE_CHECKING
 
+from simscen.core.evidence import Evidence
 from simscen.core.verdict import Finding, Status
 from simscen.criteria import condition_words
+from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import undecided
+from simscen.criteria.clearance import BEYOND
 from simscen.criteria.formula import TIE, Judged, Scene, Side, Witness
 from simscen.criteria.moments import ending, finished
+from simscen.criteria.signal_table import evidence
 from simscen.criteria.signal_values import Unavailable
 
 if TYPE_CHECKING:
@@ -21,11 +25,29 @@ if TYPE_CHECKING:
     from simscen.criteria.condition import Condition
 
 
+class Temporal(Criterion):
+    """A criterion made of comparisons of named signals."""
+
+    @abstractmethod
+    def compared(self) -> list[Condition]:
+        """All of them, in the order they are written."""
+
+    @property
+    def clearance_range(self) -> float:
+        """The largest bound on the clearance, and a little more."""
+        bounds = [one.value for one in self.compared() if one.signal == "clearance" and one.value is not None]
+        return max((bound + BEYOND for bound in bounds), default=0.0)
+
+    @property
+    def evidence(self) -> frozenset[Evidence]:
+        """What a log must hold for it to be decided."""
+        return frozenset().union(*(evidence(one.signal) for one in self.compared() if one.signal is not None))
+
+
 def finding(
-    trace: Trace, case: Case, told: str, comparisons: Iterable[Condition], judge: Callable[[Scene], Judged]
+    trace: Trace, case: Case, told: str, compared: list[Condition], judge: Callable[[Scene], Judged]
 ) -> Finding:
     """The verdict at the first sample. `told` is the formula in words, `judge` evaluates it."""
-    compared = list(comparisons)
     try:
         answer = judge(Scene.of(trace, case, finished(trace)))
     except Unavailable as missing:

@@ -6,18 +6,16 @@ from typing import TYPE_CHECKING
 
 from simscen.core.verdict import Finding
 from simscen.criteria import condition_words as words
-from simscen.criteria.base import Criterion
-from simscen.criteria.clearance import BEYOND
-from simscen.criteria.condition import Release, reach
+from simscen.criteria.condition import Condition, Release
 from simscen.criteria.formula import judged, released
-from simscen.criteria.temporal import finding
+from simscen.criteria.temporal import Temporal, finding
 
 if TYPE_CHECKING:
     from simscen.core.case import Case
     from simscen.core.trace import Trace
 
 
-class Until(Release, Criterion):
+class Until(Release, Temporal):
     """A condition held from the start until another one came true, and that came true in time.
 
     What is measured: how far each signal is from its bound at each sample of the truth; the margin is that of the best
@@ -31,11 +29,9 @@ class Until(Release, Criterion):
     Example: `until: {hold: {signal: speed, op: "<=", value: 0.01 m/s}, release: {signal: localized}, within: 5 s}`
     """
 
-    @property
-    def clearance_range(self) -> float:
-        """The largest bound on the clearance, and a little more."""
-        furthest = max(reach(self.hold), reach(self.release))
-        return furthest + BEYOND if furthest else 0.0
+    def compared(self) -> list[Condition]:
+        """Every comparison in it."""
+        return [*self.hold.comparisons(), *self.release.comparisons()]
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """The moment of the best release, or of what broke the hold before it."""
@@ -44,7 +40,7 @@ class Until(Release, Criterion):
                 trace,
                 case,
                 words.until(self.hold, self.release, self),
-                (*self.hold.comparisons(), *self.release.comparisons()),
+                self.compared(),
                 lambda scene: released(
                     judged(self.hold, scene), judged(self.release, scene), scene.window(self), scene
                 ),

@@ -8,12 +8,10 @@ from pydantic import BaseModel
 
 from simscen.core.verdict import Finding
 from simscen.criteria import condition_words as words
-from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import undecided
-from simscen.criteria.clearance import BEYOND
-from simscen.criteria.condition import Condition, Windowed, reach
+from simscen.criteria.condition import Condition, Windowed
 from simscen.criteria.formula import Judged, Scene, judged, response
-from simscen.criteria.temporal import finding
+from simscen.criteria.temporal import Temporal, finding
 from simscen.spec.base import Spec
 
 if TYPE_CHECKING:
@@ -40,7 +38,7 @@ class Whenever(Windowed):
     """Must it hold at least once? With `false`, a run in which it never did passes."""
 
 
-class Response(Spec, Criterion):
+class Response(Spec, Temporal):
     """A premise with its answer, as they stand beside each other in a scenario."""
 
     premise: Whenever
@@ -52,11 +50,9 @@ class Response(Spec, Criterion):
         assert isinstance(premise, Whenever) and isinstance(answer, Condition)
         return cls.model_construct(premise=premise, answer=answer)
 
-    @property
-    def clearance_range(self) -> float:
-        """The largest bound on the clearance, and a little more."""
-        furthest = max(reach(self.premise), reach(self.answer))
-        return furthest + BEYOND if furthest else 0.0
+    def compared(self) -> list[Condition]:
+        """Every comparison in it."""
+        return [*self.premise.comparisons(), *self.answer.comparisons()]
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """The worst answer; that the premise never held is no pass."""
@@ -69,7 +65,7 @@ class Response(Spec, Criterion):
             return response(premise, judged(self.answer, scene), window, scene)
 
         told = words.response(self.premise, self.answer)
-        found = finding(trace, case, told, (*self.premise.comparisons(), *self.answer.comparisons()), judge_both)
+        found = finding(trace, case, told, self.compared(), judge_both)
         if happened == [False] and self.premise.required:
             never = f"`{words.words(self.premise)}` never held, so nothing was tested"
             return [undecided("", never, told, ["`required: false` lets such a run pass"])]

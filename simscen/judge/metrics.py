@@ -1,94 +1,164 @@
 """What is measured of every run, whether a criterion asks for it or not: the numbers that studies compare."""
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
 from simscen.core.case import CLEARANCE_RANGE, Case
 from simscen.core.events import EventKind
-from simscen.core.geometry import Array, wrap_array
+from simscen.core.geometry import Array
 from simscen.core.trace import Trace
 from simscen.core.verdict import Status
 from simscen.criteria.goals_reached import GoalsReached
 from simscen.criteria.moments import stories
 from simscen.criteria.path_length import shortest_way
-from simscen.criteria.signals import check_finite, drive, finite, pose_error, speed, truth, turn_rate
+from simscen.criteria.signal_table import read
+from simscen.criteria.signal_values import Unavailable
+from simscen.criteria.signals import check_finite, drive, speed, truth, turn_rate
+from simscen.criteria.smooth import ldlj, sparc
+from simscen.judge.metric_table import METRICS
+from simscen.judge.pose_metrics import pose_metrics
+from simscen.judge.way_metrics import Values, way_metrics
 
 STANDING_SPEED, STANDING_TURN = 0.01, 0.02
 """m/s and rad/s below which a robot does not move (HuNavSim, which forgot the absolute value of the turn rate)."""
 
-Metrics = dict[str, float | None]
+OPTIMAL_SPEED = 2.0
+"""m/s; BARN's optimal time is the reference way at this speed."""
 
 
-def measure(trace: Trace, case: Case) -> Metrics:
-    """All metrics by name, in SI units; None where a run has none. Raises BrokenTrace when a signal is not finite.
+@dataclass(frozen=True)
+class Measures:
+    """Every metric by name in SI units, None where it is not defined for this run; and why it is not."""
 
-    success: every goal truly reached (0 or 1) · spl, soft_spl: Anderson et al. 2018, Habitat · path_length,
-    shortest_length: m · path_ratio · time_to_goal: s · heading_change: rad · clearance_min, clearance_mean: m, where
-    more than 2 m count as 2 m, however far was searched ·
-    speed_max: m/s · time_standing: s · collisions, contact_time: s · replans, recoveries ·
-    localization_{rmse,mean,max,final}: m, localization_yaw_rmse: rad · nees: mean over the run, 3 when consistent.
-    """
+    values: Mapping[str, float | None]
+    undefined: Mapping[str, str]
+
+
+def measure(trace: Trace, case: Case) -> Measures:
+    """All metrics of judge.metric_table. Raises BrokenTrace when a signal is not finite."""
     check_finite(trace)
-    return {
+    found: Values = {
         **_navigation(trace, case),
-        **_motion(trace),
+        **way_metrics(trace),
+        **_motion(trace, case),
+        **_clearance(trace),
         **_contacts(trace),
-        **_localization(trace),
         "replans": float(sum(plan.data.get("reason", "goal") != "goal" for plan in trace.of_kind(EventKind.PLAN_MADE))),
         "recoveries": float(len(trace.of_kind(EventKind.RECOVERY_STARTED))),
+        **pose_metrics(trace),
     }
+    ordered = {name: found[name] for name in METRICS}
+    return Measures(
+        {name: None if isinstance(value, str) else value for name, value in ordered.items()},
+        {name: value for name, value in ordered.items() if isinstance(value, str)},
+    )
 
 
-def _navigation(trace: Trace, case: Case) -> Metrics:
+def barn_score(success: bool, seconds: float, reference_length: float) -> float:
+    """The BARN challenge's score of a run: 0, or 0.125 (8 times the optimal time and slower) … 0.5 (twice and faster).
+
+    Its own code for moving obstacles takes the way as a difference of coordinates, which is negative, so that every
+    success scores 0.125. Raises ValueError for a reference that is no length.
+    """
+    if not reference_length > 0:
+        raise ValueError(f"a reference way of {reference_length:g} m")
+    optimal = reference_length / OPTIMAL_SPEED
+    return optimal / min(max(seconds, 2 * optimal), 8 * optimal) if success else 0.0
+
+
+def _navigation(trace: Trace, case: Case) -> Values:
     length = drive(trace).length
     shortest, unknown = shortest_way(trace, case)
-    known = not unknown
-    success = _success(trace, case)
-    ends = [story.reached for story in stories(trace, case) if not story.preempted]
-    starts = trace.of_kind(EventKind.GOAL_ACCEPTED)
-    arrived = starts and ends and ends[-1] is not None
+    success, seconds = _success(trace, case), _time_to_goal(trace, case)
+    found: Values = {"success": float(success), "path_length": length, "time_to_goal": seconds}
+    if unknown:
+        names = ("barn_score", "shortest_length", "path_length_ratio", "spl", "soft_spl")
+        return {**found, **dict.fromkeys(names, unknown)}
     return {
-        "success": float(success),
-        "path_length": length,
-        "shortest_length": shortest if known else None,
-        "path_ratio": length / shortest if known else None,
-        "spl": success * shortest / max(shortest, length) if known else None,
-        "soft_spl": _soft_spl(trace, case, shortest, length) if known else None,
-        "time_to_goal": trace.seconds((ends[-1] or 0) - starts[0].tick) if arrived else None,
+        **found,
+        "barn_score": _barn_score(case, success, seconds, shortest),
+        "shortest_length": shortest,
+        "path_length_ratio": length / shortest,
+        "spl": success * shortest / max(shortest, length),
+        "soft_spl": _soft_spl(trace, case, shortest, length),
     }
 
 
 def _success(trace: Trace, case: Case) -> bool:
     findings = GoalsReached().judge(trace, case)
-    return all(finding.status is Status.PASS for finding in findings)
+    touched = trace.of_kind(EventKind.COLLISION_STARTED)
+    return all(finding.status is Status.PASS for finding in findings) and not touched
 
 
-def _soft_spl(trace: Trace, case: Case, shortest: float, length: float) -> float | None:
+def _time_to_goal(trace: Trace, case: Case) -> float | str:
+    ends = [story.reached for story in stories(trace, case) if not story.preempted]
+    starts = trace.of_kind(EventKind.GOAL_ACCEPTED)
+    if not starts or not ends or ends[-1] is None:
+        return "the last goal was not reached"
+    return trace.seconds(ends[-1] - starts[0].tick)
+
+
+def _barn_score(case: Case, success: bool, seconds: float | str, shortest: float) -> float | str:
+    if len(case.goals) != 1:
+        return "only runs with one goal have a score"
+    return barn_score(success, seconds, shortest) if isinstance(seconds, float) else 0.0
+
+
+def _soft_spl(trace: Trace, case: Case, shortest: float, length: float) -> float | str:
     poses = truth(trace)
     if not len(poses):
-        return None
+        return "the true pose was not recorded"
     goal = case.goals[-1].pose
     x, y, _ = poses.values[-1]
     left = math.hypot(x - goal.x, y - goal.y)
     return max(0.0, 1 - left / shortest) * shortest / max(shortest, length)
 
 
-def _motion(trace: Trace) -> Metrics:
-    poses, fast, turning = truth(trace), speed(trace), turn_rate(trace)
-    near = np.minimum(trace.clearance.values[:, 0], CLEARANCE_RANGE)
-    standing = (fast.values[:, 0] < STANDING_SPEED) & (turning.values[:, 0] < STANDING_TURN)
+def _motion(trace: Trace, case: Case) -> Values:
+    fast, turning = speed(trace), turn_rate(trace)
+    if not len(fast):
+        none = "the true velocity was not recorded"
+        return dict.fromkeys(("max_speed", "time_not_moving", "mean_jerk", "max_jerk", "sparc", "ldlj"), none)
+    speeds = fast.values[:, 0]
+    standing = (speeds < STANDING_SPEED) & (turning.values[:, 0] < STANDING_TURN)
     lasts = np.diff(np.append(fast.ticks, trace.end)) / trace.tick_rate
     return {
-        "heading_change": float(np.abs(wrap_array(np.diff(poses.values[:, 2]))).sum()),
-        "clearance_min": float(near.min()) if len(near) else None,
-        "clearance_mean": float(near.mean()) if len(near) else None,
-        "speed_max": float(fast.values.max()) if len(fast) else None,
-        "time_standing": float(lasts[standing].sum()),
+        "max_speed": float(speeds.max()),
+        "time_not_moving": float(lasts[standing].sum()),
+        **_jerk(trace, case),
+        **_smoothness(trace, speeds),
     }
 
 
-def _contacts(trace: Trace) -> Metrics:
+def _jerk(trace: Trace, case: Case) -> Values:
+    try:
+        jerk = read("jerk", trace, case, {})
+    except Unavailable as why:
+        return {"mean_jerk": str(why), "max_jerk": str(why)}
+    return {"mean_jerk": float(jerk.mean()), "max_jerk": float(jerk.max())}
+
+
+def _smoothness(trace: Trace, speeds: Array) -> Values:
+    still = "the robot never moved" if speeds.max() < STANDING_SPEED else ""
+    rate = trace.tick_rate / float(trace.velocity.ticks[1] - trace.velocity.ticks[0]) if len(speeds) > 1 else 1.0
+    spectral, jerky = (None, None) if still else (sparc(speeds, rate), ldlj(speeds, rate))
+    return {
+        "sparc": still or "the run is too short" if spectral is None else spectral,
+        "ldlj": still or "the speed never changed" if jerky is None else jerky,
+    }
+
+
+def _clearance(trace: Trace) -> Values:
+    near = np.minimum(trace.clearance.values[:, 0], CLEARANCE_RANGE)
+    if not len(near):
+        return {"min_clearance": "it was not recorded", "mean_clearance": "it was not recorded"}
+    return {"min_clearance": float(near.min()), "mean_clearance": float(near.mean())}
+
+
+def _contacts(trace: Trace) -> Values:
     """Rising edges, and the time during which at least one contact lasts."""
     touching, since, total = 0, 0, 0
     for event in trace.of_kind(EventKind.COLLISION_STARTED, EventKind.COLLISION_ENDED):
@@ -100,37 +170,3 @@ def _contacts(trace: Trace) -> Metrics:
             total += event.tick - since if touching == 0 else 0
     total += trace.end - since if touching else 0
     return {"collisions": float(len(trace.of_kind(EventKind.COLLISION_STARTED))), "contact_time": trace.seconds(total)}
-
-
-def _localization(trace: Trace) -> Metrics:
-    error = pose_error(trace)
-    names = ("rmse", "mean", "max", "final")
-    if not len(error):
-        return {**{f"localization_{name}": None for name in names}, "localization_yaw_rmse": None, "nees": None}
-    off, turned = error.values.T
-    values = (_rms(off), float(off.mean()), float(off.max()), float(off[-1]))
-    return {
-        **{f"localization_{name}": value for name, value in zip(names, values, strict=True)},
-        "localization_yaw_rmse": _rms(turned),
-        "nees": _nees(trace),
-    }
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
-
-
-def _nees(trace: Trace) -> float | None:
-    """Normalised estimation error squared, e' P^-1 e, averaged over the run; None when a covariance is singular."""
-    belief, poses = finite(trace.belief, "the belief", trace), truth(trace)
-    if belief.values.shape[1] < 9:
-        return None
-    xx, xy, xa, yy, ya, aa = belief.values[:, 3:9].T
-    covariance = np.stack((np.stack((xx, xy, xa)), np.stack((xy, yy, ya)), np.stack((xa, ya, aa)))).transpose(2, 0, 1)
-    if (np.linalg.eigvalsh(covariance)[:, 0] <= 0).any():
-        return None
-    x, y = (np.interp(belief.ticks, poses.ticks, poses.values[:, axis]) for axis in (0, 1))
-    yaw = np.interp(belief.ticks, poses.ticks, np.unwrap(poses.values[:, 2]))
-    error = np.column_stack((belief.values[:, 0] - x, belief.values[:, 1] - y, wrap_array(belief.values[:, 2] - yaw)))
-    weighted = np.linalg.solve(covariance, error[:, :, np.newaxis])[:, :, 0]
-    return float(np.mean(np.sum(error * weighted, axis=1)))

@@ -1,10 +1,10 @@
 """Which evidence each criterion is decided by, so that a log without it is never judged as if it were there."""
 
-from collections.abc import Mapping
-
 from simscen.core.evidence import Coverage, Evidence
 from simscen.core.verdict import Finding, Status
 from simscen.criteria.criterion import AnyCriterion
+from simscen.criteria.temporal import Temporal
+from simscen.judge.metrics import Measures
 
 _TRUTH, _BELIEF, _GOALS = Evidence.TRUTH, Evidence.BELIEF, Evidence.NAVIGATION
 _PLACE = frozenset({_TRUTH, Evidence.ALIGNMENT})
@@ -30,13 +30,20 @@ _NEEDS: dict[str, frozenset[Evidence]] = {
 """A criterion that is not listed needs everything."""
 
 
-_LOCALIZATION = ("rmse", "mean", "max", "final", "yaw_rmse")
+_SUMS = ("rmse", "mean", "median", "max")
+_APE = (*(f"ape_{kind}_{one}" for kind in ("trans", "rot") for one in _SUMS), "ape_trans_final")
+_RPE = tuple(f"rpe_{kind}_{one}" for kind in ("trans", "rot") for one in _SUMS)
+_SHAPE = ("path_length", "path_length_ratio", "heading_change", "aol", "norm_curvature", "max_curvature")
+_SPEEDS = ("max_speed", "time_not_moving", "mean_jerk", "max_jerk", "sparc", "ldlj")
 _METRICS: dict[str, frozenset[Evidence]] = {
-    **dict.fromkeys(("success", "spl", "soft_spl"), _PLACE | {_GOALS}),
-    **dict.fromkeys(("path_length", "path_ratio", "heading_change"), frozenset({_TRUTH})),
-    **dict.fromkeys(("speed_max", "time_standing"), frozenset({_TRUTH, Evidence.VELOCITY})),
-    **dict.fromkeys(("nees", *(f"localization_{name}" for name in _LOCALIZATION)), _PLACE | {_BELIEF}),
-    **dict.fromkeys(("clearance_min", "clearance_mean"), frozenset({Evidence.CLEARANCE})),
+    **dict.fromkeys(("success", "spl", "barn_score"), _PLACE | {_GOALS, Evidence.CONTACTS}),
+    "soft_spl": _PLACE | {_GOALS},
+    **dict.fromkeys(_SHAPE, frozenset({_TRUTH})),
+    "path_irregularity": frozenset({_TRUTH, _GOALS, Evidence.PLANNING}),
+    **dict.fromkeys(_SPEEDS, frozenset({_TRUTH, Evidence.VELOCITY})),
+    **dict.fromkeys(("nees", *_APE), _PLACE | {_BELIEF}),
+    **dict.fromkeys(_RPE, frozenset({_TRUTH, _BELIEF})),
+    **dict.fromkeys(("min_clearance", "mean_clearance"), frozenset({Evidence.CLEARANCE})),
     **dict.fromkeys(("collisions", "contact_time"), frozenset({Evidence.CONTACTS})),
     "shortest_length": frozenset(),
     "time_to_goal": frozenset({_GOALS}),
@@ -47,6 +54,8 @@ _METRICS: dict[str, frozenset[Evidence]] = {
 
 def needs(entry: AnyCriterion) -> frozenset[Evidence]:
     """The evidence that decides a criterion as it is written."""
+    if isinstance(entry.chosen, Temporal):
+        return entry.chosen.evidence
     wanted = _NEEDS.get(entry.kind, frozenset(Evidence))
     if getattr(entry.chosen, "error_code", None) is not None:
         wanted |= {Evidence.ERROR_CODES}
@@ -65,13 +74,20 @@ def undecidable(entry: AnyCriterion, coverage: Coverage) -> Finding | None:
     return Finding(Status.INCONCLUSIVE, entry.kind, because, "", detail=tuple(reasons))
 
 
-def known(metrics: Mapping[str, float | None], coverage: Coverage) -> dict[str, float | None]:
+def known(measures: Measures, coverage: Coverage) -> Measures:
     """The metrics, without those that the log cannot tell: no collision recorded is not the same as none."""
-    everything = frozenset(Evidence)
-    return {
-        name: None if coverage.missing.keys() & _METRICS.get(name, everything) else value
-        for name, value in metrics.items()
-    }
+    lacking = {name: lack for name in measures.values if (lack := _lacking(_METRICS[name], coverage))}
+    return Measures(
+        {name: None if name in lacking else value for name, value in measures.values.items()},
+        {
+            **measures.undefined,
+            **{name: f"the log does not say {' nor '.join(lack)}" for name, lack in lacking.items()},
+        },
+    )
+
+
+def _lacking(wanted: frozenset[Evidence], coverage: Coverage) -> list[str]:
+    return [evidence.value for evidence in Evidence if evidence in coverage.missing and evidence in wanted]
 
 
 def doubt(entry: AnyCriterion, coverage: Coverage) -> str:

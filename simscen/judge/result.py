@@ -1,7 +1,7 @@
 """Judges a run that came to its end and sums it up."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from simscen.core.case import Case
 from simscen.core.evidence import WHOLE, Coverage
@@ -14,7 +14,7 @@ from simscen.criteria.moments import ending
 from simscen.judge.cause import explained
 from simscen.judge.disturbances import happenings, missing
 from simscen.judge.judge import judge, outcome
-from simscen.judge.metrics import measure
+from simscen.judge.metrics import Measures, measure
 from simscen.judge.needs import known
 
 
@@ -38,9 +38,9 @@ def result_of(
     verdicts = (*(verdict for verdict, _ in lacking), *verdicts)
     came_out = outcome(verdicts)
     failure = _why(verdicts) if came_out is Outcome.ERROR else None
-    metrics: Mapping[str, float | None] = {}
+    measures = Measures({}, {})
     try:
-        metrics = known(measure(trace, case), coverage)
+        measures = known(measure(trace, case), coverage)
     except BrokenTrace as broken:  # whatever the criteria looked at, a run with such a signal is no run
         came_out, failure = Outcome.ERROR, failure or RunFailure("invalid", str(broken))
     return RunResult(
@@ -49,7 +49,8 @@ def result_of(
         outcome=came_out,
         verdicts=verdicts,
         lines=lines,
-        metrics=metrics,
+        metrics=measures.values,
+        undefined=measures.undefined,
         events=dict(sorted(Counter(str(event.kind) for event in trace.events).items())),
         disturbances=happened,
         ended=ending(trace),

@@ -35,6 +35,7 @@ def as_data(result: RunResult) -> dict[str, Any]:
         "events": dict(result.events),
         "disturbances": [_happening_data(one, result.tick_rate) for one in result.disturbances],
         "metrics": {name: number(value) for name, value in result.metrics.items()},
+        "undefined": dict(result.undefined),
         "verdicts": [verdict_data(v, line, result.tick_rate) for v, line in zip(result.verdicts, lines, strict=True)],
         "error": None if error is None else {"kind": error.kind, "message": error.message, "tail": error.tail},
     }
@@ -64,6 +65,7 @@ def from_data(data: dict[str, Any]) -> RunResult:
         verdicts=tuple(read_verdict(verdict) for verdict in data["verdicts"]),
         lines=tuple(verdict["line"] for verdict in data["verdicts"]),
         metrics=data["metrics"],
+        undefined=data["undefined"],
         events=data["events"],
         disturbances=tuple(_read_happening(one) for one in data["disturbances"]),
         ended=data["ended"],

@@ -8,6 +8,7 @@ from typing import Any
 from simscen.core.result import Outcome
 from simscen.core.sessionevents import RunFinished
 from simscen.judge.resultdata import as_data
+from simscen.judge.suite import suite, suite_data
 
 FORMAT = 1
 
@@ -26,6 +27,7 @@ def as_document(runs: Sequence[RunFinished], folder: str = "") -> dict[str, Any]
         "total": len(runs),
         **counts,
         "simulated_seconds": sum(run.result.simulated for run in ordered),
+        "suite": suite_data(suite(run.result for run in ordered)),
         "runs": [{**as_data(run.result), "artifacts": _artifacts(run, folder)} for run in ordered],
     }
 

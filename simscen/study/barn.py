@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 TIME_LIMIT = 100.0
-TOP_SPEED = 2.0
 DWA = {"success": 0.850, "collisions": 0.056, "timeouts": 0.094, "score": 0.159}
 """Published for the dynamic window approach at 0.5 m/s in 50 worlds, 10 runs each."""
 
@@ -57,12 +56,6 @@ def _listed(folder: Path, rows: Iterable[dict[str, str]]) -> Iterable[BarnWorld]
             yield BarnWorld(folder / f"world_{int(row['world'])}.world", float(row["ref_path_len"]))
         except (KeyError, TypeError) as error:
             raise ValueError(f"{folder / 'scenarios.csv'}: no column {error}") from error
-
-
-def score(success: bool, seconds: float, reference_length: float) -> float:
-    """The challenge's metric of one run: 0, or 0.125 (8 times the optimal time and slower) … 0.5 (twice and faster)."""
-    optimal = reference_length / TOP_SPEED
-    return optimal / min(max(seconds, 2 * optimal), 8 * optimal) if success else 0.0
 
 
 def scenario(name: str, world: str) -> str:

@@ -8,30 +8,24 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from simscen.core.geometry import Array, wrap
+from simscen.core.chisquare import mean_bounds
+from simscen.core.geometry import Array
 from simscen.core.trace import Trace
-
-DIMENSIONS = 3
+from simscen.criteria.nees import DIMENSIONS, nees_samples
+from simscen.criteria.nees import nees as squared_errors
 
 
 def nees(error: Array, covariance: Array) -> float:
     """e' P^-1 e of an error (3,) in m, m, rad with covariance P (3, 3); inf where P is singular."""
-    if np.linalg.eigvalsh(covariance)[0] <= 0.0:
-        return float("inf")
-    return float(error @ np.linalg.solve(covariance, error))
+    return float(squared_errors(error[np.newaxis], covariance[np.triu_indices(3)][np.newaxis])[0])
 
 
 def nees_at(trace: Trace, seconds: float) -> float | None:
     """The belief's NEES at a time of a run; None before the first belief and after the end."""
-    belief, tick = trace.belief, round(seconds * trace.tick_rate)
-    index = int(np.searchsorted(belief.ticks, tick, side="right")) - 1
-    if index < 0 or tick > trace.end:
+    samples, tick = nees_samples(trace), round(seconds * trace.tick_rate)
+    if not len(samples) or tick < samples.ticks[0] or tick > trace.end:
         return None
-    when = int(belief.ticks[index])
-    x, y, yaw, xx, xy, xa, yy, ya, aa = belief.values[index].tolist()
-    true_x, true_y, true_yaw = trace.truth.at(np.array([when]))[0].tolist()
-    error = np.array([x - true_x, y - true_y, wrap(yaw - true_yaw)])
-    return nees(error, np.array([[xx, xy, xa], [xy, yy, ya], [xa, ya, aa]]))
+    return float(samples.at(np.array([tick]))[0, 0])
 
 
 def anees(values: Sequence[float]) -> float:
@@ -41,8 +35,4 @@ def anees(values: Sequence[float]) -> float:
 
 def bounds(runs: int, dimensions: int = DIMENSIONS, probability: float = 0.95) -> tuple[float, float]:
     """Between which ANEES lies with this probability when the localizer is consistent: chi2(d N) / N."""
-    from scipy.stats import chi2
-
-    tail = (1.0 - probability) / 2.0
-    freedom = dimensions * runs
-    return float(chi2.ppf(tail, freedom)) / runs, float(chi2.ppf(1.0 - tail, freedom)) / runs
+    return mean_bounds(runs, dimensions, probability)

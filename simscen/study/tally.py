@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
+from simscen.core.intervals import wilson
 from simscen.core.result import Outcome
 from simscen.core.sessionevents import RunFinished
 from simscen.core.verdict import Status
-from simscen.study.barn import score
-from simscen.study.intervals import wilson
+from simscen.judge.metrics import barn_score
 
 TIME_IS_UP = "time limit"
 """What a run's `ended` says when nothing else ended it."""
@@ -48,7 +48,7 @@ class Trial:
         if self.reference_length is None:
             return None
         seconds = self.metric("time_to_goal")
-        return score(self.fate is Fate.SUCCESS and seconds is not None, seconds or 0.0, self.reference_length)
+        return barn_score(self.fate is Fate.SUCCESS and seconds is not None, seconds or 0.0, self.reference_length)
 
     def metric(self, name: str) -> float | None:
         """A number that the judge measured."""
@@ -91,7 +91,7 @@ def tally(case: str, trials: Sequence[Trial]) -> Row:
         errors=_rate(fates, Fate.ERROR),
         seconds=mean([trial.metric("time_to_goal") for trial in arrived]),
         score=mean([trial.score for trial in trials]),
-        path_ratio=mean([trial.metric("path_ratio") for trial in arrived]),
+        path_ratio=mean([trial.metric("path_length_ratio") for trial in arrived]),
     )
 
 

@@ -1,49 +1,268 @@
-"""Metrics against closed forms, with peers' bugs as cases."""
+"""Metrics against closed forms, the authors' own numbers, evo and filterpy; bugs of other tools as cases."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from evo.core import metrics as evo
+from evo.core.trajectory import PosePath3D
+from filterpy.stats import NEES
 
-from simscen.judge.metrics import measure
+from simscen.core.navigation import Path
+from simscen.core.samples import Samples
+from simscen.criteria.bounds import BrokenTrace
+from simscen.criteria.smooth import ldlj, sparc
+from simscen.judge.metric_table import METRICS
+from simscen.judge.metrics import barn_score, measure
 from simscen.judge.sketch import sketch, sketch_case
 
 GOAL = {"goals": [{"name": "a", "pose": [3, 4, 0]}], "shortest": {"a": 5.0}}
 ARRIVED = [[1, "goal.accepted", "a"], [9, "goal.reached", "a"]]
+STEP = 6 / 240
+
+
+def measured(words, case=None):
+    return measure(sketch(words), sketch_case(case or {})).values
+
+
+def circle(radius, seconds=20, turns=1.0):
+    """Driven once around, at constant speed."""
+    count = round(seconds / STEP)
+    angles = np.linspace(0, 2 * math.pi * turns, count + 1)
+    return [[k * STEP, radius * math.cos(a), radius * math.sin(a), a + math.pi / 2] for k, a in enumerate(angles)]
+
+
+def with_speeds(speeds):
+    trace = sketch({"seconds": (len(speeds) - 1) * STEP, "truth": [[0, 0, 0]]})
+    zero = np.zeros(len(speeds))
+    return replace(trace, velocity=Samples(trace.truth.ticks, np.column_stack((speeds, zero, zero))))
+
+
+def test_every_run_reports_the_metrics_of_the_table_each_with_a_number_or_a_reason():
+    for words, case in (
+        ({"seconds": 0, "truth": [[0, 0, 0]], "belief": None}, {}),
+        ({"seconds": 10, "truth": circle(2, 10), "events": ARRIVED}, GOAL),
+    ):
+        measures = measure(sketch(words), sketch_case(case))
+        assert list(measures.values) == list(METRICS)
+        assert {name for name, value in measures.values.items() if value is None} == set(measures.undefined)
+        assert all(measures.undefined.values())
+
+
+def test_a_standing_robot_has_no_smoothness_and_says_why():
+    measures = measure(sketch({"seconds": 10, "truth": [[0, 0, 0]]}), sketch_case({}))
+    assert measures.undefined["sparc"] == measures.undefined["ldlj"] == "the robot never moved"
+    assert measures.undefined["aol"] == "the robot never drove"
+    assert "too short a way" in measures.undefined["max_curvature"]
+    assert measures.values["time_not_moving"] == pytest.approx(10.0)
+    assert measures.values["max_jerk"] == 0.0
+
+
+# -- the way
 
 
 def test_a_detour_halves_spl_when_it_doubles_the_way():
     truth = [[0, 0, 0], [2, 3, 0], [4, 3, 4], [5, 3, 5.5], [6, 3, 4], [10, 3, 4]]
-    metrics = measure(sketch({"seconds": 10, "truth": truth, "events": ARRIVED}), sketch_case(GOAL))
+    metrics = measured({"seconds": 10, "truth": truth, "events": ARRIVED}, GOAL)
     assert metrics["success"] == 1.0
     assert metrics["path_length"] == pytest.approx(10.0, abs=0.02)
+    assert metrics["shortest_length"] == 5.0
+    assert metrics["path_length_ratio"] == pytest.approx(2.0, abs=0.005)
     assert metrics["spl"] == metrics["soft_spl"] == pytest.approx(0.5, abs=0.001)
     assert metrics["time_to_goal"] == 8.0
 
 
+def test_a_way_shorter_than_the_shortest_counts_as_that():
+    metrics = measured({"seconds": 10, "truth": [[0, 0, 0], [8, 2.8, 4]], "events": ARRIVED}, GOAL)
+    assert metrics["spl"] == 1.0
+    assert metrics["soft_spl"] == pytest.approx(1 - 0.2 / 5)
+
+
 def test_a_failure_has_no_spl_but_keeps_the_share_of_the_way_it_made():
-    metrics = measure(sketch({"seconds": 10, "truth": [[0, 0, 0], [8, 1.5, 2], [10, 1.5, 2]]}), sketch_case(GOAL))
-    assert metrics["success"] == 0.0
-    assert metrics["spl"] == 0.0
+    metrics = measured({"seconds": 10, "truth": [[0, 0, 0], [8, 1.5, 2], [10, 1.5, 2]]}, GOAL)
+    assert metrics["success"] == metrics["spl"] == metrics["barn_score"] == 0.0
     assert metrics["soft_spl"] == pytest.approx(0.5)
     assert metrics["time_to_goal"] is None
 
 
+def test_a_robot_further_from_its_goal_than_at_the_start_has_no_soft_spl():
+    assert measured({"seconds": 10, "truth": [[0, 0, 0], [8, -3, -4]]}, GOAL)["soft_spl"] == 0.0
+
+
+def test_who_touched_something_did_not_succeed():
+    touched = [*ARRIVED, [5, "collision.started", "wall"]]
+    metrics = measured({"seconds": 10, "truth": [[0, 0, 0], [8, 3, 4]], "events": touched}, GOAL)
+    assert metrics["success"] == metrics["spl"] == metrics["barn_score"] == 0.0
+    assert metrics["collisions"] == 1.0
+
+
 @pytest.mark.parametrize("shortest", [{}, {"a": math.inf}, {"a": 0.0}])
 def test_spl_is_left_out_when_no_shortest_way_is_known(shortest):
-    metrics = measure(sketch({"seconds": 1, "truth": [[0, 0, 0]]}), sketch_case({**GOAL, "shortest": shortest}))
-    assert metrics["spl"] is metrics["soft_spl"] is metrics["path_ratio"] is None
+    measures = measure(sketch({"seconds": 1, "truth": [[0, 0, 0]]}), sketch_case({**GOAL, "shortest": shortest}))
+    for name in ("spl", "soft_spl", "path_length_ratio", "barn_score", "shortest_length"):
+        assert measures.values[name] is None
+        assert "shortest way" in measures.undefined[name]
+
+
+def test_a_robot_that_is_carried_has_neither_driven_nor_turned():
+    truth = [[0, 0, 0, 0], [2, 1, 0, 0], [2.025, 9, 0, 3], [4, 10, 0, 3]]
+    metrics = measured({"seconds": 4, "truth": truth, "events": [[2, "robot.placed"]]})
+    assert metrics["path_length"] == pytest.approx(2.0, abs=0.02)
+    assert metrics["heading_change"] == metrics["aol"] == metrics["norm_curvature"] == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("radius", [1.0, 2.0])
+def test_a_circle_has_the_curvature_of_its_radius(radius):
+    metrics = measured({"seconds": 20, "truth": circle(radius)})
+    assert metrics["path_length"] == pytest.approx(2 * math.pi * radius, rel=1e-3)
+    assert metrics["heading_change"] == pytest.approx(2 * math.pi)
+    assert metrics["aol"] == pytest.approx(1 / radius, rel=0.01)
+    assert metrics["max_curvature"] == pytest.approx(1 / radius, rel=1e-3)
+    assert metrics["norm_curvature"] == pytest.approx(4 * math.pi, rel=0.12)
+
+
+def test_a_straight_line_has_none_even_back_and_forth():
+    metrics = measured({"seconds": 20, "truth": [[0, 0, 0], [10, 5, 0], [20, 0, 0]]})
+    assert metrics["max_curvature"] == metrics["norm_curvature"] == 0.0
+    assert metrics["aol"] == pytest.approx(math.pi / 10, rel=0.01)
+    assert metrics["heading_change"] == 0.0
+
+
+def test_points_nearer_than_30_cm_have_no_say_in_curvature():
+    shaky = [[k / 10, k * 0.05, 0.02 * (k % 2)] for k in range(101)]
+    metrics = measured({"seconds": 10, "truth": shaky})
+    assert metrics["max_curvature"] < 0.5
+    assert metrics["aol"] > 5.0
 
 
 def test_turning_through_pi_is_a_small_change_of_heading():
+    """Arena's get_metrics.py does not wrap it, and adds yaw to metres in the norm of the way."""
     truth = [[0, 0, 0, 3.1], [1, 0, 0, 3.2], [2, 0, 0, 3.1]]
-    assert measure(sketch({"seconds": 2, "truth": truth}), sketch_case({}))["heading_change"] == pytest.approx(0.2)
+    metrics = measured({"seconds": 2, "truth": truth})
+    assert metrics["heading_change"] == pytest.approx(0.2)
+    assert metrics["path_length"] == 0.0
+
+
+def test_irregularity_is_what_was_turned_beyond_the_first_plan_to_each_goal():
+    """A stub (`pass`) in HuNavSim."""
+    words = {"seconds": 20, "truth": circle(2), "events": [[1, "goal.accepted", "a"]]}
+    bent = Path(np.array([[0, 0, 0.0], [1, 0, 3.0], [1, 1, -3.0], [2, 1, -3.0]]), 250)
+    other = Path(np.array([[0, 0, 0.0], [1, 0, 1.0]]), 900)
+    early = Path(np.array([[0, 0, 0.0], [1, 0, 2.0]]), 100)
+    trace = replace(sketch(words), plans=(early, bent, other))
+    turned = 3.0 + (2 * math.pi - 6.0)
+    assert measure(trace, sketch_case(GOAL)).values["path_irregularity"] == pytest.approx(2 * math.pi - turned)
+    straight = replace(trace, truth=sketch({"seconds": 20, "truth": [[0, 0, 0], [20, 9, 0]]}).truth)
+    assert measure(straight, sketch_case(GOAL)).values["path_irregularity"] == 0.0
+    unplanned = measure(replace(trace, plans=(early,)), sketch_case(GOAL))
+    assert "no plan" in unplanned.undefined["path_irregularity"]
+
+
+# -- BARN
+
+
+@pytest.mark.parametrize(("seconds", "expected"), [(1.0, 0.5), (12.0, 0.5), (24.0, 0.25), (48.0, 0.125), (99.0, 0.125)])
+def test_a_way_of_12_m_in_twice_its_optimal_time_or_less_is_worth_a_half(seconds, expected):
+    assert barn_score(True, seconds, 12.0) == pytest.approx(expected)
+
+
+def test_who_does_not_arrive_scores_nothing():
+    assert barn_score(False, 7.0, 12.0) == 0.0
+
+
+def test_a_reference_of_negative_length_gives_no_score():
+    """BARN's run.py takes -31 m in its dynamic branch: every success scores 0.125, after 12 s or after 99 s."""
+    for length in (-31.0, 0.0, math.nan):
+        with pytest.raises(ValueError, match="reference way"):
+            barn_score(True, 12.0, length)
+    assert barn_score(True, 15.0, 31.0) > barn_score(True, 99.0, 31.0) > 0.125
+
+
+def test_a_run_has_a_score_when_it_has_one_goal():
+    metrics = measured({"seconds": 10, "truth": [[0, 0, 0], [8, 3, 4]], "events": ARRIVED}, GOAL)
+    assert metrics["barn_score"] == pytest.approx(2.5 / 8.0)
+    two = {"goals": [*GOAL["goals"], {"name": "b", "pose": [3, 4, 0]}], "shortest": {"a": 5.0, "b": 1.0}}
+    measures = measure(sketch({"seconds": 10, "truth": [[0, 0, 0]]}), sketch_case(two))
+    assert "one goal" in measures.undefined["barn_score"]
+
+
+# -- motion
 
 
 def test_spinning_to_the_right_is_not_standing():
+    """HuNavSim's abs(r.angular_vel < 0.02) counts any turn to the right as standing."""
     truth = [[0, 0, 0, 0], [2, 0, 0, -3], [6, 0, 0, -3]]
-    metrics = measure(sketch({"seconds": 6, "truth": truth}), sketch_case({}))
-    assert metrics["time_standing"] == pytest.approx(4.0, abs=0.026)
+    assert measured({"seconds": 6, "truth": truth})["time_not_moving"] == pytest.approx(4.0, abs=0.026)
+
+
+@pytest.mark.parametrize(
+    ("speed", "turn", "stands"),
+    [(0.009, 0.019, True), (0.01, 0.0, False), (-0.01, 0.0, False), (0.0, 0.02, False), (0.0, -0.02, False)],
+)
+def test_what_counts_as_not_moving(speed, turn, stands):
+    trace = sketch({"seconds": 1, "truth": [[0, 0, 0]]})
+    trace = replace(trace, velocity=Samples(trace.truth.ticks, np.tile([speed, 0.0, turn], (41, 1))))
+    assert measure(trace, sketch_case({})).values["time_not_moving"] == (1.0 if stands else 0.0)
+
+
+def test_jerk_of_a_trapezoid_is_at_its_corners():
+    speeds = np.interp(np.arange(81) * STEP, [0, 0.5, 1.5, 2], [0, 1, 1, 0])
+    metrics = measure(with_speeds(speeds), sketch_case({})).values
+    assert metrics["max_jerk"] == pytest.approx(2 / STEP)
+    assert metrics["mean_jerk"] == pytest.approx(2 * (2 / STEP) / 81)
+    assert metrics["max_speed"] == 1.0
+
+
+def test_sparc_and_ldlj_give_the_numbers_their_authors_print():
+    movement = np.exp(-5 * np.arange(-1, 1, 0.01) ** 2)
+    assert f"{sparc(movement, 100.0):.5f}" == "-1.41403"
+    assert f"{ldlj(movement, 100.0):.5f}" == "-5.81636"
+
+
+def test_they_are_of_the_speed_over_ground_at_the_rate_of_the_truth():
+    speeds = np.sin(np.linspace(0, math.pi, 201))
+    metrics = measure(with_speeds(-speeds), sketch_case({})).values
+    assert metrics["sparc"] == sparc(speeds, 40.0)
+    assert metrics["ldlj"] == ldlj(speeds, 40.0)
+
+
+def trapezoid(seconds, wobble=0.0, stop=False):
+    times = np.arange(round(seconds * 40) + 1) / 40
+    speeds = np.interp(times, [0, 1, seconds - 1, seconds], [0, 0.5, 0.5, 0])
+    if stop:
+        speeds = np.minimum(speeds, np.interp(np.abs(times - seconds / 2), [1.0, 1.5], [0, 9]))
+    return speeds * (1 + wobble * np.sin(2 * math.pi * times))
+
+
+def test_sparc_sees_a_wobble_and_hardly_a_stop_and_ldlj_sees_a_stop():
+    plain, wobbling, stopping = trapezoid(20), trapezoid(20, wobble=0.2), trapezoid(20, stop=True)
+    assert sparc(plain, 40.0) - sparc(wobbling, 40.0) > 0.5
+    assert abs(sparc(plain, 40.0) - sparc(stopping, 40.0)) < 0.5
+    assert ldlj(plain, 40.0) - ldlj(stopping, 40.0) > 0.5
+
+
+@pytest.mark.parametrize("speeds", [[], [0.0, 0.0, 0.0, 0.0], [1.0]])
+def test_smoothness_is_not_defined_without_motion(speeds):
+    assert sparc(np.array(speeds), 40.0) is None
+    assert ldlj(np.array(speeds), 40.0) is None
+
+
+def test_a_constant_speed_has_no_ldlj_but_a_reason():
+    measures = measure(with_speeds(np.full(81, 0.5)), sketch_case({}))
+    assert measures.values["ldlj"] is None
+    assert measures.undefined["ldlj"] == "the speed never changed"
+    assert measures.values["sparc"] < 0
+
+
+# -- surroundings
+
+
+def test_clearance_is_its_least_and_its_mean():
+    metrics = measured({"seconds": 2, "truth": [[0, 0, 0]], "clearance": [[0, 1.5], [2, 0.5]]})
+    assert metrics["min_clearance"] == 0.5
+    assert metrics["mean_clearance"] == pytest.approx(1.0)
+    assert measured({"seconds": 2, "truth": [[0, 0, 0]], "clearance": 7.0})["mean_clearance"] == 2.0
 
 
 def test_two_contacts_at_once_last_as_long_as_their_union():
@@ -54,19 +273,108 @@ def test_two_contacts_at_once_last_as_long_as_their_union():
         [4, "collision.ended", "b"],
         [9, "collision.started", "a"],
     ]
-    metrics = measure(sketch({"seconds": 10, "truth": [[0, 0, 0]], "events": events}), sketch_case({}))
+    metrics = measured({"seconds": 10, "truth": [[0, 0, 0]], "events": events})
     assert metrics["collisions"] == 3.0
     assert metrics["contact_time"] == 4.0
+
+
+# -- localization
+
+
+def lost(seconds=60.0, seed=4):
+    """A curved drive with a belief that wanders around the truth."""
+    chance = np.random.default_rng(seed)
+    trace = sketch({"seconds": seconds, "truth": circle(3, seconds, turns=2)})
+    values = trace.belief.values.copy()
+    ticks = trace.belief.ticks
+    yaw = np.interp(ticks, trace.truth.ticks, np.unwrap(trace.truth.values[:, 2]))
+    values[:, :2] = trace.truth.at(ticks)[:, :2] + chance.normal(0, 0.1, (len(ticks), 2))
+    values[:, 2] = (yaw + chance.normal(0, 0.2, len(ticks)) + math.pi) % (2 * math.pi) - math.pi
+    return replace(trace, belief=Samples(ticks, values))
+
+
+def as_evo(poses):
+    matrices = [np.eye(4) for _ in poses]
+    for matrix, (x, y, yaw) in zip(matrices, poses, strict=True):
+        matrix[:2, :2] = [[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]]
+        matrix[:2, 3] = x, y
+    return PosePath3D(poses_se3=matrices)
+
+
+@pytest.mark.parametrize(
+    ("ours", "theirs"),
+    [
+        ("ape_trans", evo.APE(evo.PoseRelation.translation_part)),
+        ("ape_rot", evo.APE(evo.PoseRelation.rotation_angle_rad)),
+        (
+            "rpe_trans",
+            evo.RPE(evo.PoseRelation.translation_part, 1.0, evo.Unit.meters, pairs_from_reference=True),
+        ),
+        (
+            "rpe_rot",
+            evo.RPE(evo.PoseRelation.rotation_angle_rad, 1.0, evo.Unit.meters, pairs_from_reference=True),
+        ),
+    ],
+)
+def test_pose_errors_are_those_of_evo_without_alignment(ours, theirs):
+    trace = lost()
+    reference = as_evo(trace.truth.at(trace.belief.ticks)[:, :3])
+    theirs.process_data((reference, as_evo(trace.belief.values[:, :3])))
+    expected, metrics = theirs.get_all_statistics(), measure(trace, sketch_case({})).values
+    for name in ("rmse", "mean", "median", "max"):
+        assert metrics[f"{ours}_{name}"] == pytest.approx(expected[name], abs=1e-7), name
+
+
+def test_the_final_error_is_the_last():
+    metrics = measured({"seconds": 10, "truth": [[0, 0, 0]], "belief": [[0, 0, 0], [10, 3, 4]]})
+    assert metrics["ape_trans_final"] == metrics["ape_trans_max"] == pytest.approx(5.0)
+    assert metrics["ape_trans_median"] == pytest.approx(2.5)
+
+
+def test_a_short_drive_has_no_relative_error_but_a_reason():
+    measures = measure(sketch({"seconds": 10, "truth": [[0, 0, 0], [10, 0.9, 0]]}), sketch_case({}))
+    assert measures.undefined["rpe_trans_rmse"] == measures.undefined["rpe_rot_max"] == "the robot drove less than 1 m"
+
+
+def test_nees_is_that_of_filterpy():
+    trace, chance = lost(), np.random.default_rng(9)
+    true, values = trace.truth.at(trace.belief.ticks), trace.belief.values.copy()
+    squares = chance.normal(size=(len(values), 3, 3))
+    covariances = squares @ squares.transpose(0, 2, 1) + 0.05 * np.eye(3)
+    values[:, 3:9] = covariances[(slice(None), *np.triu_indices(3))]
+    errors = values[:, :3] - true
+    errors[:, 2] = (errors[:, 2] + math.pi) % (2 * math.pi) - math.pi
+    expected = np.mean(NEES(errors, np.zeros_like(errors), covariances))
+    found = measure(replace(trace, belief=Samples(trace.belief.ticks, values)), sketch_case({})).values["nees"]
+    assert found == pytest.approx(expected)
 
 
 def test_nees_of_errors_drawn_from_the_covariance_is_three():
     chance = np.random.default_rng(5)
     belief = [[k / 10, *chance.normal(0, 0.1, 3)] for k in range(3001)]
-    metrics = measure(sketch({"seconds": 300, "truth": [[0, 0, 0]], "belief": belief}), sketch_case({}))
+    metrics = measured({"seconds": 300, "truth": [[0, 0, 0]], "belief": belief})
     assert metrics["nees"] == pytest.approx(3.0, abs=0.2)
-    assert metrics["localization_rmse"] == pytest.approx(0.1 * math.sqrt(2), rel=0.05)
+    assert metrics["ape_trans_rmse"] == pytest.approx(0.1 * math.sqrt(2), rel=0.05)
+
+
+@pytest.mark.parametrize(
+    "covariance", [[0, 0, 0, 1, 0, 1], [1, 1, 0, 1, 0, 1], [1, 0, 1, 1, 0, 1], [1, 0, 0, 1, 0, 0], [0, 0, 0, 0, 0, 0]]
+)
+def test_a_depleted_particle_set_is_overconfident_not_a_number(covariance):
+    trace = sketch({"seconds": 1, "truth": [[0, 0, 0]], "belief": {"offset": [0.1, 0, 0]}})
+    values = trace.belief.values.copy()
+    values[3, 3:9] = covariance
+    measures = measure(replace(trace, belief=Samples(trace.belief.ticks, values)), sketch_case({}))
+    assert measures.values["nees"] is None
+    assert "overconfident" in measures.undefined["nees"]
 
 
 def test_a_run_without_belief_has_no_localization():
-    metrics = measure(sketch({"seconds": 1, "truth": [[0, 0, 0]], "belief": None}), sketch_case({}))
-    assert metrics["localization_rmse"] is metrics["nees"] is None
+    measures = measure(sketch({"seconds": 1, "truth": [[0, 0, 0]], "belief": None}), sketch_case({}))
+    assert measures.values["ape_trans_rmse"] is measures.values["nees"] is None
+    assert measures.undefined["nees"] == "the robot never said where it believes to be"
+
+
+def test_a_signal_that_is_not_a_number_is_no_metric():
+    with pytest.raises(BrokenTrace, match="true pose"):
+        measured({"seconds": 2, "truth": [[0, 0, 0], [1, math.nan, 0], [2, 0, 0]]})

@@ -81,7 +81,7 @@ def test_a_thing_without_a_place_breaks_the_run():
 def test_free_space_without_end_is_no_error_and_its_metric_is_the_range():
     result = conclude({**TRACE, "clearance": math.inf}, {"collisions": {}})
     assert result.outcome is Outcome.PASSED
-    assert result.metrics["clearance_min"] == 2.0
+    assert result.metrics["min_clearance"] == 2.0
 
 
 @pytest.mark.parametrize("text", ["{}", "[]", "3", '{"format": 99}', "nonsense"])

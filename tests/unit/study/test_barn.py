@@ -3,21 +3,9 @@ from pathlib import Path
 import pytest
 
 from simscen.loading.scenario import load_scenario
-from simscen.study.barn import barn_worlds, scenario, score
+from simscen.study.barn import barn_worlds, scenario
 
 DATA = Path(__file__).parents[4] / "shared" / "data" / "barn_sample"
-
-
-@pytest.mark.parametrize(
-    ("seconds", "expected"),
-    [(1.0, 0.5), (12.0, 0.5), (24.0, 0.25), (48.0, 0.125), (99.0, 0.125)],
-)
-def test_a_way_of_12_m_in_twice_its_optimal_time_or_less_is_worth_a_half(seconds: float, expected: float) -> None:
-    assert score(True, seconds, 12.0) == pytest.approx(expected)
-
-
-def test_who_does_not_arrive_scores_nothing() -> None:
-    assert score(False, 7.0, 12.0) == 0.0
 
 
 def test_a_scenario_of_the_challenge_is_valid(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ def run(outcome: Outcome, collided: bool = False, ended: str = "navigation ended
     status = Status.FAIL if collided else Status.PASS
     verdict = Verdict("collisions", "collisions", "error", (Finding(status, "collisions", "", ""),))
     broken = RunFailure("crashed", "it crashed") if outcome is Outcome.ERROR else None
-    metrics = {"time_to_goal": seconds, "path_ratio": 1.1}
+    metrics = {"time_to_goal": seconds, "path_length_ratio": 1.1}
     key = RunKey("s", 1)
     return RunFinished(RunResult(key, "s.scenario.yaml", outcome, (verdict,), (), metrics, ended=ended, error=broken))
 

@@ -1,7 +1,7 @@
 import pytest
 from scipy.stats import binomtest
 
-from simscen.study.intervals import wilson
+from simscen.core.intervals import wilson
 
 
 @pytest.mark.parametrize(("good", "runs"), [(0, 20), (1, 20), (10, 20), (29, 30), (20, 20), (500, 500)])

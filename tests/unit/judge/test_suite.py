@@ -1,0 +1,54 @@
+"""The figures of a session."""
+
+import pytest
+
+from simscen.core.result import Outcome, RunFailure, RunKey, RunResult
+from simscen.judge.suite import suite, suite_data, told
+
+
+def run(seed, simulated=1800.0, **metrics):
+    return RunResult(RunKey("a", seed), "a.yaml", Outcome.PASSED, metrics=metrics, simulated=simulated)
+
+
+RUNS = [
+    run(1, success=1.0, spl=0.9, soft_spl=0.9, collisions=0.0, path_length=1500.0),
+    run(2, success=0.0, spl=0.0, soft_spl=0.5, collisions=3.0, path_length=500.0),
+    run(3, success=1.0, spl=None, soft_spl=None, collisions=0.0, path_length=0.0),
+    RunResult(RunKey("a", 4), "a.yaml", Outcome.ERROR, error=RunFailure("crashed", "SIGSEGV")),
+]
+
+
+def test_rates_are_of_all_runs_and_means_of_those_that_have_the_number():
+    figures = suite(RUNS)
+    assert figures.success_rate == 0.5
+    assert figures.success_interval == pytest.approx((0.15, 0.85), abs=0.01)
+    assert (figures.spl, figures.soft_spl, figures.spl_runs) == (pytest.approx(0.45), pytest.approx(0.7), 2)
+    assert (figures.collisions_per_km, figures.collisions_per_hour) == (1.5, 2.0)
+    assert (figures.runs, figures.measured_runs, figures.kilometres, figures.hours) == (4, 3, 2.0, 1.5)
+
+
+def test_the_order_of_the_runs_changes_nothing():
+    assert suite(RUNS) == suite(reversed(RUNS))
+
+
+def test_it_is_told_in_a_line_with_the_numbers_of_runs():
+    line = (
+        "success 50% of 4 runs (15% … 85%) · SPL 0.45 of 2 runs · 1.5 collisions/km, 2.0/h in 2.00 km, 1.50 h of 3 runs"
+    )
+    assert told(suite(RUNS)) == line
+    assert told(suite(RUNS[2:3])) == "success 100% of 1 run (21% … 100%)"
+
+
+def test_without_runs_there_are_no_rates():
+    figures = suite([])
+    assert told(figures) == ""
+    data = suite_data(figures)
+    assert data["runs"] == data["measured_runs"] == data["collisions"] == 0
+    for name in ("success_rate", "success_interval", "spl", "soft_spl", "collisions_per_km", "collisions_per_hour"):
+        assert data[name] is None
+
+
+def test_runs_that_all_broke_did_not_succeed():
+    figures = suite(RUNS[3:])
+    assert (figures.success_rate, figures.measured_runs, figures.collisions_per_km) == (0.0, 0, None)
+    assert figures.collisions_per_hour is None
