@@ -104,12 +104,19 @@ def _along(points: Array, way: Array) -> tuple[Array, Array]:
         way = np.vstack((way, way))
     steps = np.diff(way, axis=0)
     lengths = np.hypot(steps[:, 0], steps[:, 1])
-    squared = np.maximum(lengths**2, math.ulp(0.0))
-    dx, dy = points[:, :1] - way[:-1, 0], points[:, 1:] - way[:-1, 1]
-    share = np.clip((dx * steps[:, 0] + dy * steps[:, 1]) / squared, 0.0, 1.0)
-    off = np.hypot(dx - share * steps[:, 0], dy - share * steps[:, 1])
-    nearest = off.argmin(axis=1)
-    rows = np.arange(len(points))
-    before = np.concatenate(([0.0], np.cumsum(lengths)))
-    left = before[-1] - before[nearest] - share[rows, nearest] * lengths[nearest]
-    return off[rows, nearest], left
+    nearest = _nearest_step(points, way[:-1], steps)
+    apart, step = points - way[nearest], steps[nearest]
+    share = np.clip((apart * step).sum(axis=1) / np.maximum(lengths[nearest] ** 2, math.ulp(0.0)), 0.0, 1.0)
+    off = np.hypot(*(apart - share[:, np.newaxis] * step).T)
+    after = np.concatenate((np.cumsum(lengths[::-1])[::-1][1:], [0.0]))
+    return off, after[nearest] + (1.0 - share) * lengths[nearest]
+
+
+def _nearest_step(points: Array, begins: Array, steps: Array) -> Array:
+    """The index of the step (m, 2) that is nearest to each point (n, 2); products of matrices, for there are many."""
+    along = points @ steps.T - (begins * steps).sum(axis=1)
+    squared = np.maximum((steps**2).sum(axis=1), math.ulp(0.0))
+    share = np.clip(along / squared, 0.0, 1.0)
+    beside = (begins**2).sum(axis=1) - 2.0 * (points @ begins.T)  # and |point|^2, the same for all steps
+    nearest: Array = (beside + share * (share * squared - 2.0 * along)).argmin(axis=1)
+    return nearest

@@ -283,15 +283,16 @@ def _changes(trace: Trace, values: Array, order: int) -> Array:
     clock = _clock(trace)
     if len(clock) <= order:
         raise Unavailable(f"the run is too short: {len(clock)} samples of the truth")
-    steps = np.diff(clock) / trace.tick_rate
-    if not np.allclose(steps, steps[0]):
+    periods = np.diff(clock)
+    if (periods != periods[0]).any():
         raise BrokenTrace("the samples of the truth are not evenly spaced")
-    first = np.diff(values) / steps[0]
+    step = float(periods[0]) / trace.tick_rate
+    first = np.diff(values) / step
     placed = [k - 1 for k in jumps(trace) if 0 < k < len(values)]
     first[placed] = 0.0
     if order == 1:
         return np.concatenate((first[:1], first))
-    second = np.diff(first) / steps[0]
+    second = np.diff(first) / step
     for k in placed:
         second[max(k - 1, 0) : k + 1] = 0.0
     return np.concatenate((second[:1], second, second[-1:]))

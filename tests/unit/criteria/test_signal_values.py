@@ -1,5 +1,6 @@
 """Named signals against closed forms, and where their samples come from."""
 
+import itertools
 import math
 from dataclasses import replace
 from typing import get_args
@@ -315,3 +316,18 @@ def test_without_the_truth_there_is_no_clock(name):
     blind: Trace = replace(trace, truth=nothing)
     with pytest.raises(Unavailable, match="true pose"):
         read(name, blind, sketch_case({"goals": [{"name": "a", "pose": [1, 0, 0]}]}), {})
+
+
+def test_the_nearest_point_of_a_plan_is_found_among_long_and_short_steps():
+    chance = np.random.default_rng(2)
+    way = np.cumsum(chance.normal(0, [[1.0, 1.0]] * 10 + [[0.02, 0.02]] * 30, (40, 2)), axis=0)
+    robot = chance.normal(0, 4, (81, 2))
+    trace = sketch({"seconds": 2, "truth": [[0, 0, 0]]})
+    trace = replace(
+        trace,
+        truth=Samples(trace.truth.ticks, np.column_stack((robot, np.zeros(81)))),
+        plans=(Path(np.column_stack((way, np.zeros(40)))),),
+    )
+    fine = np.concatenate([np.linspace(a, b, 2000) for a, b in itertools.pairwise(way)])
+    expected = [np.hypot(*(fine - point).T).min() for point in robot]
+    assert read("plan_deviation", trace, sketch_case({}), {}) == pytest.approx(expected, abs=1e-3)
