@@ -1,6 +1,6 @@
-"""Ray casting with Embree: one scene for what never moves, a small one for what does."""
+"""Ray casting with Embree: one scene for what never moves, and one for each thing that does, in its own frame."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,96 +20,87 @@ _NO_HIT = np.float32(1e30)
 """Embree answers 1e37 for a ray that meets nothing."""
 
 
-@dataclass(frozen=True, eq=False)
-class Hits:
-    """What rays met: `distances` (n,) in metres, inf for nothing; `owners` (n,) into `names`, -1 for nothing."""
-
-    distances: Array
-    owners: Indices
-    names: tuple[str, ...]
-
-
 class RayScene:
     """A `core.rays.RayCaster` over the triangles of a world and of the bodies that move in it.
 
-    Distances agree with PyBullet's rays within 1 mm. Embree works in single precision, so everything is kept
-    about the centre of the world: one that lies 10 km from the origin loses nothing, one that is itself 10 km
-    wide half a millimetre. Make a scene in the process that uses it: Embree's threads do not survive a fork.
+    A body that moves stays as it was built; the few rays that come near it are carried into its frame. Distances agree
+    with PyBullet's rays within 1 mm. Embree works in single precision, so everything is kept about its own centre: a
+    world that lies 10 km from the origin loses nothing, one that is itself 10 km wide half a millimetre. Make a scene
+    in the process that uses it: Embree's threads do not survive a fork.
     """
 
     def __init__(self, static: TriangleMesh) -> None:
         self._device = EmbreeDevice()
-        self._centre = _middle(static.vertices)
-        self._names = static.names
-        self._static = _Part(self._device, static.vertices - self._centre, static.faces, static.owners)
-        self._moving = self._part({})
-        self._placed: Mapping[str, Placed] = {}
+        self._static = _Part(self._device, static)
+        self._movers: dict[str, _Mover] = {}
 
     def set_moving(self, bodies: Mapping[str, Placed]) -> None:
         """Say where the bodies are now: by name, the triangles in a body's frame and the pose of that frame."""
-        if not _same(bodies, self._placed):
-            self._placed = dict(sorted(bodies.items()))
-            self._moving = self._part(self._placed)
+        self._movers = {name: _Mover(self._part(name, mesh), pose) for name, (mesh, pose) in bodies.items()}
 
     def cast(self, origins: Array, directions: Array) -> Array:
         """Distances (n,) in metres along unit `directions` (n, 3) from `origins` (n, 3); inf for no hit."""
-        starts, along = self._singles(origins, directions)
-        distances = self._static.distances(starts, along)
-        if self._placed:
-            distances = np.minimum(distances, self._moving.distances(starts, along))
-        return _metres(distances)
+        distances = self._static.distances(origins, directions)
+        for mover, rays in self._near(origins, directions):
+            distances[rays] = np.minimum(distances[rays], mover.distances(origins[rays], directions[rays]))
+        return np.where(distances < _NO_HIT, distances, np.inf).astype(np.float64)
 
-    def cast_owners(self, origins: Array, directions: Array) -> Hits:
-        """Like `cast`, and whose surface each ray met: that of a static solid or of a moving body."""
-        starts, along = self._singles(origins, directions)
-        distances, owners = self._static.hits(starts, along)
-        nearer, bodies = self._moving.hits(starts, along)
-        owners = np.where(nearer < distances, bodies + np.int32(len(self._names)), owners)
-        return Hits(_metres(np.minimum(distances, nearer)), owners, (*self._names, *self._placed))
+    def _part(self, name: str, mesh: TriangleMesh) -> "_Part":
+        known = self._movers.get(name)
+        return known.part if known and known.part.mesh is mesh else _Part(self._device, mesh)
 
-    def _part(self, placed: Mapping[str, Placed]) -> "_Part":
-        """A scene of moving bodies; each is the owner of its faces, in the order of `placed`."""
-        vertices, faces, owners = [np.empty((0, 3))], [np.empty((0, 3), np.int32)], [np.empty(0, np.int32)]
-        count = 0
-        for owner, (mesh, pose) in enumerate(placed.values()):
-            vertices.append(pose.apply(mesh.vertices) - self._centre)
-            faces.append(mesh.faces + np.int32(count))
-            owners.append(np.full(len(mesh.faces), owner, dtype=np.int32))
-            count += len(mesh.vertices)
-        return _Part(self._device, np.concatenate(vertices), np.concatenate(faces), np.concatenate(owners))
-
-    def _singles(self, origins: Array, directions: Array) -> tuple[Singles, Singles]:
-        starts = np.subtract(origins, self._centre).astype(np.float32)
-        return starts, np.ascontiguousarray(directions, dtype=np.float32)
+    def _near(self, origins: Array, directions: Array) -> Iterator[tuple["_Mover", npt.NDArray[np.int64]]]:
+        """The moving bodies and the numbers of the rays that meet the sphere around them."""
+        movers = [mover for mover in self._movers.values() if len(mover.part.mesh.faces)]
+        if not movers:
+            return
+        centres, radii = np.array([mover.centre for mover in movers]), np.array([mover.part.radius for mover in movers])
+        ahead = centres @ directions.T - (origins * directions).sum(axis=1)
+        off = (centres**2).sum(axis=1)[:, np.newaxis] - 2 * (centres @ origins.T) + (origins**2).sum(axis=1) - ahead**2
+        meets = (off <= radii[:, np.newaxis] ** 2) & (ahead >= -radii[:, np.newaxis])
+        for number in np.flatnonzero(meets.any(axis=1)):
+            yield movers[number], np.flatnonzero(meets[number])
 
 
 class _Part:
-    """One Embree scene and the owners of its faces."""
+    """One Embree scene of a mesh, about the middle of that mesh; `radius` is that of the sphere around it."""
 
-    def __init__(self, device: EmbreeDevice, vertices: Array, faces: Indices, owners: Indices) -> None:
+    def __init__(self, device: EmbreeDevice, mesh: TriangleMesh) -> None:
+        self.mesh, self.middle = mesh, _middle(mesh.vertices)
+        corners = mesh.vertices - self.middle
+        # A little more, for rays that graze the furthest corner.
+        self.radius = 1.001 * float(np.linalg.norm(corners, axis=1).max(initial=0.0))
         # Robust: without it rays may slip through the edge between two triangles.
         self._scene = EmbreeScene(device, True)
-        self._owners = owners
-        if len(faces):
-            corners = np.ascontiguousarray(vertices, dtype=np.float32)
-            EmbreeMesh(self._scene, corners, np.ascontiguousarray(faces, dtype=np.int32))
+        if len(mesh.faces):
+            faces = np.ascontiguousarray(mesh.faces, dtype=np.int32)
+            EmbreeMesh(self._scene, np.ascontiguousarray(corners, dtype=np.float32), faces)
 
-    def distances(self, starts: Singles, along: Singles) -> Singles:
-        """Distances (n,), beyond _NO_HIT where nothing is hit."""
+    def distances(self, origins: Array, directions: Array) -> Singles:
+        """Distances (n,) in the mesh's own frame, beyond _NO_HIT where nothing is hit."""
+        starts = np.subtract(origins, self.middle).astype(np.float32)
+        along = np.ascontiguousarray(directions, dtype=np.float32)
         answer: Singles = self._scene.run(starts, along, query="DISTANCE")
         return answer
 
-    def hits(self, starts: Singles, along: Singles) -> tuple[Singles, Indices]:
-        """Distances (n,) and owners (n,), -1 where nothing is hit."""
-        answer = self._scene.run(starts, along, output=True)
-        faces = answer["primID"]
-        owners = np.full(len(faces), -1, dtype=np.int32)
-        owners[faces >= 0] = self._owners[faces[faces >= 0]]
-        return answer["tfar"], owners
 
+@dataclass(frozen=True, eq=False)
+class _Mover:
+    """A body where it is now."""
 
-def _metres(distances: Singles) -> Array:
-    return np.where(distances < _NO_HIT, distances, np.inf).astype(np.float64)
+    part: _Part
+    pose: Pose3
+
+    @property
+    def centre(self) -> Array:
+        """The middle of the body in the world."""
+        centre: Array = self.pose.apply(self.part.middle[np.newaxis])[0]
+        return centre
+
+    def distances(self, origins: Array, directions: Array) -> Singles:
+        """As _Part.distances, of rays in the world."""
+        turn = self.pose.rotation()
+        return self.part.distances((origins - self.pose.position) @ turn, directions @ turn)
 
 
 def _middle(vertices: Array) -> Array:
@@ -117,9 +108,3 @@ def _middle(vertices: Array) -> Array:
         return np.zeros(3)
     middle: Array = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
     return middle
-
-
-def _same(bodies: Mapping[str, Placed], others: Mapping[str, Placed]) -> bool:
-    if bodies.keys() != others.keys():
-        return False
-    return all(mesh is others[name][0] and pose == others[name][1] for name, (mesh, pose) in bodies.items())

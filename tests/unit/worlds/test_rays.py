@@ -1,5 +1,4 @@
 import math
-import time
 
 import numpy as np
 import pybullet
@@ -102,16 +101,6 @@ def test_a_world_ten_kilometres_away_is_as_exact_as_one_at_the_origin():
     assert np.quantile(np.abs(near[both] - there[both]), 0.999) < 1e-4
 
 
-def test_a_ray_says_whose_surface_it_met():
-    scene = RayScene(fuse(ROOM))
-    scene.set_moving({"cart": (CART, Pose3(0, -2, 0))})
-    origins, directions = around(4, (0, 2, 0.5))
-    hits = scene.cast_owners(origins, directions)
-    assert [hits.names[k] if k >= 0 else None for k in hits.owners] == ["post", "north", None, "cart"]
-    assert hits.distances == pytest.approx([1.6, 2.9, math.inf, 3.75], abs=1e-3)
-    assert np.array_equal(hits.distances, scene.cast(origins, directions))
-
-
 def test_bodies_come_move_and_go():
     scene = RayScene(fuse([]))
     origins, directions = around(1, (0, 0, 0.3))
@@ -135,18 +124,14 @@ def test_answers_do_not_depend_on_what_was_asked_before_or_on_the_order_of_bodie
     assert np.array_equal(one.cast(origins, directions), other.cast(origins, directions))
 
 
-@pytest.mark.parametrize("posts", [209, 2090])
-def test_a_scan_of_720_beams_among_hundreds_of_posts_takes_a_fraction_of_a_millisecond(posts):
-    rng = np.random.default_rng(5)
-    spread = 2.5 * math.sqrt(posts / 209)
-    places = rng.uniform((-spread, -spread), (spread, 3 * spread), (posts, 2))
-    scene = RayScene(fuse(Solid(Cylinder(0.075, 1.0), Pose3(x, y, 0.5)) for x, y in places.tolist()))
-    origins, directions = around(720, (0.0, 0.0, 0.3))
-    took = []
-    for step in range(60):
-        begin = time.process_time()  # not the wall clock: other tests run beside this one
-        scene.set_moving({"cart": (CART, Pose3(step * 0.01, 3, 0))})
-        scene.cast(origins, directions)
-        took.append(time.process_time() - begin)
-    # The bound is 0.3 ms on a quiet machine, which `simscen bench` measures; processor time on a busy one has slack.
-    assert np.quantile(took, 0.2) < 0.0006
+def test_many_bodies_are_seen_as_if_they_were_one_world():
+    chance = np.random.default_rng(6)
+    places = [Pose3.from_rpy(*chance.uniform((-9, -9, 0), (9, 9, 1)), *chance.uniform(-3, 3, 3)) for _ in range(40)]
+    apart, together = (
+        RayScene(fuse(ROOM)),
+        RayScene(fuse([*ROOM, *(Solid(Box((0.7, 0.3, 0.5)), pose.compose(Pose3(z=0.2))) for pose in places)])),
+    )
+    box = fuse([Solid(Box((0.7, 0.3, 0.5)), Pose3(z=0.2))])
+    apart.set_moving({f"box {k}": (box, pose) for k, pose in enumerate(places)})
+    origins, directions = random_rays(5000, 7, (-10, -10, 0.05), (10, 10, 1.9))
+    assert_agree(apart.cast(origins, directions), together.cast(origins, directions))
