@@ -9,9 +9,9 @@ import pybullet
 from simscen.core.geometry import Pose3, wrap
 from simscen.core.shapes import Body, Mesh, MotionPath
 from simscen.sim import engine
-from simscen.sim.astray import astray
 from simscen.sim.enclosure import winds_around
 from simscen.sim.inertia import GRAVITY, of_solids
+from simscen.sim.lost import lost
 from simscen.sim.motion_path import pose_at, top_speed
 from simscen.sim.outline import reach
 
@@ -162,12 +162,12 @@ class Actors:
                     return name
         return None
 
-    def astray(self) -> str | None:
+    def lost(self) -> str | None:
         """What has become of the first thing that the engine has lost, or None."""
         for name, actor in self._actors.items():
             if actor.pushable:
                 place, turn = pybullet.getBasePositionAndOrientation(actor.id, physicsClientId=self._client)
-                if trouble := astray(f'object "{name}"', *place, *turn):
+                if trouble := lost(f'object "{name}"', *place, *turn):
                     return trouble
         return None
 

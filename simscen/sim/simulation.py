@@ -15,11 +15,11 @@ from simscen.core.shapes import Body, MotionPath, TriangleMesh
 from simscen.core.trace import Truth
 from simscen.sim import engine
 from simscen.sim.actors import Actors
-from simscen.sim.astray import astray
 from simscen.sim.camera import picture, show_static
 from simscen.sim.clearance import Clearance
 from simscen.sim.contacts import Contacts, Motion, inside, touches
 from simscen.sim.drives import build
+from simscen.sim.lost import lost
 from simscen.sim.robot_body import RobotBody
 from simscen.sim.vehicle import base_twist
 
@@ -112,7 +112,7 @@ class Simulation:
     def truth(self) -> Truth:
         """The robot as it really is. Raises RunError when the physics has lost it or anything else."""
         pose, velocity = self._base.pose(), self._base.velocity()
-        trouble = astray("the robot", *pose, *velocity[0], *velocity[1]) or self._actors.astray()
+        trouble = lost("the robot", *pose, *velocity[0], *velocity[1]) or self._actors.lost()
         if trouble is not None:
             raise RunError("diverged", f"simulation diverged at t={self.tick / self._rate:.3f} s: {trouble}")
         clearance, objects = self._clearance.measure(self.tick), self._actors.poses(self.tick)

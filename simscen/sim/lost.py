@@ -11,7 +11,7 @@ FAR = 1e5
 """m from the origin of the world at which nothing can be any more: worlds reach to 10 km."""
 
 
-def astray(what: str, x: float, y: float, z: float, *others: float) -> str | None:
+def lost(what: str, x: float, y: float, z: float, *others: float) -> str | None:
     """Why something whose centre is at a place in the world cannot be right, or None.
 
     `others` are more numbers that have to be finite, such as its velocity.
