@@ -42,6 +42,10 @@ class AnyCriterion(Choice):
     relocalized_within: Annotated[
         Criterion | None, OnDemand("simscen.criteria.relocalized_within", "RelocalizedWithin")
     ] = None
+    localization_consistency: Annotated[
+        Criterion | None, OnDemand("simscen.criteria.localization_consistency", "LocalizationConsistency")
+    ] = None
+    smoothness: Annotated[Criterion | None, OnDemand("simscen.criteria.smoothness", "Smoothness")] = None
     replans: Annotated[Criterion | None, OnDemand("simscen.criteria.replans", "Replans")] = None
     recoveries: Annotated[Criterion | None, OnDemand("simscen.criteria.recoveries", "Recoveries")] = None
     always: Annotated[Criterion | None, OnDemand("simscen.criteria.always", "Always")] = None

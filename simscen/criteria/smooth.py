@@ -13,6 +13,9 @@ import numpy as np
 
 from simscen.core.geometry import Array
 
+STILL = 0.01
+"""m/s; a robot that was never faster did not move, and what it did is noise."""
+
 CUTOFF = 10.0
 """Hz; faster changes of speed are noise."""
 AMPLITUDE = 0.05

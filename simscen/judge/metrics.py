@@ -17,7 +17,7 @@ from simscen.criteria.path_length import shortest_way
 from simscen.criteria.signal_table import read
 from simscen.criteria.signal_values import Unavailable
 from simscen.criteria.signals import check_finite, drive, speed, truth, turn_rate
-from simscen.criteria.smooth import ldlj, sparc
+from simscen.criteria.smooth import STILL, ldlj, sparc
 from simscen.judge.metric_table import METRICS
 from simscen.judge.pose_metrics import pose_metrics
 from simscen.judge.way_metrics import Values, way_metrics
@@ -142,7 +142,7 @@ def _jerk(trace: Trace, case: Case) -> Values:
 
 
 def _smoothness(trace: Trace, speeds: Array) -> Values:
-    still = "the robot never moved" if speeds.max() < STANDING_SPEED else ""
+    still = "the robot never moved" if speeds.max() < STILL else ""
     rate = trace.tick_rate / float(trace.velocity.ticks[1] - trace.velocity.ticks[0]) if len(speeds) > 1 else 1.0
     spectral, jerky = (None, None) if still else (sparc(speeds, rate), ldlj(speeds, rate))
     return {

@@ -19,6 +19,7 @@ _NEEDS: dict[str, frozenset[Evidence]] = {
     "time_to_goal": frozenset({_GOALS}),
     "path_length": frozenset({_TRUTH}),
     "speed": frozenset({_TRUTH, Evidence.VELOCITY}),
+    "smoothness": frozenset({_TRUTH, Evidence.VELOCITY}),
     "stopped_within": frozenset({_TRUTH, Evidence.VELOCITY, Evidence.DISTURBANCES}),
     "stuck": frozenset({_TRUTH, _GOALS}),
     "localization_error": _PLACE | {_BELIEF},
@@ -57,6 +58,8 @@ def needs(entry: AnyCriterion) -> frozenset[Evidence]:
     if isinstance(entry.chosen, Temporal):
         return entry.chosen.evidence
     wanted = _NEEDS.get(entry.kind, frozenset(Evidence))
+    if entry.kind == "speed" and getattr(entry.chosen, "in_", None) is not None:
+        wanted |= _PLACE
     if getattr(entry.chosen, "error_code", None) is not None:
         wanted |= {Evidence.ERROR_CODES}
     if isinstance(getattr(entry.chosen, "after", None), str):

@@ -98,6 +98,7 @@ AngularSpeed = Annotated[float, Field(ge=-100, le=100), Quantity("angular speed"
 PositiveAngularSpeed = Annotated[float, Field(gt=0, le=100), Quantity("angular speed")]
 PositiveAcceleration = Annotated[float, Field(gt=0, le=1000), Quantity("acceleration")]
 PositiveAngularAcceleration = Annotated[float, Field(gt=0, le=1000), Quantity("angular acceleration")]
+PositiveJerk = Annotated[float, Field(gt=0, le=1e6), Quantity("jerk")]
 Mass = Annotated[float, Field(ge=0, le=1e5), Quantity("mass")]
 PositiveMass = Annotated[float, Field(gt=0, le=1e5), Quantity("mass")]
 Frequency = Annotated[float, Field(gt=0, le=1000), Quantity("frequency")]

@@ -1,0 +1,83 @@
+"""`localization_consistency`: whether the robot is as sure of its pose as it may be."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+from pydantic import Field
+
+from simscen.core.chisquare import mean_bounds, quantile
+from simscen.core.samples import Samples
+from simscen.core.verdict import Finding
+from simscen.criteria.base import Criterion
+from simscen.criteria.bounds import at_least, at_most, missed, undecided
+from simscen.criteria.nees import DIMENSIONS, nees_samples
+from simscen.spec.base import Spec
+from simscen.spec.quantities import Duration, PositiveDuration, Quantity
+
+if TYPE_CHECKING:
+    from simscen.core.case import Case
+    from simscen.core.trace import Trace
+
+
+class LocalizationConsistency(Spec, Criterion):
+    """The robot's doubt about its pose fitted its error.
+
+    What is measured: the normalised estimation error squared e' P⁻¹ e of the believed pose (x, y, wrapped heading) with
+        its covariance P, every so often, averaged over the run; 3 when the covariance tells the truth.
+    When it fails: the average is above what a consistent belief keeps with this probability (the robot is
+        overconfident), or with `both_sides` below it; or a covariance is singular, as that of a particle set that has
+        collapsed: it claims to know a direction exactly.
+    Why this: a planner that trusts a covariance drives by it; a filter that is wrong and sure of it never recovers.
+    Source: Bar-Shalom, Li, Kirubarajan 2001, section 5.4; filterpy's stats.NEES.
+
+    The bounds are those of a mean of independent samples. Errors of one run are correlated, so `every` should be longer
+    than they last; the strict test is over runs at fixed times, as `simscen bench nav` takes it.
+
+    Example: `localization_consistency: {every: 5 s, after: 10 s}`
+    """
+
+    probability: Annotated[float, Field(ge=0.5, le=0.9999), Quantity("ratio")] = 0.95
+    """With which a consistent belief passes."""
+    every: PositiveDuration = 5.0
+    """Seconds between two samples."""
+    after: Duration = 0.0
+    """Only from this simulated time on: time to settle in."""
+    both_sides: bool = False
+    """Is a belief that is less sure than it may be a failure, too?"""
+
+    def judge(self, trace: Trace, case: Case) -> list[Finding]:
+        """The average against its upper bound, and with `both_sides` against its lower."""
+        samples = self._sampled(trace)
+        if samples is None:
+            return [undecided("localization_consistency", "the belief has no covariance")]
+        if not len(samples):
+            return [undecided("localization_consistency", f"there is no belief after t = {self.after:.2f} s")]
+        values = samples.values[:, 0]
+        worst = int(np.argmax(values))
+        at = (trace, int(samples.ticks[worst]))
+        if math.isinf(values[worst]):
+            return [missed("localization_consistency", "overconfident", "a covariance that is not singular", at)]
+        low, high = self._bounds(len(values))
+        mean, context = float(values.mean()), f"(mean of {len(values)} NEES, {DIMENSIONS} when consistent)"
+        findings = [at_most("localization_consistency", mean, high, "", at=at, context=context)]
+        if self.both_sides:
+            findings.append(at_least("localization_consistency doubt", mean, low, "", context=context))
+        return findings
+
+    def _bounds(self, count: int) -> tuple[float, float]:
+        if self.both_sides:
+            return mean_bounds(count, DIMENSIONS, self.probability)
+        return 0.0, quantile(self.probability, DIMENSIONS * count) / count
+
+    def _sampled(self, trace: Trace) -> Samples | None:
+        """The newest NEES at `after` and every so often from there to the last belief."""
+        every = nees_samples(trace)
+        if not len(every):
+            return None
+        first, last = max(self.after * trace.tick_rate, int(every.ticks[0])), int(every.ticks[-1])
+        times = np.arange(first, last + 1, self.every * trace.tick_rate).astype(np.int64)
+        chosen = np.searchsorted(every.ticks, times, side="right") - 1
+        return Samples(every.ticks[chosen], every.values[chosen])

@@ -1,0 +1,107 @@
+"""`smoothness`: how gently the robot drove."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from simscen.core.geometry import Array
+from simscen.core.verdict import Finding
+from simscen.criteria.base import Criterion
+from simscen.criteria.bounds import at_least, at_most, undecided
+from simscen.criteria.signal_table import SignalName, read
+from simscen.criteria.signal_values import Unavailable
+from simscen.criteria.signals import speed
+from simscen.criteria.smooth import STILL, ldlj, sparc
+from simscen.spec.base import Spec
+from simscen.spec.quantities import PositiveAcceleration, PositiveJerk
+
+if TYPE_CHECKING:
+    from simscen.core.case import Case
+    from simscen.core.trace import Trace
+
+
+class Smoothness(Spec, Criterion):
+    """The robot drove smoothly.
+
+    What is measured: of the true speed over ground, over the whole run: its change by time, either way
+        (acceleration), its second difference by time squared (jerk), and two measures of smoothness without a unit,
+        spectral arc length (SPARC, 0 = smooth) and log dimensionless jerk (LDLJ, greater = smoother).
+    When it fails: the largest acceleration or jerk or the mean jerk is above its bound, or SPARC or LDLJ below.
+    Why this: cargo tips and passengers feel jerk; a controller that chatters wears its gears and still arrives.
+    Source: Balasubramanian et al. 2015 and the authors' code for SPARC and LDLJ; HuNavSim and Arena report jerk, the
+        one as a first difference, the other without the time step.
+
+    SPARC hardly notices a stop on the way but sees a slow wobble, LDLJ sees the stop, and both drift with the
+    duration: bound them only in a scenario whose drive is always the same. A robot that never moved has neither, which
+    is inconclusive.
+
+    Example: `smoothness: {max_acceleration: 1 m/s^2, max_jerk: 60 m/s^3}`
+    """
+
+    max_acceleration: PositiveAcceleration | None = None
+    """m/s² over ground, speeding up or braking."""
+    max_jerk: PositiveJerk | None = None
+    """m/s³, either way."""
+    max_mean_jerk: PositiveJerk | None = None
+    """m/s³, its mean without sign."""
+    min_sparc: Annotated[float, Field(lt=0, ge=-1000)] | None = None
+    """Spectral arc length; a straight drive at one speed has about -2."""
+    min_ldlj: Annotated[float, Field(ge=-1000, le=1000)] | None = None
+    """Log dimensionless jerk."""
+
+    @model_validator(mode="after")
+    def _some_bound(self) -> Smoothness:
+        if not self.model_dump(exclude_none=True):
+            raise ValueError(f"expected at least one of: {', '.join(type(self).model_fields)}")
+        return self
+
+    def judge(self, trace: Trace, case: Case) -> list[Finding]:
+        """One finding for each bound that is given."""
+        findings = []
+        if self.max_acceleration is not None:
+            findings.append(_largest(trace, case, "acceleration", self.max_acceleration, "m/s^2"))
+        if self.max_jerk is not None:
+            findings.append(_largest(trace, case, "jerk", self.max_jerk, "m/s^3"))
+        if self.max_mean_jerk is not None:
+            findings.append(_mean_jerk(trace, case, self.max_mean_jerk))
+        if self.min_sparc is not None:
+            findings.append(_without_unit(trace, "sparc", self.min_sparc))
+        if self.min_ldlj is not None:
+            findings.append(_without_unit(trace, "ldlj", self.min_ldlj))
+        return findings
+
+
+def _largest(trace: Trace, case: Case, name: SignalName, limit: float, unit: str) -> Finding:
+    values = _read(trace, case, name)
+    if isinstance(values, str):
+        return undecided(name, values, f"≤ {limit:g} {unit}")
+    k = int(np.argmax(np.abs(values)))
+    return at_most(name, float(abs(values[k])), limit, unit, at=(trace, int(trace.truth.ticks[k])))
+
+
+def _mean_jerk(trace: Trace, case: Case, limit: float) -> Finding:
+    values = _read(trace, case, "jerk")
+    if isinstance(values, str):
+        return undecided("mean jerk", values, f"≤ {limit:g} m/s^3")
+    return at_most("mean jerk", float(values.mean()), limit, "m/s^3")
+
+
+def _read(trace: Trace, case: Case, name: SignalName) -> Array | str:
+    """The signal, or why there is none."""
+    try:
+        return read(name, trace, case, {})
+    except Unavailable as why:
+        return str(why)
+
+
+def _without_unit(trace: Trace, name: str, limit: float) -> Finding:
+    fast = speed(trace)
+    if not len(fast) or fast.values.max() < STILL:
+        return undecided(name, "the robot never moved", f"≥ {limit:g}")
+    value = (sparc if name == "sparc" else ldlj)(fast.values[:, 0], trace.tick_rate / float(np.diff(fast.ticks[:2])[0]))
+    if value is None:
+        return undecided(name, "the speed never changed", f"≥ {limit:g}")
+    return at_least(name, value, limit, "")

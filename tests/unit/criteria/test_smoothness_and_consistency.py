@@ -1,0 +1,91 @@
+"""What golden cases cannot sketch: exactly constant speeds, singular covariances, samples taken every so often."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from simscen.core.chisquare import mean_bounds
+from simscen.core.samples import Samples
+from simscen.core.verdict import Status
+from simscen.criteria.localization_consistency import LocalizationConsistency
+from simscen.criteria.smoothness import Smoothness
+from simscen.judge.sketch import sketch, sketch_case
+
+CASE = sketch_case({})
+
+
+def with_speeds(speeds):
+    trace = sketch({"seconds": (len(speeds) - 1) * 0.025, "truth": [[0, 0, 0]]})
+    zero = np.zeros(len(speeds))
+    return replace(trace, velocity=Samples(trace.truth.ticks, np.column_stack((speeds, zero, zero))))
+
+
+def test_a_speed_that_never_changes_has_no_ldlj():
+    (found,) = Smoothness(min_ldlj=-5.0).judge(with_speeds(np.full(41, 0.5)), CASE)
+    assert (found.status, found.measured) == (Status.INCONCLUSIVE, "the speed never changed")
+
+
+@pytest.mark.parametrize(("fastest", "status"), [(0.0099, Status.INCONCLUSIVE), (0.01, Status.PASS)])
+def test_trembling_is_not_driving(fastest, status):
+    speeds = fastest * np.sin(np.linspace(0, np.pi, 81))
+    assert Smoothness(min_sparc=-9.0).judge(with_speeds(speeds), CASE)[0].status is status
+
+
+def test_without_velocities_nothing_is_smooth():
+    trace = sketch({"seconds": 1, "truth": [[0, 0, 0]]})
+    nothing = Samples(np.empty(0, dtype=np.int64), np.empty((0, 3)))
+    every = Smoothness(max_acceleration=1.0, max_jerk=1.0, max_mean_jerk=1.0, min_sparc=-1.0, min_ldlj=-1.0)
+    findings = every.judge(replace(trace, velocity=nothing), CASE)
+    assert [found.status for found in findings] == [Status.INCONCLUSIVE] * 5
+
+
+def test_smoothness_needs_a_bound():
+    with pytest.raises(ValueError, match="expected at least one of: max_acceleration, max_jerk"):
+        Smoothness()
+
+
+def believing(seconds, covariances, offset=0.1):
+    trace = sketch({"seconds": seconds, "truth": [[0, 0, 0]], "belief": {"offset": [offset, 0, 0]}})
+    values = trace.belief.values.copy()
+    values[:, 3:9] = covariances
+    return replace(trace, belief=Samples(trace.belief.ticks, values))
+
+
+def test_a_singular_covariance_is_overconfident_where_it_is_sampled():
+    covariances = np.tile([0.01, 0, 0, 0.01, 0, 0.01], (101, 1))
+    covariances[50] = [0.01, 0.01, 0, 0.01, 0, 0.01]
+    trace = believing(10, covariances)
+    (found,) = LocalizationConsistency(every=1.0).judge(trace, CASE)
+    assert (found.status, found.measured, found.tick) == (Status.FAIL, "overconfident", 1200)
+    assert LocalizationConsistency(every=3.0).judge(trace, CASE)[0].status is Status.PASS
+
+
+def test_samples_are_taken_every_so_often_from_the_first_belief_or_the_time_given():
+    covariances = np.tile([0.01, 0, 0, 0.01, 0, 0.01], (101, 1))
+    covariances[30:] = [0.0025, 0, 0, 0.0025, 0, 0.0025]
+    trace = believing(10, covariances)
+    (all_of_it,) = LocalizationConsistency(every=2.0).judge(trace, CASE)
+    assert all_of_it.value == pytest.approx((2 * 1.0 + 4 * 4.0) / 6)
+    (later,) = LocalizationConsistency(every=2.0, after=2.5).judge(trace, CASE)
+    assert later.value == pytest.approx((1.0 + 3 * 4.0) / 4)
+
+
+@pytest.mark.parametrize("both_sides", [True, False])
+def test_bounds_are_two_sided_only_when_both_sides_count(both_sides):
+    trace = believing(10, np.tile([0.01, 0, 0, 0.01, 0, 0.01], (101, 1)))
+    findings = LocalizationConsistency(every=1.0, both_sides=both_sides).judge(trace, CASE)
+    high = findings[0].value + findings[0].margin
+    if both_sides:
+        assert high == pytest.approx(mean_bounds(11, 3, 0.95)[1])
+        assert findings[1].value - findings[1].margin == pytest.approx(mean_bounds(11, 3, 0.95)[0])
+    else:
+        assert high == pytest.approx(mean_bounds(11, 3, 0.90)[1])
+        assert len(findings) == 1
+
+
+def test_the_last_belief_is_a_sample_too():
+    trace = believing(10, np.tile([0.01, 0, 0, 0.01, 0, 0.01], (101, 1)))
+    (found,) = LocalizationConsistency(every=1.0, after=10.0).judge(trace, CASE)
+    assert found.status is Status.PASS
+    assert "(mean of 1 NEES" in found.limit
