@@ -28,3 +28,10 @@ class Passage:
         """The point halfway."""
         (ax, ay), (bx, by) = self.ends
         return (ax + bx) / 2, (ay + by) / 2
+
+    @property
+    def told(self) -> str:
+        """In words: "the passage of 0.90 m between `wall 3` and `wall 4` at (9.00, 5.75)"."""
+        one, other = self.between
+        between = f" between `{one}` and `{other}`" if one and other and one != other else ""
+        return f"the passage of {self.width:.2f} m{between} at ({self.middle[0]:.2f}, {self.middle[1]:.2f})"

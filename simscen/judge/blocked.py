@@ -35,7 +35,7 @@ def blocked(trace: Trace, case: Case, goal: str, tick: int, there: Sequence[Thin
     verb = "closes" if left < needed else "narrows"
     named = " and ".join(thing.told(trace) for thing in guilty)
     text = (
-        f"{named} {verb if len(guilty) == 1 else verb[:-1]} {_told(passage)} on the shortest way: "
+        f"{named} {verb if len(guilty) == 1 else verb[:-1]} {passage.told} on the shortest way: "
         f"{f'{left:.2f} m are' if left >= NOTHING else 'nothing is'} left, the robot is {needed:.2f} m wide"
     )
     return [text], {thing.event for thing in guilty}
@@ -74,12 +74,6 @@ def _ahead(trace: Trace, case: Case, goal: str, tick: int) -> list[Passage]:
 def _side(passage: Passage, point: tuple[float, float]) -> float:
     (ax, ay), (bx, by) = passage.ends
     return (bx - ax) * (point[1] - ay) - (by - ay) * (point[0] - ax)
-
-
-def _told(passage: Passage) -> str:
-    one, other = passage.between
-    between = f" between `{one}` and `{other}`" if one and other and one != other else ""
-    return f"the passage of {passage.width:.2f} m{between} at ({passage.middle[0]:.2f}, {passage.middle[1]:.2f})"
 
 
 def _reach(case: Case) -> float:

@@ -22,7 +22,7 @@ def halted(trace: Trace, case: Case, tick: int) -> tuple[list[str], set[str]]:
     if goal is None:
         return [], set()
     there = things(trace, tick)
-    lines, named = _walled_in(case, goal), set[str]()
+    lines, named = [*_walled_in(case, goal), *_touching(trace, tick)], set[str]()
     for told, events in (
         _occupied(trace, case, goal, there),
         blocked(trace, case, goal.name, tick, there),
@@ -56,7 +56,21 @@ def _failed(trace: Trace, case: Case, tick: int) -> Goal | None:
 def _walled_in(case: Case, goal: Goal) -> list[str]:
     if not math.isinf(case.shortest.get(goal.name, 0.0)):
         return []
-    return [f"the world itself leaves a robot of {2 * case.inscribed_radius:.2f} m no way to goal {goal.name}"]
+    needed = 2 * case.inscribed_radius
+    narrow = [passage for passage in case.passages if passage.goal == goal.name and passage.width < needed]
+    where = f": the widest is {narrow[0].told}" if narrow else ""
+    return [f"the world itself leaves a robot of {needed:.2f} m no way to goal {goal.name}{where}"]
+
+
+def _touching(trace: Trace, tick: int) -> list[str]:
+    """What it has begun to touch and still does."""
+    since: dict[str, int] = {}
+    for event in trace.of_kind(EventKind.COLLISION_STARTED, EventKind.COLLISION_ENDED):
+        if event.tick <= tick and event.kind == EventKind.COLLISION_STARTED:
+            since.setdefault(event.name, event.tick)
+        elif event.tick <= tick:
+            since.pop(event.name, None)
+    return [f"it had touched {name or 'something'} since t = {trace.seconds(at):.2f} s" for name, at in since.items()]
 
 
 def _occupied(trace: Trace, case: Case, goal: Goal, there: list[Thing]) -> tuple[list[str], set[str]]:

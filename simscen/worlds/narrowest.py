@@ -46,7 +46,12 @@ def narrowest(
     room = 2 * radius
     area = (x1 - x0 + 2 * room + 2) * (y1 - y0 + 2 * room + 2)
     grid = empty_grid((x0 - room, y0 - room, x1 + room, y1 + room), max(0.05, math.sqrt(area / MOST_CELLS)), "gap")
-    field = clearance_field(mesh, grid, z_range)
+    return narrowest_of(clearance_field(mesh, grid, z_range), ends, radius)
+
+
+def narrowest_of(field: ClearanceField, ends: tuple[Pose2, Pose2], radius: float) -> Gap:
+    """The same in a field that is there already."""
+    grid = field.grid
     clearance = _clearances(field, 2 * radius)
     cell = _bottleneck(clearance, grid.cell_of(np.array([ends[0][:2], ends[1][:2]])))
     place: Array = grid.centre_of(cell[None])[0]

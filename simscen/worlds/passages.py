@@ -37,6 +37,13 @@ def passages(way: Array, goal: str, field: ClearanceField) -> tuple[Passage, ...
     return tuple(_passage(goal, pair, field) for pair in sorted(found, key=lambda pair: found[pair]))
 
 
+def passage_of(sides: tuple[Point, ...], goal: str, field: ClearanceField) -> Passage:
+    """The passage between the two points of the outline that are nearest to `sides`."""
+    assert field.outline is not None
+    one, other = (int(field.outline.query(np.array(side))[1]) for side in sides)
+    return _passage(goal, (one, other), field)
+
+
 def _passage(goal: str, pair: tuple[int, int], field: ClearanceField) -> Passage:
     one, other = pair
     return Passage(goal, (_end(one, field), _end(other, field)), (_name(one, field), _name(other, field)))

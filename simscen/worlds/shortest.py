@@ -15,7 +15,8 @@ from simscen.core.shapes import TriangleMesh
 from simscen.core.world import BuiltWorld
 from simscen.worlds.clearance import HALF_DIAGONAL, clearance_field
 from simscen.worlds.lattice import Lattice, Numbers
-from simscen.worlds.passages import passages
+from simscen.worlds.narrowest import narrowest_of
+from simscen.worlds.passages import passage_of, passages
 from simscen.worlds.slicing import empty_grid
 from simscen.worlds.taut import is_clear, length, tighten
 
@@ -64,9 +65,18 @@ class ShortestWays:
         return math.inf if way is None else length(way)
 
     def leg(self, start: Pose2, goal: Pose2, name: str) -> Leg:
-        """The shortest way to the goal called `name`."""
+        """The shortest way to the goal called `name`; where there is none, the gap that is too narrow."""
         way = self.way(start, goal)
-        return Leg(math.inf) if way is None else Leg(length(way), passages(way, name, self._field))
+        if way is not None:
+            return Leg(length(way), passages(way, name, self._field))
+        return Leg(math.inf, self._too_narrow(start, goal, name))
+
+    def _too_narrow(self, start: Pose2, goal: Pose2, name: str) -> tuple[Passage, ...]:
+        """Nothing where an end itself is in the way of something, or where there is no gap at all."""
+        if not self._field.keeps(np.array([start[:2], goal[:2]]), self._allowed).all():
+            return ()
+        gap = narrowest_of(self._field, (start, goal), self._radius)
+        return (passage_of(gap.sides, name, self._field),) if len(gap.sides) == 2 else ()
 
     def way(self, start: Pose2, goal: Pose2) -> Array | None:
         """The corners (n, 2) of the shortest way, arcs as short chords; None if there is none."""

@@ -62,3 +62,13 @@ def test_an_oblique_door_is_as_wide_as_it_is():
     ]
     found = leg((-4, 0), (4, 0), *posts).passages
     assert min(passage.width for passage in found) == pytest.approx(0.8, abs=0.03)
+
+
+def test_a_gap_too_narrow_for_the_robot_is_the_passage_of_a_way_that_is_none():
+    narrow = wall("left", 0, 10.15, 0.1, 20), wall("right", 0, -10.15, 0.1, 20)
+    closed = leg((-4, 0), (4, 0), *narrow)
+    assert closed.length == math.inf
+    (gap,) = closed.passages
+    assert gap.width == pytest.approx(0.3, abs=0.03)
+    assert set(gap.between) == {"left", "right"}
+    assert leg((-4, 0), (0, 10), *narrow).passages == ()

@@ -1,0 +1,20 @@
+"""What was under way when something failed."""
+
+import pytest
+from whys import by, slip, why
+
+
+@pytest.mark.parametrize(
+    ("events", "told"),
+    [
+        (slip(2, 2, name="lidar.off", kind="off"), ["lidar.off was at work since t = 2.00 s, for 8.00 s"]),
+        (slip(0, 0, name="lidar.off", kind="off"), ["lidar.off was at work since the start, for 10.00 s"]),
+        (slip(2, 2, 8, "lidar.off", "off"), ["lidar.off had ended 2.00 s before, after 6.00 s"]),
+        (slip(2, 2, 6.5, "lidar.off", "off"), []),
+        ([[2, "fault.started", "lidar.off", {"entry": 0}]], []),
+        (by("gust", 6), ["event `gust` came 4.00 s before: something"]),
+        (by("gust", 4), []),
+    ],
+)
+def test_what_was_under_way_or_just_over_is_told_of_any_criterion(events, told):
+    assert why("speed", events, case={}) == [f"meanwhile: {text}" for text in told]

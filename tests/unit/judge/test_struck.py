@@ -1,0 +1,20 @@
+"""How what was touched came to be there."""
+
+from whys import box, by, why
+
+HIT = [2, "collision.started", "crate", {"robot_caused": True}]
+
+
+def test_what_was_put_before_the_robot_and_struck_is_named_with_its_distance():
+    lines = why("collisions", [*box(1.5, "crate", 2, 0, 0.4, 0.4, "crate falls"), HIT], at=2)
+    assert lines == ["why: crate: event `crate falls` had put it 0.30 m from the robot's middle 0.50 s before"]
+
+
+def test_what_ran_into_the_robot_is_told_with_its_speed():
+    moved = by("cart comes", 1, [1, "object.moved", "crate", {}])
+    hit = [*HIT[:3], {"robot_caused": False}]
+    way = {"crate": [[0, 2, 4], [1, 2, 4], [2, 2, 0.5], [10, 2, 0.5]]}
+    assert why("collisions", [*box(0, "crate", 2, 4, 0.4, 0.4), *moved, hit], at=2, objects=way) == [
+        "why: crate: event `cart comes` had moved it 1.00 s before, it moved at 3.50 m/s, and ran into the robot"
+    ]
+    assert why("collisions", [*box(0, "crate", 2, 0, 0.4, 0.4), HIT], at=2) == []
