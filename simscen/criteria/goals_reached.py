@@ -108,9 +108,15 @@ class GoalsReached(Spec, Criterion):
             ),
         ]
         if self.within is not None:
-            taken = trace.seconds(tick - (story.accepted or 0))
-            findings.append(at_most(f"{what} time", taken, self.within, "s", at=(trace, tick)))
+            findings.append(self._time(trace, story, self.within))
         return findings
+
+    def _time(self, trace: Trace, story: GoalStory, within: float) -> Finding:
+        what = f"goal {story.goal.name} time"
+        if story.accepted is None or story.reached is None:
+            return undecided(what, "when it was accepted was not recorded", f"≤ {within:.2f} s")
+        taken = trace.seconds(story.reached - story.accepted)
+        return at_most(what, taken, within, "s", at=(trace, story.reached))
 
 
 def _not_reached(trace: Trace, story: GoalStory) -> Finding:

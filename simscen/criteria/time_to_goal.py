@@ -55,13 +55,14 @@ class TimeToGoal(Spec, Criterion):
         return [self._timed(trace, "time_to_goal", start, unreached[0] if unreached else awaited[-1])]
 
     def _timed(self, trace: Trace, what: str, start: int | None, story: GoalStory) -> Finding:
-        begun = start or 0
+        if start is None:
+            return self._never_begun(trace, what, story)
         if story.reached is not None:
-            return at_most(what, trace.seconds(story.reached - begun), self.max, "s", at=(trace, story.reached))
+            return at_most(what, trace.seconds(story.reached - start), self.max, "s", at=(trace, story.reached))
         if story.preempted:
             return undecided(what, story.fate)
         expected = f"to be there within {self.max:.2f} s"
-        so_far = trace.seconds(trace.end - begun)
+        so_far = trace.seconds(trace.end - start)
         if story.end is None and so_far > self.max:
             return at_most(
                 what, so_far, self.max, "s", at=(trace, trace.end), detail=[f"goal {story.goal.name}: {story.fate}"]
@@ -71,3 +72,12 @@ class TimeToGoal(Spec, Criterion):
         tick = trace.end if story.end is None else story.end.tick
         fate = f"goal {story.goal.name}: {story.fate}"
         return missed(what, "never reached", expected, (trace, tick), [fate])
+
+    def _never_begun(self, trace: Trace, what: str, story: GoalStory) -> Finding:
+        """Without an acceptance no clock runs; a log that begins later may still hold the arrival."""
+        expected = f"to be there within {self.max:.2f} s"
+        if story.end is None and finished(trace):
+            return missed(
+                what, "never reached", expected, (trace, trace.end), [f"goal {story.goal.name}: {story.fate}"]
+            )
+        return undecided(what, "when its goal was accepted was not recorded", expected)

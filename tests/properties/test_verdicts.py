@@ -68,7 +68,8 @@ def waypoints(draw):
 
 
 @st.composite
-def traces(draw) -> Trace:
+def runs(draw) -> dict:
+    """A run in the words of a sketch, which a failure can show."""
     times = sorted(draw(st.lists(TIME, min_size=9, max_size=9)))
     kinds = [
         ("goal.accepted", "a", {}),
@@ -82,14 +83,13 @@ def traces(draw) -> Trace:
         ("navigation.ended", draw(st.sampled_from(["SUCCEEDED", "FAILED"])), {"error_code": 0}),
     ]
     chosen = draw(st.lists(st.booleans(), min_size=9, max_size=9))
-    words = {
+    return {
         "seconds": SECONDS,
         "truth": draw(waypoints()),
         "belief": draw(waypoints()),
         "clearance": [[0, draw(BOUND)], [SECONDS, draw(BOUND)]],
         "events": [[t, *kind] for t, kind, there in zip(times, kinds, chosen, strict=True) if there],
     }
-    return sketch(words)
 
 
 @st.composite
@@ -115,10 +115,10 @@ def test_every_criterion_is_drawn():
     assert {*LIMITS, *LOWERED, *FIXED, *TEMPORAL} >= set(AnyCriterion.choices())
 
 
-@given(traces(), criteria())
+@given(runs(), criteria())
 @settings(deadline=None)
-def test_the_sign_of_a_margin_is_the_verdict(trace, criterion):
-    found = verdict(*criterion, trace)
+def test_the_sign_of_a_margin_is_the_verdict(run, criterion):
+    found = verdict(*criterion, sketch(run))
     for finding in found.findings:
         if finding.margin is not None:
             assert finding.status is (Status.PASS if finding.margin >= 0 else Status.FAIL), finding
@@ -126,10 +126,10 @@ def test_the_sign_of_a_margin_is_the_verdict(trace, criterion):
         assert all(finding.status is Status.PASS for finding in found.findings)
 
 
-@given(traces(), criteria(), st.data())
+@given(runs(), criteria(), st.data())
 @settings(deadline=None)
-def test_loosening_a_bound_never_turns_a_pass_into_anything_else(trace, criterion, data):
-    kind, words = criterion
+def test_loosening_a_bound_never_turns_a_pass_into_anything_else(run, criterion, data):
+    (kind, words), trace = criterion, sketch(run)
     raised, lowered = LIMITS.get(kind, ()), LOWERED.get(kind, ())
     assume(raised or lowered)
     key = data.draw(st.sampled_from([*raised, *lowered]))
@@ -163,10 +163,10 @@ def shifted(trace: Trace, ticks: int) -> Trace:
     )
 
 
-@given(traces(), criteria(), st.integers(1, 10_000))
+@given(runs(), criteria(), st.integers(1, 10_000))
 @settings(deadline=None)
-def test_a_run_that_is_moved_in_time_has_the_same_verdict_at_moved_ticks(trace, criterion, ticks):
-    kind, words = criterion
+def test_a_run_that_is_moved_in_time_has_the_same_verdict_at_moved_ticks(run, criterion, ticks):
+    (kind, words), trace = criterion, sketch(run)
     assume(kind != "relocalized_within" or "after" in words)
     now, then = verdict(kind, words, trace), verdict(kind, words, shifted(trace, ticks))
     assert [(f.status, f.what, f.value, f.margin) for f in now.findings] == [
@@ -175,9 +175,10 @@ def test_a_run_that_is_moved_in_time_has_the_same_verdict_at_moved_ticks(trace, 
     assert [f.tick if f.tick is None else f.tick + ticks for f in now.findings] == [f.tick for f in then.findings]
 
 
-@given(traces(), criteria(), st.integers(1, 400))
+@given(runs(), criteria(), st.integers(1, 400))
 @settings(deadline=None)
-def test_what_was_not_decided_or_failed_when_a_log_was_cut_off_is_never_a_pass_there(trace, criterion, cut):
+def test_what_was_not_decided_or_failed_when_a_log_was_cut_off_is_never_a_pass_there(run, criterion, cut):
+    trace = sketch(run)
     end = trace.end - cut
     events = tuple(e for e in trace.events if e.tick <= end and e.kind is not EventKind.RUN_ENDED)
     assert verdict(*criterion, replace(trace, events=events)).status is not Status.PASS

@@ -31,6 +31,10 @@ def test_its_schema_lists_names_and_numbers():
         ({}, "NONE"),
         ({"error_code": 206}, "GOAL_OCCUPIED"),
         ({"error_code": 4711}, "4711"),
+        ({"error_code": 206, "error_name": ""}, "GOAL_OCCUPIED"),
+        ({"error_code": 206, "error_name": 3}, "GOAL_OCCUPIED"),
+        ({"error_code": None}, "NONE"),
+        ({"error_code": "odd"}, "odd"),
         ({"error_code": 206, "error_name": "GOAL_OCCUPIED"}, "GOAL_OCCUPIED"),
     ],
 )

@@ -1,0 +1,93 @@
+"""What can be asked of a run, what cannot, and what is meant when nothing is said."""
+
+import pytest
+from pydantic import ValidationError
+
+from simscen.criteria.base import Criterion
+from simscen.criteria.criterion import AnyCriterion
+
+
+def spec(kind, words):
+    return AnyCriterion.model_validate({kind: words}).chosen
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        ("speed", {"max": 1}),
+        ("speed", {"max_turn_rate": 1}),
+        ("path_length", {"max": 1}),
+        ("path_length", {"max_ratio": 1}),
+        ("localization_error", {"max": 1}),
+        ("localization_error", {"rmse": 1}),
+        ("localization_error", {"final": 1}),
+        ("localization_error", {"max_yaw": 1}),
+        ("replans", {"min": 1}),
+        ("replans", {"max": 0}),
+        ("replans", {"min": 0, "max": 0}),
+        ("replans", {"min": 2, "max": 2}),
+        ("recoveries", {"min": 100_000}),
+        ("collisions", {"max": 100_000}),
+        ("collisions", {"max_impulse": 0}),
+        ("goals_reached", {"goals": ["a"] * 1000}),
+        ("keepout", {"region": "wet", "distance": 0}),
+        ("clearance", {"min": 0}),
+    ],
+)
+def test_each_bound_can_stand_alone(kind, words):
+    assert spec(kind, words).model_dump(exclude_unset=True) == words
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        ("speed", {}),
+        ("path_length", {}),
+        ("localization_error", {}),
+        ("localization_error", {"after": 1}),
+        ("replans", {}),
+        ("replans", {"min": 0}),
+        ("replans", {"min": 3, "max": 2}),
+        ("replans", {"reason": "blocked"}),
+        ("recoveries", {"min": 100_001}),
+        ("recoveries", {"max": -1}),
+        ("collisions", {"max": -1}),
+        ("collisions", {"max": 100_001}),
+        ("collisions", {"max_impulse": -1}),
+        ("goals_reached", {"goals": []}),
+        ("goals_reached", {"goals": ["a"] * 1001}),
+        ("goals_reached", {"tolerance": 0}),
+        ("keepout", {"region": "wet", "distance": -1}),
+        ("clearance", {"min": -1}),
+    ],
+)
+def test_what_bounds_nothing_or_cannot_be_is_refused(kind, words):
+    with pytest.raises(ValidationError):
+        spec(kind, words)
+
+
+@pytest.mark.parametrize(
+    ("kind", "words", "meant"),
+    [
+        ("keepout", {"region": "wet"}, {"distance": 0.0}),
+        ("no_false_success", {}, {"tolerance": 1.0}),
+        ("collisions", {}, {"max": None, "caused_by_robot": False}),
+        ("stuck", {}, {"max": 10.0, "radius": 0.5}),
+        ("localization_error", {"max": 1}, {"after": 0.0}),
+        ("relocalized_within", {"time": 5}, {"tolerance": 0.25, "yaw_tolerance": 0.25, "hold": 1.0, "after": None}),
+        (
+            "stopped_within",
+            {"time": 1, "after": "lidar.off"},
+            {"speed": 0.02, "turn_rate": 0.05, "hold": 0.2, "stay": False},
+        ),
+    ],
+)
+def test_what_is_not_said_means_what_the_reference_says(kind, words, meant):
+    found = spec(kind, words)
+    assert {key: getattr(found, key) for key in meant} == meant
+
+
+def test_only_clearance_asks_for_clearance_and_for_half_a_metre_more_than_its_bound():
+    assert spec("clearance", {"min": 3}).clearance_range == 3.5
+    others = [spec("speed", {"max": 1}), spec("collisions", {}), spec("goals_reached", {})]
+    assert [isinstance(other, Criterion) and other.clearance_range for other in others] == [0.0, 0.0, 0.0]
