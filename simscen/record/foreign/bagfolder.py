@@ -21,7 +21,13 @@ class BagMessages:
     def __iter__(self) -> Iterator[Raw]:
         """Read the folder once. Raises Unusable."""
         files = sorted(self._folder.glob("*.mcap"), key=_numbered)
-        return self._own(files) if files else self._through_rosbags()
+        return self._own(files) if files and not self._is_compressed() else self._through_rosbags()
+
+    def _is_compressed(self) -> bool:
+        """Whether rosbag2 compressed each message or file on top of what MCAP does."""
+        metadata = self._folder / "metadata.yaml"
+        text = metadata.read_text(encoding="utf-8", errors="replace") if metadata.is_file() else ""
+        return re.search(r"compression_mode:\s*['\"]?(message|file)", text, re.IGNORECASE) is not None
 
     def _own(self, files: list[Path]) -> Iterator[Raw]:
         whole = []

@@ -90,7 +90,10 @@ class Reading:
         ]
         if not logged:
             names = ", ".join(sorted(self._topics)[:MOST_NAMED]) or "none at all"
-            raise Unusable("it holds nothing that could be judged", f"its topics: {names}; name others with --topic")
+            why = "".join(f"; {reason}" for reason in self._found.lacking.values())
+            raise Unusable(
+                f"it holds nothing that could be judged{why}", f"its topics: {names}; name others with --topic"
+            )
         own = [track.stamped for track in tracks if track is not None and track.stamped is not None]
         others = (self._stamped(role) for role in ("odom", "scan"))
         anchor = next((one for one in (*own, *others) if one is not None), None)

@@ -1,0 +1,167 @@
+"""Logs of a robot that simscen never met, written by rosbags and mcap from rosbags' own message definitions."""
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mcap.writer import CompressionType, IndexType
+from mcap.writer import Writer as McapWriter
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+
+STORE = get_typestore(Stores.ROS2_HUMBLE)
+T: dict[str, Any] = STORE.types
+SECOND = 1_000_000_000
+BEGIN = 1_700_000_000 * SECOND
+LATENCY = 20_000_000
+SPEED = 0.5
+
+
+@dataclass(frozen=True)
+class Said:
+    """A message: its topic, when it was logged (ns) and what it is; its own stamp is in there."""
+
+    topic: str
+    time: int
+    message: Any
+
+
+def drive(seconds: float = 10.0, begin: int = BEGIN, off: float = 0.05, mocap: str = "map") -> list[Said]:
+    """A robot that drives along x at 0.5 m/s and believes itself `off` metres further; /mocap knows better."""
+    said = []
+    for k in range(round(seconds * 20) + 1):
+        t = k / 20
+        stamp = begin + round(t * SECOND)
+        pose = stamped_pose(stamp, mocap, SPEED * t)
+        said.append(Said("/mocap", stamp + LATENCY, pose))
+        said.append(Said("/odom", stamp + LATENCY, odometry(stamp, "odom", SPEED * t, SPEED)))
+        said.append(Said("/cmd_vel", stamp + LATENCY, twist(SPEED)))
+        if k % 10 == 0:
+            said.append(Said("/amcl_pose", stamp + 5 * LATENCY, believed(stamp, SPEED * t + off)))
+            said.append(Said("/scan", stamp + LATENCY, scan(stamp)))
+    return said
+
+
+def stamp_of(time: int) -> Any:
+    """builtin_interfaces/Time."""
+    return T["builtin_interfaces/msg/Time"](sec=time // SECOND, nanosec=time % SECOND)
+
+
+def header(time: int, frame: str) -> Any:
+    """std_msgs/Header."""
+    return T["std_msgs/msg/Header"](stamp=stamp_of(time), frame_id=frame)
+
+
+def pose(x: float, y: float = 0.0, yaw: float = 0.0) -> Any:
+    """geometry_msgs/Pose."""
+    turn = T["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=math.sin(yaw / 2), w=math.cos(yaw / 2))
+    return T["geometry_msgs/msg/Pose"](position=T["geometry_msgs/msg/Point"](x=x, y=y, z=0.0), orientation=turn)
+
+
+def stamped_pose(time: int, frame: str, x: float) -> Any:
+    """geometry_msgs/PoseStamped."""
+    return T["geometry_msgs/msg/PoseStamped"](header=header(time, frame), pose=pose(x))
+
+
+def twist(forward: float) -> Any:
+    """geometry_msgs/Twist."""
+    vector = T["geometry_msgs/msg/Vector3"]
+    return T["geometry_msgs/msg/Twist"](linear=vector(x=forward, y=0.0, z=0.0), angular=vector(x=0.0, y=0.0, z=0.0))
+
+
+def odometry(time: int, frame: str, x: float, forward: float) -> Any:
+    """nav_msgs/Odometry."""
+    where = T["geometry_msgs/msg/PoseWithCovariance"](pose=pose(x), covariance=np.zeros(36))
+    fast = T["geometry_msgs/msg/TwistWithCovariance"](twist=twist(forward), covariance=np.zeros(36))
+    message = T["nav_msgs/msg/Odometry"]
+    return message(header=header(time, frame), child_frame_id="base_link", pose=where, twist=fast)
+
+
+def believed(time: int, x: float) -> Any:
+    """geometry_msgs/PoseWithCovarianceStamped."""
+    covariance = np.zeros(36)
+    covariance[[0, 7, 35]] = 0.01
+    where = T["geometry_msgs/msg/PoseWithCovariance"](pose=pose(x), covariance=covariance)
+    return T["geometry_msgs/msg/PoseWithCovarianceStamped"](header=header(time, "map"), pose=where)
+
+
+def scan(time: int) -> Any:
+    """sensor_msgs/LaserScan."""
+    ranges = np.full(8, 2.0, dtype=np.float32)
+    return T["sensor_msgs/msg/LaserScan"](
+        header=header(time, "lidar"), angle_min=-1.0, angle_max=1.0, angle_increment=0.25, time_increment=0.0,
+        scan_time=0.1, range_min=0.1, range_max=10.0, ranges=ranges, intensities=np.zeros(0, dtype=np.float32),
+    )  # fmt: skip
+
+
+def link(time: int, parent: str, child: str, x: float, y: float = 0.0, yaw: float = 0.0) -> Any:
+    """tf2_msgs/TFMessage with one transform."""
+    where = pose(x, y, yaw)
+    at = T["geometry_msgs/msg/Vector3"](x=x, y=y, z=0.0)
+    transform = T["geometry_msgs/msg/Transform"](translation=at, rotation=where.orientation)
+    one = T["geometry_msgs/msg/TransformStamped"](
+        header=header(time, parent), child_frame_id=child, transform=transform
+    )
+    return T["tf2_msgs/msg/TFMessage"](transforms=[one])
+
+
+def statuses(*goals: tuple[int, int, int]) -> Any:
+    """action_msgs/GoalStatusArray of (id, accepted at, status)."""
+    uuid, info = T["unique_identifier_msgs/msg/UUID"], T["action_msgs/msg/GoalInfo"]
+    listed = [
+        T["action_msgs/msg/GoalStatus"](
+            goal_info=info(goal_id=uuid(uuid=np.full(16, number, dtype=np.uint8)), stamp=stamp_of(accepted)),
+            status=status,
+        )
+        for number, accepted, status in goals
+    ]
+    return T["action_msgs/msg/GoalStatusArray"](status_list=listed)
+
+
+def write_bag(
+    folder: Path, said: Iterable[Said], plugin: StoragePlugin = StoragePlugin.SQLITE3, compress: str = ""
+) -> Path:
+    """A rosbag2 as rosbags writes it; `compress` is file or message."""
+    writer = Writer(folder, version=9, storage_plugin=plugin)
+    if compress:
+        writer.set_compression(CompressionMode[compress.upper()], CompressionFormat.ZSTD)
+    with writer:
+        connections: dict[str, Any] = {}
+        for one in said:
+            kind = one.message.__msgtype__
+            if one.topic not in connections:
+                connections[one.topic] = writer.add_connection(one.topic, kind, typestore=STORE)
+            writer.write(connections[one.topic], one.time, bytes(STORE.serialize_cdr(one.message, kind)))
+    return folder
+
+
+def write_mcap(
+    file: Path,
+    said: Iterable[Said],
+    profile: str = "ros2",
+    encoding: str = "cdr",
+    change: Callable[[bytes], bytes] = bytes,
+    **options: Any,
+) -> Path:
+    """An MCAP file as the mcap library writes it; `change` is done to the bytes of each message."""
+    with file.open("wb") as stream:
+        writer = McapWriter(stream, **options)
+        writer.start(profile, "somebody")
+        channels: dict[str, int] = {}
+        for number, one in enumerate(said):
+            kind = one.message.__msgtype__
+            if one.topic not in channels:
+                definition, _ = STORE.generate_msgdef(kind, ros_version=2)
+                schema = writer.register_schema(kind, "ros2msg", definition.encode())
+                channels[one.topic] = writer.register_channel(one.topic, encoding, schema)
+            data = change(bytes(STORE.serialize_cdr(one.message, kind)))
+            writer.add_message(channels[one.topic], one.time, data, one.time, number)
+        writer.finish()
+    return file
+
+
+UNINDEXED: dict[str, Any] = {"use_chunking": False, "index_types": IndexType.NONE, "use_statistics": False}
+CHUNKED: dict[str, dict[str, Any]] = {kind.name: {"compression": kind} for kind in CompressionType}

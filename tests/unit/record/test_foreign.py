@@ -1,0 +1,315 @@
+"""Logs of real robots become traces, as far as they go and no further."""
+
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from foreign_logs import (
+    BEGIN,
+    CHUNKED,
+    SECOND,
+    SPEED,
+    STORE,
+    UNINDEXED,
+    Said,
+    believed,
+    drive,
+    link,
+    odometry,
+    stamped_pose,
+    statuses,
+    write_bag,
+    write_mcap,
+)  # fmt: skip
+from rosbags.rosbag2 import StoragePlugin
+
+from simscen.core.errors import InvalidInput
+from simscen.core.events import EventKind
+from simscen.core.evidence import Evidence
+from simscen.record.foreign.read import ForeignLog, read_foreign
+from simscen.record.foreign.wanted import Wanted
+
+MOCAP = Wanted(truth="/mocap")
+WRITERS: dict[str, Callable[[Path, list[Said]], Path]] = {
+    "sqlite": lambda path, said: write_bag(path / "bag", said),
+    "sqlite, files compressed": lambda path, said: write_bag(path / "bag", said, compress="file"),
+    "sqlite, messages compressed": lambda path, said: write_bag(path / "bag", said, compress="message"),
+    "rosbag2 of mcap": lambda path, said: write_bag(path / "bag", said, StoragePlugin.MCAP),
+    "rosbag2 of mcap, messages compressed": lambda path, said: write_bag(
+        path / "bag", said, StoragePlugin.MCAP, "message"
+    ),
+    "mcap without chunks or index": lambda path, said: write_mcap(path / "a.mcap", said, **UNINDEXED),
+    **{
+        f"mcap {name}": lambda path, said, options=options: write_mcap(path / "a.mcap", said, **options)  # type: ignore[misc]
+        for name, options in CHUNKED.items()
+    },
+}
+
+
+@pytest.fixture
+def read(tmp_path: Path) -> Callable[..., ForeignLog]:
+    """Writes messages as an MCAP file and reads it."""
+
+    def call(said: list[Said], wanted: Wanted = MOCAP, **options: Any) -> ForeignLog:
+        return read_foreign(write_mcap(tmp_path / "a.mcap", said, **options), wanted)
+
+    return call
+
+
+@pytest.fixture
+def refused(read: Callable[..., ForeignLog]) -> Callable[..., str]:
+    """Why a log cannot be used."""
+
+    def call(said: list[Said], wanted: Wanted = MOCAP, **options: Any) -> str:
+        with pytest.raises(InvalidInput) as raised:
+            read(said, wanted, **options)
+        (problem,) = raised.value.problems
+        return f"{problem.code} {problem.message} ({problem.hint})"
+
+    return call
+
+
+@pytest.mark.parametrize("writer", WRITERS)
+def test_every_container_gives_the_same_trace(tmp_path: Path, writer: str) -> None:
+    log = read_foreign(WRITERS[writer](tmp_path, drive()), MOCAP)
+    trace = log.trace
+    assert not log.notes
+    assert (trace.tick_rate, trace.seconds(trace.end)) == (1000, pytest.approx(10.0, abs=0.1))
+    assert len(trace.truth) == len(trace.odometry) == len(trace.command) == 201
+    assert len(trace.belief) == len(trace.scans) == 21
+    np.testing.assert_allclose(trace.truth.values[:, 0], SPEED * trace.truth.ticks / 1000, atol=0.02)
+    np.testing.assert_allclose(trace.velocity.values, np.tile([SPEED, 0, 0], (201, 1)), atol=1e-6)
+    np.testing.assert_allclose(trace.belief.values[:, 3:], np.tile([0.01, 0, 0, 0.01, 0, 0.01], (21, 1)))
+    assert [event.kind for event in trace.events] == [EventKind.RUN_ENDED]
+    assert not log.coverage.partial
+    assert set(Evidence) - set(log.coverage.missing) == {
+        Evidence.TRUTH, Evidence.VELOCITY, Evidence.BELIEF, Evidence.ALIGNMENT
+    }  # fmt: skip
+
+
+def test_stamps_count_not_when_the_log_got_the_message(read: Callable[..., ForeignLog]) -> None:
+    """AMCL's pose is logged 80 ms after the truth of the same moment; at 0.5 m/s that would be 4 cm of error."""
+    log = read(drive(off=0.0))
+    error = log.trace.belief.values[:, 0] - np.interp(
+        log.trace.belief.ticks, log.trace.truth.ticks, log.trace.truth.values[:, 0]
+    )
+    assert np.abs(error).max() < 1e-3
+    by_log = read(drive(off=0.0), Wanted(truth="/mocap", clock="log"))
+    late = by_log.trace.belief.values[:, 0] - np.interp(
+        by_log.trace.belief.ticks, by_log.trace.truth.ticks, by_log.trace.truth.values[:, 0]
+    )
+    assert np.abs(late[:-1]).max() == pytest.approx(0.04, abs=0.002)
+
+
+def test_what_has_no_stamp_is_placed_by_the_clock_of_what_has(read: Callable[..., ForeignLog]) -> None:
+    """Twist has no header; with simulated time the log's own clock is another one, and runs at another rate."""
+    said = [replace(one, time=BEGIN + 2 * (one.time - 5 * SECOND)) for one in drive(begin=5 * SECOND)]
+    trace = read(said).trace
+    assert trace.seconds(trace.end) == pytest.approx(10.0, abs=0.2)
+    assert np.abs(trace.command.ticks - trace.truth.ticks).max() <= 2
+
+
+def test_without_a_truth_nothing_is_known_of_it_and_the_reason_names_what_could_be(
+    read: Callable[..., ForeignLog],
+) -> None:
+    log = read(drive(), Wanted())
+    assert len(log.trace.truth) == 0
+    assert log.coverage.missing[Evidence.TRUTH] == (
+        "nothing counts as the truth: name a topic or two frames with --truth; poses are on: /amcl_pose, /mocap, /odom"
+    )
+    assert "no topic /vicon" in read(drive(), Wanted(truth="/vicon")).coverage.missing[Evidence.TRUTH]
+
+
+def test_two_frames_of_tf_can_be_the_truth(read: Callable[..., ForeignLog]) -> None:
+    """map ← odom holds until it is told anew, odom ← base moves, base ← marker is static."""
+    said = drive()
+    for k in range(201):
+        stamp = BEGIN + k * SECOND // 20
+        said.append(Said("/tf", stamp, link(stamp, "odom", "base_link", SPEED * k / 20)))
+    for at, offset in ((0, 1.0), (5, 2.0)):
+        said.append(Said("/tf", BEGIN + at * SECOND, link(BEGIN + at * SECOND, "map", "odom", 0.0, offset, 1.5707963)))
+    said.append(Said("/tf_static", BEGIN, link(0, "/base_link", "/marker", 0.25)))
+    trace = read(said, Wanted(truth="map:marker")).trace
+    x, y, yaw = trace.truth.values.T
+    np.testing.assert_allclose(x, 0.0, atol=1e-6)
+    offset = np.where(trace.truth.ticks < 5000, 1.0, 2.0)
+    np.testing.assert_allclose(y, offset + 0.25 + SPEED * trace.truth.ticks / 1000, atol=2e-3)
+    np.testing.assert_allclose(yaw, np.pi / 2, atol=1e-6)
+    lost = read(said, Wanted(truth="map:wheel")).coverage.missing[Evidence.TRUTH]
+    assert lost == "tf does not connect map with wheel; frames: base_link, map, marker, odom"
+
+
+def test_a_truth_in_a_frame_of_its_own_is_not_compared_with_the_map(read: Callable[..., ForeignLog]) -> None:
+    log = read(drive(mocap="vicon"))
+    assert "frame `vicon`, the map's is `map`" in log.coverage.missing[Evidence.ALIGNMENT]
+    assert Evidence.TRUTH not in log.coverage.missing
+    same = read(drive(mocap="vicon"), Wanted(truth="/mocap", same_frame=True))
+    assert Evidence.ALIGNMENT not in same.coverage.missing
+
+
+def test_repeated_and_late_stamps_are_put_in_order_and_told(read: Callable[..., ForeignLog]) -> None:
+    said = [one for one in drive() if one.topic == "/mocap"]
+    said[10], said[11] = replace(said[10], message=said[11].message), replace(said[11], message=said[10].message)
+    said.insert(51, replace(said[50], time=said[50].time + 1))
+    log = read(said)
+    assert len(log.trace.truth) == 201
+    assert (np.diff(log.trace.truth.ticks) > 0).all()
+    assert (np.diff(log.trace.truth.values[:, 0]) > 0).all()
+    assert log.notes == ["/mocap: 1 came after a later one, 1 had the stamp of another, of which the last counts"]
+
+
+def test_a_clock_that_jumps_back_is_refused(refused: Callable[..., str]) -> None:
+    said = drive(4.0) + [replace(one, time=one.time + 5 * SECOND) for one in drive(4.0)]
+    assert refused(said).startswith("SC804 the time of /mocap jumps back by 4.0 s at its message 82 (")
+
+
+def test_topics_of_different_clocks_are_refused(refused: Callable[..., str], read: Callable[..., ForeignLog]) -> None:
+    said = [one for one in drive() if one.topic == "/mocap"]
+    said += [Said("/amcl_pose", BEGIN + k * SECOND, believed(k * SECOND, SPEED * k)) for k in range(10)]
+    assert "/amcl_pose and /mocap do not share a clock" in refused(said)
+    assert len(read(said, Wanted(truth="/mocap", clock="log")).trace.belief) == 10
+
+
+def test_stamps_that_nobody_set_are_not_used(read: Callable[..., ForeignLog]) -> None:
+    said = [one for one in drive() if one.topic != "/mocap"]
+    said += [Said("/mocap", BEGIN + k * SECOND // 20, stamped_pose(0, "map", SPEED * k / 20)) for k in range(201)]
+    log = read(said)
+    assert len(log.trace.truth) == 201
+    assert log.notes == ["/mocap: its stamps are all zero; its times are those of logging"]
+
+
+def test_a_gap_in_the_truth_leaves_room_for_doubt(read: Callable[..., ForeignLog]) -> None:
+    gone = (BEGIN + 4 * SECOND, BEGIN + 6 * SECOND)
+    log = read([one for one in drive() if one.topic != "/mocap" or not gone[0] < one.time < gone[1]])
+    assert log.coverage.partial[Evidence.TRUTH].startswith("/mocap says nothing from t = 3.9")
+    late = read([one for one in drive() if one.topic != "/mocap" or one.time > gone[1]])
+    assert late.coverage.partial[Evidence.TRUTH].startswith("/mocap says nothing from t = 0.00 s to 6.0")
+
+
+def test_a_belief_that_begins_after_a_metre_of_driving_leaves_room_for_doubt(read: Callable[..., ForeignLog]) -> None:
+    log = read([one for one in drive() if one.topic != "/amcl_pose" or one.time > BEGIN + 2 * SECOND])
+    assert log.coverage.partial[Evidence.BELIEF].startswith("/amcl_pose begins at t = 2.0")
+
+
+def test_a_twist_that_nobody_filled_in_is_no_standstill(read: Callable[..., ForeignLog]) -> None:
+    said = [Said("/gps", BEGIN + k * SECOND // 20, odometry(BEGIN + k * SECOND // 20, "map", SPEED * k / 20, 0.0))
+            for k in range(201)]  # fmt: skip
+    log = read(said, Wanted(truth="/gps"))
+    assert log.notes == ["/gps: its twist is zero though the robot moves; its poses say how fast"]
+    np.testing.assert_allclose(log.trace.velocity.values[:, 0], SPEED, atol=1e-6)
+
+
+@pytest.mark.parametrize("size", [0.2, 0.5, 0.9, 0.995])
+def test_a_log_that_breaks_off_has_no_end(tmp_path: Path, size: float) -> None:
+    file = write_mcap(tmp_path / "a.mcap", drive(), **UNINDEXED)
+    data = file.read_bytes()
+    file.write_bytes(data[: int(len(data) * size)])
+    log = read_foreign(file, MOCAP)
+    assert not log.trace.events
+    assert log.notes == ["the log breaks off, so nothing passes on it"]
+
+
+def test_a_log_of_ros_1_is_refused(refused: Callable[..., str], tmp_path: Path) -> None:
+    assert refused(drive(), profile="ros1").startswith("SC804 it is a log of ROS 1 (")
+    assert refused(drive(), profile="", encoding="ros1").startswith("SC804 it is a log of ROS 1 (")
+    (tmp_path / "a.bag").write_bytes(b"#ROSBAG V2.0\n")
+    with pytest.raises(InvalidInput, match="it is a bag of ROS 1"):
+        read_foreign(tmp_path / "a.bag", MOCAP)
+
+
+def test_what_is_of_another_type_is_left_out_and_told(read: Callable[..., ForeignLog]) -> None:
+    renamed = [replace(one, topic="/amcl_pose") for one in drive() if one.topic == "/scan"]
+    log = read([*(one for one in drive() if one.topic != "/amcl_pose"), *renamed])
+    assert log.coverage.missing[Evidence.BELIEF].startswith("/amcl_pose is a sensor_msgs/msg/LaserScan, expected ")
+
+
+def test_messages_that_are_no_cdr_are_left_out_and_told(refused: Callable[..., str]) -> None:
+    assert "/mocap is encoded as json, not as CDR" in refused(drive(), encoding="json")
+
+
+def test_messages_that_do_not_fit_their_type_are_refused(refused: Callable[..., str]) -> None:
+    only = [one for one in drive() if one.topic == "/mocap"]
+    cut = refused(only, change=lambda data: data[:40])
+    assert "message 1 of /mocap cannot be read as geometry_msgs/msg/PoseStamped" in cut
+    assert "longer than its type" in refused(only, change=lambda data: data + bytes(8))
+    assert "not plain CDR" in refused(only, change=lambda data: b"\x28\xb5\x2f\xfd" + data[4:])
+    zero = [Said("/mocap", BEGIN, replace_orientation(stamped_pose(BEGIN, "map", 0.0)))]
+    assert "not a quaternion" in refused(zero)
+
+
+def replace_orientation(message: Any) -> Any:
+    """The message with an orientation that nobody filled in."""
+    turn = STORE.types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=0.0)
+    where = STORE.types["geometry_msgs/msg/Pose"](position=message.pose.position, orientation=turn)
+    return STORE.types["geometry_msgs/msg/PoseStamped"](header=message.header, pose=where)
+
+
+def test_big_endian_messages_are_read(tmp_path: Path) -> None:
+    said = [one for one in drive() if one.topic == "/mocap"]
+    little = read_foreign(write_mcap(tmp_path / "l.mcap", said), MOCAP)
+    big = [bytes(STORE.serialize_cdr(one.message, one.message.__msgtype__, little_endian=False)) for one in said]
+    rest = iter(big)
+    log = read_foreign(write_mcap(tmp_path / "b.mcap", said, change=lambda _: next(rest)), MOCAP)
+    assert np.array_equal(log.trace.truth.values, little.trace.truth.values)
+
+
+def test_a_log_of_none_of_the_topics_is_refused_with_those_it_has(refused: Callable[..., str]) -> None:
+    told = refused([replace(one, topic="/robot1" + one.topic) for one in drive()])
+    assert told.startswith("SC804 it holds nothing that could be judged (its topics: /robot1/amcl_pose, ")
+    other = refused([], Wanted())
+    assert "its topics: none at all" in other
+
+
+def test_topics_may_have_other_names(read: Callable[..., ForeignLog]) -> None:
+    names = {name: f"/robot1/{name}" for name in ("odom", "amcl_pose", "scan", "cmd_vel")}
+    log = read([replace(one, topic="/robot1" + one.topic) for one in drive()], Wanted("/robot1/mocap", names))
+    assert len(log.trace.belief) == 21 and len(log.trace.truth) == 201
+
+
+def test_an_action_says_what_became_of_goals(read: Callable[..., ForeignLog]) -> None:
+    topic = "/navigate_to_pose/_action/status"
+    said = [
+        *drive(),
+        Said(topic, BEGIN + 1 * SECOND, statuses((9, BEGIN - SECOND, 4), (1, BEGIN + SECOND, 1))),
+        Said(topic, BEGIN + 4 * SECOND, statuses((9, BEGIN - SECOND, 4), (1, BEGIN + SECOND, 4))),
+        Said(topic, BEGIN + 5 * SECOND, statuses((1, BEGIN + SECOND, 4), (2, BEGIN + 5 * SECOND, 2))),
+        Said(topic, BEGIN + 8 * SECOND, statuses((2, BEGIN + 5 * SECOND, 6))),
+    ]
+    log = read(said, Wanted(truth="/mocap", goals=("shelf", "dock")))
+    told = [(str(event.kind), event.name, round(log.trace.seconds(event.tick))) for event in log.trace.events]
+    assert told == [
+        ("goal.accepted", "shelf", 1), ("goal.reached", "shelf", 4), ("goal.accepted", "dock", 5),
+        ("goal.failed", "dock", 8), ("navigation.ended", "FAILED", 8), ("run.ended", "the recording ends", 10),
+    ]  # fmt: skip
+    one = read(said, Wanted(truth="/mocap", goals=("shelf",)))
+    assert one.coverage.missing[Evidence.NAVIGATION] == "the log has 2 goals, the scenario 1 goal"
+
+
+def test_a_bag_without_rosbags_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    bag = write_bag(tmp_path / "bag", drive(1.0))
+    monkeypatch.setitem(sys.modules, "rosbags.rosbag2", None)
+    with pytest.raises(InvalidInput) as raised:
+        read_foreign(bag, MOCAP)
+    assert raised.value.problems[0].hint == "pip install 'simscen[rosbags]'"
+
+
+@pytest.mark.parametrize("spoil", ["cut", "empty", "no metadata", "not yaml"])
+def test_a_damaged_bag_is_told_without_a_traceback(tmp_path: Path, spoil: str) -> None:
+    bag = write_bag(tmp_path / "bag", drive())
+    (database,) = bag.glob("*.db3")
+    match spoil:
+        case "cut":
+            database.write_bytes(database.read_bytes()[:5000])
+        case "empty":
+            database.write_bytes(b"")
+        case "no metadata":
+            (bag / "metadata.yaml").unlink()
+        case "not yaml":
+            (bag / "metadata.yaml").write_text("[")
+    with pytest.raises(InvalidInput) as raised:
+        read_foreign(bag, MOCAP)
+    assert raised.value.problems[0].code in ("SC800", "SC804")
