@@ -41,7 +41,9 @@ class Temporal(Criterion):
     @property
     def evidence(self) -> frozenset[Evidence]:
         """What a log must hold for it to be decided."""
-        return frozenset().union(*(evidence(one.signal) for one in self.compared() if one.signal is not None))
+        compared = self.compared()
+        things = {Evidence.OBJECTS} if any(one.object is not None for one in compared) else set()
+        return frozenset(things).union(*(evidence(one.signal) for one in compared if one.signal is not None))
 
 
 def finding(

@@ -24,12 +24,17 @@ LONGEST_GAP = 1.0
 SMALLEST_UPDATE = 0.3
 """Metres that a robot may drive before AMCL first says where it is: Nav2's update_min_d of 0.25 m, and a bit."""
 MOST_NAMED = 12
-_NEVER = (Evidence.CLEARANCE, Evidence.CONTACTS, Evidence.ERROR_CODES, Evidence.PLANNING, Evidence.RECOVERIES)
+_NEVER = (
+    *(Evidence.CLEARANCE, Evidence.CONTACTS, Evidence.ERROR_CODES, Evidence.PLANNING, Evidence.RECOVERIES),
+    Evidence.OBJECTS,
+)
 _ONLY_OWN = {
     **dict.fromkeys(_NEVER, "no standard topic tells"),
     Evidence.DISTURBANCES: "only a log of simscen's own tells when faults and events were",
     Evidence.FOOTPRINT: "the scenario names no `robot:`",
 }
+
+_TOLD_BY = {"cmd_vel": Evidence.COMMANDS, "scan": Evidence.SCANS, "plan": Evidence.PLANS}
 
 
 class Reading:
@@ -41,13 +46,15 @@ class Reading:
         self.missing: dict[Evidence, str] = dict(_ONLY_OWN)
         self.partial: dict[Evidence, str] = {}
         self.rows = Rows()
-        truth, belief = self._truth(), self._track("amcl_pose", Evidence.BELIEF)
+        truth, belief = self._truth(), self._track("amcl_pose", Evidence.BELIEF, Evidence.COVARIANCE)
         self.time = self._timebase(truth, belief)
         if truth is not None:
             self._add_truth(truth)
         if belief is not None:
             self._add_belief(belief)
         self._align(truth, belief)
+        if belief is not None and not belief.covariances.any():
+            self.missing[Evidence.COVARIANCE] = f"{belief.source} tells no covariance"
         self._add_others()
         self._add_goals()
 
@@ -158,8 +165,11 @@ class Reading:
 
     def _add_others(self) -> None:
         """What criteria look at beside: odometry, commands, scans and plans."""
-        for role, said in self._found.said.items():
-            if not said or role not in ("odom", "cmd_vel", "scan", "plan"):
+        for role in ("odom", "cmd_vel", "scan", "plan"):
+            said = self._found.said[role]
+            if not said:
+                missing = [_TOLD_BY[role]] if role in _TOLD_BY else []
+                self.missing |= dict.fromkeys(missing, self._why_not(role, self._wanted.topic(role)).split(";")[0])
                 continue
             by_stamp = self._stamped(role) if all(_stamp(one) is not None for _, one in said) else None
             logged = np.array(sorted(time for time, _ in said), dtype=np.int64)

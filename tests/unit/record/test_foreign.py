@@ -87,7 +87,8 @@ def test_every_container_gives_the_same_trace(tmp_path: Path, writer: str) -> No
     assert [event.kind for event in trace.events] == [EventKind.RUN_ENDED]
     assert not log.coverage.partial
     assert set(Evidence) - set(log.coverage.missing) == {
-        Evidence.TRUTH, Evidence.VELOCITY, Evidence.BELIEF, Evidence.ALIGNMENT
+        Evidence.TRUTH, Evidence.VELOCITY, Evidence.BELIEF, Evidence.COVARIANCE, Evidence.ALIGNMENT,
+        Evidence.SCANS, Evidence.COMMANDS,
     }  # fmt: skip
 
 

@@ -1,0 +1,242 @@
+"""`simscen judge` on the logs of real robots: what they do not say is never passed."""
+
+import inspect
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+from foreign_logs import (
+    BEGIN,
+    SECOND,
+    SPEED,
+    Said,
+    drive,
+    stamped_pose,
+    statuses,
+    write_bag,
+    write_mcap,
+)  # fmt: skip
+from rosbags.rosbag2 import StoragePlugin
+
+from simscen.cli.main import main
+from simscen.core.case import Case
+from simscen.core.evidence import Coverage
+from simscen.core.geometry import Pose2
+from simscen.core.navigation import Goal
+from simscen.core.verdict import Status
+from simscen.criteria.criterion import AnyCriterion
+from simscen.judge.judge import judge
+from simscen.judge.needs import needs
+from simscen.loading.compose import compose
+from simscen.record.foreign.read import read_foreign
+from simscen.record.foreign.wanted import Wanted
+
+STATUS = "/navigate_to_pose/_action/status"
+
+
+class Ended(NamedTuple):
+    """How a command ended."""
+
+    code: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def simscen(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> Callable[..., Ended]:
+    """Runs `simscen judge ARGUMENTS` in a fresh folder."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments: str) -> Ended:
+        monkeypatch.setattr(sys, "argv", ["simscen", "judge", *arguments])
+        with pytest.raises(SystemExit) as end:
+            main()
+        told = capsys.readouterr()
+        return Ended(int(end.value.code or 0), told.out, told.err)
+
+    return call
+
+
+@pytest.fixture
+def limits(tmp_path: Path) -> Callable[..., str]:
+    """Writes a file of criteria."""
+
+    def write(*criteria: str, more: str = "") -> str:
+        (tmp_path / "limits.yaml").write_text(more + "pass:\n" + "".join(f"  - {one}\n" for one in criteria))
+        return "limits.yaml"
+
+    return write
+
+
+def _examples() -> list[Any]:
+    """The example of each criterion, from its docstring, as plain data."""
+    examples = []
+    for name, field in AnyCriterion.model_fields.items():
+        if name in AnyCriterion.modifiers or name == "then":
+            continue
+        for mark in field.metadata:
+            if not hasattr(mark, "load"):
+                continue
+            text = re.search(r"Example: `(.*)`$", inspect.getdoc(mark.load()) or "", re.MULTILINE)
+            assert text, name
+            tree, problems = compose(text[1], name)
+            assert tree is not None and not problems
+            examples.append(pytest.param(tree.plain, id=name))
+    return examples
+
+
+@pytest.mark.parametrize("example", _examples())
+def test_no_criterion_passes_on_a_log_without_what_decides_it(tmp_path: Path, example: dict[str, Any]) -> None:
+    """Not even with a truth and goals, when any one kind of evidence is taken away."""
+    entry = AnyCriterion.model_validate(example)
+    goals = (Goal("shelf", Pose2(SPEED * 10, 0.0)),)
+    case = Case(Pose2(0.0, 0.0), goals, {"shelf": SPEED * 10}, {"aisle": ((50, 50), (51, 50), (51, 51))})
+    log = read_foreign(write_mcap(tmp_path / "a.mcap", drive()), Wanted(truth="/mocap", goals=("shelf",)))
+    assert needs(entry), "something decides it"
+    for evidence in needs(entry):
+        (verdict,) = judge([entry], log.trace, case, Coverage({evidence: "taken away"}))
+        assert verdict.status is Status.INCONCLUSIVE
+        assert evidence.value in verdict.findings[0].measured
+    (verdict,) = judge([entry], log.trace, case, log.coverage)
+    assert verdict.status is not Status.ERROR
+    assert verdict.status is Status.INCONCLUSIVE or not needs(entry) & log.coverage.missing.keys()
+
+
+def test_a_log_is_judged_by_a_file_of_criteria(simscen, limits, tmp_path: Path) -> None:
+    write_mcap(tmp_path / "drive.mcap", drive())
+    file = limits("speed: {max: 0.6 m/s}", "localization_error: {max: 0.1 m}", "path_length: {max: 6 m}")
+    ended = simscen("drive.mcap", "--scenario", file, "--truth", "/mocap")
+    assert (ended.code, ended.err) == (0, "")
+    assert ended.out.startswith("  ✓ drive.mcap   10.1 s recorded   tightest: ")
+    strict = simscen("drive.mcap", "--scenario", limits("speed: {max: 0.4 m/s}"), "--truth", "/mocap")
+    assert strict.code == 1
+    assert "speed: 0.50 m/s > 0.40 m/s, at t = " in strict.out
+    assert "limits.yaml:2" in strict.out
+
+
+def test_without_a_truth_what_asks_for_it_is_inconclusive_and_says_so(simscen, limits, tmp_path: Path) -> None:
+    write_mcap(tmp_path / "drive.mcap", drive())
+    file = limits("speed: {max: 9 m/s}", "collisions: {max: 9}", "replans: {max: 99}", "result: {status: SUCCEEDED}")
+    ended = simscen("drive.mcap", "--scenario", file)
+    assert ended.code == 1
+    assert "speed: inconclusive: the log does not say where the robot truly was nor how fast" in ended.out
+    assert "name a topic or two frames with --truth; poses are on: /amcl_pose, /mocap, /odom" in ended.out
+    assert "collisions: inconclusive: the log does not say what the robot touched" in ended.out
+    assert ended.out.count("inconclusive") == 4
+
+
+def test_a_log_of_others_needs_criteria(simscen, tmp_path: Path) -> None:
+    write_mcap(tmp_path / "drive.mcap", drive())
+    ended = simscen("drive.mcap")
+    assert ended.code == 2
+    assert "SC801" in ended.err and "--scenario" in ended.err
+
+
+def test_a_folder_of_old_logs_gives_a_table_of_margins(simscen, limits, tmp_path: Path) -> None:
+    (tmp_path / "old/monday").mkdir(parents=True)
+    write_bag(tmp_path / "old/monday/bag", drive(), StoragePlugin.SQLITE3)
+    write_mcap(tmp_path / "old/late.mcap", drive(off=0.15))
+    write_mcap(tmp_path / "old/lost.mcap", [one for one in drive() if one.topic != "/mocap"])
+    (tmp_path / "old/broken.mcap").write_bytes(b"\x89MCAP0\r\n")
+    file = limits("localization_error: {max: 0.1 m}", "{speed: {max: 0.6 m/s}, id: fast}")
+    ended = simscen("old", "--scenario", file, "--truth", "/mocap")
+    rows = [line.split() for line in ended.out.splitlines()]
+    assert ended.code == 3
+    assert rows[0] == ["log", "localization_error", "fast"]
+    assert rows[1][:2] == ["!", "old/broken.mcap"]
+    assert rows[2] == ["✗", "old/late.mcap", "-0.05", "m", "+0.10", "m/s"]
+    assert rows[3] == ["✗", "old/lost.mcap", "?", "?"]
+    assert rows[4] == ["✓", "old/monday/bag", "+0.05", "m", "+0.10", "m/s"]
+    assert "? fast: the log does not say where the robot truly was" in ended.out
+    assert ended.out.splitlines()[-1] == "1 passed, 2 failed, 1 could not be judged"
+
+
+def test_goals_of_the_file_are_judged_by_the_actions_status_and_the_truth(simscen, limits, tmp_path: Path) -> None:
+    said = [
+        *drive(),
+        Said(STATUS, BEGIN + SECOND, statuses((1, BEGIN + SECOND, 2))),
+        Said(STATUS, BEGIN + 10 * SECOND, statuses((1, BEGIN + SECOND, 4))),
+    ]
+    write_mcap(tmp_path / "drive.mcap", said)
+    goals = "goals: [{name: shelf, pose: {x: 5, y: 0}, xy_tolerance: 0.3 m}]\n"
+    file = limits("goals_reached: {}", "result: {status: SUCCEEDED}", "time_to_goal: {max: 10 s}", more=goals)
+    assert simscen("drive.mcap", "--scenario", file, "--truth", "/mocap").code == 0
+    file = limits("goals_reached: {}", more=goals.replace("x: 5", "x: 7"))
+    assert "goal shelf: 2.0" in simscen("drive.mcap", "--scenario", file, "--truth", "/mocap").out
+    file = limits("goals_reached: {}")
+    assert "the log has 1 goal, the scenario 0 goals" in simscen("drive.mcap", "--scenario", file).out
+    file = limits("goals_reached: {}", more="goals: [{pose: shelf}]\n")
+    ended = simscen("drive.mcap", "--scenario", file, "--truth", "/mocap")
+    assert ended.code == 2
+    assert ended.err.startswith("limits.yaml:1:16: error[SC030] no place of the world is called `shelf`")
+
+
+def test_regions_and_the_footprint_come_from_the_world_and_the_robot_of_the_file(simscen, limits, tmp_path) -> None:
+    write_mcap(tmp_path / "drive.mcap", drive())
+    (tmp_path / "hall.world.yaml").write_text(
+        "simscen: 1\nwalls: [{points: [[-9, -9], [9, -9], [9, 9], [-9, 9], [-9, -9]]}]\n"
+        "regions: {aisle: [[2, 0.5], [3, 0.5], [3, 2]]}\n"
+    )
+    robot = "robot: {model: turtlebot, pose: {x: 0, y: 0}}\n"
+    file = limits("keepout: {region: aisle}", more="world: hall.world.yaml\n")
+    assert "the scenario names no `robot:`" in simscen("drive.mcap", "--scenario", file, "--truth", "/mocap").out
+    file = limits("keepout: {region: aisle}", more=f"world: hall.world.yaml\n{robot}")
+    assert simscen("drive.mcap", "--scenario", file, "--truth", "/mocap").code == 0
+
+
+def test_signals_are_judged_where_the_log_has_them(simscen, limits, tmp_path: Path) -> None:
+    write_mcap(tmp_path / "drive.mcap", drive())
+    always = 'always: {{signal: {}, op: "<=", value: {}}}'
+    file = limits(always.format("scan_age", "0.6 s"), always.format("collision_count", 3))
+    ended = simscen("drive.mcap", "--scenario", file, "--truth", "/mocap")
+    assert ended.code == 1
+    assert ended.out.count("inconclusive") == 1
+    assert "the log does not say what the robot touched" in ended.out
+
+
+def test_what_is_odd_about_a_log_is_noted_and_a_cut_one_passes_nothing(simscen, limits, tmp_path: Path) -> None:
+    data = write_mcap(tmp_path / "drive.mcap", drive()).read_bytes()
+    (tmp_path / "drive.mcap").write_bytes(data[: len(data) - 400])
+    ended = simscen("drive.mcap", "--scenario", limits("speed: {max: 9 m/s}"), "--truth", "/mocap")
+    assert ended.code == 1
+    assert ended.err == "note: drive.mcap: the log breaks off, so nothing passes on it\n"
+    assert "so far, but the log stops at" in ended.out
+
+
+def test_a_gap_in_the_truth_leaves_a_pass_inconclusive_but_not_a_failure(simscen, limits, tmp_path: Path) -> None:
+    gone = (BEGIN + 4 * SECOND, BEGIN + 6 * SECOND)
+    said = [one for one in drive() if one.topic != "/mocap" or not gone[0] < one.time < gone[1]]
+    write_mcap(tmp_path / "drive.mcap", said)
+    ended = simscen("drive.mcap", "--scenario", limits("speed: {max: 9 m/s}"), "--truth", "/mocap")
+    assert "so far, but /mocap says nothing from t = " in ended.out
+    ended = simscen("drive.mcap", "--scenario", limits("speed: {max: 0.1 m/s}"), "--truth", "/mocap")
+    assert "speed: 0.50 m/s > 0.10 m/s" in ended.out
+
+
+@pytest.mark.parametrize("option", ["odom", "odo=/x", "odom=x", "=", "odom="])
+def test_a_topic_that_cannot_be_understood_is_refused(simscen, limits, tmp_path: Path, option: str) -> None:
+    write_mcap(tmp_path / "drive.mcap", drive(1.0))
+    ended = simscen("drive.mcap", "--scenario", limits("speed: {max: 9 m/s}"), "--topic", option)
+    assert ended.code == 2
+    assert "expected NAME=/TOPIC with one of odom, amcl_pose, " in ended.err
+
+
+def test_metrics_that_a_log_does_not_tell_are_null_in_its_result(simscen, limits, tmp_path: Path) -> None:
+    write_mcap(tmp_path / "drive.mcap", drive())
+    ended = simscen("drive.mcap", "--scenario", limits("speed: {max: 9 m/s}"), "--truth", "/mocap", "--json")
+    assert re.search(r'"collisions": null', ended.out) and re.search(r'"path_length": (4\.9|5\.0)', ended.out)
+    blind = simscen("drive.mcap", "--scenario", limits("speed: {max: 9 m/s}"), "--json")
+    assert not re.search(r'"(path_length|speed_max|success|localization_max)": [0-9]', blind.out)
+
+
+def test_a_truth_that_is_not_a_number_is_an_error(simscen, limits, tmp_path: Path) -> None:
+    said = [*drive(2.0), Said("/mocap", BEGIN + 3 * SECOND, stamped_pose(BEGIN + 3 * SECOND, "map", float("nan")))]
+    write_mcap(tmp_path / "drive.mcap", said)
+    ended = simscen("drive.mcap", "--scenario", limits("speed: {max: 9 m/s}"), "--truth", "/mocap")
+    assert ended.code == 3
+    assert "is not finite at t = " in ended.out
