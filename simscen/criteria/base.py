@@ -24,6 +24,11 @@ class Criterion(ABC):
         """How far around the robot, in metres, it needs clearance to be searched; 0 where it does not look at it."""
         return 0.0
 
+    @property
+    def horizon(self) -> float:
+        """Seconds of simulated time before which it cannot be known that it holds."""
+        return 0.0
+
     @abstractmethod
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """One finding for each bound, in the order of the specification."""

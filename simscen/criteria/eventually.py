@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from simscen.core.verdict import Finding
 from simscen.criteria import condition_words as words
+from simscen.criteria import horizon
 from simscen.criteria.condition import Condition, Windowed
 from simscen.criteria.formula import in_time, judged
 from simscen.criteria.temporal import Temporal, finding
@@ -32,6 +33,11 @@ class Eventually(Windowed, Temporal):
     def compared(self) -> list[Condition]:
         """Every comparison in it."""
         return list(self.comparisons())
+
+    @property
+    def horizon(self) -> float:
+        """The first moment of its stretch."""
+        return horizon.in_time("eventually", self, self)
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """The moment at which it held best, or came nearest to it."""

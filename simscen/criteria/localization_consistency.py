@@ -48,6 +48,11 @@ class LocalizationConsistency(Spec, Criterion):
     both_sides: bool = False
     """Is a belief that is less sure than it may be a failure, too?"""
 
+    @property
+    def horizon(self) -> float:
+        """When judging begins."""
+        return self.after
+
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """The average against its upper bound, and with `both_sides` against its lower."""
         samples = self._sampled(trace)

@@ -51,6 +51,11 @@ class LocalizationError(Spec, Criterion):
             raise ValueError("expected at least one of: max, rmse, final, max_yaw")
         return self
 
+    @property
+    def horizon(self) -> float:
+        """When judging begins."""
+        return self.after
+
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """One finding for each bound that is given."""
         error = pose_error(trace)

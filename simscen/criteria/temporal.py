@@ -59,7 +59,8 @@ def finding(
         return _decided(trace, told, compared, answer, "low", low)
     if high < 0:
         return _decided(trace, told, compared, answer, "high", high)
-    return undecided("", f"the run ended at t = {trace.seconds(trace.end):.2f} s ({ending(trace)}), too soon", told)
+    ended = f"the run ended at t = {trace.seconds(trace.end):.2f} s ({ending(trace)})"
+    return undecided("", f"{ended} before `{told}` was decided", told)
 
 
 def _decided(trace: Trace, told: str, compared: list[Condition], answer: Judged, side: Side, value: float) -> Finding:

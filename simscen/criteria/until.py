@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from simscen.core.verdict import Finding
 from simscen.criteria import condition_words as words
+from simscen.criteria import horizon
 from simscen.criteria.condition import Condition, Release
 from simscen.criteria.formula import judged, released
 from simscen.criteria.temporal import Temporal, finding
@@ -32,6 +33,11 @@ class Until(Release, Temporal):
     def compared(self) -> list[Condition]:
         """Every comparison in it."""
         return [*self.hold.comparisons(), *self.release.comparisons()]
+
+    @property
+    def horizon(self) -> float:
+        """The first moment at which it may be released."""
+        return horizon.released(self.release, self)
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """The moment of the best release, or of what broke the hold before it."""

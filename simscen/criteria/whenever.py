@@ -8,6 +8,7 @@ from pydantic import BaseModel
 
 from simscen.core.verdict import Finding
 from simscen.criteria import condition_words as words
+from simscen.criteria import horizon
 from simscen.criteria.bounds import undecided
 from simscen.criteria.condition import Condition, Windowed
 from simscen.criteria.formula import Judged, Scene, judged, response
@@ -53,6 +54,11 @@ class Response(Spec, Temporal):
     def compared(self) -> list[Condition]:
         """Every comparison in it."""
         return [*self.premise.comparisons(), *self.answer.comparisons()]
+
+    @property
+    def horizon(self) -> float:
+        """All of the stretch in which the premise counts."""
+        return horizon.in_time("always", self.answer, self.premise)
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """The worst answer; that the premise never held is no pass."""

@@ -30,6 +30,7 @@ CODES = {
     "SC033": "Two things have the same name.",
     "SC034": "A rate does not divide the physics rate, so that it would not be regular.",
     "SC035": "What is named is a fixed part of the world, but only something that can move makes sense there.",
+    "SC036": "A criterion cannot be decided before the time limit ends the run.",
     "SC040": "Two scenarios have the same id, or would have on a file system that ignores case.",
     "SC041": "A scenario's id cannot be a folder of its own in the output.",
     "SC301": "A start or goal is inside an obstacle or off the map.",

@@ -19,7 +19,7 @@ READINGS = {"lidar": "Scan", "odometry": "Odometry", "imu": "Imu", "bumper": "Bu
 
 def inconsistencies(loaded: LoadedScenario, world: World | None = None) -> list[Problem]:
     """Every contradiction within a scenario and the files it names; `world` is what its world file has become."""
-    checks = (_unfit_faults, _twice_named, _uneven_rates)
+    checks = (_unfit_faults, _twice_named, _uneven_rates, _undecidable)
     return [*_unknown_names(loaded, world), *(problem for check in checks for problem in check(loaded))]
 
 
@@ -103,6 +103,15 @@ def _uneven_rates(loaded: LoadedScenario) -> Iterator[Problem]:
         for name, sensor in loaded.robot.spec.sensors.items():
             keys = ("sensors", name, sensor.kind, "rate")
             yield from _uneven(loaded, clock, loaded.robot.tree, keys, getattr(sensor.chosen, "rate", 1.0))
+
+
+def _undecidable(loaded: LoadedScenario) -> Iterator[Problem]:
+    for index, entry in enumerate(loaded.spec.pass_):
+        horizon = getattr(entry.chosen, "horizon", 0.0)
+        if horizon > loaded.spec.time_limit:
+            looks = f"it looks {horizon:g} s ahead, but the time limit is {loaded.spec.time_limit:g} s"
+            message = f"`{entry.kind}` can never hold: {looks}"
+            yield loaded.problem_at(loaded.key_place_of("pass", index, entry.kind), "SC036", message)
 
 
 def _uneven(
