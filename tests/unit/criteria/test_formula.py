@@ -1,0 +1,76 @@
+"""Formulas on whole runs: what is decided stays decided, and the sign of the margin is the verdict."""
+
+from dataclasses import replace
+
+from formulas import CASE, FORMULAS, NUMBERS, VALUES, horizon, run, validated
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from simscen.core.samples import Samples
+from simscen.core.verdict import Status
+from simscen.criteria.criterion import AnyCriterion
+from simscen.criteria.formula import Scene, judged
+from simscen.judge.judge import judge
+
+
+@settings(deadline=None)
+@given(FORMULAS, VALUES, st.data())
+def test_what_is_decided_stays_so_however_the_run_would_have_gone_on(formula, p, data):
+    """The interval of a short run holds the value of every continuation of it."""
+    q = data.draw(st.lists(NUMBERS, min_size=len(p), max_size=len(p)))
+    more = horizon(formula) + 1
+    longer = [values + data.draw(st.lists(NUMBERS, min_size=more, max_size=more)) for values in (p, q)]
+    short, whole = (judged(validated(formula), Scene.of(run(*pq), CASE, over=True)) for pq in ((p, q), longer))
+    assert short.low[0] <= whole.low[0] == whole.high[0] <= short.high[0]
+
+
+@settings(deadline=None)
+@given(FORMULAS, VALUES, st.booleans(), st.data())
+def test_the_sign_of_the_margin_is_the_verdict_and_the_witness_supports_it(formula, p, ended, data):
+    q = data.draw(st.lists(NUMBERS, min_size=len(p), max_size=len(p)))
+    trace = run(p, q, ended)
+    (verdict,) = judge([AnyCriterion.model_validate({"always": {**formula, "within": 1.0}})], trace, CASE)
+    (finding,) = verdict.findings
+    if finding.margin is not None and finding.status is not Status.INCONCLUSIVE:
+        assert (finding.status is Status.PASS) == (finding.margin >= 0)
+    if finding.status in (Status.PASS, Status.FAIL):
+        signal = p if finding.what == "clearance" else q
+        assert finding.value == signal[finding.tick // 240]
+    if not ended:
+        assert verdict.status is not Status.PASS
+
+
+@settings(deadline=None)
+@given(VALUES, NUMBERS, st.integers(0, 2), st.integers(0, 3))
+def test_loosening_a_bound_never_turns_a_pass_into_a_fail(p, q, bound, by):
+    formulas = [
+        {"signal": "clearance", "op": op, "value": value, "within": 3.0}
+        for op, values in ((">=", (bound, bound - by)), ("<=", (bound, bound + by)))
+        for value in values
+        if value > -1
+    ]
+    order = [Status.FAIL, Status.INCONCLUSIVE, Status.PASS]
+    statuses = {}
+    for operator in ("always", "eventually"):
+        for formula in formulas:
+            (verdict,) = judge([AnyCriterion.model_validate({operator: formula})], run(p, [q] * len(p)), CASE)
+            statuses[operator, formula["op"], formula["value"]] = order.index(verdict.status)
+    for (operator, op, value), status in statuses.items():
+        looser = value - by if op == ">=" else value + by
+        assert statuses.get((operator, op, looser), 2) >= status
+
+
+@given(FORMULAS, VALUES, st.integers(1, 1000))
+@settings(deadline=None)
+def test_a_run_that_begins_later_is_judged_alike(formula, p, later):
+    trace = run(p, p)
+    moved = replace(
+        trace,
+        **{
+            name: Samples(getattr(trace, name).ticks + 240 * later, getattr(trace, name).values)
+            for name in ("truth", "velocity", "clearance")
+        },
+    )
+    one, other = (judged(validated(formula), Scene.of(some, CASE, over=True)) for some in (trace, moved))
+    assert one.low.tolist() == other.low.tolist()
+    assert one.high.tolist() == other.high.tolist()
