@@ -9,10 +9,13 @@ PYTHON ?= $(shell for v in 3.11 3.10; do \
 	then echo $$p; exit; fi; done; done)
 STAMP := $(VENV)/.installed
 
-.PHONY: help setup run test check lint types layers schemas docs bench build clean
+LOWEST := .venv-lowest
+LOWEST_TESTS := tests/diagnostics tests/cases $(addprefix tests/unit/,cli loading judge report run sim worlds)
+
+.PHONY: help setup run test test-lowest check lint types layers schemas docs bench build clean
 
 help:  ## Print this list
-	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 setup: $(STAMP)  ## Make the virtual environment in .venv (the other targets do it when needed)
 
@@ -33,6 +36,16 @@ run: setup  ## Run the scenarios that ship
 
 test: setup check  ## Run everything CI runs: checks, then the tests
 	@$(BIN)/python -m pytest
+
+test-lowest:  ## Test with the oldest packages that pyproject.toml allows, in .venv-lowest
+	@test -x $(LOWEST)/bin/python || $(PYTHON) -m venv $(LOWEST)
+	@$(LOWEST)/bin/python -m pip install --quiet uv
+	@$(LOWEST)/bin/uv pip install --quiet --python $(LOWEST)/bin/python --resolution lowest-direct --editable .
+	@$(LOWEST)/bin/uv pip freeze --quiet --exclude-editable --python $(LOWEST)/bin/python > $(LOWEST)/constraints.txt
+	@$(LOWEST)/bin/uv pip install --quiet --python $(LOWEST)/bin/python --constraint $(LOWEST)/constraints.txt \
+	"pytest>=8.2" "pytest-xdist>=3.6" "hypothesis>=6.100" "junitparser>=3.1" "shapely>=2.0" "xacro>=2.0"
+	@$(LOWEST)/bin/python -m pytest -n 2 $(LOWEST_TESTS)
+	@$(LOWEST)/bin/simscen run scenarios/navigation scenarios/faults --out $$(mktemp -d)/out
 
 check: lint types layers schemas  ## Lint, types, layers, drift of schemas and docs
 
@@ -58,4 +71,4 @@ build: setup  ## Build the wheel into dist/
 	@$(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist .
 
 clean:  ## Remove what make made
-	rm -rf $(VENV) dist build simscen-out .mypy_cache .pytest_cache .ruff_cache
+	rm -rf $(VENV) $(LOWEST) dist build simscen-out .mypy_cache .pytest_cache .ruff_cache

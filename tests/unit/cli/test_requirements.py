@@ -1,0 +1,98 @@
+"""An installation that cannot work says so in one line instead of running nothing, or everything into errors."""
+
+import importlib.metadata
+import re
+import sys
+from pathlib import Path
+
+import pytest
+import typer
+
+from simscen.cli import requirements
+from simscen.cli.start import start
+
+PYPROJECT = (Path(__file__).parents[3] / "pyproject.toml").read_text()
+
+
+@pytest.fixture
+def installed(monkeypatch):
+    """Packages by version, as if they were installed and simscen needed `needs`."""
+
+    def installed(needs, **versions):
+        def version(name):
+            if name not in versions:
+                raise importlib.metadata.PackageNotFoundError(name)
+            return versions[name]
+
+        monkeypatch.setattr(importlib.metadata, "requires", lambda _: needs)
+        monkeypatch.setattr(importlib.metadata, "version", version)
+
+    return installed
+
+
+def test_this_installation_has_what_it_needs() -> None:
+    assert requirements.unmet() == []
+    assert requirements.unmet_typer() == []
+
+
+@pytest.mark.parametrize(
+    ("need", "version", "fits"),
+    [
+        ("numpy<3,>=1.26", "1.26", True),
+        ("numpy<3,>=1.26", "1.26.0", True),
+        ("numpy<3,>=1.26", "2.4.6", True),
+        ("numpy<3,>=1.26", "1.25.9", False),
+        ("numpy<3,>=1.26", "3.0", False),
+        ("numpy<3,>=1.26", "3.0rc1", False),
+        ("numpy>=2.17.7.post6", "2.17.7", False),
+        ("numpy>=2.17.7.post6", "2.17.7.post6", True),
+        ("numpy!=1.5,>=1", "1.5", False),
+        ("numpy (>=1.26)", "1.27+local", True),
+        ("numpy", "0", True),
+        ('numpy>=9; extra == "more"', "1", True),
+    ],
+)
+def test_versions_are_compared(installed, need, version, fits) -> None:
+    installed([need], numpy=version)
+    assert (requirements.unmet() == []) is fits
+
+
+def test_what_is_wrong_is_told_with_what_helps(installed) -> None:
+    installed(["typer<1,>=0.20", "ompl>=2"], typer="0.12.5")
+    assert requirements.unmet() == [
+        "typer 0.12.5 is installed, and simscen needs typer>=0.20,<1: pip install 'typer>=0.20,<1'",
+        "ompl is not installed: pip install 'ompl'",
+    ]
+
+
+def test_a_run_that_cannot_work_is_not_begun(installed, monkeypatch, capsys) -> None:
+    installed(["pybullet>=3.2.7"], pybullet="3.2.6")
+    monkeypatch.setattr(sys, "argv", ["simscen", "run", "nothing"])
+    with pytest.raises(SystemExit) as end:
+        start()
+    assert end.value.code == 3
+    assert capsys.readouterr().err == (
+        "simscen: this installation does not work: pybullet 3.2.6 is installed, and simscen needs pybullet>=3.2.7: "
+        "pip install 'pybullet>=3.2.7'\n"
+    )
+
+
+@pytest.mark.parametrize("command", ["validate", "doctor", "--version"])
+def test_a_typer_that_misreads_options_reads_none(monkeypatch, capsys, command) -> None:
+    monkeypatch.setattr(typer, "__version__", "0.12.5")
+    monkeypatch.setattr(sys, "argv", ["simscen", command])
+    with pytest.raises(SystemExit) as end:
+        start()
+    assert end.value.code == 3
+    assert "typer 0.12.5 is installed, and simscen needs typer>=0.20" in capsys.readouterr().err
+
+
+def test_the_oldest_typer_is_that_of_pyproject() -> None:
+    (oldest,) = re.findall(r'"typer>=([\d.]+),', PYPROJECT)
+    assert tuple(map(int, oldest.split("."))) == requirements.TYPER
+
+
+def test_every_dependency_has_bounds_that_are_read() -> None:
+    block = PYPROJECT.split("dependencies = [", 1)[1].split("\n]", 1)[0]
+    for line in re.findall(r'"([^"]+)"', block):
+        assert re.fullmatch(r"[\w-]+>=[\w.]+(,<\d+)?", line), line
