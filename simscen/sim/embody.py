@@ -9,6 +9,7 @@ from simscen.model.robot import RobotSpec
 from simscen.sim.ground import refuse_dragging
 from simscen.sim.inertia import MassProperties, of_solids
 from simscen.sim.robot_body import RobotBody, assemble
+from simscen.sim.size import refuse_giants
 from simscen.sim.undercarriage import wheels_of
 from simscen.sim.urdf.body import body_of_urdf
 from simscen.sim.urdf.elements import MeshReader
@@ -26,9 +27,9 @@ def robot_body(
     meshes must lie in; `read_mesh` reads a mesh file. Raises InvalidInput when the URDF or the body cannot be
     used.
     """
-    if spec.urdf is not None:
-        return body_of_urdf(spec, file, roots, read_mesh)
-    return _of_shapes(spec, file)
+    body = _of_shapes(spec, file) if spec.urdf is None else body_of_urdf(spec, file, roots, read_mesh)
+    refuse_giants(body, file)
+    return body
 
 
 def _of_shapes(spec: RobotSpec, file: Path | None) -> RobotBody:

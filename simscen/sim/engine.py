@@ -12,8 +12,10 @@ from simscen.sim.camera import visible
 from simscen.sim.inertia import GRAVITY
 from simscen.sim.outline import extremes
 
-FACES_AT_ONCE = 40_000
+FACES_AT_ONCE, VERTICES_AT_ONCE = 40_000, 120_000
 """Bullet's shared-memory commands hold at most 131072 vertices and 524288 indices."""
+STRIP = 20.0
+"""m of x that lie together in one lot of faces."""
 FLOOR = 0.005
 """Faces that lie wholly below this height in m are left to the ground plane, on which wheels roll smoothly."""
 
@@ -84,8 +86,15 @@ def touch(client: int, body: int, link: int, group: int, others: int) -> None:
 def static_mesh(client: int, mesh: TriangleMesh) -> list[int]:
     """What never moves, as few bodies: concave meshes without the faces that lie on the ground."""
     faces = above_floor(mesh.vertices, mesh.faces)
-    chunks = [faces[k : k + FACES_AT_ONCE] for k in range(0, len(faces), FACES_AT_ONCE)]
-    return [_concave(client, mesh, chunk) for chunk in chunks]
+    return [_concave(client, mesh, tile) for tile in tiles(mesh.vertices, faces)]
+
+
+def tiles(vertices: Array, faces: Faces) -> list[Faces]:
+    """Faces in as many lots as Bullet takes at once; those of a lot lie together, in strips and from end to end."""
+    if len(faces) > FACES_AT_ONCE:
+        middle = vertices[faces, :2].mean(axis=1)
+        faces = faces[np.lexsort((middle[:, 1], np.floor(middle[:, 0] / STRIP)))]
+    return [faces[k : k + FACES_AT_ONCE] for k in range(0, len(faces), FACES_AT_ONCE)]
 
 
 def above_floor(vertices: Array, faces: Faces) -> Faces:
@@ -133,10 +142,23 @@ def concave_shape(client: int, mesh: Mesh) -> int:
 
 def convex_shape(client: int, mesh: Mesh) -> int:
     """The convex hull of a mesh's vertices."""
+    mesh = _thinned(mesh)
     shape: int = pybullet.createCollisionShape(
         pybullet.GEOM_MESH, vertices=mesh.vertices.tolist(), physicsClientId=client
     )
     return _made(shape)
+
+
+def _thinned(mesh: Mesh) -> Mesh:
+    """A mesh of more vertices than Bullet takes at once: those of its convex hull."""
+    if len(mesh.vertices) <= VERTICES_AT_ONCE:
+        return mesh
+    from scipy.spatial import ConvexHull
+
+    corners = mesh.vertices[np.sort(ConvexHull(mesh.vertices).vertices)]
+    if len(corners) > VERTICES_AT_ONCE:
+        raise RuntimeError(f"a convex hull of {len(corners)} corners; PyBullet takes {VERTICES_AT_ONCE}")
+    return Mesh(corners, np.empty((0, 3), np.int32))
 
 
 def compound_shape(client: int, solids: Iterable[Solid]) -> int:

@@ -5,6 +5,7 @@ simulated second in a BARN world (28 facets a cylinder, 40 Hz). Here every solid
 an engine of its own that is never stepped, built when the robot first comes near.
 """
 
+import itertools
 import math
 from collections.abc import Collection
 
@@ -34,7 +35,7 @@ class Proximity:
         self._hull = [engine.fixed(self._client, shape) for shape in engine.hull_shapes(self._client, robot.solid)]
         self._starts, self._order = _by_owner(static)
         self._low, self._high = _extents(static, self._starts, self._order)
-        self._bodies: dict[int, int] = {}
+        self._bodies: dict[int, list[int]] = {}
         # For each solid around: a lower bound of its distance plus what had been travelled when that was known.
         self._bounds: dict[int, float] = {}
         self._travelled = 0.0
@@ -63,11 +64,11 @@ class Proximity:
 
     def _measure(self, owner: int, within: float) -> float:
         """Distance to one solid; inf if above `within`. Remembers what is known for later."""
-        body = self._bodies.get(owner)
-        if body is None:
-            body = self._bodies[owner] = self._build(owner)
+        bodies = self._bodies.get(owner)
+        if bodies is None:
+            bodies = self._bodies[owner] = self._build(owner)
         nearest = math.inf
-        for hull in self._hull:
+        for hull, body in itertools.product(self._hull, bodies):
             for point in pybullet.getClosestPoints(hull, body, within, physicsClientId=self._client):
                 nearest = min(nearest, point[8])
         self._bounds[owner] = min(nearest, within) + self._travelled
@@ -87,16 +88,17 @@ class Proximity:
         if self._nearest not in self._bounds:
             self._nearest = None
 
-    def _build(self, owner: int) -> int:
-        faces = self._faces(owner)
+    def _build(self, owner: int) -> list[int]:
+        faces, vertices = self._faces(owner), self._mesh.vertices
         if self.convex(owner):
-            shape = engine.convex_shape(self._client, engine.compact(self._mesh.vertices, faces))
+            shapes = [engine.convex_shape(self._client, engine.compact(vertices, faces))]
         else:
-            standing = engine.above_floor(self._mesh.vertices, faces)
-            shape = engine.concave_shape(self._client, engine.compact(self._mesh.vertices, standing))
-        body = engine.fixed(self._client, shape)
-        pybullet.changeDynamics(body, -1, collisionMargin=0.0, physicsClientId=self._client)
-        return body
+            lots = engine.tiles(vertices, engine.above_floor(vertices, faces))
+            shapes = [engine.concave_shape(self._client, engine.compact(vertices, lot)) for lot in lots]
+        bodies = [engine.fixed(self._client, shape) for shape in shapes]
+        for body in bodies:
+            pybullet.changeDynamics(body, -1, collisionMargin=0.0, physicsClientId=self._client)
+        return bodies
 
     def _faces(self, owner: int) -> npt.NDArray[np.int32]:
         return self._mesh.faces[self._order[self._starts[owner] : self._starts[owner + 1]]]

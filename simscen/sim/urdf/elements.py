@@ -13,6 +13,9 @@ from simscen.sim.inertia import MassProperties
 from simscen.sim.urdf.files import MESH_BYTES, Folders, Trouble, check_regular
 from simscen.sim.urdf.markup import Element, Unusable
 
+MESH_REACH = 20.0
+"""m along any axis from a mesh's own origin, which need not be in it."""
+
 MeshReader = Callable[[Path], Mesh]
 
 
@@ -62,7 +65,15 @@ class Meshes:
             mesh = self.read(path)
         except (Trouble, ValueError) as error:
             raise Unusable(element, f"mesh {written[:200]!r}: {error}") from error
-        return Mesh(mesh.vertices * np.array(scale), mesh.faces)
+        with np.errstate(over="ignore"):
+            vertices = mesh.vertices * np.array(scale)
+            farthest = float(np.abs(vertices).max(initial=0.0))
+        if not farthest <= MESH_REACH:
+            hint = 'is it in millimetres? give it scale="0.001 0.001 0.001"'
+            raise Unusable(
+                element, f"mesh {written[:200]!r} reaches {farthest:.4g} m, more than {MESH_REACH:g} m", hint
+            )
+        return Mesh(vertices, mesh.faces)
 
 
 def link_of(element: Element, meshes: Meshes) -> Link:

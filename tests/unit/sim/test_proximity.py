@@ -1,13 +1,15 @@
 import math
 
 import numpy as np
+import pybullet
 import pytest
 import trimesh
 from playground import box, shipped
 
 from simscen.core.geometry import Pose3
-from simscen.core.shapes import Box, Cylinder, Extrusion, Solid
+from simscen.core.shapes import Box, Cylinder, Extrusion, Mesh, Solid
 from simscen.sim.embody import robot_body
+from simscen.sim.engine import convex_shape, fixed, tiles
 from simscen.sim.proximity import Proximity, point_to_triangles
 from simscen.worlds.meshing import fuse
 
@@ -59,3 +61,38 @@ def test_the_same_place_gives_the_same_distance_whatever_was_asked_before(proxim
     for x in range(10):
         proximity.distance(Pose3(x, x / 2))
     assert proximity.distance(Pose3(1.9, 0.3)) == first
+
+
+def wall_of_many_triangles(columns, rows):
+    """The plane x = 5 from y = -10 to 10, up to 2 m: every triangle with corners of its own."""
+    y, z = np.meshgrid(np.linspace(-10, 10, columns + 1), np.linspace(0, 2, rows + 1), indexing="ij")
+    grid = np.stack((np.full_like(y, 5.0), y, z), axis=-1)
+    a, b, c, d = grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]
+    corners = np.stack((np.stack((a, b, c), axis=-2), np.stack((a, c, d), axis=-2))).reshape(-1, 3)
+    return Mesh(corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3))
+
+
+def test_a_solid_of_more_triangles_than_bullet_takes_at_once_is_as_near_as_any():
+    wall = wall_of_many_triangles(400, 60)
+    assert len(wall.faces) == 48_000
+    made = Proximity(fuse([Solid(wall, Pose3(), "wall")]), robot_body(shipped("turtlebot")), 2.0)
+    for y in (-9.0, -3.3, 0.0, 9.5):
+        assert made.distance(Pose3(4.0, y)) == pytest.approx(1.0 - 0.22, abs=1e-3)
+    made.close()
+
+
+def test_every_face_is_in_one_tile():
+    wall = wall_of_many_triangles(400, 60)
+    found = np.concatenate(tiles(wall.vertices, wall.faces))
+    assert sorted(map(tuple, found.tolist())) == sorted(map(tuple, wall.faces.tolist()))
+    assert [len(tile) for tile in tiles(wall.vertices, wall.faces)] == [40_000, 8_000]
+
+
+def test_a_hull_of_more_corners_than_bullet_takes_at_once_is_that_of_its_outermost():
+    points = np.random.default_rng(4).uniform(-0.2, 0.2, size=(150_000, 3))
+    made = Proximity(fuse([]), robot_body(shipped("turtlebot")), 2.0)
+    shape = convex_shape(made._client, Mesh(points, np.empty((0, 3), np.int32)))
+    low, high = pybullet.getAABB(fixed(made._client, shape), physicsClientId=made._client)
+    assert low == pytest.approx(points.min(axis=0), abs=0.05)
+    assert high == pytest.approx(points.max(axis=0), abs=0.05)
+    made.close()

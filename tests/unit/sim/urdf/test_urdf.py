@@ -5,6 +5,7 @@ import os
 import struct
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from simscen.core.errors import InvalidInput
@@ -363,3 +364,30 @@ def test_the_jackal_turns_in_place_and_its_wheels_slip(jackal):
     by_wheels = (after[1] - rolled[1] - after[0] + rolled[0]) * 0.098 / 0.37559
     assert math.hypot(end.x - begin.x, end.y - begin.y) < 0.1
     assert 1.2 < by_wheels / turned < 2.0
+
+
+@pytest.mark.parametrize("size", [25.0, 1e3, 1e30, 3e38])
+def test_a_mesh_in_other_units_is_refused_where_it_is_named(refusal, tmp_path, size):
+    corners = np.array([[0, 0, 0], [size, 0, 0], [0, size, 0], [0, 0, size]], dtype="<f4")
+    faces = b"".join(
+        bytes(12) + corners[list(face)].tobytes() + bytes(2) for face in ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3))
+    )
+    (tmp_path / "big.stl").write_bytes(bytes(80) + struct.pack("<I", 4) + faces)
+    problem = refusal(robot(geometry='<mesh filename="big.stl"/>'))
+    assert (problem.path, problem.line) == ("robot.urdf", 5)
+    assert f"mesh 'big.stl' reaches {size:.4g} m, more than 20 m" in problem.message
+    assert "scale" in problem.hint
+
+
+@pytest.mark.parametrize("geometry", ['<box size="25 0.36 0.2"/>', '<sphere radius="11"/>'])
+def test_a_giant_is_no_robot(refusal, geometry):
+    problem = refusal(robot(geometry=geometry))
+    assert problem.code in ("SC402", "SC400")
+    assert "reaches" in problem.message
+
+
+def test_a_body_of_shapes_has_the_same_bounds(tmp_path):
+    data = {"simscen": 1, "name": "cart", "drive": DIFFERENTIAL, "limits": LIMITS, "sensors": {}, "mass": 9}
+    ship = RobotSpec.model_validate({**data, "body": [{"box": [1000, 1, 1], "z": 0.1}]})
+    with pytest.raises(InvalidInput, match=r"robot 'cart' reaches 500 m from its base, more than 10 m"):
+        robot_body(ship, tmp_path / "cart.robot.yaml")
