@@ -12,7 +12,7 @@ STAMP := $(VENV)/.installed
 LOWEST := .venv-lowest
 LOWEST_TESTS := tests/diagnostics tests/cases $(addprefix tests/unit/,cli loading judge report run sim worlds)
 
-.PHONY: help setup run test test-lowest check lint types layers schemas docs bench build clean
+.PHONY: help setup run test test-lowest check lint types layers schemas docs mutation bench build clean
 
 help:  ## Print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -63,6 +63,9 @@ schemas: setup  ## Check that schemas/ and docs/reference/ are what the code say
 
 docs: setup  ## Write schemas/ and docs/reference/ anew
 	@$(BIN)/python -m simscen.cli.generate
+
+mutation: setup  ## Change what decides verdicts, a little at a time: some test must fail each time (long)
+	@nice -n 10 $(BIN)/python tests/mutation/run.py --write
 
 bench: setup  ## Measure speed (simscen bench)
 	@$(BIN)/simscen bench

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from simscen.core.events import Event, EventKind
@@ -66,13 +67,19 @@ def _success(trace: Trace, case: Case, ended: tuple[Event, ...], k: int) -> Find
 
     The first answers for all goals of the scenario, which its task held, accepted by then or not.
     """
-    end, since = ended[k], ended[k - 1].tick if k else -1
+    end = ended[k]
     if end.name != "SUCCEEDED":
         return None
-    own = [s for s in stories(trace, case) if since < began(s) <= end.tick or (k == 0 and s.goal in case.goals)]
+    own = [s for s in stories(trace, case) if _task(s, ended) == k or (k == 0 and s.goal in case.goals)]
     late = [s for s in own if not s.preempted and (s.reached is None or s.reached > end.tick)]
     if not late:
         return None
     names = ", ".join(story.goal.name for story in late)
     expected = "SUCCEEDED only with every goal reached"
     return missed("result", "SUCCEEDED", expected, (trace, end.tick), [f"not reached: {names}"])
+
+
+def _task(story: GoalStory, ended: tuple[Event, ...]) -> int | None:
+    """Which end of navigation answers for a goal: the first after it began, or at which it is over, too."""
+    over = math.inf if story.end is None else story.end.tick
+    return next((k for k, end in enumerate(ended) if began(story) < end.tick or over <= end.tick), None)

@@ -5,10 +5,11 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 ROOMS = ("criteria", "judge", "triggers")
 ALL_TESTS = {
-    "criteria": ["tests/unit/criteria", "tests/unit/judge", "tests/properties/test_verdicts.py"],
-    "judge": ["tests/unit/judge", "tests/unit/criteria", "tests/properties/test_verdicts.py"],
+    "criteria": ["tests/unit/criteria", "tests/unit/judge"],
+    "judge": ["tests/unit/judge", "tests/unit/criteria/test_promises.py"],
     "triggers": ["tests/unit/triggers", "tests/unit/run/test_firing.py"],
 }
+EVERY_CRITERION = ["tests/unit/criteria/test_promises.py", "tests/unit/criteria/test_specs.py"]
 IDLE = {"__init__.py", "sketch.py"}
 """What decides nothing: sketches make the traces of tests."""
 
@@ -25,14 +26,13 @@ def module_name(file: Path) -> str:
 
 
 def tests_of(file: Path) -> list[list[str]]:
-    """The tests to try, the likeliest to kill first: its own, then all of its room."""
+    """The tests to try, the likeliest to kill first: golden cases, its own, those of every criterion or of its room.
+
+    A criterion with golden cases of its own is used by nothing else.
+    """
     room, kind = file.parent.name, file.stem
-    own = [f"tests/unit/{room}/test_{kind}.py"]
-    stages = []
+    own = [path.relative_to(ROOT).as_posix() for path in sorted((ROOT / f"tests/unit/{room}").glob(f"test_{kind}*.py"))]
     if (ROOT / f"tests/cases/{kind}.yaml").exists():
-        stages.append(["golden", kind])
-    elif room in ("criteria", "judge"):
-        stages.append(["golden", ""])
-    if (ROOT / own[0]).exists():
-        stages.append(own)
-    return [*stages, [test for test in ALL_TESTS[room] if (ROOT / test).exists()]]
+        return [["golden", kind], [*own, *EVERY_CRITERION]]
+    golden = [["golden", ""]] if room in ("criteria", "judge") else []
+    return [*golden, *([own] if own else []), ALL_TESTS[room]]
