@@ -1,5 +1,7 @@
 """`simscen judge`."""
 
+import json
+import shlex
 import sys
 from enum import Enum
 from pathlib import Path
@@ -13,11 +15,11 @@ from simscen.cli.logs import logs_of
 from simscen.cli.reports import verdict
 from simscen.core.errors import UsageError
 from simscen.core.sessionevents import RunFinished
-from simscen.judge.resultdata import to_json
+from simscen.judge.resultdata import as_data
 from simscen.record.foreign.wanted import TOPICS, Clock, Wanted
 from simscen.report.judged import in_a_line, in_full, summary, table
 from simscen.report.lines import text_of
-from simscen.report.results import to_json as all_to_json
+from simscen.report.results import as_document, in_order
 
 
 class Time(str, Enum):
@@ -51,7 +53,7 @@ def command(
     ] = False,
     root: Annotated[Path | None, typer.Option(help="Files that the scenario names stay in this folder.")] = None,
     world_path: Annotated[list[Path] | None, typer.Option(help="Folder with worlds and models; repeatable.")] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print result.json, of several logs results.json.")] = False,
+    json_: Annotated[bool, typer.Option("--json", help="Print result.json, of several logs results.json.")] = False,
 ) -> None:
     """Judge recorded runs, without simulating them.
 
@@ -69,11 +71,13 @@ def command(
     judging = Judging(wanted, scenario, root, world_path or [])
     lost = runs_without_log(logs)
     runs = [*((str(file), judging.judged(file, alone=len(files) + len(lost) == 1)) for file in files), *lost]
+    if wanted != Wanted() and not judging.foreign:
+        judging.notes.append("logs of simscen hold their own truth and times: options for those of others do nothing")
     for note in judging.notes:
         print_text(f"note: {harmless(note)}", sys.stderr)
-    if json:
-        answers = [run for _, run in runs]
-        print(to_json(answers[0].result) if len(runs) == 1 else all_to_json(answers), end="")
+    if json_:
+        options = _options(wanted, scenario, root, world_path or [])
+        print(_document([run for _, run in runs], options), end="")
     else:
         _print(runs, scenario is not None)
     sys.exit(verdict([run for _, run in runs]))
@@ -89,6 +93,28 @@ def _print(runs: list[tuple[str, RunFinished]], one_scenario: bool) -> None:
         lines = [*(in_a_line(run, f"{name:{width}}") for name, run in runs), summary([run for _, run in runs])]
     for line in lines:
         print_text(text_of(line))
+
+
+def _document(runs: list[RunFinished], options: list[str]) -> str:
+    """result.json of one log, results.json of several; `again` judges the log again instead of simulating its run."""
+    document = {**as_data(runs[0].result)} if len(runs) == 1 else as_document(runs)
+    logs = [run.artifacts.mcap for run in in_order(runs)]
+    for log, data in zip(logs, document.get("runs", [document]), strict=True):
+        if log:
+            data["again"] = shlex.join(["simscen", "judge", log, *options])
+    return json.dumps(document, sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _options(wanted: Wanted, scenario: Path | None, root: Path | None, world_path: list[Path]) -> list[str]:
+    """How this command was called, as far as it matters."""
+    given = {"--scenario": scenario, "--truth": wanted.truth, "--root": root}
+    several = [("--topic", f"{name}={topic}") for name, topic in wanted.topics.items()]
+    several += [("--world-path", str(folder)) for folder in world_path]
+    words = [word for name, value in given.items() if value is not None for word in (name, str(value))]
+    words += [word for pair in several for word in pair]
+    words += ["--time", "log"] if wanted.clock == "log" else []
+    words += ["--tick-rate", str(wanted.tick_rate)] if wanted.tick_rate != Wanted.tick_rate else []
+    return [*words, *(["--same-frame"] if wanted.same_frame else [])]
 
 
 def _topics(written: list[str]) -> dict[str, str]:

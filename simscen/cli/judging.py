@@ -11,7 +11,7 @@ from simscen.core.errors import InvalidInput
 from simscen.core.evidence import Coverage, Evidence
 from simscen.core.problems import Problem
 from simscen.core.result import RunFailure, RunKey, unfinished
-from simscen.core.sessionevents import RunFinished
+from simscen.core.sessionevents import Artifacts, RunFinished
 from simscen.core.trace import Trace
 from simscen.judge.result import result_of
 from simscen.loading.criteria_file import LoadedCriteria, load_criteria
@@ -27,10 +27,14 @@ from simscen.run.outfolder import run_folder
 
 
 class Judging:
-    """Judges logs by `scenario`, or each by its own; `notes` are what is odd about them."""
+    """Judges logs by `scenario`, or each by its own; `notes` are what is odd about them.
+
+    `foreign` is how many of them simscen did not write.
+    """
 
     def __init__(self, wanted: Wanted, scenario: Path | None, root: Path | None, world_path: Sequence[Path]) -> None:
         self.notes: list[str] = []
+        self.foreign = 0
         self._wanted, self._scenario, self._world_path = wanted, scenario, world_path
         self._case: Case | None = None
         self._criteria: LoadedCriteria | None = None
@@ -49,7 +53,8 @@ class Judging:
             if alone or isinstance(error, UnusableScenario):
                 raise
             told = "; ".join(problem.message for problem in error.problems)
-            return RunFinished(unfinished(RunKey(log.stem, 0), str(log), RunFailure("invalid", told)), file=str(log))
+            result = unfinished(RunKey(log.stem, 0), str(log), RunFailure("invalid", told))
+            return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=str(log))
 
     def _own(self, log: Path) -> RunFinished:
         read = read_run(log)
@@ -57,22 +62,24 @@ class Judging:
         key = RunKey(about.name, about.seed)
         if self._criteria is None:
             spec = spec_of_text(about.scenario, str(log))
-            return RunFinished(result_of(key, str(log), spec.pass_, read.trace, case), file=str(log))
+            result = result_of(key, str(log), spec.pass_, read.trace, case)
+            return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=str(log))
         # What had to happen stands in the scenario of the log, at lines that the file of criteria does not have.
         case = replace(case, disturbances=tuple(replace(one, line=0) for one in case.disturbances))
-        return self._finished(key, read.trace, case, Coverage())
+        return self._finished(log, key, read.trace, case, Coverage())
 
     def _foreign(self, log: Path) -> RunFinished:
         if self._criteria is None:
             hint = "say with --scenario what must hold; a file with `pass:` is enough"
             raise InvalidInput([Problem(str(log), 0, 0, "SC801", "not a log of simscen", hint)])
+        self.foreign += 1
         case = self._foreign_case()
         read = read_foreign(log, replace(self._wanted, goals=tuple(goal.name for goal in case.goals)))
         self.notes += [f"{log}: {note}" for note in read.notes]
         missing = dict(read.coverage.missing)
         if case.footprint:
             del missing[Evidence.FOOTPRINT]
-        return self._finished(RunKey(log.stem, 0), read.trace, case, Coverage(missing, read.coverage.partial))
+        return self._finished(log, RunKey(log.stem, 0), read.trace, case, Coverage(missing, read.coverage.partial))
 
     def _foreign_case(self) -> Case:
         """What the file of criteria says about the robot's surroundings; read once."""
@@ -87,12 +94,12 @@ class Judging:
                 raise UnusableScenario(from_here(error.problems, home)) from error
         return self._case
 
-    def _finished(self, key: RunKey, trace: Trace, case: Case, coverage: Coverage) -> RunFinished:
+    def _finished(self, log: Path, key: RunKey, trace: Trace, case: Case, coverage: Coverage) -> RunFinished:
         """Judged by the file of criteria."""
         criteria, file = self._criteria, str(self._scenario)
         assert criteria is not None
         result = result_of(key, file, criteria.spec.pass_, trace, case, criteria.lines, coverage)
-        return RunFinished(result, file=file)
+        return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=file)
 
 
 class UnusableScenario(InvalidInput):

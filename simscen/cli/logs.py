@@ -24,7 +24,8 @@ def logs_of(paths: Sequence[Path]) -> list[Path]:
         except (OSError, ValueError) as error:
             told = reason(error) if isinstance(error, OSError) else "no such file or directory"
             raise InvalidInput([Problem(str(path), 0, 0, "SC800", told)]) from error
-        found.update(dict.fromkeys(_logs(path) if is_folder(path) else [path]))
+        inside = sorted(_logs(path), key=lambda log: log.parts) if is_folder(path) else [path]
+        found.update(dict.fromkeys(inside))
     if not found:
         where = ", ".join(quoted(str(path)) for path in paths)
         raise NothingSelected(f"no logs found in {where}; a folder is searched for *.mcap and rosbag2 folders")

@@ -20,7 +20,7 @@ def to_json(runs: Sequence[RunFinished], folder: str = "") -> str:
 
 def as_document(runs: Sequence[RunFinished], folder: str = "") -> dict[str, Any]:
     """The same as plain data: counts, then one entry for each run in the form of its result.json."""
-    ordered = sorted(runs, key=lambda run: (run.result.path, run.key))
+    ordered = in_order(runs)
     counts = {outcome.value: sum(run.outcome is outcome for run in runs) for outcome in Outcome}
     return {
         "format": FORMAT,
@@ -30,6 +30,11 @@ def as_document(runs: Sequence[RunFinished], folder: str = "") -> dict[str, Any]
         "suite": suite_data(suite(run.result for run in ordered)),
         "runs": [{**as_data(run.result), "artifacts": _artifacts(run, folder)} for run in ordered],
     }
+
+
+def in_order(runs: Sequence[RunFinished]) -> list[RunFinished]:
+    """By file, scenario and seed: the order they ended in does not show."""
+    return sorted(runs, key=lambda run: (run.result.path, run.key))
 
 
 def _artifacts(run: RunFinished, folder: str) -> dict[str, str]:

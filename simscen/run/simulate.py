@@ -60,7 +60,9 @@ def simulate_file(
 def judged(prepared: Prepared, seed: int, trace: Trace, log: Path | None = None) -> Run:
     """The run that a trace shows."""
     loaded = prepared.loaded
-    lines = tuple(loaded.place_of("pass", index).line for index in range(len(prepared.spec.pass_)))
+    places = [loaded.place_of("pass", index) for index in range(len(prepared.spec.pass_))]
+    # One that the scenario extends or takes from defaults.yaml has its line in another file than reports name.
+    lines = tuple(place.line if place.path == loaded.path else 0 for place in places)
     result = result_of(RunKey(loaded.id, seed), loaded.path, prepared.spec.pass_, trace, prepared.case, lines)
     return Run(result, trace, prepared.case, log)
 

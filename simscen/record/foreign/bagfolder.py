@@ -1,7 +1,7 @@
 """The messages of a rosbag2 folder. Its MCAP files we read ourselves; SQLite and compressed files rosbags does."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from pathlib import Path
 
 from simscen.record.foreign.mcapfile import McapMessages, Raw
@@ -13,8 +13,8 @@ INSTALL = "pip install 'simscen[rosbags]'"
 class BagMessages:
     """Gives a folder's messages, file after file; then `complete` says whether all are there that it speaks of."""
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
+    def __init__(self, folder: Path, wanted: Container[str]) -> None:
+        self._folder, self._wanted = folder, wanted
         self.complete = False
         self.topics: dict[str, str] = {}
 
@@ -47,10 +47,11 @@ class BagMessages:
         try:
             with Reader(self._folder) as reader:
                 self.topics = {one.topic: one.msgtype for one in reader.connections}
-                for connection, time, data in reader.messages():
+                chosen = [one for one in reader.connections if one.topic in self._wanted]
+                for connection, time, data in reader.messages(chosen) if chosen else ():
                     count += 1
                     yield Raw(connection.topic, connection.msgtype, "cdr", time, bytes(data))
-                self.complete = count == reader.message_count
+                self.complete = count == sum(one.msgcount for one in chosen)
         except (Unusable, OSError):
             raise
         except Exception as error:  # rosbags lets what SQLite, YAML and zstd raise fall through
@@ -58,10 +59,10 @@ class BagMessages:
             raise Unusable(told, "try `ros2 bag reindex`") from error
 
 
-def messages_of(path: Path) -> McapMessages | BagMessages:
-    """The messages of an MCAP file or of a rosbag2 folder. Raises Unusable for what is neither."""
+def messages_of(path: Path, wanted: Container[str]) -> McapMessages | BagMessages:
+    """The messages of an MCAP file or of a rosbag2 folder, those on the topics `wanted` at least. Raises Unusable."""
     if path.is_dir():
-        return BagMessages(path)
+        return BagMessages(path, wanted)
     if path.suffix == ".bag":
         raise Unusable("it is a bag of ROS 1", "convert it, e.g. with `rosbags-convert`, whose bags are of ROS 2")
     if path.suffix == ".db3":

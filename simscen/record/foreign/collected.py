@@ -2,7 +2,7 @@
 
 import struct
 from collections import defaultdict
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -33,19 +33,22 @@ class Collected:
 
     said: dict[str, list[tuple[int, Any]]] = field(default_factory=lambda: defaultdict(list))
     lacking: dict[str, str] = field(default_factory=dict)
-    count: int = 0
 
 
-def collect(raw: Iterable[Raw], wanted: Wanted) -> Collected:
-    """Read what is wanted. Raises Unusable for a message that is not of its type."""
+def roles_of(wanted: Wanted) -> dict[str, list[str]]:
+    """What each topic that is wanted stands for; the truth may be a topic that stands for something else, too."""
     roles: dict[str, list[str]] = defaultdict(list)
     for role in TOPICS:
         roles[wanted.topic(role)].append(role)
     if wanted.truth is not None and wanted.frames is None:
         roles[wanted.truth].append("truth")
+    return dict(roles)
+
+
+def collect(raw: Iterable[Raw], roles: Mapping[str, Sequence[str]]) -> Collected:
+    """Read the messages of these topics. Raises Unusable for one that is not of its type."""
     found = Collected()
     for message in raw:
-        found.count += 1
         for role in roles.get(message.topic, ()):
             _take(found, role, message)
     return found

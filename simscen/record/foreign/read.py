@@ -10,7 +10,7 @@ from simscen.core.events import Event, EventKind
 from simscen.core.evidence import Coverage
 from simscen.core.trace import Trace
 from simscen.record.foreign.bagfolder import messages_of
-from simscen.record.foreign.collected import collect
+from simscen.record.foreign.collected import collect, roles_of
 from simscen.record.foreign.reading import Reading
 from simscen.record.foreign.unusable import Unusable
 from simscen.record.foreign.wanted import Wanted
@@ -33,8 +33,9 @@ def read_foreign(path: Path, wanted: Wanted) -> ForeignLog:
     nothing passes on it. Raises InvalidInput, with the reason, for what cannot be used.
     """
     try:
-        messages = messages_of(path)
-        found = collect(messages, wanted)
+        roles = roles_of(wanted)
+        messages = messages_of(path, roles)
+        found = collect(messages, roles)
         reading = Reading(found, messages.topics, wanted)
         end = reading.time.end
         if messages.complete:
