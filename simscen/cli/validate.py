@@ -55,7 +55,8 @@ def _problems(kind: str, file: Path, checks: Checks) -> list[Problem]:
     if kind == "scenario":
         return checks.scenario(file)[1]
     found = problems_of(kind, file, checks.root, checks.world_path)
-    return found if found or kind == "robot" else checks.world(file)
+    wrong = any(problem.severity == "error" for problem in found)
+    return found if wrong or kind == "robot" else [*found, *checks.world(file)]
 
 
 @dataclass

@@ -10,6 +10,7 @@ from simscen.loading.document import Library
 from simscen.loading.paths import Fence
 from simscen.loading.scenario import try_scenario
 from simscen.loading.tree import Fields
+from simscen.loading.worldsense import senseless
 
 _ONLY_ROBOTS = frozenset({"drive", "sensors", "limits", "body", "urdf"})
 _ONLY_WORLDS = frozenset({"walls", "obstacles", "objects", "doors", "places", "regions", "map_height", "sdf"})
@@ -17,21 +18,23 @@ _ONLY_SCENARIOS = frozenset({"world", "robot", "goals", "pass", "events", "fault
 
 
 def problems_of(kind: str, file: Path, root: Path, world_path: Sequence[Path] = ()) -> list[Problem]:
-    """All that is wrong with a "scenario", "world", "robot" or "map" file and the files it names."""
+    """All that is wrong with a "scenario", "world", "robot" or "map" file and the files it names; some are warnings."""
     if kind == "scenario":
         loaded = try_scenario(file, root, world_path)
-        return loaded if isinstance(loaded, list) else []
+        return loaded if isinstance(loaded, list) else list(loaded.notes)
     library = Library(Fence.around(root, world_path))
     if isinstance(path := library.fence.entered(file), Problem):
         return [path]
     assets = Assets(library)
+    senses: list[Problem] = []
     if kind == "world":
-        assets.world_file(path)
+        world = assets.world_file(path)
+        senses = senseless(world) if world is not None else []
     elif kind == "robot":
         assets.robot_file(path)
     else:
         assets.map_file(path)
-    return library.with_source(sorted(assets.problems))
+    return library.with_source(sorted([*assets.problems, *senses]))
 
 
 def kind_of(file: Path, root: Path) -> str:

@@ -60,7 +60,8 @@ class Assets:
         if spec.sdf is not None:
             sdf = self._find(spec.sdf, value_place(tree, ("sdf",)))
         name = spec.name or path.name.split(".")[0]
-        return LoadedWorld(name, path, spec, loaded_map, sdf) if len(self.problems) == before else None
+        whole = tree if isinstance(tree, Fields) else None
+        return LoadedWorld(name, path, spec, loaded_map, sdf, whole) if len(self.problems) == before else None
 
     def map(self, written: Leaf) -> LoadedMap | None:
         """The ROS map in the file that a scenario names."""

@@ -5,11 +5,15 @@ from collections.abc import Iterator
 from simscen.core.problems import Problem
 from simscen.core.time import Clock
 from simscen.core.world import World
+from simscen.loading.hardlyfails import hardly_fails
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.messages import quoted, suggestion
 from simscen.loading.names import ARTICLES, event_names, known_names, own_goal_names
+from simscen.loading.neverhappens import never_happens
+from simscen.loading.neverholds import never_holds
 from simscen.loading.references import references
 from simscen.loading.tree import Fields, Key, key_place, real_keys, value_place
+from simscen.loading.worldsense import senseless
 from simscen.model.robot import RobotSpec
 
 COMMAND = "cmd_vel"
@@ -18,9 +22,16 @@ READINGS = {"lidar": "Scan", "odometry": "Odometry", "imu": "Imu", "bumper": "Bu
 
 
 def inconsistencies(loaded: LoadedScenario, world: World | None = None) -> list[Problem]:
-    """Every contradiction within a scenario and the files it names; `world` is what its world file has become."""
-    checks = (_unfit_faults, _twice_named, _uneven_rates, _undecidable)
-    return [*_unknown_names(loaded, world), *(problem for check in checks for problem in check(loaded))]
+    """Every contradiction within a scenario and the files it names, and what deserves a look, as warnings.
+
+    `world` is what its world file has become. Where names are unknown, no more is asked.
+    """
+    unknown = [*_unknown_names(loaded, world), *_unfit_faults(loaded), *_twice_named(loaded), *_uneven_rates(loaded)]
+    unknown += [loaded.sourced(problem) for problem in senseless(loaded.world)]
+    if any(problem.severity == "error" for problem in unknown):
+        return unknown
+    checks = (_undecidable, _short_faults, never_happens, never_holds, hardly_fails)
+    return [*unknown, *(problem for check in checks for problem in check(loaded))]
 
 
 def _unknown_names(loaded: LoadedScenario, world: World | None) -> Iterator[Problem]:
@@ -52,6 +63,19 @@ def _unfit_faults(loaded: LoadedScenario) -> Iterator[Problem]:
             hint = f"it can happen to: {', '.join(fitting)}" if fitting else "this robot has nothing it can happen to"
             message = f"fault `{entry.kind}` makes no sense on {_article(kind)} (`{entry.sensor}`)"
             yield loaded.problem_at(loaded.key_place_of("faults", index, entry.kind), "SC032", message, hint)
+
+
+def _short_faults(loaded: LoadedScenario) -> Iterator[Problem]:
+    """Faults that may begin and end between two messages of their sensor."""
+    if loaded.robot.spec is None:
+        return
+    rates = {name: getattr(sensor.chosen, "rate", None) for name, sensor in loaded.robot.spec.sensors.items()}
+    rates[COMMAND] = loaded.spec.stack.controller_frequency
+    for index, entry in enumerate(loaded.spec.faults):
+        rate = rates.get(entry.sensor)
+        if entry.for_ is not None and rate is not None and entry.for_ * rate < 1 - 1e-9:
+            message = f"`{entry.label}` may be over between two messages: `{entry.sensor}` has {rate:g} a second"
+            yield loaded.problem(("faults", index, "for"), "SC050", message, f"make it {1 / rate:g} s at least")
 
 
 def _article(reading: str) -> str:

@@ -1,7 +1,7 @@
 """What loading yields: validated specifications, and the files they came from."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -35,6 +35,7 @@ class LoadedWorld:
     spec: WorldSpec | None = None
     map: LoadedMap | None = None
     sdf: Path | None = None
+    tree: Fields | None = field(default=None, repr=False, compare=False)
 
 
 @dataclass(frozen=True)
@@ -94,6 +95,9 @@ class LoadedScenario:
 
     def problem_at(self, place: Place, code: str, message: str, hint: str = "") -> Problem:
         """A problem at a place in any of the files read, with the text of its line."""
-        lines = self.sources.get(place.path, "").split("\n")
-        source = lines[place.line - 1] if 0 < place.line <= len(lines) else ""
-        return Problem(*place, code=code, message=message, hint=hint, source=source)
+        return self.sourced(Problem(*place, code=code, message=message, hint=hint))
+
+    def sourced(self, problem: Problem) -> Problem:
+        """A problem in any of the files read with the text of its line."""
+        lines = self.sources.get(problem.path, "").split("\n")
+        return replace(problem, source=lines[problem.line - 1]) if 0 < problem.line <= len(lines) else problem

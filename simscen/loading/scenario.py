@@ -1,6 +1,7 @@
 """Load a scenario with everything it names, or say all that is wrong with it."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -83,7 +84,10 @@ def _with_assets(spec: ScenarioSpec, tree: Fields, library: Library, file: Path)
             dict.fromkeys(note for used in (world.map, robot_map) if used and used != "none" for note in used.notes)
         ),
     )
-    return sorted(inconsistencies(loaded)) or loaded
+    problems = sorted(inconsistencies(loaded))
+    if any(problem.severity == "error" for problem in problems):
+        return problems
+    return replace(loaded, notes=tuple(problems))
 
 
 def _world(spec: ScenarioSpec, tree: Fields, assets: Assets, file: Path) -> LoadedWorld | None:

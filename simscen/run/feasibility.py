@@ -31,8 +31,8 @@ def check(loaded: LoadedScenario, cache: WorldCache | None = None) -> list[Probl
     world = cache.world(loaded)
     loaded = _with_robot(loaded)
     problems = [*_once_known(loaded, world), *_too_large(loaded, world)]
-    if not problems:
-        problems = _impossible(Scene(loaded, world, robot_size_of(loaded)), cache)
+    if not any(problem.severity == "error" for problem in problems):
+        problems += _impossible(Scene(loaded, world, robot_size_of(loaded)), cache)
     return [*problems, *notes_of(world, loaded.world, loaded.root)]
 
 

@@ -2,6 +2,7 @@
 
 import hashlib
 import pickle
+from dataclasses import replace
 
 from simscen.core.world import BuiltWorld
 from simscen.loading.loaded import LoadedScenario
@@ -27,7 +28,7 @@ class PreparedCache:
         self._scenarios.clear()
 
     def _world(self, loaded: LoadedScenario, height: float) -> BuiltWorld:
-        key = hashlib.sha256(pickle.dumps((loaded.world, height))).hexdigest()
+        key = hashlib.sha256(pickle.dumps((replace(loaded.world, tree=None), height))).hexdigest()
         if key not in self._worlds:
             self._worlds[key] = build_world(loaded, height)
         return self._worlds[key]

@@ -7,7 +7,8 @@ from itertools import pairwise
 from simscen.core.navigation import Goal
 from simscen.core.problems import Problem
 from simscen.criteria.criterion import AnyCriterion
-from simscen.model.robot import Limits, Omnidirectional, RobotSpec
+from simscen.loading.neverhappens import top_speed
+from simscen.model.robot import RobotSpec
 from simscen.run.expectation import expects_failure
 from simscen.run.goals import goals_of
 from simscen.run.scene import Scene
@@ -34,15 +35,6 @@ def untimely(scene: Scene, ways: Ways) -> list[Problem]:
         return []
     exact = [ways.shortest(a, b) for a, b in pairwise(stops)]
     return list(_broken(scene, goals, spec, exact)) if all(map(math.isfinite, exact)) else []
-
-
-def top_speed(robot: RobotSpec) -> float:
-    """In m/s, over ground in any direction."""
-    limits: Limits = robot.limits
-    ahead = max(limits.linear, limits.reverse or limits.linear)
-    if isinstance(robot.drive, Omnidirectional):
-        return math.hypot(ahead, limits.lateral or limits.linear)
-    return ahead
 
 
 def _broken(scene: Scene, goals: tuple[Goal, ...], robot: RobotSpec, whole: list[float]) -> Iterator[Problem]:

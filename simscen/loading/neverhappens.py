@@ -1,0 +1,205 @@
+"""Events and faults that can never happen, whatever the robot does: a test of them tests nothing."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+from simscen.core.problems import Problem
+from simscen.loading.loaded import LoadedScenario
+from simscen.loading.names import event_names, own_goal_names
+from simscen.loading.tree import Key
+from simscen.model.disturbance import EventEntry
+from simscen.model.robot import RobotSpec
+from simscen.triggers.trigger import Test, Trigger
+
+Keys = tuple[Key, ...]
+Why = tuple[Keys, str]
+"""Where what keeps a trigger from firing stands, and in words that follow "never happens: "."""
+
+LATCHED = frozenset({"time", "travelled", "goal", "replan", "recovery", "collision", "event"})
+"""Conditions that stay true once they are."""
+FASTER = 1.1
+"""Times its top speed that a robot is at most, by overshoot."""
+LOST = 0.5
+"""Metres that a stack which is told the truth is never off."""
+
+
+def never_happens(loaded: LoadedScenario) -> Iterator[Problem]:
+    """What can never happen, and what happens less often than it says."""
+    run = _Run(loaded, frozenset())
+    while (alive := run.possible) != run.alive:
+        run = replace(run, alive=alive)
+    triggers = [(("events", k, "when"), entry.when, name) for k, (entry, name) in enumerate(run.events)]
+    faults: list[tuple[Keys, Trigger | None, str]] = [
+        (("faults", k, "when"), entry.when, entry.label) for k, entry in enumerate(loaded.spec.faults)
+    ]
+    for keys, trigger, name in [*triggers, *faults]:
+        if trigger is None:
+            continue
+        if why := run.never(trigger, keys):
+            yield loaded.problem(why[0], "SC050", f"`{name}` can never happen: {why[1]}")
+        elif trigger.times > 1 and trigger.edge == "rising" and _latched(trigger):
+            message = f"`{name}` happens once, not {trigger.times} times: its condition stays true from then on"
+            yield replace(loaded.problem((*keys, "times"), "SC052", message), severity="warning")
+
+
+@dataclass(frozen=True)
+class _Run:
+    """What a run can come to, when the events of these names may happen."""
+
+    loaded: LoadedScenario
+    alive: frozenset[str]
+
+    @cached_property
+    def events(self) -> list[tuple[EventEntry, str]]:
+        return list(zip(self.loaded.spec.events, event_names(self.loaded), strict=True))
+
+    @property
+    def possible(self) -> frozenset[str]:
+        """The events that may happen once those that are alive may; more and more of them, up to a fixed point."""
+        return frozenset(name for entry, name in self.events if self.never(entry.when, ()) is None)
+
+    def never(self, trigger: Trigger, keys: Keys) -> Why | None:
+        """Why a trigger never fires."""
+        limit = self.loaded.spec.time_limit
+        if trigger.probability == 0:
+            return (*keys, "probability"), "its probability is 0"
+        if trigger.edge == "falling" and _latched(trigger):
+            return (*keys, "edge"), "its condition never stops being true"
+        earliest = trigger.delay + _earliest(trigger)
+        if trigger.edge == "rising" and earliest >= limit:
+            key = "delay" if trigger.delay else trigger.kind
+            return (*keys, key), f"{earliest:g} s is not before the run's time limit of {limit:g} s"
+        return self._why(trigger, keys)
+
+    def _why(self, test: Test, keys: Keys) -> Why | None:
+        if test.all is not None:
+            whys = self._whys(test.all, (*keys, "all"))
+            return next((why for why in whys if why), None)
+        if test.any is not None:
+            whys = self._whys(test.any, (*keys, "any"))
+            return whys[0] if all(whys) else None
+        if test.not_ is not None:
+            always = test.not_.time is not None and _earliest(test.not_) == 0
+            return ((*keys, "not"), "what must not be true always is") if always else None
+        check = _CHECKS.get(test.kind)
+        why = check(self, test.chosen) if check else None
+        return ((*keys, test.kind), why) if why else None
+
+    def _whys(self, tests: Sequence[Test], keys: Keys) -> list[Why | None]:
+        return [self._why(test, (*keys, k)) for k, test in enumerate(tests)]
+
+    def does(self, *kinds: str) -> bool:
+        """Whether an event that may happen does any of these."""
+        return any(action.kind in kinds for e, name in self.events if name in self.alive for action in e.actions)
+
+    def sent(self, goal: str | None) -> int:
+        """How many goals of a name (or at all) the robot can be sent."""
+        own = [name for name in own_goal_names(self.loaded) if goal in (None, name)]
+        more = sum(
+            entry.when.times
+            for entry, name in self.events
+            for action in entry.actions
+            if name in self.alive and action.kind == "new_goal" and goal in (None, getattr(action.chosen, "name", ""))
+        )
+        return len(own) + more
+
+    def _time(self, time: Any) -> str | None:
+        limit = self.loaded.spec.time_limit
+        return f"{time.root:g} s is not before the run's time limit of {limit:g} s" if time.root >= limit else None
+
+    def _travelled(self, travelled: Any) -> str | None:
+        top, limit = self._top_speed, self.loaded.spec.time_limit
+        if top is None or travelled.root <= FASTER * top * limit:
+            return None
+        return f"at its top speed of {top:g} m/s the robot drives {top * limit:g} m within the time limit"
+
+    def _speed_above(self, speed: Any) -> str | None:
+        top = self._top_speed
+        if top is None or speed.root <= FASTER * top or self._may_be_rammed:
+            return None
+        return f"the robot's top speed is {top:g} m/s"
+
+    def _distance_remaining(self, _: Any) -> str | None:
+        return None if self.sent(None) else "the robot has no goal"
+
+    def _localization_error(self, error: Any) -> str | None:
+        told = self.loaded.spec.stack.localizer.type == "ground_truth"
+        return "the localizer is told the truth" if told and error.root >= LOST else None
+
+    def _goal(self, goal: Any) -> str | None:
+        sent, whose = self.sent(goal.name), "" if goal.name is None else f" called `{goal.name}`"
+        if goal.count > sent:
+            return f"the robot is sent {sent or 'no'} goal{'' if sent == 1 else 's'}{whose}"
+        if goal.status == "canceled" and not self.does("cancel_goal", "new_goal"):
+            return "no event cancels a goal or sends another"
+        stops = self.loaded.spec.on_goal_failure == "stop" and not self.does("new_goal")
+        if goal.status == "failed" and goal.count > 1 and stops:
+            return "the run ends after the first goal that fails (`on_goal_failure: stop`)"
+        return None
+
+    def _replan(self, _: Any) -> str | None:
+        return None if self.sent(None) else "the robot has no goal to plan for"
+
+    def _recovery(self, recovery: Any) -> str | None:
+        return no_recovery(self.loaded, recovery.name) if self.sent(None) else "the robot has no goal to fail at"
+
+    def _event(self, event: Any) -> str | None:
+        return None if event.name in self.alive else f"it waits for event `{event.name}`, which never does"
+
+    @property
+    def _top_speed(self) -> float | None:
+        spec = self.loaded.robot.spec
+        return None if spec is None or self.does("push", "kidnap") else top_speed(spec)
+
+    @property
+    def _may_be_rammed(self) -> bool:
+        world = self.loaded.world
+        own = world.spec is not None and world.sdf is None
+        return not own or self.does("move", "close", "open") or any(thing.move for thing in world.spec.objects)  # type: ignore[union-attr]
+
+
+_CHECKS = {
+    "time": _Run._time,
+    "travelled": _Run._travelled,
+    "speed_above": _Run._speed_above,
+    "distance_remaining": _Run._distance_remaining,
+    "localization_error": _Run._localization_error,
+    "goal": _Run._goal,
+    "replan": _Run._replan,
+    "recovery": _Run._recovery,
+    "event": _Run._event,
+}
+
+
+def top_speed(robot: RobotSpec) -> float:
+    """In m/s over ground, in whichever direction it drives fastest."""
+    limits = robot.limits
+    ahead = max(limits.linear, limits.reverse or limits.linear)
+    sideways = (limits.lateral or limits.linear) if robot.drive.type == "omnidirectional" else 0.0
+    return float((ahead**2 + sideways**2) ** 0.5)
+
+
+def no_recovery(loaded: LoadedScenario, behaviour: str | None) -> str | None:
+    """Why a recovery behaviour (any, for None) never runs."""
+    recovery = loaded.spec.stack.recovery
+    if not recovery.behaviors or recovery.number_of_retries == 0:
+        return "the stack has no recoveries"
+    if behaviour is not None and behaviour not in recovery.behaviors:
+        return f"the stack's recoveries are {', '.join(dict.fromkeys(recovery.behaviors))}"
+    return None
+
+
+def _latched(test: Test) -> bool:
+    parts = test.all or test.any
+    return all(map(_latched, parts)) if parts else test.kind in LATCHED
+
+
+def _earliest(test: Test) -> float:
+    """Seconds before which a condition is not true for sure."""
+    if test.all is not None:
+        return max(map(_earliest, test.all))
+    if test.any is not None:
+        return min(map(_earliest, test.any))
+    return float(test.chosen.root) if test.time is not None else 0.0  # type: ignore[attr-defined]

@@ -1,0 +1,49 @@
+"""Go through all of a specification, with where each part of it stands in the file."""
+
+from collections.abc import Iterator
+from typing import Annotated, Any, get_args, get_origin
+
+from pydantic import BaseModel, RootModel
+
+from simscen.loading.tree import Key
+from simscen.spec.quantities import Quantity
+
+Keys = tuple[Key, ...]
+
+
+def below(spec: Any, keys: Keys = ()) -> Iterator[tuple[Keys, BaseModel]]:
+    """Every mapping of a specification, itself included, in the order of its fields."""
+    if isinstance(spec, RootModel):
+        yield from below(spec.root, keys)
+    elif isinstance(spec, BaseModel):
+        yield keys, spec
+        for name, field in type(spec).model_fields.items():
+            yield from below(getattr(spec, name), (*keys, field.alias or name))
+    elif isinstance(spec, list | tuple):
+        for index, item in enumerate(spec):
+            yield from below(item, (*keys, index))
+    elif isinstance(spec, dict):
+        for key, item in spec.items():
+            yield from below(item, (*keys, key))
+
+
+def quantities(spec: BaseModel, dimension: str) -> Iterator[tuple[Keys, float]]:
+    """The numbers of one dimension in a specification."""
+    for keys, part in below(spec):
+        for name, field in type(part).model_fields.items():
+            value = getattr(part, name)
+            marked = any(_has(mark, dimension) for mark in field.metadata) or _measures(field.annotation, dimension)
+            if marked and isinstance(value, int | float):
+                yield (*keys, field.alias or name), value
+
+
+def _measures(kind: Any, dimension: str) -> bool:
+    """Whether a type, or a member of a union, is a quantity of the dimension."""
+    if get_origin(kind) is Annotated:
+        inner, *marks = get_args(kind)
+        return any(_has(mark, dimension) for mark in marks) or _measures(inner, dimension)
+    return any(_measures(member, dimension) for member in get_args(kind))
+
+
+def _has(mark: Any, dimension: str) -> bool:
+    return isinstance(mark, Quantity) and mark.dimension == dimension
