@@ -15,6 +15,7 @@ from simscen.loading.scenario import try_scenario
 from simscen.loading.worldfile import load_world_file
 from simscen.run.feasibility import check, notes_of
 from simscen.run.worldcache import WorldCache
+from simscen.run.worldchecks import misnamed
 from simscen.run.worldsource import world_of
 
 
@@ -97,7 +98,8 @@ class Checks:
             notes = list(source.map.notes) if source.map else []
             if self.fast:
                 return notes
-            return [*notes, *notes_of(world_of(source, self.root, self.world_path, self.lenient), source, self.root)]
+            world = world_of(source, self.root, self.world_path, self.lenient)
+            return [*notes, *misnamed(world, source), *notes_of(world, source, self.root)]
         except InvalidInput as error:
             return error.problems
 

@@ -47,6 +47,8 @@ CODES = {
     "SC311": "Something in a world or map deserves a look; with --lenient, also what was left out of it.",
     "SC312": "A world holds more than one world file of our own can.",
     "SC313": "Something in a world has no extent.",
+    "SC314": "A place of a world is inside an obstacle.",
+    "SC315": "A region is outside its world.",
     "SC320": "A map image cannot be used.",
     "SC330": "A map would have too many cells.",
     "SC331": "A map would become too many walls.",

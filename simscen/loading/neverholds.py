@@ -7,7 +7,6 @@ from simscen.core.problems import Problem
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.names import goal_names
 from simscen.loading.neverhappens import no_recovery
-from simscen.loading.specwalk import below
 from simscen.loading.tree import Key
 
 Keys = tuple[Key, ...]
@@ -19,7 +18,6 @@ NONE = 0
 
 def never_holds(loaded: LoadedScenario) -> Iterator[Problem]:
     """Every criterion, or pair of criteria, that no run can pass."""
-    yield from _reversed_bounds(loaded)
     for index, entry in enumerate(loaded.spec.pass_):
         keys: Keys = ("pass", index, entry.kind)
         check = _CHECKS.get(entry.kind)
@@ -27,15 +25,6 @@ def never_holds(loaded: LoadedScenario) -> Iterator[Problem]:
         if why:
             yield loaded.problem_at(loaded.key_place_of(*keys), "SC051", f"{entry.kind} can never hold: {why}")
     yield from _contradictions(loaded)
-
-
-def _reversed_bounds(loaded: LoadedScenario) -> Iterator[Problem]:
-    """`min` above `max`, in whatever has both."""
-    for keys, spec in below(loaded.spec):
-        low, high = getattr(spec, "min", None), getattr(spec, "max", None)
-        if isinstance(low, int | float) and isinstance(high, int | float) and low > high:
-            message = f"`min` {low:g} is greater than `max` {high:g}"
-            yield loaded.problem((*keys, "min"), "SC016", message)
 
 
 def _without_goals(loaded: LoadedScenario, kind: str, criterion: Any) -> str | None:

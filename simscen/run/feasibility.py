@@ -12,12 +12,14 @@ from simscen.core.world import World
 from simscen.loading.consistency import inconsistencies
 from simscen.loading.loaded import LoadedScenario, LoadedWorld
 from simscen.run.misplaced import misplaced
+from simscen.run.pointless import places_of_triggers, pointless
 from simscen.run.robotsize import robot_size_of
 from simscen.run.scene import Scene
 from simscen.run.unreachable import starts_of, unreachable
 from simscen.run.untimely import untimely
 from simscen.run.ways import Ways
 from simscen.run.worldcache import WorldCache
+from simscen.run.worldchecks import misnamed
 from simscen.run.worldsource import load_robot
 from simscen.worlds.mapsize import too_large
 
@@ -31,17 +33,20 @@ def check(loaded: LoadedScenario, cache: WorldCache | None = None) -> list[Probl
     world = cache.world(loaded)
     loaded = _with_robot(loaded)
     problems = [*_once_known(loaded, world), *_too_large(loaded, world)]
+    problems += [loaded.sourced(problem) for problem in misnamed(world, loaded.world)]
     if not any(problem.severity == "error" for problem in problems):
         problems += _impossible(Scene(loaded, world, robot_size_of(loaded)), cache)
     return [*problems, *notes_of(world, loaded.world, loaded.root)]
 
 
 def _impossible(scene: Scene, cache: WorldCache) -> list[Problem]:
-    ways = Ways(scene, cache, (*starts_of(scene), *(goal.pose for _, goal in scene.targets)))
+    stops = (*starts_of(scene), *(goal.pose for _, goal in scene.targets), *places_of_triggers(scene))
+    ways = Ways(scene, cache, stops)
     wrong = misplaced(scene)
     problems = [problem for _, problem in wrong]
     problems += [problem for problem, _ in unreachable(scene, ways, {keys for keys, _ in wrong})]
-    return problems or untimely(scene, ways)
+    problems += [] if any(keys == ("robot", "pose") for keys, _ in wrong) else pointless(scene, ways)
+    return problems if any(problem.severity == "error" for problem in problems) else [*problems, *untimely(scene, ways)]
 
 
 def _with_robot(loaded: LoadedScenario) -> LoadedScenario:

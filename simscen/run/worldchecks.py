@@ -1,0 +1,31 @@
+"""What the built world tells about the places and regions that its file names."""
+
+from collections.abc import Iterator
+
+from simscen.core.problems import Problem
+from simscen.core.world import World
+from simscen.loading.loaded import LoadedWorld
+from simscen.loading.messages import quoted
+from simscen.loading.tree import key_place
+from simscen.worlds.contain import blocking_solid
+
+INSIDE = 1e-6
+HEIGHTS = 0.02, 0.4
+"""Metres between which something is in the way of most robots."""
+
+
+def misnamed(world: World, source: LoadedWorld) -> Iterator[Problem]:
+    """Warnings about places in obstacles and regions where nothing is, without the text of their lines."""
+    if source.spec is None or source.tree is None:
+        return
+    for name, place in source.spec.places.items():
+        solid = blocking_solid(world, (place.x, place.y), INSIDE, HEIGHTS)
+        if solid is not None:
+            message = f'place {quoted(name)} is inside obstacle "{solid}"'
+            yield Problem(*key_place(source.tree, ("places", name)), "SC314", message, severity="warning")
+    left, low, right, high = world.bounds
+    for name, corners in source.spec.regions.items():
+        xs, ys = [x for x, _ in corners], [y for _, y in corners]
+        if max(xs) < left or min(xs) > right or max(ys) < low or min(ys) > high:
+            message = f"region {quoted(name)} is outside the world ({left:g} … {right:g}, {low:g} … {high:g})"
+            yield Problem(*key_place(source.tree, ("regions", name)), "SC315", message, severity="warning")
