@@ -11,10 +11,12 @@ import pytest
 from simscen.cli.diagnostics import as_text
 from simscen.cli.select import Checks
 from simscen.core.problems import Problem
+from simscen.loading.codes import CODES
 
 HERE = Path(__file__).parent / "meaningless"
 CASES = sorted(HERE.glob("*.scenario.yaml"))
 CHECKS = Checks(HERE)
+OTHERS = {"SC014", "SC016", "SC030", "SC031", "SC032", "SC033", "SC035", "SC313", "SC314", "SC315"}
 
 
 @pytest.fixture(scope="module")
@@ -31,6 +33,16 @@ def test_says_exactly_what_is_meaningless_and_where(case: Path, told: dict[Path,
     if os.environ.get("SIMSCEN_UPDATE"):
         expected.write_text(text, encoding="utf-8")
     assert text == expected.read_text(encoding="utf-8")
+
+
+def test_at_least_seventy_are_refused_or_warned_of(told: dict[Path, list[Problem]]) -> None:
+    assert [case.name for case, problems in told.items() if not problems] == []
+    assert len(told) >= 70
+
+
+def test_every_check_of_meaning_has_a_file(told: dict[Path, list[Problem]]) -> None:
+    meant = {code for code in CODES if code.startswith("SC05") or "SC301" <= code <= "SC304" or code in OTHERS}
+    assert meant - {problem.code for problems in told.values() for problem in problems} == set()
 
 
 def test_each_message_belongs_to_a_case() -> None:
