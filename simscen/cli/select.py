@@ -71,12 +71,16 @@ def _shard(scenarios: list[LoadedScenario], number: int, count: int) -> list[Loa
 
 @dataclass(frozen=True)
 class Checks:
-    """Looks at files for all that can be wrong with them; with `fast`, for nothing that geometry is needed for."""
+    """Looks at files for all that can be wrong with them; with `fast`, for nothing that geometry is needed for.
+
+    Into the folder `pictures` goes a picture of each scenario that geometry finds something wrong with.
+    """
 
     root: Path
     world_path: Sequence[Path] = ()
     lenient: bool = False
     fast: bool = False
+    pictures: Path | None = None
     cache: WorldCache = field(default_factory=WorldCache)
 
     def scenario(self, file: Path) -> tuple[LoadedScenario | None, list[Problem]]:
@@ -86,7 +90,7 @@ class Checks:
             return None, loaded
         loaded = replace(loaded, lenient=self.lenient)
         with files_read() as read:
-            problems = [*loaded.notes, *([] if self.fast else checked(loaded, self.cache))]
+            problems = [*loaded.notes, *([] if self.fast else checked(loaded, self.cache, self.pictures))]
         loaded = replace(loaded, read=tuple(sorted(read)))
         usable = not any(problem.severity == "error" for problem in problems)
         return (loaded if usable else None), list(dict.fromkeys(problems))
@@ -104,9 +108,9 @@ class Checks:
             return error.problems
 
 
-def checked(scenario: LoadedScenario, cache: WorldCache | None = None) -> list[Problem]:
+def checked(scenario: LoadedScenario, cache: WorldCache | None = None, pictures: Path | None = None) -> list[Problem]:
     """What only geometry can tell, or why its world cannot be used."""
     try:
-        return check(scenario, cache)
+        return check(scenario, cache, pictures)
     except InvalidInput as error:
         return error.problems

@@ -34,14 +34,20 @@ def command(
         bool, typer.Option("--lenient", help="What of an SDF world cannot be used is a warning, not an error.")
     ] = False,
     fast: Annotated[bool, typer.Option("--fast", help="Leave out whatever needs the world to be built.")] = False,
+    picture: Annotated[
+        Path | None, typer.Option(help="Folder for a picture of each scenario whose geometry is wrong.")
+    ] = None,
 ) -> None:
     """Check scenario, world and robot files without running anything.
 
     Every problem of every file is listed with its line. Folders are searched for *.scenario.yaml, *.world.yaml and
-    *.robot.yaml. Exit code 0: all are valid; 2: some are not; 5: there are none.
+    *.robot.yaml. Scenarios are looked at in their worlds: is the robot free at its start and goals, can it get there in
+    time, can all events happen, can all criteria hold and fail?
+
+    Exit code 0: all are valid; 2: some are not; 5: there are none.
     """
     home = root if root is not None else default_root(paths)
-    checks, checked = Checks(home, world_path or [], lenient, fast), _Checked()
+    checks, checked = Checks(home, world_path or [], lenient, fast, picture), _Checked()
     for file in discover(paths, home, SCENARIO + WORLD + ROBOT):
         kind = kind_of(file, home)
         checked.add(kind, from_here(_problems(kind, file, checks), home))

@@ -15,6 +15,7 @@ from simscen.run.misplaced import misplaced
 from simscen.run.pointless import places_of_triggers, pointless
 from simscen.run.robotsize import robot_size_of
 from simscen.run.scene import Scene
+from simscen.run.sketch import draw
 from simscen.run.unreachable import starts_of, unreachable
 from simscen.run.untimely import untimely
 from simscen.run.ways import Ways
@@ -24,29 +25,38 @@ from simscen.run.worldsource import load_robot
 from simscen.worlds.mapsize import too_large
 
 
-def check(loaded: LoadedScenario, cache: WorldCache | None = None) -> list[Problem]:
+def check(loaded: LoadedScenario, cache: WorldCache | None = None, pictures: Path | None = None) -> list[Problem]:
     """What cannot be, at the line it is written in, and what deserves a look, as warnings.
 
-    `cache` keeps worlds for the scenarios to come. Raises InvalidInput for unusable files.
+    `cache` keeps worlds for the scenarios to come; into the folder `pictures` goes a picture of what is wrong. Raises
+    InvalidInput for unusable files, and UsageError for a picture that cannot be written.
     """
     cache = cache or WorldCache()
     world = cache.world(loaded)
     loaded = _with_robot(loaded)
     problems = [*_once_known(loaded, world), *_too_large(loaded, world)]
     problems += [loaded.sourced(problem) for problem in misnamed(world, loaded.world)]
-    if not any(problem.severity == "error" for problem in problems):
-        problems += _impossible(Scene(loaded, world, robot_size_of(loaded)), cache)
+    if not _has_errors(problems):
+        problems += _impossible(Scene(loaded, world, robot_size_of(loaded)), cache, pictures)
     return [*problems, *notes_of(world, loaded.world, loaded.root)]
 
 
-def _impossible(scene: Scene, cache: WorldCache) -> list[Problem]:
+def _impossible(scene: Scene, cache: WorldCache, pictures: Path | None) -> list[Problem]:
     stops = (*starts_of(scene), *(goal.pose for _, goal in scene.targets), *places_of_triggers(scene))
     ways = Ways(scene, cache, stops)
     wrong = misplaced(scene)
-    problems = [problem for _, problem in wrong]
-    problems += [problem for problem, _ in unreachable(scene, ways, {keys for keys, _ in wrong})]
+    closed = list(unreachable(scene, ways, {keys for keys, _ in wrong}))
+    problems = [*(problem for _, problem in wrong), *(problem for problem, _ in closed)]
     problems += [] if any(keys == ("robot", "pose") for keys, _ in wrong) else pointless(scene, ways)
-    return problems if any(problem.severity == "error" for problem in problems) else [*problems, *untimely(scene, ways)]
+    problems += [] if _has_errors(problems) else untimely(scene, ways)
+    if problems and pictures is not None:
+        file = draw(scene, [gap for _, gap in closed], pictures)
+        problems = [replace(problem, hint=f"{problem.hint}; picture: {file}".lstrip("; ")) for problem in problems]
+    return problems
+
+
+def _has_errors(problems: list[Problem]) -> bool:
+    return any(problem.severity == "error" for problem in problems)
 
 
 def _with_robot(loaded: LoadedScenario) -> LoadedScenario:

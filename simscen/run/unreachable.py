@@ -21,7 +21,7 @@ def starts_of(scene: Scene) -> list[Pose2]:
     return [scene.start, *(action.pose.pose for _, _, action in scene.actions if isinstance(action, Kidnap))]
 
 
-def unreachable(scene: Scene, ways: Ways, misplaced: set[Keys]) -> Iterator[tuple[Problem, tuple[float, float] | None]]:
+def unreachable(scene: Scene, ways: Ways, misplaced: set[Keys]) -> Iterator[tuple[Problem, tuple[float, float]]]:
     """A problem for each goal that is cut off, and where; those that are misplaced have theirs already.
 
     It is an error when fixed walls cut it off, and a warning when something does that might be passed or moved.

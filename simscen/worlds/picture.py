@@ -1,6 +1,7 @@
 """A picture of a world from above: its cut at lidar height, the map over it, bodies, places and regions."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -9,7 +10,7 @@ import numpy as np
 from simscen.core.geometry import Array
 from simscen.core.grid import FREE, OccupancyGrid
 from simscen.core.shapes import Body
-from simscen.core.world import BuiltWorld
+from simscen.core.world import BuiltWorld, Polygon
 from simscen.worlds.meshing import fuse
 from simscen.worlds.section import outlines
 
@@ -21,11 +22,14 @@ Colour = tuple[int, int, int, int]
 PAPER, FREE_GROUND, UNKNOWN_GROUND = (226, 230, 236, 255), (255, 255, 255, 255), (226, 230, 236, 255)
 MAPPED_WALL, WALL = (147, 178, 214, 255), (16, 42, 82, 255)
 BODY, PLACE, REGION, RULER = (214, 102, 20, 255), (20, 128, 74, 255), (122, 82, 178, 255), (120, 128, 140, 255)
+MARK = (200, 24, 40, 255)
 
 LONGEST = 1200
 """Pixels along the longer side."""
 FINER = 2
 """Everything is drawn this much larger and scaled down, which smooths the lines."""
+RING = 18 * FINER
+"""Canvas pixels from the middle of a gap to the ring around it."""
 
 
 @dataclass(frozen=True)
@@ -43,11 +47,16 @@ class View:
         return list(zip(x.tolist(), y.tolist(), strict=True))
 
 
-def picture(built: BuiltWorld, height: float) -> "Image.Image":
+def picture(
+    built: BuiltWorld,
+    height: float,
+    footprints: Sequence[Polygon] = (),
+    gaps: Sequence[tuple[float, float]] = (),
+) -> "Image.Image":
     """The world cut at `height` metres, as an RGB image of at most LONGEST pixels a side, north (y) up.
 
     Dark lines are the cut, light blue cells the map over it, grey what the map does not know; bodies are orange where
-    they start, places green, regions violet.
+    they start, places green, regions violet. `footprints` are drawn in red, and red rings around `gaps`.
     """
     from PIL import Image, ImageDraw
 
@@ -61,7 +70,11 @@ def picture(built: BuiltWorld, height: float) -> "Image.Image":
     _lines(pen, view, outlines(built.mesh, height), WALL)
     for body in built.world.bodies:
         _lines(pen, view, _body_outline(body, height), BODY)
+    for outline in footprints:
+        pen.polygon(view.pixels(np.array(outline)), fill=(*MARK[:3], 60), outline=MARK, width=FINER + 1)
     _names(pen, view, built)
+    for x, y in view.pixels(np.array(gaps).reshape(-1, 2)):
+        pen.ellipse((x - RING, y - RING, x + RING, y + RING), outline=MARK, width=2 * FINER)
     _ruler(pen, view)
     canvas.alpha_composite(overlay)
     width, rows = view.size

@@ -94,3 +94,34 @@ def test_a_flood_of_problems_is_cut(simscen, tmp_path: Path) -> None:
     ended = simscen("validate", "bad.scenario.yaml")
     assert "bad.scenario.yaml: … and 33 more" in ended.out
     assert ended.out.endswith("83 problems in 1 of 1 file\n")
+
+
+SEALED = "{points: [[4, 0], [4, 4]], name: partition}, "
+
+
+def test_what_geometry_finds_is_drawn_on_request(simscen, tmp_path: Path) -> None:
+    good = (tmp_path / "good.scenario.yaml").read_text()
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub/bad.scenario.yaml").write_text(good.replace("walls: [", f"walls: [{SEALED}"))
+    ended = simscen("validate", ".", "--picture", "pictures")
+    assert (ended.code, ended.out.count("picture: pictures/sub/bad.png")) == (2, 1)
+    assert [path.name for path in (tmp_path / "pictures").rglob("*.png")] == ["bad.png"]
+
+
+def test_a_picture_that_cannot_be_written_is_told(simscen, tmp_path: Path) -> None:
+    good = (tmp_path / "good.scenario.yaml").read_text()
+    (tmp_path / "bad.scenario.yaml").write_text(good.replace("walls: [", f"walls: [{SEALED}"))
+    (tmp_path / "file").write_text("")
+    ended = simscen("validate", "bad.scenario.yaml", "--picture", "file")
+    assert (ended.code, "cannot write the picture file/bad.png" in ended.err) == (2, True)
+
+
+def test_fast_leaves_the_geometry_out_and_nothing_else(simscen, tmp_path: Path) -> None:
+    good = (tmp_path / "good.scenario.yaml").read_text()
+    (tmp_path / "sealed.scenario.yaml").write_text(good.replace("walls: [", f"walls: [{SEALED}"))
+    assert simscen("validate", "sealed.scenario.yaml").code == 2
+    assert simscen("validate", "sealed.scenario.yaml", "--fast").code == 0
+    (tmp_path / "late.scenario.yaml").write_text(
+        f"{good}time_limit: 9 s\nevents: [{{when: {{time: 9 s}}, do: {{cancel_goal: {{}}}}}}]\n"
+    )
+    assert "can never happen" in simscen("validate", "late.scenario.yaml", "--fast").out
