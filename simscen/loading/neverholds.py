@@ -47,12 +47,7 @@ def _recoveries(loaded: LoadedScenario, recoveries: Any) -> str | None:
     return no_recovery(loaded, recoveries.name) if recoveries.min else None
 
 
-def _localization_error(loaded: LoadedScenario, error: Any) -> str | None:
-    limit = loaded.spec.time_limit
-    return f"judging begins at {error.after:g} s, and the time limit is {limit:g} s" if error.after >= limit else None
-
-
-_CHECKS = {"result": _result, "recoveries": _recoveries, "localization_error": _localization_error}
+_CHECKS = {"result": _result, "recoveries": _recoveries}
 
 
 def _contradictions(loaded: LoadedScenario) -> Iterator[Problem]:
