@@ -12,7 +12,7 @@ STAMP := $(VENV)/.installed
 LOWEST := .venv-lowest
 LOWEST_TESTS := tests/diagnostics tests/cases $(addprefix tests/unit/,cli loading judge report run sim worlds)
 
-.PHONY: help setup run test test-lowest check lint types layers schemas docs mutation bench build clean
+.PHONY: help setup run test test-lowest check lint types layers schemas docs mutation bench campaign fuzz build clean
 
 help:  ## Print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -69,6 +69,12 @@ mutation: setup  ## Change what decides verdicts, a little at a time: some test 
 
 bench: setup  ## Measure speed (simscen bench)
 	@$(BIN)/simscen bench
+
+campaign: setup  ## Run 500 scenarios, a tenth of which crash, hang or swell
+	@$(BIN)/python tests/campaign/fault_batch.py
+
+fuzz: setup  ## Feed 20 000 damaged files to every loader
+	@$(BIN)/python tests/fuzz/fuzz.py
 
 build: setup  ## Build the wheel into dist/
 	@$(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist .
