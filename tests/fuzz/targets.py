@@ -1,0 +1,168 @@
+"""What is fuzzed: a folder in which all files are sound but one, and the loader that a user would meet it through."""
+
+import contextlib
+import io
+import random
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from mcap import records
+from mutate import mutant
+
+from simscen.cli.select import Checks
+from simscen.core.errors import InvalidInput
+from simscen.core.problems import Problem
+from simscen.judge.judge import judge
+from simscen.loading.resolved import spec_of_text
+from simscen.record.openlog import WholeRecords
+from simscen.record.recover import recover
+from simscen.record.replay import read_run
+from simscen.record.schemas import MessageType
+from simscen.record.writer import McapWriter
+from simscen.run.prepare import prepare
+
+CORPUS = Path(__file__).parent / "corpus"
+SCENARIO = """\
+simscen: 1
+world: {world}
+robot: {{model: {robot}, pose: {{x: 1, y: 1}}}}
+goals: [{{pose: {{x: 1.5, y: 1}}}}]
+pass: [{{goals_reached: {{}}}}]
+"""
+ROBOT = """\
+simscen: 1
+name: cube
+urdf: {urdf}
+drive: {{type: omnidirectional}}
+limits: {{linear: 0.5, angular: 1, linear_acceleration: 1, angular_acceleration: 2}}
+sensors: {{lidar: {{lidar: {{rate: 10 Hz}}}}, odom: {{odometry: {{}}}}}}
+"""
+ROOM = "{simscen: 1, walls: [{points: [[0, 0], [2, 0], [2, 2], [0, 2], [0, 0]]}]}"
+MESH_WORLD = """\
+<sdf version="1.7"><world name="w"><model name="m"><static>true</static><link name="l">
+<collision name="a"><pose>0 0 0.5 0 0 0</pose><geometry><box><size>0.1 0.1 1</size></box></geometry></collision>
+<collision name="b"><pose>4 4 0.5 0 0 0</pose><geometry><box><size>0.1 0.1 1</size></box></geometry></collision>
+<collision name="c"><pose>3 3 0 0 0 0</pose><geometry><mesh><uri>{file}</uri></mesh></geometry></collision>
+</link></model></world></sdf>
+"""
+MAP = "image: {file}\nresolution: 0.05\norigin: [0, 0, 0]\n"
+
+
+@dataclass
+class Target:
+    """Files that are damaged, by name, the texts of those beside them, and what reads them.
+
+    `{file}` in a text is the name of the damaged one. `read` gives the problems that a user would see.
+    """
+
+    files: dict[str, bytes]
+    beside: dict[str, str]
+    read: Callable[[Path], list[Problem]]
+    damage: Callable[[list[bytes], random.Random], tuple[int, bytes]] = field(default=mutant)
+
+    def build(self, folder: Path, chance: random.Random) -> Path:
+        """Write a mutant and what it needs; the mutant's path."""
+        names = list(self.files)
+        index, data = self.damage(list(self.files.values()), chance)
+        for name, text in self.beside.items():
+            (folder / name).write_text(text.replace("{file}", names[index]))
+        for name in ("tent.stl", "room.pgm"):
+            (folder / name).write_bytes(next(CORPUS.glob(f"*/{name}")).read_bytes())
+        (folder / "room.yaml").write_text(MAP.format(file="room.pgm"))
+        (folder / names[index]).write_bytes(data)
+        return folder / names[index]
+
+
+def read_scenario(mutated: Path) -> list[Problem]:
+    """What `validate` says; what it accepts must be fit to be run."""
+    folder = mutated.parent
+    file = mutated if mutated.name.endswith(".scenario.yaml") else folder / "a.scenario.yaml"
+    loaded, problems = Checks(folder).scenario(file)
+    if loaded is not None:
+        prepare(loaded)
+    return problems
+
+
+def read_log(path: Path) -> list[Problem]:
+    """What `judge` and `log recover` say."""
+    with contextlib.suppress(InvalidInput):
+        recover(path)
+    read = read_run(path)
+    spec = spec_of_text(read.about.scenario, str(path))
+    verdicts = judge(spec.pass_, read.trace, read.about.case)
+    assert isinstance(verdicts, tuple)
+    return []
+
+
+def damaged_log(corpus: list[bytes], chance: random.Random) -> tuple[int, bytes]:
+    """Half are damaged as bytes, which checksums notice; half inside their records, with checksums that fit."""
+    if chance.random() < 0.3:
+        return mutant(corpus, chance)
+    out = io.BytesIO()
+    writer = McapWriter(out, "ros2", "simscen")
+    kinds: dict[int, MessageType] = {}
+    channels: dict[int, int] = {}
+    rate = chance.choice((0.0005, 0.002, 0.02))
+
+    def damaged(data: bytes) -> bytes:
+        return mutant([data], chance)[1] if data and chance.random() < rate else data
+
+    with contextlib.suppress(KeyError, ValueError, struct.error, OverflowError):  # what cannot be written is no log
+        for record in WholeRecords(io.BytesIO(corpus[0])):
+            match record:
+                case records.Schema():
+                    kinds[record.id] = MessageType(record.name, record.data.decode(), "")
+                case records.Channel():
+                    channels[record.id] = writer.channel(record.topic, kinds[record.schema_id], record.metadata)
+                case records.Message():
+                    writer.message(channels[record.channel_id], record.log_time, damaged(record.data))
+                case records.Attachment():
+                    data = mutant([record.data], chance)[1] if chance.random() < 0.2 else record.data
+                    writer.attach(record.name, record.media_type, data)
+                case records.Metadata():
+                    values = {k: damaged(v.encode()).decode("utf-8", "replace") for k, v in record.metadata.items()}
+                    writer.note(record.name, values)
+        writer.finish()
+    return 0, out.getvalue()
+
+
+def _corpus(name: str) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in sorted((CORPUS / name).iterdir())}
+
+
+def targets(log: bytes) -> dict[str, Target]:
+    """All of them; `log` is that of a short run."""
+    world = {"a.scenario.yaml": SCENARIO.format(world="{file}", robot="turtlebot")}
+    robot = {"a.scenario.yaml": SCENARIO.format(world=ROOM, robot="{file}")}
+    urdf = {
+        "a.scenario.yaml": SCENARIO.format(world=ROOM, robot="a.robot.yaml"),
+        "a.robot.yaml": ROBOT.format(urdf="{file}"),
+    }
+    image = {"a.scenario.yaml": SCENARIO.format(world="a.yaml", robot="turtlebot"), "a.yaml": MAP}
+    mesh = {"a.scenario.yaml": SCENARIO.format(world="a.sdf", robot="turtlebot"), "a.sdf": MESH_WORLD}
+    return {
+        "scenario": Target(_corpus("scenario"), {}, read_scenario),
+        "world": Target(_corpus("world"), world, read_scenario),
+        "robot": Target(_corpus("robot"), robot, read_scenario),
+        "map": Target(_corpus("map"), world, read_scenario),
+        "image": Target(_corpus("image"), image, read_scenario),
+        "sdf": Target(_corpus("sdf"), world, read_scenario),
+        "urdf": Target(_corpus("urdf"), urdf, read_scenario),
+        "xacro": Target(_corpus("xacro"), urdf, read_scenario),
+        "mesh": Target(_corpus("mesh"), mesh, read_scenario),
+        "log": Target({"run.mcap": log}, {}, read_log, damaged_log),
+    }
+
+
+def check_problems(problems: list[Problem], mutated: Path) -> None:
+    """Each says what is wrong, in a file that is there, at a place that is in it."""
+    for problem in problems:
+        assert problem.message, problem
+        assert problem.path, problem
+        if problem.line and mutated.suffix != ".mcap" and Path(problem.path).name == mutated.name:
+            text = mutated.read_bytes().decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\r", "\n")
+            lines = text.split("\n")
+            assert problem.line <= len(lines), f"line {problem.line} of {len(lines)}: {problem.message}"
+            assert 0 <= problem.col <= len(lines[problem.line - 1]) + 1, f"{problem.place}: {problem.message}"
