@@ -75,7 +75,8 @@ def _number(data: bytes, _: list[bytes], chance: random.Random) -> bytes:
     if not found:
         return data
     one = chance.choice(found)
-    return data[: one.start()] + chance.choice(NUMBERS) + data[one.end() :]
+    other = chance.choice(NUMBERS) if chance.random() < 0.5 else f"{chance.uniform(-5, 10):.3g}".encode()
+    return data[: one.start()] + other + data[one.end() :]
 
 
 def _line(data: bytes, corpus: list[bytes], chance: random.Random) -> bytes:
