@@ -43,7 +43,7 @@ test-lowest:  ## Test with the oldest packages that pyproject.toml allows, in .v
 	@$(LOWEST)/bin/uv pip install --quiet --python $(LOWEST)/bin/python --resolution lowest-direct --editable .
 	@$(LOWEST)/bin/uv pip freeze --quiet --exclude-editable --python $(LOWEST)/bin/python > $(LOWEST)/constraints.txt
 	@$(LOWEST)/bin/uv pip install --quiet --python $(LOWEST)/bin/python --constraint $(LOWEST)/constraints.txt \
-	"pytest>=8.2" "pytest-xdist>=3.6" "hypothesis>=6.100" "junitparser>=3.1" "shapely>=2.0" "xacro>=2.0"
+	"pytest>=8.2" "pytest-xdist>=3.6" "hypothesis>=6.100" "junitparser>=3.1" "check-jsonschema>=0.29" "shapely>=2.0" "xacro>=2.0"
 	@$(LOWEST)/bin/python -m pytest -n 2 $(LOWEST_TESTS)
 	@$(LOWEST)/bin/simscen run scenarios/navigation scenarios/faults --out $$(mktemp -d)/out
 

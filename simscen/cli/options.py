@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
-from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Union, get_args, get_origin
 
 from typer.models import ArgumentInfo, OptionInfo
 
@@ -76,10 +76,10 @@ def exits() -> str:
 
 
 def _parameters_of(function: Callable[..., Any]) -> list[tuple[inspect.Parameter, Any, ArgumentInfo | OptionInfo]]:
-    hints = get_type_hints(function, include_extras=True)
     found = []
-    for parameter in inspect.signature(function).parameters.values():
-        annotation = hints[parameter.name]
+    # Not get_type_hints: Python 3.10 hides the annotation in an Optional where the default is None.
+    for parameter in inspect.signature(function, eval_str=True).parameters.values():
+        annotation = parameter.annotation
         if get_origin(annotation) is Annotated:
             kind, info = get_args(annotation)[:2]
             if isinstance(info, ArgumentInfo | OptionInfo):

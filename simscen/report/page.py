@@ -11,8 +11,8 @@ from simscen.judge.wording import comparison, subject, tightest, when
 from simscen.report.complaints import broken, complaints, failure, place
 from simscen.report.text import one_line, visible
 
-MOST_PICTURES = 400
-"""A picture weighs some 40 kB; more of them make a page that no browser likes."""
+PICTURE_BYTES = 6 * 2**20
+"""Of all pictures together; one weighs some 40 kB. Larger pages open slowly and are cut off by CI systems."""
 
 _STYLE = """
 :root { color-scheme: light; font: 15px/1.45 system-ui, sans-serif; color: #262a30; }
@@ -42,7 +42,8 @@ def to_html(runs: Sequence[RunFinished], title: str = "simscen") -> str:
         if (number := sum(run.outcome is outcome for run in runs)) or outcome is Outcome.PASSED
     )
     simulated = sum(run.result.simulated for run in ordered)
-    body = "\n".join(_run(run, number < MOST_PICTURES) for number, run in enumerate(ordered))
+    pictures = _pictures(ordered)
+    body = "\n".join(_run(run, picture) for run, picture in zip(ordered, pictures, strict=True))
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">\n'
         '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; img-src data:; '
@@ -52,7 +53,7 @@ def to_html(runs: Sequence[RunFinished], title: str = "simscen") -> str:
     )
 
 
-def _run(run: RunFinished, with_picture: bool) -> str:
+def _run(run: RunFinished, picture: str) -> str:
     label = ", ".join(part for part in (f"seed {run.key.seed}", run.key.variation) if part)
     nearest = f"tightest: {tightest(run.result.verdicts)}" if run.outcome is Outcome.PASSED else ""
     opened = "" if run.outcome is Outcome.PASSED else " open"
@@ -61,7 +62,7 @@ def _run(run: RunFinished, with_picture: bool) -> str:
         f'<span class="pill {run.outcome.value}">{run.outcome.value}</span>'
         f'<span class="name">{_text(run.key.scenario)}</span><span class="quiet">{_text(label)}</span>'
         f'<span class="quiet">{run.result.simulated:.1f} s</span><span class="quiet">{_text(nearest)}</span></summary>'
-        f'<div class="in">{_why(run)}{_verdicts(run)}{_disturbances(run)}{_picture(run) if with_picture else ""}'
+        f'<div class="in">{_why(run)}{_verdicts(run)}{_disturbances(run)}{picture}'
         f"{_metrics(run)}{_again(run)}</div></details>"
     )
 
@@ -103,13 +104,24 @@ def _disturbances(run: RunFinished) -> str:
     return f"<table>{head}{''.join(rows)}</table>" if rows else ""
 
 
-def _picture(run: RunFinished) -> str:
-    """The picture inside the page; one that has gone since is left out."""
-    path = Path(run.artifacts.picture)
-    if not run.artifacts.picture or not path.is_file():
-        return ""
+def _pictures(runs: Sequence[RunFinished]) -> list[str]:
+    """Each run's picture inside the page, as long as there is room; one that has gone since is left out."""
+    shown, room = [], PICTURE_BYTES
+    for run in runs:
+        path = Path(run.artifacts.picture)
+        size = path.stat().st_size if run.artifacts.picture and path.is_file() else 0
+        room -= size
+        shown.append(_picture(path) if size and room >= 0 else _where(path) if size else "")
+    return shown
+
+
+def _picture(path: Path) -> str:
     data = base64.b64encode(path.read_bytes()).decode("ascii")
     return f'<img alt="map of the run" loading="lazy" src="data:image/png;base64,{data}">'
+
+
+def _where(path: Path) -> str:
+    return f'<p class="quiet">picture: <code>{_text(str(path))}</code></p>'
 
 
 def _metrics(run: RunFinished) -> str:

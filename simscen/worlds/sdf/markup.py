@@ -11,7 +11,7 @@ from xml.parsers import expat
 from simscen.worlds.sdf.report import Place, Unusable
 
 DEEPEST = 100
-MOST_ELEMENTS = 500_000
+MOST_ELEMENTS = 200_000
 """BARN's worlds have 13 000; twenty megabytes of `<a/>` would otherwise take gigabytes."""
 LONGEST_SHOWN_LINE, LONGEST_SHOWN_NAME = 300, 120
 

@@ -36,6 +36,8 @@ def _compact(part: Part) -> Part:
 def _check(parts: tuple[Part, ...]) -> None:
     limit(sum(len(part.faces) for part in parts))
     for part in parts:
+        if part.vertices.ndim != 2 or part.vertices.shape[1] != 3:
+            raise UnusableMesh("a vertex does not have three coordinates")
         if part.faces.min() < 0 or part.faces.max() >= len(part.vertices):
             raise UnusableMesh("a triangle names a vertex that is not there")
         if not np.isfinite(part.vertices).all():

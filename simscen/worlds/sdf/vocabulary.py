@@ -1,6 +1,7 @@
 """The elements of SDF that carry no solid, and what to do with one that is not known at all."""
 
 import difflib
+from functools import lru_cache
 
 from simscen.worlds.sdf.markup import Element
 from simscen.worlds.sdf.report import Report
@@ -72,11 +73,17 @@ def judge_unknown(element: Element, parent: str, report: Report) -> None:
         raise element.unusable(f"<{tag[:60]}> is not expanded", "expand it first: run xacro, or `gz sdf -p`")
     if ":" in tag and not adds:
         return
-    close = difflib.get_close_matches(tag, sorted(MATTERS[parent] | harmless), n=1, cutoff=0.75)
-    hint = f"did you mean <{close[0]}>?" if close else ""
-    if adds or parent in SHAPES or (close and close[0] in MATTERS[parent]):
+    close = _closest(tag[:60], frozenset(MATTERS[parent] | harmless))
+    hint = f"did you mean <{close}>?" if close else ""
+    if adds or parent in SHAPES or close in MATTERS[parent]:
         raise element.unusable(f"unknown element <{tag[:60]}>", hint)
     report.note(element.place, f"unknown element <{tag[:60]}> ignored" + (f"; {hint}" if hint else ""))
+
+
+@lru_cache(maxsize=1000)  # a file of many elements has few kinds, and each look takes 0.3 ms
+def _closest(tag: str, known: frozenset[str]) -> str:
+    """The known tag that is meant by a misspelt one, or nothing."""
+    return next(iter(difflib.get_close_matches(tag, sorted(known), n=1, cutoff=0.75)), "")
 
 
 def judge_children(element: Element, parent: str, report: Report) -> None:

@@ -6,6 +6,7 @@ from PIL import Image
 
 from simscen.core.result import RunKey
 from simscen.core.sessionevents import Artifacts
+from simscen.report import page
 from simscen.report.page import to_html
 
 
@@ -61,3 +62,13 @@ def test_the_picture_is_inside_the_page(failed, tmp_path):
 
 def test_a_picture_that_is_gone_is_left_out(failed):
     assert "<img" not in to_html([failed])
+
+
+def test_pictures_fill_the_page_only_so_far_and_those_of_failures_first(passed, failed, tmp_path, monkeypatch):
+    picture = tmp_path / "map.png"
+    Image.new("L", (8, 8)).save(picture)
+    monkeypatch.setattr(page, "PICTURE_BYTES", picture.stat().st_size)
+    runs = [replace(run, artifacts=Artifacts(picture=str(picture))) for run in (passed, failed)]
+    html = to_html(runs)
+    assert [tag for tag, _ in parsed(html)].count("img") == 1
+    assert html.index("<img") < html.index(f"picture: <code>{picture}")

@@ -1,3 +1,4 @@
+import difflib
 import time
 from pathlib import Path
 
@@ -47,6 +48,19 @@ def test_the_number_of_elements_is_limited(refuse, monkeypatch):
     monkeypatch.setattr(markup, "MOST_ELEMENTS", 1000)
     (problem,) = refuse("<sdf version='1.9'>" + "<a/>" * 1000)
     assert "more than 1000 elements" in problem.message
+
+
+def test_a_kind_of_element_is_looked_up_once_however_often_it_is_there(tmp_path, monkeypatch):
+    looks = []
+    real = difflib.get_close_matches
+    monkeypatch.setattr(
+        difflib, "get_close_matches", lambda word, *rest, **how: looks.append(word) or real(word, *rest, **how)
+    )
+    (tmp_path / "x.world").write_text(
+        f"<sdf version='1.6'><world name='w'>{MODEL}{'<never_heard_of/>' * 1000}</world></sdf>"
+    )
+    load_sdf(tmp_path / "x.world", root=tmp_path)
+    assert looks == ["never_heard_of"]
 
 
 def test_files_beyond_20_mib_are_refused_at_once(tmp_path):

@@ -195,6 +195,11 @@ class TestObj:
         shape = mesh(OBJ, "<submesh><name>right</name></submesh>", name="x.obj")
         assert (len(shape.faces), shape.vertices[:, 0].min()) == (1, 5)
 
+    @pytest.mark.parametrize("written", ["v 0 0", "v 0", "v"])
+    def test_vertices_without_three_coordinates_are_refused(self, broken, written):
+        plane = "\n".join([written, written.replace("0", "1"), written.replace("0", "2"), "f 1 2 3", ""])
+        assert "mesh" in broken(plane, name="x.obj").message
+
     def test_indices_out_of_range_are_refused(self, broken):
         broken(OBJ.replace("f 1 2 3", "f 1 2 300"), name="x.obj")
 
