@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import at_most, undecided
@@ -22,8 +24,8 @@ if TYPE_CHECKING:
 class RelocalizedWithin(Spec, Criterion):
     """The robot found itself again in time.
 
-    What is measured: time from the start of `after` (or of the run) until the belief is within the tolerances of the
-        true pose and stays there for `hold`; each time that it happens.
+    What is measured: time from the start of `after` (or of the run) until the belief, once lost, is within the
+        tolerances of the true pose again and stays there for `hold`; each time that it happens.
     When it fails: that took longer than `time`.
     Why this: a wrong start or a kidnapping must be mended while driving, not merely survived; and a belief that
         crosses the truth by chance has not found it.
@@ -70,7 +72,9 @@ class RelocalizedWithin(Spec, Criterion):
         right = (off[:, 0] <= self.tolerance) & (off[:, 1] <= self.yaw_tolerance)
         if right[ticks <= start + self.time * trace.tick_rate].all():
             return undecided("relocalized_within", f"the robot was never lost {self._context}", self._limit)
-        found, lasted = first_lasting(ticks, right, round(self.hold * trace.tick_rate), trace.end)
+        # What held before it lost itself is no finding again.
+        lost = int(np.argmin(right))
+        found, lasted = first_lasting(ticks[lost:], right[lost:], round(self.hold * trace.tick_rate), trace.end)
         tick = trace.end if found is None else found
         elapsed = trace.seconds(tick - start)
         if not lasted and elapsed <= self.time:

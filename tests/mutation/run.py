@@ -1,7 +1,8 @@
 """Mutation check of what decides verdicts: `make mutation`, or with names of modules for those alone.
 
 Every mutant is killed by a test, or listed in equivalent.yaml with the reason why it cannot be. The run fails when one
-that is not listed survives, and when one that is listed is killed or gone. `--write` writes the table into the docs.
+that is not listed survives, and when one that is listed is killed or gone. `--write` puts what came of it into the
+table in the docs.
 """
 
 import ast
@@ -73,7 +74,7 @@ def main(arguments: list[str]) -> int:
         for line in tally.stale:
             print(f"  STALE {line}", flush=True)
         failed |= bool(tally.alive or tally.stale)
-    if "--write" in arguments and not failed:
+    if "--write" in arguments:
         write(rows)
     sums = [sum(row[k] for row in rows) for k in range(1, 5)]
     print(f"{sums[0]} mutants: {sums[1]} killed, {sums[2]} equivalent with a reason, {sums[3]} survived")
@@ -81,13 +82,21 @@ def main(arguments: list[str]) -> int:
 
 
 def write(rows: list[tuple[str, int, int, int, int]]) -> None:
-    """The table of docs/design/mutation.md."""
-    total = ("**all**", *(sum(row[k] for row in rows) for k in range(1, 5)))
-    lines = ["| module | mutants | killed | equivalent | survived |", "|---|---|---|---|---|"]
-    lines += ["| " + " | ".join(map(str, row)) + " |" for row in [*rows, total]]
+    """Put these rows into the table of docs/design/mutation.md; those of other modules stay."""
     before, rest = TABLE.read_text(encoding="utf-8").split(BEGIN)
-    after = rest.split(END)[1]
+    old, after = rest.split(END)
+    known = {row[0]: row for row in (_row(line) for line in old.splitlines()[2:-1])} | {row[0]: row for row in rows}
+    all_rows = [known[name] for name in sorted(known)]
+    total = ("**all**", *(sum(row[k] for row in all_rows) for k in range(1, 5)))
+    lines = ["| module | mutants | killed | equivalent | survived |", "|---|---|---|---|---|"]
+    lines += ["| " + " | ".join(map(str, row)) + " |" for row in [*all_rows, total]]
     TABLE.write_text(before + BEGIN + "\n".join(lines) + "\n" + END + after, encoding="utf-8")
+
+
+def _row(line: str) -> tuple[str, int, int, int, int]:
+    name, *numbers = (cell.strip() for cell in line.strip("|").split("|"))
+    total, killed, equivalent, survived = map(int, numbers)
+    return name, total, killed, equivalent, survived
 
 
 if __name__ == "__main__":

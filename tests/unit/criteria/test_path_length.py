@@ -1,0 +1,62 @@
+"""Lengths that floats hold exactly, so that a bound is met to the bit."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from simscen.core.samples import Samples
+from simscen.core.verdict import Status
+from simscen.criteria.criterion import AnyCriterion
+from simscen.judge.judge import judge
+from simscen.judge.sketch import sketch, sketch_case
+
+CASE = {"goals": [{"name": "a", "pose": [4, 0]}], "shortest": {"a": 4.0}}
+REACHED = [[0, "goal.accepted", "a"], [4, "goal.reached", "a"]]
+
+
+def found(words, events=REACHED, case=CASE, step=0.5, steps=8):
+    """What path_length says of a straight drive in a few exact steps, one each half second."""
+    ticks = np.arange(steps + 1, dtype=np.int64) * 120
+    way = np.column_stack((step * np.arange(steps + 1), np.zeros((steps + 1, 2))))
+    trace = replace(sketch({"seconds": 4, "truth": [[0, 0, 0]], "events": events}), truth=Samples(ticks, way))
+    (verdict,) = judge([AnyCriterion.model_validate({"path_length": words})], trace, sketch_case(case))
+    (finding,) = verdict.findings
+    return finding
+
+
+@pytest.mark.parametrize(("limit", "margin", "tick"), [(4.0, 0.0, 960), (3.5, -0.5, 960), (2.0, -2.0, 600)])
+def test_a_length_is_placed_where_it_first_went_beyond_its_bound(limit, margin, tick):
+    finding = found({"max": limit})
+    assert (finding.margin, finding.tick) == (margin, tick)
+    assert finding.place == (tick / 240, 0.0)
+
+
+def test_a_length_that_holds_is_placed_where_the_drive_ended():
+    assert found({"max": 5.0}).tick == 960
+
+
+@pytest.mark.parametrize(("ratio", "status"), [(1.0, Status.PASS), (1.5, Status.PASS)])
+def test_a_perfect_drive_has_the_ratio_one(ratio, status):
+    assert found({"max_ratio": ratio}).status is status
+
+
+@pytest.mark.parametrize(("shortest", "status"), [(4.0, Status.INCONCLUSIVE), (3.5, Status.FAIL)])
+def test_without_arriving_only_a_way_that_is_too_long_already_is_decided(shortest, status):
+    case = {**CASE, "shortest": {"a": shortest}}
+    assert found({"max_ratio": 1.0}, events=REACHED[:1], case=case).status is status
+
+
+def test_a_goal_nearby_has_a_ratio_too():
+    case = {**CASE, "shortest": {"a": 0.5}}
+    assert found({"max_ratio": 1.0}, case=case, step=0.25, steps=2).margin == 0.0
+
+
+def test_what_cannot_be_compared_is_told_in_order():
+    twice = {"goals": [{"name": n, "pose": [4, 0]} for n in "cbacba"], "shortest": dict.fromkeys("abc", 1.0)}
+    assert found({"max_ratio": 1.0}, case=twice).measured.startswith("several goals are called a, b, c:")
+    sent = {**CASE, "sent": [{"name": n, "pose": [4, 0]} for n in "dcb"]}
+    events = [[k, "goal.accepted", name] for k, name in enumerate("dcb")]
+    assert found({"max_ratio": 1.0}, case=sent, events=events).measured.startswith("b, c, d was sent on the way")
+    assert found({"max_ratio": 1.0}, case={**CASE, "shortest": {"a": 0.0}}).measured == "the shortest way has no length"
+    assert found({"max_ratio": 1.0}, case={**CASE, "shortest": {}}).measured == "no shortest way to a is known"
