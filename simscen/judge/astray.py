@@ -1,5 +1,7 @@
 """Why a robot is not where it believes to be."""
 
+import math
+
 import numpy as np
 
 from simscen.core.events import EventKind
@@ -14,7 +16,7 @@ LOST = 0.5
 def astray(trace: Trace, tick: int, known: bool = False) -> tuple[list[str], set[str]]:
     """How far off it was, if far and not `known`; how that came about; and which events and faults did it."""
     off = _off(trace, tick)
-    if not off >= LOST:  # nan, too
+    if not off >= LOST:  # nan, too: not known
         return [], set()
     lines = [] if known else [f"it believed itself {off:.2f} m from where it was"]
     named: set[str] = set()
@@ -38,7 +40,7 @@ def astray(trace: Trace, tick: int, known: bool = False) -> tuple[list[str], set
 
 def _off(trace: Trace, tick: int) -> float:
     if not len(trace.belief) or not len(trace.truth):
-        return 0.0
+        return math.nan
     bx, by = trace.belief.at(np.array([tick]))[0, :2].tolist()
     x, y = trace.place(tick)
     return float(np.hypot(bx - x, by - y))

@@ -6,7 +6,7 @@ from simscen.core.events import Event, EventKind
 from simscen.core.trace import Trace
 from simscen.judge.things import Thing, things
 
-MOVING = 0.05
+MOVING = 0.0625
 """m/s from which a thing moves."""
 LOOK_BACK = 0.25
 """Seconds over which its speed is taken."""

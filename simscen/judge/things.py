@@ -63,9 +63,10 @@ def pose_at(trace: Trace, spawned: Event, tick: int) -> Pose2:
     x, y, yaw = (spawned.data.get(key) for key in ("x", "y", "yaw"))
     samples = trace.objects.get(spawned.name)
     if samples is not None:
-        now = (samples.ticks >= spawned.tick) & (samples.ticks <= tick)
+        # The truth of its own tick was taken before it came, and may be that of another thing of its name.
+        now = (samples.ticks > spawned.tick) & (samples.ticks <= tick)
         if now.any():
-            x, y, yaw = samples.values[np.flatnonzero(now)[-1], :3].tolist()
+            x, y, yaw = samples.values[now][-1].tolist()
     assert isinstance(x, int | float) and isinstance(y, int | float) and isinstance(yaw, int | float)
     return Pose2(float(x), float(y), float(yaw))
 

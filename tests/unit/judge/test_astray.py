@@ -25,3 +25,27 @@ def test_an_odometry_fault_leads_astray_long_after_it_is_over():
         "why: odom.slip falsified its odometry from t = 1.50 s on"
     ]
     assert why("localization_error", slip(1, 1.5, 2, "lidar.off", "off"), **lost) == []
+
+
+def test_lost_is_half_a_metre_in_any_direction():
+    case = {"goals": [GOAL]}
+    at_one = {"seconds": 10, "truth": [[0, 0, 1]]}
+    half = why("goals_reached", [], trace=at_one, case=case, belief={"offset": [0.5, 0, 0]})
+    assert half == ["why: it believed itself 0.50 m from where it was"]
+    assert why("goals_reached", [], trace=at_one, case=case, belief={"offset": [0, 0.8, 0]}) == [
+        "why: it believed itself 0.80 m from where it was"
+    ]
+    assert why("goals_reached", [], trace=at_one, case=case, belief={"offset": [0.49, 0, 0]}) == []
+
+
+def test_what_happens_at_that_very_tick_counts_and_what_comes_later_does_not():
+    lost = {"case": {"goals": [GOAL]}, "belief": {"offset": [2, 0, 0]}}
+    events = by("carried off", 6, [6, "robot.placed", "", {}])
+    assert why("localization_error", events, at=6, **lost) == [
+        "why: event `carried off` had set it down elsewhere 0.00 s before"
+    ]
+    assert why("localization_error", events, at=5.9, **lost) == []
+
+
+def test_a_robot_that_never_said_where_it_is_is_not_known_to_be_astray():
+    assert why("goals_reached", [], case={"goals": [GOAL]}, belief=None) == []

@@ -70,3 +70,9 @@ def test_what_an_event_did_is_told_of_what_it_did_it_to():
 
 def test_what_has_no_outline_at_the_height_of_a_robot_is_in_nobodys_way():
     assert there([spawned(0, "lamp", 0, 0, parts=[])], 1) == []
+
+
+def test_one_that_replaces_another_of_its_name_stands_where_it_was_put():
+    events = [spawned(0, "cart", 0, 0), spawned(6, "cart", 5, 0)]
+    way = {"cart": [[0, 0, 0], [6, 0, 0], [6.025, 5, 0], [10, 5, 0]]}
+    assert [there(events, at, objects=way)[0].outlines[0].mean(axis=0)[0] for at in (5.9, 6, 7)] == [0.0, 5.0, 5.0]
