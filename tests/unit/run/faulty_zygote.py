@@ -104,6 +104,7 @@ DAEMON = "61.25"
 
 RESULT = """{"format": 2, "scenario": "x", "seed": 1, "variation": "", "path": "x", "outcome": "passed", "ended": "",
 "simulated_seconds": 1.5, "tick_rate": 240, "again": "", "events": {}, "disturbances": [], "metrics": {},
+"undefined": {},
 "verdicts": [], "error": null}"""
 
 

@@ -46,7 +46,7 @@ def test_clearance_is_searched_as_far_as_a_criterion_asks(verdicts):
     found, done = verdicts("pass: [{clearance: {min: 3 m}}]")
     assert found["clearance"].status is Status.PASS
     assert done.trace.clearance.values.max() == 3.5
-    assert done.result.metrics["clearance_min"] == 2.0
+    assert done.result.metrics["min_clearance"] == 2.0
 
 
 def test_a_wall_beyond_the_usual_search_is_near_enough_to_fail_a_far_bound(verdicts):
