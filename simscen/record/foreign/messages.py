@@ -3,6 +3,7 @@
 Source: the definitions of ROS 2 Humble in common_interfaces; those used here have not changed since Foxy.
 """
 
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -16,7 +17,7 @@ Numbers = tuple[float, ...]
 
 _UPPER_TRIANGLE = (0, 1, 5, 7, 11, 35)
 _ON_THE_GROUND = (0, 1, 5)
-_SHORTEST_QUATERNION = 0.5
+_ODDEST_QUATERNION = 0.1
 NO_COVARIANCE: Numbers = (0.0,) * 6
 
 
@@ -181,7 +182,7 @@ def _plane(covariance: Numbers) -> Numbers:
 
 def _unit(pose: Numbers) -> Numbers:
     """The pose with a quaternion of length 1. Raises ValueError for one that is no rotation: nobody filled it in."""
-    norm = float(np.linalg.norm(pose[3:]))
-    if norm < _SHORTEST_QUATERNION:
+    norm = math.hypot(*pose[3:])
+    if not abs(norm - 1.0) < _ODDEST_QUATERNION:
         raise ValueError("an orientation is not a quaternion of length 1")
     return (*pose[:3], *(value / norm for value in pose[3:]))

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from simscen.core.events import Event, EventKind
 from simscen.core.evidence import Coverage
 from simscen.core.trace import Trace
@@ -36,7 +38,8 @@ def read_foreign(path: Path, wanted: Wanted) -> ForeignLog:
         roles = roles_of(wanted)
         messages = messages_of(path, roles)
         found = collect(messages, roles)
-        reading = Reading(found, messages.topics, wanted)
+        with np.errstate(all="ignore"):  # what is not finite is found and named by whoever judges it
+            reading = Reading(found, messages.topics, wanted)
         end = reading.time.end
         if messages.complete:
             reading.rows.events.append(Event(end, EventKind.RUN_ENDED, "the recording ends"))

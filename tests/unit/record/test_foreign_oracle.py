@@ -1,0 +1,113 @@
+"""A log of simscen's own, with all that says so taken out, is judged like one of others: the two must agree."""
+
+import random
+from pathlib import Path
+
+import numpy as np
+import pytest
+from foreign_logs import drive, write_mcap
+from mcap import records
+from mcap.writer import Writer
+
+from simscen.core.errors import InvalidInput
+from simscen.core.verdict import Status
+from simscen.criteria.criterion import AnyCriterion
+from simscen.judge.judge import judge
+from simscen.record.foreign.mcapfile import is_own
+from simscen.record.foreign.read import read_foreign
+from simscen.record.foreign.wanted import Wanted
+from simscen.record.openlog import WholeRecords, open_log
+from simscen.record.replay import read_log
+from simscen.run.simulate import simulate_file
+
+SCENARIO = """\
+simscen: 1
+world: {simscen: 1, walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]}
+robot: {pose: {x: 1, y: 1}}
+goals: [{pose: {x: 4, y: 3}}]
+pass: [{goals_reached: {}}]
+"""
+TRUTH = Wanted(truth="/ground_truth/odom", tick_rate=240)
+
+
+@pytest.fixture(scope="module")
+def own(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The log of a short drive."""
+    folder = tmp_path_factory.mktemp("own")
+    (folder / "a.scenario.yaml").write_text(SCENARIO)
+    simulate_file(folder / "a.scenario.yaml", 1, folder / "run.mcap", folder)
+    return folder / "run.mcap"
+
+
+@pytest.fixture(scope="module")
+def disguised(own: Path) -> Path:
+    """Its messages alone, written by the mcap library."""
+    file = own.with_name("disguised.mcap")
+    with open_log(own) as source, file.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start("ros2", "somebody")
+        schemas, channels = {}, {}
+        for record in WholeRecords(source):
+            match record:
+                case records.Schema():
+                    schemas[record.id] = writer.register_schema(record.name, record.encoding, record.data)
+                case records.Channel() if record.id not in channels:
+                    channels[record.id] = writer.register_channel(record.topic, "cdr", schemas[record.schema_id])
+                case records.Message():
+                    writer.add_message(
+                        channels[record.channel_id], record.log_time, record.data, record.publish_time, record.sequence
+                    )
+        writer.finish()
+    return file
+
+
+def test_the_signals_are_the_same_to_the_last_bit(own: Path, disguised: Path) -> None:
+    """But for the normalised quaternions' last one; ticks are found exactly."""
+    assert is_own(own) and not is_own(disguised)
+    ours, theirs = read_log(own).trace, read_foreign(disguised, TRUTH).trace
+    for name in ("truth", "velocity", "belief", "odometry", "command"):
+        mine, its = getattr(ours, name), getattr(theirs, name)
+        np.testing.assert_array_equal(mine.ticks, its.ticks, name)
+        np.testing.assert_allclose(mine.values, its.values, rtol=0, atol=1e-12, err_msg=name)
+    np.testing.assert_array_equal(ours.scans, theirs.scans)
+    assert (ours.end, len(ours.plans)) == (theirs.end, len(theirs.plans))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        {"speed": {"max": 0.45}},
+        {"speed": {"max": 5.0, "max_turn_rate": 0.2}},
+        {"localization_error": {"max": 0.01, "rmse": 5.0, "max_yaw": 1.0}},
+        {"path_length": {"max": 3.0}},
+        {"always": {"signal": "turn_rate", "op": "<=", "value": 3.0}},
+    ],
+)
+def test_verdicts_and_margins_agree(own: Path, disguised: Path, text: dict[str, object]) -> None:
+    entry = AnyCriterion.model_validate(text)
+    log, foreign = read_log(own), read_foreign(disguised, TRUTH)
+    (mine,) = judge([entry], log.trace, log.about.case)
+    (its,) = judge([entry], foreign.trace, log.about.case, foreign.coverage)
+    assert [finding.status for finding in mine.findings] == [finding.status for finding in its.findings]
+    assert [f.margin for f in mine.findings] == pytest.approx([f.margin for f in its.findings], abs=1e-9)
+    assert Status.INCONCLUSIVE not in {finding.status for finding in its.findings}
+
+
+@pytest.mark.parametrize("compressed", [True, False])
+def test_a_log_with_wrong_bytes_is_read_or_refused(tmp_path: Path, compressed: bool) -> None:
+    chance, file = random.Random(7), tmp_path / "a.mcap"
+    options = {} if compressed else {"use_chunking": False}
+    data = write_mcap(file, drive(2.0), **options).read_bytes()
+    refused = 0
+    for _ in range(150):
+        spoilt = bytearray(data)
+        for _ in range(chance.choice((1, 3, 20))):
+            spoilt[chance.randrange(8, len(data))] = chance.randrange(256)
+        file.write_bytes(spoilt[: chance.choice((len(data), chance.randrange(8, len(data))))])
+        is_own(file)
+        try:
+            read_foreign(file, Wanted(truth="/mocap"))
+        except InvalidInput as error:
+            refused += 1
+            assert error.problems[0].code in ("SC802", "SC804")
+    assert refused > 30
