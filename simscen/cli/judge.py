@@ -67,6 +67,7 @@ def command(
     """
     clock: Clock = "log" if time is Time.LOG else "header"
     wanted = Wanted(truth, _topics(topic or []), tick_rate, clock, same_frame)
+    _check_truth(wanted)
     files = logs_of(logs)
     judging = Judging(wanted, scenario, root, world_path or [])
     lost = runs_without_log(logs)
@@ -115,6 +116,17 @@ def _options(wanted: Wanted, scenario: Path | None, root: Path | None, world_pat
     words += ["--time", "log"] if wanted.clock == "log" else []
     words += ["--tick-rate", str(wanted.tick_rate)] if wanted.tick_rate != Wanted.tick_rate else []
     return [*words, *(["--same-frame"] if wanted.same_frame else [])]
+
+
+def _check_truth(wanted: Wanted) -> None:
+    """Raise UsageError for a truth that is none."""
+    if wanted.truth is None:
+        return
+    if not wanted.truth.startswith("/") and not (wanted.frames and all(wanted.frames)):
+        told = f"expected a /topic, or two frames as map:base_link, got {harmless(wanted.truth) or 'nothing'}"
+        raise UsageError(f"cannot read --truth: {told}")
+    if wanted.truth == wanted.topic("amcl_pose"):
+        raise UsageError(f"--truth {harmless(wanted.truth)} is what the robot believes: every belief would be right")
 
 
 def _topics(written: list[str]) -> dict[str, str]:

@@ -48,11 +48,11 @@ class Judging:
     def judged(self, log: Path, alone: bool) -> RunFinished:
         """What a log says. One that cannot be used is an error of its own among several; alone it is the command's."""
         try:
-            return self._own(log) if not log.is_dir() and is_own(log) else self._foreign(log)
+            return self._own(log) if _may_be_own(log) and is_own(log) else self._foreign(log)
         except InvalidInput as error:
             if alone or isinstance(error, UnusableScenario):
                 raise
-            told = "; ".join(problem.message for problem in error.problems)
+            told = "; ".join(": ".join(filter(None, (one.message, one.hint))) for one in error.problems)
             result = unfinished(RunKey(log.stem, 0), str(log), RunFailure("invalid", told))
             return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=str(log))
 
@@ -69,10 +69,10 @@ class Judging:
         return self._finished(log, key, read.trace, case, Coverage())
 
     def _foreign(self, log: Path) -> RunFinished:
+        self.foreign += 1
         if self._criteria is None:
             hint = "say with --scenario what must hold; a file with `pass:` is enough"
             raise InvalidInput([Problem(str(log), 0, 0, "SC801", "not a log of simscen", hint)])
-        self.foreign += 1
         case = self._foreign_case()
         read = read_foreign(log, replace(self._wanted, goals=tuple(goal.name for goal in case.goals)))
         self.notes += [f"{log}: {note}" for note in read.notes]
@@ -100,6 +100,10 @@ class Judging:
         assert criteria is not None
         result = result_of(key, file, criteria.spec.pass_, trace, case, criteria.lines, coverage)
         return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=file)
+
+
+def _may_be_own(log: Path) -> bool:
+    return not log.is_dir() and log.suffix not in (".db3", ".bag")
 
 
 class UnusableScenario(InvalidInput):

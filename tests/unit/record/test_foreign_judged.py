@@ -226,6 +226,29 @@ def test_a_topic_that_cannot_be_understood_is_refused(simscen, limits, tmp_path:
     assert "expected NAME=/TOPIC with one of odom, amcl_pose, " in ended.err
 
 
+@pytest.mark.parametrize("truth", ["mocap", "", ":", "map:", "/amcl_pose"])
+def test_a_truth_that_is_none_is_refused(simscen, limits, tmp_path: Path, truth: str) -> None:
+    write_mcap(tmp_path / "drive.mcap", drive(1.0))
+    ended = simscen("drive.mcap", "--scenario", limits("speed: {max: 9 m/s}"), "--truth", truth)
+    assert ended.code == 2
+    assert "--truth" in ended.err and ended.out == ""
+
+
+def test_a_database_without_its_folder_says_what_to_name(simscen, limits, tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / "bag", drive(1.0))
+    ended = simscen(str(next(bag.glob("*.db3"))), "--scenario", limits("speed: {max: 9 m/s}"))
+    assert ended.code == 2
+    assert "a rosbag2 is a folder with a metadata.yaml" in ended.err
+
+
+def test_logs_of_others_among_several_say_that_they_need_criteria(simscen, tmp_path: Path) -> None:
+    write_mcap(tmp_path / "a.mcap", drive(1.0))
+    write_mcap(tmp_path / "b.mcap", drive(1.0))
+    ended = simscen(".", "--truth", "/mocap")
+    assert (ended.code, ended.err) == (3, "")
+    assert ended.out.count("say with --scenario what must hold") == 2
+
+
 def test_metrics_that_a_log_does_not_tell_are_null_in_its_result(simscen, limits, tmp_path: Path) -> None:
     write_mcap(tmp_path / "drive.mcap", drive())
     ended = simscen("drive.mcap", "--scenario", limits("speed: {max: 9 m/s}"), "--truth", "/mocap", "--json")
