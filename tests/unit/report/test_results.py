@@ -2,7 +2,7 @@ import json
 from dataclasses import replace
 
 from simscen.judge.resultdata import from_data
-from simscen.report.results import to_json
+from simscen.report.results import as_document, to_json
 
 
 def test_every_run_is_in_it_once_with_its_result(passed, failed, crashed):
@@ -14,6 +14,13 @@ def test_every_run_is_in_it_once_with_its_result(passed, failed, crashed):
         "navigation/goal",
     ]
     assert from_data(document["runs"][1]).verdicts == failed.result.verdicts
+
+
+def test_the_figures_of_the_session_are_in_it(passed, failed, crashed):
+    figures = as_document([passed, failed, crashed])["suite"]
+    assert figures["runs"] == 3
+    assert figures["measured_runs"] == sum(bool(run.result.metrics) for run in (passed, failed, crashed))
+    assert "collisions_per_km" in figures
 
 
 def test_artifacts_are_relative_to_the_session_so_that_the_folder_may_move(failed):
