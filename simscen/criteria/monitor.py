@@ -65,7 +65,7 @@ def _unbounded(hold: Array, release: Array, window: Window, ahead: Ahead) -> Arr
     """From the last sample backwards: released now, or held now and released later."""
     later = -math.inf if window.last is None and ahead.over else ahead.beyond
     answers = []
-    for held, freed in zip(reversed(hold.tolist()), reversed(release.tolist()), strict=True):
+    for held, freed in np.column_stack((hold, release))[::-1].tolist():
         later = max(freed, min(held, later))
         answers.append(later)
     return np.array(answers[::-1])
@@ -83,9 +83,7 @@ def _greatest(values: Array, first: int, width: int, count: int) -> Array:
     A window reaches over the border of at most two blocks of its width: what is left of the one and the beginning of
     the other. (van Herk 1992; Gil and Werman 1993.)
     """
-    filled = np.full(-(-len(values) // width) * width, -math.inf)
-    filled[: len(values)] = values
-    blocks = filled.reshape(-1, width)
+    blocks = np.pad(values, (0, -len(values) % width)).reshape(-1, width)  # what is added is in no window
     begun = np.maximum.accumulate(blocks, axis=1).ravel()
     left = np.maximum.accumulate(blocks[:, ::-1], axis=1)[:, ::-1].ravel()
     greatest: Array = np.maximum(left[first : first + count], begun[first + width - 1 : first + width - 1 + count])

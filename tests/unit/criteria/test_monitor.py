@@ -1,8 +1,10 @@
 """Temporal operators against brute force over every window."""
 
 import math
+from itertools import product
 
 import numpy as np
+import pytest
 from formulas import NUMBERS, VALUES
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -62,3 +64,21 @@ def test_until_over_a_whole_minute_takes_no_cubic_time():
     p, q = chance.normal(1.0, 1.0, 1201), chance.normal(-2.0, 1.0, 1201)
     whole = monitor.until(p, q, Window(0, 1200), Ahead(-math.inf, True))
     assert whole[0] == max(min(q[k], p[:k].min(initial=math.inf)) for k in range(1201))
+
+
+FEW = [list(values) for n in (1, 2, 3) for values in product((-1.0, 2.0), repeat=n)]
+WINDOWS = [Window(first, last) for first in range(4) for last in (None, *range(first, 5))]
+
+
+@pytest.mark.parametrize("over", [True, False])
+@pytest.mark.parametrize("beyond", [-math.inf, math.inf])
+def test_every_operator_in_every_window_over_every_short_signal(beyond, over):
+    ahead = Ahead(beyond, over)
+    for window, p in product(WINDOWS, FEW):
+        values = np.array(p)
+        assert monitor.always(values, window, ahead).tolist() == brute("always", p, window, ahead)
+        assert monitor.eventually(values, window, ahead).tolist() == brute("eventually", p, window, ahead)
+        for q in FEW:
+            if len(q) == len(p):
+                found = monitor.until(values, np.array(q), window, ahead)
+                assert found.tolist() == brute("until", p, window, ahead, q), (window, p, q)
