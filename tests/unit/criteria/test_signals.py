@@ -1,13 +1,16 @@
 """Signals against closed forms, brute force and evo's definition of APE."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simscen.criteria.signals import drive, first_lasting, pose_error
+from simscen.core.samples import Samples
+from simscen.criteria.bounds import BrokenTrace
+from simscen.criteria.signals import clearance, drive, first_lasting, pose_error, speed, true_pose, turn_rate
 from simscen.judge.sketch import sketch
 
 
@@ -57,3 +60,89 @@ def test_the_first_lasting_stretch_is_the_one_brute_force_finds(true, hold):
             if stop == end:
                 expected = (int(ticks[k]), False)
     assert first_lasting(ticks, np.array(true), hold, end) == expected
+
+
+def at_half_seconds(xy, placed=()):
+    """A trace with the truth at these points, half a second apart, and set down elsewhere at these seconds."""
+    ticks = np.arange(len(xy), dtype=np.int64) * 120
+    truth = Samples(ticks, np.column_stack((np.array(xy, dtype=np.float64), np.zeros(len(xy)))))
+    events = [[t, "robot.placed"] for t in placed]
+    return replace(sketch({"seconds": len(xy) / 2, "truth": [[0, 0, 0]], "events": events}), truth=truth)
+
+
+def test_trembling_is_no_drive_and_small_moves_add_up_to_one():
+    still = at_half_seconds([(0, 0), (0.0078125, 0), (0, 0), (0, 0.0078125), (0, 0)])
+    assert drive(still).length == 0.0
+    creeping = drive(at_half_seconds([(0.0078125 * k, 0) for k in range(9)]))
+    assert creeping.length == 0.0625
+    assert creeping.ticks.tolist() == [0, 240, 480, 720, 960]
+    assert creeping.travelled.tolist() == [0.0, 0.015625, 0.03125, 0.046875, 0.0625]
+
+
+def test_a_move_of_exactly_a_centimetre_counts():
+    assert drive(at_half_seconds([(0, 0), (0.01, 0)])).length == 0.01
+    assert drive(at_half_seconds([(0, 1), (0, 1.5)])).length == 0.5
+
+
+def test_being_set_down_elsewhere_is_no_drive_but_what_follows_is():
+    way = drive(at_half_seconds([(0, 0), (1, 0), (9, 9), (9, 10)], placed=[0.5]))
+    assert way.length == 2.0
+    assert way.travelled.tolist() == [0.0, 1.0, 1.0, 2.0]
+    assert drive(at_half_seconds([(0, 0), (1, 0), (9, 9), (9, 10)])).length > 12
+
+
+def test_the_way_until_a_moment_is_what_was_left_behind_by_then():
+    way = drive(at_half_seconds([(0, 0), (1, 0), (2, 0)]))
+    assert [way.until(tick) for tick in (-1, 0, 119, 120, 239, 240, 9999)] == [0.0, 0.0, 0.0, 1.0, 1.0, 2.0, 2.0]
+
+
+def test_nothing_recorded_is_no_way():
+    trace = at_half_seconds([(0, 0)])
+    empty = replace(trace, truth=Samples(trace.truth.ticks[:0], trace.truth.values[:0]))
+    assert drive(empty).length == 0.0
+    assert len(pose_error(empty)) == 0
+    assert len(pose_error(replace(trace, belief=Samples(trace.truth.ticks[:0], np.empty((0, 9)))))) == 0
+
+
+def test_speed_is_over_ground_and_turning_has_no_sign():
+    trace = sketch({"seconds": 1, "truth": [[0, 0, 0]]})
+    trace.velocity.values[3] = (-3.0, 4.0, -2.0)
+    assert (speed(trace).values[3, 0], turn_rate(trace).values[3, 0]) == (5.0, 2.0)
+    assert speed(trace).values.shape == turn_rate(trace).values.shape == (41, 1)
+
+
+@pytest.mark.parametrize(("column", "value"), [(0, np.nan), (1, np.inf), (2, -np.inf)])
+def test_a_signal_that_is_not_finite_is_named_with_its_first_moment(column, value):
+    trace = sketch({"seconds": 4, "truth": [[0, 0, 0]]})
+    trace.truth.values[[80, 120], column] = value
+    with pytest.raises(BrokenTrace, match=r"the true pose is not finite at t = 2\.00 s"):
+        drive(trace)
+
+
+@pytest.mark.parametrize("value", [np.nan, -np.inf])
+def test_a_clearance_that_is_no_number_is_named_with_its_first_moment(value):
+    trace = sketch({"seconds": 4, "truth": [[0, 0, 0]]})
+    trace.clearance.values[[80, 120]] = value
+    with pytest.raises(BrokenTrace, match=r"the clearance is not a number at t = 2\.00 s"):
+        clearance(trace)
+    trace.clearance.values[:] = np.inf
+    assert clearance(trace) is trace.clearance
+
+
+def test_the_true_pose_at_a_tick_is_the_newest_sample():
+    trace = at_half_seconds([(0, 0), (1, 0), (2, 0)])
+    assert [true_pose(trace, tick).x for tick in (0, 119, 120, 500)] == [0.0, 0.0, 1.0, 2.0]
+
+
+def test_an_error_of_heading_goes_the_short_way_round_between_samples_too():
+    words = {"seconds": 2, "truth": [[0, 0, 0, 3.1], [2, 0, 0, 3.2]], "belief": [[0, 0, 0, -3.1], [2, 0, 0, -3.0]]}
+    assert pose_error(sketch(words)).values[:, 1] == pytest.approx(np.full(21, 2 * math.pi - 6.2))
+
+
+def test_an_error_is_against_the_truth_at_that_very_moment():
+    ticks = np.array([0, 240], dtype=np.int64)
+    trace = sketch({"seconds": 1, "truth": [[0, 0, 0], [1, 4, 8]], "belief": [[0, 1, 0], [1, 1, 0]]})
+    rare = replace(trace, truth=Samples(ticks, np.array([[0.0, 0.0, 0.0], [4.0, 8.0, 0.0]])))
+    error = pose_error(rare)
+    assert error.ticks[5] == 120
+    assert error.values[5, 0] == pytest.approx(math.hypot(1 - 2, 0 - 4))
