@@ -32,7 +32,8 @@ def tests_of(file: Path) -> list[list[str]]:
     """
     room, kind = file.parent.name, file.stem
     own = [path.relative_to(ROOT).as_posix() for path in sorted((ROOT / f"tests/unit/{room}").glob(f"test_{kind}*.py"))]
-    if (ROOT / f"tests/cases/{kind}.yaml").exists():
-        return [["golden", kind], [*own, *EVERY_CRITERION]]
+    kinds = ["result", "error_code"] if kind == "result" else [kind]
+    if room == "criteria" and (ROOT / f"tests/cases/{kind}.yaml").exists():
+        return [*(["golden", of] for of in kinds), [*own, *EVERY_CRITERION]]
     golden = [["golden", ""]] if room in ("criteria", "judge") else []
     return [*golden, *([own] if own else []), ALL_TESTS[room]]

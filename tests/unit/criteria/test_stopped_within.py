@@ -1,0 +1,106 @@
+"""Stopping to the tick: a velocity every 0.1 s, given number by number."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from simscen.core.samples import Samples
+from simscen.core.verdict import Status
+from simscen.criteria.criterion import AnyCriterion
+from simscen.judge.judge import judge
+from simscen.judge.sketch import sketch, sketch_case
+
+MOVING, STILL = 0.5, 0.0
+
+
+def found(speeds, *faults, turning=0.0, scans=(), **words):
+    """The findings for speeds at 0, 0.1, 0.2, … s and faults [from, to] in seconds."""
+    events = []
+    for start, end in faults:
+        events.append([start, "fault.started", "lidar.off"])
+        events += [] if end is None else [[end, "fault.ended", "lidar.off"]]
+    ticks = np.arange(len(speeds), dtype=np.int64) * 24
+    velocity = np.column_stack((speeds, np.zeros(len(speeds)), np.full(len(speeds), turning)))
+    trace = sketch({"seconds": (len(speeds) - 1) / 10, "truth": [[0, 0, 0]], "events": events})
+    seen = np.array([round(t * 240) for t in scans], dtype=np.int64)
+    trace = replace(trace, velocity=Samples(ticks, velocity), scans=seen)
+    entry = AnyCriterion.model_validate({"stopped_within": {"time": 0.5, "after": "lidar.off", **words}})
+    (verdict,) = judge([entry], trace, sketch_case({}))
+    return verdict.findings
+
+
+def test_the_bounds_of_rest_belong_to_rest():
+    (finding,) = found([MOVING] * 12 + [0.02] * 10, (1.0, None), turning=0.05)
+    assert (finding.status, finding.value) == (Status.PASS, 0.2)
+    (finding,) = found([MOVING] * 12 + [0.0201] * 10, (1.0, None))
+    assert finding.status is Status.FAIL
+    (finding,) = found([MOVING] * 12 + [STILL] * 10, (1.0, None), turning=0.0501)
+    assert finding.status is Status.FAIL
+
+
+def test_a_rest_that_was_over_when_the_fault_began_is_none():
+    (finding,) = found([*[MOVING] * 9, STILL, *[MOVING] * 12], (1.05, None), hold=0.1, time=0.2)
+    assert finding.status is Status.FAIL
+    both = [*[MOVING] * 8, STILL, *[MOVING] * 13]
+    (finding,) = found(both, (1.0, None), hold=0.1, time=0.2)
+    assert finding.status is Status.FAIL
+    assert "it never came to rest" in finding.detail
+
+
+def test_it_stood_when_the_newest_sample_before_says_so():
+    assert found([*[MOVING] * 8, STILL, *[MOVING] * 13], (1.0, None))[0].status is Status.FAIL
+    assert found([*[MOVING] * 9, STILL, *[MOVING] * 13], (1.0, None))[0].status is Status.INCONCLUSIVE
+    assert found([STILL, *[MOVING] * 13], (0.0, None))[0].status is Status.INCONCLUSIVE
+
+
+def test_a_fault_from_the_first_tick_on_sees_the_first_sample():
+    first, second = found([STILL, *[MOVING] * 12, *[STILL] * 5], (0.0, 0.5), (1.0, None), hold=0.1)
+    assert (first.status, first.value) == (Status.PASS, 0.0)
+    assert (second.status, second.value) == (Status.PASS, 0.3)
+
+
+def test_stopping_as_the_fault_ends_is_stopping():
+    (finding,) = found([MOVING] * 15 + [STILL] * 5, (1.0, 1.5))
+    assert (finding.status, finding.margin) == (Status.PASS, 0.0)
+
+
+def test_moving_when_the_run_and_the_time_end_together_decides_nothing():
+    (finding,) = found([MOVING] * 16, (1.0, None))
+    assert finding.status is Status.INCONCLUSIVE
+    (finding,) = found([MOVING] * 17, (1.0, None))
+    assert (finding.status, finding.value) == (Status.FAIL, 0.6)
+
+
+def test_moving_when_the_fault_and_the_time_end_together_decides_nothing():
+    (finding,) = found([MOVING] * 30, (1.0, 1.5))
+    assert finding.status is Status.INCONCLUSIVE
+
+
+@pytest.mark.parametrize(
+    ("scan", "told"),
+    [
+        (2.0, "drove 0.00 m at 0.00 m/s"),
+        (1.8, "drove 0.00 m at 0.00 m/s"),
+        (1.775, "drove 0.00 m blind at 0.00 m/s; the newest scan was 0.2 s old"),
+    ],
+)
+def test_a_scan_older_than_two_periods_is_told(scan, told):
+    (finding,) = found([MOVING] * 20 + [STILL] * 5, (1.0, None), scans=[scan])
+    assert finding.detail[0] == told
+
+
+@pytest.mark.parametrize(("peak", "told"), [(9, "0.50"), (10, "0.75"), (15, "0.75"), (20, "0.50"), (21, "0.50")])
+def test_the_top_speed_is_that_of_the_time_it_took(peak, told):
+    speeds = [MOVING] * 20 + [STILL] * 5
+    if peak < 20:
+        speeds[peak] = 0.75
+    (finding,) = found(speeds, (1.0, None))
+    assert finding.detail[1] == f"its top speed in that time was {told} m/s"
+
+
+def test_the_top_speed_may_be_low_and_be_that_of_the_last_moment():
+    (finding,) = found([0.1] * 25, (1.0, None))
+    assert finding.detail[1] == "its top speed in that time was 0.10 m/s"
+    (finding,) = found([0.1] * 24 + [0.2], (1.0, None))
+    assert finding.detail[1] == "its top speed in that time was 0.20 m/s"
