@@ -87,7 +87,7 @@ def _with_assets(spec: ScenarioSpec, tree: Fields, library: Library, file: Path)
     problems = sorted(inconsistencies(loaded))
     if any(problem.severity == "error" for problem in problems):
         return problems
-    return replace(loaded, notes=tuple(problems))
+    return replace(loaded, notes=(*loaded.notes, *problems))
 
 
 def _world(spec: ScenarioSpec, tree: Fields, assets: Assets, file: Path) -> LoadedWorld | None:
