@@ -87,7 +87,24 @@ def _bottleneck(clearance: Array, ends: npt.NDArray[np.int64]) -> npt.NDArray[np
         labels, _ = ndimage.label(clearance >= levels[middle], structure=np.ones((3, 3)))
         joined = labels[first] == labels[last] > 0
         low, high = (middle, high) if joined else (low, middle)
-    cell: npt.NDArray[np.int64] = np.argwhere(clearance == levels[low])[0]
+    return _joint(clearance, levels[low], first, last)
+
+
+def _joint(clearance: Array, level: float, first: tuple[int, ...], last: tuple[int, ...]) -> npt.NDArray[np.int64]:
+    """A cell of this clearance through which the start's part of the cells with more is joined with another part."""
+    from scipy import ndimage
+
+    parts, _ = ndimage.label(clearance > level, structure=np.ones((3, 3)))
+    joints, _ = ndimage.label(clearance == level, structure=np.ones((3, 3)))
+    found: list[tuple[bool, npt.NDArray[np.int64]]] = []
+    for number, box in enumerate(ndimage.find_objects(joints), start=1):
+        around = tuple(slice(max(0, side.start - 1), side.stop + 1) for side in box)
+        beside = ndimage.binary_dilation(joints[around] == number, structure=np.ones((3, 3), np.bool_))
+        joined = set(np.unique(parts[around][beside]).tolist()) - {0}
+        cells = np.argwhere(joints == number)
+        if len(joined) > 1 and (parts[first] in joined or parts[first] == 0):
+            found.append((parts[last] not in joined, cells[len(cells) // 2]))
+    cell: npt.NDArray[np.int64] = min(found, key=lambda joint: joint[0])[1] if found else np.argwhere(joints)[0]
     return cell
 
 
