@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from simscen.core.errors import UsageError
+from simscen.core.outputs import require_plain
 from simscen.run.scene import Scene
 from simscen.worlds.overlap import placed
 
@@ -19,6 +20,7 @@ def draw(scene: Scene, gaps: Sequence[tuple[float, float]], folder: Path) -> Pat
     image = picture(build(scene.world, height), height, [placed(scene.outline, pose) for pose in poses], gaps)
     file = folder / f"{scene.loaded.id}.png"
     try:
+        require_plain(file)
         file.parent.mkdir(parents=True, exist_ok=True)
         image.save(file)
     except OSError as error:

@@ -19,7 +19,7 @@ from simscen.run.simulate import simulate
 ROOT = Path(__file__).parents[2]
 NO_LOCALIZER = ("stack.localizer", {"type": "odometry"})
 DRIFTING_ODOMETRY = ("faults", [{"sensor": "odom", "bias": {"turn_per_metre": 0.05}}])
-NO_RECOVERY = ("stack.recovery", {"number_of_retries": 0, "behaviors": []})
+ONE_RECOVERY = ("stack.recovery", {"number_of_retries": 1})
 
 SHUT = {"close": {"name": "door meeting room"}}
 CRATE_IN_THE_OTHER_WAY = {"spawn": {"name": "crate", "box": [0.5, 1.4, 1.0], "pose": {"x": 12.0, "y": 1.95}}}
@@ -38,7 +38,7 @@ CHANGES = {
     "navigation/goal_occupied": [("result", [("goals.0.pose", {"x": 3.0, "y": 5.0})])],
     "navigation/goal_outside_map": [("result", [("goals.0.pose", {"x": 3.0, "y": 5.0})])],
     "recovery/corridor_blocked_then_opened": [
-        ("goals_reached", [NO_RECOVERY]),
+        ("goals_reached", [ONE_RECOVERY]),
         ("recoveries", [("events", [])]),
     ],
     "recovery/blocked_for_good": [("result", [("events", [])])],
