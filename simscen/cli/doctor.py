@@ -1,23 +1,18 @@
 """`simscen doctor`."""
 
 import hashlib
-import os
-import platform
 import shutil
 import sys
 import tempfile
+import textwrap
 from collections.abc import Callable, Iterator
 from functools import partial
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from simscen.cli import machine
 from simscen.cli.diagnostics import harmless, print_text
+from simscen.cli.machine import Ill
 from simscen.core.errors import Exit, SimscenError
-from simscen.run.versions import PACKAGES, cpu_flags
-
-PYTHONS = ((3, 10), (3, 11))
-LEAST_FREE = 500 << 20
-"""Bytes: some hundred logs of a minute each."""
 
 SCENARIO = """\
 simscen: 1
@@ -28,10 +23,9 @@ time_limit: 1 s
 pass: [{collisions: {max: 0}}]
 """
 
-
-class Ill(Exception):
-    """Why a check does not hold, and what would help."""
-
+INDENT = 15
+SLOWEST = 1.0
+"""Times real time: below that, campaigns take longer than the drives they stand for."""
 
 Check = tuple[str, Callable[[], str]]
 
@@ -39,8 +33,9 @@ Check = tuple[str, Callable[[], str]]
 def command() -> None:
     """Check that this installation can run scenarios.
 
-    Python, packages, what Linux must offer, room on the disk, and one second of a real run, twice, whose logs must be
-    equal. Exit code 0: all is well; 3: something is not.
+    Python, packages and their versions, what Linux must offer, limits of memory and files, room on the disk; one second
+    of a real run, twice, whose logs must be equal; and the speed of a patrol, beside PyBullet alone. What is not well
+    is told with what helps. Exit code 0: all is well; 3: something is not.
     """
     well = True
     for name, check in checks():
@@ -48,82 +43,47 @@ def command() -> None:
             sign, told = "✓", check()
         except Ill as ill:
             well, sign, told = False, "✗", str(ill)
-        print_text(f"  {sign} {name:10} {harmless(told)}")
+        print_text(_line(sign, name, harmless(told)))
         sys.stdout.flush()
     sys.exit(Exit.PASSED if well else Exit.INCOMPLETE)
 
 
 def checks() -> Iterator[Check]:
     """Name and check, in the order in which they are done; a check returns what it found or raises Ill."""
-    yield "python", python
-    yield from ((name, partial(package, name)) for name in PACKAGES)
-    yield "processor", processor
-    yield "fork", fork
-    yield "pidfd", pidfd
-    yield "temporary", partial(writable, Path(tempfile.gettempdir()))
-    yield "here", partial(room, Path.cwd())
+    yield "python", machine.python
+    yield "packages", machine.packages
+    yield "processor", machine.processor
+    yield "fork", machine.fork
+    yield "pidfd", machine.pidfd
+    yield "limits", machine.limits
+    yield "shared", machine.shared_memory
+    yield "temporary", partial(machine.writable, Path(tempfile.gettempdir()))
+    yield "here", partial(machine.room, Path.cwd())
     yield "run", run_twice
+    yield "speed", speed
 
 
-def python() -> str:
-    """The version of Python is one that pybullet and ompl have wheels for."""
-    if sys.version_info[:2] not in PYTHONS:
-        raise Ill(f"{platform.python_version()}: simscen needs 3.10 or 3.11, which pybullet and ompl have wheels for")
-    return f"{platform.python_version()} ({sys.executable})"
+def _line(sign: str, name: str, told: str) -> str:
+    """One check within the width of the terminal."""
+    width = max(40, shutil.get_terminal_size((80, 24)).columns)
+    first = f"  {sign} {name:10} "
+    wrapper = textwrap.TextWrapper(width, first, " " * INDENT, break_long_words=False, break_on_hyphens=False)
+    return wrapper.fill(told)
 
 
-def package(name: str) -> str:
-    """A package is installed."""
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        raise Ill(f"not installed: pip install {name}") from None
+def speed() -> str:
+    """A patrol with everything on, beside PyBullet alone: what differs from other machines is the processor's share."""
+    from simscen.cli.quiet import engine_output_on_stderr
 
+    with engine_output_on_stderr():
+        from simscen.run import bench
 
-def processor() -> str:
-    """What logs may differ by in their last bits: never ill."""
-    return f"{platform.machine()}, {len(os.sched_getaffinity(0))} cores, {' '.join(cpu_flags()) or 'flags unknown'}"
-
-
-def fork() -> str:
-    """Runs are forked from a warm process."""
-    if sys.platform != "linux":
-        raise Ill(f"{sys.platform}: runs are supervised with means that only Linux has")
-    child = os.fork()
-    if child == 0:
-        os._exit(7)
-    if os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) != 7:
-        raise Ill("a forked process did not end as it should")
-    return "processes can be forked"
-
-
-def pidfd() -> str:
-    """The supervisor waits for processes by file descriptors."""
-    try:
-        os.close(os.pidfd_open(os.getpid()))
-    except (AttributeError, OSError) as error:
-        raise Ill(f"pidfd_open: {error}; Linux 5.3 or newer is needed, and a sandbox that allows it") from None
-    return f"Linux {platform.release()}"
-
-
-def writable(folder: Path) -> str:
-    """Something can be written in a folder."""
-    try:
-        with tempfile.NamedTemporaryFile(dir=folder) as file:
-            file.write(b"simscen")
-            file.flush()
-    except OSError as error:
-        raise Ill(f"cannot write in {folder}: {error.strerror}") from None
-    return f"{folder} is writable"
-
-
-def room(folder: Path) -> str:
-    """There is room for some logs where simscen-out would be."""
-    told = writable(folder)
-    free = shutil.disk_usage(folder).free
-    if free < LEAST_FREE:
-        raise Ill(f"only {free / 2**20:.0f} MiB are free in {folder}; a run of a minute writes some 5 MiB")
-    return f"{told}, {free / 2**30:.1f} GiB free"
+        patrol = bench.measure_patrol(1)
+    ratio = f"{patrol.cpu / patrol.bare:.1f} times what PyBullet alone takes"
+    told = f"{patrol.factor:.0f} times real time on one core, {ratio}"
+    if patrol.factor < SLOWEST:
+        raise Ill(f"{told}; use a faster processor, or one that other containers leave alone")
+    return told
 
 
 def run_twice() -> str:

@@ -1,36 +1,85 @@
 """simscen doctor finds what would keep runs from working."""
 
 import os
+import re
+import resource
 import shutil
 import sys
 
 import pytest
 
-from simscen.cli import doctor
+from simscen.cli import doctor, machine
+from simscen.run import bench
 
 
-def test_a_sound_installation_is_well(simscen) -> None:
+@pytest.fixture
+def quick(monkeypatch):
+    """Without the checks that take long."""
+    monkeypatch.setattr(doctor, "run_twice", lambda: "not now")
+    monkeypatch.setattr(doctor, "speed", lambda: "not now, either")
+
+
+def test_a_sound_installation_is_well_and_told_in_80_columns(simscen, monkeypatch) -> None:
+    monkeypatch.setattr(doctor, "speed", lambda: "not now")
+    monkeypatch.setenv("COLUMNS", "80")
     ended = simscen("doctor")
     assert ended.code == 0
-    assert all(line.startswith("  ✓ ") for line in ended.out.splitlines())
-    assert "1 s simulated twice, equal logs: sha256 " in ended.out.splitlines()[-1]
+    assert all(line.startswith(("  ✓ ", " " * 15)) and len(line) <= 80 for line in ended.out.splitlines())
+    assert "1 s simulated twice, equal logs: sha256 " in ended.out.splitlines()[-2]
 
 
-def test_one_ill_thing_is_told_and_the_rest_is_checked(simscen, monkeypatch) -> None:
-    monkeypatch.setattr(doctor, "run_twice", lambda: "not now")
-    monkeypatch.setattr(shutil, "disk_usage", lambda _: shutil._ntuple_diskusage(1, 1, 3 << 20))
+def test_one_ill_thing_is_told_and_the_rest_is_checked(simscen, quick, monkeypatch) -> None:
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: shutil._ntuple_diskusage(1, 1, 30 << 20))
     ended = simscen("doctor")
     assert ended.code == 3
-    assert next(line for line in ended.out.splitlines() if "✗" in line).startswith("  ✗ here       only 3 MiB are free")
-    assert ended.out.splitlines()[-1] == "  ✓ run        not now"
+    assert next(line for line in ended.out.splitlines() if "✗" in line).startswith(
+        "  ✗ here       only 30 MiB are free"
+    )
+    assert ended.out.splitlines()[-1] == "  ✓ speed      not now, either"
+
+
+def test_speed_is_that_of_a_patrol_beside_pybullet(monkeypatch) -> None:
+    parts = {"physics": 1.0}
+    monkeypatch.setattr(bench, "measure_patrol", lambda _: bench.Patrol(60.0, 2.0, parts, 0.5))
+    assert doctor.speed() == "30 times real time on one core, 4.0 times what PyBullet alone takes"
+    monkeypatch.setattr(bench, "measure_patrol", lambda _: bench.Patrol(60.0, 90.0, parts, 20.0))
+    with pytest.raises(machine.Ill, match="a faster processor"):
+        doctor.speed()
+
+
+@pytest.mark.parametrize(
+    ("what", "value", "told"),
+    [
+        (resource.RLIMIT_AS, 200 << 20, "a run gets 200 MiB of memory; raise `ulimit -v`"),
+        (resource.RLIMIT_NOFILE, 20, "may open 20 files; raise `ulimit -n`"),
+        (resource.RLIMIT_FSIZE, 1 << 20, "a file may have 1 MiB; raise `ulimit -f`"),
+    ],
+)
+def test_limits_that_are_too_tight_are_told_with_what_helps(monkeypatch, what, value, told) -> None:
+    real = resource.getrlimit
+    monkeypatch.setattr(resource, "getrlimit", lambda asked: (value, value) if asked == what else real(asked))
+    with pytest.raises(machine.Ill, match=re.escape(told)):
+        machine.limits()
+
+
+def test_the_memory_of_a_container_counts(monkeypatch) -> None:
+    monkeypatch.setattr(machine, "_cgroup_memory", lambda: 300 << 20)
+    with pytest.raises(machine.Ill, match="a run gets 300 MiB of memory"):
+        machine.limits()
+
+
+def test_packages_that_do_not_fit_are_ill(monkeypatch) -> None:
+    monkeypatch.setattr(machine, "unmet", lambda: ["numpy 1.0 is installed"])
+    with pytest.raises(machine.Ill, match=r"numpy 1\.0 is installed"):
+        machine.packages()
 
 
 def test_other_pythons_and_missing_packages_are_ill(monkeypatch) -> None:
-    with pytest.raises(doctor.Ill, match="pip install no-such-package"):
-        doctor.package("no-such-package")
+    with pytest.raises(machine.Ill, match="pip install no-such-package"):
+        machine._version("no-such-package")
     monkeypatch.setattr(sys, "version_info", (3, 12, 1))
-    with pytest.raises(doctor.Ill, match=r"needs 3\.10 or 3\.11"):
-        doctor.python()
+    with pytest.raises(machine.Ill, match=r"needs 3\.10 or 3\.11"):
+        machine.python()
 
 
 def test_a_sandbox_without_pidfd_is_ill(monkeypatch) -> None:
@@ -38,10 +87,10 @@ def test_a_sandbox_without_pidfd_is_ill(monkeypatch) -> None:
         raise PermissionError(1, "Operation not permitted")
 
     monkeypatch.setattr(os, "pidfd_open", refused)
-    with pytest.raises(doctor.Ill, match="Operation not permitted"):
-        doctor.pidfd()
+    with pytest.raises(machine.Ill, match="Operation not permitted"):
+        machine.pidfd()
 
 
 def test_a_folder_that_takes_no_files_is_ill(tmp_path) -> None:
-    with pytest.raises(doctor.Ill, match="cannot write in"):
-        doctor.writable(tmp_path / "nowhere")
+    with pytest.raises(machine.Ill, match="cannot write in"):
+        machine.writable(tmp_path / "nowhere")
