@@ -28,7 +28,7 @@ def halted(trace: Trace, case: Case, tick: int) -> tuple[list[str], set[str]]:
         blocked(trace, case, goal.name, tick, there),
         _standing_at(trace, case, tick, there),
     ):
-        if not events or not events <= named:
+        if "" in events or not events <= named:  # of what an event brought, one sentence is enough
             lines += told
             named |= events
     return lines, named

@@ -27,14 +27,15 @@ def result_of(
     lines: tuple[int, ...] = (),
     coverage: Coverage = WHOLE,
 ) -> RunResult:
-    """Judge a trace and sum it up. `path` is the scenario's file, `lines` where each criterion stands in it.
+    """Judge a trace and sum it up.
 
+    `path` is the scenario's file, `lines` where each criterion stands in it, () for a file that does not hold them.
     What had to happen and did not is a verdict, too; it comes first, for it is the reason of what follows.
     """
     verdicts = explained(judge(criteria, trace, case, coverage), trace, case)
     happened = happenings(trace, case)
     lacking = missing(trace, happened, verdicts)
-    lines = (*(line for _, line in lacking), *(lines or (0,) * len(verdicts)))
+    lines = (*(line for _, line in lacking), *lines) if lines else ()
     verdicts = (*(verdict for verdict, _ in lacking), *verdicts)
     came_out = outcome(verdicts)
     failure = _why(verdicts) if came_out is Outcome.ERROR else None

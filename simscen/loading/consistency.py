@@ -73,7 +73,7 @@ def _short_faults(loaded: LoadedScenario) -> Iterator[Problem]:
     rates[COMMAND] = loaded.spec.stack.controller_frequency
     for index, entry in enumerate(loaded.spec.faults):
         rate = rates.get(entry.sensor)
-        if entry.for_ is not None and rate is not None and entry.for_ * rate < 1 - 1e-9:
+        if entry.required and entry.for_ is not None and rate is not None and entry.for_ * rate < 1 - 1e-9:
             message = f"`{entry.label}` may be over between two messages: `{entry.sensor}` has {rate:g} a second"
             yield loaded.problem(("faults", index, "for"), "SC050", message, f"make it {1 / rate:g} s at least")
 

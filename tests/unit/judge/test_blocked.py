@@ -60,3 +60,33 @@ def test_a_thing_that_moved_counts_where_it_is_now():
     )
     assert line.startswith("why: cart (moved by event `cart comes` at t = 3.00 s) closes the passage")
     assert why("result", [*box(0, "cart", 5, 0, 0.6, 1.2)])[0].startswith("why: cart closes the passage")
+
+
+def test_what_leaves_room_to_turn_is_not_in_the_way_and_a_passage_as_it_is_never_is():
+    assert why("result", box(1, "crate", 5, -0.5, 0.2, 0.4, "crate falls")) == []
+    tight = {**CASE, "passages": [["study", [5, 0.25], [5, -0.25], "west wall", "east wall"]]}
+    assert why("result", [], case=tight) == []
+    assert why("result", box(1, "crate", 5, 5, 0.2, 0.4, "crate falls"), case=tight) == []
+
+
+def test_of_several_closed_passages_the_tightest_is_told():
+    wider = ["study", [6, 0.9], [6, -0.9], "a", "b"]
+    events = [*box(1, "crate", 5, 0, 0.2, 0.9, "crate falls"), *box(1, "shelf", 6, 0, 0.2, 1.5, "shelf falls")]
+    (line,) = why("result", events, case={**CASE, "passages": [wider, DOOR]})
+    assert line.startswith("why: crate")
+    assert "1.00 m between `west wall`" in line
+
+
+def test_three_centimetres_are_not_nothing():
+    (line,) = why("result", box(1, "crate", 5, 0, 0.6, 0.94, "crate falls"))
+    assert "0.03 m are left" in line
+
+
+def test_a_robot_off_the_way_has_all_passages_before_it():
+    case = {**CASE, "passages": [["study", [3.4, 0.5], [3.4, -0.5], "a", "b"], DOOR]}
+    crate = box(1, "crate", 3.4, 0, 0.1, 2.0, "crate falls")
+    assert why("result", crate, case=case)[0].startswith(
+        "why: crate (spawned by event `crate falls` at t = 1.00 s) closes"
+    )
+    near = {**CASE, "passages": [["study", [3.6, 0.5], [3.6, -0.5], "a", "b"], DOOR], "inscribed_radius": 0.01}
+    assert "closes" not in "".join(why("result", box(1, "crate", 3.6, 0, 0.1, 2.0, "crate falls"), case=near))

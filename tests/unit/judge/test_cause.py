@@ -1,6 +1,6 @@
 """Failures are explained, and nothing else is."""
 
-from whys import STANDS, by
+from whys import STANDS, by, why
 
 from simscen.core.verdict import Finding, Status, Verdict
 from simscen.judge.cause import explained
@@ -17,3 +17,8 @@ def test_only_failures_are_explained_and_before_their_own_details():
         (),
         (),
     ]
+
+
+def test_of_many_causes_the_first_six_are_told():
+    lines = why("speed", [event for k in range(9) for event in by(f"gust {k}", 9)], case={})
+    assert lines == [f"meanwhile: event `gust {k}` came 1.00 s before: something" for k in range(6)]

@@ -121,3 +121,10 @@ def test_disturbances_survive_their_file():
     result = judged([*event(3), *fault(3)], EVENT, {**FAULT, "when": "", "required": False})
     assert from_json(to_json(result)) == result
     assert result.disturbances[1].ordered == Disturbance("lidar.off", "fault", required=False, line=9)
+
+
+def test_in_a_file_that_does_not_hold_the_criteria_it_has_no_line_either():
+    trace, case = sketch(WORDS), sketch_case({"disturbances": [EVENT]})
+    result = result_of(RunKey("a", 1), "run.mcap", [AnyCriterion.model_validate({"collisions": {}})], trace, case)
+    assert len(result.verdicts) == 2
+    assert result.lines == ()

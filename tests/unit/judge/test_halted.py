@@ -56,3 +56,22 @@ def test_after_the_goal_has_failed_it_is_still_the_one_that_was_kept():
     failed = [[0, "goal.accepted", "study"], [8, "goal.failed", "study", {}], *crate]
     built = sketch({**STANDS, "events": failed})
     assert len(causes("result", 2400, built, sketch_case(CASE))) == 1
+
+
+def test_what_closes_the_way_and_is_near_is_told_once_and_what_else_is_near_as_well():
+    case = {**CASE, "passages": [["study", [4.6, 0.5], [4.6, -0.5], "a", "b"]]}
+    crate = box(1, "crate", 4.6, 0, 0.4, 2.0, "crate falls")
+    (line,) = why("result", crate, case=case)
+    assert "closes" in line
+    bin_ = box(2, "bin", 4, 0.4, 0.2, 0.2, "bin rolls")
+    assert [line.split(" (")[0] for line in why("result", [*crate, *bin_], case=case)] == ["why: crate", "why: bin"]
+
+
+def test_what_was_there_from_the_start_is_told_beside_what_else_was():
+    case = {**CASE, "passages": [["study", [4.6, 0.5], [4.6, -0.5], "a", "b"]]}
+    events = [*box(0, "door", 4.6, 0, 0.1, 2.0), *box(0, "bin", 4, 0.4, 0.2, 0.2)]
+    assert [line.split()[1] for line in why("result", events, case=case)] == ["door", "bin"]
+
+
+def test_what_is_further_than_thirty_centimetres_holds_nobody():
+    assert why("stuck", box(1, "crate", 4.75, 0, 0.4, 0.4, "falls"), case={**CASE, "passages": []}) == []
