@@ -48,6 +48,12 @@ def test_a_rest_that_was_over_when_the_fault_began_is_none():
     assert "it never came to rest" in finding.detail
 
 
+def test_a_rest_that_ends_as_the_fault_begins_is_none():
+    speeds = [*[MOVING] * 9, STILL, *[MOVING] * 30]
+    first, _ = found(speeds, (1.0, 1.7), (2.5, None), hold=0.1)
+    assert (first.status, first.value) == (Status.FAIL, 0.7)
+
+
 def test_it_stood_when_the_newest_sample_before_says_so():
     assert found([*[MOVING] * 8, STILL, *[MOVING] * 13], (1.0, None))[0].status is Status.FAIL
     assert found([*[MOVING] * 9, STILL, *[MOVING] * 13], (1.0, None))[0].status is Status.INCONCLUSIVE
