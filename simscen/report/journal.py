@@ -41,7 +41,7 @@ class Journal:
     def plan(self, runs: Sequence[Planned], version: str, workers: int) -> None:
         """Open a session of these runs; what stood in the journal before no longer counts."""
         self._numbers, self._answered = {run.key: number for number, run in enumerate(runs)}, set()
-        facts = {"format": FORMAT, "version": version, "workers": workers, "pid": os.getpid()}
+        facts = {"format": FORMAT, "version": version, "workers": workers, "pid": os.getpid(), "cwd": str(Path.cwd())}
         self._write({"event": "planned", **facts, "runs": [planned_data(run) for run in runs]})
 
     def __call__(self, event: SessionEvent) -> None:

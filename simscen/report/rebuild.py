@@ -2,15 +2,18 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from simscen.core.errors import InvalidInput
 from simscen.core.problems import Problem
 from simscen.core.result import RunFailure, RunKey, unfinished
 from simscen.core.sessionevents import RunFinished, SessionStarted
+from simscen.report.checkout import from_here
 from simscen.report.journaldata import FORMAT, NAME, Planned, read_planned, read_run
+
+Run = TypeVar("Run", Planned, RunFinished)
 
 
 @dataclass(frozen=True)
@@ -73,7 +76,8 @@ def _past(lines: list[dict[str, Any]], folder: Path) -> Past:
     first = lines[0]
     if first["format"] != FORMAT:
         raise ValueError(f"it has format {first['format']}; this version reads {FORMAT}")
-    planned = tuple(read_planned(run) for run in first["runs"])
+    cwd = first.get("cwd", "")
+    planned = tuple(_seen_from_here(read_planned(run), cwd) for run in first["runs"])
     answered: dict[RunKey, RunFinished] = {}
     begun: set[RunKey] = set()
     for line in lines[1:]:
@@ -81,7 +85,7 @@ def _past(lines: list[dict[str, Any]], folder: Path) -> Past:
             begun.add(planned[line["run"]].key)
         elif line["event"] == "finished":
             key = planned[line["run"]].key
-            answered[key] = read_run(line, folder)
+            answered[key] = _seen_from_here(read_run(line, folder), cwd)
     last = lines[-1]
     return Past(
         version=first["version"],
@@ -92,6 +96,11 @@ def _past(lines: list[dict[str, Any]], folder: Path) -> Past:
         wall=last["at"],
         interrupted=len(answered) < len(planned) or bool(last.get("interrupted")),
     )
+
+
+def _seen_from_here(run: Run, cwd: str) -> Run:
+    """The run with its scenario's file as seen from where we are now, not from where the session was."""
+    return replace(run, file=from_here(run.file, cwd))
 
 
 def _invalid(path: Path, message: str, hint: str = "") -> InvalidInput:

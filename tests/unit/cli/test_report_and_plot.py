@@ -44,10 +44,13 @@ def out(recorded: Path, tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("name", ["results.json", "junit.xml"])
-def test_reports_come_back_byte_for_byte(simscen, out: Path, name: str) -> None:
+def test_reports_come_back_byte_for_byte(
+    simscen, out: Path, recorded: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.chdir(recorded.parent)
     before = (out / name).read_bytes()
     (out / name).write_text("spoilt")
-    ended = simscen("report", "out")
+    ended = simscen("report", str(out))
     assert (ended.code, ended.err) == (1, "")
     assert (out / name).read_bytes() == before
     assert "2 failed" in ended.out
@@ -69,6 +72,17 @@ def test_with_a_junit_file_of_its_own_a_report_writes_that_file_only_and_says_so
     assert ended.out.splitlines()[-2].endswith("· ci.xml")
     assert {path: (path.read_bytes(), path.stat().st_mtime_ns) for path in out.rglob("*") if path.is_file()} == before
     assert b'line="' not in (out.parent / "ci.xml").read_bytes()
+
+
+def test_a_report_made_from_elsewhere_names_the_scenario_as_seen_from_there(
+    simscen, out: Path, recorded: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(recorded.parent)
+    (recorded.parent / "ci").mkdir()
+    monkeypatch.chdir("ci")
+    ended = simscen("report", str(out), "--junit", "here.xml")
+    assert ended.code == 1
+    assert b'file="../short.scenario.yaml"' in (recorded.parent / "ci/here.xml").read_bytes()
 
 
 def test_a_full_disk_leaves_the_reports_that_were_there(simscen, out: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,23 @@
+"""Where a verdict's criterion is written."""
+
+from pathlib import Path
+
+from simscen.run.simulate import simulate_file
+
+BASE = """\
+simscen: 1
+world: {simscen: 1, walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]}
+robot: {pose: {x: 1, y: 1}}
+goals: [{pose: {x: 1.4, y: 1}}]
+pass:
+  - speed: {max: 2 m/s}
+"""
+
+
+def test_a_criterion_of_a_base_has_no_line_in_the_file_that_extends_it(tmp_path: Path) -> None:
+    """Line 6 of the scenario is another one than line 6 of its base."""
+    (tmp_path / "base.yaml").write_text(BASE)
+    (tmp_path / "a.scenario.yaml").write_text("extends: base.yaml\n\n\nname: a\n")
+    (tmp_path / "b.scenario.yaml").write_text("extends: base.yaml\npass:\n  - collisions: {max: 0}\n")
+    (extended, own) = (simulate_file(tmp_path / f"{name}.scenario.yaml", 1, None, tmp_path) for name in ("a", "b"))
+    assert (extended.result.lines, own.result.lines) == ((0,), (3,))
