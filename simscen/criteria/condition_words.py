@@ -69,8 +69,9 @@ def measured(witness: Witness) -> str:
     """The deciding value."""
     comparison = witness.comparison
     signal = comparison.measured
-    if comparison.value is None or signal.asks:
-        return "yes" if witness.value > 0.5 else "no"
+    if signal.asks:
+        return "yes" if witness.value else "no"
+    assert comparison.value is not None
     if math.isinf(witness.value):
         return "infinite"
     return quantity(witness.value, signal.unit, decimals(witness.value, comparison.value))
@@ -80,8 +81,9 @@ def limit(witness: Witness) -> str:
     """What it had to be."""
     comparison = witness.comparison
     signal = comparison.measured
-    if comparison.value is None or comparison.op is None or signal.asks:
+    if signal.asks:
         return "no" if witness.negated else "yes"
+    assert comparison.value is not None and comparison.op is not None
     op = _OPPOSITE[comparison.op] if witness.negated else comparison.op
     digits = decimals(witness.value, comparison.value)
     return f"{_SIGNS[op]} {quantity(comparison.value, signal.unit, digits)}"
@@ -89,8 +91,9 @@ def limit(witness: Witness) -> str:
 
 def _bound(condition: Condition) -> str:
     signal = condition.measured
-    if signal.asks or condition.op is None or condition.value is None:
+    if signal.asks:
         return ""
+    assert condition.op is not None and condition.value is not None
     return f"{_SIGNS[condition.op]} {condition.value:g} {signal.unit}".rstrip()
 
 

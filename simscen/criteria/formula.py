@@ -230,7 +230,7 @@ def _compared(condition: Condition, scene: Scene) -> Judged:
         at = scene.trace.seconds(int(scene.trace.truth.ticks[int(np.argmax(np.isnan(values)))]))
         raise BrokenTrace(f"{condition.signal} is not a number at t = {at:.2f} s")
     if condition.measured.asks:
-        sure = np.where(values > 0.5, math.inf, -math.inf)
+        sure = np.where(values, math.inf, -math.inf)
         return _Compared(sure, sure, condition, values)
     distances = _distances(condition, values)
     if condition.signal != "clearance":

@@ -70,6 +70,15 @@ FEW = [list(values) for n in (1, 2, 3) for values in product((-1.0, 2.0), repeat
 WINDOWS = [Window(first, last) for first in range(4) for last in (None, *range(first, 5))]
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_windows_reach_over_the_blocks_they_are_computed_in(seed):
+    chance, ahead = np.random.default_rng(seed), Ahead(math.inf, True)
+    values = chance.integers(-9, 9, 11).astype(np.float64)
+    for window in (Window(first, first + length) for first in range(3) for length in range(7)):
+        assert monitor.always(values, window, ahead).tolist() == brute("always", values.tolist(), window, ahead)
+        assert monitor.eventually(values, window, ahead).tolist() == brute("eventually", values.tolist(), window, ahead)
+
+
 @pytest.mark.parametrize("over", [True, False])
 @pytest.mark.parametrize("beyond", [-math.inf, math.inf])
 def test_every_operator_in_every_window_over_every_short_signal(beyond, over):
