@@ -4,13 +4,16 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
 from simscen.core.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Sphere
 from simscen.worlds.meshing import triangulate
 from simscen.worlds.sdf.polyline import trapezoids
+
+GRID = 1e-9
+"""m; without it GEOS takes equal areas with almost equal corners for different ones."""
 
 
 def shaped(geometry, pose="", static="<static>1</static>"):
@@ -154,13 +157,14 @@ class TestPolylines:
 
     @settings(max_examples=60, deadline=None)
     @given(st.lists(st.lists(coordinates, min_size=3, max_size=6, unique=True), min_size=1, max_size=3))
+    @example([[(-1, 6), (6, -5), (1, 4), (-2, -6)]])
     def test_trapezoids_cover_the_odd_area_of_any_outlines_once(self, outlines):
         expected = shapely.Polygon()
         for points in outlines:
             for triangle in _even_odd(points):
-                expected = expected.symmetric_difference(triangle)
+                expected = shapely.symmetric_difference(expected, triangle, grid_size=GRID)
         pieces = [shapely.Polygon(piece) for piece in trapezoids([np.array(o, float) for o in outlines])]
-        assert shapely.unary_union(pieces).symmetric_difference(expected).area < 1e-6
+        assert shapely.symmetric_difference(shapely.unary_union(pieces), expected, grid_size=GRID).area < 1e-6
         assert sum(piece.area for piece in pieces) == pytest.approx(expected.area, abs=1e-6)
         assert all(piece.exterior.is_ccw for piece in pieces)
 
