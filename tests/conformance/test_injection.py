@@ -29,8 +29,10 @@ TELLING = str(Path(__file__).with_name("telling_zygote.py"))
 @pytest.fixture
 def hostile(folder: Path) -> str:
     """A scenario that fails, and whatever has a name in it has a hostile one."""
-    goals = [{"name": "near", "pose": {"x": 1.2, "y": 1}}]
-    goals += [{"name": name, "pose": {"x": 5, "y": 3}, "timeout": 0.1} for name in HOSTILE]
+    goals = [{"name": "near", "pose": {"x": 1.8, "y": 1}}]
+    goals += [
+        {"name": name, "pose": {"x": 5, "y": 1 + number % 2 * 2}, "timeout": 0.1} for number, name in enumerate(HOSTILE)
+    ]
     events = [
         {
             "name": f"event {name}",
@@ -40,7 +42,7 @@ def hostile(folder: Path) -> str:
         for number, name in enumerate(HOSTILE)
     ]
     scenario = {
-        "simscen": 1, "name": HOSTILE[2], "world": "room.world.yaml", "on_goal_failure": "continue", "goals": goals,
+        "simscen": 1, "name": HOSTILE[2], "world": "room.world.yaml", "on_goal_failure": "continue", "goals": goals, "time_limit": 500,
         "description": "\n::error::gotcha\n".join(HOSTILE), "events": events, "linger": 0,
         "robot": {"model": "cube.robot.yaml", "pose": "start"}, "pass": [{"goals_reached": {}}],
     }  # fmt: skip
