@@ -42,7 +42,8 @@ def hostile(folder: Path) -> str:
         for number, name in enumerate(HOSTILE)
     ]
     scenario = {
-        "simscen": 1, "name": HOSTILE[2], "world": "room.world.yaml", "on_goal_failure": "continue", "goals": goals, "time_limit": 500,
+        "simscen": 1, "name": HOSTILE[2], "world": "room.world.yaml", "on_goal_failure": "continue", "goals": goals,
+        "time_limit": 500,
         "description": "\n::error::gotcha\n".join(HOSTILE), "events": events, "linger": 0,
         "robot": {"model": "cube.robot.yaml", "pose": "start"}, "pass": [{"goals_reached": {}}],
     }  # fmt: skip
