@@ -44,15 +44,13 @@ def out(recorded: Path, tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("name", ["results.json", "junit.xml"])
-def test_reports_come_back_byte_for_byte(
-    simscen, out: Path, recorded: Path, monkeypatch: pytest.MonkeyPatch, name: str
-) -> None:
+def test_reports_come_back_byte_for_byte(simscen, recorded: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     monkeypatch.chdir(recorded.parent)
-    before = (out / name).read_bytes()
-    (out / name).write_text("spoilt")
-    ended = simscen("report", str(out))
+    before = (recorded / name).read_bytes()
+    (recorded / name).write_text("spoilt")
+    ended = simscen("report", "out")
     assert (ended.code, ended.err) == (1, "")
-    assert (out / name).read_bytes() == before
+    assert (recorded / name).read_bytes() == before
     assert "2 failed" in ended.out
     assert ended.out.splitlines()[-1].startswith(
         "success 0% of 2 runs (0% … 66%) · SPL 0.00 of 2 runs · 0.0 collisions/km"
