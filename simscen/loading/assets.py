@@ -98,8 +98,13 @@ class Assets:
         if spec is None or tree is None:
             return None
         urdf = self._find(spec.urdf, value_place(tree, ("urdf",))) if spec.urdf else None
+        places = {package: value_place(tree, ("packages", package)) for package in spec.packages}
+        packages = {package: self._folder(spec.packages[package], place) for package, place in places.items()}
+        if (spec.urdf and urdf is None) or None in packages.values():
+            return None
         body = tree if isinstance(tree, Fields) else None
-        return LoadedRobot(name, path, spec, urdf, bundled, body) if urdf or not spec.urdf else None
+        found = {package: folder for package, folder in packages.items() if folder is not None}
+        return LoadedRobot(name, path, spec, urdf, bundled, body, found)
 
     def _ros_map(self, tree: Node | None, path: Path) -> LoadedMap | None:
         spec = self._model(RosMapSpec, tree)
@@ -123,12 +128,23 @@ class Assets:
         return spec
 
     def _find(self, written: str, place: Place) -> Path | None:
+        found = self._existing(written, place)
+        if found is not None and not found.is_file():
+            self._add(place, "SC001", f"not a regular file: {quoted(written)}")
+            return None
+        return found
+
+    def _folder(self, written: str, place: Place) -> Path | None:
+        found = self._existing(written, place)
+        if found is not None and not found.is_dir():
+            self._add(place, "SC001", f"not a folder: {quoted(written)}")
+            return None
+        return found
+
+    def _existing(self, written: str, place: Place) -> Path | None:
         found = self.library.fence.find(written, self.library.folder_of(place))
         if isinstance(found, Refusal):
             self._add(place, found.code, found.message, found.hint)
-            return None
-        if not found.is_file():
-            self._add(place, "SC001", f"not a regular file: {quoted(written)}")
             return None
         return found
 

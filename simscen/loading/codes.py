@@ -55,6 +55,7 @@ CODES = {
     "SC400": "A URDF or xacro file cannot be read or holds what cannot be used.",
     "SC401": "A part of a robot's body reaches the ground, so that it would drag instead of roll.",
     "SC402": "A robot is larger than any that can be simulated.",
+    "SC403": "A `*.robot.yaml` gives its xacro file an argument that no `<xacro:arg>` declares.",
     "SC800": "The log cannot be read.",
     "SC801": "The file is not a log of simscen.",
     "SC802": "The log is damaged.",

@@ -42,7 +42,8 @@ class LoadedWorld:
 class LoadedRobot:
     """A robot: `spec` from a `*.robot.yaml`, `urdf` where it is built on one. A bare `.urdf` has no `spec`.
 
-    `path` is the file the scenario named; `bundled` tells that simscen ships it.
+    `path` is the file the scenario named; `bundled` tells that simscen ships it; `packages` are the folders of ROS
+    packages that its file names.
     """
 
     name: str
@@ -51,6 +52,7 @@ class LoadedRobot:
     urdf: Path | None = None
     bundled: bool = False
     tree: Fields | None = field(repr=False, default=None)
+    packages: Mapping[str, Path] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,8 @@ from simscen.spec.quantities import (
     PositiveSpeed,
 )
 
+FilePath = Annotated[str, Field(min_length=1, max_length=4096)]
+Argument = Annotated[str, Field(max_length=4096)] | int | float | bool
 JointNames = Annotated[list[Name], Field(min_length=1, max_length=20)]
 
 
@@ -182,8 +184,12 @@ class RobotSpec(Spec):
     """Version of this language."""
     name: Name
     description: Annotated[str, Field(max_length=10_000)] = ""
-    urdf: Annotated[str, Field(min_length=1, max_length=4096)] | None = None
+    urdf: FilePath | None = None
     """A URDF (or xacro) file, relative to this one, instead of `body`."""
+    packages: Annotated[dict[Name, FilePath], Field(max_length=100)] = {}
+    """ROS packages by name: the folder, relative to this file, that `package://` and `$(find)` in the URDF mean."""
+    arguments: Annotated[dict[Name, Argument], Field(max_length=200)] = {}
+    """What the xacro file's `<xacro:arg>` get in place of their defaults."""
     body: Annotated[list[Part], Field(min_length=1, max_length=50)] | None = None
     """Simple shapes that make up the hull; wheels are added by the drive."""
     mass: PositiveMass | None = None
@@ -201,6 +207,8 @@ class RobotSpec(Spec):
     def _consistent(self) -> "RobotSpec":
         if (self.urdf is None) == (self.body is None):
             raise ValueError("expected exactly one of: body, urdf")
+        if self.urdf is None and (self.packages or self.arguments):
+            raise ValueError("`packages` and `arguments` are for a `urdf`")
         if self.body is not None and self.mass is None:
             raise ValueError("`mass` is missing; a robot with a `body` needs one")
         if self.radius is not None and self.footprint is not None:

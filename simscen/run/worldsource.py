@@ -8,9 +8,12 @@ from typing import TYPE_CHECKING
 
 from simscen.core.errors import InvalidInput
 from simscen.core.grid import OccupancyGrid
+from simscen.core.problems import Problem
 from simscen.core.shapes import Mesh
 from simscen.core.world import World
 from simscen.loading.loaded import LoadedMap, LoadedRobot, LoadedScenario, LoadedWorld
+from simscen.loading.messages import quoted, suggestion
+from simscen.loading.tree import key_place
 from simscen.model.robot import RobotSpec
 from simscen.model.world import WorldSpec
 from simscen.worlds.own import build_own
@@ -63,15 +66,31 @@ def _read_mesh(path: Path) -> Mesh:
 
 def load_robot(loaded: LoadedScenario) -> tuple[RobotSpec, RobotBody]:
     """The robot as specified (a bare URDF as far as it makes plain), and made ready for physics."""
-    return robot_of(loaded.robot, (loaded.root, *loaded.world_path))
+    try:
+        return robot_of(loaded.robot, (loaded.root, *loaded.world_path))
+    except InvalidInput as error:
+        raise InvalidInput([p if p.source else loaded.sourced(p) for p in error.problems]) from error
 
 
 def robot_of(robot: LoadedRobot, roots: tuple[Path, ...]) -> tuple[RobotSpec, RobotBody]:
     """The same of a robot whose files lie in `roots`."""
     from simscen.sim.embody import robot_body
+    from simscen.sim.urdf.files import Found
+    from simscen.sim.urdf.xacro.expand import UnknownArgument
 
     spec = robot.spec or _inferred(robot.path, roots)
-    return spec, robot_body(spec, robot.path, roots, _read_mesh)
+    found = Found(robot.urdf, robot.packages) if robot.urdf else None
+    try:
+        return spec, robot_body(spec, robot.path, roots, _read_mesh, found)
+    except UnknownArgument as error:
+        raise InvalidInput([_unknown(robot, error.name, error.declared)]) from error
+
+
+def _unknown(robot: LoadedRobot, argument: str, declared: Sequence[str]) -> Problem:
+    assert robot.tree is not None and robot.urdf is not None  # who else would give arguments
+    message = f"{quoted(robot.urdf.name)} declares no argument {quoted(argument)}"
+    hint = suggestion(argument, declared) or "it has no <xacro:arg>"
+    return Problem(*key_place(robot.tree, ("arguments", argument)), "SC403", message, hint)
 
 
 def _inferred(urdf: Path, roots: tuple[Path, ...]) -> RobotSpec:

@@ -13,21 +13,26 @@ from simscen.sim.size import refuse_giants
 from simscen.sim.undercarriage import wheels_of
 from simscen.sim.urdf.body import body_of_urdf
 from simscen.sim.urdf.elements import MeshReader
+from simscen.sim.urdf.files import Found
 
 LOW = 0.5
 """Height of the centre of mass over that of the hull's volume: batteries and motors lie at the bottom."""
 
 
 def robot_body(
-    spec: RobotSpec, file: Path | None = None, roots: Sequence[Path] = (), read_mesh: MeshReader | None = None
+    spec: RobotSpec,
+    file: Path | None = None,
+    roots: Sequence[Path] = (),
+    read_mesh: MeshReader | None = None,
+    found: Found | None = None,
 ) -> RobotBody:
     """The body of a robot as specified.
 
-    `file` is the `*.robot.yaml`, to which `spec.urdf` is relative; `roots` are the folders that the URDF and its
-    meshes must lie in; `read_mesh` reads a mesh file. Raises InvalidInput when the URDF or the body cannot be
-    used.
+    `file` is the `*.robot.yaml`, to which `spec.urdf` is relative unless it was `found` already; `roots` are the
+    folders that the URDF and its meshes must lie in; `read_mesh` reads a mesh file. Raises InvalidInput when the URDF
+    or the body cannot be used.
     """
-    body = _of_shapes(spec, file) if spec.urdf is None else body_of_urdf(spec, file, roots, read_mesh)
+    body = _of_shapes(spec, file) if spec.urdf is None else body_of_urdf(spec, file, roots, read_mesh, found)
     refuse_giants(body, file)
     return body
 

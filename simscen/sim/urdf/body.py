@@ -1,6 +1,6 @@
 """A robot's body from its URDF: everything rigid fused into one hull, wheels where its drive has them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,35 +17,54 @@ from simscen.sim.outline import extremes
 from simscen.sim.robot_body import RobotBody, assemble
 from simscen.sim.undercarriage import Wheel, wheel_inertia
 from simscen.sim.urdf.elements import Meshes, MeshReader
-from simscen.sim.urdf.files import Folders, Trouble, read_xml
+from simscen.sim.urdf.files import Folders, Found, Trouble, read_xml
 from simscen.sim.urdf.markup import CODE
 from simscen.sim.urdf.tree import Tree, tree_of
 from simscen.sim.urdf.wheels import WheelJoint, chosen
-from simscen.sim.urdf.xacro.expand import expand
+from simscen.sim.urdf.xacro.expand import UnknownArgument, expand
 
 CASTER = 0.35
 """A caster is smaller than this fraction of the hull's length and width."""
 
 
-def body_of_urdf(spec: RobotSpec, file: Path | None, roots: Sequence[Path], read_mesh: MeshReader | None) -> RobotBody:
-    """The body that `spec.urdf`, relative to `file`, describes. Raises InvalidInput."""
+def body_of_urdf(
+    spec: RobotSpec, file: Path | None, roots: Sequence[Path], read_mesh: MeshReader | None, found: Found | None
+) -> RobotBody:
+    """The body that `spec.urdf`, relative to `file` unless it was `found`, describes. Raises InvalidInput."""
+    return body_of_tree(spec, tree_of_spec(spec, file, roots, read_mesh, found))
+
+
+def tree_of_spec(
+    spec: RobotSpec, file: Path | None, roots: Sequence[Path], read_mesh: MeshReader | None, found: Found | None
+) -> Tree:
+    """The links and joints that `spec.urdf` describes. Raises InvalidInput."""
     assert spec.urdf is not None
     folder = (file or Path()).resolve().parent
-    folders = Folders.of(roots or (folder,))
+    folders = Folders.of(roots or (folder,), found.packages if found else None)
     try:
-        path = folders.locate(spec.urdf, folder)
+        path = found.urdf if found else folders.locate(spec.urdf, folder)
     except Trouble as trouble:
         shown = folders.shown(file.resolve()) if file else ""
         raise InvalidInput([Problem(shown, 0, 0, CODE, f"urdf {spec.urdf[:200]!r}: {trouble}")]) from trouble
-    return body_of_tree(spec, read_tree(path, folders, read_mesh))
+    return read_tree(path, folders, read_mesh, {name: _text(value) for name, value in spec.arguments.items()})
 
 
-def read_tree(path: Path, folders: Folders, read_mesh: MeshReader | None) -> Tree:
+def read_tree(
+    path: Path, folders: Folders, read_mesh: MeshReader | None, arguments: Mapping[str, str] | None = None
+) -> Tree:
     """The links and joints of a URDF or xacro file. Raises InvalidInput."""
     robot = read_xml(path, folders)
-    if path.suffix == ".xacro" or "xmlns:xacro" in robot.attributes:
-        robot = expand(robot, path, folders, lambda included: read_xml(included, folders))
-    return tree_of(robot, Meshes(path.parent, folders, read_mesh))
+    expanded = path.suffix == ".xacro" or "xmlns:xacro" in robot.attributes
+    if expanded:
+        robot = expand(robot, path, folders, lambda included: read_xml(included, folders), arguments)
+    elif arguments:
+        raise UnknownArgument(robot, next(iter(arguments)), ())
+    return tree_of(robot, Meshes(path.parent, folders, read_mesh, expanded))
+
+
+def _text(argument: str | float | bool) -> str:
+    """An argument as it would stand in an XML file."""
+    return str(argument).lower() if isinstance(argument, bool) else str(argument)
 
 
 def body_of_tree(spec: RobotSpec, tree: Tree) -> RobotBody:

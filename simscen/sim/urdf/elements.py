@@ -46,25 +46,28 @@ class Joint:
 class Meshes:
     """Where meshes are looked for, and who reads them.
 
-    `read` gives the triangles of a file in metres, and raises ValueError with a sentence when it cannot.
+    `read` gives the triangles of a file in metres, and raises ValueError with a sentence when it cannot. `expanded` =
+    the URDF was a xacro file.
     """
 
     folder: Path
     folders: Folders
     read: MeshReader | None
+    expanded: bool = False
 
     def mesh(self, element: Element) -> Mesh:
         """The mesh a `<mesh>` element names; raises Unusable at its line."""
         written = element.text("filename")
         scale = element.numbers("scale", 3, (1.0, 1.0, 1.0))
         try:
-            path = self.folders.locate(written, self.folder)
+            path = self.folders.locate(written, self.folder, self.expanded)
             check_regular(path, MESH_BYTES)
             if self.read is None:
                 raise Trouble("meshes cannot be read here")
             mesh = self.read(path)
         except (Trouble, ValueError) as error:
-            raise Unusable(element, f"mesh {written[:200]!r}: {error}") from error
+            hint = error.hint if isinstance(error, Trouble) else ""
+            raise Unusable(element, f"mesh {written[:200]!r}: {error}", hint) from error
         with np.errstate(over="ignore"):
             vertices = mesh.vertices * np.array(scale)
             farthest = float(np.abs(vertices).max(initial=0.0))

@@ -3,7 +3,7 @@
 Text between elements and comments are passed over: nothing of a robot's body is in them.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,17 +25,43 @@ FileReader = Callable[[Path], Element]
 """Reads a file inside the allowed folders; raises InvalidInput."""
 
 
-def expand(robot: Element, file: Path, folders: Folders, read: FileReader) -> Element:
-    """The `robot` of the xacro `file` with everything expanded. Raises InvalidInput."""
+class UnknownArgument(InvalidInput):
+    """An argument is given that no `<xacro:arg>` declares; `declared` are those that are."""
+
+    def __init__(self, robot: Element, name: str, declared: Iterable[str]) -> None:
+        self.name, self.declared = name, sorted(declared)
+        listed = ", ".join(self.declared) or "none"
+        super().__init__([robot.problem(f"no <xacro:arg> is called {name[:60]!r}", f"there are: {listed}")])
+
+
+def expand(
+    robot: Element, file: Path, folders: Folders, read: FileReader, arguments: Mapping[str, str] | None = None
+) -> Element:
+    """The `robot` of the xacro `file` with everything expanded; `arguments` are in place of defaults.
+
+    Raises InvalidInput, and UnknownArgument of it.
+    """
     whole = replace(robot, tag="", attributes={}, children=[])
-    _Expansion(file, folders, read).element(robot, whole, Scope(), Macros())
+    expansion = _Expansion(file, folders, read, arguments or {})
+    expansion.element(robot, whole, Scope(), Macros())
+    declared = expansion.declared | declared_in(robot)
+    for name in arguments or {}:
+        if name not in declared:
+            raise UnknownArgument(robot, name, declared)
     return whole.children[0]
 
 
+def declared_in(element: Element) -> set[str]:
+    """The arguments that a file declares, whether or not what holds them is expanded."""
+    own = {element.name} if element.tag == "xacro:arg" else set()
+    return own.union(*map(declared_in, element.children))
+
+
 class _Expansion:
-    def __init__(self, file: Path, folders: Folders, read: FileReader) -> None:
+    def __init__(self, file: Path, folders: Folders, read: FileReader, arguments: Mapping[str, str]) -> None:
         self._budget = Budget()
-        self._texts = Texts(folders, file, self._budget)
+        self._texts = Texts(folders, file, self._budget, arguments)
+        self.declared: set[str] = set()
         self._folders, self._read_file = folders, read
         self._read: dict[Path, Element] = {}
         self._calls: list[tuple[Macro, Element]] = []
@@ -86,6 +112,7 @@ class _Expansion:
 
     def _argument(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
         name = needed(source, "name")
+        self.declared.add(name)
         if name not in self._texts.arguments:
             self._texts.arguments[name] = self._texts.text(needed(source, "default", empty=True), scope)
 
@@ -132,12 +159,12 @@ class _Expansion:
             around.held[space] = scope
             macros.spaces[space] = macros = Macros()
         try:
-            path = self._folders.inside(self._texts.file.parent / written)
+            path = self._folders.locate(written, self._texts.file.parent, expanded=True)
             if truth(source.attributes.get("optional", "false")) and not path.exists():
                 return
             check_regular(path, URDF_BYTES)
         except Trouble as trouble:
-            raise Refused(f"include {written[:200]!r}: {trouble}") from trouble
+            raise Refused(f"include {written[:200]!r}: {trouble}", trouble.hint) from trouble
         before, self._texts.file = self._texts.file, path
         self._children(self._parsed(path), into, scope, macros)
         self._texts.file = before
@@ -147,6 +174,7 @@ class _Expansion:
             if len(self._read) >= MOST_FILES:
                 raise Refused(f"more than {MOST_FILES} files are included")
             self._read[path] = self._read_file(path)
+            self.declared |= declared_in(self._read[path])
         return self._read[path]
 
 

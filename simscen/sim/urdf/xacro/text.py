@@ -1,13 +1,13 @@
 """Text with `${expressions}` and `$(substitutions)`."""
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
-from simscen.sim.urdf.files import Folders
+from simscen.sim.urdf.files import Folders, Trouble
 from simscen.sim.urdf.markup import Element
 from simscen.sim.urdf.xacro.budget import LONGEST, Budget, Refused
 from simscen.sim.urdf.xacro.expression import evaluate
-from simscen.sim.urdf.xacro.packages import find_package
 from simscen.sim.urdf.xacro.scope import Block, Lazy, Resolving, Scope
 from simscen.sim.urdf.xacro.values import Value, literal
 
@@ -17,9 +17,9 @@ TOKEN = re.compile(r"\$\$+[{(]|\$\{[^}]*\}|\$\([^)]*\)|[^$]+|\$[^{($]+|\$\Z")
 class Texts:
     """Evaluates texts; `file` is the one being expanded, `arguments` are those of `<xacro:arg>`."""
 
-    def __init__(self, folders: Folders, file: Path, budget: Budget) -> None:
+    def __init__(self, folders: Folders, file: Path, budget: Budget, arguments: Mapping[str, str]) -> None:
         self.budget, self.file = budget, file
-        self.arguments: dict[str, str] = {}
+        self.arguments = dict(arguments)
         self._folders = folders
 
     def value(self, text: str, scope: Scope) -> Value:
@@ -98,13 +98,19 @@ class Texts:
             case ["optenv", _, *default]:
                 return " ".join(default)  # whatever the environment says, a run is that of its files
             case ["find", package]:
-                return str(find_package(package, self.file.parent, self._folders))
+                return self._package(package)
             case ["dirname"]:
                 return str(self.file.parent)
             case ["env", *_]:
                 raise Refused(f"$({command[:60]}): the environment is not read", "write the value into the file")
             case _:
                 raise Refused(f"$({command[:60]}) is not expanded", "arg, find, dirname and optenv are")
+
+    def _package(self, name: str) -> str:
+        try:
+            return str(self._folders.package(name, self.file.parent))
+        except Trouble as trouble:
+            raise Refused(f"$(find {name[:60]}): {trouble}", trouble.hint) from None
 
 
 class _Scoped:

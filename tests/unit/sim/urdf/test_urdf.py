@@ -164,7 +164,7 @@ def test_37_a_missing_mesh_is_named_with_its_line(refusal):
     [
         ("../secret.stl", "outside the scenario root"),
         ("/etc/passwd", "absolute paths are not read"),
-        ("package://robot/base.stl", "URLs such as package:// are not read"),
+        ("package://robot/base.stl", "there is no package 'robot'"),
         ("file:///etc/passwd", "URLs"),
     ],
 )
