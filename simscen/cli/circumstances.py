@@ -6,7 +6,7 @@ import platform
 import sys
 from datetime import datetime, timezone
 
-from simscen.run.versions import cpu_flags, versions
+from simscen.run.versions import arithmetic, cpu_flags, versions
 
 
 def as_json(wall: float | None = None) -> bytes:
@@ -20,6 +20,7 @@ def as_json(wall: float | None = None) -> bytes:
             "machine": platform.machine(),
             "cores": os.cpu_count(),
             "cpu_flags": cpu_flags(),
+            "arithmetic": arithmetic(),
             "packages": versions(),
         },
         indent=2,

@@ -18,7 +18,7 @@ from simscen.core.errors import Exit, UsageError
 from simscen.core.sessionevents import SessionEvent
 from simscen.report.journal import Journal, require_free
 from simscen.report.rebuild import read_journal
-from simscen.run.outfolder import make_folder
+from simscen.run.outfolder import RUNS, make_folder
 from simscen.run.session import Options, plan, run_session, seeds_of
 
 WARM_PROCESS = ("-m", "simscen.cli.warm_process")
@@ -46,6 +46,10 @@ def command(
     check_determinism: Annotated[
         bool, typer.Option("--check-determinism", help="Run everything twice and compare the logs, byte for byte.")
     ] = False,
+    check_against: Annotated[
+        Path | None,
+        typer.Option(help="Compare with this output folder of another session or machine."),
+    ] = None,
     junit: Annotated[Path | None, typer.Option(help="Write JUnit XML here as well.")] = None,
     junit_family: Annotated[
         JunitFamily, typer.Option(help="xunit2 leaves out what Jenkins' schema forbids.")
@@ -75,7 +79,9 @@ def command(
     scenarios, warnings = load_all(paths, root, world_path or [], lenient, wanted)
     if warnings:
         print_text(as_text(warnings), sys.stderr)
-    options = Options(workers or _cores(), seed, repeat, check_determinism, fail_fast, wall_limit)
+    options = Options(workers or _cores(), seed, repeat, check_determinism, fail_fast, wall_limit, check_against)
+    if check_against is not None and not (check_against / RUNS).is_dir():
+        raise UsageError(f"--check-against {check_against}: there are no runs in it")
     for scenario in scenarios:
         seeds_of(scenario, options)
     require_writable(junit, out or resume, {file for each in scenarios for file in (*each.files.values(), *each.read)})

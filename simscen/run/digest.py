@@ -6,7 +6,7 @@ import platform
 from pathlib import Path
 
 from simscen.loading.loaded import LoadedScenario
-from simscen.run.versions import code, cpu_flags, versions
+from simscen.run.versions import arithmetic, code, cpu_flags, versions
 
 
 def digest(loaded: LoadedScenario) -> str:
@@ -31,6 +31,7 @@ def _circumstances(loaded: LoadedScenario) -> dict[str, object]:
         "code": code(),
         "machine": platform.machine(),
         "cpu_flags": cpu_flags(),
+        "arithmetic": arithmetic(),
         "lenient": loaded.lenient,
     }
 

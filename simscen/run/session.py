@@ -10,6 +10,7 @@ from simscen.core.errors import Exit, UsageError
 from simscen.core.result import Outcome, RunFailure, RunKey
 from simscen.core.sessionevents import Listener, RunFinished, RunProgress, RunStarted
 from simscen.loading.loaded import LoadedScenario
+from simscen.run.against import agreed
 from simscen.run.answer import answer_to, not_done
 from simscen.run.jobs import Job
 from simscen.run.outfolder import run_folder
@@ -20,7 +21,8 @@ from simscen.run.supervisor import Advanced, Ended, Interrupted, Started, superv
 class Options:
     """How to run. `seed` None = each scenario's own; `repeat` runs use consecutive seeds.
 
-    `twice` runs everything a second time with the same seed, to compare. `wall_limit` in seconds bounds each run.
+    `twice` runs everything a second time with the same seed, to compare; `against` is the output folder of an earlier
+    session to compare with. `wall_limit` in seconds bounds each run.
     """
 
     workers: int = 1
@@ -29,6 +31,7 @@ class Options:
     twice: bool = False
     fail_fast: bool = False
     wall_limit: float = 300.0
+    against: Path | None = None
 
 
 def seeds_of(scenario: LoadedScenario, options: Options) -> range:
@@ -76,7 +79,8 @@ def run_session(
                     listen(RunProgress(job.key, seconds))
                 case Ended(end=end):
                     twin = answers.get(job.number ^ 1) if options.twice else None
-                    answers[job.number] = compared(answer_to(job, end), twin)
+                    answer = compared(answer_to(job, end), twin)
+                    answers[job.number] = answer if options.against is None else agreed(answer, options.against)
                     listen(answers[job.number])
     except Interrupted as interrupted:
         stopped = Exit(128 + interrupted.number)

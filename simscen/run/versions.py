@@ -1,6 +1,8 @@
 """Which software and which processor a result comes from: with others, it may differ in its last bits."""
 
 import hashlib
+import importlib
+import math
 import platform
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -30,6 +32,33 @@ def cpu_flags() -> list[str]:
         return []
     flags = next((line.split(":", 1)[1].split() for line in lines if line.startswith("flags")), [])
     return sorted(_LAST_BITS.intersection(flags))
+
+
+@cache
+def arithmetic() -> dict[str, str]:
+    """Fingerprints of what the C library and numpy compute here: equal ones compute alike, down to the last bit.
+
+    They depend on the instructions that both choose at run time (`numpy` lists its own), which flags alone do not say.
+    """
+    import numpy as np
+
+    numbers = [(0.37 + 1.618 * k) * 1.7 ** (k % 23) for k in range(400)]
+    functions = (math.sin, math.cos, math.tan, math.atan, math.sqrt, lambda x: math.exp(-x / 1e5), math.log)
+    libm = [function(number) for function in functions for number in numbers]
+    array = np.array(numbers)
+    told = [np.sin(array), np.exp(-array / 1e5), np.arctan2(array, array[::-1]), np.outer(array, array) @ array]
+    return {
+        "libm": hashlib.sha256(repr(libm).encode()).hexdigest()[:16],
+        "numpy": hashlib.sha256(b"".join(part.tobytes() for part in told)).hexdigest()[:16],
+        "numpy_dispatch": " ".join(sorted(name for name, used in _numpy_features().items() if used)),
+    }
+
+
+def _numpy_features() -> dict[str, bool]:
+    import numpy as np
+
+    core = "numpy._core" if np.lib.NumpyVersion(np.__version__) >= "2.0.0" else "numpy.core"
+    return dict(importlib.import_module(f"{core}._multiarray_umath").__cpu_features__)
 
 
 @cache

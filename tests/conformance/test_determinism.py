@@ -106,9 +106,25 @@ def test_90_without_fused_multiply_add_the_verdicts_are_the_same(reference, pair
     environment = warmprocess.environment()
     monkeypatch.setattr(warmprocess, "environment", lambda: {**environment, **plain})
     assert simscen("run", ".", "--out", "out").code == 0
-    assert isinstance(json.loads((pair / "out/run.json").read_text())["cpu_flags"], list)
+    assert simscen("run", ".", "--out", "again", "--check-against", "out").code == 0
+    assert {"libm", "numpy", "numpy_dispatch"} == set(json.loads((pair / "out/run.json").read_text())["arithmetic"])
     verdicts = {
         name: [verdict["status"] for verdict in json.loads(result)["verdicts"]]
         for name, (result, _) in results(pair / "out").items()
     }
     assert verdicts == {name: ["pass"] for name in reference}
+
+
+def test_a_run_that_another_session_has_otherwise_or_not_at_all_is_an_error(pair: Path, simscen) -> None:
+    assert simscen("run", "a.scenario.yaml", "--out", "out").code == 0
+    assert simscen("run", "a.scenario.yaml", "--out", "same", "--check-against", "out").code == 0
+    file = pair / "a.scenario.yaml"
+    file.write_text(file.read_text().replace("pose: {x: 1,", "pose: {x: 1.01,"))
+    moved = simscen("run", "a.scenario.yaml", "--out", "moved", "--check-against", "out")
+    assert moved.code == 3
+    assert "nondeterministic: not as in out: tick 0 (t = 0.000 s): the true pose differs by 0.01 m" in moved.out
+    missing = simscen("run", "a.scenario.yaml", "--seed", "99", "--out", "missing", "--check-against", "out")
+    assert missing.code == 3
+    assert "seed-99/run.mcap: No such file or directory" in missing.out
+    nowhere = simscen("run", "a.scenario.yaml", "--out", "never", "--check-against", "nowhere")
+    assert (nowhere.code, nowhere.err) == (2, "simscen: --check-against nowhere: there are no runs in it\n")

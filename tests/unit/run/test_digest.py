@@ -183,7 +183,7 @@ def test_every_scenario_in_a_world_knows_all_files_of_it(project: Path, of: Dige
     assert {"model.sdf", "crate.stl", "hill.png", "cart.xacro", "size.xacro", "mast.stl"} <= {f.name for f in first}
 
 
-@pytest.mark.parametrize("what", ["versions", "cpu_flags", "code"])
+@pytest.mark.parametrize("what", ["versions", "cpu_flags", "arithmetic", "code"])
 def test_software_and_processor_matter(of: Digest, monkeypatch: pytest.MonkeyPatch, what: str) -> None:
     """Another release of Bullet, other vector instructions or another simscen may change last bits."""
     before = of()
