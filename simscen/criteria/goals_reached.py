@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from simscen.core.geometry import wrap
-from simscen.core.verdict import Finding, Status
+from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import at_most, held, missed, undecided
 from simscen.criteria.moments import GoalStory, ending, finished, stories
@@ -57,7 +57,7 @@ class GoalsReached(Spec, Criterion):
             return [undecided("goals_reached", "the scenario has no goals", "reached")]
         for story in chosen:
             findings += self._reached(trace, story) if story.reached is not None else [self._missing(trace, story)]
-        if all(story.preempted for story in chosen) and not any(f.status is not Status.PASS for f in findings):
+        if self.goals is None and all(story.preempted for story in chosen):
             findings.append(undecided("goals_reached", "every goal was preempted", "reached"))
         return findings
 
