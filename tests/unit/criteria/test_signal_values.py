@@ -85,6 +85,7 @@ def test_jerk_is_the_second_difference_of_speed_not_the_first():
 def test_jerk_needs_three_samples_and_acceleration_two():
     case = sketch_case({})
     assert len(read("acceleration", driving([[0, 0, 0], [1, 0, 0]]), case, {})) == 2
+    assert len(read("jerk", driving([[0, 0, 0], [1, 0, 0], [1, 0, 0]]), case, {})) == 3
     with pytest.raises(Unavailable, match="too short: 2 samples"):
         read("jerk", driving([[0, 0, 0], [1, 0, 0]]), case, {})
     with pytest.raises(Unavailable, match="too short: 1 samples"):
