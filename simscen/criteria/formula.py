@@ -125,7 +125,7 @@ class _Until(Judged):
             decides = self.release.witness(sample + at, side)
         else:
             decides = self.hold.witness(sample + int(np.argmin(held[:at])), side)
-        broken = np.flatnonzero(held[:end] < 0)
+        broken = np.flatnonzero(np.signbit(held[:end]))
         return decides.noting(BROKEN, sample + int(broken[0])) if best[at] < 0 and len(broken) else decides
 
 
