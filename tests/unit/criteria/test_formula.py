@@ -2,12 +2,15 @@
 
 from dataclasses import replace
 
+import numpy as np
+import pytest
 from formulas import CASE, FORMULAS, NUMBERS, VALUES, horizon, run, validated
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from simscen.core.samples import Samples
 from simscen.core.verdict import Status
+from simscen.criteria.bounds import BrokenTrace
 from simscen.criteria.criterion import AnyCriterion
 from simscen.criteria.formula import Scene, judged
 from simscen.judge.judge import judge
@@ -74,3 +77,16 @@ def test_a_run_that_begins_later_is_judged_alike(formula, p, later):
     one, other = (judged(validated(formula), Scene.of(some, CASE, over=True)) for some in (trace, moved))
     assert one.low.tolist() == other.low.tolist()
     assert one.high.tolist() == other.high.tolist()
+
+
+@pytest.mark.parametrize("samples", [1, 2, 3])
+def test_a_run_may_be_of_few_samples(samples):
+    scene = Scene.of(run([1.0] * samples, [0.0] * samples), CASE, over=True)
+    assert len(judged(validated({"signal": "clearance", "op": ">", "value": 0}), scene).low) == samples
+
+
+def test_uneven_samples_are_refused_with_the_time_at_which_they_begin():
+    trace = run([1.0] * 5, [0.0] * 5)
+    ticks = trace.truth.ticks + np.array([0, 0, 0, 1, 1])
+    with pytest.raises(BrokenTrace, match=r"not evenly spaced after t = 2.00 s"):
+        Scene.of(replace(trace, truth=Samples(ticks, trace.truth.values)), CASE, over=True)

@@ -122,10 +122,10 @@ def test_unevenly_spaced_samples_are_refused():
 def test_the_goal_is_the_one_accepted_last_also_one_that_an_event_sent():
     words = {
         "seconds": 6,
-        "truth": [[0, 0, 0, 0.5]],
-        "events": [[1, "goal.accepted", "shelf"], [3, "goal.accepted", "sent", {"x": 0.0, "y": 7.0, "yaw": -0.5}]],
+        "truth": [[0, 1, -2, 0.5]],
+        "events": [[1, "goal.accepted", "shelf"], [3, "goal.accepted", "sent", {"x": 1.0, "y": 5.0, "yaw": -0.5}]],
     }
-    case = {"goals": [{"name": "shelf", "pose": [3, 4, 0.25]}]}
+    case = {"goals": [{"name": "shelf", "pose": [4, 2, 0.25]}]}
     distance, heading = signal("goal_distance", words, case), signal("goal_heading_error", words, case)
     assert [at(distance, t) for t in (0, 1, 2.975, 3, 6)] == [5.0, 5.0, 5.0, 7.0, 7.0]
     assert [at(heading, t) for t in (0, 3)] == pytest.approx([0.25, 1.0])
@@ -200,8 +200,8 @@ def test_a_command_is_held_and_none_counts_as_zero_before_the_first():
 def test_an_object_is_infinitely_far_while_it_is_not_there():
     words = {
         "seconds": 4,
-        "truth": [[0, 0, 0]],
-        "objects": {"cart": [[0, 3, 4]]},
+        "truth": [[0, 1, -2]],
+        "objects": {"cart": [[0, 4, 2]]},
         "events": [[1, "object.spawned", "cart"], [3, "object.removed", "cart"]],
     }
     values = signal("distance_to", words, object="cart")
@@ -209,10 +209,10 @@ def test_an_object_is_infinitely_far_while_it_is_not_there():
 
 
 def test_distances_to_what_does_not_move():
-    words = {"seconds": 1, "truth": [[0, 0, 0]], "events": [[0, "object.spawned", "box", {"x": 0.0, "y": 2.0}]]}
-    case = {"goals": [{"name": "shelf", "pose": [3, 4, 0]}]}
+    words = {"seconds": 1, "truth": [[0, 1, -2]], "events": [[0, "object.spawned", "box", {"x": 1.0, "y": 0.0}]]}
+    case = {"goals": [{"name": "shelf", "pose": [4, 2, 0]}]}
     assert signal("distance_to", words, case, goal="shelf")[0] == 5.0
-    assert signal("distance_to", words, case, point=[6, 8])[0] == 10.0
+    assert signal("distance_to", words, case, point=[7, 6])[0] == 10.0
     assert signal("distance_to", words, case, object="box")[0] == 2.0
     with pytest.raises(Unavailable, match="`cart` never was there"):
         signal("distance_to", words, case, object="cart")
