@@ -122,13 +122,13 @@ def test_unevenly_spaced_samples_are_refused():
 def test_the_goal_is_the_one_accepted_last_also_one_that_an_event_sent():
     words = {
         "seconds": 6,
-        "truth": [[0, 1, -2, 0.5]],
-        "events": [[1, "goal.accepted", "shelf"], [3, "goal.accepted", "sent", {"x": 1.0, "y": 5.0, "yaw": -0.5}]],
+        "truth": [[0, 1, -2, 3.0]],
+        "events": [[1, "goal.accepted", "shelf"], [3, "goal.accepted", "sent", {"x": 1.0, "y": 5.0, "yaw": -3.0}]],
     }
-    case = {"goals": [{"name": "shelf", "pose": [4, 2, 0.25]}]}
+    case = {"goals": [{"name": "shelf", "pose": [4, 2, 3.1]}]}
     distance, heading = signal("goal_distance", words, case), signal("goal_heading_error", words, case)
     assert [at(distance, t) for t in (0, 1, 2.975, 3, 6)] == [5.0, 5.0, 5.0, 7.0, 7.0]
-    assert [at(heading, t) for t in (0, 3)] == pytest.approx([0.25, 1.0])
+    assert [at(heading, t) for t in (0, 3)] == pytest.approx([0.1, 2 * math.pi - 6.0])
 
 
 def test_the_first_goal_counts_before_any_is_accepted_and_without_goals_there_is_no_distance():
