@@ -1,6 +1,8 @@
 """What only the whole scenario can tell: do the names exist, do faults fit their sensors, do rates fit the clock?"""
 
+import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 from simscen.core.problems import Problem
 from simscen.core.time import Clock
@@ -15,6 +17,7 @@ from simscen.loading.references import references
 from simscen.loading.tree import Fields, Key, key_place, real_keys, value_place
 from simscen.loading.worldsense import senseless
 from simscen.model.robot import RobotSpec
+from simscen.triggers.trigger import Trigger
 
 COMMAND = "cmd_vel"
 READINGS = {"lidar": "Scan", "odometry": "Odometry", "imu": "Imu", "bumper": "Bump", "camera": "Image"}
@@ -66,16 +69,30 @@ def _unfit_faults(loaded: LoadedScenario) -> Iterator[Problem]:
 
 
 def _short_faults(loaded: LoadedScenario) -> Iterator[Problem]:
-    """Faults that may begin and end between two messages of their sensor."""
+    """Faults shorter than the time between two messages of their sensor: those that are due between them hit none."""
     if loaded.robot.spec is None:
         return
     rates = {name: getattr(sensor.chosen, "rate", None) for name, sensor in loaded.robot.spec.sensors.items()}
     rates[COMMAND] = loaded.spec.stack.controller_frequency
     for index, entry in enumerate(loaded.spec.faults):
         rate = rates.get(entry.sensor)
-        if entry.required and entry.for_ is not None and rate is not None and entry.for_ * rate < 1 - 1e-9:
-            message = f"`{entry.label}` may be over between two messages: `{entry.sensor}` has {rate:g} a second"
-            yield loaded.problem(("faults", index, "for"), "SC050", message, f"make it {1 / rate:g} s at least")
+        if entry.for_ is None or rate is None or entry.for_ * rate >= 1 - 1e-9:
+            continue
+        begin = _begin(entry.when)
+        between = begin is not None and math.ceil(begin * rate - 1e-6) > (begin + entry.for_) * rate + 1e-6
+        certainly = "begins and ends" if between else "may begin and end"
+        message = f"`{entry.label}` {certainly} between two messages: `{entry.sensor}` has {rate:g} a second"
+        hint = f"make it {1 / rate:g} s at least"
+        problem = loaded.problem(("faults", index, "for"), "SC050", message, hint)
+        if begin is None or between:
+            yield problem if between else replace(problem, severity="warning")
+
+
+def _begin(when: Trigger | None) -> float | None:
+    """The second in which a fault begins, where the clock alone decides."""
+    if when is None:
+        return 0.0
+    return float(when.chosen.root) + when.delay if when.time is not None else None  # type: ignore[attr-defined]
 
 
 def _article(reading: str) -> str:
