@@ -85,7 +85,7 @@ def _short_faults(loaded: LoadedScenario) -> Iterator[Problem]:
         hint = f"make it {1 / rate:g} s at least"
         problem = loaded.problem(("faults", index, "for"), "SC050", message, hint)
         if begin is None or between:
-            yield problem if between else replace(problem, severity="warning")
+            yield problem if between and entry.required else replace(problem, severity="warning")
 
 
 def _begin(when: Trigger | None) -> float | None:

@@ -30,15 +30,16 @@ def never_happens(loaded: LoadedScenario) -> Iterator[Problem]:
     run = _Run(loaded, frozenset())
     while (alive := run.possible) != run.alive:
         run = replace(run, alive=alive)
-    triggers = [(("events", k, "when"), entry.when, name) for k, (entry, name) in enumerate(run.events)]
-    faults: list[tuple[Keys, Trigger | None, str]] = [
-        (("faults", k, "when"), entry.when, entry.label) for k, entry in enumerate(loaded.spec.faults)
+    triggers: list[tuple[Keys, Trigger | None, str, bool]] = [
+        *((("events", k, "when"), entry.when, name, entry.required) for k, (entry, name) in enumerate(run.events)),
+        *((("faults", k, "when"), e.when, e.label, e.required) for k, e in enumerate(loaded.spec.faults)),
     ]
-    for keys, trigger, name in [*triggers, *faults]:
+    for keys, trigger, name, required in triggers:
         if trigger is None:
             continue
         if why := run.never(trigger, keys):
-            yield loaded.problem(why[0], "SC050", f"`{name}` can never happen: {why[1]}")
+            problem = loaded.problem(why[0], "SC050", f"`{name}` can never happen: {why[1]}")
+            yield problem if required else replace(problem, severity="warning")
         elif trigger.times > 1 and trigger.edge == "rising" and _latched(trigger):
             message = f"`{name}` happens once, not {trigger.times} times: its condition stays true from then on"
             yield replace(loaded.problem((*keys, "times"), "SC052", message), severity="warning")
