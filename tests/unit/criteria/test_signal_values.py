@@ -294,6 +294,7 @@ def test_a_goal_is_active_until_it_ends_or_another_takes_its_place():
         [3.75, "recovery.ended", "spin"],
         [3.8, "plan.made", "", {"reason": "blocked"}],
         [3.8, "plan.made", "", {"reason": "goal"}],
+        [3.9, "plan.made", "", {"reason": "rate"}],
     ]
     words = {"seconds": 4, "truth": [[0, 0, 0]], "events": events}
     first, some = signal("goal_active", words, goal="a"), signal("goal_active", words)
@@ -301,7 +302,8 @@ def test_a_goal_is_active_until_it_ends_or_another_takes_its_place():
     assert [at(some, t) for t in (0.975, 1, 2, 2.975, 3)] == [0, 1, 1, 1, 0]
     assert np.flatnonzero(signal("recovery_active", words, recovery="spin")).tolist() == list(range(140, 150))
     assert not signal("recovery_active", words, recovery="wait").any()
-    assert signal("replan_count", words)[-1] == signal("recovery_count", words)[-1] == 1
+    assert (signal("replan_count", words)[-1], signal("recovery_count", words)[-1]) == (2, 1)
+    assert at(signal("time", words), 3.5) == 3.5
 
 
 def test_a_signal_that_is_not_finite_names_itself_and_the_time():
