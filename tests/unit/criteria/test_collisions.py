@@ -62,3 +62,10 @@ def test_up_to_a_tenth_of_a_metre_a_second_is_standing(speed, status):
     trace = sketch({"seconds": 8, "truth": [[0, 0, 0]], "events": HIT})
     trace.velocity.values[:, 0] = speed
     assert verdict({"caused_by_robot": True}, trace).status is status
+
+
+def test_what_it_did_later_says_nothing_of_a_contact_before_the_first_sample():
+    trace = sketch({"seconds": 8, "truth": [[0, 0, 0]], "events": [[0.01, *HIT[0][1:]]]})
+    trace.velocity.values[41:, 0] = 1.0
+    late = replace(trace, velocity=Samples(trace.velocity.ticks[40:], trace.velocity.values[40:]))
+    assert verdict({"caused_by_robot": True}, late).status is Status.PASS

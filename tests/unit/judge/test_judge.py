@@ -1,6 +1,11 @@
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
+from simscen.core.events import Event, EventKind
 from simscen.core.result import Outcome
+from simscen.core.samples import Samples
 from simscen.core.verdict import Finding, Status, Verdict
 from simscen.criteria.clearance import Clearance
 from simscen.criteria.criterion import AnyCriterion
@@ -65,3 +70,20 @@ def test_a_criterion_that_checked_nothing_is_an_error(monkeypatch):
 )
 def test_only_severity_fail_fails_a_run_but_a_broken_criterion_always_breaks_it(verdicts, expected):
     assert outcome(verdicts) is expected
+
+
+def without_signals(trace):
+    none = Samples(np.empty(0, dtype=np.int64), np.empty((0, 3)))
+    return replace(trace, truth=none, velocity=none, belief=none, odometry=none, command=none)
+
+
+def test_nothing_passes_in_a_log_with_nothing_in_it_but_one_signal_or_event_is_something():
+    few = [criterion(recoveries={"max": 5})]
+    (empty,) = judge(few, without_signals(TRACE), CASE)
+    assert empty.status is Status.INCONCLUSIVE
+    assert empty.findings[0].measured == "0 recoveries in a log with nothing in it"
+    accepted = Event(5, EventKind.GOAL_ACCEPTED, "a")
+    (spoken,) = judge(few, replace(without_signals(TRACE), events=(accepted, *TRACE.events)), CASE)
+    assert spoken.status is Status.PASS
+    (seen,) = judge(few, replace(without_signals(TRACE), truth=TRACE.truth), CASE)
+    assert seen.status is Status.PASS
