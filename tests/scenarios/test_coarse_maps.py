@@ -34,4 +34,4 @@ def test_a_robot_arrives_where_it_says_it_does(cell, tmp_path):
     (tmp_path / "office.scenario.yaml").write_text(SCENARIO)
     run = simscen.simulate(tmp_path / "office.scenario.yaml")
     assert run.passed, run.result.verdicts
-    assert run.result.metrics["localization_rmse"] < 0.06
+    assert run.result.metrics["ape_trans_rmse"] < 0.06
