@@ -26,6 +26,7 @@ COMMANDS = {
     "explain": "Explain a trigger, action, fault, criterion, signal, metric, component or error code.",
     "schema": "Print or write the JSON Schemas that editors use.",
     "world": "Inspect, convert and export worlds.",
+    "robot": "Drive a robot once and compare command, odometry and truth.",
     "bench": "Measure how fast simscen runs here.",
     "doctor": "Check that this installation can run scenarios.",
 }

@@ -56,6 +56,8 @@ CODES = {
     "SC401": "A part of a robot's body reaches the ground, so that it would drag instead of roll.",
     "SC402": "A robot is larger than any that can be simulated.",
     "SC403": "A `*.robot.yaml` gives its xacro file an argument that no `<xacro:arg>` declares.",
+    "SC404": "A dimension of a robot's drive is not what its URDF draws: it drives otherwise than it reckons.",
+    "SC405": "A URDF draws wheels or casters off the ground that the others stand on.",
     "SC800": "The log cannot be read.",
     "SC801": "The file is not a log of simscen.",
     "SC802": "The log is damaged.",

@@ -48,6 +48,10 @@ class Library:
         """The problems with the text of their lines."""
         return [self._sourced(problem) for problem in problems]
 
+    def with_source_where_missing(self, problems: list[Problem]) -> list[Problem]:
+        """Likewise, of problems some of which are in files that were read elsewhere and have it."""
+        return [problem if problem.source else self._sourced(problem) for problem in problems]
+
     def _sourced(self, problem: Problem) -> Problem:
         lines = self.texts.get(problem.path, "").split("\n")
         return replace(problem, source=lines[problem.line - 1]) if 0 < problem.line <= len(lines) else problem

@@ -54,12 +54,12 @@ def _map_and_notes(source: LoadedMap) -> tuple[OccupancyGrid, tuple[str, ...]]:
     return load_grid(source.spec, source.image)
 
 
-def _read_mesh(path: Path) -> Mesh:
+def read_mesh(path: Path) -> Mesh:
     """For a URDF, which tells what is wrong with a mesh at the line that names it."""
-    from simscen.worlds.sdf.meshes import read_mesh
+    from simscen.worlds.sdf.meshes import read_mesh as read
 
     try:
-        return read_mesh(path)
+        return read(path)
     except InvalidInput as error:
         raise ValueError("; ".join(problem.message for problem in error.problems)) from error
 
@@ -81,7 +81,7 @@ def robot_of(robot: LoadedRobot, roots: tuple[Path, ...]) -> tuple[RobotSpec, Ro
     spec = robot.spec or _inferred(robot.path, roots)
     found = Found(robot.urdf, robot.packages) if robot.urdf else None
     try:
-        return spec, robot_body(spec, robot.path, roots, _read_mesh, found)
+        return spec, robot_body(spec, robot.path, roots, read_mesh, found)
     except UnknownArgument as error:
         raise InvalidInput([_unknown(robot, error.name, error.declared)]) from error
 
@@ -96,4 +96,4 @@ def _unknown(robot: LoadedRobot, argument: str, declared: Sequence[str]) -> Prob
 def _inferred(urdf: Path, roots: tuple[Path, ...]) -> RobotSpec:
     from simscen.sim.urdf.infer import spec_of_urdf
 
-    return spec_of_urdf(urdf, roots, _read_mesh)
+    return spec_of_urdf(urdf, roots, read_mesh)

@@ -100,6 +100,23 @@ def _check_wheels(spec: RobotSpec, tree: Tree, wheels: list[WheelJoint]) -> None
     if spec.drive.type == "ackermann" and not any(wheel.steered for wheel in wheels):
         hint = "name the steering joints in the drive's `steering`"
         raise InvalidInput([tree.element.problem("no steered wheels found", hint)])
+    refuse_rear_steering(wheels)
+
+
+def refuse_rear_steering(wheels: Sequence[WheelJoint]) -> None:
+    """Raises InvalidInput for a car whose steered wheels are not ahead of those that drive."""
+    steered = [wheel for wheel in wheels if wheel.steered]
+    if not steered:
+        return
+    front, rear = (
+        float(np.mean([w.place[0] for w in some])) for some in (steered, [w for w in wheels if not w.steered])
+    )
+    if front <= rear:
+        message = (
+            f"its steered wheels are {rear - front:.3g} m behind the driven ones: only front steering is simulated"
+        )
+        hint = "x must point ahead: turn the root's joint by 180 degrees if the URDF is drawn the other way round"
+        raise InvalidInput([steered[0].joint.element.problem(message, hint)])
 
 
 def _base(wheels: list[WheelJoint], solids: Sequence[Solid]) -> Pose3:

@@ -20,7 +20,7 @@ from simscen.model.robot import (
     WheelOdometry,
 )
 from simscen.sim.outline import extremes
-from simscen.sim.urdf.body import body_of_tree, read_tree
+from simscen.sim.urdf.body import body_of_tree, read_tree, refuse_rear_steering
 from simscen.sim.urdf.elements import MeshReader
 from simscen.sim.urdf.files import Folders
 from simscen.sim.urdf.tree import Tree
@@ -65,6 +65,7 @@ def _drive(tree: Tree, wheels: list[WheelJoint]) -> Drive:
     size = {"wheel_radius": driven[0].radius, "wheel_separation": separation, "wheel_width": driven[0].width}
     steered = [wheel.place[0] for wheel in wheels if wheel.steered]
     if steered:
+        refuse_rear_steering(wheels)
         base = float(np.mean(steered) - np.mean(axles))
         return Ackermann.model_validate({"type": "ackermann", "wheel_base": base, "max_steering": 0.5, **size})
     if max(axles) - min(axles) < STRAIGHT:

@@ -1,0 +1,181 @@
+"""`simscen robot check`: command, odometry and truth of one drive, and what the files say otherwise."""
+
+import json
+import sys
+
+import pytest
+
+from simscen.cli import main as cli
+
+BOX = """
+  <link name="base">
+    <collision><origin xyz="{x} 0 {z}"/><geometry><box size="{size}"/></geometry></collision>
+    <inertial><origin xyz="{x} 0 {z}"/><mass value="{mass}"/><inertia ixx="{i}" iyy="{i}" izz="{i}"/></inertial>
+  </link>"""
+WHEEL = """
+  <link name="{name}">
+    <collision><origin rpy="1.5707963 0 0"/><geometry><cylinder radius="{r}" length="0.04"/></geometry></collision>
+    <inertial><mass value="0.5"/></inertial>
+  </link>
+  <joint name="{name}_joint" type="continuous">
+    <parent link="{parent}"/><child link="{name}"/><origin xyz="{x} {y} {z}"/><axis xyz="0 1 0"/>
+  </joint>"""
+KNUCKLE = """
+  <link name="{name}"/>
+  <joint name="{name}_joint" type="revolute">
+    <parent link="base"/><child link="{name}"/><origin xyz="{x} {y} 0"/><axis xyz="0 0 1"/>
+    <limit lower="-0.5" upper="0.5" effort="1" velocity="1"/>
+  </joint>"""
+CASTER = """
+  <link name="caster"><collision><geometry><sphere radius="0.02"/></geometry></collision></link>
+  <joint name="c" type="fixed"><parent link="base"/><child link="caster"/><origin xyz="-0.15 0 {z}"/></joint>"""
+
+
+def wheels(parent="base", r=0.05, x=0.0, half=0.2, name="", z=None):
+    return "".join(
+        WHEEL.format(name=f"{name}{side}", parent=parent.format(side=side), r=r, x=x, y=y, z=r if z is None else z)
+        for side, y in (("left", half), ("right", -half))
+    )
+
+
+def urdf(*parts, size="0.4 0.3 0.1", mass=6, x=0.0, z=0.13, i=0.1):
+    return f'<robot name="cart">{BOX.format(size=size, mass=mass, x=x, z=z, i=i)}{"".join(parts)}\n</robot>\n'
+
+
+def robot_yaml(drive):
+    return (
+        f"simscen: 1\nname: cart\nurdf: cart.urdf\ndrive:\n  {drive}\nsensors: {{}}\n"
+        "limits: {linear: 1, angular: 1.5, linear_acceleration: 1, angular_acceleration: 2}\n"
+    )
+
+
+@pytest.fixture
+def check(tmp_path, monkeypatch, capsys):
+    """Check a robot in a folder with some files: exit code, what is printed, what is told on stderr."""
+    monkeypatch.chdir(tmp_path)
+
+    def check(robot, *options, **files):
+        for name, text in files.items():
+            (tmp_path / name.replace("_", ".")).write_text(text)
+        monkeypatch.setattr(sys, "argv", ["simscen", "robot", "check", robot, *options])
+        with pytest.raises(SystemExit) as end:
+            cli.main()
+        return end.value.code, *capsys.readouterr()
+
+    return check
+
+
+@pytest.fixture
+def figures(check):
+    def figures(robot, **files):
+        return json.loads(check(robot, "--json", **files)[1])
+
+    return figures
+
+
+@pytest.mark.parametrize("name", ["amr", "car", "jackal", "omni", "turtlebot"])
+def test_every_shipped_robot_drives_what_it_is_told(check, name):
+    code, told, _ = check(name)
+    assert code == 0, told
+    assert "checks held" in told
+    assert max(map(len, told.splitlines())) <= 80
+
+
+def test_a_caster_a_millimetre_too_low_is_told_at_its_line(check):
+    text = urdf(wheels(), CASTER.format(z=0.019))
+    code, told, _ = check("cart.urdf", cart_urdf=text)
+    assert code == 0
+    line = text[: text.index('<link name="caster"')].count("\n") + 1
+    assert f"cart.urdf:{line}:3: warning[SC405] link 'caster' reaches 1.0 mm below the wheels" in told
+
+
+def test_a_caster_that_hangs_above_the_ground_is_told(check):
+    told = check("cart.urdf", cart_urdf=urdf(wheels(), CASTER.format(z=0.03)))[1]
+    assert "link 'caster' hangs 10.0 mm above the ground" in told
+
+
+def test_wheels_at_different_heights_are_told(check):
+    four = wheels(x=-0.15, name="rear_") + wheels(x=0.15, name="front_", z=0.052)
+    told = check("cart.urdf", cart_urdf=urdf(four))[1]
+    assert "the wheel on joint 'front_left_joint' hangs 2.0 mm above the lowest one's ground" in told
+
+
+def test_a_robot_as_drawn_has_no_warnings(figures):
+    assert figures("cart.urdf", cart_urdf=urdf(wheels(), CASTER.format(z=0.02)))["problems"] == []
+
+
+@pytest.mark.parametrize("with_spec", [False, True])
+def test_a_car_drawn_backwards_is_refused_at_its_line(check, with_spec):
+    """It had a negative wheel base."""
+    knuckles = "".join(KNUCKLE.format(name=f"k_{side}", x=-0.3, y=y) for side, y in (("left", 0.2), ("right", -0.2)))
+    front = "".join(
+        WHEEL.format(name=f"front_{side}", parent=f"k_{side}", r=0.05, x=0, y=0, z=0.05) for side in ("left", "right")
+    )
+    drive = "{type: ackermann, wheel_radius: 0.05, wheel_separation: 0.4, wheel_base: 0.3, max_steering: 0.5}"
+    spec = {"cart_robot_yaml": robot_yaml(drive)} if with_spec else {}
+    name = "cart.robot.yaml" if with_spec else "cart.urdf"
+    code, _, told = check(name, cart_urdf=urdf(wheels(), knuckles, front), **spec)
+    assert code == 2
+    assert "its steered wheels are 0.3 m behind the driven ones: only front steering is simulated" in told
+    assert "cart.urdf:" in told.split(": error")[0]
+
+
+DIFFERENTIAL = "{{type: differential, wheel_radius: {}, wheel_separation: {}}}"
+
+
+def test_a_wheel_separation_other_than_the_urdfs_is_told_with_both_numbers_and_the_one_that_fits(check):
+    files = {"cart_urdf": urdf(wheels()), "cart_robot_yaml": robot_yaml(DIFFERENTIAL.format(0.05, 0.45))}
+    code, told, _ = check("cart.robot.yaml", **files)
+    assert code == 1
+    assert "cart.robot.yaml:5:62: warning[SC404] wheel_separation is 0.45 m here, but 0.4 m in cart.urdf" in told
+    assert float(told.split("wheel_separation 0.45 m: ")[1].split()[0]) == pytest.approx(0.4, rel=0.002)
+
+
+def test_a_wheel_radius_other_than_the_urdfs_is_told_with_both_numbers_and_the_one_that_fits(check):
+    files = {"cart_urdf": urdf(wheels()), "cart_robot_yaml": robot_yaml(DIFFERENTIAL.format(0.06, 0.4))}
+    code, told, _ = check("cart.robot.yaml", **files)
+    assert code == 1
+    assert "wheel_radius is 0.06 m here, but 0.05 m in cart.urdf" in told
+    assert float(told.split("wheel_radius 0.06 m: ")[1].split()[0]) == pytest.approx(0.05, rel=0.002)
+    assert "wheel_separation 0.4 m:" not in told
+
+
+SKID = "{{type: skid_steer, wheel_radius: 0.16, wheel_separation: 0.56, wheel_base: 0.5, turning_scale: {}}}"
+
+
+def test_the_effective_track_that_is_told_fits(figures):
+    """Wheels that skid turn a heavy base as if they stood further apart."""
+    four = wheels(x=-0.25, r=0.16, half=0.28, name="rear_") + wheels(x=0.25, r=0.16, half=0.28, name="front_")
+    files = {"cart_urdf": urdf(four, size="0.9 0.4 0.2", mass=45, z=0.25, i=1.5)}
+    name = "turn: odometry, from true angle"
+
+    def turned(scale):
+        found = figures("cart.robot.yaml", **files, cart_robot_yaml=robot_yaml(SKID.format(scale)))
+        return next(check for check in found["checks"] if check["name"] == name)
+
+    wrong = turned(1.44)
+    assert not wrong["held"]
+    assert wrong["advice"].startswith("turning_scale 1.44: ")
+    right = turned(wrong["advice"].split(": ")[1].split()[0])
+    assert right["value"] < 0.5
+
+
+def test_a_load_that_drags_a_skid_steered_base_off_its_spot_is_told(check):
+    four = wheels(x=-0.25, r=0.16, half=0.28, name="rear_") + wheels(x=0.25, r=0.16, half=0.28, name="front_")
+    code, told, _ = check("cart.urdf", cart_urdf=urdf(four, size="0.7 0.4 0.2", mass=45, z=0.25, i=1.5, x=-0.1))
+    assert code == 1
+    assert "FAILED  turn: off the spot" in told
+    assert "behind the middle of its wheels" in told
+
+
+def test_the_same_robot_gives_the_same_figures_and_picture(check, tmp_path):
+    once, again = (check("turtlebot", "--json", "--picture", f"{name}.png")[1] for name in ("a", "b"))
+    assert once == again
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+@pytest.mark.parametrize("robot", ["turtlebotx", "gone.urdf"])
+def test_a_robot_that_is_not_there_is_told(check, robot):
+    code, _, told = check(robot)
+    assert code == 2
+    assert f"{robot}: error[SC001] no such file, and no robot called `{robot}` ships" in told
