@@ -14,8 +14,8 @@ from simscen.core.sessionevents import RunFinished, SessionEvent
 from simscen.loading.scenario import load_scenario
 from simscen.record.replay import read_log
 from simscen.report.lines import Naming, finished, text_of
-from simscen.run.jobs import Job
 from simscen.run.outfolder import run_folder
+from simscen.run.process.jobs import Job
 from simscen.run.session import Options, run_session
 from simscen.study.consistency import anees, bounds, nees_at
 from simscen.study.experiments import Experiment

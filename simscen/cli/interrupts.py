@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-from simscen.run.supervisor import Interrupted
+from simscen.run.process.supervisor import Interrupted
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from simscen.cli.requirements import unmet
-from simscen.run.confine import FILE_BYTES, MEMORY_BYTES, OPEN_FILES
+from simscen.run.process.confine import FILE_BYTES, MEMORY_BYTES, OPEN_FILES
 from simscen.run.versions import PACKAGES, cpu_flags
 
 PYTHONS = ((3, 10), (3, 11))

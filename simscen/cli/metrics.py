@@ -1,7 +1,7 @@
 """The metrics of every run and of a session, for `simscen explain metrics` and the reference."""
 
 from simscen.cli.catalogue import OPTIONAL, Field, Topic
-from simscen.judge.metric_table import METRICS, Metric
+from simscen.judge.measure.table import METRICS, Metric
 
 REPORTED = """\
 Every run reports these numbers in result.json, whether a criterion asks for them or not; they are computed from the

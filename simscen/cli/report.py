@@ -10,7 +10,7 @@ from simscen.cli.diagnostics import print_text
 from simscen.cli.reports import JunitFamily, Reports, require_writable, verdict
 from simscen.cli.screen import Format, screen
 from simscen.core.errors import Exit
-from simscen.judge.suite import suite, told
+from simscen.judge.measure.suite import suite, told
 from simscen.report.journal import require_free
 from simscen.report.rebuild import read_journal
 

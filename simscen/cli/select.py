@@ -13,9 +13,9 @@ from simscen.loading.keywords import select
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import try_scenario
 from simscen.loading.worldfile import load_world_file
-from simscen.run.feasibility import check, notes_of
+from simscen.run.precheck.feasibility import check, notes_of
+from simscen.run.precheck.worldchecks import misnamed
 from simscen.run.worldcache import WorldCache
-from simscen.run.worldchecks import misnamed
 from simscen.run.worldsource import world_of
 
 

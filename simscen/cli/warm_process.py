@@ -10,13 +10,13 @@ import simscen.sim.simulation
 import simscen.stack.build  # noqa: F401 - engines are imported here so that the forks need not
 from simscen.core.run import Run
 from simscen.report.picture import Scene, write_picture
-from simscen.run.confine import MEMORY_BYTES
-from simscen.run.jobs import Job
 from simscen.run.perform import perform
 from simscen.run.prepare import Prepared
 from simscen.run.prepared_cache import PreparedCache
-from simscen.run.worker import Progress
-from simscen.run.zygote import Zygote
+from simscen.run.process.confine import MEMORY_BYTES
+from simscen.run.process.jobs import Job
+from simscen.run.process.worker import Progress
+from simscen.run.process.zygote import Zygote
 
 _PREPARED = PreparedCache()
 

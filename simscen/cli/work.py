@@ -12,7 +12,7 @@ from simscen.report.journal import Journal
 from simscen.report.journaldata import Planned
 from simscen.report.rebuild import read_journal
 from simscen.run.digest import digest
-from simscen.run.jobs import Job
+from simscen.run.process.jobs import Job
 from simscen.run.repeat_command import repeat_command, shown
 
 

@@ -19,8 +19,8 @@ from simscen.loading.discovery import default_root
 from simscen.loading.loaded import LoadedWorld
 from simscen.loading.worldfile import load_world_file, world_text
 from simscen.model.world import WorldSpec
-from simscen.run.feasibility import notes_of
 from simscen.run.outfolder import write_atomically
+from simscen.run.precheck.feasibility import notes_of
 from simscen.run.worldsource import world_of
 
 app = typer.Typer(rich_markup_mode=None, add_completion=False, no_args_is_help=True)

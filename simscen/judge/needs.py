@@ -4,7 +4,7 @@ from simscen.core.evidence import Coverage, Evidence
 from simscen.core.verdict import Finding, Status
 from simscen.criteria.criterion import AnyCriterion
 from simscen.criteria.temporal import Temporal
-from simscen.judge.metrics import Measures
+from simscen.judge.measure.metrics import Measures
 
 _TRUTH, _BELIEF, _GOALS = Evidence.TRUTH, Evidence.BELIEF, Evidence.NAVIGATION
 _PLACE = frozenset({_TRUTH, Evidence.ALIGNMENT})

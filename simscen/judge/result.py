@@ -11,11 +11,11 @@ from simscen.core.verdict import Status, Verdict
 from simscen.criteria.bounds import BrokenTrace
 from simscen.criteria.criterion import AnyCriterion
 from simscen.criteria.moments import ending
-from simscen.judge.cause import explained
 from simscen.judge.disturbances import happenings, missing
 from simscen.judge.judge import judge, outcome
-from simscen.judge.metrics import Measures, measure
+from simscen.judge.measure.metrics import Measures, measure
 from simscen.judge.needs import known
+from simscen.judge.why.cause import explained
 
 
 def result_of(

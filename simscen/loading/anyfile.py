@@ -9,8 +9,8 @@ from simscen.loading.discovery import ROBOT, WORLD
 from simscen.loading.document import Library
 from simscen.loading.paths import Fence
 from simscen.loading.scenario import try_scenario
+from simscen.loading.sense.worldsense import senseless
 from simscen.loading.tree import Fields
-from simscen.loading.worldsense import senseless
 
 _ONLY_ROBOTS = frozenset({"drive", "sensors", "limits", "body", "urdf"})
 _ONLY_WORLDS = frozenset({"walls", "obstacles", "objects", "doors", "places", "regions", "map_height", "sdf"})

@@ -7,15 +7,15 @@ from dataclasses import replace
 from simscen.core.problems import Problem
 from simscen.core.time import Clock
 from simscen.core.world import World
-from simscen.loading.hardlyfails import hardly_fails
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.messages import quoted, suggestion
 from simscen.loading.names import ARTICLES, event_names, known_names, own_goal_names
-from simscen.loading.neverhappens import never_happens
-from simscen.loading.neverholds import never_holds
 from simscen.loading.references import references
+from simscen.loading.sense.hardlyfails import hardly_fails
+from simscen.loading.sense.neverhappens import never_happens
+from simscen.loading.sense.neverholds import never_holds
+from simscen.loading.sense.worldsense import senseless
 from simscen.loading.tree import Fields, Key, key_place, real_keys, value_place
-from simscen.loading.worldsense import senseless
 from simscen.model.robot import RobotSpec
 from simscen.triggers.trigger import Trigger
 

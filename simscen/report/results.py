@@ -7,8 +7,8 @@ from typing import Any
 
 from simscen.core.result import Outcome
 from simscen.core.sessionevents import RunFinished
+from simscen.judge.measure.suite import suite, suite_data
 from simscen.judge.resultdata import as_data
-from simscen.judge.suite import suite, suite_data
 
 FORMAT = 1
 

@@ -11,10 +11,10 @@ from simscen.core.result import Outcome, RunFailure, RunKey
 from simscen.core.sessionevents import Listener, RunFinished, RunProgress, RunStarted
 from simscen.loading.loaded import LoadedScenario
 from simscen.run.against import agreed
-from simscen.run.answer import answer_to, not_done
-from simscen.run.jobs import Job
 from simscen.run.outfolder import run_folder
-from simscen.run.supervisor import Advanced, Ended, Interrupted, Started, supervise
+from simscen.run.process.answer import answer_to, not_done
+from simscen.run.process.jobs import Job
+from simscen.run.process.supervisor import Advanced, Ended, Interrupted, Started, supervise
 
 
 @dataclass(frozen=True)

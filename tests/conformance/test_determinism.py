@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.run import warmprocess
+from simscen.run.process import warmprocess
 
 SIMSCEN = Path(sys.executable).with_name("simscen")
 TELLING = str(Path(__file__).with_name("telling_zygote.py"))

@@ -18,7 +18,7 @@ TELLING = Path(__file__).with_name("telling_zygote.py")
 IMPATIENT = f"""
 import simscen.cli.run
 from simscen.cli.main import main
-from simscen.run import supervisor
+from simscen.run.process import supervisor
 simscen.cli.run.WARM_PROCESS = ({str(TELLING)!r},)
 supervisor.SILENCE = 5.0
 main()

@@ -16,7 +16,7 @@ IDLE = {"__init__.py", "sketch.py"}
 
 def modules() -> list[Path]:
     """Every module that has something to decide."""
-    files = [file for room in ROOMS for file in sorted((ROOT / "simscen" / room).glob("*.py"))]
+    files = [file for room in ROOMS for file in sorted((ROOT / "simscen" / room).rglob("*.py"))]
     return [file for file in files if file.name not in IDLE]
 
 
@@ -30,8 +30,9 @@ def tests_of(file: Path) -> list[list[str]]:
 
     A criterion with golden cases of its own is used by nothing else.
     """
-    room, kind = file.parent.name, file.stem
-    own = [path.relative_to(ROOT).as_posix() for path in sorted((ROOT / f"tests/unit/{room}").glob(f"test_{kind}*.py"))]
+    room, kind = file.relative_to(ROOT / "simscen").parts[0], file.stem
+    found = sorted((ROOT / "tests/unit" / room).rglob(f"test_{kind}*.py"))
+    own = [path.relative_to(ROOT).as_posix() for path in found]
     kinds = ["result", "error_code"] if kind == "result" else [kind]
     if room == "criteria" and (ROOT / f"tests/cases/{kind}.yaml").exists():
         return [*(["golden", of] for of in kinds), [*own, *EVERY_CRITERION]]

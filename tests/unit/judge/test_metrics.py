@@ -13,8 +13,8 @@ from simscen.core.navigation import Path
 from simscen.core.samples import Samples
 from simscen.criteria.bounds import BrokenTrace
 from simscen.criteria.smooth import ldlj, sparc
-from simscen.judge.metric_table import METRICS
-from simscen.judge.metrics import barn_score, measure
+from simscen.judge.measure.metrics import barn_score, measure
+from simscen.judge.measure.table import METRICS
 from simscen.judge.sketch import sketch, sketch_case
 
 GOAL = {"goals": [{"name": "a", "pose": [3, 4, 0]}], "shortest": {"a": 5.0}}

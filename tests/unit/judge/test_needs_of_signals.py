@@ -7,8 +7,8 @@ from simscen.core.verdict import Status
 from simscen.criteria.criterion import AnyCriterion
 from simscen.criteria.signal_table import SIGNALS, evidence
 from simscen.judge.judge import judge
-from simscen.judge.metric_table import METRICS
-from simscen.judge.metrics import measure
+from simscen.judge.measure.metrics import measure
+from simscen.judge.measure.table import METRICS
 from simscen.judge.needs import known, needs
 from simscen.judge.sketch import sketch, sketch_case
 

@@ -3,7 +3,7 @@
 import pytest
 
 from simscen.core.result import Outcome, RunFailure, RunKey, RunResult
-from simscen.judge.suite import suite, suite_data, told
+from simscen.judge.measure.suite import suite, suite_data, told
 
 
 def run(seed, simulated=1800.0, **metrics):

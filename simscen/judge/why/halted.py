@@ -1,0 +1,94 @@
+"""What keeps a robot from its goal: a closed passage, an occupied goal, something that it stands at."""
+
+import math
+
+import numpy as np
+
+from simscen.core.case import Case
+from simscen.core.events import EventKind
+from simscen.core.navigation import Goal
+from simscen.core.trace import Trace
+from simscen.criteria.moments import stories
+from simscen.judge.why.blocked import blocked
+from simscen.judge.why.things import Thing, things
+
+NEAR = 0.3
+"""Metres from the robot's hull within which a thing may be what holds it."""
+
+
+def halted(trace: Trace, case: Case, tick: int) -> tuple[list[str], set[str]]:
+    """Sentences on what is in the way of the goal that is driven to at `tick`; and the events that put it there."""
+    goal = _goal(trace, case, tick)
+    if goal is None:
+        return [], set()
+    there = things(trace, tick)
+    lines, named = [*_walled_in(case, goal), *_touching(trace, tick)], set[str]()
+    for told, events in (
+        _occupied(trace, case, goal, there),
+        blocked(trace, case, goal.name, tick, there),
+        _standing_at(trace, case, tick, there),
+    ):
+        if "" in events or not events <= named:  # of what an event brought, one sentence is enough
+            lines += told
+            named |= events
+    return lines, named
+
+
+def _goal(trace: Trace, case: Case, tick: int) -> Goal | None:
+    """The goal under way at `tick`, or the one that just ended without being reached."""
+    open_ = [
+        story
+        for story in stories(trace, case)
+        if story.accepted is not None and story.accepted <= tick and (story.end is None or story.end.tick >= tick)
+    ]
+    late = [story for story in open_ if story.reached is None or story.reached > tick]
+    return late[-1].goal if late else _failed(trace, case, tick)
+
+
+def _failed(trace: Trace, case: Case, tick: int) -> Goal | None:
+    """The goal whose failure ended the navigation before `tick`."""
+    ends = [e for e in trace.of_kind(EventKind.GOAL_REACHED, EventKind.GOAL_FAILED) if e.tick <= tick]
+    if not ends or ends[-1].kind != EventKind.GOAL_FAILED:
+        return None
+    return next((goal for goal in case.every_goal if goal.name == ends[-1].name), None)
+
+
+def _walled_in(case: Case, goal: Goal) -> list[str]:
+    if not math.isinf(case.shortest.get(goal.name, 0.0)):
+        return []
+    needed = 2 * case.inscribed_radius
+    narrow = [passage for passage in case.passages if passage.goal == goal.name and passage.width < needed]
+    where = f": the widest is {narrow[0].told}" if narrow else ""
+    return [f"the world itself leaves a robot of {needed:.2f} m no way to goal {goal.name}{where}"]
+
+
+def _touching(trace: Trace, tick: int) -> list[str]:
+    """What it has begun to touch and still does."""
+    since: dict[str, int] = {}
+    for event in trace.of_kind(EventKind.COLLISION_STARTED, EventKind.COLLISION_ENDED):
+        if event.tick <= tick and event.kind == EventKind.COLLISION_STARTED:
+            since.setdefault(event.name, event.tick)
+        elif event.tick <= tick:
+            since.pop(event.name, None)
+    return [f"it had touched {name or 'something'} since t = {trace.seconds(at):.2f} s" for name, at in since.items()]
+
+
+def _occupied(trace: Trace, case: Case, goal: Goal, there: list[Thing]) -> tuple[list[str], set[str]]:
+    place = np.array([[goal.pose.x, goal.pose.y]])
+    for thing in there:
+        apart = float(thing.distance(place)[0])
+        if apart < case.inscribed_radius:
+            where = "on" if apart == 0 else f"{apart:.2f} m from the middle of"
+            return [f"{thing.told(trace)} stands {where} goal {goal.name}"], {thing.event}
+    return [], set()
+
+
+def _standing_at(trace: Trace, case: Case, tick: int, there: list[Thing]) -> tuple[list[str], set[str]]:
+    """The thing nearest to the robot, when it is very near."""
+    if not there or not len(trace.truth):
+        return [], set()
+    place = np.array([trace.place(tick)])
+    apart, thing = min(((float(t.distance(place)[0]) - case.inscribed_radius, t) for t in there), key=lambda p: p[0])
+    if not apart <= NEAR:  # nan, too
+        return [], set()
+    return [f"{thing.told(trace)} was {max(apart, 0.0):.2f} m from the robot"], {thing.event}

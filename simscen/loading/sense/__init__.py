@@ -1,0 +1,1 @@
+"""What is well-formed and means nothing: found in the text, without building a world."""

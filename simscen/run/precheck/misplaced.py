@@ -1,0 +1,115 @@
+"""What would stand in something else: the robot at its start or a goal, and what events put into the world."""
+
+import math
+from collections.abc import Iterator
+from itertools import product
+
+from simscen.actions.robot import Kidnap
+from simscen.actions.spawn import Spawn
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.navigation import Goal
+from simscen.core.problems import Problem
+from simscen.core.shapes import Solid
+from simscen.core.world import Polygon
+from simscen.run.precheck.expectation import expects_bad_start
+from simscen.run.precheck.scene import Keys, Scene
+from simscen.triggers.time import Time
+from simscen.triggers.trigger import Trigger
+from simscen.worlds.overlap import placed, polygons_overlap
+from simscen.worlds.upright import upright
+
+GOAL_HINT = "move it, or expect the failure with `result: {status: FAILED, error_code: GOAL_OCCUPIED}`"
+WITHIN = (-0.9, 0.0, 0.9)
+"""Shares of a goal's tolerances at which the robot may stand instead."""
+
+
+def misplaced(scene: Scene) -> list[tuple[Keys, Problem]]:
+    """Problems and whose they are: the start, goals that are to be reached, kidnappings, spawns."""
+    checks = (_start(scene), _goals(scene), _kidnaps(scene), _spawns(scene))
+    return [found for check in checks for found in check]
+
+
+def _start(scene: Scene) -> Iterator[tuple[Keys, Problem]]:
+    solids = (*scene.world.solids, *scene.standing)
+    if not expects_bad_start(scene.loaded.spec):
+        yield from _told(scene, ("robot", "pose"), "the robot's start", scene.start, solids, "move it to free space")
+
+
+def _goals(scene: Scene) -> Iterator[tuple[Keys, Problem]]:
+    for keys, goal in scene.targets:
+        found = list(_told(scene, keys, f"goal `{goal.name}`", goal.pose, scene.world.solids, GOAL_HINT))
+        if not found or not _fits_nearby(scene, goal):
+            yield from found
+
+
+def _fits_nearby(scene: Scene, goal: Goal) -> bool:
+    """Whether only the exact pose is too tight, for a footprint that is not round: the robot may stop near it."""
+    outside = scene.ground.outside(goal.pose)
+    if outside or scene.size.radius is not None or scene.circle_at(goal.pose, scene.world.solids):
+        return False
+    x, y, yaw = goal.pose
+    near = (
+        Pose2(x + a * goal.xy_tolerance, y + b * goal.xy_tolerance, yaw + c * goal.yaw_tolerance)
+        for a, b, c in product(WITHIN, repeat=3)
+        if math.hypot(a, b) <= 1
+    )
+    return any(scene.footprint_at(pose, scene.world.solids) is None for pose in near)
+
+
+def _kidnaps(scene: Scene) -> Iterator[tuple[Keys, Problem]]:
+    for keys, _, action in scene.actions:
+        if isinstance(action, Kidnap):
+            what, hint = "the place where the robot is set down", "move it to free space"
+            yield from _told(scene, (*keys, "pose"), what, action.pose.pose, scene.world.solids, hint)
+
+
+def _told(
+    scene: Scene, keys: Keys, what: str, pose: Pose2, solids: tuple[Solid, ...], hint: str
+) -> Iterator[tuple[Keys, Problem]]:
+    where = scene.ground.outside(pose) or scene.footprint_at(pose, solids)
+    if where:
+        yield keys, scene.loaded.problem(keys, "SC301", f"{what} ({pose.x:g}, {pose.y:g}) is {where}", hint)
+
+
+def _spawns(scene: Scene) -> Iterator[tuple[Keys, Problem]]:
+    for keys, _, action in scene.actions:
+        if isinstance(action, Spawn):
+            when = scene.loaded.spec.events[int(keys[1])].when
+            where = _buried(scene, action) or _on_the_robot(scene, action, when)
+            if where:
+                message, hint = f"`{action.name}` would appear {where}", "put it somewhere else"
+                yield keys, scene.loaded.problem((*keys, "name"), "SC304", message, hint)
+
+
+def _buried(scene: Scene, spawn: Spawn) -> str | None:
+    """Where a thing is put whose whole outline lies within one obstacle: nobody would ever meet it."""
+    if spawn.pose is None:
+        return None
+    corners = placed(_outline(spawn), spawn.pose.pose)
+    for solid in scene.world.solids:
+        prism = upright(solid)
+        if prism is None or prism.bottom > spawn.z or prism.top < spawn.z + spawn.tall:
+            continue
+        if all(prism.distance(corner, (prism.bottom, prism.top)) == 0 for corner in corners):
+            return f'inside obstacle "{solid.name}"'
+    return None
+
+
+def _on_the_robot(scene: Scene, spawn: Spawn, when: Trigger) -> str | None:
+    """Whether a thing is put where the robot is at that moment: beside it at any time, or at its start at once."""
+    if spawn.z >= scene.size.height:
+        return None
+    if spawn.ahead is not None:
+        corners = placed(_outline(spawn), Pose2(spawn.ahead[0], spawn.ahead[1], spawn.yaw))
+    elif spawn.pose is not None and isinstance(when.time, Time) and when.time.root + when.delay == 0:
+        corners = placed(_outline(spawn), scene.start.inverse().compose(spawn.pose.pose))
+    else:
+        return None
+    return "on the robot" if polygons_overlap(scene.outline, corners) else None
+
+
+def _outline(spawn: Spawn) -> Polygon:
+    """Of a thing in its own frame; corner for corner that of its convex hull when it is not convex."""
+    solid = spawn.solid(spawn.name)
+    prism = upright(Solid(solid.shape, Pose3(z=solid.pose.z), spawn.name))
+    return prism.base if prism is not None else tuple((x, y) for x, y in spawn.polygon or ())

@@ -1,0 +1,128 @@
+"""A scenario in its world, with the room that its robot takes: what the checks before a run look at."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+from pydantic import BaseModel
+
+from simscen.core.geometry import Pose2
+from simscen.core.navigation import Goal
+from simscen.core.shapes import Body, Solid
+from simscen.core.world import Polygon, World
+from simscen.loading.loaded import LoadedScenario
+from simscen.loading.tree import Key
+from simscen.model.disturbance import EventEntry
+from simscen.run.goals import goals_of, pose_of, sent_goals
+from simscen.run.precheck.expectation import expects_failure
+from simscen.run.precheck.ground import Ground, ground_of
+from simscen.run.robotsize import RobotSize
+from simscen.worlds.contain import first_blocking
+from simscen.worlds.overlap import first_overlapping
+from simscen.worlds.upright import upright
+
+SILL = 0.02
+"""Metres: what is lower is not in a robot's way."""
+CIRCLE_EDGE = 1e-6
+Keys = tuple[Key, ...]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """All that is known before a run."""
+
+    loaded: LoadedScenario
+    world: World
+    size: RobotSize
+
+    @property
+    def z_range(self) -> tuple[float, float]:
+        """Between which heights something is in the robot's way."""
+        return SILL, max(2 * SILL, self.size.height)
+
+    @cached_property
+    def start(self) -> Pose2:
+        """Where the robot truly stands at first."""
+        return pose_of(self.loaded.spec.robot.pose, self.world)
+
+    @cached_property
+    def ground(self) -> Ground:
+        """Where the robot can be at all."""
+        return ground_of(self.loaded, self.world)
+
+    @cached_property
+    def standing(self) -> tuple[Solid, ...]:
+        """What can move, where it is at first, by the names that scenarios know."""
+        return tuple(_placed(self.world.bodies))
+
+    @cached_property
+    def staying(self) -> tuple[Solid, ...]:
+        """What could move but never does: nothing opens, moves or removes it, and the robot cannot push it."""
+        moved = {name for _, kind, action in self.actions if kind in MOVING for name in [getattr(action, "name", "")]}
+        return tuple(_placed(b for b in self.world.bodies if b.mass == 0 and b.path is None and b.name not in moved))
+
+    @cached_property
+    def certain(self) -> tuple[Solid, ...]:
+        """The fixed solids that are walls to a robot for sure: upright ones, and the walls made of a map.
+
+        A mesh or a tilted box may be a ramp.
+        """
+        mapped = self.world.grid is not None
+        return tuple(s for s in self.world.solids if upright(s) is not None or (mapped and s.name == "map"))
+
+    @cached_property
+    def targets(self) -> list[tuple[Keys, Goal]]:
+        """The goals that are to be reached, also those that events send, each with where its pose stands."""
+        spec = self.loaded.spec
+        own: dict[Keys, Goal] = {("goals", k): goal for k, goal in enumerate(goals_of(spec, self.world))}
+        every = {**own, **sent_goals(spec)}
+        return [((*keys, "pose"), goal) for keys, goal in every.items() if not expects_failure(spec, goal.name)]
+
+    @cached_property
+    def actions(self) -> list[tuple[Keys, str, BaseModel]]:
+        """Every action of every event: where it stands in the file, its kind, and what it says."""
+        return [found for k, event in enumerate(self.loaded.spec.events) for found in actions_of(k, event)]
+
+    def does(self, *kinds: str) -> bool:
+        """Whether an event of the scenario does any of these."""
+        return any(kind in kinds for _, kind, _ in self.actions)
+
+    def footprint_at(self, pose: Pose2, solids: Iterable[Solid]) -> str | None:
+        """Which of the solids the robot's own footprint would overlap, as words that follow "is"; None for none."""
+        if solid := first_blocking(solids, (pose.x, pose.y), CIRCLE_EDGE, self.z_range):
+            return f'inside obstacle "{solid}"'
+        if solid := self.circle_at(pose, solids):
+            return f'nearer to obstacle "{solid}" than the robot\'s {self._radius} of {self.size.inscribed:.2f} m'
+        if self.size.radius is None and (solid := first_overlapping(solids, self.outline, pose, self.z_range)):
+            return f'so near to obstacle "{solid}" that the robot\'s footprint, turned as it is there, would overlap it'
+        return None
+
+    def circle_at(self, pose: Pose2, solids: Iterable[Solid]) -> str | None:
+        """Which of the solids the circle inside the robot's footprint would overlap, however it is turned."""
+        return first_blocking(solids, (pose.x, pose.y), self.size.inscribed, self.z_range)
+
+    @property
+    def outline(self) -> Polygon:
+        """The footprint in the robot's own frame."""
+        return self.size.footprint
+
+    @property
+    def _radius(self) -> str:
+        return "radius" if self.size.radius is not None else "inscribed radius"
+
+
+MOVING = frozenset({"open", "close", "move", "remove"})
+"""Actions after which a thing is no longer where it was."""
+
+
+def actions_of(number: int, event: EventEntry) -> Iterator[tuple[Keys, str, BaseModel]]:
+    """The actions of the event with this number."""
+    for k, action in enumerate(event.actions):
+        index: Keys = (k,) if isinstance(event.do, list) else ()
+        yield ("events", number, "do", *index, action.kind), action.kind, action.chosen
+
+
+def _placed(bodies: Iterable[Body]) -> Iterator[Solid]:
+    for body in bodies:
+        for solid in body.solids:
+            yield Solid(solid.shape, body.pose.compose(solid.pose), body.name)

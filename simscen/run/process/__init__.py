@@ -1,0 +1,1 @@
+"""One process for each run: what starts it, hears it, ends it, and tells what became of it."""

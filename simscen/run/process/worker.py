@@ -1,0 +1,125 @@
+"""The process of one run, from its first instruction to its last."""
+
+import errno
+import faulthandler
+import json
+import os
+import signal
+import sys
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple, NoReturn
+
+from simscen.core.errors import InvalidInput, RunError
+from simscen.core.trace import Moment
+from simscen.run.process.confine import die_with_parent, limit_resources, offer_to_the_oom_killer
+from simscen.run.process.jobs import Job, line
+from simscen.run.process.orphans import adopt_orphans, has_descendants
+
+PROGRESS_EVERY = 5.0
+"""Simulated seconds between two signs of life."""
+
+Perform = Callable[[Job, Callable[[float], None]], dict[str, Any]]
+"""Runs a job; is handed what to tell simulated seconds to; returns the end record."""
+
+
+_OUT_OF_MEMORY = {"error": "out-of-memory", "message": "the run used more memory than it may"}
+
+
+class Pipes(NamedTuple):
+    """Where a worker tells how it goes, and where it prints; descriptors."""
+
+    report: int
+    printed: int
+
+
+def be_worker(job: Job, parent: int, pipes: Pipes, perform: Perform) -> NoReturn:
+    """Run the job, tell how it ended, and leave without looking back, whatever happens.
+
+    `os._exit` because nanobind and Bullet have nothing to say at the end that a user should read, and because nothing
+    may return into the warm process, of which this is a copy.
+    """
+    code = 1
+    try:
+        _settle(parent, pipes.printed)
+        end = _end_record(job, pipes.report, perform)
+        os.write(pipes.report, line({"end": end, "left_processes": has_descendants()}))
+        code = 0
+        sys.stdout.flush()
+        sys.stderr.flush()
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        os._exit(code)
+
+
+def _settle(parent: int, printed: int) -> None:
+    """Become a process of its own: session, output, limits, and a stack to show when it is asked for or crashes."""
+    os.setsid()
+    die_with_parent(parent)
+    adopt_orphans()
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _redirect_output(printed)
+    faulthandler.enable()
+    faulthandler.register(signal.SIGUSR1)
+    offer_to_the_oom_killer()
+    limit_resources()
+
+
+def _end_record(job: Job, report: int, perform: Perform) -> dict[str, Any]:
+    try:
+        job.folder.mkdir(parents=True, exist_ok=True)
+        return perform(job, lambda seconds: _tell(report, seconds))
+    except RunError as error:
+        return {"error": error.kind, "message": str(error)}
+    except InvalidInput as error:
+        return {"error": "invalid", "message": str(error)}
+    except MemoryError:
+        return _OUT_OF_MEMORY
+    except SystemExit as left:
+        return {"error": "crashed", "message": f"exited {left.code} by itself ({_innermost(left)})"}
+    except OSError as error:
+        traceback.print_exc()
+        if error.errno == errno.ENOMEM:
+            return _OUT_OF_MEMORY
+        return {"error": "output", "message": f"{error.strerror or error} writing {error.filename or job.folder}"}
+    except Exception as error:
+        # The boundary of the process: whatever went wrong becomes this run's error, with the line it came from.
+        traceback.print_exc()
+        return {"error": "crashed", "message": f"{type(error).__name__}: {error} ({_innermost(error)})"}
+
+
+def _innermost(error: BaseException) -> str:
+    frame = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{Path(frame.filename).name}:{frame.lineno}"
+
+
+def _tell(report: int, seconds: float) -> None:
+    os.write(report, json.dumps({"seconds": seconds}).encode() + b"\n")
+
+
+def _redirect_output(printed: int) -> None:
+    """Send what libraries print (also from C) to the run's own log, out of the command line's way."""
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, 0)
+    os.dup2(printed, 1)
+    os.dup2(printed, 2)
+    os.close(nothing)
+    os.close(printed)
+
+
+class Progress:
+    """A log that only tells how far the run is."""
+
+    def __init__(self, tick_rate: int, tell: Callable[[float], None]) -> None:
+        self._rate, self._tell = tick_rate, tell
+        self._next = 0.0
+
+    def append(self, moment: Moment) -> None:
+        """Tell now and then."""
+        seconds = moment.tick / self._rate
+        if seconds >= self._next:
+            self._next = seconds + PROGRESS_EVERY
+            self._tell(seconds)

@@ -1,0 +1,24 @@
+"""Failures are explained, and nothing else is."""
+
+from whys import STANDS, by, why
+
+from simscen.core.verdict import Finding, Status, Verdict
+from simscen.judge.sketch import sketch, sketch_case
+from simscen.judge.why.cause import explained
+
+
+def test_only_failures_are_explained_and_before_their_own_details():
+    trace = sketch({**STANDS, "events": by("gust", 9)})
+    failed = Finding(Status.FAIL, "speed", "2", "≤ 1", tick=2400, detail=("own",))
+    findings = (failed, Finding(Status.PASS, "speed", "0", "≤ 1", tick=2400), Finding(Status.FAIL, "speed", "2", "≤ 1"))
+    (verdict,) = explained([Verdict("speed", "speed", "fail", findings)], trace, sketch_case({}))
+    assert [finding.detail for finding in verdict.findings] == [
+        ("meanwhile: event `gust` came 1.00 s before: something", "own"),
+        (),
+        (),
+    ]
+
+
+def test_of_many_causes_the_first_six_are_told():
+    lines = why("speed", [event for k in range(9) for event in by(f"gust {k}", 9)], case={})
+    assert lines == [f"meanwhile: event `gust {k}` came 1.00 s before: something" for k in range(6)]

@@ -1,0 +1,77 @@
+"""What keeps a robot from its goal."""
+
+from whys import CASE, STANDS, box, why
+
+from simscen.judge.sketch import sketch, sketch_case
+from simscen.judge.why.cause import causes
+
+
+def test_a_thing_on_the_goal_is_named_once():
+    assert why("goals_reached", box(1, "pallet", 8, 0, 1, 1, "pallet falls")) == [
+        "why: pallet (spawned by event `pallet falls` at t = 1.00 s) stands on goal study"
+    ]
+    (line,) = why("goals_reached", box(1, "pallet", 8, 0.6, 1, 1, "pallet falls"))
+    assert "stands 0.10 m from the middle of goal study" in line
+
+
+def test_a_world_without_a_way_is_named():
+    assert why("result", [], case={**CASE, "shortest": {"study": float("inf")}}) == [
+        "why: the world itself leaves a robot of 0.40 m no way to goal study"
+    ]
+
+
+def test_what_the_robot_stands_at_is_named():
+    (line,) = why("stuck", box(1, "crate", 4.6, 0, 0.4, 0.4, "crate falls"), case={**CASE, "passages": []})
+    assert line == "why: crate (spawned by event `crate falls` at t = 1.00 s) was 0.20 m from the robot"
+
+
+def test_the_gap_that_is_too_narrow_is_named_with_the_world_that_leaves_no_way():
+    gap = ["study", [5, 0.15], [5, -0.15], "west wall", "east wall"]
+    (line,) = why("result", [], case={**CASE, "shortest": {"study": float("inf")}, "passages": [gap]})
+    assert line.endswith(
+        "no way to goal study: the widest is the passage of 0.30 m between `west wall` and `east wall` at (5.00, 0.00)"
+    )
+
+
+def test_what_it_touches_and_has_touched_since_is_named():
+    touches = [[3, "collision.started", "sill", {}], [4, "collision.ended", "sill", {}]]
+    assert why("stuck", touches) == []
+    assert why("stuck", [*touches, [6, "collision.started", "sill", {}]]) == [
+        "why: it had touched sill since t = 6.00 s"
+    ]
+    assert why("stuck", [[6, "collision.started", "sill", {}]], at=5) == []
+
+
+def test_only_a_goal_that_is_still_wanted_has_something_in_its_way():
+    crate = box(1, "crate", 5, 0, 0.6, 2.0, "crate falls")
+    assert why("stuck", crate, at=9)
+    reached = [[0, "goal.accepted", "study"], [8, "goal.reached", "study"]]
+    built = sketch({**STANDS, "events": [*reached, *crate]})
+    assert causes("stuck", 2160, built, sketch_case(CASE)) == []
+    assert causes("goals_reached", 1920, built, sketch_case(CASE)) == []
+
+
+def test_after_the_goal_has_failed_it_is_still_the_one_that_was_kept():
+    crate = box(1, "crate", 5, 0, 0.6, 2.0, "crate falls")
+    failed = [[0, "goal.accepted", "study"], [8, "goal.failed", "study", {}], *crate]
+    built = sketch({**STANDS, "events": failed})
+    assert len(causes("result", 2400, built, sketch_case(CASE))) == 1
+
+
+def test_what_closes_the_way_and_is_near_is_told_once_and_what_else_is_near_as_well():
+    case = {**CASE, "passages": [["study", [4.6, 0.5], [4.6, -0.5], "a", "b"]]}
+    crate = box(1, "crate", 4.6, 0, 0.4, 2.0, "crate falls")
+    (line,) = why("result", crate, case=case)
+    assert "closes" in line
+    bin_ = box(2, "bin", 4, 0.4, 0.2, 0.2, "bin rolls")
+    assert [line.split(" (")[0] for line in why("result", [*crate, *bin_], case=case)] == ["why: crate", "why: bin"]
+
+
+def test_what_was_there_from_the_start_is_told_beside_what_else_was():
+    case = {**CASE, "passages": [["study", [4.6, 0.5], [4.6, -0.5], "a", "b"]]}
+    events = [*box(0, "door", 4.6, 0, 0.1, 2.0), *box(0, "bin", 4, 0.4, 0.2, 0.2)]
+    assert [line.split()[1] for line in why("result", events, case=case)] == ["door", "bin"]
+
+
+def test_what_is_further_than_thirty_centimetres_holds_nobody():
+    assert why("stuck", box(1, "crate", 4.75, 0, 0.4, 0.4, "falls"), case={**CASE, "passages": []}) == []

@@ -1,0 +1,78 @@
+"""What can move, where it stands, and how far away that is."""
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from simscen.judge.sketch import sketch
+from simscen.judge.why.things import things
+
+SQUARE = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]
+NOTCHED = [[0, 0], [3, 0], [3, 3], [2, 3], [2, 1], [1, 1], [1, 3], [0, 3]]
+
+
+def spawned(at, name, x, y, yaw=0.0, parts=(SQUARE,)):
+    return [at, "object.spawned", name, {"x": x, "y": y, "yaw": yaw, "parts": list(parts)}]
+
+
+def there(events, at, **words):
+    return things(sketch({"seconds": 10, "truth": [[0, 0, 0]], "events": events, **words}), round(at * 240))
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.floats(-4, 4), st.floats(-4, 4), st.floats(-3.1, 3.1), st.sampled_from([SQUARE, NOTCHED]))
+def test_the_distance_is_shapelys(x, y, yaw, outline):
+    (thing,) = there([spawned(1, "thing", 0.5, -0.5, yaw, [outline])], 2)
+    theirs = shapely.Polygon(thing.outlines[0]).distance(shapely.Point(x, y))
+    assert thing.distance(np.array([[x, y]]))[0] == pytest.approx(theirs, abs=1e-9)
+
+
+def test_of_several_parts_the_nearest_counts():
+    far = [[9, 9], [10, 9], [10, 10]]
+    (thing,) = there([spawned(1, "table", 0, 0, parts=[far, SQUARE])], 2)
+    assert thing.distance(np.array([[1.5, 0.0], [9.9, 9.5]])).tolist() == pytest.approx([1.0, 0.0])
+
+
+def test_a_thing_is_there_from_when_it_came_until_it_went():
+    events = [spawned(2, "crate", 3, 0), [5, "object.removed", "crate", {}], spawned(7, "crate", 4, 0)]
+    assert [len(there(events, at)) for at in (1.9, 2, 4.9, 5, 6.9, 7)] == [0, 1, 1, 0, 0, 1]
+    assert there(events, 8)[0].outlines[0].mean(axis=0).tolist() == [4.0, 0.0]
+
+
+def test_it_stands_where_it_was_seen_last_not_where_one_of_its_name_stood_before():
+    events = [spawned(0, "cart", 0, 0), [4, "object.removed", "cart", {}], spawned(6, "cart", 5, 0)]
+    way = {"cart": [[0, 0, 0], [3, 3, 0], [6, 3, 0], [8, 9, 0]]}
+    assert there(events, 2, objects=way)[0].outlines[0].mean(axis=0).tolist() == pytest.approx([2.0, 0.0])
+    assert there(events, 7, objects=way)[0].outlines[0].mean(axis=0).tolist() == pytest.approx([6.0, 0.0])
+
+
+def test_what_an_event_did_is_told_of_what_it_did_it_to():
+    events = [
+        spawned(0, "bin", 9, 9),
+        [1, "event.started", "crate falls", {}],
+        spawned(1, "crate", 3, 0),
+        [1, "event.ended", "crate falls", {}],
+        [2, "event.started", "cart comes", {}],
+        [2, "object.moved", "crate", {}],
+        [2, "event.ended", "cart comes", {}],
+    ]
+    trace = sketch({"seconds": 10, "truth": [[0, 0, 0]], "events": events})
+    assert [thing.told(trace) for thing in things(trace, 300)] == [
+        "bin",
+        "crate (spawned by event `crate falls` at t = 1.00 s)",
+    ]
+    assert [thing.told(trace) for thing in things(trace, 480)][1:] == [
+        "crate (moved by event `cart comes` at t = 2.00 s)"
+    ]
+
+
+def test_what_has_no_outline_at_the_height_of_a_robot_is_in_nobodys_way():
+    assert there([spawned(0, "lamp", 0, 0, parts=[])], 1) == []
+
+
+def test_one_that_replaces_another_of_its_name_stands_where_it_was_put():
+    events = [spawned(0, "cart", 0, 0), spawned(6, "cart", 5, 0)]
+    way = {"cart": [[0, 0, 0], [6, 0, 0], [6.025, 5, 0], [10, 5, 0]]}
+    assert [there(events, at, objects=way)[0].outlines[0].mean(axis=0)[0] for at in (5.9, 6, 7)] == [0.0, 5.0, 5.0]

@@ -1,0 +1,41 @@
+"""Sketched failures: a robot that does not reach the study, and what happened on the way."""
+
+from simscen.judge.sketch import sketch, sketch_case
+from simscen.judge.why.cause import causes
+
+GOAL = {"name": "study", "pose": [8, 0, 0]}
+DOOR = ["study", [5, 0.5], [5, -0.5], "west wall", "east wall"]
+CASE = {
+    "goals": [GOAL],
+    "passages": [DOOR],
+    "inscribed_radius": 0.2,
+    "footprint": [[0.3, 0.2], [-0.3, 0.2], [-0.3, -0.2]],
+}
+STANDS = {"seconds": 10, "truth": [[0, 0, 0], [4, 4, 0], [10, 4, 0]]}
+REFUSED = [[0, "goal.accepted", "study"], [10, "goal.failed", "study", {"error_name": "NO_VALID_PATH"}]]
+
+
+def box(at, name, x, y, length, width, event=""):
+    half, side = length / 2, width / 2
+    corners = [[-half, -side], [half, -side], [half, side], [-half, side]]
+    spawned = [at, "object.spawned", name, {"x": x, "y": y, "yaw": 0.0, "parts": [corners]}]
+    return by(event, at, spawned) if event else [spawned]
+
+
+def by(event, at, *what):
+    effects = [{"happened": True, "what": "something"}]
+    started, ended = [at, "event.started", event, {"entry": 0}], [at, "event.ended", event, {"effects": effects}]
+    return [started, *what, ended]
+
+
+def why(criterion, events, at=10, trace=STANDS, case=CASE, **changes):
+    built = sketch({**trace, "events": [*REFUSED, *events], **changes})
+    return causes(criterion, round(at * 240), built, sketch_case(case))
+
+
+def slip(begin, felt, end=None, name="odom.slip", kind="slip"):
+    told = [
+        [begin, "fault.started", name, {"entry": 0, "fault": kind}],
+        [felt, "fault.took_effect", name, {"entry": 0}],
+    ]
+    return [*told, *([[end, "fault.ended", name, {"entry": 0}]] if end else [])]

@@ -1,0 +1,219 @@
+"""What a session promises: every run is answered exactly once, and no fault is ever reported as a pass."""
+
+import contextlib
+import os
+import re
+import signal
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from simscen.core.errors import Exit
+from simscen.core.result import Outcome
+from simscen.core.sessionevents import RunFinished, RunProgress, RunStarted
+from simscen.loading.scenario import load_scenario
+from simscen.run.process import supervisor
+from simscen.run.process.supervisor import Interrupted
+from simscen.run.session import Options, plan, run_session
+
+ENTRY = (str(Path(__file__).with_name("faulty_zygote.py")),)
+SCENARIO = """
+simscen: 1
+tags: [{fault}]
+world: {{simscen: 1, walls: [{{points: [[0, 0], [9, 0]]}}]}}
+robot: {{pose: {{x: 1, y: 1}}}}
+pass: [{{collisions: {{max: 0}}}}]
+"""
+
+
+@pytest.fixture
+def session(tmp_path):
+    def run(*faults, events=None, entry=ENTRY, **options):
+        scenarios = []
+        for number, fault in enumerate(faults):
+            file = tmp_path / f"{number}-{fault}.scenario.yaml"
+            file.write_text(SCENARIO.format(fault=fault))
+            scenarios.append(load_scenario(file, tmp_path))
+        chosen = Options(**{"wall_limit": 20.0, **options})
+        heard = [] if events is None else events
+        answers, stopped = run_session(plan(scenarios, chosen, tmp_path / "out"), chosen, entry, heard.append)
+        return {answer.key.scenario.partition("-")[2]: answer for answer in answers}, stopped
+
+    return run
+
+
+def test_a_run_that_ends_well_is_answered_with_its_result(session):
+    events = []
+    answers, stopped = session("fine", events=events)
+    assert answers["fine"].outcome is Outcome.PASSED
+    assert stopped is None
+    assert [type(event) for event in events[:2]] == [RunStarted, RunProgress]
+    assert events[1].simulated == 1.5
+
+
+@pytest.mark.parametrize(
+    ("fault", "kind", "told"),
+    [
+        ("segfault", "crashed", "crashed: SIGSEGV"),
+        ("kill", "crashed", "killed (SIGKILL; possibly out of memory; peak memory"),
+        ("exit-0", "crashed", "exited 0 without a result"),
+        ("sys-exit", "crashed", "exited 0"),
+        ("exception", "crashed", "ZeroDivisionError: the controller divided by zero (faulty_zygote.py:"),
+        ("memory", "out-of-memory", "more memory than it may"),
+        ("garbled", "crashed", "its result cannot be read"),
+        ("grandchild", "crashed", "left a process behind"),
+        ("daemon", "crashed", "left a process behind"),
+        ("daemon-crash", "crashed", "crashed: SIGSEGV"),
+        ("prepare-segfault", "crashed", "was killed (SIGSEGV) while it prepared this one, in string_at (__init__.py:"),
+        ("prepare-exit", "crashed", "exited 0"),
+        ("prepare-memory", "out-of-memory", "more memory than it may"),
+    ],
+)
+def test_a_fault_is_an_error_that_says_what_happened_and_leaves_its_neighbours_alone(session, fault, kind, told):
+    answers, _ = session(fault, "fine", workers=2)
+    assert answers[fault].outcome is Outcome.ERROR
+    assert answers[fault].result.error.kind == kind
+    assert told in answers[fault].result.error.message
+    assert answers["fine"].outcome is Outcome.PASSED
+    assert not daemons()
+
+
+def daemons():
+    """The processes that faulty_zygote's daemon left, wherever they are."""
+    found = []
+    for entry in os.scandir("/proc"):
+        with contextlib.suppress(OSError):
+            if entry.name.isdigit() and b"61.25" in Path(entry.path, "cmdline").read_bytes().split(b"\0"):
+                found.append(entry.name)
+    return found
+
+
+def test_the_log_of_a_crashed_worker_shows_where_it_was(session):
+    answers, _ = session("segfault")
+    assert "faulty_zygote.py" in answers["segfault"].result.error.tail
+
+
+@pytest.mark.parametrize("fault", ["hang", "deaf"])
+def test_a_run_beyond_its_wall_limit_is_killed_and_told(session, fault):
+    answers, _ = session(fault, wall_limit=1.0)
+    assert answers[fault].result.error.kind == "timeout"
+
+
+def test_of_a_flood_the_log_keeps_the_beginning_and_the_end(session, tmp_path, capfd):
+    answers, _ = session("flood")
+    assert answers["flood"].outcome is Outcome.PASSED
+    (log,) = tmp_path.rglob("worker.log")
+    text = log.read_bytes()
+    assert len(text) < 2 << 20
+    assert text.startswith(b"the beginning\nxxx")
+    assert text.endswith(b"xxx\nthe end\n")
+    assert re.search(rb"simscen left out \d+ bytes here", text)
+    assert capfd.readouterr().out == ""
+
+
+def test_when_the_warm_process_dies_its_runs_are_errors_and_the_rest_still_runs(session):
+    answers, _ = session("kill-parent", "fine")
+    assert answers["kill-parent"].result.error.kind == "crashed"
+    assert answers["fine"].outcome is Outcome.PASSED
+
+
+def test_a_neighbour_of_a_run_that_kills_the_warm_process_runs_again_by_itself(session):
+    answers, _ = session("kill-parent", "long", "fine", workers=2)
+    assert [name for name, answer in answers.items() if answer.outcome is Outcome.PASSED] == ["long", "fine"]
+    assert answers["kill-parent"].result.error.kind == "crashed"
+    assert "that prepares runs was killed (SIGKILL) while" in answers["kill-parent"].result.error.message
+
+
+def test_neighbours_of_a_world_whose_preparation_crashes_are_answered_once_and_pass(session):
+    events = []
+    answers, _ = session("long", "prepare-segfault", "fine", workers=2, events=events)
+    assert [name for name, answer in answers.items() if answer.outcome is Outcome.PASSED] == ["fine", "long"]
+    for kind in (RunStarted, RunFinished):
+        told = [event.key for event in events if isinstance(event, kind)]
+        assert len(told) == len(set(told)) == 3
+
+
+def test_a_preparation_that_hangs_in_c_is_a_timeout_with_its_stack(session, monkeypatch):
+    monkeypatch.setattr(supervisor, "SILENCE", 2.0)
+    answers, _ = session("prepare-hang", "fine", wall_limit=1.0)
+    assert answers["prepare-hang"].result.error.kind == "timeout"
+    assert ", in prepare (faulty_zygote.py:" in answers["prepare-hang"].result.error.message
+    assert answers["fine"].outcome is Outcome.PASSED
+
+
+def test_a_warm_process_that_is_stopped_is_replaced(session, monkeypatch):
+    monkeypatch.setattr(supervisor, "SILENCE", 2.0)
+    answers, _ = session("stop-parent", "fine")
+    assert "did not answer and was killed" in answers["stop-parent"].result.error.message
+    assert answers["fine"].outcome is Outcome.PASSED
+
+
+def test_a_warm_process_that_cannot_start_is_an_error_of_every_run_with_its_reason(session, tmp_path):
+    broken = tmp_path / "broken.py"
+    broken.write_text("import no_such_module")
+    answers, _ = session("fine", "hang", entry=(str(broken),))
+    assert [answer.outcome for answer in answers.values()] == [Outcome.ERROR] * 2
+    assert all("No module named 'no_such_module'" in answer.result.error.tail for answer in answers.values())
+
+
+def test_stray_bytes_on_the_pipes_are_no_message(session):
+    answers, _ = session("stray-bytes", "fine", workers=2)
+    assert answers["stray-bytes"].outcome is Outcome.PASSED
+    assert answers["fine"].outcome is Outcome.PASSED
+
+
+def test_what_is_printed_while_a_run_is_prepared_stands_in_its_log(session, tmp_path):
+    session("prepare-memory")
+    (log,) = tmp_path.rglob("worker.log")
+    assert log.read_text().startswith("growing\n")
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root writes everywhere")
+def test_a_folder_that_cannot_be_written_is_an_error_that_says_so(session, tmp_path):
+    (tmp_path / "out").mkdir(mode=0o500)
+    answers, _ = session("fine")
+    assert "Permission denied" in answers["fine"].result.error.message
+
+
+def test_a_folder_that_cannot_be_made_is_an_error_that_says_so(session, tmp_path):
+    (tmp_path / "out").write_text("")
+    answers, _ = session("fine")
+    assert (answers["fine"].result.error.kind, "Not a directory writing" in answers["fine"].result.error.message) == (
+        "output",
+        True,
+    )
+
+
+def test_five_crashes_of_five_are_five_errors(session):
+    answers, _ = session("segfault", "kill", "exit-0", "exception", "sys-exit", workers=2)
+    assert [answer.outcome for answer in answers.values()] == [Outcome.ERROR] * 5
+
+
+def test_fail_fast_answers_the_rest_as_not_run(session):
+    answers, _ = session("exception", "fine", fail_fast=True)
+    assert answers["fine"].result.error.kind == "not-run"
+
+
+def test_an_interrupted_session_answers_every_run(session):
+    def interrupt(number, _):
+        raise Interrupted(number)
+
+    before = signal.signal(signal.SIGINT, interrupt)
+    events = []
+
+    def when_started():
+        while not any(isinstance(event, RunProgress) for event in events):
+            time.sleep(0.01)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    watcher = threading.Thread(target=when_started, daemon=True)
+    try:
+        watcher.start()
+        answers, stopped = session("hang", "fine", events=events)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert stopped is Exit.INTERRUPTED
+    assert answers["hang"].result.error.kind == "interrupted"
+    assert answers["fine"].result.error.kind == "not-run"
