@@ -1,9 +1,11 @@
 """A robot as a user writes it (`*.robot.yaml`)."""
 
+import math
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from simscen.core.mecanum import MecanumWheels
 from simscen.spec.base import Choice, Ranged, Spec, by_default
 from simscen.spec.objects import Shaped
 from simscen.spec.places import Name, PoseSpec, Ring
@@ -70,12 +72,37 @@ class Ackermann(Spec):
 
 
 class Omnidirectional(Spec):
-    """Moves in any direction (mecanum or omni wheels, idealised as a planar drive)."""
+    """Moves in any direction (omni wheels, idealised as a planar drive); its odometry sees every motion."""
 
     type: Literal["omnidirectional"]
 
 
-Drive = Annotated[Differential | SkidSteer | Ackermann | Omnidirectional, Field(discriminator="type")]
+class Mecanum(Spec):
+    """Four mecanum wheels: moves in any direction, with odometry from the wheels' encoders."""
+
+    type: Literal["mecanum"]
+    wheel_radius: PositiveLength
+    wheel_separation: PositiveLength
+    """Between the middles of the wheels on the left and on the right (track width)."""
+    wheel_base: PositiveLength
+    """Between the front and the rear axle."""
+    wheel_width: PositiveLength = 0.05
+    roller_angle: Annotated[Angle, Field(ge=0.1, le=1.4)] = 0.7853981633974483
+    """Between a roller's axis and the wheel's axle."""
+    left: JointNames | None = None
+    """Wheel joints of the URDF; default: found by position."""
+    right: JointNames | None = None
+
+    @property
+    def wheels(self) -> MecanumWheels:
+        """Their kinematics."""
+        slant = 1 / math.tan(self.roller_angle)
+        return MecanumWheels(self.wheel_radius, self.wheel_separation / 2, self.wheel_base / 2, slant)
+
+
+Holonomic = Omnidirectional | Mecanum
+"""Drives that can go sideways."""
+Drive = Annotated[Differential | SkidSteer | Ackermann | Omnidirectional | Mecanum, Field(discriminator="type")]
 
 
 class Limits(Spec):
@@ -86,7 +113,7 @@ class Limits(Spec):
     reverse: PositiveSpeed | None = None
     """Backward speed; default: as forward."""
     lateral: PositiveSpeed | None = None
-    """Sideways speed of an omnidirectional base; default: as forward."""
+    """Sideways speed of an omnidirectional or mecanum base; default: as forward."""
     angular: PositiveAngularSpeed
     linear_acceleration: PositiveAcceleration
     linear_deceleration: PositiveAcceleration | None = None

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from simscen.model.robot import Drive, SkidSteer
+from simscen.model.robot import Drive, Mecanum, SkidSteer
 from simscen.run.trialdrive import Rest, Trial, drive_once
 from simscen.sim.robot_body import RobotBody
 
@@ -115,6 +115,9 @@ def _track_that_fits(drive: Drive, turn: Trial, line: Trial) -> str:
     share = turn.odometry.turned / turn.truth.turned * line.truth.driven / line.odometry.driven
     if abs(share - 1) <= FITTING:
         return ""
+    if isinstance(drive, Mecanum):
+        lever = drive.wheels.lever
+        return f"half track + half base x cot(roller_angle) {lever:.4g} m: {lever * share:.4g} m fits"
     if isinstance(drive, SkidSteer):
         track = separation * drive.turning_scale * share
         return f"turning_scale {drive.turning_scale:.4g}: {drive.turning_scale * share:.4g} fits (track {track:.4g} m)"

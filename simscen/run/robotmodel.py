@@ -2,7 +2,7 @@
 
 import math
 
-from simscen.model.robot import Ackermann, Omnidirectional
+from simscen.model.robot import Ackermann, Holonomic
 from simscen.sim.robot_body import RobotBody
 from simscen.stack.protocols import RobotModel
 
@@ -10,7 +10,7 @@ from simscen.stack.protocols import RobotModel
 def robot_model(body: RobotBody) -> RobotModel:
     """The datasheet of a body."""
     limits, drive = body.limits, body.drive
-    holonomic = isinstance(drive, Omnidirectional)
+    holonomic = isinstance(drive, Holonomic)
     return RobotModel(
         footprint=body.footprint,
         radius=body.radius,

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from simscen.core.motion import Twist
-from simscen.model.robot import Drive, Omnidirectional, SkidSteer
+from simscen.model.robot import Drive, Mecanum, Omnidirectional, SkidSteer
 
 Rolled = tuple[float, ...]
 Kinematics = Callable[[Rolled], Twist]
@@ -12,10 +12,13 @@ Kinematics = Callable[[Rolled], Twist]
 def kinematics_of(drive: Drive) -> Kinematics:
     """Turns an increment of `SensorView.encoders` into a motion of the base in its own frame (m, m, rad).
 
-    Siegwart, Nourbakhsh and Scaramuzza, Introduction to Autonomous Mobile Robots, section 3.2.
+    Siegwart, Nourbakhsh and Scaramuzza, Introduction to Autonomous Mobile Robots, section 3.2; mecanum wheels: see
+    MecanumWheels.
     """
     if isinstance(drive, Omnidirectional):
         return _omnidirectional
+    if isinstance(drive, Mecanum):
+        return _mecanum(drive)
     separation = drive.wheel_separation * (drive.turning_scale if isinstance(drive, SkidSteer) else 1.0)
     return _sided(drive.wheel_radius, separation)
 
@@ -24,6 +27,14 @@ def _sided(radius: float, separation: float) -> Kinematics:
     def motion(rolled: Rolled) -> Twist:
         left, right = rolled[0] * radius, rolled[1] * radius
         return Twist((left + right) / 2, 0.0, (right - left) / separation)
+
+    return motion
+
+
+def _mecanum(drive: Mecanum) -> Kinematics:
+    def motion(rolled: Rolled) -> Twist:
+        front_left, front_right, rear_left, rear_right = rolled
+        return drive.wheels.motion((front_left, front_right, rear_left, rear_right))
 
     return motion
 

@@ -25,8 +25,9 @@ class SensorView(Protocol):
     def encoders(self) -> tuple[float, ...]:
         """What has been rolled so far.
 
-        On wheels: the mean angle in rad of the driven wheels on the left, and of those on the right. Omnidirectional:
-        metres forward, metres to the left, and radians.
+        On wheels: the mean angle in rad of the driven wheels on the left, and of those on the right. Mecanum: the
+        angles in rad of the wheels front left, front right, rear left, rear right. Omnidirectional: metres forward,
+        metres to the left, and radians.
         """
         ...
 

@@ -4,8 +4,9 @@ from typing import Protocol
 
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.motion import Twist
-from simscen.model.robot import Ackermann, Differential, Omnidirectional, SkidSteer
+from simscen.model.robot import Ackermann, Differential, Mecanum, Omnidirectional, SkidSteer
 from simscen.sim.ackermann import AckermannDrive
+from simscen.sim.mecanum import MecanumDrive
 from simscen.sim.planar import OmnidirectionalDrive, PlanarBase
 from simscen.sim.robot_body import RobotBody
 from simscen.sim.vehicle import Vehicle
@@ -60,8 +61,9 @@ class Drive(Protocol):
     def encoders(self) -> tuple[float, ...]:
         """What has been rolled so far.
 
-        On wheels: the mean angle in rad of the driven wheels on the left, and of those on the right. Omnidirectional:
-        metres forward, metres to the left, and radians.
+        On wheels: the mean angle in rad of the driven wheels on the left, and of those on the right. Mecanum: the
+        angles in rad of the wheels front left, front right, rear left, rear right. Omnidirectional: metres forward,
+        metres to the left, and radians.
         """
         ...
 
@@ -72,6 +74,9 @@ def build(client: int, body: RobotBody, pose: Pose2, period: float) -> tuple[Bas
         case Omnidirectional():
             base = PlanarBase(client, body, pose)
             return base, OmnidirectionalDrive(base, body, period)
+        case Mecanum():
+            base = PlanarBase(client, body, pose)
+            return base, MecanumDrive(base, body, period)
         case Ackermann():
             vehicle = Vehicle(client, body, pose)
             return vehicle, AckermannDrive(client, vehicle, body, period)

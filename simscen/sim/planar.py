@@ -1,4 +1,4 @@
-"""A base that moves in any direction: mecanum or omni wheels, idealised as a motor for each direction."""
+"""A base that moves in any direction, idealised as a motor for each direction."""
 
 import math
 
@@ -7,7 +7,7 @@ import pybullet
 from simscen.core.geometry import Pose2, Pose3, wrap
 from simscen.core.motion import STOP, Twist
 from simscen.sim import engine
-from simscen.sim.inertia import GRAVITY
+from simscen.sim.inertia import GRAVITY, MassProperties, combined
 from simscen.sim.ramp import Ramp
 from simscen.sim.robot_body import RobotBody
 
@@ -20,17 +20,17 @@ SLED = 0.001
 
 
 class PlanarBase:
-    """A hull on three joints from the world: along x, along y, about z. It cannot tip, and has no wheels to slip."""
+    """A hull on three joints from the world: along x, along y, about z. It cannot tip, and no wheel slips."""
 
     def __init__(self, client: int, body: RobotBody, pose: Pose2) -> None:
         self._client = client
-        moments, base_from_centre = body.chassis.principal()
+        moments, base_from_centre = _whole(body).principal()
         sleds = 2
         hulls = engine.hull_shapes(client, body.solid)
         extra = len(hulls) - 1
         self.id: int = pybullet.createMultiBody(
             0,
-            linkMasses=[SLED] * sleds + [body.chassis.mass] + [SLED] * extra,
+            linkMasses=[SLED] * sleds + [body.mass] + [SLED] * extra,
             linkCollisionShapeIndices=[-1] * sleds + hulls,
             linkVisualShapeIndices=[-1] * (sleds + len(hulls)),
             linkPositions=[(0, 0, 0)] * (sleds + len(hulls)),
@@ -96,6 +96,12 @@ class PlanarBase:
         )
 
 
+def _whole(body: RobotBody) -> MassProperties:
+    """The chassis with its wheels, if it has any: they do not move in it."""
+    wheels = [wheel.inertia.placed(Pose3(wheel.x, wheel.y, wheel.radius)) for wheel in body.wheels]
+    return combined([body.chassis, *wheels]) if wheels else body.chassis
+
+
 class OmnidirectionalDrive:
     """Follows any twist; its encoders see every motion over the ground, in the base frame."""
 
@@ -113,13 +119,17 @@ class OmnidirectionalDrive:
     def advance(self) -> None:
         """Turn the motors' velocity with the base, half a period ahead, so that it drives arcs."""
         changed = self._ramp.advance()
-        velocity = self._ramp.velocity
+        velocity = self._driven(self._ramp.velocity)
         if not changed and velocity == STOP:
             return
         self._count()
         heading = self._seen.yaw + velocity.wz * self._period / 2
         c, s = math.cos(heading), math.sin(heading)
         self._base.motors(Twist(c * velocity.vx - s * velocity.vy, s * velocity.vx + c * velocity.vy, velocity.wz))
+
+    def _driven(self, velocity: Twist) -> Twist:
+        """What the motors make of a velocity."""
+        return velocity
 
     def rest(self) -> None:
         """Start again from standstill."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from simscen.core.geometry import Pose3
 from simscen.core.shapes import Box, Cylinder, Solid, Sphere
 from simscen.core.world import Polygon
-from simscen.model.robot import Ackermann, Differential, Drive, Omnidirectional, SkidSteer
+from simscen.model.robot import Ackermann, Differential, Drive, Mecanum, Omnidirectional, SkidSteer
 from simscen.sim.inertia import GRAVITY, MassProperties, of_shape
 from simscen.sim.outline import footprint
 
@@ -68,7 +68,7 @@ def wheels_of(drive: Drive, mass: float) -> tuple[Wheel, ...]:
             return ()
         case Differential():
             axles = {"wheel": 0.0}
-        case SkidSteer():
+        case SkidSteer() | Mecanum():
             axles = {"rear": -drive.wheel_base / 2, "front": drive.wheel_base / 2}
         case Ackermann():
             axles = {"rear": 0.0, "front": drive.wheel_base}
@@ -89,7 +89,9 @@ def wheel_inertia(mass: float, radius: float, width: float) -> MassProperties:
 
 
 def motorised(wheels: tuple[Wheel, ...], drive: Drive, mass: float) -> tuple[Wheel, ...]:
-    """The wheels with motors that suit a robot of this mass in kg."""
+    """The wheels with motors that suit a robot of this mass in kg; a planar base has its own."""
+    if isinstance(drive, Mecanum):
+        return wheels
     grip = mass * GRAVITY / max(1, sum(wheel.driven for wheel in wheels))
     return tuple(
         replace(

@@ -8,7 +8,7 @@ import yaml
 
 from simscen.core.geometry import Pose2
 from simscen.core.motion import STOP, Twist
-from simscen.model.robot import RobotSpec
+from simscen.model.robot import Holonomic, RobotSpec
 from simscen.sim.embody import robot_body
 from simscen.sim.simulation import Simulation
 from simscen.worlds.meshing import fuse, triangulate
@@ -28,13 +28,13 @@ def robot(request):
 
 def test_all_kinds_of_drive_ship():
     drives = {yaml.safe_load((ROBOTS / f"{name}.robot.yaml").read_text())["drive"]["type"] for name in NAMES}
-    assert drives == {"differential", "skid_steer", "ackermann", "omnidirectional"}
+    assert drives == {"differential", "skid_steer", "ackermann", "omnidirectional", "mecanum"}
 
 
 def test_given_any_command_then_neither_speeds_nor_accelerations_exceed_the_limits(robot):
     spec, simulation = robot
     limits, chance = spec.limits, random.Random(5)
-    lateral = limits.lateral or limits.linear if spec.drive.type == "omnidirectional" else 0.0
+    lateral = limits.lateral or limits.linear if isinstance(spec.drive, Holonomic) else 0.0
     fastest = max(limits.linear_acceleration, limits.linear_deceleration or 0.0)
     before = STOP
     for _ in range(40):
@@ -44,7 +44,7 @@ def test_given_any_command_then_neither_speeds_nor_accelerations_exceed_the_limi
         # Wheels that slip sideways let a base swing out a little further than was asked of it.
         assert -(limits.reverse or limits.linear) * 1.05 <= now.vx <= limits.linear * 1.05
         assert abs(now.wz) <= limits.angular * 1.3
-        if spec.drive.type == "omnidirectional":
+        if isinstance(spec.drive, Holonomic):
             assert abs(now.vy) <= lateral * 1.01
         if spec.drive.type == "differential":
             assert abs(now.vx - before.vx) <= fastest * (24 + FIRMWARE) / 240 * 1.1

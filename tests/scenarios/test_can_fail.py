@@ -56,6 +56,9 @@ CHANGES = {
     "robots/omni_patrol": [
         ("localization_error", [NO_LOCALIZER, DRIFTING_ODOMETRY]),
     ],
+    "robots/mecanum_errand": [
+        ("localization_error", [NO_LOCALIZER, DRIFTING_ODOMETRY]),
+    ],
     "robots/amr_aisle": [("time_to_goal", [("stack.controller.desired_linear_vel", 0.3)])],
     "localization/wrong_initial_estimate": [("localization_error", [NO_LOCALIZER])],
 }

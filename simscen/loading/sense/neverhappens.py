@@ -10,7 +10,7 @@ from simscen.loading.loaded import LoadedScenario
 from simscen.loading.names import event_names, own_goal_names
 from simscen.loading.tree import Key
 from simscen.model.disturbance import EventEntry
-from simscen.model.robot import RobotSpec
+from simscen.model.robot import Holonomic, RobotSpec
 from simscen.triggers.trigger import Test, Trigger
 
 Keys = tuple[Key, ...]
@@ -178,7 +178,7 @@ def top_speed(robot: RobotSpec) -> float:
     """In m/s over ground, in whichever direction it drives fastest."""
     limits = robot.limits
     ahead = max(limits.linear, limits.reverse or limits.linear)
-    sideways = (limits.lateral or limits.linear) if robot.drive.type == "omnidirectional" else 0.0
+    sideways = (limits.lateral or limits.linear) if isinstance(robot.drive, Holonomic) else 0.0
     return float((ahead**2 + sideways**2) ** 0.5)
 
 

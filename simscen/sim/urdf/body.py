@@ -10,7 +10,7 @@ from simscen.core.errors import InvalidInput
 from simscen.core.geometry import Pose3
 from simscen.core.problems import Problem
 from simscen.core.shapes import Solid
-from simscen.model.robot import Omnidirectional, RobotSpec
+from simscen.model.robot import Mecanum, Omnidirectional, RobotSpec
 from simscen.sim.ground import GROUND_CLEARANCE
 from simscen.sim.inertia import MassProperties, combined
 from simscen.sim.outline import extremes
@@ -92,6 +92,8 @@ def body_of_tree(spec: RobotSpec, tree: Tree) -> RobotBody:
 def _check_wheels(spec: RobotSpec, tree: Tree, wheels: list[WheelJoint]) -> None:
     if isinstance(spec.drive, Omnidirectional):
         return
+    if isinstance(spec.drive, Mecanum):
+        _check_corners(tree, wheels)
     driven = [wheel for wheel in wheels if not wheel.steered]
     sides = {wheel.place[1] > 0 for wheel in driven}
     if len(sides) < 2:
@@ -101,6 +103,17 @@ def _check_wheels(spec: RobotSpec, tree: Tree, wheels: list[WheelJoint]) -> None
         hint = "name the steering joints in the drive's `steering`"
         raise InvalidInput([tree.element.problem("no steered wheels found", hint)])
     refuse_rear_steering(wheels)
+
+
+def _check_corners(tree: Tree, wheels: list[WheelJoint]) -> None:
+    """Raises InvalidInput unless there is one wheel at each corner, as mecanum wheels must be."""
+    middle = np.mean([wheel.place[:2] for wheel in wheels], axis=0) if wheels else (0.0, 0.0)
+    corners = {(wheel.place[0] > middle[0], wheel.place[1] > middle[1]) for wheel in wheels}
+    if len(wheels) != 4 or len(corners) != 4:
+        names = ", ".join(wheel.joint.name for wheel in wheels) or "none"
+        message = f"a mecanum drive has one wheel at each of four corners; found: {names[:200]}"
+        hint = "name the four wheel joints in the drive's `left` and `right`"
+        raise InvalidInput([tree.element.problem(message, hint)])
 
 
 def refuse_rear_steering(wheels: Sequence[WheelJoint]) -> None:

@@ -73,7 +73,7 @@ def figures(check):
     return figures
 
 
-@pytest.mark.parametrize("name", ["amr", "car", "jackal", "omni", "turtlebot"])
+@pytest.mark.parametrize("name", ["amr", "car", "jackal", "mecanum", "omni", "turtlebot"])
 def test_every_shipped_robot_drives_what_it_is_told(check, name):
     code, told, _ = check(name)
     assert code == 0, told
@@ -166,6 +166,32 @@ def test_a_load_that_drags_a_skid_steered_base_off_its_spot_is_told(check):
     assert code == 1
     assert "FAILED  turn: off the spot" in told
     assert "behind the middle of its wheels" in told
+
+
+MECANUM = "{{type: mecanum, wheel_radius: 0.05, wheel_separation: {}, wheel_base: 0.4}}"
+
+
+def test_a_urdf_with_four_mecanum_wheels_goes_sideways_where_its_robot_yaml_says_so(figures):
+    four = wheels(x=-0.2, name="rear_") + wheels(x=0.2, name="front_")
+    found = figures("cart.robot.yaml", cart_urdf=urdf(four), cart_robot_yaml=robot_yaml(MECANUM.format(0.4)))
+    assert found["passed"] and not found["problems"]
+    (sideways,) = (trial for trial in found["trials"] if trial["name"] == "sideways")
+    assert sideways["truth"]["end"]["y"] == pytest.approx(2.0, abs=0.01)
+
+
+def test_mecanum_wheels_that_stand_otherwise_than_the_drive_reckons_are_told(check):
+    four = wheels(x=-0.2, name="rear_") + wheels(x=0.2, name="front_")
+    code, told, _ = check("cart.robot.yaml", cart_urdf=urdf(four), cart_robot_yaml=robot_yaml(MECANUM.format(0.5)))
+    assert code == 1
+    assert "wheel_separation is 0.5 m here, but 0.4 m in cart.urdf" in told
+    assert "cot(roller_angle) 0.45 m: 0.4 m fits" in told
+
+
+def test_two_mecanum_wheels_are_refused(check):
+    files = {"cart_urdf": urdf(wheels()), "cart_robot_yaml": robot_yaml(MECANUM.format(0.4))}
+    code, _, told = check("cart.robot.yaml", **files)
+    assert code == 2
+    assert "a mecanum drive has one wheel at each of four corners; found: left_joint, right_joint" in told
 
 
 def test_the_same_robot_gives_the_same_figures_and_picture(check, tmp_path):

@@ -56,7 +56,7 @@ def test_a_missing_type_lists_the_types() -> None:
         "simscen: 1\nname: r\nurdf: a\nsensors: {}\ndrive: {wheel_radius: 1}\n" + LIMITS,
     )[0]
     assert problem.message == "missing key `type` in `drive`"
-    assert problem.hint == "expected one of: differential, skid_steer, ackermann, omnidirectional"
+    assert problem.hint == "expected one of: differential, skid_steer, ackermann, omnidirectional, mecanum"
 
 
 def test_a_mapping_may_be_expected_where_a_type_would_tell_which() -> None:

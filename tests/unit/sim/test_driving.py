@@ -84,6 +84,28 @@ def test_an_omnidirectional_base_goes_sideways_and_drives_arcs(simulate):
     assert length / turned == pytest.approx(0.5, rel=2e-3)
 
 
+def test_a_mecanum_base_goes_diagonally_on_two_of_its_wheels_and_its_encoders_know(simulate):
+    """Closed form: each of the two wheels rolls vx + vy over the radius a second, the others stand."""
+    simulation = simulate("mecanum", drive=(0.3, 0.3, 0.0))
+    simulation.step(2 * TICKS)
+    before = simulation.encoders()
+    simulation.step(TICKS)
+    rolled = [b - a for a, b in zip(before, simulation.encoders(), strict=True)]
+    assert rolled == pytest.approx([0.0, 0.6 / 0.0475, 0.6 / 0.0475, 0.0], abs=1e-4)
+    assert simulation.truth().twist == pytest.approx((0.3, 0.3, 0.0), abs=1e-6)
+
+
+def test_a_mecanum_base_turns_by_its_wheels_over_half_its_length_and_width(simulate):
+    """Closed form: (lx + ly) wz / r, forwards on the right."""
+    simulation = simulate("mecanum", drive=(0.0, 0.0, 1.0))
+    simulation.step(2 * TICKS)
+    before = simulation.encoders()
+    simulation.step(TICKS)
+    rolled = [b - a for a, b in zip(before, simulation.encoders(), strict=True)]
+    wheel = (0.235 + 0.15) / 0.0475
+    assert rolled == pytest.approx([-wheel, wheel, -wheel, wheel], rel=1e-4)
+
+
 def test_a_car_cannot_turn_in_place_nor_tighter_than_its_steering(simulate):
     simulation = simulate("car", drive=(0.0, 0.0, 1.0))
     simulation.step(2 * TICKS)
