@@ -39,7 +39,7 @@ def _row(trial: "Trial") -> str:
 
 def _line(check: "Check") -> str:
     verdict = "ok" if check.held else "FAILED"
-    told = f"  {verdict:7} {check.name:36} {check.value:9.3f}, at most {check.limit:g} {check.unit}"
+    told = f"  {verdict:7} {check.name:36} {check.value:9.3f}, at most {check.limit:.3g} {check.unit}"
     return told if check.held or not check.advice else f"{told}\n          {check.advice}"
 
 

@@ -16,12 +16,12 @@ HEADING, TILT = math.radians(2.0), math.radians(3.0)
 """rad: heading at the end of the line, and how far the base may lean at any time."""
 FITTING = 0.005
 """Share by which a dimension that fits may be off."""
-ROLLING = (0.02, 0.02, 0.02, 0.02)
-SKIDDING = (0.10, 0.03, 0.04, 0.10)
+ROLLING = (0.02, 0.02, 0.02, 0.05)
+SKIDDING = (0.10, 0.03, 0.04, 0.50)
 """Angle turned over commanded, and over what the encoders say; end of the square by odometry from the true one, over
-the way driven; m off the spot while turning on it. Wheels that skid turn a base as if they stood further apart, by a
-ratio that changes with load and speed: no track fits every turn (Mandow et al., Experimental kinematics for wheeled
-skid-steer mobile robots, IROS 2007)."""
+the way driven; off the spot while turning on it, over the radius that the base takes to turn. Wheels that skid turn a
+base as if they stood further apart, by a ratio that changes with load and speed: no track fits every turn (Mandow et al.,
+Experimental kinematics for wheeled skid-steer mobile robots, IROS 2007)."""
 
 
 @dataclass(frozen=True)
@@ -75,9 +75,8 @@ def _checks(body: RobotBody, rest: Rest, trials: dict[str, Trial]) -> Iterator[C
     yield _share(f"{turn.name}: turned, from commanded", turn.truth.turned, turn.command.turned, turned, advice)
     yield _share(f"{turn.name}: odometry, from true angle", turn.odometry.turned, turn.truth.turned, reckoned, advice)
     if turn.name == "turn":
-        x = float(body.chassis.centre[0])
-        advice = f"its mass lies {abs(x):.3f} m {'ahead of' if x > 0 else 'behind'} the middle of its wheels"
-        yield Check("turn: off the spot", max(math.hypot(p.x, p.y) for p in turn.truth.path), off, "m", advice)
+        far = max(math.hypot(pose.x, pose.y) for pose in turn.truth.path)
+        yield Check("turn: off the spot", far, off * body.circumscribed_radius, "m", _offset(body))
     if sideways := trials.get("sideways"):
         yield _share("sideways: driven, from commanded", sideways.truth.driven, sideways.command.driven, STRAIGHT)
         yield _share("sideways: odometry, from true", sideways.odometry.driven, sideways.truth.driven, SLIP)
@@ -97,6 +96,14 @@ def _share(name: str, value: float, right: float, limit: float, advice: str = ""
 
 def _degrees(angle: float) -> float:
     return abs(math.degrees(angle))
+
+
+def _offset(body: RobotBody) -> str:
+    """Where the mass is: wheels that skid turn about a place nearer to it."""
+    x, y, _ = body.chassis.centre.tolist()
+    along = f"{abs(x):.3f} m {'ahead of' if x > 0 else 'behind'}"
+    across = f"{abs(y):.3f} m to the {'left' if y > 0 else 'right'} of"
+    return f"its mass lies {along if abs(x) >= abs(y) else across} the middle of its wheels"
 
 
 def _radius_that_fits(drive: Drive, line: Trial) -> str:

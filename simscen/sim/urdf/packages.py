@@ -10,9 +10,9 @@ def is_package_name(name: str) -> bool:
 
 
 def places_of(name: str, near: Path, roots: Sequence[Path]) -> Iterator[Path]:
-    """Folders that may be the package, for a file in the folder `near`: around it, in the roots, a folder below them.
+    """Folders that may be the package, for a file in the folder `near`: around it, in the roots, up to two below them.
 
-    Repositories hold packages side by side, and a workspace holds repositories.
+    A workspace holds repositories, and these hold packages, perhaps in a folder for some that belong together.
     """
     for folder in (near, *near.parents):
         if folder.name == name:
@@ -21,5 +21,6 @@ def places_of(name: str, near: Path, roots: Sequence[Path]) -> Iterator[Path]:
         if folder in roots:
             break
     yield from (root if root.name == name else root / name for root in roots)
-    for root in roots:
-        yield from sorted(root.glob(f"*/{name}"))
+    for pattern in (f"*/{name}", f"*/*/{name}"):
+        for root in roots:
+            yield from sorted(root.glob(pattern))

@@ -13,6 +13,9 @@ from simscen.sim.urdf.tree import Tree
 ALONG = 0.99
 """Cosine within which an axis counts as pointing sideways or up (8 degrees)."""
 
+TURNING = ("revolute", "continuous")
+"""Joints that can steer; an upright prismatic one is a suspension."""
+
 
 @dataclass(frozen=True, eq=False)
 class WheelJoint:
@@ -27,7 +30,7 @@ class WheelJoint:
 
 def found(tree: Tree) -> list[WheelJoint]:
     """The wheels that the URDF makes plain: continuous joints about a sideways axis that carry something round."""
-    steering = set(steered_links(tree, [j for j in tree.joints.values() if _about(tree, j, 2) and j.type != "fixed"]))
+    steering = steered_links(tree, [j for j in tree.joints.values() if j.type in TURNING and _about(tree, j, 2)])
     wheels = [
         wheel_joint(tree, joint, joint.child in steering)
         for joint in tree.joints.values()

@@ -66,10 +66,10 @@ f 2 3 4
 def published(tmp_path):
     """A robot of two packages in their own repositories, and its body as `more` lines of its *.robot.yaml make it."""
 
-    def body(more="", mesh="package://cart_parts/meshes/plate.obj", parts="repo/cart_parts", world_path=()):
+    def body(more="", mesh="package://cart_parts/meshes/plate.obj", parts="repo/cart_parts", world_path=(), edit=str):
         files = {
             "cart.robot.yaml": ROBOT.format(urdf="repo/cart_description/urdf/cart.urdf.xacro", more=more),
-            "repo/cart_description/urdf/cart.urdf.xacro": XACRO.replace("{mesh}", mesh),
+            "repo/cart_description/urdf/cart.urdf.xacro": edit(XACRO.replace("{mesh}", mesh)),
             f"{parts}/urdf/wheel.xacro": WHEEL,
             f"{parts}/meshes/plate.obj": TETRAHEDRON,
         }
@@ -101,6 +101,10 @@ def test_a_package_in_another_repository_of_the_workspace_is_found(published):
     assert published(parts="other_repo/cart_parts").wheels
 
 
+def test_a_package_that_its_repository_keeps_in_a_folder_is_found(published):
+    assert published(parts="other_repo/common/cart_parts").wheels
+
+
 def test_a_package_is_found_through_a_folder_of_the_world_path(published):
     assert published(parts="../ros/share/cart_parts", world_path=["../ros/share"]).wheels
 
@@ -114,6 +118,19 @@ def test_a_package_that_is_nowhere_is_told_at_the_line_that_names_it(refusal):
     assert (problem.path, problem.line) == ("repo/cart_description/urdf/cart.urdf.xacro", 4)
     assert problem.message == "$(find cart_parts): there is no package 'cart_parts'"
     assert "--world-path" in problem.hint and "packages: {cart_parts: path}" in problem.hint
+
+
+def test_all_that_is_missing_is_told_at_once_and_nothing_that_follows_from_it(published):
+    def also(text):
+        find = '<xacro:include filename="$(find {})/x.xacro"/>'
+        return text.replace("<link", find.format("sensors") + find.format("cart_parts") + "<link", 1)
+
+    with pytest.raises(InvalidInput) as caught:
+        published(parts="vendor/parts", edit=also)
+    assert [problem.message for problem in caught.value.problems] == [
+        "$(find cart_parts): there is no package 'cart_parts'",
+        "$(find sensors): there is no package 'sensors'",
+    ]
 
 
 def test_a_package_outside_the_root_is_refused_at_its_line(refusal):

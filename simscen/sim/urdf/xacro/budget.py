@@ -16,6 +16,10 @@ class Refused(Exception):
         super().__init__(message)
 
 
+class Missing(Refused):
+    """A file or a package is not there; what else there is can still be looked at."""
+
+
 class Budget:
     """Counts steps, and, as a context manager, how deep they are within each other. Raises Refused."""
 

@@ -8,9 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from simscen.core.errors import InvalidInput
+from simscen.core.problems import Problem
 from simscen.sim.urdf.files import URDF_BYTES, Folders, Trouble, check_regular
 from simscen.sim.urdf.markup import MOST_ELEMENTS, Element
-from simscen.sim.urdf.xacro.budget import Budget, Refused
+from simscen.sim.urdf.xacro.budget import Budget, Missing, Refused
 from simscen.sim.urdf.xacro.calls import bind, called
 from simscen.sim.urdf.xacro.macros import Macro, Macros, macro_of
 from simscen.sim.urdf.xacro.properties import define
@@ -43,7 +44,13 @@ def expand(
     """
     whole = replace(robot, tag="", attributes={}, children=[])
     expansion = _Expansion(file, folders, read, arguments or {})
-    expansion.element(robot, whole, Scope(), Macros())
+    try:
+        expansion.element(robot, whole, Scope(), Macros())
+    except InvalidInput:
+        if not expansion.missing:
+            raise
+    if expansion.missing:  # what went wrong without these files is no news
+        raise InvalidInput(list(expansion.missing.values()))
     declared = expansion.declared | declared_in(robot)
     for name in arguments or {}:
         if name not in declared:
@@ -62,6 +69,7 @@ class _Expansion:
         self._budget = Budget()
         self._texts = Texts(folders, file, self._budget, arguments)
         self.declared: set[str] = set()
+        self.missing: dict[str, Problem] = {}
         self._folders, self._read_file = folders, read
         self._read: dict[Path, Element] = {}
         self._calls: list[tuple[Macro, Element]] = []
@@ -153,6 +161,12 @@ class _Expansion:
         self._calls.pop()
 
     def _include(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
+        try:
+            self._included(source, into, scope, macros)
+        except Missing as missing:
+            self.missing.setdefault(missing.message, source.problem(missing.message, missing.hint))
+
+    def _included(self, source: Element, into: Element, scope: Scope, macros: Macros) -> None:
         written = self._texts.text(needed(source, "filename"), scope)
         if space := self._texts.text(source.attributes.get("ns", ""), scope):
             around, scope = scope, Scope(scope, namespace=True)
@@ -164,7 +178,7 @@ class _Expansion:
                 return
             check_regular(path, URDF_BYTES)
         except Trouble as trouble:
-            raise Refused(f"include {written[:200]!r}: {trouble}", trouble.hint) from trouble
+            raise Missing(f"include {written[:200]!r}: {trouble}", trouble.hint) from trouble
         before, self._texts.file = self._texts.file, path
         self._children(self._parsed(path), into, scope, macros)
         self._texts.file = before

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from simscen.sim.urdf.files import Folders, Trouble
 from simscen.sim.urdf.markup import Element
-from simscen.sim.urdf.xacro.budget import LONGEST, Budget, Refused
+from simscen.sim.urdf.xacro.budget import LONGEST, Budget, Missing, Refused
 from simscen.sim.urdf.xacro.expression import evaluate
 from simscen.sim.urdf.xacro.scope import Block, Lazy, Resolving, Scope
 from simscen.sim.urdf.xacro.values import Value, literal
@@ -110,7 +110,7 @@ class Texts:
         try:
             return str(self._folders.package(name, self.file.parent))
         except Trouble as trouble:
-            raise Refused(f"$(find {name[:60]}): {trouble}", trouble.hint) from None
+            raise Missing(f"$(find {name[:60]}): {trouble}", trouble.hint) from None
 
 
 class _Scoped:

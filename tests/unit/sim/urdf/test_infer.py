@@ -48,6 +48,19 @@ def test_wheel_joints_that_know_their_speed_limit_the_robot(infer):
     assert infer(text).limits.linear == pytest.approx(0.5)
 
 
+def test_wheels_on_a_suspension_are_not_steered(infer):
+    text = describe(robot_body(shipped("turtlebot")))
+    for side in ("left", "right"):
+        text = text.replace(
+            f'<joint name="wheel_{side}" type="continuous">\n    <parent link="base_link" />',
+            f'<link name="drop_{side}"/><joint name="drop_{side}" type="prismatic"><parent link="base_link"/>'
+            f'<child link="drop_{side}"/><axis xyz="0 0 1"/></joint>'
+            f'<joint name="wheel_{side}" type="continuous">\n    <parent link="drop_{side}" />',
+        )
+    assert text.count("prismatic") == 2
+    assert infer(text).drive.type == "differential"
+
+
 def test_a_robot_without_wheels_is_not_guessed(infer):
     with pytest.raises(InvalidInput, match="cannot tell from its wheels"):
         infer(describe(robot_body(shipped("omni"))))
