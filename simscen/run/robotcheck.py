@@ -20,8 +20,8 @@ ROLLING = (0.02, 0.02, 0.02, 0.05)
 SKIDDING = (0.10, 0.03, 0.04, 0.50)
 """Angle turned over commanded, and over what the encoders say; end of the square by odometry from the true one, over
 the way driven; off the spot while turning on it, over the radius that the base takes to turn. Wheels that skid turn a
-base as if they stood further apart, by a ratio that changes with load and speed: no track fits every turn (Mandow et al.,
-Experimental kinematics for wheeled skid-steer mobile robots, IROS 2007)."""
+base as if they stood further apart, by a ratio that changes with load and speed: no track fits every turn (Mandow et
+al., Experimental kinematics for wheeled skid-steer mobile robots, IROS 2007)."""
 
 
 @dataclass(frozen=True)
