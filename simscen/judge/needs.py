@@ -59,7 +59,7 @@ def needs(entry: AnyCriterion) -> frozenset[Evidence]:
     if isinstance(entry.chosen, Temporal):
         return entry.chosen.evidence
     wanted = _NEEDS.get(entry.kind, frozenset(Evidence))
-    if entry.kind == "speed" and getattr(entry.chosen, "in_", None) is not None:
+    if getattr(entry.chosen, "in_", None) is not None:
         wanted |= _PLACE
     if getattr(entry.chosen, "error_code", None) is not None:
         wanted |= {Evidence.ERROR_CODES}

@@ -4,11 +4,26 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 ROOMS = ("criteria", "judge", "triggers")
+WHYS = [f"tests/unit/judge/why/test_{of}.py" for of in ("cause", "halted", "blocked", "struck", "astray", "meanwhile")]
 ALL_TESTS = {
     "criteria": ["tests/unit/criteria", "tests/unit/judge"],
     "judge": ["tests/unit/judge", "tests/unit/criteria/test_promises.py"],
     "triggers": ["tests/unit/triggers", "tests/unit/run/test_firing.py"],
 }
+NEIGHBOURS: dict[str, list[str]] = {
+    "metrics": ["tests/unit/judge/test_metrics.py"],
+    "way": ["tests/unit/judge/test_metrics.py"],
+    "pose": ["tests/unit/judge/test_metrics.py"],
+    "result": ["tests/unit/judge/test_disturbances.py"],
+    "resultdata": ["tests/unit/judge/test_result.py", "tests/unit/judge/test_disturbances.py"],
+    "verdictdata": ["tests/unit/judge/test_result.py", "tests/unit/judge/test_resultdata.py"],
+    "needs": ["tests/unit/judge/test_judge.py"],
+    "wording": [],
+    "suite": [],
+    "disturbances": [],
+    **dict.fromkeys(("cause", "things", "blocked", "halted", "struck", "astray", "meanwhile"), WHYS),
+}
+"""What else than its own tests concerns a module of judge: these, and not the whole room."""
 EVERY_CRITERION = ["tests/unit/criteria/test_promises.py", "tests/unit/criteria/test_specs.py"]
 IDLE = {"__init__.py", "sketch.py"}
 """What decides nothing: sketches make the traces of tests."""
@@ -36,5 +51,8 @@ def tests_of(file: Path) -> list[list[str]]:
     kinds = ["result", "error_code"] if kind == "result" else [kind]
     if room == "criteria" and (ROOT / f"tests/cases/{kind}.yaml").exists():
         return [*(["golden", of] for of in kinds), [*own, *EVERY_CRITERION]]
+    if room == "judge" and kind in NEIGHBOURS:
+        beside = [test for test in NEIGHBOURS[kind] if test not in own]
+        return [tests for tests in (own, beside) if tests]
     golden = [["golden", ""]] if room in ("criteria", "judge") else []
     return [*golden, *([own] if own else []), ALL_TESTS[room]]

@@ -38,7 +38,7 @@ class Measures:
 
 
 def measure(trace: Trace, case: Case) -> Measures:
-    """All metrics of judge.metric_table. Raises BrokenTrace when a signal is not finite."""
+    """All metrics of judge.measure.table. Raises BrokenTrace when a signal is not finite."""
     check_finite(trace)
     found: Values = {
         **_navigation(trace, case),

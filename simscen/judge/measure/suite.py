@@ -79,7 +79,8 @@ def suite_data(figures: Suite) -> dict[str, float | list[float] | None]:
 def told(figures: Suite) -> str:
     """One line: "success 93% of 14 runs (69% … 99%) · SPL 0.81 of 12 runs · 0.8 collisions/km, 1.9/h in …"."""
     parts = []
-    if figures.success_rate is not None and figures.success_interval is not None:
+    if figures.success_interval is not None:
+        assert figures.success_rate is not None
         low, high = figures.success_interval
         parts.append(f"success {figures.success_rate:.0%} of {_runs(figures.runs)} ({low:.0%} … {high:.0%})")
     if figures.spl is not None:

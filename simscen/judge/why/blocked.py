@@ -8,7 +8,7 @@ import numpy as np
 from simscen.core.case import Case
 from simscen.core.geometry import Array
 from simscen.core.passage import Passage
-from simscen.core.polygons import distance_to_segment
+from simscen.core.polygons import distance_to_segment, turn
 from simscen.core.trace import Trace
 from simscen.judge.why.things import Thing
 
@@ -44,7 +44,7 @@ def blocked(trace: Trace, case: Case, goal: str, tick: int, there: Sequence[Thin
 def room(passage: Passage, there: Sequence[Thing]) -> float:
     """The diameter in metres of the largest disc that can cross the passage."""
     ends = np.array(passage.ends)
-    share = np.linspace(0.0, 1.0, 2 + math.ceil(passage.width / STEP))[:, None]
+    share = np.linspace(0.0, 1.0, 2 + round(passage.width / STEP))[:, None]
     middles = ends[0] + share * (ends[1] - ends[0])
     near: list[Array] = [np.linalg.norm(middles - end, axis=1) for end in ends]
     near += [thing.distance(middles) for thing in there]
@@ -66,14 +66,9 @@ def _ahead(trace: Trace, case: Case, goal: str, tick: int) -> list[Passage]:
     nearest = min(range(len(found)), key=lambda k: distance_to_segment(*here, *found[k].ends))
     if distance_to_segment(*here, *found[nearest].ends) > ON_THE_WAY:
         return found
-    after = found[nearest + 1 : nearest + 2]
-    passed = after and _side(found[nearest], here) * _side(found[nearest], after[0].middle) > 0
-    return found[nearest + 1 :] if passed else found[nearest:]
-
-
-def _side(passage: Passage, point: tuple[float, float]) -> float:
-    (ax, ay), (bx, by) = passage.ends
-    return (bx - ax) * (point[1] - ay) - (by - ay) * (point[0] - ax)
+    ends, beyond = found[nearest].ends, found[nearest + 1 :]
+    passed = beyond and turn(*ends, here) * turn(*ends, beyond[0].middle) > 0
+    return beyond if passed else found[nearest:]
 
 
 def _reach(case: Case) -> float:

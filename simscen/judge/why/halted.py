@@ -8,7 +8,7 @@ from simscen.core.case import Case
 from simscen.core.events import EventKind
 from simscen.core.navigation import Goal
 from simscen.core.trace import Trace
-from simscen.criteria.moments import stories
+from simscen.criteria.moments import GoalStory, began, stories
 from simscen.judge.why.blocked import blocked
 from simscen.judge.why.things import Thing, things
 
@@ -35,26 +35,20 @@ def halted(trace: Trace, case: Case, tick: int) -> tuple[list[str], set[str]]:
 
 
 def _goal(trace: Trace, case: Case, tick: int) -> Goal | None:
-    """The goal under way at `tick`, or the one that just ended without being reached."""
-    open_ = [
-        story
-        for story in stories(trace, case)
-        if story.accepted is not None and story.accepted <= tick and (story.end is None or story.end.tick >= tick)
-    ]
-    late = [story for story in open_ if story.reached is None or story.reached > tick]
-    return late[-1].goal if late else _failed(trace, case, tick)
+    """The goal that the robot was given last by `tick`, as long as it is wanted."""
+    begun = [story for story in stories(trace, case) if began(story) <= tick]
+    return begun[-1].goal if begun and not _over(begun[-1], tick) else None
 
 
-def _failed(trace: Trace, case: Case, tick: int) -> Goal | None:
-    """The goal whose failure ended the navigation before `tick`."""
-    ends = [e for e in trace.of_kind(EventKind.GOAL_REACHED, EventKind.GOAL_FAILED) if e.tick <= tick]
-    if not ends or ends[-1].kind != EventKind.GOAL_FAILED:
-        return None
-    return next((goal for goal in case.every_goal if goal.name == ends[-1].name), None)
+def _over(story: GoalStory, tick: int) -> bool:
+    """Whether it was reached at `tick`, or canceled before; one that failed has been kept from the robot."""
+    if story.reached is not None:
+        return story.reached <= tick
+    return story.end is not None and story.end.kind == EventKind.GOAL_CANCELED and story.end.tick < tick
 
 
 def _walled_in(case: Case, goal: Goal) -> list[str]:
-    if not math.isinf(case.shortest.get(goal.name, 0.0)):
+    if case.shortest.get(goal.name) != math.inf:
         return []
     needed = 2 * case.inscribed_radius
     narrow = [passage for passage in case.passages if passage.goal == goal.name and passage.width < needed]

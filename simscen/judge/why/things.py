@@ -80,10 +80,10 @@ def _thing(trace: Trace, tick: int, spawned: Event, by: str, last: Event) -> Thi
 
 def _distance(points: Array, corners: Array) -> Array:
     """Metres (n,) from points (n, 2) to a filled polygon (m, 2)."""
-    ends = np.roll(corners, -1, axis=0)
+    ends = np.roll(corners, 1, axis=0)
     step, apart = ends - corners, points[:, None] - corners
-    squared = np.maximum(np.sum(step**2, axis=1), 1e-18)
-    along = np.clip(np.sum(apart * step, axis=2) / squared, 0.0, 1.0)
+    along, squared = np.sum(apart * step, axis=2), np.sum(step**2, axis=1)
+    along = np.clip(np.divide(along, squared, out=np.zeros_like(along), where=squared > 0), 0.0, 1.0)
     away: Array = np.linalg.norm(apart - along[:, :, None] * step, axis=2).min(axis=1)
     y0, y1 = corners[:, 1], ends[:, 1]
     crosses = (y0 > points[:, 1:]) != (y1 > points[:, 1:])

@@ -52,3 +52,8 @@ def test_runs_that_all_broke_did_not_succeed():
     figures = suite(RUNS[3:])
     assert (figures.success_rate, figures.measured_runs, figures.collisions_per_km) == (0.0, 0, None)
     assert figures.collisions_per_hour is None
+
+
+def test_a_short_way_and_a_short_time_have_rates_too():
+    figures = suite([run(1, simulated=36.0, success=0.0, collisions=2.0, path_length=10.0)])
+    assert (figures.collisions_per_km, figures.collisions_per_hour) == (200.0, 200.0)

@@ -1,7 +1,8 @@
 import pytest
 
+from simscen.core.disturbance import Disturbance, Happening
 from simscen.core.verdict import Finding, Status, Verdict
-from simscen.judge.wording import sentence, tightest
+from simscen.judge.wording import sentence, tightest, told, violations, when
 
 
 def verdict(finding, kind="stopped_within", name="stopped_within"):
@@ -44,3 +45,53 @@ def test_the_tightest_bound_is_the_one_with_the_least_share_of_its_limit_left():
     ]
     assert tightest(verdicts) == "path_length +0.14 m"
     assert tightest([]) == ""
+
+
+def bound(limit, margin, value):
+    return verdict(Finding(Status.PASS, "own", "", limit, margin, "m", value), limit, limit)
+
+
+@pytest.mark.parametrize(
+    ("tight", "loose"),
+    [
+        (bound("≤ 10", 0.95, 9.05), bound("≥ 1", 0.1, 1.1)),
+        (bound("≤ 10", 0.0, 10.0), bound("≤ 9", 0.01, 8.99)),
+        (bound("≤ 5", 4.9, 0.1), bound("≤ 6", 6.0, 0.0)),
+        (bound("≥ 1", 0.005, 1.005), bound("≥ -10", 0.1, -9.9)),
+        (bound("≥ 0", 0.05, 0.05), bound("≤ 1", 0.1, 0.9)),
+    ],
+    ids=["of either direction", "met to the bit", "with nothing used of it", "below zero", "of zero"],
+)
+def test_shares_of_a_limit_compare_bounds(tight, loose):
+    for verdicts in ([tight, loose], [loose, tight]):
+        assert tightest(verdicts).startswith(tight.id)
+
+
+def test_what_keeps_a_verdict_from_passing_is_all_but_its_passes():
+    passed, undecided = Finding(Status.PASS, "a", "", ""), Finding(Status.INCONCLUSIVE, "b", "", "")
+    assert violations(Verdict("result", "result", "fail", (passed, STOP, undecided))) == (STOP, undecided)
+
+
+@pytest.mark.parametrize(
+    ("ticks", "text"),
+    [
+        ((), "never"),
+        ((240, 600), "t = 1.00 s, 2.50 s"),
+        ((0, 240, 480, 720, 960), "t = 0.00 s, 1.00 s, 2.00 s, 3.00 s, 4.00 s"),
+        ((0, 240, 480, 720, 960, 1200, 1440), "t = 0.00 s, 1.00 s, 2.00 s, 3.00 s, 4.00 s and 2 more"),
+    ],
+)
+def test_of_times_the_first_five_are_told(ticks, text):
+    assert when(Happening(Disturbance("gust", "event"), ticks, True, ""), 240) == text
+
+
+@pytest.mark.parametrize(
+    ("ticks", "happened", "text"),
+    [
+        ((2400,), True, "gust: t = 10.00 s, pushed it"),
+        ((2400,), False, "gust: t = 10.00 s, pushed it, so it did not happen"),
+        ((), False, "gust: pushed it, so it did not happen"),
+    ],
+)
+def test_a_disturbance_is_told_in_a_line(ticks, happened, text):
+    assert told(Happening(Disturbance("gust", "event"), ticks, happened, "pushed it"), 240) == text

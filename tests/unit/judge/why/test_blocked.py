@@ -1,7 +1,14 @@
 """What closes the way, and nothing else."""
 
+from dataclasses import dataclass
+
+import numpy as np
 import pytest
-from whys import CASE, DOOR, box, by, why
+from whys import CASE, DOOR, STANDS, box, by, why
+
+from simscen.judge.sketch import sketch, sketch_case
+from simscen.judge.why.blocked import blocked
+from simscen.judge.why.things import Thing, things
 
 CLOSES = (
     "why: crate (spawned by event `crate falls` at t = 1.00 s) closes the passage of 1.00 m between `west wall` and "
@@ -90,3 +97,84 @@ def test_a_robot_off_the_way_has_all_passages_before_it():
     )
     near = {**CASE, "passages": [["study", [3.6, 0.5], [3.6, -0.5], "a", "b"], DOOR], "inscribed_radius": 0.01}
     assert "closes" not in "".join(why("result", box(1, "crate", 3.6, 0, 0.1, 2.0, "crate falls"), case=near))
+
+
+def doors(*at):
+    return {**CASE, "passages": [["study", [x, 0.5], [x, -0.5], "a", "b"] for x in at]}
+
+
+@pytest.mark.parametrize(
+    ("at", "case", "told"),
+    [
+        (3.0, doors(3.0, 3.9, 5.0, 6.0), False),
+        (3.9, doors(3.0, 3.9, 5.0, 6.0), False),
+        (5.0, doors(3.0, 3.9, 5.0, 6.0), True),
+        (6.0, doors(3.0, 3.9, 5.0, 6.0), True),
+        (4.1, doors(3.0, 4.1, 5.0, 6.0), True),
+        (3.0, doors(3.0, 4.1, 5.0, 6.0), False),
+        (4.0, doors(3.0, 4.0, 5.0), True),
+        (3.5, doors(3.5, 5.0), False),
+        (3.49, doors(3.49, 5.0), True),
+        (3.9, doors(3.9), True),
+    ],
+)
+def test_the_passages_from_the_robot_on_count(at, case, told):
+    lines = why("result", box(1, "crate", at, 0, 0.02, 2.0), case=case)
+    assert any("closes" in line for line in lines) is told
+
+
+def test_a_passage_in_line_with_the_next_is_not_passed():
+    case = {**CASE, "passages": [["study", [3.9, 0.5], [3.9, -0.5], "a", "b"], ["study", [3.9, 3], [3.9, 2], "a", "b"]]}
+    assert "closes" in why("result", box(1, "crate", 3.9, 0, 0.02, 2.0), case=case)[0]
+
+
+def test_a_long_robot_needs_more_room_to_turn():
+    long = {**CASE, "footprint": [[0.1, 0.2], [-0.6, 0.2], [-0.6, -0.2], [0.1, -0.2]]}
+    (line,) = why("result", box(1, "crate", 5, -0.5, 0.6, 1.1), case=long)
+    assert "0.45 m are left" in line
+
+
+def test_two_centimetres_are_not_nothing_and_room_is_looked_for_up_to_the_very_end():
+    assert "0.02 m are left" in why("result", box(1, "crate", 5, 0, 0.6, 0.95))[0]
+    assert "0.10 m are left" in why("result", box(1, "crate", 5, -0.3, 0.6, 1.4))[0]
+
+
+@dataclass(frozen=True)
+class Fog(Thing):
+    """What is equally near to every place."""
+
+    near: float = 0.0
+
+    def distance(self, points):
+        return np.full(len(points), self.near)
+
+
+def said(*there, **changes):
+    fogs = [Fog(name, (), "", 0, False, near) for name, near in there]
+    lines, _ = blocked(sketch(STANDS), sketch_case({**CASE, **changes}), "study", 2400, fogs)
+    return " ".join(lines).split(" the passage")[0]
+
+
+def test_a_robot_that_just_fits_is_not_shut_in_and_one_that_can_just_turn_not_hampered():
+    assert said(("fog", 0.2)) == "fog narrows"
+    assert said(("fog", 0.199)) == "fog closes"
+    assert said(("fog", 0.2), footprint=[]) == ""
+    assert said(("fog", 0.01)).startswith("fog")
+
+
+def test_two_centimetres_less_than_the_passage_has_are_no_change():
+    assert said(("fog", 0.49), footprint=[[0.6, 0.8]]) == ""
+    assert said(("fog", 0.48), footprint=[[0.6, 0.8]]) == "fog narrows"
+
+
+def test_of_what_closes_it_alone_the_last_is_named_and_not_what_leaves_room():
+    assert said(("a", 0.1), ("b", 0.1), ("c", 0.1)) == "c closes"
+    assert said(("a", 0.1), ("b", 0.2)) == "a closes"
+    assert said(("a", 0.25), ("b", 0.4)) == "a narrows"
+
+
+def test_what_has_no_part_in_closing_it_is_not_named_with_what_has():
+    trace = sketch({**STANDS, "events": [*box(1, "a", 5, 0.4, 0.6, 0.4), *box(2, "b", 5, -0.4, 0.6, 0.4)]})
+    fogs = [Fog("haze", (), "", 0, False, 0.49), Fog("mist", (), "", 0, False, 0.6)]
+    (line,), _ = blocked(trace, sketch_case(CASE), "study", 2400, [*things(trace, 2400), *fogs])
+    assert line.startswith("a and b close the passage")

@@ -1,5 +1,6 @@
 """What keeps a robot from its goal."""
 
+import pytest
 from whys import CASE, STANDS, box, why
 
 from simscen.judge.sketch import sketch, sketch_case
@@ -75,3 +76,49 @@ def test_what_was_there_from_the_start_is_told_beside_what_else_was():
 
 def test_what_is_further_than_thirty_centimetres_holds_nobody():
     assert why("stuck", box(1, "crate", 4.75, 0, 0.4, 0.4, "falls"), case={**CASE, "passages": []}) == []
+
+
+@pytest.mark.parametrize(
+    ("events", "at", "wanted"),
+    [
+        ([[3, "goal.accepted", "study"]], 3, True),
+        ([[3, "goal.accepted", "study"]], 2.9, False),
+        ([[0, "goal.accepted", "study"], [8, "goal.canceled", "study"]], 8, True),
+        ([[0, "goal.accepted", "study"], [8, "goal.canceled", "study"]], 8.1, False),
+        ([[0, "goal.accepted", "study"], [8, "goal.reached", "study"]], 7.9, True),
+        ([[0, "goal.accepted", "study"], [8, "goal.failed", "study"]], 7.9, True),
+        ([[0, "goal.accepted", "study"], [8, "goal.failed", "study"]], 8, True),
+        ([[8, "goal.failed", "study"]], 8, True),
+    ],
+)
+def test_a_goal_is_wanted_from_when_it_was_accepted_until_it_was_reached_or_given_up(events, at, wanted):
+    built = sketch({**STANDS, "events": [*box(0, "crate", 5, 0, 0.6, 2.0), *events]})
+    assert bool(causes("stuck", round(at * 240), built, sketch_case(CASE))) is wanted
+
+
+def test_what_stands_where_the_goal_before_was_does_not_keep_it_from_the_next():
+    goals = [{"name": "kitchen", "pose": [2, 3, 0]}, {"name": "study", "pose": [8, 0, 0]}]
+    told = [[0, "goal.accepted", "kitchen"], [2, "goal.reached", "kitchen"], [2, "goal.accepted", "study"]]
+    built = sketch({**STANDS, "events": [*told, *box(3, "crate", 2, 3, 1, 1)]})
+    assert causes("stuck", 2400, built, sketch_case({**CASE, "goals": goals})) == []
+
+
+def test_a_passage_as_wide_as_the_robot_is_not_what_leaves_no_way():
+    gap = ["study", [5, 0.2], [5, -0.2], "west wall", "east wall"]
+    (line,) = why("result", [], case={**CASE, "shortest": {"study": float("inf")}, "passages": [gap]})
+    assert line.endswith("no way to goal study")
+
+
+def test_what_it_begins_to_touch_at_that_very_tick_is_named_and_what_it_lets_go_of_then_is_not():
+    touches = [[6, "collision.started", "sill", {}], [8, "collision.ended", "sill", {}]]
+    assert why("stuck", touches, at=6) == ["why: it had touched sill since t = 6.00 s"]
+    assert why("stuck", touches, at=8) == []
+
+
+def test_a_thing_that_the_robot_on_its_goal_would_just_touch_does_not_stand_on_it():
+    assert why("stuck", box(0, "crate", 8, 0.75, 1, 1), case={**CASE, "inscribed_radius": 0.25}) == []
+
+
+def test_what_is_thirty_centimetres_away_may_hold_the_robot():
+    (line,) = why("stuck", box(0, "crate", 4.7, 0, 0.4, 0.4), case={**CASE, "passages": []})
+    assert line == "why: crate was 0.30 m from the robot"

@@ -29,6 +29,12 @@ def test_the_distance_is_shapelys(x, y, yaw, outline):
     assert thing.distance(np.array([[x, y]]))[0] == pytest.approx(theirs, abs=1e-9)
 
 
+def test_a_corner_that_repeats_and_one_at_the_height_of_the_point_change_nothing():
+    diamond = [[1, 0], [0, 1], [0, 1], [-1, 0], [0, -1]]
+    (thing,) = there([spawned(1, "thing", 0, 0, 0.0, [diamond])], 2)
+    assert thing.distance(np.array([[0.0, 0.0], [3.0, 0.0], [-3.0, 0.0], [0.0, 4.0]])).tolist() == [0.0, 2.0, 2.0, 3.0]
+
+
 def test_of_several_parts_the_nearest_counts():
     far = [[9, 9], [10, 9], [10, 10]]
     (thing,) = there([spawned(1, "table", 0, 0, parts=[far, SQUARE])], 2)

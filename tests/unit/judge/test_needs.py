@@ -1,0 +1,65 @@
+"""What a log must hold for each criterion and metric, written out once more: without it, no number is a number."""
+
+import pytest
+
+from simscen.core.evidence import Coverage, Evidence
+from simscen.criteria.criterion import AnyCriterion
+from simscen.judge.measure.metrics import Measures
+from simscen.judge.measure.table import METRICS
+from simscen.judge.needs import doubt, known, needs
+
+TRUTH, ALIGNMENT, GOALS, BELIEF = Evidence.TRUTH, Evidence.ALIGNMENT, Evidence.NAVIGATION, Evidence.BELIEF
+
+
+@pytest.mark.parametrize(
+    ("words", "wanted"),
+    [
+        ({"goals_reached": {}}, {TRUTH, ALIGNMENT, GOALS}),
+        ({"result": {"status": "FAILED"}}, {GOALS}),
+        ({"result": {"status": "FAILED", "error_code": "NO_VALID_PATH"}}, {GOALS, Evidence.ERROR_CODES}),
+        ({"error_code": {"code": "NO_VALID_PATH"}}, {GOALS, Evidence.ERROR_CODES}),
+        ({"no_false_success": {}}, {TRUTH, ALIGNMENT, GOALS}),
+        ({"collisions": {}}, {Evidence.CONTACTS}),
+        ({"clearance": {"min": 0.1}}, {Evidence.CLEARANCE}),
+        ({"keepout": {"region": "ramp"}}, {TRUTH, ALIGNMENT, Evidence.FOOTPRINT}),
+        ({"time_to_goal": {"max": 9}}, {GOALS}),
+        ({"path_length": {"max": 9}}, {TRUTH}),
+        ({"speed": {"max": 1}}, {TRUTH, Evidence.VELOCITY}),
+        ({"speed": {"max": 1, "in": "ramp"}}, {TRUTH, Evidence.VELOCITY, ALIGNMENT}),
+        ({"stopped_within": {"time": 1, "after": "lidar.off"}}, {TRUTH, Evidence.VELOCITY, Evidence.DISTURBANCES}),
+        ({"stuck": {}}, {TRUTH, GOALS}),
+        ({"localization_error": {"max": 1, "after": 2}}, {TRUTH, ALIGNMENT, BELIEF}),
+        ({"localization_consistency": {"every": 5}}, {TRUTH, ALIGNMENT, BELIEF, Evidence.COVARIANCE}),
+        ({"relocalized_within": {"time": 9}}, {TRUTH, ALIGNMENT, BELIEF}),
+        ({"relocalized_within": {"time": 9, "after": "gust"}}, {TRUTH, ALIGNMENT, BELIEF, Evidence.DISTURBANCES}),
+        ({"replans": {"max": 2}}, {Evidence.PLANNING}),
+        ({"recoveries": {"max": 2}}, {Evidence.RECOVERIES}),
+    ],
+)
+def test_a_criterion_needs_this_and_no_more(words, wanted):
+    assert needs(AnyCriterion.model_validate(words)) == wanted
+
+
+@pytest.mark.parametrize(
+    ("lacking", "left_out"),
+    [
+        (GOALS, {"success", "spl", "barn_score", "soft_spl", "path_irregularity", "time_to_goal"}),
+        (Evidence.CONTACTS, {"success", "spl", "barn_score", "collisions", "contact_time"}),
+        (ALIGNMENT, {"success", "spl", "barn_score", "soft_spl", "nees", *(name for name in METRICS if "ape" in name)}),
+        (BELIEF, {"nees", *(name for name in METRICS if "pe_" in name)}),
+        (Evidence.COVARIANCE, {"nees"}),
+        (Evidence.CLEARANCE, {"min_clearance", "mean_clearance"}),
+        (Evidence.PLANNING, {"replans", "path_irregularity"}),
+        (Evidence.RECOVERIES, {"recoveries"}),
+        (Evidence.VELOCITY, {"max_speed", "time_not_moving", "mean_jerk", "max_jerk", "sparc", "ldlj"}),
+    ],
+)
+def test_what_a_log_lacks_leaves_these_metrics_out_and_no_others(lacking, left_out):
+    measures = known(Measures(dict.fromkeys(METRICS, 1.0), {}), Coverage({lacking: ""}))
+    assert set(measures.undefined) == {name for name, value in measures.values.items() if value is None} == left_out
+
+
+def test_only_what_decides_a_criterion_makes_its_pass_doubtful():
+    gaps = Coverage(partial={Evidence.CONTACTS: "no contacts before t = 3 s", BELIEF: "no belief after t = 9 s"})
+    assert doubt(AnyCriterion.model_validate({"collisions": {}}), gaps) == "no contacts before t = 3 s"
+    assert doubt(AnyCriterion.model_validate({"clearance": {"min": 0.1}}), gaps) == ""
