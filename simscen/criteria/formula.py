@@ -126,7 +126,7 @@ class _Until(Judged):
         else:
             decides = self.hold.witness(sample + int(np.argmin(held[:at])), side)
         broken = np.flatnonzero(np.signbit(held[:end]))
-        return decides.noting(BROKEN, sample + int(broken[0])) if best[at] < 0 and len(broken) else decides
+        return decides.noting(BROKEN, sample + int(broken[0])) if np.signbit(best[at]) and len(broken) else decides
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,7 +250,6 @@ def _distances(condition: Condition, values: Array) -> Array:
 
 
 def _first(values: Array, wanted: float, sample: int, window: monitor.Window) -> int:
-    """The first sample in the window that has a value."""
+    """The first sample from the window's begin on that has a value; one in the window has it."""
     begin = sample + window.first
-    end = None if window.last is None else sample + window.last + 1
-    return begin + int(np.argmax(values[begin:end] == wanted))
+    return begin + int(np.argmax(values[begin:] == wanted))

@@ -26,14 +26,14 @@ def nees(error: Array, covariance: Array) -> Array:
     """
     xx, xy, xa, yy, ya, aa = covariance.T
     x, y, yaw = error.T
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         y_pivot = yy - xy * xy / xx
         slope = (ya - xy * xa / xx) / y_pivot
         yaw_pivot = aa - xa * xa / xx - slope * slope * y_pivot
         y_rest = y - xy / xx * x
         yaw_rest = yaw - xa / xx * x - slope * y_rest
         value = x * x / xx + y_rest * y_rest / y_pivot + yaw_rest * yaw_rest / yaw_pivot
-    definite = (xx > 0) & (y_pivot > 0) & (yaw_pivot > 0) & np.isfinite(value)
+    definite = (np.array([xx, y_pivot, yaw_pivot]) > 0).all(axis=0) & np.isfinite(value)
     answer: Array = np.where(definite, value, np.inf)
     return answer
 
@@ -46,4 +46,4 @@ def nees_samples(trace: Trace) -> Samples:
     x, y = (np.interp(belief.ticks, poses.ticks, poses.values[:, axis]) for axis in (0, 1))
     yaw = np.interp(belief.ticks, poses.ticks, np.unwrap(poses.values[:, 2]))
     error = np.column_stack((belief.values[:, 0] - x, belief.values[:, 1] - y, wrap_array(belief.values[:, 2] - yaw)))
-    return Samples(belief.ticks, nees(error, belief.values[:, 3:9])[:, np.newaxis])
+    return Samples(belief.ticks, nees(error, belief.values[:, 3:])[:, np.newaxis])

@@ -49,7 +49,7 @@ def ldlj(speeds: Array, rate: float) -> float | None:
 
     None where it is not defined: for a robot that never moved, or whose speed never changed its slope.
     """
-    if len(speeds) < 3 or not np.any(speeds):
+    if not np.any(speeds):
         return None
     dt = 1.0 / rate
     jerk = np.diff(speeds, 2) / dt**2

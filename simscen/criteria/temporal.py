@@ -66,15 +66,18 @@ def finding(
 def _decided(trace: Trace, told: str, compared: list[Condition], answer: Judged, side: Side, value: float) -> Finding:
     witness = answer.witness(0, side)
     tick = int(trace.truth.ticks[witness.sample])
-    signal, unit = witness.comparison.measured, _unit(compared)
-    margin = None if unit is None or math.isinf(value) else _margin(value)
+    signal, unit, margin = witness.comparison.measured, _unit(compared), None
+    if unit is None or math.isinf(value):
+        unit = signal.unit
+    else:
+        margin = _margin(value)
     return Finding(
-        status=Status.PASS if value > 0 else Status.FAIL,
+        status=Status.PASS if side == "low" else Status.FAIL,
         what=condition_words.subject(witness.comparison),
         measured=condition_words.measured(witness),
         limit=condition_words.limit(witness),
         margin=margin,
-        unit=signal.unit if margin is None or unit is None else unit,
+        unit=unit,
         value=None if signal.asks else witness.value,
         tick=tick,
         place=trace.place(tick),

@@ -25,6 +25,24 @@ NEIGHBOURS: dict[str, list[str]] = {
 }
 """What else than its own tests concerns a module of judge: these, and not the whole room."""
 EVERY_CRITERION = ["tests/unit/criteria/test_promises.py", "tests/unit/criteria/test_specs.py"]
+CONDITIONS = ["golden", "always", "eventually", "until", "whenever"]
+CONCERNED = {
+    "criteria/condition": [["tests/unit/criteria/test_conditions.py"], CONDITIONS],
+    "criteria/condition_words": [["tests/unit/criteria/test_condition_words.py"], CONDITIONS],
+    "criteria/formula": [CONDITIONS, ["tests/unit/criteria/test_formula.py"]],
+    "criteria/horizon": [["tests/unit/criteria/test_horizon.py"]],
+    "criteria/monitor": [CONDITIONS, ["tests/unit/criteria/test_monitor.py"]],
+    "criteria/nees": [["golden", "localization_consistency"], ["tests/unit/criteria/test_nees.py"]],
+    "criteria/signal_places": [["tests/unit/criteria/test_signal_values.py"], CONDITIONS],
+    "criteria/signal_table": [
+        [f"tests/unit/criteria/test_{what}.py" for what in ("signal_table", "conditions", "temporal")]
+    ],
+    "criteria/signal_values": [["tests/unit/criteria/test_signal_values.py"], CONDITIONS],
+    "criteria/signals": [["tests/unit/criteria/test_signals.py"], ["golden"]],
+    "criteria/smooth": [["tests/unit/criteria/test_smooth.py"]],
+    "criteria/temporal": [CONDITIONS, ["tests/unit/criteria/test_temporal.py"]],
+}
+"""Of what many others use: the tests of what it is, not of all that is made of it."""
 IDLE = {"__init__.py", "sketch.py"}
 """What decides nothing: sketches make the traces of tests."""
 
@@ -46,6 +64,8 @@ def tests_of(file: Path) -> list[list[str]]:
     A criterion with golden cases of its own is used by nothing else.
     """
     room, kind = file.relative_to(ROOT / "simscen").parts[0], file.stem
+    if f"{room}/{kind}" in CONCERNED:
+        return CONCERNED[f"{room}/{kind}"]
     found = sorted((ROOT / "tests/unit" / room).rglob(f"test_{kind}*.py"))
     own = [path.relative_to(ROOT).as_posix() for path in found]
     kinds = ["result", "error_code"] if kind == "result" else [kind]
@@ -54,5 +74,5 @@ def tests_of(file: Path) -> list[list[str]]:
     if room == "judge" and kind in NEIGHBOURS:
         beside = [test for test in NEIGHBOURS[kind] if test not in own]
         return [tests for tests in (own, beside) if tests]
-    golden = [["golden", ""]] if room in ("criteria", "judge") else []
+    golden = [["golden"]] if room in ("criteria", "judge") else []
     return [*golden, *([own] if own else []), ALL_TESTS[room]]

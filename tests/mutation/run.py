@@ -14,7 +14,7 @@ from pathlib import Path
 import yaml
 from mutants import Mutant, mutants
 from rooms import ROOT, module_name, modules, tests_of
-from trial import survives
+from trial import survives, tried
 
 EQUIVALENT = Path(__file__).with_name("equivalent.yaml")
 TABLE = ROOT / "docs/design/mutation.md"
@@ -38,17 +38,21 @@ class Tally:
 
 def check(file: Path, listed: dict[str, str]) -> Tally:
     """Try every mutant of a module. `listed` maps changes to the reason why they change nothing."""
-    name, stages, tally = module_name(file), tests_of(file), Tally()
-    for tests in stages:
-        if not survives(name, file, ast.parse(file.read_text(encoding="utf-8")), tests):
+    name, stages, tally = module_name(file), [], Tally()
+    for tests in tests_of(file):
+        passed, limit = tried(name, file, ast.parse(file.read_text(encoding="utf-8")), tests)
+        if not passed:
             raise SystemExit(f"{name}: its tests fail without any mutant: {' '.join(tests)}")
+        stages.append((tests, limit))
     unseen = dict(listed)
     for mutant in mutants(file):
         tally.total += 1
         expected = unseen.pop(mutant.change, None) is not None
-        if all(survives(name, file, mutant.tree, tests) for tests in stages):
+        if all(survives(name, file, mutant.tree, tests, limit) for tests, limit in stages):
             tally.equivalent += expected
-            tally.alive += [] if expected else [mutant]
+            if not expected:
+                tally.alive.append(mutant)
+                print(f"  SURVIVED {name}:{mutant.line} {mutant.change}", flush=True)
         else:
             tally.killed += 1
             tally.stale += [f"killed, though listed: {mutant.change}"] if expected else []
@@ -70,8 +74,6 @@ def main(arguments: list[str]) -> int:
         tally = check(file, (listed or {}).get(short, {}))
         rows.append((short, tally.total, tally.killed, tally.equivalent, len(tally.alive)))
         print(f"{short:42} {tally.total:5} {tally.killed:5} killed {tally.equivalent:4} equivalent", flush=True)
-        for mutant in tally.alive:
-            print(f"  SURVIVED {short}:{mutant.line} {mutant.change}", flush=True)
         for line in tally.stale:
             print(f"  STALE {line}", flush=True)
         failed |= bool(tally.alive or tally.stale)

@@ -8,9 +8,12 @@ from formulas import CASE, FORMULAS, NUMBERS, VALUES, horizon, run, validated
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from simscen.core.navigation import Path
 from simscen.core.samples import Samples
 from simscen.core.verdict import Status
+from simscen.criteria import monitor
 from simscen.criteria.bounds import BrokenTrace
+from simscen.criteria.condition import Window
 from simscen.criteria.criterion import AnyCriterion
 from simscen.criteria.formula import Scene, judged
 from simscen.judge.judge import judge
@@ -85,8 +88,34 @@ def test_a_run_may_be_of_few_samples(samples):
     assert len(judged(validated({"signal": "clearance", "op": ">", "value": 0}), scene).low) == samples
 
 
-def test_uneven_samples_are_refused_with_the_time_at_which_they_begin():
+@pytest.mark.parametrize(("late", "begins"), [([0, 0, 0, 1, 1], "2.00"), ([0, 1, 0, 0, 0], "1.00")])
+def test_uneven_samples_are_refused_with_the_time_at_which_they_begin(late, begins):
     trace = run([1.0] * 5, [0.0] * 5)
-    ticks = trace.truth.ticks + np.array([0, 0, 0, 1, 1])
-    with pytest.raises(BrokenTrace, match=r"not evenly spaced after t = 2.00 s"):
+    ticks = trace.truth.ticks + np.array(late)
+    with pytest.raises(BrokenTrace, match=rf"not evenly spaced after t = {begins} s"):
         Scene.of(replace(trace, truth=Samples(ticks, trace.truth.values)), CASE, over=True)
+
+
+def test_a_window_without_a_sample_is_refused():
+    scene = Scene.of(run([1.0] * 5, [0.0] * 5), CASE, over=True)
+    with pytest.raises(BrokenTrace, match=r"the window up to 1.9 s ahead holds no sample: they are 1 s apart"):
+        scene.window(Window(between=[1.1, 1.9]))
+    assert scene.window(Window(between=[1.1, 2.0])) == monitor.Window(2, 2)
+
+
+def test_of_a_single_sample_the_next_one_may_be_a_tick_away():
+    assert Scene.of(run([1.0], [0.0]), CASE, over=True).window(Window(within=1 / 240)) == monitor.Window(0, 1)
+
+
+def test_an_answer_below_other_conditions_is_due_from_the_first_sample_on():
+    premise, answer = ({"signal": name, "op": ">=", "value": 0.5} for name in ("clearance", "yaw_rate"))
+    formula = validated({"all": [{"whenever": premise, "then": answer}]})
+    scene = Scene.of(run([1.0, 0.0, 0.0], [-1.0, 1.0, 1.0]), CASE, over=True)
+    assert judged(formula, scene).low.tolist() == [-0.5, 0.5, 0.5]
+
+
+def test_a_signal_that_is_no_number_is_named_with_its_first_moment():
+    lost = Path(np.full((2, 3), np.nan), 480)
+    trace = replace(run([1.0] * 5, [0.0] * 5), plans=(lost,))
+    with pytest.raises(BrokenTrace, match=r"plan_deviation is not a number at t = 2.00 s"):
+        judged(validated({"signal": "plan_deviation", "op": "<", "value": 1.0}), Scene.of(trace, CASE, over=True))

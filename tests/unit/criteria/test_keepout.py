@@ -129,3 +129,45 @@ def test_without_a_footprint_the_robot_is_a_disc_of_its_inscribed_radius():
 @pytest.mark.parametrize("ring", [[[0, 0], [1, 0], [2, 0]], [*NOTCHED, *NOTCHED], [[0, 0], [1, 1], [1, 0], [0, 1]]])
 def test_a_region_that_has_no_inside_of_its_own_is_an_error_never_a_pass(ring):
     assert judged(ring, [[0, 9, 9, 0]]).status is Status.ERROR
+
+
+FLY = [[-0.001, -0.001], [0.001, -0.001], [0.001, 0.001], [-0.001, 0.001]]
+TAIL = [[-1.5, -0.05], [0.1, -0.05], [0.1, 0.05], [-1.5, 0.05]]
+
+
+def around(x, y, r):
+    return [[x - r, y - r], [x + r, y - r], [x + r, y + r], [x - r, y + r]]
+
+
+def in_one_step(region, start, end, footprint=FLY, **more):
+    return judged(region, [[0, *start], [0.025, *end]], footprint, seconds=0.025, **more)
+
+
+@pytest.mark.parametrize(("start", "end", "tick"), [((0, 0), (0.3, 0), 6), ((0.3, 0), (0, 0), 0)])
+def test_the_nearest_moment_may_be_a_sample_itself(start, end, tick):
+    found = in_one_step(around(1, 0, 0.5), start, end)
+    assert (found.value, found.tick) == (pytest.approx(0.199, abs=1e-9), tick)
+
+
+@pytest.mark.parametrize("turn", [2.0, -2.0])
+def test_a_tail_that_sweeps_over_a_region_between_two_samples_is_in_it(turn):
+    at = np.pi + turn / 2
+    swept = around(1.4 * np.cos(at), 1.4 * np.sin(at), 0.02)
+    assert in_one_step(swept, (0, 0, 0), (0, 0, turn), TAIL).value < 0
+    beyond = around(1.7 * np.cos(at), 1.7 * np.sin(at), 0.02)
+    assert in_one_step(beyond, (0, 0, 0), (0, 0, turn), TAIL).value > 0.1
+
+
+@pytest.mark.parametrize(("x", "y"), [(0.5, 0.0), (0.0, 0.5), (0.35, -0.35)])
+def test_a_way_in_any_direction_between_two_samples_is_searched(x, y):
+    assert in_one_step(around(x, y, 0.02), (0, 0), (2 * x, 2 * y)).value < 0
+
+
+def test_the_nearest_moment_is_found_to_half_a_centimetre():
+    tip = [[0.0165, 0.0], [0.0166, -1.0], [0.0164, -1.0]]
+    assert in_one_step(tip, (0, 0), (0.022, 0), [], radius=0.0).value < 0.005
+
+
+@pytest.mark.parametrize("side", [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)])
+def test_a_disc_is_round(side):
+    assert judged(around(*side, 0.25), [[0, 0, 0, 0]], [], radius=0.3).value == pytest.approx(0.45)

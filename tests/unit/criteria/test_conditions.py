@@ -1,0 +1,158 @@
+"""Which conditions can be written, and what is said of those that cannot."""
+
+import math
+
+import pytest
+from pydantic import ValidationError
+
+from simscen.criteria.condition import Condition, Window
+
+NEAR = {"signal": "clearance", "op": "<", "value": 0.5}
+LOST = {"not": {"signal": "localized"}}
+FAST = {"signal": "speed", "op": ">", "value": 1.0}
+
+
+def refused(words):
+    with pytest.raises(ValidationError) as error:
+        Condition.model_validate(words)
+    return "; ".join(problem["msg"].removeprefix("Value error, ") for problem in error.value.errors())
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        ({}, "expected one of: signal, all, any, not, always, eventually, until, whenever"),
+        ({**NEAR, "not": LOST}, "only one of signal, not may be given here"),
+        ({"all": [LOST], "any": [LOST]}, "only one of all, any may be given here"),
+        ({"whenever": NEAR}, "`whenever` and `then` belong together"),
+        ({**NEAR, "then": LOST}, "`whenever` and `then` belong together"),
+        ({"not": LOST, "op": "<"}, "`op` belongs to a signal, not to `not`"),
+        ({"any": [LOST], "value": 0.0}, "`value` belongs to a signal, not to `any`"),
+        ({"not": LOST, "scale": 1.0}, "`scale` belongs to a signal, not to `not`"),
+        ({"not": LOST, "with": "box"}, "`with` belongs to a signal, not to `not`"),
+        ({"all": []}, "List should have at least 1 item after validation, not 0"),
+        ({"any": []}, "List should have at least 1 item after validation, not 0"),
+        ({"all": [LOST] * 51}, "List should have at most 50 items after validation, not 51"),
+        ({"any": [LOST] * 51}, "List should have at most 50 items after validation, not 51"),
+        ({**NEAR, "region": "dock"}, "`clearance` is not about `region`"),
+        ({"signal": "in_region", "goal": "a"}, "`in_region` is not about `goal`"),
+        ({"signal": "in_region"}, "`in_region` needs exactly one of: region"),
+        ({"signal": "distance_to", "op": "<", "value": 1}, "`distance_to` needs exactly one of: object, point, goal"),
+        (
+            {"signal": "distance_to", "goal": "a", "object": "cart", "op": "<", "value": 1},
+            "`distance_to` needs exactly one of: object, point, goal",
+        ),
+        ({"signal": "localized", "op": ">=", "value": 2}, "`localized` is yes or no: write it alone, or below `not`"),
+        ({"signal": "localized", "op": ">", "value": 1}, "`localized` is yes or no: write it alone, or below `not`"),
+        ({"signal": "localized", "op": ">="}, "`localized` is yes or no: write it alone, or below `not`"),
+        ({"signal": "localized", "value": 1}, "`localized` is yes or no: write it alone, or below `not`"),
+        ({"signal": "localized", "scale": 1}, "`localized` is yes or no: write it alone, or below `not`"),
+        ({"signal": "speed", "op": ">"}, "`speed` needs `op` and `value`"),
+        ({"signal": "speed", "value": 1}, "`speed` needs `op` and `value`"),
+        ({**FAST, "scale": 0}, "`scale` must be greater than 0"),
+        ({**FAST, "scale": -0.5}, "`scale` must be greater than 0"),
+        ({**FAST, "op": "=="}, "`==` never holds for long for what is measured; use `<=` and `>=` around it"),
+        ({**FAST, "op": "="}, "`=` never holds for long for what is measured; use `<=` and `>=` around it"),
+        ({**FAST, "op": "!="}, "`!=` never holds for long for what is measured; use `<=` and `>=` around it"),
+        (
+            {**FAST, "value": "1 rad/s"},
+            "`rad/s` is a unit of angular speed, but this is a speed; units: ",
+        ),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(words, why):
+    assert refused(words).startswith(why)
+
+
+@pytest.mark.parametrize(
+    ("signal", "op", "value", "why"),
+    [
+        ("speed", ">=", 0, "never below 0 m/s, so `>= 0 m/s` always holds"),
+        ("speed", ">", -1, "never below 0 m/s, so `> -1 m/s` always holds"),
+        ("speed", "<", 0, "never below 0 m/s, so `< 0 m/s` never holds"),
+        ("speed", "<=", -1, "never below 0 m/s, so `<= -1 m/s` never holds"),
+        ("goal_heading_error", "<=", math.pi, "never above 3.14159 rad, so `<= 3.14159 rad` always holds"),
+        ("goal_heading_error", "<", 4, "never above 3.14159 rad, so `< 4 rad` always holds"),
+        ("goal_heading_error", ">", math.pi, "never above 3.14159 rad, so `> 3.14159 rad` never holds"),
+        ("goal_heading_error", ">=", 4, "never above 3.14159 rad, so `>= 4 rad` never holds"),
+        ("collision_count", ">=", 0, "never below 0, so `>= 0` always holds"),
+    ],
+)
+def test_what_every_run_or_none_fulfils_is_no_condition(signal, op, value, why):
+    assert refused({"signal": signal, "op": op, "value": value}) == f"`{signal}` is {why}"
+
+
+@pytest.mark.parametrize(
+    ("signal", "op", "value"),
+    [
+        ("speed", ">", 0),
+        ("speed", "<=", 0),
+        ("goal_heading_error", ">=", math.pi),
+        ("goal_heading_error", "<", math.pi),
+        ("clearance", "<=", -1),
+        ("yaw_rate", ">", -50),
+    ],
+)
+def test_a_bound_at_the_edge_of_what_can_be_is_one(signal, op, value):
+    assert Condition.model_validate({"signal": signal, "op": op, "value": value}).value == value
+
+
+def test_a_bound_is_of_the_signals_dimension():
+    told = Condition.model_validate({"signal": "speed", "op": ">", "value": "50 cm/s", "scale": "10 cm/s"})
+    assert (told.value, told.scale) == (0.5, 0.1)
+    assert Condition.model_validate({"signal": "nees", "op": ">", "value": 3}).value == 3.0
+
+
+def test_a_misspelt_signal_is_one_mistake_whatever_the_unit_of_its_bound():
+    assert refused({"signal": "sped", "op": ">", "value": "1 m/s"}).count(";") == 0
+    assert refused({"signal": "sped", "op": ">", "value": "1 N s"}).count(";") == 0
+    assert refused({"signal": "sped", "op": ">", "value": 1}).count(";") == 0
+    assert "valid number" in refused({"signal": "sped", "op": ">", "value": "fast"})
+
+
+def test_a_condition_knows_its_comparisons_in_the_order_they_are_written():
+    hurt = {"signal": "in_collision"}
+    told = Condition.model_validate(
+        {"any": [{"all": [NEAR, LOST]}, {"until": {"hold": hurt, "release": NEAR}}, {"whenever": LOST, "then": hurt}]}
+    )
+    names = [one.signal for one in told.comparisons()]
+    assert names == ["clearance", "localized", "in_collision", "clearance", "localized", "in_collision"]
+    assert [one.signal for one in Condition.model_validate({"always": NEAR}).comparisons()] == ["clearance"]
+    assert [one.signal for one in Condition.model_validate({"eventually": NEAR}).comparisons()] == ["clearance"]
+
+
+def test_what_a_signal_is_about_goes_by_the_keys_of_the_language():
+    assert Condition.model_validate({"signal": "in_collision", "with": "box"}).about == {"with": "box"}
+    assert Condition.model_validate({"signal": "in_region", "region": "dock"}).about == {"region": "dock"}
+    assert Condition.model_validate({"signal": "in_collision"}).about == {}
+
+
+@pytest.mark.parametrize(
+    ("words", "stretch"),
+    [
+        ({}, (0.0, None)),
+        ({"within": 2}, (0.0, 2.0)),
+        ({"after": 2}, (2.0, None)),
+        ({"between": [0, 2]}, (0.0, 2.0)),
+        ({"between": [1, 2]}, (1.0, 2.0)),
+    ],
+)
+def test_a_window_is_a_stretch_ahead(words, stretch):
+    assert Window.model_validate(words).stretch == stretch
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        ({"within": 2, "after": 1}, "only one of within, after may be given here"),
+        ({"after": 1, "between": [2, 3]}, "only one of after, between may be given here"),
+        ({"between": [2, 2]}, "the window from 2 s to 2 s is empty"),
+        ({"between": [3, 2]}, "the window from 3 s to 2 s is empty"),
+        ({"between": [3]}, "at least 2 items"),
+        ({"between": [1, 2, 3]}, "at most 2 items"),
+        ({"within": 0}, "greater than 0"),
+    ],
+)
+def test_a_window_is_one_stretch_and_not_empty(words, why):
+    with pytest.raises(ValidationError, match=why):
+        Window.model_validate(words)

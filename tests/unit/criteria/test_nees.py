@@ -1,0 +1,102 @@
+"""NEES against closed forms, and of which beliefs."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from simscen.core.samples import Samples
+from simscen.criteria.bounds import BrokenTrace
+from simscen.criteria.nees import DIMENSIONS, nees, nees_samples
+from simscen.judge.sketch import sketch
+
+APART = [0.25, 0.0, 0.0, 0.04, 0.0, 0.01]
+"""Variances of x, y and yaw: deviations of 0.5 m, 0.2 m and 0.1 rad."""
+
+
+def of(error, covariance):
+    return float(nees(np.array([error]), np.array([covariance]))[0])
+
+
+@pytest.mark.parametrize(("error", "expected"), [((1, 0, 0), 4.0), ((0, 0.4, 0), 4.0), ((0, 0, 0.3), 9.0)])
+def test_errors_count_in_standard_deviations_squared(error, expected):
+    assert of(error, APART) == pytest.approx(expected)
+    assert of([-part for part in error], APART) == pytest.approx(expected)
+
+
+def test_it_is_the_error_in_the_inverse_covariance_whatever_is_correlated():
+    chance = np.random.default_rng(4)
+    roots, errors = chance.normal(size=(30, 3, 3)), chance.normal(size=(30, 3))
+    full = roots @ roots.transpose(0, 2, 1) + 0.1 * np.eye(3)
+    rows, columns = np.triu_indices(3)
+    expected = [error @ np.linalg.inv(matrix) @ error for error, matrix in zip(errors, full, strict=True)]
+    assert nees(errors, full[:, rows, columns]) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    "covariance",
+    [
+        [0, 0, 0, 1, 0, 1],
+        [1, 0, 0, 0, 0, 1],
+        [1, 0, 0, 1, 0, 0],
+        [-1, 0, 0, 1, 0, 1],
+        [1, 0, 0, -1, 0, 1],
+        [1, 0, 0, 1, 0, -1],
+        [-1, 0, 0, -1, 0, -1],
+        [1, 1, 0, 1, 0, 1],
+        [1, 0, 1, 1, 0, 1],
+        [1, 0, 0, 1, 1, 1],
+        [1e-320, 0, 0, 1, 0, 1],
+    ],
+)
+def test_a_covariance_that_is_not_positive_definite_claims_to_know_a_direction_exactly(covariance):
+    assert of((1, 1, 1), covariance) == math.inf
+
+
+def test_a_filter_of_three_dimensions_that_tells_the_truth_has_three():
+    assert DIMENSIONS == 3
+
+
+def believing(truth, belief, covariance=APART):
+    """Truth and beliefs as (tick, x, y, yaw)."""
+    trace = sketch({"seconds": 1, "truth": [[0, 0, 0]]})
+    ticks, poses = np.array([row[0] for row in belief]), np.array([row[1:] for row in belief], dtype=np.float64)
+    way = Samples(np.array([row[0] for row in truth]), np.array([row[1:] for row in truth], dtype=np.float64))
+    return replace(
+        trace, truth=way, belief=Samples(ticks, np.column_stack((poses, np.tile(covariance, (len(ticks), 1)))))
+    )
+
+
+def test_each_belief_is_compared_with_the_truth_at_its_tick():
+    trace = believing([(0, 0, 0, 0), (240, 4, 8, 0.4)], [(60, 1, 2, 0.1), (120, 3, 4, 0.2), (180, 3, 6.4, 0.2)])
+    found = nees_samples(trace)
+    assert found.ticks.tolist() == [60, 120, 180]
+    assert found.values == pytest.approx(np.array([[0.0], [4.0], [5.0]]))
+
+
+def test_headings_differ_by_the_short_way_round():
+    trace = believing([(0, 0, 0, 3.1), (240, 0, 0, 3.2 - 2 * math.pi)], [(120, 0, 0, 3.05 - 2 * math.pi)])
+    assert nees_samples(trace).values[0, 0] == pytest.approx(1.0)
+
+
+def test_each_covariance_is_that_of_its_belief():
+    trace = believing([(0, 0, 0, 0)], [(0, 1, 0.2, 0.1)], [0.25, 0.03, 0.01, 0.04, 0.002, 0.01])
+    full = np.array([[0.25, 0.03, 0.01], [0.03, 0.04, 0.002], [0.01, 0.002, 0.01]])
+    error = np.array([1, 0.2, 0.1])
+    assert nees_samples(trace).values[0, 0] == pytest.approx(error @ np.linalg.inv(full) @ error)
+
+
+def test_without_covariances_beliefs_or_the_truth_there_is_none():
+    trace = believing([(0, 0, 0, 0)], [(0, 0, 0, 0)])
+    nothing = Samples(np.empty(0, dtype=np.int64), np.empty((0, 9)))
+    bare = Samples(trace.belief.ticks, trace.belief.values[:, :8])
+    for lacking in (replace(trace, belief=bare), replace(trace, belief=nothing), replace(trace, truth=nothing)):
+        assert nees_samples(lacking).values.shape == (0, 1)
+        assert len(nees_samples(lacking)) == 0
+    assert len(nees_samples(trace)) == 1
+
+
+def test_a_belief_that_is_not_finite_is_named():
+    with pytest.raises(BrokenTrace, match=r"the belief is not finite at t = 0.50 s"):
+        nees_samples(believing([(0, 0, 0, 0)], [(0, 0, 0, 0), (120, math.nan, 0, 0)]))

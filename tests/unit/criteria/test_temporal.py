@@ -1,0 +1,139 @@
+"""What a temporal criterion asks of a log, in which unit its margin is, and what its finding tells."""
+
+import math
+
+import pytest
+
+from simscen.core.evidence import Evidence
+from simscen.core.verdict import Status
+from simscen.criteria.criterion import AnyCriterion
+from simscen.criteria.temporal import Temporal
+from simscen.judge.judge import judge
+from simscen.judge.sketch import sketch, sketch_case
+
+
+def criterion(words):
+    chosen = AnyCriterion.model_validate(words).chosen
+    assert isinstance(chosen, Temporal)
+    return chosen
+
+
+def found(words, trace, case=None):
+    (verdict,) = judge([AnyCriterion.model_validate(words)], sketch(trace), sketch_case(case or {}))
+    (finding,) = verdict.findings
+    return finding
+
+
+FAR = {"signal": "clearance", "op": ">", "value": 2.0}
+FARTHER = {"signal": "clearance", "op": ">", "value": 3.0}
+SLOW = {"signal": "speed", "op": "<", "value": 1.0}
+HURT = {"signal": "in_collision"}
+CART = {"signal": "distance_to", "object": "cart", "op": ">", "value": 1.0}
+STILL = {"seconds": 1, "truth": [[0, 0, 0]]}
+
+
+@pytest.mark.parametrize(
+    ("words", "metres"),
+    [
+        ({"always": FAR}, 2.5),
+        ({"always": {"any": [FARTHER, FAR, SLOW]}}, 3.5),
+        ({"until": {"hold": SLOW, "release": FAR}}, 2.5),
+        ({"whenever": FAR, "then": FARTHER}, 3.5),
+        ({"eventually": {"any": [SLOW, {"signal": "goal_distance", "op": "<", "value": 5.0}]}}, 0.0),
+        ({"always": HURT}, 0.0),
+    ],
+)
+def test_the_clearance_is_searched_for_half_a_metre_beyond_the_largest_bound_on_it(words, metres):
+    assert criterion(words).clearance_range == metres
+
+
+def test_it_needs_what_its_signals_need_and_objects_only_for_what_is_about_one():
+    assert criterion({"always": SLOW}).evidence == {Evidence.TRUTH, Evidence.VELOCITY}
+    both = criterion({"until": {"hold": SLOW, "release": HURT}})
+    assert both.evidence == {Evidence.TRUTH, Evidence.VELOCITY, Evidence.CONTACTS}
+    assert criterion({"always": CART}).evidence == {Evidence.TRUTH, Evidence.ALIGNMENT, Evidence.OBJECTS}
+    assert criterion({"always": {"all": [SLOW, CART]}}).evidence > {Evidence.OBJECTS, Evidence.VELOCITY}
+    point = {"signal": "distance_to", "point": [0, 0], "op": ">", "value": 1.0}
+    assert criterion({"always": point}).evidence == {Evidence.TRUTH, Evidence.ALIGNMENT}
+
+
+WAY = {"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]], "clearance": 2.25}
+FAR_SIGHTED = {"clearance_range": 9.0}
+
+
+@pytest.mark.parametrize(
+    ("condition", "margin", "unit"),
+    [
+        (FAR, 0.25, "m"),
+        ({"all": [FAR, {**FAR, "value": 2.125}]}, 0.125, "m"),
+        ({"all": [FAR, SLOW]}, None, "m"),
+        ({"all": [FAR, {"not": HURT}]}, 0.25, "m"),
+        ({"all": [{**FAR, "scale": 0.5}, {**SLOW, "scale": 0.25}]}, 0.5, ""),
+        ({"all": [{**FAR, "scale": 0.5}, SLOW]}, None, "m/s"),
+        ({"all": [{**FAR, "scale": 0.5}, {**FAR, "value": 1.0}]}, None, "m"),
+        ({"all": [{**FAR, "scale": 0.5}, {"not": HURT}]}, 0.5, ""),
+        ({"not": HURT}, None, ""),
+        ({"any": [FAR, {"not": HURT}]}, None, ""),
+        ({**FAR, "value": 2.25, "op": ">="}, 0.0, "m"),
+    ],
+)
+def test_a_margin_is_in_the_unit_that_all_its_signals_share(condition, margin, unit):
+    finding = found({"always": condition}, WAY, FAR_SIGHTED)
+    assert finding.status is Status.PASS
+    assert (finding.margin, finding.unit) == (margin if margin is None else pytest.approx(margin), unit)
+
+
+def test_a_tie_that_does_not_hold_keeps_its_sign():
+    finding = found({"always": {**FAR, "value": 2.25}}, WAY, FAR_SIGHTED)
+    assert finding.status is Status.FAIL
+    assert -1e-300 < finding.margin < 0
+
+
+def test_a_signal_that_is_infinite_has_no_margin():
+    finding = found(
+        {"always": CART}, {**STILL, "events": [[0.5, "object.removed", "cart"]], "objects": {"cart": [[0, 9, 0]]}}
+    )
+    assert finding.margin == pytest.approx(8.0)
+    gone = {**STILL, "events": [[0, "object.removed", "cart"]], "objects": {"cart": [[0, 9, 0]]}}
+    finding = found({"always": CART}, gone)
+    assert (finding.status, finding.measured, finding.margin, finding.value) == (
+        Status.PASS,
+        "infinite",
+        None,
+        math.inf,
+    )
+
+
+def test_a_finding_tells_the_deciding_moment_its_place_and_its_signal():
+    finding = found({"eventually": {"signal": "goal_distance", "op": "<", "value": 1.0}}, WAY, GOAL)
+    assert (finding.what, finding.status, finding.value, finding.tick) == ("goal_distance", Status.PASS, 0.5, 960)
+    assert finding.place == pytest.approx((2.0, 0.0))
+    assert finding.detail == ("asked: eventually goal_distance < 1 m",)
+
+
+GOAL = {"goals": [{"name": "a", "pose": [2.5, 0, 0]}]}
+
+
+def test_an_answer_of_yes_or_no_has_no_value():
+    finding = found({"always": {"not": HURT}}, STILL)
+    assert (finding.measured, finding.limit, finding.value) == ("no", "no", None)
+
+
+def test_what_the_end_of_the_run_left_open_is_undecided_with_the_time_of_the_end():
+    finding = found({"always": {**FAR, "within": 9.0}}, WAY)
+    assert finding.status is Status.INCONCLUSIVE
+    assert finding.measured.startswith("the run ended at t = 4.00 s (navigation ended) before `always within 9 s")
+    assert finding.limit == "always within 9 s clearance > 2 m"
+
+
+def test_a_signal_that_was_not_recorded_leaves_it_undecided():
+    finding = found({"always": {"signal": "nees", "op": "<", "value": 9}}, {**STILL, "belief": None})
+    assert (finding.status, finding.measured) == (Status.INCONCLUSIVE, "no covariance was recorded")
+
+
+def test_when_each_note_was_is_told():
+    answer = {"whenever": {**FAR, "op": "<"}, "then": HURT}
+    trace = {"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]], "clearance": [[0, 9], [2, 9], [2.025, 1], [4, 1]]}
+    finding = found(answer, trace)
+    assert finding.status is Status.FAIL
+    assert finding.detail[1:] == ("the answer was due at t = 2.02 s",)
