@@ -26,10 +26,11 @@ def geometry_notes(robot: LoadedRobot, spec: RobotSpec, body: RobotBody, roots: 
     from simscen.sim.urdf.stance import stance_of
 
     tree = tree_of_spec(spec, robot.path, roots, read_mesh, Found(robot.urdf, robot.packages))
-    return [*_otherwise(robot, body), *stance_of(tree, spec.drive)]
+    return [*otherwise(robot, body), *stance_of(tree, spec.drive)]
 
 
-def _otherwise(robot: LoadedRobot, body: RobotBody) -> Iterator[Problem]:
+def otherwise(robot: LoadedRobot, body: RobotBody) -> Iterator[Problem]:
+    """Warnings about dimensions of the drive that are not those of the URDF."""
     if robot.tree is None or robot.urdf is None:
         return
     drawn = _drawn(body.wheels)

@@ -36,6 +36,7 @@ def check(loaded: LoadedScenario, cache: WorldCache | None = None, pictures: Pat
     loaded = _with_robot(loaded)
     problems = [*_once_known(loaded, world), *_too_large(loaded, world)]
     problems += [loaded.sourced(problem) for problem in misnamed(world, loaded.world)]
+    problems += _otherwise(loaded)
     if not _has_errors(problems):
         problems += _impossible(Scene(loaded, world, robot_size_of(loaded)), cache, pictures)
     return [*problems, *notes_of(world, loaded.world, loaded.root)]
@@ -53,6 +54,15 @@ def _impossible(scene: Scene, cache: WorldCache, pictures: Path | None) -> list[
         file = draw(scene, [gap for _, gap in closed], pictures)
         problems = [replace(problem, hint=f"{problem.hint}; picture: {file}".lstrip("; ")) for problem in problems]
     return problems
+
+
+def _otherwise(loaded: LoadedScenario) -> Iterator[Problem]:
+    """Where a robot's file and its URDF do not agree."""
+    if loaded.robot.urdf is None:
+        return
+    from simscen.run.robotgeometry import otherwise
+
+    yield from map(loaded.sourced, otherwise(loaded.robot, load_robot(loaded)[1]))
 
 
 def _has_errors(problems: list[Problem]) -> bool:

@@ -2,6 +2,7 @@
 
 import json
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -129,6 +130,18 @@ def test_a_wheel_separation_other_than_the_urdfs_is_told_with_both_numbers_and_t
     assert code == 1
     assert "cart.robot.yaml:5:62: warning[SC404] wheel_separation is 0.45 m here, but 0.4 m in cart.urdf" in told
     assert float(told.split("wheel_separation 0.45 m: ")[1].split()[0]) == pytest.approx(0.4, rel=0.002)
+
+
+def test_a_scenario_is_told_of_a_wheel_separation_other_than_the_urdfs(simscen):
+    sensors = "{lidar: {lidar: {mount: {z: 0.3}}}, odom: {odometry: {}}}"
+    text = robot_yaml(DIFFERENTIAL.format(0.05, 0.45)).replace("sensors: {}", f"sensors: {sensors}")
+    Path("cart.robot.yaml").write_text(text)
+    Path("cart.urdf").write_text(urdf(wheels()))
+    good = Path("good.scenario.yaml").read_text()
+    Path("good.scenario.yaml").write_text(good.replace("robot: {pose", "robot: {model: cart.robot.yaml, pose"))
+    ended = simscen("validate", "good.scenario.yaml")
+    assert "cart.robot.yaml:5:62: warning[SC404] wheel_separation is 0.45 m here, but 0.4 m in cart.urdf" in ended.out
+    assert ended.code == 0
 
 
 def test_a_wheel_radius_other_than_the_urdfs_is_told_with_both_numbers_and_the_one_that_fits(check):
