@@ -11,10 +11,12 @@ from simscen.core.problems import Problem
 from simscen.loading.discovery import default_root, discover
 from simscen.loading.keywords import select
 from simscen.loading.loaded import LoadedScenario
+from simscen.loading.robotfile import load_robot_file
 from simscen.loading.scenario import try_scenario
 from simscen.loading.worldfile import load_world_file
 from simscen.run.precheck.feasibility import check, notes_of
 from simscen.run.precheck.worldchecks import misnamed
+from simscen.run.robotproblems import problems_once_built
 from simscen.run.worldcache import WorldCache
 from simscen.run.worldsource import world_of
 
@@ -104,6 +106,15 @@ class Checks:
                 return notes
             world = world_of(source, self.root, self.world_path, self.lenient)
             return [*notes, *misnamed(world, source), *notes_of(world, source, self.root)]
+        except InvalidInput as error:
+            return error.problems
+
+    def robot(self, file: Path) -> list[Problem]:
+        """What only building a robot can tell, or why it cannot be used."""
+        if self.fast:
+            return []
+        try:
+            return problems_once_built(load_robot_file(str(file), self.root, self.world_path))
         except InvalidInput as error:
             return error.problems
 

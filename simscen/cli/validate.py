@@ -33,7 +33,9 @@ def command(
     lenient: Annotated[
         bool, typer.Option("--lenient", help="What of an SDF world cannot be used is a warning, not an error.")
     ] = False,
-    fast: Annotated[bool, typer.Option("--fast", help="Leave out whatever needs the world to be built.")] = False,
+    fast: Annotated[
+        bool, typer.Option("--fast", help="Leave out whatever needs a world or robot to be built.")
+    ] = False,
     picture: Annotated[
         Path | None, typer.Option(help="Folder for a picture of each scenario whose geometry is wrong.")
     ] = None,
@@ -57,12 +59,13 @@ def command(
 
 
 def _problems(kind: str, file: Path, checks: Checks) -> list[Problem]:
-    """What the text tells; where that is nothing, what the geometry tells, which needs numpy."""
+    """What the text tells; where that is nothing, what building it tells, which needs numpy."""
     if kind == "scenario":
         return checks.scenario(file)[1]
     found = problems_of(kind, file, checks.root, checks.world_path)
     wrong = any(problem.severity == "error" for problem in found)
-    return found if wrong or kind == "robot" else [*found, *checks.world(file)]
+    built = checks.robot if kind == "robot" else checks.world
+    return found if wrong else [*found, *built(file)]
 
 
 @dataclass

@@ -144,6 +144,35 @@ def test_a_scenario_is_told_of_a_wheel_separation_other_than_the_urdfs(simscen):
     assert ended.code == 0
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "code", "told"),
+    [
+        ("x", "x", 0, "1 robot is valid"),
+        ("radius: 0.05", "radius: 0.06", 0, "warning[SC404] wheel_radius is 0.06 m here, but 0.05 m in cart.urdf"),
+        ("limits:", "arguments: {a: 1}\nlimits:", 2, "cart.robot.yaml:7:13: error[SC403] `cart.urdf` declares no"),
+        ("0.05, wheel", "0.05, left: [x], right: [y], wheel", 2, "cart.urdf:1:1: error[SC400] no joint called 'x'"),
+    ],
+)
+def test_validate_builds_a_robot_of_a_urdf(simscen, old, new, code, told):
+    """It called robots valid that no scenario could use."""
+    Path("cart.robot.yaml").write_text(robot_yaml(DIFFERENTIAL.format(0.05, 0.4)).replace(old, new))
+    Path("cart.urdf").write_text(urdf(wheels()))
+    ended = simscen("validate", "cart.robot.yaml")
+    assert told in ended.out
+    assert ended.code == code
+    assert simscen("validate", "--fast", "cart.robot.yaml").code == 0
+
+
+def test_validate_tells_of_a_body_that_would_drag(simscen):
+    text = robot_yaml(DIFFERENTIAL.format(0.05, 0.4)).replace(
+        "urdf: cart.urdf", "mass: 5\nbody: [{box: [0.3, 0.3, 0.2]}]"
+    )
+    Path("cart.robot.yaml").write_text(text)
+    ended = simscen("validate", "cart.robot.yaml")
+    assert "error[SC401] a part of the body of 'cart' reaches the ground" in ended.out
+    assert ended.code == 2
+
+
 def test_a_wheel_radius_other_than_the_urdfs_is_told_with_both_numbers_and_the_one_that_fits(check):
     files = {"cart_urdf": urdf(wheels()), "cart_robot_yaml": robot_yaml(DIFFERENTIAL.format(0.06, 0.4))}
     code, told, _ = check("cart.robot.yaml", **files)
