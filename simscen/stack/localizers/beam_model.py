@@ -71,3 +71,7 @@ class BeamModel:
             return logarithm
 
         return by_blocks(judge, poses)
+
+    def tempering(self, beams: Beams) -> float:
+        """A sum of cubes says little however many beams there are."""
+        return 1.0

@@ -26,6 +26,10 @@ class SensorModel(Protocol):
         """
         ...
 
+    def tempering(self, beams: Beams) -> float:
+        """The exponent that puts likelihoods of any scan on one scale: 1/beams for a product, 1 for a bounded sum."""
+        ...
+
 
 def obstacle_field(grid: OccupancyGrid, max_distance: float) -> DistanceField:
     """Distances to the surfaces of what is occupied; off the map counts as far from everything, as in nav2_amcl.
@@ -66,6 +70,10 @@ class LikelihoodField:
 
         return by_blocks(judge, poses)
 
+    def tempering(self, beams: Beams) -> float:
+        """A sum of cubes says little however many beams there are."""
+        return 1.0
+
 
 @dataclass(frozen=True)
 class BeamSkipping:
@@ -104,6 +112,10 @@ class LikelihoodFieldProb:
             return logarithm
 
         return by_blocks(judge, poses)
+
+    def tempering(self, beams: Beams) -> float:
+        """The geometric mean over the beams that hit something."""
+        return 1 / max(1, int(np.count_nonzero(beams.ranges < beams.range_max)))
 
     def _kept(self, poses: Array, points: Array, skipping: BeamSkipping) -> npt.NDArray[np.bool_] | slice:
         near = self._field.table.take(self._field.cells_seen(poses, points)) < skipping.distance

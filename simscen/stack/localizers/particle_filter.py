@@ -11,13 +11,13 @@ from simscen.core.belief import Estimate
 from simscen.core.geometry import Array, Pose2
 from simscen.core.sensing import Scan
 from simscen.model.stack import Amcl
-from simscen.stack.localizers.beams import select_beams
+from simscen.stack.localizers.beams import Beams, select_beams
 from simscen.stack.localizers.clusters import summarise
 from simscen.stack.localizers.kld import KldBound
 from simscen.stack.localizers.likelihood_field import SensorModel
 from simscen.stack.localizers.motion_models import MotionModel
 from simscen.stack.localizers.particles import FreeSpace, Particles
-from simscen.stack.localizers.recovery import Recovery
+from simscen.stack.localizers.recovery import PROBES, Recovery
 from simscen.stack.localizers.resampling import adaptive, systematic
 
 CONVERGED_WITHIN = 0.5  # nav2_amcl's pf.dist_threshold, in m
@@ -37,6 +37,7 @@ class ParticleFilter:
         """Start over: particles around the estimate's pose, or over all free space when it has none."""
         self.particles = self._anywhere.begin(estimate, self._bound.most, self._chance)
         self._recovery = Recovery(self._spec.recovery_alpha_slow, self._spec.recovery_alpha_fast)
+        self._put_anywhere = np.zeros(len(self.particles.weights), dtype=np.bool_)
         self._corrections = 0
 
     def move(self, delta: Pose2) -> None:
@@ -61,23 +62,44 @@ class ParticleFilter:
         shift = best if best > -np.inf else 0.0
         weights = self.particles.weights * np.exp(logarithm - shift)
         total = float(weights.sum())
-        self._recovery.observe(math.exp(shift) * total)
+        if self._recovery.wanted:
+            self._observe(beams, weights, shift)
         self.particles = Particles(poses, weights / total) if total > 0 else Particles.equal(poses)
         answer = summarise(self.particles) if total > 0 else None
         self._resample()
         return answer
 
+    def _observe(self, beams: Beams, weights: Array, shift: float) -> None:
+        """Tell the recovery how the particles explain a scan, but for those that were put anywhere a scan ago.
+
+        `weights` (n,) are theirs times the likelihood of the beams, without the factor exp(shift).
+        """
+        kept = ~self._put_anywhere if not self._put_anywhere.all() else slice(None)
+        likely = float(weights[kept].sum() / self.particles.weights[kept].sum())
+        tracked = math.log(likely) + shift if likely > 0 else -math.inf
+        anywhere = self._sensor.log_likelihood(self._anywhere.draw(PROBES, self._chance), beams, False)
+        scale = self._sensor.tempering(beams)
+        self._recovery.observe(tracked * scale, anywhere * scale)
+
     def _resample(self) -> None:
         """Draw new particles, on every resample_interval-th scan and, if selective, when too few carry weight."""
         self._corrections += 1
+        self._put_anywhere = np.zeros(len(self.particles.weights), dtype=np.bool_)
         lopsided = self.particles.effective <= len(self.particles.weights) / 2
         if self._corrections % self._spec.resample_interval == 0 and (lopsided or not self._spec.selective_resampling):
-            self.particles = Particles.equal(adaptive(self._draw, self._bound))
+            drawn = adaptive(self._draw, self._bound)
+            self._put_anywhere = drawn[:, 3] > 0
+            self.particles = Particles.equal(np.ascontiguousarray(drawn[:, :3]))
 
     def _draw(self, count: int) -> Array:
-        """Poses (count, 3) in random order: most from the particles, the recovery's share from anywhere."""
-        poses = self.particles.poses[systematic(self.particles.weights, count, self._chance)]
-        if self._recovery.share > 0:
-            lost = self._chance.random(count) < self._recovery.share
-            poses[lost] = self._anywhere.draw(int(lost.sum()), self._chance)
-        return self._chance.permutation(poses)
+        """Poses in random order: most from the particles, the recovery's share from anywhere.
+
+        Rows (count, 4): x, y, yaw, and 1 for anywhere.
+        """
+        drawn = np.zeros((count, 4))
+        drawn[:, :3] = self.particles.poses[systematic(self.particles.weights, count, self._chance)]
+        if (share := self._recovery.share) > 0:
+            lost = self._chance.random(count) < share
+            drawn[lost, :3] = self._anywhere.draw(int(lost.sum()), self._chance)
+            drawn[lost, 3] = 1
+        return self._chance.permutation(drawn)

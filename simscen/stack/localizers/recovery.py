@@ -3,30 +3,60 @@
 Augmented MCL: Thrun, Burgard & Fox, Probabilistic Robotics, section 8.3.5 and table 8.3.
 """
 
+import math
+
+import numpy as np
+
+from simscen.core.geometry import Array
+
+PROBES = 200
+"""Poses from anywhere that each scan is compared with."""
+KNOWS_NOTHING = 0.1
+"""The share of places that explain the scans as well as the particles do, from which on they may be lost."""
+_MOST = 50.0
+"""No logarithm of how much likelier counts for more, so that its exponential is a number."""
+
 
 class Recovery:
-    """Compares a fast with a slow running average of the likelihood; when it has dropped, particles are put anywhere.
+    """Compares a fast with a slow running average of how much better the particles explain a scan than anywhere does.
 
-    Keeps to the book where nav2_amcl does not: the averages are not set to zero when particles were put anywhere
-    (that ends the recovery after a few dozen of them, and 8 instead of 12 of 12 kidnapped robots were found), and the
-    likelihood is not divided by the number of particles, which KLD-sampling changes. Where both begin at one extreme,
-    the book at zero and nav2_amcl at the first scan's likelihood, which a fresh cloud around a good guess makes
-    higher than any later one (70 % of the particles stayed random for good), the averages here are normalised.
+    The book and nav2_amcl average the likelihood itself. It varies with the scene as much as with the pose: people,
+    glass and a map that is out of date lower it, although the robot is where it thinks it is, and then good particles
+    are thrown away. Here each scan is its own yardstick: it is weighed at PROBES random poses, too, and what is
+    averaged is how many times likelier it is at the particles than there. Particles are put anywhere while the fast
+    average is below the slow one *and* at least KNOWS_NOTHING of the places of the map explained the recent scans
+    better than the particles.
+
+    nav2_amcl sets both averages to zero when it put particles anywhere ("to avoid spiraling off into complete
+    randomness"), which ends a recovery after a few dozen of them. Nothing spirals here: particles that were put
+    anywhere by the last scan are not asked how well the filter knows its place. The averages are normalised from the
+    first scan on; the book begins at zero, nav2_amcl at the first scan's.
     """
 
     def __init__(self, alpha_slow: float, alpha_fast: float) -> None:
+        self.wanted = alpha_fast > 0
         self._slow, self._fast = RunningAverage(alpha_slow), RunningAverage(alpha_fast)
+        self._better = RunningAverage(alpha_fast)
 
-    def observe(self, likelihood: float) -> None:
-        """Take in the average likelihood of a scan over the particles."""
-        self._slow.add(likelihood)
-        self._fast.add(likelihood)
+    def observe(self, tracked: float, anywhere: Array) -> None:
+        """Take in the logarithms of how likely a scan is: of the average over the particles, and at random poses (n,).
+
+        They are of one scale from scan to scan: see SensorModel.tempering.
+        """
+        best = float(anywhere.max())
+        average = best + math.log(float(np.mean(np.exp(anywhere - best)))) if best > -np.inf else -np.inf
+        likelier = math.exp(min(tracked - average, _MOST)) if tracked > -np.inf else 0.0
+        self._slow.add(likelier)
+        self._fast.add(likelier)
+        self._better.add(float(np.mean(anywhere > tracked)))
 
     @property
     def share(self) -> float:
-        """The share of new particles to put anywhere: 1 - w_fast / w_slow, or zero."""
+        """The share of new particles to put anywhere: 1 - fast / slow, or zero."""
         slow, fast = self._slow.value, self._fast.value
-        return max(0.0, 1 - fast / slow) if slow > 0 else 0.0
+        if slow <= 0 or self._better.value < KNOWS_NOTHING:
+            return 0.0
+        return max(0.0, 1 - fast / slow)
 
 
 class RunningAverage:

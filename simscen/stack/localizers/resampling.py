@@ -27,6 +27,8 @@ def systematic(weights: Array, count: int, chance: np.random.Generator) -> Indic
 def adaptive(draw: Callable[[int], Array], bound: KldBound) -> Array:
     """Poses (n, 3) from `draw`, which returns as many as it is asked for, until the KLD bound says enough.
 
+    Rows may tell more than x, y and yaw behind these.
+
     Fox (2003), table 3, in blocks instead of one by one: the sequence of draws is cut where it first satisfies the
     bound. `draw` must return its poses in an order that does not matter.
     """

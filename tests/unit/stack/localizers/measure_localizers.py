@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
-from localizer_room import USUAL, Drive, Noise, drive, errors, kidnapped, localizer, nees, run, scan
+from localizer_room import USUAL, Drive, Noise, crowded, drive, errors, kidnapped, localizer, nees, run, scan
 
 from simscen.core.belief import Estimate
 from simscen.core.geometry import Array, Pose2
@@ -76,6 +76,17 @@ def search(spec: Spec, seeds: Iterable[int], way: "dict[int, tuple[Drive, Estima
     return Search(found.astype(np.bool_), seconds)
 
 
+def among_people(spec: Spec, seeds: Iterable[int], seconds: float = 60.0) -> Array:
+    """RMSE and largest error (n, 2) in m of drives that the map and the wheels are wrong about, the start known."""
+    rows = []
+    for seed in seeds:
+        way = crowded(drive(seconds, seed % 12), seed)
+        start = Estimate(Pose2(*way.truth[0]), tuple(STD))
+        off = np.hypot(*errors(run(localizer(spec, start, seed), way, seed), way.truth)[:, :2].T)
+        rows.append((np.sqrt(np.mean(off**2)), off.max()))
+    return np.array(rows)
+
+
 def wrong_start(spec: Spec, seeds: Iterable[int]) -> Search:
     """The estimate is 0.5 m off in a random direction and 20° to either side."""
     ways = {}
@@ -120,6 +131,16 @@ def main() -> None:
     print_costs()
     print_tracking(range(1, 51))
     print_searches(range(1, 51))
+    print_among_people(range(1, 11))
+
+
+def print_among_people(seeds: Iterable[int]) -> None:
+    """How well recovery leaves a robot alone that knows where it is, though neither map nor wheels are right."""
+    many = PROB.model_copy(update={"max_particles": 5000})
+    for name, spec in (("amcl", MANY), ("recovery", RECOVERING), ("prob", many), ("prob, recovery", RECOVERING_PROB)):
+        rmse, most = among_people(spec, seeds).T
+        print(f"among people, {name}: RMSE {rmse.mean():.2f} m (worst {rmse.max():.2f}), at most {most.max():.2f} m, "
+              f"{np.sum(most > 1)} of {len(most)} ever more than 1 m off", flush=True)  # fmt: skip
 
 
 def print_costs() -> None:

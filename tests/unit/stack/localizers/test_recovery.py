@@ -15,34 +15,48 @@ def test_a_running_average_is_the_exponentially_weighted_one(alpha: float) -> No
         assert average.value == pytest.approx(np.average(values[:count], weights=weights))
 
 
-def test_a_drop_of_the_likelihood_asks_for_random_particles_until_it_is_made_up() -> None:
+ANYWHERE = np.log(np.linspace(0.5, 1.5, 200))
+"""Likelihoods of a scan at random places: one on average."""
+
+
+def test_a_drop_of_the_likelihood_below_that_of_other_places_asks_for_random_particles_until_it_is_made_up() -> None:
     """Long after the start the averages are those of the book."""
     recovery, slow, fast = Recovery(0.01, 0.3), 6.0, 6.0
     for _ in range(3000):
-        recovery.observe(6.0)
+        recovery.observe(np.log(6.0), ANYWHERE)
     assert recovery.share < 1e-12
-    for likelihood in [2.0] * 5 + [6.0] * 30:
+    shares = []
+    for likelihood in [0.8] * 5 + [6.0] * 30:
         slow, fast = slow + 0.01 * (likelihood - slow), fast + 0.3 * (likelihood - fast)
-        recovery.observe(likelihood)
-        assert recovery.share == pytest.approx(max(0, 1 - fast / slow), abs=1e-9)
-    assert recovery.share == 0
+        recovery.observe(np.log(likelihood), ANYWHERE)
+        shares.append(recovery.share)
+        assert recovery.share in (0.0, pytest.approx(max(0, 1 - fast / slow), abs=1e-9))
+    assert shares[4] > 0.5
+    assert shares[-1] == 0
 
 
-def test_a_lucky_first_scan_is_soon_forgotten() -> None:
+def test_a_scan_that_is_hard_to_explain_anywhere_is_no_reason() -> None:
     recovery = Recovery(0.001, 0.1)
-    for likelihood in [8.0] + [5.0] * 30:
-        recovery.observe(likelihood)
-    assert recovery.share < 0.03
+    for hard in [1.0] * 50 + [1e-3] * 50:
+        recovery.observe(np.log(6.0 * hard), ANYWHERE + np.log(hard))
+        assert recovery.share < 1e-12
 
 
-def test_with_nav2s_default_of_zero_there_are_none() -> None:
-    recovery = Recovery(0.0, 0.0)
-    for likelihood in (6.0, 1.0, 0.0):
-        recovery.observe(likelihood)
+def test_nor_is_one_that_the_particles_explain_worse_than_usual_but_better_than_other_places() -> None:
+    recovery = Recovery(0.001, 0.1)
+    for likelihood in [6.0] * 50 + [2.0] * 50:
+        recovery.observe(np.log(likelihood), ANYWHERE)
         assert recovery.share == 0
 
 
-def test_a_scan_that_nothing_explains_at_the_very_start_is_no_reason_to_divide_by_zero() -> None:
+def test_with_nav2s_default_of_zero_nobody_asks() -> None:
+    assert not Recovery(0.0, 0.0).wanted
+    assert Recovery(0.001, 0.1).wanted
+
+
+@pytest.mark.parametrize(("tracked", "anywhere"), [(-np.inf, -np.inf), (-np.inf, 0.0), (0.0, -np.inf), (2000.0, 0.0)])
+def test_what_nothing_or_only_one_side_explains_is_still_a_share(tracked: float, anywhere: float) -> None:
     recovery = Recovery(0.01, 0.3)
-    recovery.observe(0.0)
-    assert recovery.share == 0
+    recovery.observe(1.0, np.zeros(3))
+    recovery.observe(tracked, np.full(3, anywhere))
+    assert 0 <= recovery.share <= 1
