@@ -81,7 +81,7 @@ def speed(trace: Trace) -> Samples:
 def turn_rate(trace: Trace) -> Samples:
     """True turn rate without its sign (rad/s), (n, 1)."""
     velocity = finite(trace.velocity, "the true velocity", trace)
-    return Samples(velocity.ticks, np.abs(velocity.values[:, 2:3]))
+    return Samples(velocity.ticks, np.abs(velocity.values[:, 2])[:, np.newaxis])
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,8 +98,8 @@ class Drive:
 
     def until(self, tick: int) -> float:
         """Metres driven up to `tick`."""
-        at = int(np.searchsorted(self.ticks, tick, side="right")) - 1
-        return float(self.travelled[at]) if at >= 0 else 0.0
+        driven = self.travelled[self.ticks <= tick]
+        return float(driven[-1]) if len(driven) else 0.0
 
 
 def drive(trace: Trace) -> Drive:
@@ -149,8 +149,8 @@ def pose_error(trace: Trace) -> Samples:
 
 
 def _stale(trace: Trace) -> Ticks:
-    ticks = trace.truth.ticks[trace.truth.ticks >= trace.belief.ticks[0]]
-    newest = trace.belief.ticks[np.searchsorted(trace.belief.ticks, ticks, side="right") - 1]
+    ticks, came = trace.truth.ticks, trace.belief.ticks
+    newest = came[np.maximum(np.searchsorted(came, ticks) - 1, 0)]  # before each: where one comes, there is a sample
     old: Ticks = ticks[ticks - newest > STALE_AFTER * trace.tick_rate]
     return old
 

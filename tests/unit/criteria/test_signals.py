@@ -10,7 +10,16 @@ from hypothesis import strategies as st
 
 from simscen.core.samples import Samples
 from simscen.criteria.bounds import BrokenTrace
-from simscen.criteria.signals import clearance, drive, first_lasting, pose_error, speed, true_pose, turn_rate
+from simscen.criteria.signals import (
+    check_finite,
+    clearance,
+    drive,
+    first_lasting,
+    pose_error,
+    speed,
+    true_pose,
+    turn_rate,
+)
 from simscen.judge.sketch import sketch
 
 
@@ -99,8 +108,9 @@ def test_the_way_until_a_moment_is_what_was_left_behind_by_then():
 def test_nothing_recorded_is_no_way():
     trace = at_half_seconds([(0, 0)])
     empty = replace(trace, truth=Samples(trace.truth.ticks[:0], trace.truth.values[:0]))
-    assert drive(empty).length == 0.0
-    assert len(pose_error(empty)) == 0
+    way, error = drive(empty), pose_error(empty)
+    assert (way.length, way.until(9), len(way.ticks), len(way.travelled)) == (0.0, 0.0, 0, 0)
+    assert (len(error), error.values.shape) == (0, (0, 2))
     assert len(pose_error(replace(trace, belief=Samples(trace.truth.ticks[:0], np.empty((0, 9)))))) == 0
 
 
@@ -129,6 +139,13 @@ def test_a_clearance_that_is_no_number_is_named_with_its_first_moment(value):
     assert clearance(trace) is trace.clearance
 
 
+def test_of_several_things_whose_pose_is_not_finite_the_first_by_name_is_named():
+    trace = sketch({"seconds": 1, "truth": [[0, 0, 0]]})
+    lost = Samples(trace.truth.ticks, np.full((41, 3), np.nan))
+    with pytest.raises(BrokenTrace, match=r"the pose of cart is not finite at t = 0\.00 s"):
+        check_finite(replace(trace, objects={"door": lost, "cart": lost}))
+
+
 def test_the_true_pose_at_a_tick_is_the_newest_sample():
     trace = at_half_seconds([(0, 0), (1, 0), (2, 0)])
     assert [true_pose(trace, tick).x for tick in (0, 119, 120, 500)] == [0.0, 0.0, 1.0, 2.0]
@@ -141,8 +158,16 @@ def test_an_error_of_heading_goes_the_short_way_round_between_samples_too():
 
 def test_an_error_is_against_the_truth_at_that_very_moment():
     ticks = np.array([0, 240], dtype=np.int64)
-    trace = sketch({"seconds": 1, "truth": [[0, 0, 0], [1, 4, 8]], "belief": [[0, 1, 0], [1, 1, 0]]})
-    rare = replace(trace, truth=Samples(ticks, np.array([[0.0, 0.0, 0.0], [4.0, 8.0, 0.0]])))
+    trace = sketch({"seconds": 1, "truth": [[0, 0, 0]], "belief": [[0, 1, 1, 3.2]]})
+    rare = replace(trace, truth=Samples(ticks, np.array([[0.0, 0.0, 3.0], [4.0, 8.0, 3.4 - 2 * math.pi]])))
     error = pose_error(rare)
     assert error.ticks[5] == 120
-    assert error.values[5, 0] == pytest.approx(math.hypot(1 - 2, 0 - 4))
+    assert error.values[5] == pytest.approx([math.hypot(1 - 2, 1 - 4), 0.0])
+
+
+def test_each_belief_is_relied_on_for_a_second_also_the_first():
+    trace = sketch({"seconds": 4, "truth": [[0, 0, 0], [4, 4, 0]]})
+    few = np.array([240, 720])
+    error = pose_error(replace(trace, belief=Samples(few, trace.belief.at(few))))
+    assert error.ticks.tolist() == [240, *range(486, 720, 6), 720]
+    assert pose_error(replace(trace, belief=Samples(few[1:], trace.belief.at(few[1:])))).ticks.tolist() == [720]
