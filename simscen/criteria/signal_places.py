@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -16,6 +15,10 @@ from simscen.criteria.signals import finite
 
 if TYPE_CHECKING:
     from simscen.core.trace import Trace
+
+
+_TINY = np.finfo(np.float64).tiny
+"""Square metres; stands for the square of a step of no length, to divide by."""
 
 
 def distance_to(asked: Asked) -> Array:
@@ -37,18 +40,18 @@ def _to_object(trace: Trace, name: str, poses: Array) -> Array:
     if name in trace.objects:
         where = finite(trace.objects[name], f"the pose of {name}", trace).at(trace.truth.ticks)
     else:
-        where = _standing(trace, name, len(poses))
+        where = _standing(trace, name)
     distance = np.hypot(poses[:, 0] - where[:, 0], poses[:, 1] - where[:, 1])
     there: Array = np.where(_there(trace, name), distance, np.inf)
     return there
 
 
-def _standing(trace: Trace, name: str, samples: int) -> Array:
-    """The pose with which a thing that never moved was put into the world."""
+def _standing(trace: Trace, name: str) -> Array:
+    """Where a thing that never moved was put into the world, (1, 2)."""
     for event in trace.of_kind(EventKind.OBJECT_SPAWNED):
         x, y = event.data.get("x"), event.data.get("y")
         if event.name == name and isinstance(x, int | float) and isinstance(y, int | float):
-            return np.tile([float(x), float(y)], (samples, 1))
+            return np.array([[x, y]], dtype=np.float64)
     raise Unavailable(f"`{name}` never was there, or does not move")
 
 
@@ -93,9 +96,10 @@ def plan_deviation(asked: Asked) -> Array:
 def _plans(trace: Trace, clock: Ticks) -> list[tuple[int, int, Array]]:
     """(first sample, sample after the last, points) of each plan that was followed for at least a sample."""
     plans = [plan for plan in trace.plans if len(plan.points)]
-    begins: list[int] = np.searchsorted(clock, [plan.tick for plan in plans], side="left").tolist()
+    begins: list[int] = np.searchsorted(clock, [plan.tick for plan in plans]).tolist()
     ends = [*begins, len(clock)][1:]
-    return [(b, e, plan.points[:, :2]) for b, e, plan in zip(begins, ends, plans, strict=True) if b < e]
+    followed = [k for k, end in enumerate(ends) if begins[k] < end]
+    return [(begins[k], ends[k], plans[k].points[:, :2]) for k in followed]
 
 
 def _along(points: Array, way: Array) -> tuple[Array, Array]:
@@ -106,7 +110,7 @@ def _along(points: Array, way: Array) -> tuple[Array, Array]:
     lengths = np.hypot(steps[:, 0], steps[:, 1])
     nearest = _nearest_step(points, way[:-1], steps)
     apart, step = points - way[nearest], steps[nearest]
-    share = np.clip((apart * step).sum(axis=1) / np.maximum(lengths[nearest] ** 2, math.ulp(0.0)), 0.0, 1.0)
+    share = np.clip((apart * step).sum(axis=1) / np.maximum(lengths[nearest] ** 2, _TINY), 0.0, 1.0)
     off = np.hypot(*(apart - share[:, np.newaxis] * step).T)
     after = np.concatenate((np.cumsum(lengths[::-1])[::-1][1:], [0.0]))
     return off, after[nearest] + (1.0 - share) * lengths[nearest]
@@ -115,7 +119,7 @@ def _along(points: Array, way: Array) -> tuple[Array, Array]:
 def _nearest_step(points: Array, begins: Array, steps: Array) -> Array:
     """The index of the step (m, 2) that is nearest to each point (n, 2); products of matrices, for there are many."""
     along = points @ steps.T - (begins * steps).sum(axis=1)
-    squared = np.maximum((steps**2).sum(axis=1), math.ulp(0.0))
+    squared = np.maximum((steps**2).sum(axis=1), _TINY)
     share = np.clip(along / squared, 0.0, 1.0)
     beside = (begins**2).sum(axis=1) - 2.0 * (points @ begins.T)  # and |point|^2, the same for all steps
     nearest: Array = (beside + share * (share * squared - 2.0 * along)).argmin(axis=1)

@@ -240,6 +240,13 @@ def test_a_newer_plan_takes_the_place_of_the_old_one():
         signal("plan_deviation", {"seconds": 1, "truth": [[0, 0, 0]]})
 
 
+def test_a_plan_that_came_after_the_last_sample_was_never_followed():
+    trace = sketch({"seconds": 1, "truth": [[0, 1, 1]]})
+    late = Path(np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]]), 241)
+    with pytest.raises(Unavailable, match="no plan"):
+        read("plan_deviation", replace(trace, plans=(late,)), sketch_case({}), {})
+
+
 def test_a_plan_of_one_point_is_a_place():
     trace = sketch({"seconds": 1, "truth": [[0, 3, 4]]})
     trace = replace(trace, plans=(Path(np.array([[0.0, 0.0, 0.0]]), 0), Path()))
