@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import accumulate
 
 import numpy as np
 
@@ -142,12 +143,15 @@ def _jerk(trace: Trace, case: Case) -> Values:
 
 
 def _smoothness(trace: Trace, speeds: Array) -> Values:
-    still = "the robot never moved" if speeds.max() < STILL else ""
-    rate = trace.tick_rate / float(trace.velocity.ticks[1] - trace.velocity.ticks[0]) if len(speeds) > 1 else 1.0
-    spectral, jerky = (None, None) if still else (sparc(speeds, rate), ldlj(speeds, rate))
+    if speeds.max() < STILL:
+        return dict.fromkeys(("sparc", "ldlj"), "the robot never moved")
+    if len(speeds) < 2:
+        return dict.fromkeys(("sparc", "ldlj"), "the run is too short")
+    rate = trace.tick_rate / float(trace.velocity.ticks[1] - trace.velocity.ticks[0])
+    spectral, jerky = sparc(speeds, rate), ldlj(speeds, rate)
     return {
-        "sparc": still or "the run is too short" if spectral is None else spectral,
-        "ldlj": still or "the speed never changed" if jerky is None else jerky,
+        "sparc": "the run is too short" if spectral is None else spectral,
+        "ldlj": "the speed never changed" if jerky is None else jerky,
     }
 
 
@@ -160,13 +164,9 @@ def _clearance(trace: Trace) -> Values:
 
 def _contacts(trace: Trace) -> Values:
     """Rising edges, and the time during which at least one contact lasts."""
-    touching, since, total = 0, 0, 0
-    for event in trace.of_kind(EventKind.COLLISION_STARTED, EventKind.COLLISION_ENDED):
-        if event.kind == EventKind.COLLISION_STARTED:
-            since = event.tick if touching == 0 else since
-            touching += 1
-        elif touching:
-            touching -= 1
-            total += event.tick - since if touching == 0 else 0
-    total += trace.end - since if touching else 0
-    return {"collisions": float(len(trace.of_kind(EventKind.COLLISION_STARTED))), "contact_time": trace.seconds(total)}
+    events = trace.of_kind(EventKind.COLLISION_STARTED, EventKind.COLLISION_ENDED)
+    steps = [1 if event.kind == EventKind.COLLISION_STARTED else -1 for event in events]
+    # The end of a contact that began before the log did is not one of those that are known.
+    touching = np.array(list(accumulate(steps, lambda number, step: max(number, 0) + step)))
+    lasts = np.diff([*(event.tick for event in events), trace.end])
+    return {"collisions": float(steps.count(1)), "contact_time": trace.seconds(int(lasts[touching > 0].sum()))}

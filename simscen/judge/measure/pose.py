@@ -31,15 +31,18 @@ def pose_metrics(trace: Trace) -> Values:
 
 
 def _summed(name: str, errors: Array) -> Values:
-    values = (np.sqrt(np.mean(errors**2)), np.mean(errors), np.median(errors), np.max(errors))
-    return {f"{name}_{one}": float(value) for one, value in zip(_SUMS, values, strict=True)}
+    return {
+        f"{name}_rmse": float(np.sqrt(np.mean(errors**2))),
+        f"{name}_mean": float(np.mean(errors)),
+        f"{name}_median": float(np.median(errors)),
+        f"{name}_max": float(np.max(errors)),
+    }
 
 
 def _relative(trace: Trace) -> Values:
     """(Q_i^-1 Q_j)^-1 (P_i^-1 P_j) of truth Q and belief P, where the true way from i to j is DELTA long."""
-    believed, true = trace.belief.values[:, :3], _truth_at_beliefs(trace)
-    steps = np.hypot(*np.diff(true[:, :2], axis=0).T)
-    i, j = _pairs(steps)
+    believed, true = trace.belief.values, _truth_at_beliefs(trace)
+    i, j = _pairs(np.linalg.norm(np.diff(true[:, :2], axis=0), axis=1))
     if not len(i):
         return {f"rpe_{kind}_{one}": f"the robot drove less than {DELTA:g} m" for kind in _KINDS for one in _SUMS}
     moved_true, moved_believed = _between(true[i], true[j]), _between(believed[i], believed[j])
@@ -62,7 +65,7 @@ def _pairs(steps: Array) -> tuple[list[int], list[int]]:
 
 
 def _between(origin: Array, poses: Array) -> Array:
-    """The poses (n, 3) as seen from `origin` (n, 3)."""
+    """The poses (n, 3), or with more behind, as seen from `origin` (n, 3)."""
     c, s = np.cos(origin[:, 2]), np.sin(origin[:, 2])
     dx, dy = (poses - origin)[:, :2].T
     return np.column_stack((c * dx + s * dy, c * dy - s * dx, poses[:, 2] - origin[:, 2]))

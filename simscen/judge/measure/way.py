@@ -29,7 +29,7 @@ def way_metrics(trace: Trace) -> Values:
 
 def legs_of(trace: Trace, way: Drive) -> list[Array]:
     """The corners (n, 2) of each piece of the way that was driven without being set down elsewhere."""
-    corners = truth(trace).at(way.ticks)[:, :2] if len(way.ticks) else np.empty((0, 2))
+    corners = truth(trace).at(way.ticks)[:, :2]
     breaks = np.flatnonzero(np.diff(way.travelled) == 0.0) + 1
     return [leg for leg in np.split(corners, breaks) if len(leg)]
 

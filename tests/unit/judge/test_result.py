@@ -4,6 +4,7 @@ import math
 import pytest
 
 from simscen.core.result import Outcome, RunKey
+from simscen.criteria.clearance import Clearance
 from simscen.criteria.criterion import AnyCriterion
 from simscen.judge.result import result_of
 from simscen.judge.resultdata import from_json, read_result, to_json
@@ -82,6 +83,25 @@ def test_free_space_without_end_is_no_error_and_its_metric_is_the_range():
     result = conclude({**TRACE, "clearance": math.inf}, {"collisions": {}})
     assert result.outcome is Outcome.PASSED
     assert result.metrics["min_clearance"] == 2.0
+
+
+def test_events_are_counted_in_the_order_of_their_names():
+    events = [[1, "plan.made"], [2, "goal.accepted", "a"], [3, "plan.made"]]
+    counted = conclude({**TRACE, "events": events}, {"collisions": {}}).events
+    assert list(counted.items()) == [("goal.accepted", 1), ("plan.made", 2), ("run.ended", 1)]
+
+
+def test_an_error_says_which_criteria_broke_and_how(monkeypatch):
+    monkeypatch.setattr(Clearance, "judge", lambda *_: 1 / 0)
+    criteria = [{"clearance": {"min": 0.1}}, {"collisions": {}}]
+    assert conclude(TRACE, *criteria).error.message == "clearance: ZeroDivisionError: division by zero"
+    broken = conclude({**TRACE, "truth": [[0, 0, 0], [2, math.nan, 0]]}, *criteria)
+    assert broken.error.message == "clearance: ZeroDivisionError: division by zero"
+
+
+def test_a_run_that_nothing_judged_is_an_error():
+    assert conclude(TRACE).error.message == "nothing judged this run"
+    assert conclude(TRACE, {"collisions": {}}).error is None
 
 
 @pytest.mark.parametrize("text", ["{}", "[]", "3", '{"format": 99}', "nonsense"])

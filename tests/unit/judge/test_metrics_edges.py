@@ -1,0 +1,126 @@
+"""Metrics of the goals, the motion and the contacts of a run, to the sample."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from simscen.core.samples import Samples
+from simscen.criteria.smooth import sparc
+from simscen.judge.measure.metrics import barn_score, measure
+from simscen.judge.sketch import sketch, sketch_case
+
+NAMES = "abc"
+GOALS = {
+    "goals": [{"name": name, "pose": [k, 0, 0]} for k, name in enumerate(NAMES, start=1)],
+    "shortest": dict.fromkeys(NAMES, 1.0),
+}
+TOUR = {"seconds": 12, "truth": [[0, 0, 0], [2, 1, 0], [3, 1, 0], [4, 2, 0], [5, 2, 0], [9, 3, 0], [12, 3, 0]]}
+TOLD = [
+    [1, "goal.accepted", "a"],
+    [2, "goal.reached", "a"],
+    [3, "goal.accepted", "b"],
+    [4, "goal.reached", "b"],
+    [5, "goal.accepted", "c"],
+    [9, "goal.reached", "c"],
+]
+
+
+def measures(events=(), case=GOALS, **words):
+    return measure(sketch({**TOUR, "events": list(events), **words}), sketch_case(case))
+
+
+def test_the_time_is_from_the_first_acceptance_to_the_last_arrival():
+    found = measures(TOLD).values
+    assert (found["time_to_goal"], found["success"]) == (8.0, 1.0)
+    assert measures([TOLD[0], *TOLD[2:]]).values["time_to_goal"] == 8.0
+    assert measures([*TOLD[:3], *TOLD[4:]]).values["time_to_goal"] == 8.0
+
+
+@pytest.mark.parametrize("events", [[], TOLD[:5], TOLD[:2], [TOLD[1], TOLD[3], TOLD[5]]])
+def test_without_the_last_arrival_or_any_acceptance_there_is_no_time(events):
+    found = measures(events)
+    assert found.values["time_to_goal"] is None
+    assert found.undefined["time_to_goal"] == "the last goal was not reached"
+    assert measures([*TOLD], case={}).values["time_to_goal"] is None
+
+
+def test_one_goal_of_several_is_no_success():
+    assert measures(TOLD[:4]).values["success"] == 0.0
+
+
+def test_nobody_waits_for_a_goal_that_another_one_preempted():
+    case = {**GOALS, "sent": [{"name": "d", "pose": [3, 0, 0]}]}
+    last = [[9, "goal.canceled", "c", {"preempted_by": "d"}], [9, "goal.accepted", "d"], [11, "goal.reached", "d"]]
+    assert measures([*TOLD[:5], *last], case).values["time_to_goal"] == 10.0
+    dropped = [[7, "goal.accepted", "c"], [7, "goal.canceled", "c", {"preempted_by": "d"}]]
+    before = [*TOLD[:3], [5, "goal.accepted", "d"], [6, "goal.reached", "d"]]
+    assert measures([*before, *dropped], case).values["time_to_goal"] == 5.0
+
+
+def test_soft_spl_is_of_the_last_goal_and_the_last_place():
+    found = measures(truth=[[0, 0, 0], [11.975, 0, 0], [12, 1.5, 0]])
+    assert found.values["soft_spl"] == pytest.approx(0.5)
+
+
+def test_without_the_true_pose_there_is_no_soft_spl():
+    nothing = Samples(np.empty(0, np.int64), np.empty((0, 3)))
+    found = measure(replace(sketch(TOUR), truth=nothing, velocity=nothing), sketch_case(GOALS))
+    assert found.undefined["soft_spl"] == "the true pose was not recorded"
+    assert found.undefined["max_speed"] == found.undefined["sparc"] == "the true velocity was not recorded"
+
+
+def test_only_plans_for_another_reason_than_a_goal_are_replans():
+    plans = [
+        [1, "plan.made", "", {}],
+        [2, "plan.made", "", {"reason": "goal"}],
+        [3, "plan.made", "", {"reason": "timer"}],
+    ]
+    assert measures([*plans, [4, "plan.made", "", {"reason": "blocked"}]]).values["replans"] == 2.0
+
+
+def test_ways_of_half_a_metre_have_a_score_too():
+    assert barn_score(True, 1.0, 0.5) == pytest.approx(0.25)
+
+
+def with_speeds(speeds, ticks=None):
+    trace = sketch({"seconds": (len(speeds) - 1) / 40, "truth": [[0, 0, 0]]})
+    values = np.column_stack((speeds, np.zeros((len(speeds), 2))))
+    velocity = Samples(trace.truth.ticks if ticks is None else ticks, values)
+    return measure(replace(trace, velocity=velocity), sketch_case({}))
+
+
+def test_a_centimetre_a_second_is_motion():
+    assert with_speeds(np.full(81, 0.01)).values["sparc"] < 0
+    assert with_speeds(np.full(81, 0.0099)).undefined["sparc"] == "the robot never moved"
+
+
+def test_smoothness_takes_two_samples_at_least():
+    assert with_speeds(np.array([1.0, 0.5])).values["sparc"] == sparc(np.array([1.0, 0.5]), 40.0)
+    one = with_speeds(np.array([1.0]))
+    assert one.undefined["sparc"] == one.undefined["ldlj"] == "the run is too short"
+
+
+def test_a_velocity_that_is_recorded_later_is_as_smooth():
+    speeds = np.sin(np.linspace(0, math.pi, 41))
+    assert with_speeds(speeds, 600 + 6 * np.arange(41)).values["sparc"] == sparc(speeds, 40.0)
+
+
+def contact(at, kind):
+    return [at, f"collision.{kind}", "wall"]
+
+
+@pytest.mark.parametrize(
+    ("events", "collisions", "seconds"),
+    [
+        ([], 0, 0.0),
+        ([contact(1, "started"), contact(3, "ended"), contact(5, "started"), contact(6, "ended")], 2, 3.0),
+        ([contact(1, "started"), contact(2, "started"), contact(3, "ended"), contact(7, "ended")], 2, 6.0),
+        ([contact(1, "ended"), contact(2, "started"), contact(5, "ended")], 1, 3.0),
+        ([contact(1, "ended"), contact(2, "ended"), contact(3, "started")], 1, 9.0),
+    ],
+)
+def test_contacts_last_while_there_is_one(events, collisions, seconds):
+    found = measures(events).values
+    assert (found["collisions"], found["contact_time"]) == (collisions, seconds)

@@ -1,0 +1,61 @@
+"""Pose errors in closed form."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from simscen.core.samples import Samples
+from simscen.judge.measure.pose import pose_metrics
+from simscen.judge.sketch import sketch
+
+
+def located(ticks, true, told, believed):
+    """A trace with these poses (x, y, yaw) of truth, and of belief with the variance of 1 in each."""
+    trace = sketch({"seconds": max(ticks) / 240, "truth": [[0, 0, 0]]})
+    beliefs = np.array([[*pose, 1, 0, 0, 1, 0, 1] for pose in believed], dtype=np.float64)
+    truth = Samples(np.array(ticks), np.array(true, dtype=np.float64))
+    return replace(trace, truth=truth, belief=Samples(np.array(told), beliefs))
+
+
+def test_relative_errors_are_over_each_metre_from_where_the_last_one_ended():
+    steps = [0.5, 0.4375, 0.0625] * 3
+    ways = np.concatenate(([0.0], np.cumsum(steps)))
+    believed = np.add(ways, [0, 5, 7, 0.2, -9, 8, 0.1, 6, -5, 0.5])
+    ticks = [6 * k for k in range(len(ways))]
+    metrics = pose_metrics(located(ticks, [(x, 0, 0) for x in ways], ticks, [(x, 0, 0) for x in believed]))
+    assert metrics["rpe_trans_mean"] == pytest.approx((0.2 + 0.1 + 0.4) / 3)
+    assert metrics["rpe_trans_median"] == pytest.approx(0.2)
+    assert metrics["rpe_trans_max"] == pytest.approx(0.4)
+    assert metrics["rpe_trans_rmse"] == pytest.approx(((0.04 + 0.01 + 0.16) / 3) ** 0.5)
+    assert metrics["rpe_rot_max"] == 0.0
+    assert metrics["ape_trans_final"] == pytest.approx(0.5)
+
+
+def test_a_turn_is_no_way():
+    ticks = [0, 6, 12]
+    poses = [(0, 0, 0), (0.1, 0, 3.0), (0.2, 0, 0)]
+    assert pose_metrics(located(ticks, poses, ticks, poses))["rpe_trans_max"] == "the robot drove less than 1 m"
+
+
+def test_between_two_samples_the_truth_turns_the_shorter_way():
+    true = [(0, 0, 0), (0.5, 0, 0), (1.0, 0, 3.1), (1.5, 0, 2 * np.pi - 3.1 - 2 * np.pi)]
+    metrics = pose_metrics(located([0, 6, 12, 18], true, [0, 15], [(0, 0, 0), (1.25, 0, np.pi - 0.1)]))
+    assert metrics["rpe_rot_max"] == pytest.approx(0.1)
+    assert metrics["rpe_trans_max"] == pytest.approx(0.0)
+
+
+def test_relative_errors_are_seen_from_the_robot():
+    quarter = np.pi / 2
+    true = [(2, 3, 0.0), (2, 4, quarter)]
+    believed = [(5, 5, quarter), (4, 5, 2 * quarter + 0.2)]
+    metrics = pose_metrics(located([0, 6], true, [0, 6], believed))
+    assert metrics["rpe_trans_max"] == pytest.approx(0.0)
+    assert metrics["rpe_rot_max"] == pytest.approx(0.2)
+
+
+def test_a_belief_without_covariance_has_no_nees_but_a_reason():
+    trace = located([0, 6], [(0, 0, 0)] * 2, [0, 6], [(0, 0, 0)] * 2)
+    bare = replace(trace, belief=Samples(trace.belief.ticks, trace.belief.values[:, :3]))
+    assert pose_metrics(bare)["nees"] == "the belief has no covariance"
+    assert pose_metrics(trace)["nees"] == 0.0

@@ -1,0 +1,140 @@
+"""The shape of the driven way, in closed form."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from simscen.core.navigation import Path
+from simscen.core.samples import Samples
+from simscen.criteria.signals import drive
+from simscen.judge.measure.way import legs_of, way_metrics
+from simscen.judge.sketch import sketch
+
+TICKS = 6
+CORNER = [(5, 7), (6, 7), (6, 8)]
+
+
+def driven(points, events=(), plans=()):
+    """A trace whose robot is at one of the points (x, y) or (x, y, yaw) at each of its samples."""
+    poses = np.array([[*point, 0.0][:3] for point in points], dtype=np.float64)
+    trace = sketch({"seconds": TICKS * (len(poses) - 1) / 240, "truth": [[0, 0, 0]], "events": list(events)})
+    return replace(trace, truth=Samples(trace.truth.ticks, poses), plans=tuple(plans))
+
+
+def shape(*points, **words):
+    return way_metrics(driven(points, **words))
+
+
+def placed(before):
+    """Set down elsewhere after the sample before this one."""
+    return [[TICKS * (before - 1) / 240, "robot.placed"]]
+
+
+def accepted(sample=0, name="a"):
+    return [TICKS * sample / 240, "goal.accepted", name]
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_right_angle_of_two_metres(side):
+    metrics = shape((5, 7), (6, 7), (6, 7 + side, side * math.pi / 2))
+    assert metrics["max_curvature"] == pytest.approx(math.sqrt(2))
+    assert metrics["norm_curvature"] == pytest.approx(2 * math.sqrt(2))
+    assert metrics["aol"] == pytest.approx(math.pi / 4)
+    assert metrics["heading_change"] == pytest.approx(math.pi / 2)
+
+
+def test_the_curvature_is_one_over_the_radius_of_the_circle_through_three_points():
+    middle, radius, angles = np.array([3.0, -1.0]), 2.5, (0.1, 0.9, 2.3)
+    points = [middle + radius * np.array([math.cos(a), math.sin(a)]) for a in angles]
+    chords = 2 * radius * (math.sin(0.4) + math.sin(0.7))
+    metrics = shape(*points)
+    assert metrics["max_curvature"] == pytest.approx(1 / radius)
+    assert metrics["norm_curvature"] == pytest.approx(chords / radius)
+
+
+def test_of_several_bends_the_sum_and_the_greatest_are_told():
+    metrics = shape((0, 0), (1, 0), (1, 1), (3, 1))
+    assert metrics["max_curvature"] == pytest.approx(math.sqrt(2))
+    assert metrics["norm_curvature"] == pytest.approx(2 * math.sqrt(2) + 3 * 2 / math.sqrt(5))
+    assert metrics["aol"] == pytest.approx(math.pi / 4)
+
+
+def test_curvature_is_of_points_thirty_centimetres_from_the_one_before():
+    assert shape((0, 0), (0.3, 0), (0.3, 0.3))["max_curvature"] == pytest.approx(math.sqrt(2) / 0.3)
+    shaky = shape((5, 7), (5.2, 7.1), (5.4, 7), (5.4, 7.2), (5.4, 7.4), (5.41, 7.41))
+    assert shaky["max_curvature"] == pytest.approx(math.sqrt(2) / 0.4)
+    short = shape((0, 0), (0.3, 0), (0.3, 0.29))
+    assert (
+        short["max_curvature"]
+        == short["norm_curvature"]
+        == "the robot drove too short a way: fewer than three points 0.3 m apart"
+    )
+
+
+def test_each_piece_of_the_way_has_its_own_bends():
+    carried = placed(3)
+    metrics = shape(*CORNER, (0, 0), (2, 0), (2, 2), events=carried)
+    assert metrics["max_curvature"] == pytest.approx(math.sqrt(2))
+    assert metrics["norm_curvature"] == pytest.approx(4 * math.sqrt(2))
+    assert metrics["aol"] == pytest.approx(math.pi / 6)
+    straight = shape(*CORNER, (0, 0), (2, 0), events=carried)
+    assert straight["norm_curvature"] == pytest.approx(2 * math.sqrt(2))
+    assert straight["aol"] == pytest.approx(math.pi / 2 / 4)
+
+
+def test_the_pieces_are_those_between_being_set_down():
+    trace = driven([*CORNER, (0, 0), (2, 0), (4, 4)], [*placed(3), *placed(5)])
+    assert [leg.tolist() for leg in legs_of(trace, drive(trace))] == [
+        [[5, 7], [6, 7], [6, 8]],
+        [[0, 0], [2, 0]],
+        [[4, 4]],
+    ]
+
+
+def test_a_way_of_eighths_of_a_metre_is_one_piece():
+    metrics = shape((0, 0), (0.125, 0), (0.125, 0.125))
+    assert metrics["aol"] == pytest.approx(math.pi / 2 / 0.25)
+
+
+def test_without_a_true_pose_there_is_no_shape():
+    trace = replace(
+        sketch({"seconds": 1, "truth": [[0, 0, 0]]}), truth=Samples(np.empty(0, np.int64), np.empty((0, 3)))
+    )
+    metrics = way_metrics(trace)
+    assert metrics["aol"] == "the robot never drove"
+    assert metrics["heading_change"] == 0.0
+    assert "too short a way" in metrics["max_curvature"]
+
+
+@pytest.mark.parametrize(("before", "turned"), [(1, 0.6), (2, 0.5), (3, 0.3), (4, 0.7)])
+def test_being_turned_while_set_down_is_no_change_of_heading(before, turned):
+    yaws = [(0, 0, 0), (0, 0, 0.1), (0, 0, 0.3), (0, 0, 0.7)]
+    assert shape(*yaws, events=placed(before))["heading_change"] == pytest.approx(turned)
+
+
+def test_being_set_down_before_the_first_sample_changes_nothing():
+    trace = driven([(0, 0, 0), (0, 0, 0.1), (0, 0, 0.3)], [[0, "robot.placed"]])
+    late = replace(trace, truth=Samples(trace.truth.ticks + 1, trace.truth.values))
+    assert way_metrics(late)["heading_change"] == pytest.approx(0.3)
+
+
+def plan(sample, *yaws):
+    return Path(np.array([[0.0, 0.0, yaw] for yaw in yaws]), TICKS * sample)
+
+
+def test_the_first_plan_from_each_acceptance_on_is_what_had_to_be_turned():
+    spun = [(0, 0, 0.0), (0, 0, 1.0), (0, 0, 2.0), (0, 0, 3.0)]
+    plans = [plan(0, 0, 0.9), plan(1, 0, -0.5), plan(1, 0, 0.1), plan(2, 0, 0.25, 0.0)]
+    assert shape(*spun, events=[accepted(1)], plans=plans)["path_irregularity"] == pytest.approx(2.5)
+    both = shape(*spun, events=[accepted(1), accepted(2, "b")], plans=plans)
+    assert both["path_irregularity"] == pytest.approx(2.0)
+    assert shape(*spun, events=[accepted(0)], plans=[plan(0, 0, 2, 0, 2)])["path_irregularity"] == 0.0
+
+
+def test_a_goal_without_a_plan_or_none_at_all_leaves_it_undefined():
+    why = "there is no plan to each goal to compare with"
+    assert shape(*CORNER, plans=[plan(0, 0, 1)])["path_irregularity"] == why
+    twice = [accepted(0), accepted(2, "b")]
+    assert shape(*CORNER, events=twice, plans=[plan(1, 0, 1)])["path_irregularity"] == why
