@@ -149,17 +149,25 @@ class Fog(Thing):
         return np.full(len(points), self.near)
 
 
-def said(*there, **changes):
+def told(*there, **changes):
     fogs = [Fog(name, (), "", 0, False, near) for name, near in there]
     lines, _ = blocked(sketch(STANDS), sketch_case({**CASE, **changes}), "study", 2400, fogs)
-    return " ".join(lines).split(" the passage")[0]
+    return " ".join(lines)
+
+
+def said(*there, **changes):
+    return told(*there, **changes).split(" the passage")[0]
 
 
 def test_a_robot_that_just_fits_is_not_shut_in_and_one_that_can_just_turn_not_hampered():
     assert said(("fog", 0.2)) == "fog narrows"
     assert said(("fog", 0.199)) == "fog closes"
     assert said(("fog", 0.2), footprint=[]) == ""
-    assert said(("fog", 0.01)).startswith("fog")
+
+
+def test_two_centimetres_that_are_left_are_told_and_less_is_nothing():
+    assert "the shortest way: 0.02 m are left" in told(("fog", 0.01))
+    assert "the shortest way: nothing is left" in told(("fog", 0.0099))
 
 
 def test_two_centimetres_less_than_the_passage_has_are_no_change():
