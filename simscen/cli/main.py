@@ -21,6 +21,7 @@ COMMANDS = {
     "judge": "Judge recorded runs, without simulating them.",
     "report": "Write the reports of an output folder anew.",
     "plot": "Draw a recorded run.",
+    "localize": "Run a recorded drive through the localizer alone.",
     "log": "Mend the logs of runs that broke off.",
     "new": "Write a commented scenario to start from.",
     "explain": "Explain a trigger, action, fault, criterion, signal, metric, component or error code.",

@@ -58,6 +58,18 @@ class GoalState(NamedTuple):
     status: int
 
 
+class Scanned(NamedTuple):
+    """A planar scan: angles in rad, ranges (n,) in m, inf where nothing was hit."""
+
+    stamp: int
+    frame: str
+    angle_min: float
+    angle_increment: float
+    range_min: float
+    range_max: float
+    ranges: Array
+
+
 def odometry(data: bytes) -> Posed:
     """nav_msgs/msg/Odometry."""
     cursor = _cursor(data)
@@ -132,6 +144,18 @@ def path(data: bytes) -> Planned:
 def stamp_of_scan(data: bytes) -> int:
     """When a sensor_msgs/msg/LaserScan was taken."""
     return _header(_cursor(data))[0]
+
+
+def laser_scan(data: bytes) -> Scanned:
+    """sensor_msgs/msg/LaserScan, without its intensities."""
+    cursor = _cursor(data)
+    stamp, frame = _header(cursor)
+    first, _, step, _, _, least, most = cursor.take("7f")
+    count = cursor.count()
+    ranges = np.asarray(cursor.array("<f4" if data[1] else ">f4", (count,)), dtype=np.float64)
+    cursor.array("<f4" if data[1] else ">f4", (cursor.count(),))
+    _end(cursor)
+    return Scanned(stamp, frame, first, step, least, most, ranges)
 
 
 def goal_states(data: bytes) -> list[GoalState]:

@@ -1,0 +1,81 @@
+"""What a robot measured, out of any log, and where it truly was if the log knows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from simscen.core.geometry import Array, Pose2
+from simscen.core.motion import Twist
+from simscen.core.samples import Ticks
+from simscen.core.sensing import Odometry, Scan
+from simscen.record.foreign.carmen import carmen_rows
+from simscen.record.foreign.sensedcsv import csv_rows
+from simscen.record.foreign.sensedros import ros_rows
+from simscen.record.foreign.sensedrows import TICK_RATE, Range, Rows
+from simscen.record.foreign.unusable import Unusable
+from simscen.record.replay import DAMAGE, invalid
+
+
+@dataclass(frozen=True, eq=False)
+class Sensed:
+    """`readings` in the order in which the robot received them; `truth` (n, 3) x, y, yaw in the map at `ticks` (n,).
+
+    Ticks are of 1/TICK_RATE s, from the log's first reading on.
+    """
+
+    readings: Sequence[Odometry | Scan]
+    ticks: Ticks
+    truth: Array
+
+
+def read_sensed(path: Path, odometry: str, scan: str, reference: str | None) -> Sensed:
+    """Read odometry, scans and a reference from a rosbag2 folder, an MCAP file, a CARMEN log or a CSV file.
+
+    The topics matter for ROS alone; without `reference`, what simscen's own logs, CARMEN's TRUEPOS and the rows called
+    `truth` of a CSV file say counts. Raises InvalidInput for what cannot be used.
+    """
+    try:
+        if path.suffix == ".csv":
+            rows = csv_rows(path)
+        elif path.suffix in (".log", ".clf", ".carmen"):
+            rows = carmen_rows(path)
+        else:
+            rows = ros_rows(path, odometry, scan, reference)
+        for kind, told in (("odometry", rows.odometry), ("scans", rows.scans)):
+            if not told:
+                raise Unusable(f"it holds no {kind}", rows.hint)
+        return _sensed(rows)
+    except Unusable as error:
+        raise invalid(path, "SC804", str(error), error.hint) from error
+    except UnicodeDecodeError as error:
+        raise invalid(path, "SC802", "the log is not text") from error
+    except OSError as error:
+        raise invalid(path, "SC800", f"cannot read the log: {error.strerror or error}") from error
+    except DAMAGE as error:
+        raise invalid(path, "SC802", f"the log is damaged: {error or type(error).__name__}") from error
+
+
+def _sensed(rows: Rows) -> Sensed:
+    start = min(*(row.time for row in rows.odometry), *(row.time for row in rows.scans))
+
+    def tick(time: float) -> int:
+        return round((time - start) * TICK_RATE)
+
+    told: list[tuple[int, int, Odometry | Scan]] = [
+        (row.order, 0, Odometry("odom", tick(row.time), Pose2(*row.pose), Twist())) for row in rows.odometry
+    ]
+    told += [(row.order, 1, _scan(row, tick(row.time))) for row in rows.scans]
+    told.sort(key=lambda one: one[:2])
+    truth = {tick(row.time): row.pose for row in rows.truth}
+    ticks = np.array(sorted(truth), dtype=np.int64)
+    poses = np.array([truth[int(one)] for one in ticks], dtype=np.float64).reshape(-1, 3)
+    return Sensed([one for *_, one in told], ticks, poses)
+
+
+def _scan(row: Range, tick: int) -> Scan:
+    first, increment, least, most = row.layout
+    return Scan("lidar", tick, row.ranges, first, increment, least, most, Pose2(*row.mount))

@@ -1,0 +1,62 @@
+"""Logs as CSV: one row for each reading, its kind first.
+
+    odom,TIME,X,Y,YAW
+    scan,TIME,ANGLE_MIN,ANGLE_INCREMENT,RANGE_MIN,RANGE_MAX,R0,R1,…
+    truth,TIME,X,Y,YAW
+    mount,X,Y,YAW
+
+Seconds, metres, radians; `inf` where a beam hit nothing, `nan` where it gave no answer. `mount` is where the lidar is
+on the robot, for all scans after it. Rows that are empty or begin with `#` mean nothing.
+"""
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+
+from simscen.record.foreign.sensedrows import Range, Rows, Stamped, Triple
+from simscen.record.foreign.unusable import Unusable
+
+
+def csv_rows(path: Path) -> Rows:
+    """The rows of a CSV log. Raises Unusable for one that is none of these."""
+    rows, mount = Rows(hint="see `simscen localize --help` for its columns"), (0.0, 0.0, 0.0)
+    with path.open(encoding="utf-8", newline="") as lines:
+        for number, row in enumerate(csv.reader(lines), 1):
+            words = [word.strip() for word in row]
+            if not words or not words[0] or words[0].startswith("#"):
+                continue
+            try:
+                values = [float(word) for word in words[1:] if word]
+                if words[0] == "mount":
+                    mount = _finite(values, 3)
+                else:
+                    _take(rows, words[0], number, values, mount)
+            except ValueError as error:
+                raise Unusable(f"line {number}: {error}", rows.hint) from error
+    return rows
+
+
+def _take(rows: Rows, kind: str, order: int, values: list[float], mount: Triple) -> None:
+    match kind:
+        case "odom" | "truth":
+            time, pose = (values or [math.nan])[0], values[1:]
+            told = rows.odometry if kind == "odom" else rows.truth
+            if not math.isfinite(time):
+                raise ValueError(f"{time} is not a time")
+            told.append(Stamped(time, order, _finite(pose, 3)))
+        case "scan":
+            if len(values) < 6 or not all(math.isfinite(value) for value in values[:5]):
+                raise ValueError("a scan has a time, four numbers that describe it, and ranges")
+            time, first, step, least, most = values[:5]
+            rows.scans.append(Range(time, order, np.array(values[5:]), (first, step, least, most), mount))
+        case _:
+            raise ValueError(f"no kind of row is called {kind!r}; known: odom, scan, truth, mount")
+
+
+def _finite(values: list[float], count: int) -> Triple:
+    if len(values) != count or not all(math.isfinite(value) for value in values):
+        raise ValueError(f"expected {count} numbers, got {values}")
+    x, y, yaw = values
+    return x, y, yaw

@@ -1,0 +1,115 @@
+"""A recorded drive through the localizer alone: how far its belief is from a reference."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from simscen.core.belief import Estimate
+from simscen.core.chance import Streams
+from simscen.core.geometry import Array, wrap_array
+from simscen.core.sensing import Odometry, Scan
+from simscen.model.stack import StackSpec
+from simscen.record.foreign.sensed import Sensed
+from simscen.record.foreign.sensedrows import TICK_RATE
+from simscen.stack.localizers.build import build_localizer
+from simscen.stack.protocols import Surroundings
+
+LONGEST_GAP = TICK_RATE
+"""Ticks between two poses of the reference above which nothing is said in between."""
+
+
+@dataclass(frozen=True, eq=False)
+class Localized:
+    """What the localizer believed: `times` (n,) in s and `poses` (n, 3) in the map; `scans` were used.
+
+    `cpu` is the processor's time in s that all of it took, which no two runs share.
+    """
+
+    times: Array
+    poses: Array
+    scans: int
+    cpu: float
+
+
+@dataclass(frozen=True)
+class Lost:
+    """The belief was further off than allowed from a time in s on, `until` it was not; None = to the end."""
+
+    since: float
+    until: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Errors:
+    """Distances (n,) in m and heading errors (n,) in rad at `times` (n,) in s, and when the robot was lost."""
+
+    times: Array
+    distance: Array
+    yaw: Array
+    lost: Sequence[Lost]
+
+    def figures(self) -> dict[str, float]:
+        """Median, RMSE, largest and last distance in m; RMSE of the heading in rad."""
+        off = self.distance
+        return {
+            "median": float(np.median(off)),
+            "rmse": float(np.sqrt(np.mean(off**2))),
+            "max": float(off.max()),
+            "final": float(off[-1]),
+            "yaw_rmse": float(np.sqrt(np.mean(self.yaw**2))),
+        }
+
+
+def localize(sensed: Sensed, spec: StackSpec, surroundings: Surroundings, estimate: Estimate, seed: int) -> Localized:
+    """Feed a log to the localizer of a stack, reading by reading; the belief is taken after each odometry.
+
+    The same arguments give the same beliefs.
+    """
+    chance = Streams(seed).generator("localizer")
+    localizer = build_localizer(spec.localizer, surroundings, estimate, chance)
+    began, times, poses, scans = time.process_time(), [], [], 0
+    for reading in sensed.readings:
+        match reading:
+            case Scan():
+                localizer.on_scan(reading)
+                scans += 1
+            case Odometry():
+                localizer.on_odometry(reading)
+                times.append(reading.tick / TICK_RATE)
+                poses.append(tuple(localizer.belief.pose))
+    cpu = time.process_time() - began
+    return Localized(np.array(times), np.array(poses), scans, cpu)
+
+
+def errors_of(localized: Localized, sensed: Sensed, far: float) -> Errors | None:
+    """How far off the belief was wherever the reference says something; None where it never does.
+
+    The reference is interpolated, not over gaps. The robot is lost where the belief is more than `far` m off.
+    """
+    if len(sensed.ticks) < 2:
+        return None
+    known = sensed.ticks / TICK_RATE
+    inside = (localized.times >= known[0]) & (localized.times <= known[-1])
+    after = np.clip(np.searchsorted(known, localized.times), 1, len(known) - 1)
+    inside &= known[after] - known[after - 1] <= LONGEST_GAP / TICK_RATE
+    times = localized.times[inside]
+    if not len(times):
+        return None
+    yaw = np.unwrap(sensed.truth[:, 2])
+    x, y, heading = (np.interp(times, known, values) for values in (*sensed.truth[:, :2].T, yaw))
+    poses = localized.poses[inside]
+    distance = np.hypot(poses[:, 0] - x, poses[:, 1] - y)
+    return Errors(times, distance, wrap_array(poses[:, 2] - heading), lost_times(times, distance > far))
+
+
+def lost_times(times: Array, far: Array) -> list[Lost]:
+    """The stretches in which the robot was lost."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], far.astype(np.int8), [0]))))
+    return [
+        Lost(float(times[begin]), float(times[end]) if end < len(times) else None)
+        for begin, end in zip(edges[::2], edges[1::2], strict=True)
+    ]
