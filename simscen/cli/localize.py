@@ -31,7 +31,7 @@ def command(
     map_: Annotated[Path, typer.Option("--map", help="The ROS map (yaml) that the robot has.")],
     robot: Annotated[str, typer.Option(help="A robot file, or the name of one that ships.")],
     scenario: Annotated[
-        Path | None, typer.Option(help="Take the `stack:` of this file; one with nothing else is enough.")
+        Path | None, typer.Option(help="Take the `stack:` of this file; `pass:` is all else that it needs.")
     ] = None,
     reference: Annotated[
         str | None, typer.Option(help="The topic of the reference pose; default: what the log itself calls the truth.")
