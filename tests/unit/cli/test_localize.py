@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 BOXES = np.array([
-    (-0.1, -0.1, 6.1, 0.0), (-0.1, 4.0, 6.1, 4.1), (-0.1, 0.0, 0.0, 4.0), (6.0, 0.0, 6.1, 4.0), (2.5, 1.5, 3.5, 2.5),
+    (-0.1, -0.1, 6.1, 0.0), (-0.1, 4.0, 6.1, 4.1), (-0.1, 0.0, 0.0, 4.0), (6.0, 0.0, 6.1, 4.0), (1.2, 1.8, 2.0, 2.8),
     (4.5, 0.0, 5.2, 0.4),
 ])  # fmt: skip
 ANGLES = -math.pi / 2 + math.pi / 180 * np.arange(181)
@@ -38,9 +38,9 @@ def write_map(folder: Path) -> None:
 
 
 def drive() -> list[tuple[float, tuple[float, float, float], tuple[float, float, float]]]:
-    """Time, true pose and odometry whose wheels slip by a tenth, around the crate at 0.4 m/s and 10 Hz."""
+    """Time, true pose and odometry whose wheels slip by a tenth, past the crate at 0.3 m/s and 10 Hz."""
     rows, x, y, yaw, odom = [], 1.0, 0.8, 0.0, [0.0, 0.0, 0.0]
-    for k in range(200):
+    for k in range(150):
         rows.append((k / 10, (x, y, yaw), (odom[0], odom[1], odom[2])))
         turn = 0.05 if 50 <= k < 81 else 0.0
         x, y = x + 0.03 * math.cos(yaw + turn / 2), y + 0.03 * math.sin(yaw + turn / 2)
@@ -87,9 +87,9 @@ def test_a_drive_on_slipping_wheels_is_followed_in_every_format(simscen, tmp_pat
     ended = simscen("localize", log, *GIVEN, "--json", "--picture", "way.png")
     assert ended.code == 0, ended.err
     found = json.loads(ended.out)
-    assert found["scans"] == 200
-    assert found["error"]["max"] < 0.5
-    assert found["error"]["rmse"] < 0.12
+    assert found["scans"] == 150
+    assert found["error"]["max"] < 0.2
+    assert found["error"]["rmse"] < 0.1
     assert found["lost"] == []
     assert "ms of processor time per scan" in ended.err
     assert (tmp_path / "way.png").stat().st_size > 1000
