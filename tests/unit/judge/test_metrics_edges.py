@@ -71,12 +71,8 @@ def test_without_the_true_pose_there_is_no_soft_spl():
 
 
 def test_only_plans_for_another_reason_than_a_goal_are_replans():
-    plans = [
-        [1, "plan.made", "", {}],
-        [2, "plan.made", "", {"reason": "goal"}],
-        [3, "plan.made", "", {"reason": "timer"}],
-    ]
-    assert measures([*plans, [4, "plan.made", "", {"reason": "blocked"}]]).values["replans"] == 2.0
+    plans = [[k, "plan.made", "", {"reason": why}] for k, why in enumerate(("goal", "timer", "blocked", "worse"))]
+    assert measures([*plans, [4, "plan.made", "", {}]]).values["replans"] == 3.0
 
 
 def test_ways_of_half_a_metre_have_a_score_too():
