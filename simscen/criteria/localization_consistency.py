@@ -68,14 +68,14 @@ class LocalizationConsistency(Spec, Criterion):
         low, high = self._bounds(len(values))
         mean, context = float(values.mean()), f"(mean of {len(values)} NEES, {DIMENSIONS} when consistent)"
         findings = [at_most("localization_consistency", mean, high, "", at=at, context=context)]
-        if self.both_sides:
+        if low is not None:
             findings.append(at_least("localization_consistency doubt", mean, low, "", context=context))
         return findings
 
-    def _bounds(self, count: int) -> tuple[float, float]:
+    def _bounds(self, count: int) -> tuple[float | None, float]:
         if self.both_sides:
             return mean_bounds(count, DIMENSIONS, self.probability)
-        return 0.0, quantile(self.probability, DIMENSIONS * count) / count
+        return None, quantile(self.probability, DIMENSIONS * count) / count
 
     def _sampled(self, trace: Trace) -> Samples | None:
         """The newest NEES at `after` and every so often from there to the last belief."""

@@ -230,12 +230,15 @@ def recovery_count(asked: Asked) -> Array:
 
 
 def inside(points: Array, corners: Array) -> Flags:
-    """Whether each of `points` (n, 2) is inside a polygon (m, 2), by the number of edges a ray to the right crosses."""
+    """Whether each of `points` (n, 2) is inside a polygon (m, 2), by the number of edges a ray to the right crosses.
+
+    Of its border, left and below belong to it: of regions side by side, each place is in one.
+    """
     x, y = points[:, :1], points[:, 1:]
-    ends = np.roll(corners, -1, axis=0)
-    crosses = (corners[:, 1] > y) != (ends[:, 1] > y)
-    rise = np.where(corners[:, 1] == ends[:, 1], 1.0, ends[:, 1] - corners[:, 1])
-    right = x < corners[:, 0] + (y - corners[:, 1]) / rise * (ends[:, 0] - corners[:, 0])
+    others = np.roll(corners, 1, axis=0)
+    crosses = (corners[:, 1] > y) != (others[:, 1] > y)
+    rise = np.where(corners[:, 1] == others[:, 1], np.inf, others[:, 1] - corners[:, 1])
+    right = x < corners[:, 0] + (y - corners[:, 1]) / rise * (others[:, 0] - corners[:, 0])
     odd: Flags = (crosses & right).sum(axis=1) % 2 == 1
     return odd
 
@@ -268,7 +271,7 @@ def _covariance(trace: Trace) -> Array:
     belief = finite(trace.belief, "the belief", trace)
     if not len(belief) or belief.values.shape[1] < 9:
         raise Unavailable("no covariance of the belief was recorded")
-    return _held(trace, belief, "belief")[:, 3:9]
+    return _held(trace, belief, "belief")[:, 3:]
 
 
 def _commanded(trace: Trace) -> Array:
@@ -309,7 +312,7 @@ def _age(trace: Trace, came: Ticks) -> Array:
 
 
 def _current_goals(trace: Trace, case: Case) -> Array:
-    """x, y, yaw of the goal accepted last; of the first one before it is accepted."""
+    """x, y, yaw of the goal accepted last, (n, 3); of the first one, (1, 3), when none ever is."""
     clock = _clock(trace)
     named = {goal.name: goal.pose for goal in reversed(case.every_goal)}
     ticks, poses = [], []
@@ -322,7 +325,7 @@ def _current_goals(trace: Trace, case: Case) -> Array:
     if not poses and not case.goals:
         raise Unavailable("there was no goal")
     if not poses:
-        ticks, poses = [0], [case.goals[0].pose]
+        return np.array([case.goals[0].pose], dtype=np.float64)
     return Samples(np.array(ticks, dtype=np.int64), np.array(poses, dtype=np.float64)).at(clock)
 
 
@@ -332,11 +335,11 @@ def _happening(of: Of) -> str:
 
 def _between(trace: Trace, start: EventKind, ends: tuple[EventKind, ...], name: object) -> Flags:
     """From each event of the kind `start` (of that name, if one is given) to the next of `ends` under its name."""
-    stretches = []
+    stretches: list[tuple[int, float]] = []
     for event in trace.of_kind(start):
         if name in (None, event.name):
             later = (e.tick for e in trace.of_kind(*ends) if _ends(e.kind, e.name, event.name) and e.tick > event.tick)
-            stretches.append((event.tick, next(later, trace.end + 1)))
+            stretches.append((event.tick, next(later, np.inf)))
     return _stretches(trace, stretches)
 
 
@@ -345,7 +348,7 @@ def _ends(kind: EventKind, name: str, begun: str) -> bool:
     return name == begun or kind in (EventKind.NAVIGATION_ENDED, EventKind.GOAL_ACCEPTED)
 
 
-def _stretches(trace: Trace, stretches: Iterable[tuple[int, int]]) -> Flags:
+def _stretches(trace: Trace, stretches: Iterable[tuple[int, float]]) -> Flags:
     """True from `start` to before `end`, and at the next sample at least."""
     clock = _clock(trace)
     flags = np.zeros(len(clock), dtype=bool)

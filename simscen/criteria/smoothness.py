@@ -101,7 +101,7 @@ def _without_unit(trace: Trace, name: str, limit: float) -> Finding:
     fast = speed(trace)
     if not len(fast) or fast.values.max() < STILL:
         return undecided(name, "the robot never moved", f"≥ {limit:g}")
-    value = (sparc if name == "sparc" else ldlj)(fast.values[:, 0], trace.tick_rate / float(np.diff(fast.ticks[:2])[0]))
+    value = (sparc if name == "sparc" else ldlj)(fast.values[:, 0], trace.tick_rate / float(np.diff(fast.ticks)[0]))
     if value is None:
         return undecided(name, "the speed never changed", f"≥ {limit:g}")
     return at_least(name, value, limit, "")

@@ -27,6 +27,10 @@ NEIGHBOURS: dict[str, list[str]] = {
 EVERY_CRITERION = ["tests/unit/criteria/test_promises.py", "tests/unit/criteria/test_specs.py"]
 CONDITIONS = ["golden", "always", "eventually", "until", "whenever"]
 CONCERNED = {
+    "criteria/localization_consistency": [
+        ["golden", "localization_consistency"],
+        ["tests/unit/criteria/test_smoothness_and_consistency.py", *EVERY_CRITERION],
+    ],
     "criteria/condition": [["tests/unit/criteria/test_conditions.py"], CONDITIONS],
     "criteria/condition_words": [["tests/unit/criteria/test_condition_words.py"], CONDITIONS],
     "criteria/formula": [CONDITIONS, ["tests/unit/criteria/test_formula.py"]],
@@ -39,7 +43,10 @@ CONCERNED = {
     ],
     "criteria/signal_values": [["tests/unit/criteria/test_signal_values.py"], CONDITIONS],
     "criteria/signals": [["tests/unit/criteria/test_signals.py"], ["golden"]],
-    "criteria/smooth": [["tests/unit/criteria/test_smooth.py"]],
+    "criteria/smooth": [
+        ["tests/unit/criteria/test_smooth.py"],
+        ["tests/unit/criteria/test_smoothness_and_consistency.py"],
+    ],
     "criteria/temporal": [CONDITIONS, ["tests/unit/criteria/test_temporal.py"]],
 }
 """Of what many others use: the tests of what it is, not of all that is made of it."""

@@ -151,7 +151,7 @@ def test_the_nearest_moment_may_be_a_sample_itself(start, end, tick):
 
 @pytest.mark.parametrize("turn", [2.0, -2.0])
 def test_a_tail_that_sweeps_over_a_region_between_two_samples_is_in_it(turn):
-    at = np.pi + turn / 2
+    at = np.pi + 0.3 * turn
     swept = around(1.4 * np.cos(at), 1.4 * np.sin(at), 0.02)
     assert in_one_step(swept, (0, 0, 0), (0, 0, turn), TAIL).value < 0
     beyond = around(1.7 * np.cos(at), 1.7 * np.sin(at), 0.02)

@@ -7,13 +7,14 @@ from typing import get_args
 
 import numpy as np
 import pytest
+import shapely
 
 from simscen.core.navigation import Path
 from simscen.core.samples import Samples
 from simscen.core.trace import Trace
 from simscen.criteria.bounds import BrokenTrace
 from simscen.criteria.signal_table import SIGNALS, SignalName, read
-from simscen.criteria.signal_values import Unavailable
+from simscen.criteria.signal_values import Unavailable, inside
 from simscen.judge.sketch import sketch, sketch_case
 
 STEP = 6 / 240
@@ -103,6 +104,38 @@ def test_being_set_down_elsewhere_is_neither_braking_nor_jerk():
     assert np.count_nonzero(read("jerk", stays, case, {})) == 2
 
 
+@pytest.mark.parametrize(
+    ("after", "still", "smooth"), [(0, [0, 1], [0, 1]), (3, [4], [3, 4]), (7, [8], [7, 8]), (8, [], []), (9, [], [])]
+)
+def test_only_the_changes_over_being_set_down_are_left_out(after, still, smooth):
+    """Speeds of a parabola; set down elsewhere after a sample, so that the change to the next one is none."""
+    trace = driving([[0.05 * k * k, 0, 0] for k in range(9)])
+    events = sketch({"seconds": 1, "truth": [[0, 0, 0]], "events": [[after * STEP, "robot.placed"]]}).events
+    trace, case = replace(trace, events=events), sketch_case({})
+    changes = np.array([0.05 / STEP, *(0.05 * (2 * k + 1) / STEP for k in range(8))])
+    changes[still] = 0.0
+    jerks = np.full(9, 0.1 / STEP**2)
+    jerks[smooth] = 0.0
+    assert read("acceleration", trace, case, {}) == pytest.approx(changes)
+    assert read("jerk", trace, case, {}) == pytest.approx(jerks)
+
+
+def test_being_set_down_before_the_first_sample_changes_nothing_after_it():
+    trace = driving([[0, 0, 0]] * 4 + [[1, 0, 0]])
+    placed = sketch({"seconds": 1, "truth": [[0, 0, 0]], "events": [[0, "robot.placed"]]}).events
+    later = Samples(trace.truth.ticks + 240, trace.truth.values)
+    trace = replace(trace, truth=later, velocity=Samples(later.ticks, trace.velocity.values), events=placed)
+    assert read("acceleration", trace, sketch_case({}), {}).tolist() == [0.0] * 4 + [1.0 / STEP]
+
+
+def test_a_belief_without_a_covariance_does_not_say_how_sure_it_is():
+    trace = sketch({"seconds": 1, "truth": [[0, 0, 0]]})
+    bare = replace(trace, belief=Samples(trace.belief.ticks, trace.belief.values[:, :3]))
+    for name in ("position_std", "yaw_std"):
+        with pytest.raises(Unavailable, match="no covariance of the belief was recorded"):
+            read(name, bare, sketch_case({}), {})
+
+
 def test_a_kidnapped_robot_has_not_travelled():
     events = [[2, "robot.placed"]]
     truth = [[0, 0, 0], [2, 1, 0], [2.025, 9, 0], [4, 10, 0]]
@@ -131,6 +164,18 @@ def test_the_goal_is_the_one_accepted_last_also_one_that_an_event_sent():
     assert [at(heading, t) for t in (0, 3)] == pytest.approx([0.1, 2 * math.pi - 6.0])
 
 
+def test_a_goal_of_the_scenario_is_where_its_name_says_unless_its_acceptance_says_all_of_it():
+    words = {"seconds": 2, "truth": [[0, 0, 0]], "events": [[1, "goal.accepted", "shelf", {"x": 1.0, "y": 0.0}]]}
+    case = {"goals": [{"name": "first", "pose": [0, 2, 0]}, {"name": "shelf", "pose": [3, 4, 0]}]}
+    assert set(signal("goal_distance", words, case)) == {5.0}
+
+
+def test_what_never_ended_lasts_to_the_last_sample():
+    words = {"seconds": 2, "truth": [[0, 0, 0]], "events": [[1, "goal.accepted", "a"], [1, "collision.started", "b"]]}
+    for name in ("goal_active", "in_collision"):
+        assert np.flatnonzero(signal(name, words)).tolist() == list(range(40, 81))
+
+
 def test_the_first_goal_counts_before_any_is_accepted_and_without_goals_there_is_no_distance():
     words = {"seconds": 1, "truth": [[0, 0, 0]]}
     goals = [{"name": "a", "pose": [3, 4, 0]}, {"name": "b", "pose": [1, 0, 0]}]
@@ -142,6 +187,11 @@ def test_the_first_goal_counts_before_any_is_accepted_and_without_goals_there_is
 def test_scans_grow_old_from_the_start_and_from_the_newest():
     age = signal("scan_age", {"seconds": 4, "truth": [[0, 0, 0]], "scans": [[1, 2]]})
     assert [at(age, t) for t in (0, 0.5, 1.0, 1.05, 2.0, 4.0)] == pytest.approx([0, 0.5, 0, 0.05, 0, 2.0])
+
+
+def test_without_any_scan_its_age_is_that_of_the_run():
+    age = signal("scan_age", {"seconds": 4, "truth": [[0, 0, 0]], "scans": []})
+    assert [at(age, t) for t in (0, 0.5, 4.0)] == [0, 0.5, 4.0]
 
 
 def test_the_belief_error_is_held_from_one_belief_to_the_next():
@@ -261,6 +311,28 @@ def test_a_robot_is_in_a_region_with_its_centre():
         signal("in_region", {"seconds": 4, "truth": [[0, 0, 0.5]]}, case, region="hal")
 
 
+@pytest.mark.parametrize("corners", [[[1, 0], [0, 1], [-1, 0], [0, -1]], [[1, 0], [0, -1], [-1, 0], [0, 1]]])
+def test_inside_is_inside_at_the_height_of_a_corner_too(corners):
+    points = np.array([[-2.0, 0.0], [-0.5, 0.0], [0.0, 0.0], [0.5, 0.0], [2.0, 0.0], [-0.5, 1.0], [-0.5, -1.0]])
+    assert inside(points, np.array(corners)).tolist() == [False, True, True, True, False, False, False]
+
+
+def test_of_regions_side_by_side_each_place_is_in_one():
+    square, right, above = (np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) + by for by in ([0, 0], [1, 0], [0, 1]))
+    border = np.array([[0.0, 0.5], [0.5, 0.0], [1.0, 0.5], [0.5, 1.0]])
+    assert inside(border, square).tolist() == [True, True, False, False]
+    assert inside(border, right).tolist() == [False, False, True, False]
+    assert inside(border, above).tolist() == [False, False, False, True]
+
+
+def test_inside_are_the_points_that_are_inside_for_shapely():
+    corners = [[0, 0], [4, 1], [3, 5], [2, 1.5], [-1, 4]]
+    chance = np.random.default_rng(5)
+    points = chance.uniform(-2, 6, (400, 2))
+    within = shapely.contains_xy(shapely.Polygon(corners), *points.T)
+    assert inside(points, np.array(corners)).tolist() == within.tolist()
+
+
 def test_a_fault_is_active_from_its_start_to_before_its_end_and_an_event_without_one_to_the_last_sample():
     events = [[1, "fault.started", "lidar.off"], [2, "fault.ended", "lidar.off"], [1.5, "event.started", "cart"]]
     words = {"seconds": 3, "truth": [[0, 0, 0]], "events": events}
@@ -341,3 +413,10 @@ def test_the_nearest_point_of_a_plan_is_found_among_long_and_short_steps():
     fine = np.concatenate([np.linspace(a, b, 2000) for a, b in itertools.pairwise(way)])
     expected = [np.hypot(*(fine - point).T).min() for point in robot]
     assert read("plan_deviation", trace, sketch_case({}), {}) == pytest.approx(expected, abs=1e-3)
+
+
+def test_events_are_counted_in_whatever_order_they_were_written():
+    events = [[1, "recovery.started", "spin"], [2, "recovery.started", "wait"], [3, "recovery.started", "spin"]]
+    trace = sketch({"seconds": 4, "truth": [[0, 0, 0]], "events": events})
+    values = read("recovery_count", replace(trace, events=trace.events[::-1]), sketch_case({}), {})
+    assert [at(values, t) for t in (0, 1, 2, 3, 4)] == [0, 1, 2, 3, 3]

@@ -65,6 +65,10 @@ def test_ldlj_has_no_unit(rate):
     assert ldlj(np.array([0.0, 1.0, 1.0, 0.0]), rate) == pytest.approx(-math.log(4**3 * 2))
 
 
+def test_the_ldlj_of_a_slope_that_hardly_changes_is_above_zero():
+    assert ldlj(np.array([1.0, 0.998046875, 1.0]), 40.0) == pytest.approx(-math.log(27 * 2**-16))
+
+
 @pytest.mark.parametrize("speeds", [[1.0], [1.0, 2.0], [1.0, 2.0, 3.0]])
 def test_without_a_change_of_slope_there_is_no_ldlj(speeds):
     assert ldlj(np.array(speeds), 40.0) is None

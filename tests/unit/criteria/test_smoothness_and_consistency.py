@@ -9,6 +9,7 @@ from simscen.core.chisquare import mean_bounds
 from simscen.core.samples import Samples
 from simscen.core.verdict import Status
 from simscen.criteria.localization_consistency import LocalizationConsistency
+from simscen.criteria.smooth import sparc
 from simscen.criteria.smoothness import Smoothness
 from simscen.judge.sketch import sketch, sketch_case
 
@@ -30,6 +31,16 @@ def test_a_speed_that_never_changes_has_no_ldlj():
 def test_trembling_is_not_driving(fastest, status):
     speeds = fastest * np.sin(np.linspace(0, np.pi, 81))
     assert Smoothness(min_sparc=-9.0).judge(with_speeds(speeds), CASE)[0].status is status
+
+
+def test_the_spectrum_is_that_of_the_rate_of_the_truth():
+    speeds = np.random.default_rng(6).uniform(0, 1, 81)
+    assert Smoothness(min_sparc=-900.0).judge(with_speeds(speeds), CASE)[0].value == sparc(speeds, 40.0)
+
+
+def test_two_samples_have_a_spectrum():
+    speeds = np.array([1.0, 0.5])
+    assert Smoothness(min_sparc=-900.0).judge(with_speeds(speeds), CASE)[0].value == sparc(speeds, 40.0)
 
 
 def test_without_velocities_nothing_is_smooth():
@@ -67,6 +78,7 @@ def test_samples_are_taken_every_so_often_from_the_first_belief_or_the_time_give
     trace = believing(10, covariances)
     (all_of_it,) = LocalizationConsistency(every=2.0).judge(trace, CASE)
     assert all_of_it.value == pytest.approx((2 * 1.0 + 4 * 4.0) / 6)
+    assert all_of_it.tick == 960
     (later,) = LocalizationConsistency(every=2.0, after=2.5).judge(trace, CASE)
     assert later.value == pytest.approx((1.0 + 3 * 4.0) / 4)
 
@@ -89,3 +101,9 @@ def test_the_last_belief_is_a_sample_too():
     (found,) = LocalizationConsistency(every=1.0, after=10.0).judge(trace, CASE)
     assert found.status is Status.PASS
     assert "(mean of 1 NEES" in found.limit
+
+
+def test_after_the_last_belief_there_is_no_sample():
+    trace = believing(10, np.tile([0.01, 0, 0, 0.01, 0, 0.01], (101, 1)))
+    (found,) = LocalizationConsistency(every=1.0, after=1 / 240).judge(trace, CASE)
+    assert "(mean of 10 NEES" in found.limit

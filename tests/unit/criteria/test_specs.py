@@ -74,6 +74,11 @@ def test_what_bounds_nothing_or_cannot_be_is_refused(kind, words):
         ("collisions", {}, {"max": None, "caused_by_robot": False}),
         ("stuck", {}, {"max": 10.0, "radius": 0.5}),
         ("localization_error", {"max": 1}, {"after": 0.0}),
+        (
+            "localization_consistency",
+            {},
+            {"probability": 0.95, "every": 5.0, "after": 0.0, "both_sides": False},
+        ),
         ("relocalized_within", {"time": 5}, {"tolerance": 0.25, "yaw_tolerance": 0.25, "hold": 1.0, "after": None}),
         (
             "stopped_within",
