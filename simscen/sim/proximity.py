@@ -2,7 +2,8 @@
 
 Asking the fused mesh would be exact too, but costs 0.6 µs for each triangle within reach: 20 to 40 ms of CPU for each
 simulated second in a BARN world (28 facets a cylinder, 40 Hz). Here every solid that is convex is one convex shape, in
-an engine of its own that is never stepped, built when the robot first comes near.
+an engine of its own that is never stepped, built when the robot first comes near. A concave solid as large as a map
+(188 000 triangles in one) is taken in tiles, each built and asked only when the robot is near it.
 """
 
 import itertools
@@ -17,6 +18,7 @@ from simscen.core.geometry import Array, Pose3
 from simscen.core.shapes import TriangleMesh
 from simscen.sim import engine, outline
 from simscen.sim.enclosure import winds_around
+from simscen.sim.parts import parts_of
 from simscen.sim.robot_body import RobotBody
 
 STRIDE = 0.25
@@ -33,64 +35,69 @@ class Proximity:
         self._mesh, self._reach = static, reach
         self._radius, self._height = outline.reach(robot.solid)
         self._hull = [engine.fixed(self._client, shape) for shape in engine.hull_shapes(self._client, robot.solid)]
-        self._starts, self._order = _by_owner(static)
-        self._low, self._high = _extents(static, self._starts, self._order)
+        self._parts = parts_of(static)
         self._bodies: dict[int, list[int]] = {}
-        # For each solid around: a lower bound of its distance plus what had been travelled when that was known.
+        # For each part around: a lower bound of its distance plus what had been travelled when that was known.
         self._bounds: dict[int, float] = {}
         self._travelled = 0.0
         self._nearest: int | None = None
+        self._distance = math.inf
         self._pose, self._centre = Pose3(), (math.inf, math.inf)
 
     def distance(self, pose: Pose3) -> float:
         """Distance in metres from the robot, with its base at `pose`, to the nearest solid; inf beyond the reach.
 
-        The distance to a solid shrinks at most by what the robot moves, so only those are measured again that may have
-        come nearer than the nearest.
+        The distance to a part changes at most by what the robot moves, so only those are measured again that may have
+        come nearer than the nearest, and the nearest no farther than it may have gone: what is asked costs time for
+        each triangle within reach.
         """
-        self._travelled += _motion(self._pose, pose, self._radius, self._height)
+        moved = _motion(self._pose, pose, self._radius, self._height)
+        self._travelled += moved
         self._pose = pose
         if math.hypot(pose.x - self._centre[0], pose.y - self._centre[1]) > STRIDE:
             self._look_around(pose)
         for hull in self._hull:
             pybullet.resetBasePositionAndOrientation(hull, pose.position, pose.quaternion, physicsClientId=self._client)
-        nearest = math.inf if self._nearest is None else self._measure(self._nearest, self._reach)
-        for owner, bound in self._bounds.items():
-            if bound - self._travelled < min(nearest, self._reach) and owner != self._nearest:
-                found = self._measure(owner, min(nearest + SLACK, self._reach))
+        farthest = min(self._distance + moved + SLACK, self._reach)
+        nearest = math.inf if self._nearest is None else self._measure(self._nearest, farthest)
+        for part, bound in self._bounds.items():
+            if bound - self._travelled < min(nearest, self._reach) and part != self._nearest:
+                found = self._measure(part, min(nearest + SLACK, self._reach))
                 if found < nearest:
-                    nearest, self._nearest = found, owner
+                    nearest, self._nearest = found, part
+        self._distance = nearest
         return nearest
 
-    def _measure(self, owner: int, within: float) -> float:
-        """Distance to one solid; inf if above `within`. Remembers what is known for later."""
-        bodies = self._bodies.get(owner)
+    def _measure(self, part: int, within: float) -> float:
+        """Distance to one part; inf if above `within`. Remembers what is known for later."""
+        bodies = self._bodies.get(part)
         if bodies is None:
-            bodies = self._bodies[owner] = self._build(owner)
+            bodies = self._bodies[part] = self._build(part)
         nearest = math.inf
         for hull, body in itertools.product(self._hull, bodies):
             for point in pybullet.getClosestPoints(hull, body, within, physicsClientId=self._client):
                 nearest = min(nearest, point[8])
-        self._bounds[owner] = min(nearest, within) + self._travelled
+        self._bounds[part] = min(nearest, within) + self._travelled
         return nearest
 
     def _look_around(self, pose: Pose3) -> None:
-        """Lists the solids that may come within reach during the next stride."""
+        """Lists the parts that may come within reach during the next stride."""
         self._centre = (pose.x, pose.y)
-        outside = np.maximum(np.maximum(self._low[:, :2] - self._centre, self._centre - self._high[:, :2]), 0.0)
+        low, high = self._parts.low[:, :2], self._parts.high[:, :2]
+        outside = np.maximum(np.maximum(low - self._centre, self._centre - high), 0.0)
         far = np.hypot(outside[:, 0], outside[:, 1]) - self._radius
-        near = np.flatnonzero((far < self._reach + STRIDE) & (self._high[:, 2] > engine.FLOOR))
+        near = np.flatnonzero((far < self._reach + STRIDE) & (self._parts.high[:, 2] > engine.FLOOR))
         known = self._bounds
         self._bounds = {
-            owner: max(bound + self._travelled, known.get(owner, -math.inf))
-            for bound, owner in sorted(zip(far[near].tolist(), near.tolist(), strict=True))
+            part: max(bound + self._travelled, known.get(part, -math.inf))
+            for bound, part in sorted(zip(far[near].tolist(), near.tolist(), strict=True))
         }
         if self._nearest not in self._bounds:
             self._nearest = None
 
-    def _build(self, owner: int) -> list[int]:
-        faces, vertices = self._faces(owner), self._mesh.vertices
-        if self.convex(owner):
+    def _build(self, part: int) -> list[int]:
+        vertices, faces = self._mesh.vertices, self._mesh.faces[self._parts.faces(part)]
+        if self._parts.whole(part) and engine.is_convex(engine.compact(vertices, faces)):
             shapes = [engine.convex_shape(self._client, engine.compact(vertices, faces))]
         else:
             lots = engine.tiles(vertices, engine.above_floor(vertices, faces))
@@ -100,18 +107,17 @@ class Proximity:
             pybullet.changeDynamics(body, -1, collisionMargin=0.0, physicsClientId=self._client)
         return bodies
 
-    def _faces(self, owner: int) -> npt.NDArray[np.int32]:
-        return self._mesh.faces[self._order[self._starts[owner] : self._starts[owner + 1]]]
-
     def around(self, place: tuple[float, float, float], but: Collection[int] = ()) -> list[int]:
         """The solids that a place is inside of, by number, without those in `but`."""
-        held = np.flatnonzero(((self._low <= place) & (place <= self._high)).all(axis=1)).tolist()
-        asked = [owner for owner in held if owner not in but]
+        asked = [owner for owner in self._parts.holding(place) if owner not in but]
         return [owner for owner in asked if winds_around(self._mesh.vertices[self._faces(owner)], place)]
 
     def convex(self, owner: int) -> bool:
         """Whether a solid is convex."""
         return engine.is_convex(engine.compact(self._mesh.vertices, self._faces(owner)))
+
+    def _faces(self, owner: int) -> npt.NDArray[np.int32]:
+        return self._mesh.faces[self._parts.faces_of(owner)]
 
     def name(self, owner: int) -> str:
         """What a solid is called."""
@@ -120,11 +126,11 @@ class Proximity:
     def owner(self, place: tuple[float, float, float]) -> str:
         """The name of the solid whose surface is nearest to a place where the hull touches something."""
         point = np.array(place)
-        outside = np.maximum(np.maximum(self._low - point, point - self._high), 0.0)
+        outside = np.maximum(np.maximum(self._parts.low - point, point - self._parts.high), 0.0)
         near = np.flatnonzero((outside < 0.05).all(axis=1))
         if not len(near):
             return ""
-        faces = np.concatenate([self._order[self._starts[k] : self._starts[k + 1]] for k in near.tolist()])
+        faces = np.concatenate([self._parts.faces(part) for part in near.tolist()])
         distances = point_to_triangles(point, self._mesh.vertices[self._mesh.faces[faces]])
         return self._mesh.names[int(self._mesh.owners[faces[int(np.argmin(distances))]])]
 
@@ -144,24 +150,6 @@ def _up(pose: Pose3) -> tuple[float, float, float]:
     """The base's z axis in the world."""
     x, y, z, w = pose.quaternion
     return 2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)
-
-
-def _by_owner(mesh: TriangleMesh) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """Faces sorted by owner, and where each owner's begin."""
-    order = np.argsort(mesh.owners, kind="stable")
-    starts = np.searchsorted(mesh.owners[order], np.arange(len(mesh.names) + 1))
-    return starts.astype(np.int64), order.astype(np.int64)
-
-
-def _extents(mesh: TriangleMesh, starts: npt.NDArray[np.int64], order: npt.NDArray[np.int64]) -> tuple[Array, Array]:
-    """Lowest and highest corner (n, 3) of each owner; one without faces is nowhere."""
-    low, high = np.full((len(starts) - 1, 3), np.inf), np.full((len(starts) - 1, 3), -np.inf)
-    filled = np.flatnonzero(np.diff(starts))
-    if len(filled):
-        corners = mesh.vertices[mesh.faces[order]]
-        low[filled] = np.minimum.reduceat(corners.min(axis=1), starts[filled])
-        high[filled] = np.maximum.reduceat(corners.max(axis=1), starts[filled])
-    return low, high
 
 
 def point_to_triangles(point: Array, corners: Array) -> Array:

@@ -96,3 +96,31 @@ def test_a_hull_of_more_corners_than_bullet_takes_at_once_is_that_of_its_outermo
     assert low == pytest.approx(points.min(axis=0), abs=0.05)
     assert high == pytest.approx(points.max(axis=0), abs=0.05)
     made.close()
+
+
+def test_a_solid_as_large_as_a_map_is_asked_where_the_robot_is_only():
+    wall = wall_of_many_triangles(400, 60)
+    made = Proximity(fuse([Solid(wall, Pose3(), "wall")]), robot_body(shipped("turtlebot")), 2.0)
+    assert made.distance(Pose3(4.0, 0.0)) == pytest.approx(1.0 - 0.22, abs=1e-3)
+    assert sum(len(made._parts.faces(part)) for part in made._bodies) < 0.5 * len(wall.faces)
+    assert made.owner((5.0, 1.0, 0.5)) == "wall"
+    assert made.around((4.0, 0.0, 0.5)) == []
+
+
+def room_of_many_triangles():
+    """A closed box of 12 x 12 x 2 m from the origin, of some thousand triangles."""
+    box = trimesh.creation.box((12.0, 12.0, 2.0)).subdivide().subdivide().subdivide().subdivide()
+    return Mesh(np.asarray(box.vertices), np.asarray(box.faces, dtype=np.int32))
+
+
+def test_a_place_is_inside_a_solid_of_many_tiles_as_in_any_other():
+    made = Proximity(
+        fuse([Solid(room_of_many_triangles(), Pose3(z=1.0), "block"), box("shelf", 20, 0, 2, 2)]),
+        robot_body(shipped("turtlebot")),
+        2.0,
+    )
+    assert [made.name(k) for k in made.around((1.0, 1.0, 0.5))] == ["block"]
+    assert [made.name(k) for k in made.around((20.0, 0.0, 0.5))] == ["shelf"]
+    assert made.distance(Pose3(6.5, 0.0)) == pytest.approx(0.5 - 0.22, abs=1e-3)
+    assert not made.convex(0)
+    assert made.convex(1)
