@@ -5,7 +5,8 @@ Distances are kept as squared whole cells (uint16), so that distance in metres a
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import distance_transform_edt
+
+from simscen.stack.nearest import squared_cells
 
 FREE, MAX_NON_OBSTACLE, INSCRIBED, LETHAL, NO_INFORMATION = 0, 252, 253, 254, 255
 FAR = 65535
@@ -16,10 +17,11 @@ Squared = npt.NDArray[np.uint16]
 
 def squared_distances(lethal: npt.NDArray[np.bool_]) -> Squared:
     """For each cell the exact squared distance in cells to the nearest lethal cell's centre, at most FAR."""
-    if not lethal.any():
-        return np.full(lethal.shape, FAR, dtype=np.uint16)
-    distance = distance_transform_edt(~lethal)
-    return np.minimum(np.rint(distance * distance), FAR).astype(np.uint16)
+    squared = np.full(lethal.shape, FAR, dtype=np.uint16)
+    if lethal.any():
+        for rows, distances in squared_cells(lethal):
+            squared[rows] = np.minimum(distances, FAR)
+    return squared
 
 
 class Inflation:

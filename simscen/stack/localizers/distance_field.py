@@ -1,13 +1,13 @@
 """How far each cell of a map is from the nearest obstacle: what likelihood fields and ray marching look up."""
 
 from collections.abc import Callable
-from typing import cast
 
 import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array
 from simscen.core.grid import OccupancyGrid
+from simscen.stack.nearest import squared_cells
 
 Float32 = npt.NDArray[np.float32]
 Cells = npt.NDArray[np.intp]
@@ -34,15 +34,14 @@ class DistanceField:
 
         Everything off the map is an obstacle if `walled`, and `limit` from any obstacle if not.
         """
-        from scipy.ndimage import distance_transform_edt
-
         bordered = np.pad(obstacles, 1, constant_values=walled)
-        distance = np.full(bordered.shape, limit)
+        distance = np.full(bordered.shape, limit, dtype=np.float32)
         if bordered.any():
-            distance = np.minimum(cast(Array, distance_transform_edt(~bordered)) * grid.resolution, limit)
+            for rows, squared in squared_cells(bordered):
+                distance[rows] = np.minimum(np.sqrt(squared) * grid.resolution, limit)
         if not walled:
             distance[[0, -1], :] = distance[:, [0, -1]] = limit
-        self.table: Float32 = distance.astype(np.float32).ravel()
+        self.table: Float32 = distance.ravel()
         self.resolution = grid.resolution
         self._height, self._width = grid.shape
         self._grid_from_map = grid.origin.inverse()

@@ -51,14 +51,14 @@ class FreeSpace:
     """Draws poses uniformly over the free cells of a map; over all cells if none is free."""
 
     def __init__(self, grid: OccupancyGrid) -> None:
-        free = np.argwhere(grid.cells == FREE)
-        self._cells = free if len(free) else np.argwhere(np.ones_like(grid.cells))
+        free = np.flatnonzero(grid.cells == FREE)
+        self._cells = (free if len(free) else np.arange(grid.cells.size)).astype(np.int32)
         self._grid = grid
 
     def draw(self, count: int, chance: np.random.Generator) -> Array:
         """Poses (count, 3) in the map frame."""
-        cells = self._cells[chance.integers(len(self._cells), size=count)]
-        local = (cells[:, ::-1] + chance.random((count, 2))) * self._grid.resolution
+        row, column = np.divmod(self._cells[chance.integers(len(self._cells), size=count)], self._grid.shape[1])
+        local = (np.column_stack((column, row)) + chance.random((count, 2))) * self._grid.resolution
         return np.column_stack((self._grid.origin.apply(local), chance.uniform(-np.pi, np.pi, count)))
 
     def begin(self, estimate: Estimate, count: int, chance: np.random.Generator) -> Particles:
