@@ -1,4 +1,4 @@
-"""`simscen bench`: how fast it is; `simscen bench nav`: how well the reference stack drives."""
+"""`simscen bench`: how fast it is; `bench worlds`: also in large worlds; `bench nav`: how well the stack drives."""
 
 import json
 from dataclasses import asdict
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from simscen.cli import bench_nav
+from simscen.cli import bench_nav, bench_worlds
 from simscen.cli.diagnostics import print_text
 
 if TYPE_CHECKING:
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer(rich_markup_mode=None, add_completion=False)
 app.command("nav")(bench_nav.command)
+app.command("worlds")(bench_worlds.command)
 
 
 class Format(str, Enum):

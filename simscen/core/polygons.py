@@ -20,6 +20,15 @@ def distance_to_polygon(point: Pose2, corners: Sequence[tuple[float, float]]) ->
     return min(distance_to_segment(point.x, point.y, a, b) for a, b in edges)
 
 
+def deep_inside(pose: Pose2, corners: Sequence[Corner]) -> float:
+    """Metres from the border of a polygon for a place in it; negative outside."""
+    if not holds(corners, (pose.x, pose.y)):
+        return -1.0
+    return min(
+        distance_to_segment(pose.x, pose.y, a, b) for a, b in zip(corners, (*corners[1:], corners[0]), strict=True)
+    )
+
+
 def flaw(ring: Sequence[Corner]) -> str | None:
     """What keeps a ring of corners from being the border of one area, as words that follow "it"; None for nothing.
 

@@ -61,8 +61,9 @@ class LoadedScenario:
 
     `id` is its path without suffix relative to the root; `file` is absolute, `path` is `file` relative to the root as
     problems show it. `text` is the file as it was read. `map` is the map the robot gets: a ROS map, "none" for mapless
-    driving, or None = what the world gives. `sources` holds the texts of all files read, by shown path, and `files`
-    their absolute paths. `read` are the files that the world and the robot were made of besides, once they were built.
+    driving, or None = what the world gives; the masks are those of its stack. `sources` holds the texts of all files
+    read, by shown path, and `files` their absolute paths. `read` are the files that the world and the robot were made
+    of besides, once they were built.
     `notes` are warnings. With `lenient`, what of an SDF world cannot be used is left out and noted.
     """
 
@@ -82,6 +83,8 @@ class LoadedScenario:
     read: tuple[Path, ...] = ()
     notes: tuple[Problem, ...] = ()
     lenient: bool = False
+    keepout_mask: LoadedMap | None = None
+    speed_mask: LoadedMap | None = None
 
     def place_of(self, *keys: Key) -> Place:
         """Where the value at `keys` stands in its file, e.g. `place_of("goals", 0, "pose")`."""

@@ -12,7 +12,7 @@ from simscen.loading.consistency import inconsistencies
 from simscen.loading.document import Library
 from simscen.loading.loaded import LoadedMap, LoadedScenario, LoadedWorld
 from simscen.loading.paths import Fence
-from simscen.loading.tree import Fields, Leaf, Node, at, child, value_place
+from simscen.loading.tree import Fields, Key, Leaf, Node, at, child, value_place
 from simscen.loading.validation import check
 from simscen.model.scenario import ScenarioSpec
 from simscen.model.world import WorldSpec
@@ -62,6 +62,9 @@ def _with_assets(spec: ScenarioSpec, tree: Fields, library: Library, file: Path)
     assets = Assets(library)
     world = _world(spec, tree, assets, file)
     robot_map = _map(spec, tree, assets)
+    keepout_mask = _mask(spec.stack.keepout_mask, tree, ("stack", "keepout_mask"), assets)
+    limits = spec.stack.speed_mask
+    speed_mask = _mask(limits.file if limits else None, tree, ("stack", "speed_mask", "file"), assets)
     robot = assets.robot(spec.robot.model, value_place(tree, ("robot", "model")))
     if world is None or robot is None or assets.problems:
         return library.with_source(sorted(assets.problems))
@@ -80,9 +83,9 @@ def _with_assets(spec: ScenarioSpec, tree: Fields, library: Library, file: Path)
         tree=tree,
         sources=dict(library.texts),
         files=dict(library.files),
-        notes=tuple(
-            dict.fromkeys(note for used in (world.map, robot_map) if used and used != "none" for note in used.notes)
-        ),
+        notes=_notes(world.map, robot_map if robot_map != "none" else None, keepout_mask, speed_mask),
+        keepout_mask=keepout_mask,
+        speed_mask=speed_mask,
     )
     problems = sorted(inconsistencies(loaded))
     if any(problem.severity == "error" for problem in problems):
@@ -102,6 +105,17 @@ def _map(spec: ScenarioSpec, tree: Fields, assets: Assets) -> LoadedMap | Litera
     if spec.map is None or spec.map == "none" or not isinstance(node, Leaf):
         return "none" if spec.map == "none" else None
     return assets.map(node)
+
+
+def _mask(written: str | None, tree: Fields, keys: tuple[Key, ...], assets: Assets) -> LoadedMap | None:
+    """The filter mask that the stack names there."""
+    node = at(tree, keys)
+    return assets.map(node) if written is not None and isinstance(node, Leaf) else None
+
+
+def _notes(*maps: LoadedMap | None) -> tuple[Problem, ...]:
+    """What was noted about the maps used, each once."""
+    return tuple(dict.fromkeys(note for used in maps if used for note in used.notes))
 
 
 def unusable_name(name: str) -> bool:

@@ -276,6 +276,26 @@ class SpeedZone(Spec):
     """While the robot believes itself inside."""
 
 
+MaskFile = Annotated[str, Field(min_length=1, max_length=4096)]
+
+
+class SpeedMask(Spec):
+    """A filter mask of speed limits (nav2_costmap_2d's SpeedFilter and its CostmapFilterInfo).
+
+    What a cell of the mask says is `base + multiplier · value`, its value being 0 … 100 as map_server reads the mask
+    (`mode: scale` keeps the greys). Cells of value 0 and unknown ones limit nothing, nor does a limit of 0 or less.
+    """
+
+    file: MaskFile
+    """Map yaml of the mask, relative to this file; its resolution and origin may differ from the map's."""
+    type: Literal["percent", "absolute"] = "percent"
+    """Percent of the controller's full speed (CostmapFilterInfo type 1), or m/s (type 2)."""
+    base: Annotated[float, Field(ge=-1000, le=1000)] = 0.0
+    """CostmapFilterInfo's base: percent or m/s."""
+    multiplier: Annotated[float, Field(ge=-1000, le=1000)] = 1.0
+    """CostmapFilterInfo's multiplier: percent or m/s for each unit of a cell's value."""
+
+
 class StackSpec(Spec):
     """The navigation stack under test: Nav2 in miniature."""
 
@@ -294,3 +314,7 @@ class StackSpec(Spec):
     """Regions of the world that the robot must not enter (nav2_costmap_2d's KeepoutFilter)."""
     speed_zones: Annotated[list[SpeedZone], Field(max_length=100)] = []
     """Regions of the world with a speed limit."""
+    keepout_mask: MaskFile | None = None
+    """Map yaml of a filter mask: its occupied cells are lethal to the costmap (nav2_costmap_2d's KeepoutFilter)."""
+    speed_mask: SpeedMask | None = None
+    """A filter mask of speed limits."""

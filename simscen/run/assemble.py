@@ -56,6 +56,7 @@ def assemble(prepared: Prepared, seed: int) -> Rig:
         tick_rate=clock.rate,
         keepout=tuple(world.regions[name] for name in prepared.stack.keepout),
         speed_zones=tuple((world.regions[zone.region], zone.speed_limit) for zone in prepared.stack.speed_zones),
+        masks=prepared.masks,
         lidars=tuple(name for name, sensor in prepared.robot.sensors.items() if sensor.lidar),
     )
     stack = build_stack(prepared.stack, surroundings, streams, clock, stop_on_failure=spec.on_goal_failure == "stop")

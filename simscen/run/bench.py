@@ -61,10 +61,10 @@ class Field:
 def measure_patrol(rounds: int) -> Patrol:
     """The median of several runs of the patrol, recorded as always; then once more, taken apart."""
     prepared = prepare(load_scenario(PATROL, PATROL.parent))
-    _run(prepared)  # the first run pays for imports and caches
-    runs = [_run(prepared) for _ in range(rounds)]
+    timed_run(prepared)  # the first run pays for imports and caches
+    runs = [timed_run(prepared) for _ in range(rounds)]
     watch = Stopwatch()
-    simulated, _, whole = _run(prepared, watch)
+    simulated, _, whole = timed_run(prepared, watch)
     cpu = statistics.median(cpu for _, cpu, _ in runs)
     # The stopwatch sees wall time and costs some itself: the parts are scaled to a run without it.
     parts = {name: seconds * cpu / whole for name, seconds in watch.seconds.items()}
@@ -72,7 +72,7 @@ def measure_patrol(rounds: int) -> Patrol:
     return Patrol(simulated, cpu, parts, _bare_patrol(prepared, simulated))
 
 
-def _run(prepared: Prepared, watch: Stopwatch | None = None) -> tuple[float, float, float]:
+def timed_run(prepared: Prepared, watch: Stopwatch | None = None) -> tuple[float, float, float]:
     """Simulated, CPU and wall seconds of one run, from setting up to the verdicts; `watch` takes it apart."""
     gc.collect()
     with TemporaryDirectory() as folder:

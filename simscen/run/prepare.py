@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 from simscen.core.belief import Estimate
 from simscen.core.case import CLEARANCE_RANGE, Case
+from simscen.core.filtermasks import FilterMasks
 from simscen.core.geometry import Pose2
 from simscen.core.grid import OccupancyGrid
 from simscen.core.world import BuiltWorld
@@ -18,6 +19,7 @@ from simscen.model.robot import RobotSpec
 from simscen.model.scenario import ScenarioSpec, estimate_of
 from simscen.model.stack import Amcl, OdometryOnly, StackSpec
 from simscen.run.goals import goals_of, pose_of, sent_goals
+from simscen.run.masks import load_masks
 from simscen.run.robotsize import inscribed_radius
 from simscen.run.worldsource import load_map, load_robot, load_world
 from simscen.sim.robot_body import RobotBody
@@ -34,6 +36,7 @@ class Prepared:
     loaded: LoadedScenario
     built: BuiltWorld
     map: OccupancyGrid | None
+    masks: FilterMasks
     robot: RobotSpec
     body: RobotBody
     stack: StackSpec
@@ -79,6 +82,7 @@ def prepare(loaded: LoadedScenario, world_of: BuildWorld = build_world) -> Prepa
         loaded=loaded,
         built=built,
         map=_robot_map(loaded, built),
+        masks=load_masks(loaded),
         robot=robot,
         body=body,
         stack=stack_of(spec),

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.belief import Belief, Estimate
+from simscen.core.filtermasks import FilterMasks
 from simscen.core.geometry import Pose2
 from simscen.core.grid import OccupancyGrid
 from simscen.core.motion import Twist
@@ -139,6 +140,11 @@ class Controller(Protocol):
         """Follow this path from now on."""
         ...
 
+    @property
+    def full_speed(self) -> float:
+        """What it drives at in m/s where nothing limits it."""
+        ...
+
     def set_speed_limit(self, limit: float | None) -> None:
         """Drive no faster than this in m/s from now on; None lifts the limit (a speed zone was left)."""
         ...
@@ -207,7 +213,8 @@ class Stack(Protocol):
 class Surroundings:
     """What a stack is installed with: its robot, its map (None = mapless) and the ticks a second.
 
-    `keepout` are polygons it must not enter, `speed_zones` polygons with a speed limit in m/s.
+    `keepout` are polygons it must not enter, `speed_zones` polygons with a speed limit in m/s; `masks` say
+    the same of cells.
     """
 
     robot: RobotModel
@@ -215,4 +222,5 @@ class Surroundings:
     tick_rate: int
     keepout: tuple[Polygon, ...] = ()
     speed_zones: tuple[tuple[Polygon, float], ...] = ()
+    masks: FilterMasks = field(default_factory=FilterMasks)
     lidars: tuple[str, ...] = field(default=())

@@ -20,7 +20,7 @@ from simscen.stack.protocols import Controller, Localizer, NavigationFailure, Su
 from simscen.stack.publishing import Publishing
 from simscen.stack.tasks import Task
 from simscen.stack.velocity_smoother import VelocitySmoother
-from simscen.stack.zones import speed_limit
+from simscen.stack.zones import SpeedFilter
 
 CRAWL = 0.02
 """m/s and rad/s (times five): what is slower does not count as driving."""
@@ -46,7 +46,7 @@ class ReferenceStack:
         costmap_period: int,
         journal: list[Event],
     ) -> None:
-        self._zones = surroundings.speed_zones
+        self._speed_filter = SpeedFilter(surroundings)
         self._localizer, self._costmap, self._controller = localizer, costmap, controller
         self._navigator, self._task, self._smoother, self._monitor = navigator, task, smoother, monitor
         self._tick_rate = surroundings.tick_rate
@@ -173,8 +173,8 @@ class ReferenceStack:
             self._free_at = tick
             return STOP
         pose = self._localizer.belief.pose
-        if self._zones:
-            self._controller.set_speed_limit(speed_limit(self._zones, pose))
+        if self._speed_filter:
+            self._controller.set_speed_limit(self._speed_filter.limit(pose, self._controller.full_speed))
         try:
             wanted, reached = self._navigator.step(tick, pose, self._twist, self._held(tick))
         except NavigationFailure as failure:

@@ -1,11 +1,21 @@
-"""Speed zones: where the robot must drive slowly (nav2's speed filter)."""
+"""Where the robot must drive slowly (nav2's speed filter)."""
 
 from simscen.core.geometry import Pose2
 from simscen.core.polygons import distance_to_polygon
-from simscen.core.world import Polygon
+from simscen.stack.protocols import Surroundings
 
 
-def speed_limit(zones: tuple[tuple[Polygon, float], ...], pose: Pose2) -> float | None:
-    """The lowest limit in m/s of the zones that the pose lies in; None outside all."""
-    limits = [limit for polygon, limit in zones if distance_to_polygon(pose, polygon) == 0.0]
-    return min(limits, default=None)
+class SpeedFilter:
+    """The speed zones and the speed mask that a stack is installed with."""
+
+    def __init__(self, surroundings: Surroundings) -> None:
+        self._zones, self._mask = surroundings.speed_zones, surroundings.masks.speed
+
+    def __bool__(self) -> bool:
+        return bool(self._zones) or self._mask is not None
+
+    def limit(self, pose: Pose2, full_speed: float) -> float | None:
+        """The lowest limit in m/s where the robot believes itself; None outside all. `full_speed` is without limits."""
+        limits = [limit for polygon, limit in self._zones if distance_to_polygon(pose, polygon) == 0.0]
+        masked = self._mask.at(pose, full_speed) if self._mask is not None else None
+        return min(limits if masked is None else [*limits, masked], default=None)

@@ -11,6 +11,8 @@ from simscen.core.problems import Problem
 from simscen.core.world import World
 from simscen.loading.consistency import inconsistencies
 from simscen.loading.loaded import LoadedScenario, LoadedWorld
+from simscen.run.masks import load_masks
+from simscen.run.precheck.masked import masked
 from simscen.run.precheck.misplaced import misplaced
 from simscen.run.precheck.pointless import places_of_triggers, pointless
 from simscen.run.precheck.scene import Scene
@@ -49,6 +51,7 @@ def _impossible(scene: Scene, cache: WorldCache, pictures: Path | None) -> list[
     closed = list(unreachable(scene, ways, {keys for keys, _ in wrong}))
     problems = [*(problem for _, problem in wrong), *(problem for problem, _ in closed)]
     problems += [] if any(keys == ("robot", "pose") for keys, _ in wrong) else pointless(scene, ways)
+    problems += masked(scene, load_masks(scene.loaded))
     problems += [] if _has_errors(problems) else untimely(scene, ways)
     if problems and pictures is not None:
         file = draw(scene, [gap for _, gap in closed], pictures)

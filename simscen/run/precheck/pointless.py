@@ -6,7 +6,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 from simscen.core.geometry import Pose2, wrap
-from simscen.core.polygons import distance_to_polygon, distance_to_segment, holds
+from simscen.core.polygons import deep_inside, distance_to_polygon
 from simscen.core.problems import Problem
 from simscen.core.world import Polygon
 from simscen.criteria.keepout import Keepout
@@ -102,24 +102,10 @@ def _kept_out(scene: Scene) -> Iterator[Problem]:
         if polygons_overlap(corners, placed(scene.outline, scene.start)):
             yield scene.loaded.problem(keys, "SC051", f"keepout can never hold: the robot starts in `{region}`")
             continue
-        inside = [goal.name for _, goal in scene.targets if _deep(goal.pose, corners) > goal.xy_tolerance]
+        inside = [goal.name for _, goal in scene.targets if deep_inside(goal.pose, corners) > goal.xy_tolerance]
         if inside:
             message = f"keepout can never hold while goal `{inside[0]}` is reached, which lies in `{region}`"
             yield scene.loaded.problem(keys, "SC051", message)
-    for index, region in enumerate(scene.loaded.spec.stack.keepout):
-        inside = [g.name for _, g in scene.targets if _deep(g.pose, scene.world.regions[region]) > g.xy_tolerance]
-        if inside:
-            message = f"goal `{inside[0]}` cannot be reached: it lies in `{region}`, which the stack keeps out of"
-            yield scene.loaded.problem(("stack", "keepout", index), "SC302", message)
-
-
-def _deep(pose: Pose2, corners: Polygon) -> float:
-    """Metres from the border of a polygon for a place in it; negative outside."""
-    if not holds(corners, (pose.x, pose.y)):
-        return -1.0
-    return min(
-        distance_to_segment(pose.x, pose.y, a, b) for a, b in zip(corners, (*corners[1:], corners[0]), strict=True)
-    )
 
 
 def _there_already(scene: Scene) -> Iterator[Problem]:

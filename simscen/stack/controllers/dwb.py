@@ -44,6 +44,11 @@ class DynamicWindowController:
         self._track = PathTracker(path)
         self._goal_pose.reset()
 
+    @property
+    def full_speed(self) -> float:
+        """What it drives at in m/s where nothing limits it."""
+        return self._fastest
+
     def set_speed_limit(self, limit: float | None) -> None:
         """Drive no faster than this in m/s; None lifts the limit."""
         self._limit = math.inf if limit is None else limit

@@ -49,6 +49,11 @@ class RegulatedPurePursuit:
         self._track = PathTracker(path)
         self._goal_pose.reset()
 
+    @property
+    def full_speed(self) -> float:
+        """What it drives at in m/s where nothing limits it."""
+        return self._desired
+
     def set_speed_limit(self, limit: float | None) -> None:
         """Drive no faster than this in m/s; None lifts the limit."""
         self._limit = limit

@@ -93,10 +93,10 @@ class Costmap:
         return within(self._frame, start, goal) if self._rolling else goal
 
     def _layer(self, centre: Pose2) -> StaticLayer:
-        grid, keepout = self._surroundings.map, self._surroundings.keepout
+        grid, keepout, mask = self._surroundings.map, self._surroundings.keepout, self._surroundings.masks.keepout
         if grid is not None:
-            return static_layer(grid, keepout)
-        return empty_layer(window_around(centre, self._spec.rolling_size, self._spec.resolution), keepout)
+            return static_layer(grid, keepout, mask)
+        return empty_layer(window_around(centre, self._spec.rolling_size, self._spec.resolution), keepout, mask)
 
     def _lay(self, layer: StaticLayer) -> None:
         self._frame, self._unknown = layer.frame, layer.unknown

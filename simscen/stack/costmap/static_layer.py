@@ -1,10 +1,11 @@
-"""The map the robot was given, as an unrotated costmap, with keepout zones painted in."""
+"""The map the robot was given, as an unrotated costmap, with keepout zones and masks painted in."""
 
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
+from simscen.core.filtermasks import kept_out
 from simscen.core.geometry import Array
 from simscen.core.grid import UNKNOWN, OccupancyGrid
 from simscen.core.world import Polygon
@@ -24,7 +25,7 @@ class StaticLayer:
     unknown: Mask
 
 
-def static_layer(grid: OccupancyGrid, keepout: tuple[Polygon, ...]) -> StaticLayer:
+def static_layer(grid: OccupancyGrid, keepout: tuple[Polygon, ...], mask: OccupancyGrid | None = None) -> StaticLayer:
     """The layer of a map; a map with a turned origin is sampled into an unrotated frame of the same resolution."""
     if abs(grid.origin.yaw) < 1e-9:
         frame = Frame((grid.origin.x, grid.origin.y), grid.resolution, grid.shape)
@@ -32,18 +33,24 @@ def static_layer(grid: OccupancyGrid, keepout: tuple[Polygon, ...]) -> StaticLay
     else:
         frame = _bounding_frame(grid)
         cells = grid.values_at(_all_centres(frame)).reshape(frame.shape)
-    lethal = np.ascontiguousarray(cells >= OCCUPIED_FROM)
-    for polygon in keepout:
-        lethal |= inside_polygon(frame, polygon)
+    lethal = np.ascontiguousarray(cells >= OCCUPIED_FROM) | _forbidden(frame, keepout, mask)
     return StaticLayer(frame, lethal, np.ascontiguousarray(cells == UNKNOWN) & ~lethal)
 
 
-def empty_layer(frame: Frame, keepout: tuple[Polygon, ...]) -> StaticLayer:
-    """The layer of a robot without a map: nothing but keepout zones."""
+def empty_layer(frame: Frame, keepout: tuple[Polygon, ...], mask: OccupancyGrid | None = None) -> StaticLayer:
+    """The layer of a robot without a map: nothing but keepout zones and masks."""
+    return StaticLayer(frame, _forbidden(frame, keepout, mask), np.zeros(frame.shape, dtype=bool))
+
+
+def _forbidden(frame: Frame, keepout: tuple[Polygon, ...], mask: OccupancyGrid | None) -> Mask:
     lethal = np.zeros(frame.shape, dtype=bool)
     for polygon in keepout:
         lethal |= inside_polygon(frame, polygon)
-    return StaticLayer(frame, lethal, np.zeros(frame.shape, dtype=bool))
+    if mask is not None:
+        columns = np.arange(frame.shape[1])
+        for row in range(frame.shape[0]):
+            lethal[row] |= kept_out(mask, frame.centres(np.column_stack((np.full_like(columns, row), columns))))
+    return lethal
 
 
 def inside_polygon(frame: Frame, polygon: Polygon) -> Mask:

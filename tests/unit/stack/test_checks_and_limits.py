@@ -7,7 +7,9 @@ import pytest
 from flatland import RATE, Flatland, box_robot, round_robot
 
 from simscen.core.events import Event
+from simscen.core.filtermasks import FilterMasks, SpeedLimits
 from simscen.core.geometry import Pose2
+from simscen.core.grid import OccupancyGrid
 from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import ErrorCode, Goal, Path
 from simscen.core.sensing import Scan
@@ -28,7 +30,7 @@ from simscen.stack.recovery import RoundRobin
 from simscen.stack.replanning import PlanInForce
 from simscen.stack.tasks import Task
 from simscen.stack.velocity_smoother import VelocitySmoother
-from simscen.stack.zones import speed_limit
+from simscen.stack.zones import SpeedFilter
 
 GOAL = Goal("g", Pose2(1.0, 0.0, 0.0), xy_tolerance=0.2, yaw_tolerance=0.2)
 DRIVING = Twist(0.3)
@@ -246,9 +248,12 @@ def test_a_plan_is_tight_where_it_has_lost_room_soon_but_not_where_it_never_had_
 
 def test_the_lowest_limit_of_the_zones_one_is_in_counts() -> None:
     zones = ((((0, 0), (2, 0), (2, 2), (0, 2)), 0.3), (((1, 0), (3, 0), (3, 2), (1, 2)), 0.2))
-    assert speed_limit(zones, Pose2(0.5, 1)) == 0.3
-    assert speed_limit(zones, Pose2(1.5, 1)) == 0.2
-    assert speed_limit(zones, Pose2(5, 1)) is None
+    mask = SpeedLimits(OccupancyGrid(np.full((2, 1), 50, np.int8), 1.0), True, 0.0, 1.0)
+    found = SpeedFilter(Surroundings(round_robot(), None, RATE, speed_zones=zones, masks=FilterMasks(speed=mask)))
+    assert found.limit(Pose2(0.5, 1), 0.5) == 0.25
+    assert found.limit(Pose2(0.5, 1), 1.0) == 0.3
+    assert found.limit(Pose2(1.5, 1), 0.5) == 0.2
+    assert found.limit(Pose2(5, 1), 0.5) is None
 
 
 def test_a_task_says_how_it_ended_with_the_code_of_the_last_failure() -> None:

@@ -1,0 +1,166 @@
+"""What a simulated second costs in worlds as people have them, each held against the patrol of a small house."""
+
+import math
+import resource
+import statistics
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise, product
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.grid import FREE, OCCUPIED, OccupancyGrid
+from simscen.core.shapes import Box, Solid
+from simscen.loading.scenario import load_scenario
+from simscen.run.bench import timed_run
+from simscen.run.prepare import prepare
+from simscen.worlds.meshing import fuse
+from simscen.worlds.rosmap import save_map
+
+HOUSE = Path(__file__).parent.parent / "data" / "bench" / "house.scenario.yaml"
+MOVABLE = 40
+EDGE = 2000
+"""Cells of 5 cm along each side of the map: 100 x 100 m."""
+SCENARIO = """\
+simscen: 1
+seed: 1
+world: {world}
+robot: {{pose: {{x: {start[0]}, y: {start[1]}}}}}
+goals: [{goals}]
+time_limit: 60 s
+pass:
+  - collisions: {{max: 0}}
+"""
+
+
+@dataclass(frozen=True)
+class Cost:
+    """A world of so many triangles that stay, and things that move: CPU ms for each simulated second.
+
+    `preparing` is CPU seconds once for all runs; `memory` is the most that this process has used so far, in MB.
+    """
+
+    name: str
+    triangles: int
+    movable: int
+    simulated: float
+    milliseconds: float
+    preparing: float
+    memory: float
+
+
+def measure_worlds(rounds: int) -> Iterator[Cost]:
+    """The house, a hall with movable meshes, and a map of 100 x 100 m: the median of several runs each."""
+    with TemporaryDirectory() as folder:
+        yield _measured("house, patrol of five rooms", HOUSE, rounds)
+        yield _measured(f"hall, {MOVABLE} movable meshes", write_hall(Path(folder, "hall")), rounds)
+        yield _measured("map of 100 x 100 m", write_arena(Path(folder, "arena")), rounds)
+
+
+def _measured(name: str, file: Path, rounds: int) -> Cost:
+    import time
+
+    begun = time.process_time()
+    prepared = prepare(load_scenario(file, file.parent))
+    preparing = time.process_time() - begun
+    timed_run(prepared)  # the first run pays for imports and caches
+    runs = [timed_run(prepared) for _ in range(rounds)]
+    simulated = runs[0][0]
+    return Cost(
+        name,
+        triangles=len(prepared.built.mesh.faces),
+        movable=len(prepared.built.world.bodies),
+        simulated=simulated,
+        milliseconds=1e3 * statistics.median(cpu for _, cpu, _ in runs) / simulated,
+        preparing=preparing,
+        memory=_most_memory(),
+    )
+
+
+def _most_memory() -> float:
+    used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return used / 1e6 if sys.platform == "darwin" else used / 1e3
+
+
+def write_hall(folder: Path) -> Path:
+    """A hall of 30 x 20 m as an SDF world, with chairs in five rows: movable meshes of 432 triangles; its scenario."""
+    folder.mkdir()
+    for number in range(4):
+        (folder / f"mesh_{number}.obj").write_text(_obj(_chair(0.4 + 0.05 * number)))
+    places = [(2.5 + 3.5 * column, 2.0 + 4.0 * row) for row, column in product(range(5), range(8))]
+    models = "".join(_mesh_model(number, x, y) for number, (x, y) in enumerate(places))
+    walls = "".join(
+        _box_model(name, x, y, length, width)
+        for name, x, y, length, width in (
+            ("south", 15, 0, 30, 0.2),
+            ("north", 15, 20, 30, 0.2),
+            ("west", 0, 10, 0.2, 20),
+            ("east", 30, 10, 0.2, 20),
+        )
+    )
+    (folder / "hall.world").write_text(f'<sdf version="1.7"><world name="hall">{walls}{models}</world></sdf>')
+    return _scenario(folder, "hall.world", ((1.0, 4.0), (25.0, 4.0), (25.0, 12.0), (1.0, 12.0)))
+
+
+def _chair(width: float) -> list[Solid]:
+    """Slats of a seat and a back on four legs, from the ground up."""
+    half, slats = width / 2 - 0.02, np.linspace(-1, 1, 16).tolist()
+    parts = [((width, width / 20, 0.04), (0.0, half * place, 0.46)) for place in slats]
+    parts += [((0.04, width / 20, 0.5), (-half, half * place, 0.73)) for place in slats]
+    parts += [((0.04, 0.04, 0.44), (x, y, 0.22)) for x in (-half, half) for y in (-half, half)]
+    return [Solid(Box(size), Pose3(*place), "chair") for size, place in parts]
+
+
+def _obj(solids: list[Solid]) -> str:
+    mesh = fuse(solids)
+    corners = [f"v {x} {y} {z}" for x, y, z in mesh.vertices.tolist()]
+    return "\n".join([*corners, *(f"f {a + 1} {b + 1} {c + 1}" for a, b, c in mesh.faces.tolist())]) + "\n"
+
+
+def _mesh_model(number: int, x: float, y: float) -> str:
+    mesh = f"<mesh><uri>mesh_{number % 4}.obj</uri></mesh>"
+    return (
+        f'<model name="thing {number}"><pose>{x} {y} 0 0 0 {number}</pose><link name="body">'
+        "<inertial><mass>5</mass></inertial>"
+        f'<collision name="c"><geometry>{mesh}</geometry></collision></link></model>'
+    )
+
+
+def _box_model(name: str, x: float, y: float, length: float, width: float) -> str:
+    box = f"<box><size>{length} {width} 1</size></box>"
+    return (
+        f'<model name="{name}"><static>true</static><pose>{x} {y} 0.5 0 0 0</pose><link name="body">'
+        f'<collision name="c"><geometry>{box}</geometry></collision></link></model>'
+    )
+
+
+def write_arena(folder: Path) -> Path:
+    """A ROS map of 100 x 100 m at 5 cm with 400 blocks and 0.5 % of noise, as from SLAM; its scenario."""
+    folder.mkdir()
+    chance = np.random.default_rng(7)
+    cells = np.full((EDGE, EDGE), FREE, dtype=np.int8)
+    cells[chance.random((EDGE, EDGE)) < 0.005] = OCCUPIED
+    cells[:4] = cells[-4:] = cells[:, :4] = cells[:, -4:] = OCCUPIED
+    for column, row, width, depth in chance.integers((10, 10, 8, 8), (EDGE - 60, EDGE - 60, 50, 50), (400, 4)).tolist():
+        cells[row : row + depth, column : column + width] = OCCUPIED
+    middle = EDGE // 2
+    cells[middle - 12 : middle + 12, 60:-60] = FREE
+    save_map(OccupancyGrid(cells, 0.05, Pose2(0.0, 0.0)), folder / "arena.yaml")
+    return _scenario(folder, "arena.yaml", ((5.0, 50.0), (25.0, 50.0), (50.0, 50.0)))
+
+
+def _scenario(folder: Path, world: str, way: tuple[tuple[float, float], ...]) -> Path:
+    goals = ", ".join(f"{{pose: {{x: {x}, y: {y}, yaw: {yaw:.4f}}}}}" for x, y, yaw in _headed(way))
+    file = folder / f"{folder.name}.scenario.yaml"
+    file.write_text(SCENARIO.format(world=world, start=way[0], goals=goals))
+    return file
+
+
+def _headed(way: tuple[tuple[float, float], ...]) -> Iterator[tuple[float, float, float]]:
+    """The places of a way after its first, with the heading in which one comes to them."""
+    for (ax, ay), (bx, by) in pairwise(way):
+        yield bx, by, math.atan2(by - ay, bx - ax)

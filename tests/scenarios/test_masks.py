@@ -1,0 +1,177 @@
+"""Nav2's filter masks: what a keepout mask forbids is driven around, what a speed mask limits is driven slowly."""
+
+import math
+
+import numpy as np
+import pytest
+
+import simscen
+from simscen.core.errors import InvalidInput
+from simscen.loading.scenario import load_scenario
+from simscen.run.precheck.feasibility import check
+
+SCENARIO = """\
+simscen: 1
+world:
+  simscen: 1
+  name: hall
+  walls: [{name: wall, points: [[0, 0], [10, 0], [10, 6], [0, 6], [0, 0]]}]
+  regions: {middle: [[4.2, 0], [5.8, 0], [5.8, 3.8], [4.2, 3.8]]}
+robot: {pose: {x: 1.5, y: 2}}
+goals: [{pose: {x: 8.5, y: 2}}]
+time_limit: 60
+pass:
+  - goals_reached: {}
+  - collisions: {}
+"""
+CELL = 0.1
+
+
+def mask(folder, name, grey, *, mode="trinary", origin=(0.0, 0.0, 0.0), more=""):
+    """A mask whose `grey` (rows, columns) has the lowest row first, in cells of 10 cm."""
+    rows, columns = grey.shape
+    (folder / f"{name}.pgm").write_bytes(f"P5\n{columns} {rows}\n255\n".encode() + grey[::-1].tobytes())
+    (folder / f"{name}.yaml").write_text(
+        f"image: {name}.pgm\nmode: {mode}\nresolution: {CELL}\norigin: {list(origin)}\n"
+        f"negate: 0\noccupied_thresh: 1.0\nfree_thresh: 0.0\n{more}"
+    )
+
+
+def white(height=6.0, width=10.0):
+    """A mask that says nothing, over all of the hall."""
+    return np.full((round(height / CELL), round(width / CELL)), 255, dtype=np.uint8)
+
+
+def scenario(folder, stack, more=""):
+    file = folder / "masks.scenario.yaml"
+    file.write_text(f"{SCENARIO}{more}stack:\n{stack}")
+    return file
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_keepout_mask_across_the_direct_way_is_driven_around(turned, tmp_path):
+    if turned:  # the same strip as an image of its own, on its side and with its corner at (6, 0)
+        mask(tmp_path, "strip", np.zeros((20, 40), dtype=np.uint8), origin=(6.0, 0.0, math.pi / 2))
+    else:
+        grey = white()
+        grey[:40, 40:60] = 0
+        mask(tmp_path, "strip", grey)
+    run = simscen.simulate(scenario(tmp_path, "  keepout_mask: strip.yaml\n", "  - keepout: {region: middle}\n"))
+    assert run.passed, run.result.verdicts
+    assert run.result.metrics["path_length"] > 7.8
+
+
+def fastest(run, left, right):
+    """The robot's greatest true speed in m/s between two x."""
+    x, speed = run.trace.truth.values[:, 0], run.trace.velocity.values[:, 0]
+    return float(speed[(x > left) & (x < right)].max())
+
+
+SPEED_MASKS = {
+    "percent": ("scale", 102, "type: percent, base: 100, multiplier: -1", 0.5 * 0.4),  # 60 of 100 dark: 40 percent
+    "absolute": ("raw", 30, "type: absolute, multiplier: 0.01", 0.3),
+}
+
+
+@pytest.mark.parametrize("kind", SPEED_MASKS)
+def test_a_speed_mask_caps_the_true_speed_inside_and_nowhere_else(kind, tmp_path):
+    mode, value, how, limit = SPEED_MASKS[kind]
+    grey = white() if mode == "scale" else np.zeros_like(white())
+    grey[:, 40:60] = value
+    mask(tmp_path, "slow", grey, mode=mode)
+    run = simscen.simulate(scenario(tmp_path, f"  speed_mask: {{file: slow.yaml, {how}}}\n"))
+    assert run.passed, run.result.verdicts
+    assert 0.7 * limit < fastest(run, 4.5, 5.8) < 1.05 * limit
+    assert fastest(run, 6.5, 7.5) > 1.4 * limit
+
+
+def told(file):
+    """What is said about a scenario before it runs: file, line, code, severity and words of each problem."""
+    try:
+        loaded = load_scenario(file, file.parent)
+        problems = [*loaded.notes, *check(loaded)]
+    except InvalidInput as error:
+        problems = error.problems
+    return [(p.path, p.line, p.code, p.severity, f"{p.message}; {p.hint}") for p in problems]
+
+
+LINE = SCENARIO.count("\n") + 2
+"""Of the first line below `stack:`."""
+
+
+def test_a_missing_mask_is_refused_at_its_line(tmp_path):
+    ((path, line, code, severity, text),) = told(scenario(tmp_path, "  keepout_mask: nowhere.yaml\n"))
+    assert (path, line, code, severity) == ("masks.scenario.yaml", LINE, "SC023", "error")
+    assert "nowhere.yaml" in text
+
+
+def test_a_mask_outside_of_the_root_is_refused_at_its_line(tmp_path):
+    ((_, line, code, _, _),) = told(scenario(tmp_path, "  speed_mask: {file: ../../elsewhere.yaml}\n"))
+    assert (line, code) == (LINE, "SC020")
+
+
+def test_what_is_no_map_is_refused_as_a_mask(tmp_path):
+    (tmp_path / "zones.yaml").write_text("type: 1\nfilter_info_topic: /costmap_filter_info\nbase: 0.0\n")
+    problems = told(scenario(tmp_path, "  keepout_mask: zones.yaml\n"))
+    assert {path for path, *_ in problems} == {"zones.yaml"}
+    assert any("image" in text for *_, text in problems)
+
+
+def test_a_mask_with_too_many_pixels_is_refused_at_its_line(tmp_path):
+    mask(tmp_path, "huge", white())
+    (tmp_path / "huge.pgm").write_bytes(b"P5\n90000 90000\n255\n")
+    ((path, line, code, severity, text),) = told(scenario(tmp_path, "  keepout_mask: huge.yaml\n"))
+    assert (path, line, code, severity) == ("masks.scenario.yaml", LINE, "SC320", "error")
+    assert "90000 x 90000 pixels" in text
+    assert "huge.pgm" in text
+
+
+def test_an_unknown_key_of_a_mask_is_noted_and_ignored(tmp_path):
+    grey = white()
+    grey[:5, :5] = 0
+    mask(tmp_path, "corner", grey, more="kind: keepout\n")
+    ((path, line, code, severity, text),) = told(scenario(tmp_path, "  keepout_mask: corner.yaml\n"))
+    assert (path, line, code, severity) == ("corner.yaml", 8, "SC311", "warning")
+    assert "`kind` means nothing" in text
+
+
+def test_a_goal_in_a_masked_cell_is_told_with_the_code_to_expect_and_the_stack_gives_that_code(tmp_path):
+    grey = white()
+    grey[:40, 60:] = 0
+    mask(tmp_path, "right", grey)
+    stack = "  keepout_mask: right.yaml\n"
+    ((_, line, code, severity, text),) = told(scenario(tmp_path, stack))
+    assert (line, code, severity) == (LINE, "SC302", "error")
+    assert "error_code: GOAL_OCCUPIED" in text
+    file = scenario(tmp_path, stack)
+    failing = "  - result: {status: FAILED, error_code: GOAL_OCCUPIED}\n"
+    file.write_text(file.read_text().replace("  - goals_reached: {}\n", failing))
+    assert told(file) == []
+    assert simscen.simulate(file).passed
+
+
+def test_a_start_in_a_masked_cell_is_warned_of(tmp_path):
+    grey = white()
+    grey[:, :30] = 0
+    mask(tmp_path, "left", grey)
+    ((_, line, code, severity, text),) = told(scenario(tmp_path, "  keepout_mask: left.yaml\n"))
+    assert (line, code, severity) == (LINE, "SC302", "warning")
+    assert "START_OCCUPIED" in text
+
+
+def test_masks_that_say_nothing_are_warned_of(tmp_path):
+    mask(tmp_path, "blank", white())
+    stack = "  keepout_mask: blank.yaml\n  speed_mask: {file: blank.yaml, base: 100, multiplier: -1}\n"
+    assert [(line, code, severity) for _, line, code, severity, _ in told(scenario(tmp_path, stack))] == [
+        (LINE, "SC055", "warning"),
+        (LINE + 1, "SC055", "warning"),
+    ]
+
+
+def test_without_a_map_a_keepout_mask_holds_all_the_same(tmp_path):
+    grey = white()
+    grey[:40, 40:60] = 0
+    mask(tmp_path, "strip", grey)
+    more = "  - keepout: {region: middle}\nmap: none\n"
+    run = simscen.simulate(scenario(tmp_path, "  keepout_mask: strip.yaml\n  localizer: {type: ground_truth}\n", more))
+    assert run.passed, run.result.verdicts
