@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import product
 
 from simscen.actions.robot import Kidnap
@@ -12,9 +13,10 @@ from simscen.core.problems import Problem
 from simscen.core.shapes import Solid
 from simscen.core.world import Polygon
 from simscen.run.precheck.expectation import expects_bad_start
-from simscen.run.precheck.scene import Keys, Scene
+from simscen.run.precheck.scene import CIRCLE_EDGE, Keys, Scene
 from simscen.triggers.time import Time
 from simscen.triggers.trigger import Trigger
+from simscen.worlds.contain import first_blocking
 from simscen.worlds.overlap import placed, polygons_overlap
 from simscen.worlds.upright import upright
 
@@ -40,6 +42,10 @@ def _goals(scene: Scene) -> Iterator[tuple[Keys, Problem]]:
         found = list(_told(scene, keys, f"goal `{goal.name}`", goal.pose, scene.world.solids, GOAL_HINT))
         if not found or not _fits_nearby(scene, goal):
             yield from found
+        place = goal.pose.x, goal.pose.y
+        if not found and (thing := first_blocking(scene.lying, place, CIRCLE_EDGE, scene.z_range)):
+            message = f"goal `{goal.name}` is where `{thing}` is at first, and nothing says that it will be gone"
+            yield keys, replace(scene.loaded.problem(keys, "SC301", message, GOAL_HINT), severity="warning")
 
 
 def _fits_nearby(scene: Scene, goal: Goal) -> bool:

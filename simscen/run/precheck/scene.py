@@ -58,8 +58,18 @@ class Scene:
     @cached_property
     def staying(self) -> tuple[Solid, ...]:
         """What could move but never does: nothing opens, moves or removes it, and the robot cannot push it."""
-        moved = {name for _, kind, action in self.actions if kind in MOVING for name in [getattr(action, "name", "")]}
-        return tuple(_placed(b for b in self.world.bodies if b.mass == 0 and b.path is None and b.name not in moved))
+        return tuple(
+            _placed(b for b in self.world.bodies if b.mass == 0 and b.path is None and b.name not in self._moved)
+        )
+
+    @cached_property
+    def lying(self) -> tuple[Solid, ...]:
+        """What can move but is left alone: it neither goes by itself, nor does an event open, move or remove it."""
+        return tuple(_placed(b for b in self.world.bodies if b.path is None and b.name not in self._moved))
+
+    @cached_property
+    def _moved(self) -> set[str]:
+        return {getattr(action, "name", "") for _, kind, action in self.actions if kind in MOVING}
 
     @cached_property
     def certain(self) -> tuple[Solid, ...]:
