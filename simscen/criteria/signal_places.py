@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from simscen.core.trace import Trace
 
 
-_TINY = np.finfo(np.float64).tiny
+_TINY = sys.float_info.min
 """Square metres; stands for the square of a step of no length, to divide by."""
 
 

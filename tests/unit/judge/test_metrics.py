@@ -5,8 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from evo.core import metrics as evo
-from evo.core.trajectory import PosePath3D
 from filterpy.stats import NEES
 
 from simscen.core.navigation import Path
@@ -294,6 +292,8 @@ def lost(seconds=60.0, seed=4):
 
 
 def as_evo(poses):
+    from evo.core.trajectory import PosePath3D
+
     matrices = [np.eye(4) for _ in poses]
     for matrix, (x, y, yaw) in zip(matrices, poses, strict=True):
         matrix[:2, :2] = [[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]]
@@ -301,22 +301,13 @@ def as_evo(poses):
     return PosePath3D(poses_se3=matrices)
 
 
-@pytest.mark.parametrize(
-    ("ours", "theirs"),
-    [
-        ("ape_trans", evo.APE(evo.PoseRelation.translation_part)),
-        ("ape_rot", evo.APE(evo.PoseRelation.rotation_angle_rad)),
-        (
-            "rpe_trans",
-            evo.RPE(evo.PoseRelation.translation_part, 1.0, evo.Unit.meters, pairs_from_reference=True),
-        ),
-        (
-            "rpe_rot",
-            evo.RPE(evo.PoseRelation.rotation_angle_rad, 1.0, evo.Unit.meters, pairs_from_reference=True),
-        ),
-    ],
-)
-def test_pose_errors_are_those_of_evo_without_alignment(ours, theirs):
+@pytest.mark.parametrize("ours", ["ape_trans", "ape_rot", "rpe_trans", "rpe_rot"])
+def test_pose_errors_are_those_of_evo_without_alignment(ours):
+    evo = pytest.importorskip("evo.core.metrics", reason="evo asks for newer packages than make test-lowest has")
+    kind, part = ours.split("_")
+    relation = {"trans": evo.PoseRelation.translation_part, "rot": evo.PoseRelation.rotation_angle_rad}[part]
+    absolute = kind == "ape"
+    theirs = evo.APE(relation) if absolute else evo.RPE(relation, 1.0, evo.Unit.meters, pairs_from_reference=True)
     trace = lost()
     reference = as_evo(trace.truth.at(trace.belief.ticks)[:, :3])
     theirs.process_data((reference, as_evo(trace.belief.values[:, :3])))
