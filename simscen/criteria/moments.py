@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import zip_longest
 from typing import TYPE_CHECKING
 
-from simscen.core.events import Event, EventKind
+from simscen.core.events import Event, EventKind, Value
 from simscen.core.navigation import Goal
 
 if TYPE_CHECKING:
@@ -29,11 +29,27 @@ class Span:
 
 
 def spans(trace: Trace, label: str) -> list[Span]:
-    """Each time the fault or event `label` happened. What never ended, or takes no time, goes on to the run's end."""
-    starts = [event.tick for event in trace.of_kind(*_STARTS) if event.name == label]
-    ends = [event.tick for event in trace.of_kind(*_ENDS) if event.name == label]
-    pairs = zip_longest(starts, ends[: len(starts)])
-    return [Span(start, end, True) if end and end > start else Span(start, trace.end, False) for start, end in pairs]
+    """Each time the fault or event `label` happened. What never ended, or takes no time, goes on to the run's end.
+
+    Several entries of a scenario may share a label; the end of one is not that of another.
+    """
+    starts = [event for event in trace.of_kind(*_STARTS) if event.name == label]
+    ends = [event for event in trace.of_kind(*_ENDS) if event.name == label]
+    found = []
+    for entry in dict.fromkeys(_entry(start) for start in starts):
+        begun = [start.tick for start in starts if _entry(start) == entry]
+        over = [end.tick for end in ends if _entry(end) == entry]
+        found += [_span(trace, *pair) for pair in zip_longest(begun, over[: len(begun)])]
+    return sorted(found, key=lambda span: span.start)
+
+
+def _entry(event: Event) -> Value:
+    """Which entry of the scenario it is about."""
+    return event.data.get("entry")
+
+
+def _span(trace: Trace, start: int, end: int | None) -> Span:
+    return Span(start, end, True) if end and end > start else Span(start, trace.end, False)
 
 
 def never_started(trace: Trace, label: str) -> tuple[str, list[str]]:
