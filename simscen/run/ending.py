@@ -8,19 +8,15 @@ from simscen.core.trace import Decision
 class Ending:
     """Ends a run a while after its navigation task has ended, or at its time limit.
 
-    A task that was given anew in the meantime (a goal sent by an event) takes the ending back. A run ends with a
-    sample of the truth, whatever the rates of truth, sensors and controller: at a beat that takes one anyway, or at
-    the first beat at which an end is due.
+    It hears of every beat. A task that was given anew in the meantime (a goal sent by an event) takes the ending back.
+    A run ends with the first sample of the truth from then on, so that all its samples are evenly spaced: what is
+    derived from them (accelerations, windows of time) means the same at its end as before.
     """
 
     def __init__(self, clock: Clock, time_limit: float, linger: float) -> None:
         self._limit = clock.ticks(time_limit)
         self._linger = clock.ticks(linger)
         self._over: int | None = None
-
-    def due(self, tick: int) -> bool:
-        """Whether, from all that was heard before, the run is to end at this beat: then the truth is needed."""
-        return self.reached(tick) is not None
 
     def heard(self, decision: Decision) -> None:
         """What the stack decided at a beat; tell each of them."""
@@ -31,7 +27,7 @@ class Ending:
                 self._over = None
 
     def reached(self, tick: int) -> Event | None:
-        """The event that ends the run at this beat, or None."""
+        """The event that ends the run at this beat, which samples the truth, or None."""
         if self._over is not None and tick >= self._over:
             return Event(tick, EventKind.RUN_ENDED, "navigation ended")
         if tick >= self._limit:

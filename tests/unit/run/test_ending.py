@@ -1,11 +1,16 @@
 """A run ends a while after its task, whatever is sampled how often."""
 
+import numpy as np
 import pytest
 
 from simscen.core.events import Event, EventKind
 from simscen.core.motion import STOP
 from simscen.core.time import Clock
 from simscen.core.trace import Decision
+from simscen.core.verdict import Status
+from simscen.criteria.criterion import AnyCriterion
+from simscen.judge.judge import judge
+from simscen.judge.sketch import sketch_case
 from simscen.run.ending import Ending
 
 RATES = [
@@ -30,21 +35,29 @@ def test_a_run_ends_soon_after_its_task_at_all_rates_and_with_a_sample_of_the_tr
     )
     (navigated,), (ended,) = trace.of_kind("navigation.ended"), trace.of_kind("run.ended")
     assert ended.name == "navigation ended"
-    assert trace.seconds(ended.tick - navigated.tick) == pytest.approx(0.5, abs=0.1)
+    assert 0.5 <= trace.seconds(ended.tick - navigated.tick) < 0.5 + 1 / truth_rate
     assert trace.truth.ticks[-1] == trace.end == ended.tick
+    assert len(set(np.diff(trace.truth.ticks))) == 1, "evenly spaced to the end"
 
 
 def test_a_run_that_goes_nowhere_ends_at_its_time_limit_with_a_sample_of_the_truth(play):
     trace = play(goals="[]", time_limit="1.3", physics="{truth_rate: 1 Hz}", **{"pass": "[{collisions: {max: 0}}]"})
     assert trace.of_kind("run.ended")[0].name == "time limit"
-    assert trace.truth.ticks.tolist() == [0, 240, 312]
+    assert trace.truth.ticks.tolist() == [0, 240, 480]
+
+
+def test_an_end_between_two_samples_breaks_nothing_that_is_derived_from_them(play):
+    trace = play(linger="0.33", physics="{truth_rate: 10 Hz}", stack="{localizer: {type: ground_truth}}")
+    criterion = AnyCriterion.model_validate({"always": {"signal": "jerk", "op": "<=", "value": 1e6}})
+    (verdict,) = judge([criterion], trace, sketch_case({}))
+    assert verdict.status is Status.PASS, verdict
 
 
 def test_a_new_goal_takes_the_ending_back():
     ending = Ending(Clock(240), 60.0, 0.5)
     ending.heard(Decision(STOP, events=(Event(100, EventKind.NAVIGATION_ENDED),)))
-    assert not ending.due(219)
-    assert ending.due(220)
+    assert not ending.reached(219)
+    assert ending.reached(220)
     ending.heard(Decision(STOP, events=(Event(120, EventKind.GOAL_ACCEPTED),)))
-    assert not ending.due(220)
-    assert ending.due(60 * 240)
+    assert not ending.reached(220)
+    assert ending.reached(60 * 240)
