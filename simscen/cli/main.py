@@ -120,6 +120,8 @@ def _called() -> int:
         except SimscenError as error:
             return _told(error)
     except SystemExit as end:
+        if isinstance(end.__context__, BrokenPipeError):  # where output is not buffered, click meets it first: 1
+            return Exit.INCOMPLETE
         return end.code if isinstance(end.code, int) else Exit.PASSED
     except KeyboardInterrupt:
         return Exit.INTERRUPTED

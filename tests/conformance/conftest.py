@@ -38,7 +38,7 @@ goals: [{pose: {x: 1.5, y: 1}}]
 time_limit: 20
 pass: [{goals_reached: {}}]
 """
-_PLACE = re.compile(r"^(?P<path>\S.*?)(?P<place>(:\d+:\d+)?): (error\[SC\d{3}\]|… and \d+ more)")
+_PLACE = re.compile(r"^(?P<path>\S.*?)(?P<place>(:\d+:\d+)?): ((error|warning)\[SC\d{3}\]|… and \d+ more)")
 
 
 class Ended(NamedTuple):

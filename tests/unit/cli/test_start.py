@@ -1,5 +1,6 @@
 """The installed command, in a process of its own."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -45,13 +46,17 @@ def test_it_prints_everything_and_ends_with_the_code_of_the_command(simscen, arg
     assert told in done.stdout + done.stderr
 
 
-def test_a_reader_that_is_gone_is_no_error_worth_a_word(simscen) -> None:
-    process = subprocess.Popen([*COMMAND, "list", "."], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_reader_that_is_gone_is_no_error_worth_a_word(simscen, unbuffered: str) -> None:
+    env = {**os.environ, "PYTHONUNBUFFERED": unbuffered}
+    process = subprocess.Popen(
+        [*COMMAND, "list", "."], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=env
+    )
     assert process.stdout is not None and process.stderr is not None
     process.stdout.close()
     assert process.stderr.read() == ""
     process.stderr.close()
-    assert process.wait() == 1  # as typer has it
+    assert process.wait() == 3
 
 
 def test_an_own_world_of_simple_shapes_is_validated_without_numpy_or_any_engine(simscen) -> None:
