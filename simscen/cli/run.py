@@ -17,6 +17,7 @@ from simscen.cli.work import Work, begin
 from simscen.core.errors import Exit, UsageError
 from simscen.core.sessionevents import SessionEvent
 from simscen.report.journal import Journal, require_free
+from simscen.report.journaldata import NAME
 from simscen.report.rebuild import read_journal
 from simscen.run.outfolder import RUNS, make_folder
 from simscen.run.session import Options, plan, run_session, seeds_of
@@ -44,7 +45,12 @@ def command(
         bool, typer.Option("--fail-fast", "-x", help="Stop after the first run that does not pass.")
     ] = False,
     check_determinism: Annotated[
-        bool, typer.Option("--check-determinism", help="Run everything twice and compare the logs, byte for byte.")
+        bool,
+        typer.Option(
+            "--check-determinism",
+            help="Run everything twice and compare the logs, byte for byte; with the output folder of an earlier "
+            "session behind it, as --check-against.",
+        ),
     ] = False,
     check_against: Annotated[
         Path | None,
@@ -75,6 +81,8 @@ def command(
     Exit code 0: all passed; 1: a criterion failed; 2: an invalid scenario or an unusable output folder (nothing was
     run); 3: a run could not be completed; 5: nothing selected; 129, 130 and 143: interrupted.
     """
+    if check_determinism and (earlier := [path for path in paths if (path / NAME).is_file()]):
+        paths, check_determinism, check_against = [p for p in paths if p not in earlier], False, earlier[0]
     wanted = Selection(keyword, tag or [], shard_of(shard))
     scenarios, warnings = load_all(paths, root, world_path or [], lenient, wanted)
     if warnings:

@@ -118,6 +118,8 @@ def test_90_without_fused_multiply_add_the_verdicts_are_the_same(reference, pair
 def test_a_run_that_another_session_has_otherwise_or_not_at_all_is_an_error(pair: Path, simscen) -> None:
     assert simscen("run", "a.scenario.yaml", "--out", "out").code == 0
     assert simscen("run", "a.scenario.yaml", "--out", "same", "--check-against", "out").code == 0
+    asked = ("run", "a.scenario.yaml", "--check-determinism", "out", "--out", "alike")
+    assert simscen(*asked).code == 0, "an output folder is what to compare with, not where to look for scenarios"
     file = pair / "a.scenario.yaml"
     file.write_text(file.read_text().replace("pose: {x: 1,", "pose: {x: 1.01,"))
     moved = simscen("run", "a.scenario.yaml", "--out", "moved", "--check-against", "out")
