@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from filterpy.stats import NEES
+from filterpy import stats
 
 from simscen.core.navigation import Path
 from simscen.core.samples import Samples
@@ -15,6 +15,7 @@ from simscen.judge.measure.metrics import barn_score, measure
 from simscen.judge.measure.table import METRICS
 from simscen.judge.sketch import sketch, sketch_case
 
+NEES = getattr(stats, "NEES", None) or stats.NESS  # as filterpy 1.4.5 misspells it
 GOAL = {"goals": [{"name": "a", "pose": [3, 4, 0]}], "shortest": {"a": 5.0}}
 ARRIVED = [[1, "goal.accepted", "a"], [9, "goal.reached", "a"]]
 STEP = 6 / 240
