@@ -3,6 +3,8 @@
 from collections import Counter
 from collections.abc import Sequence
 
+from pydantic import BaseModel
+
 from simscen.model.disturbance import EventEntry, FaultEntry
 
 
@@ -13,13 +15,26 @@ def stream_names(entries: Sequence[EventEntry | FaultEntry]) -> list[str]:
     stream of what it says: editing it gives it other draws, and only it. Of entries that say the same the k-th draws
     from the k-th stream, so that it does not matter which is which.
     """
-    said = [
-        f"/{entry.name}" if entry.name is not None else f"={entry.model_dump_json(exclude_defaults=True)}"
-        for entry in entries
-    ]
+    said = [f"/{entry.name}" if entry.name is not None else f"={_written(entry)}" for entry in entries]
     before: Counter[str] = Counter()
     names = []
     for what in said:
         before[what] += 1
         names.append(f"{what}#{before[what]}")
     return names
+
+
+def _written(entry: BaseModel) -> str:
+    _build(entry)
+    return entry.model_dump_json(exclude_defaults=True)
+
+
+def _build(value: object) -> None:
+    """Have the serializers of all models in it built: pydantic 2.11 does not, of models that came from a pickle."""
+    if isinstance(value, BaseModel):
+        type(value).model_rebuild()
+        for _, inner in value:
+            _build(inner)
+    elif isinstance(value, list):
+        for inner in value:
+            _build(inner)
