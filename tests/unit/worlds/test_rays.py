@@ -1,4 +1,6 @@
 import math
+import subprocess
+import sys
 
 import numpy as np
 import pybullet
@@ -135,3 +137,21 @@ def test_many_bodies_are_seen_as_if_they_were_one_world():
     apart.set_moving({f"box {k}": (box, pose) for k, pose in enumerate(places)})
     origins, directions = random_rays(5000, 7, (-10, -10, 0.05), (10, 10, 1.9))
     assert_agree(apart.cast(origins, directions), together.cast(origins, directions))
+
+
+COLLECTED = """
+import gc
+from simscen.core.shapes import Box, Solid
+from simscen.worlds.meshing import fuse
+from simscen.worlds.rays import RayScene
+for _ in range(200):
+    knot = [RayScene(fuse([Solid(Box((1.0, 1.0, 1.0)))]))]
+    knot.append(knot)
+    del knot
+    gc.collect()
+"""
+
+
+def test_a_scene_that_the_garbage_collector_takes_does_not_crash():
+    """Embree 2 did, once in a hundred runs in one process: its device went before its scenes."""
+    assert subprocess.run([sys.executable, "-c", COLLECTED], check=False).returncode == 0
