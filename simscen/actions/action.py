@@ -1,9 +1,9 @@
 """The list of actions: a new one is one file and one line here."""
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from simscen.actions.base import Action
-from simscen.spec.base import Choice
+from simscen.spec.choice import Choice
 from simscen.spec.ondemand import OnDemand
 
 if TYPE_CHECKING:
@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 
 class AnyAction(Choice):
     """One thing to do."""
+
+    group: ClassVar[str] = "action"
 
     spawn: Annotated[Action | None, OnDemand("simscen.actions.spawn", "Spawn")] = None
     remove: Annotated[Action | None, OnDemand("simscen.actions.remove", "Remove")] = None

@@ -3,7 +3,7 @@
 import inspect
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
@@ -17,7 +17,8 @@ from simscen.faults.fault import AnyFault
 from simscen.model import robot, scenario, stack, world
 from simscen.model.disturbance import EventEntry, FaultEntry
 from simscen.model.rosmap import RosMapSpec
-from simscen.spec.base import Choice
+from simscen.spec import registry
+from simscen.spec.choice import Choice, added
 from simscen.spec.docs import field_docs
 from simscen.spec.ondemand import type_of
 from simscen.spec.quantities import UNITS, Quantity
@@ -48,6 +49,8 @@ class Topic:
     text: str
     example: str = ""
     rows: tuple[Field, ...] = ()
+    origin: str = ""
+    """The package that adds it, and its version; "" for what simscen ships."""
 
     @property
     def fields(self) -> list[Field]:
@@ -64,15 +67,19 @@ class Topic:
         return ""
 
 
-def topics() -> list[Topic]:
-    """Every topic, group by group, in the order of the language."""
+def topics(installed: bool = False) -> list[Topic]:
+    """Every topic, group by group, in the order of the language; with what `installed` packages add, if asked."""
     return [
         *_choices("trigger", Test),
+        *_added(Test, installed),
         _topic("trigger", "when", Trigger),
         *_choices("action", AnyAction),
+        *_added(AnyAction, installed),
         *_choices("fault", AnyFault),
+        *_added(AnyFault, installed),
         _topic("fault", "faults", FaultEntry),
         *_choices("criterion", AnyCriterion),
+        *_added(AnyCriterion, installed),
         _topic("criterion", "pass", AnyCriterion),
         *(_topic("scenario", name, model) for name, model in _SCENARIO.items()),
         *(_topic("stack", name, model) for name, model in _STACK.items()),
@@ -82,6 +89,7 @@ def topics() -> list[Topic]:
         *(_topic("robot", name, model) for name, model in _ROBOT.items()),
         *(_topic("drive", kind, model) for kind, model in by_type(robot.Drive)),
         *_choices("sensor", robot.Sensor),
+        *_added(robot.Sensor, installed),
     ]
 
 
@@ -202,6 +210,14 @@ def _choices(group: str, choice: type[Choice]) -> Iterator[Topic]:
         models = [m for m in get_args(kind) or (kind,) if isinstance(m, type) and m is not NoneType]
         model = models[0] if models and issubclass(models[0], BaseModel) and models[0] is not choice else None
         yield _topic(group, key, model) if model is not None else Topic(group, key, None, docs.get(name, ""))
+
+
+def _added(choice: type[Choice], wanted: bool) -> Iterator[Topic]:
+    if not wanted:
+        return
+    origins = {entry.name: entry.origin for entry in registry.installed(choice.group)}
+    for key, model in added(choice).items():
+        yield replace(_topic(choice.group, key, model), origin=origins[key])
 
 
 def _topic(group: str, name: str, model: type[BaseModel]) -> Topic:

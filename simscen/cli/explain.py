@@ -33,7 +33,7 @@ def command(
 
 
 def _everything() -> list[Topic]:
-    return [*topics(), *signal_topics(), *metric_topics()]
+    return [*topics(installed=True), *signal_topics(), *metric_topics()]
 
 
 def _called(name: str) -> list[Topic]:
@@ -58,7 +58,8 @@ def _overview(width: int) -> str:
 
 
 def _explained(topic: Topic, width: int) -> str:
-    parts = [f"{topic.name} ({topic.group})", _paragraphs(topic.text, width)]
+    of = f"{topic.group} of {topic.origin}" if topic.origin else topic.group
+    parts = [f"{topic.name} ({of})", _paragraphs(topic.text, width)]
     if topic.value:
         parts.append(f"  Value: {topic.value}")
     if topic.fields:

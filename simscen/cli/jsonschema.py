@@ -10,7 +10,7 @@ from pydantic_core import core_schema
 from simscen.model.robot import RobotSpec
 from simscen.model.scenario import ScenarioSpec
 from simscen.model.world import WorldSpec
-from simscen.spec.base import Choice
+from simscen.spec.choice import Choice, added, widened
 
 Schema = dict[str, Any]
 
@@ -19,10 +19,10 @@ DRAFT = "http://json-schema.org/draft-07/schema#"
 """What yaml-language-server knows best; nothing newer is needed."""
 
 
-def schema_of(name: str) -> Schema:
-    """The JSON Schema of a "scenario", "world" or "robot" file."""
+def schema_of(name: str, installed: bool = False) -> Schema:
+    """The JSON Schema of a "scenario", "world" or "robot" file; with what `installed` packages add, if asked."""
     model = MODELS[name]
-    generated = model.model_json_schema(schema_generator=_Generator)
+    generated = model.model_json_schema(schema_generator=_WithInstalled if installed else _Generator)
     schema = _mended(
         {**generated, "properties": {"extends": _EXTENDS, **generated["properties"]}}, generated.get("$defs", {})
     )
@@ -49,14 +49,26 @@ class _Generator(GenerateJsonSchema):
         if issubclass(model, RootModel) and model.__doc__:
             made["description"] = _joined(model.__doc__.strip(), made.get("description", ""))
         if issubclass(model, Choice):
-            made.update(_exactly_one(model))
+            made.update(_exactly_one(model, list(model.choices())))
         return made
 
 
-def _exactly_one(model: type[Choice]) -> Schema:
+class _WithInstalled(_Generator):
+    """The same, with the choices that installed packages add; broken ones are left out, as nobody can write them."""
+
+    def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
+        made, model = super().model_schema(schema), schema["cls"]
+        if not issubclass(model, Choice) or widened(model) is model:
+            return made
+        for key, found in added(model).items():
+            made["properties"][key] = self.generate_inner(core_schema.nullable_schema(found.__pydantic_core_schema__))
+        return {**made, **_exactly_one(model, [*model.choices(), *added(model)])}
+
+
+def _exactly_one(model: type[Choice], keys: list[str]) -> Schema:
     if not model.modifiers:
         return {"minProperties": 1, "maxProperties": 1}
-    return {"oneOf": [{"required": [key]} for key in model.choices()]}
+    return {"oneOf": [{"required": [key]} for key in keys]}
 
 
 def _mended(node: Any, definitions: Schema) -> Any:

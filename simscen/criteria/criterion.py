@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import BaseModel, model_validator
 
 from simscen.criteria.base import Criterion
-from simscen.spec.base import Choice
+from simscen.spec.choice import Choice
 from simscen.spec.ondemand import OnDemand
 from simscen.spec.places import Name
 
@@ -13,6 +13,7 @@ from simscen.spec.places import Name
 class AnyCriterion(Choice):
     """One pass criterion."""
 
+    group: ClassVar[str] = "criterion"
     modifiers: ClassVar[frozenset[str]] = frozenset({"id", "severity", "then"})
 
     id: Name | None = None

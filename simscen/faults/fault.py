@@ -1,14 +1,16 @@
 """The list of faults: a new one is one file and one line here."""
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from simscen.faults.base import Fault
-from simscen.spec.base import Choice
+from simscen.spec.choice import Choice
 from simscen.spec.ondemand import OnDemand
 
 
 class AnyFault(Choice):
     """One thing that goes wrong."""
+
+    group: ClassVar[str] = "fault"
 
     off: Annotated[Fault | None, OnDemand("simscen.faults.off", "Off")] = None
     dropout: Annotated[Fault | None, OnDemand("simscen.faults.dropout", "Dropout")] = None

@@ -19,6 +19,7 @@ CODES = {
     "SC016": "Values contradict each other.",
     "SC017": "A text or list is too short, too long, or holds characters that cannot be there.",
     "SC018": "A key has no value.",
+    "SC019": "What an installed package adds cannot be used, for example because importing it fails.",
     "SC020": "A path leads out of the root. Choose another with --root, or allow a folder with --world-path.",
     "SC021": "A path is absolute or a URL; paths are relative to the file they are written in.",
     "SC022": "Symbolic links lead in a circle.",

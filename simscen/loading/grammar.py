@@ -1,4 +1,4 @@
-"""What the models allow at a place: the keys that would have been right there.
+"""What the models allow at a place, with what installed packages add: the keys that would have been right there.
 
 A pydantic `loc` mixes keys of the file with tags of unions. Both are followed here along the types, keeping every
 model that could be meant.
@@ -9,9 +9,10 @@ from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel, RootModel, Tag
+from pydantic.fields import FieldInfo
 
 from simscen.loading.tree import Key
-from simscen.spec.base import Choice
+from simscen.spec.choice import Choice
 from simscen.spec.ondemand import OnDemand, type_of
 
 
@@ -44,11 +45,20 @@ def needs_nothing(model: type[BaseModel]) -> bool:
 
 
 def field_type(model: type[BaseModel], key: str) -> Any:
-    """The declared type of the field that is written as `key`."""
+    """The declared type of the field that is written as `key`; None where there is none, or its package is broken."""
     for name, field in model.model_fields.items():
         if key in (field.alias, name):
-            return type_of(field)
+            return _type_of(field)
     return None
+
+
+def _type_of(field: FieldInfo) -> Any:
+    from simscen.spec.registry import BrokenPlugin
+
+    try:
+        return type_of(field)
+    except BrokenPlugin:
+        return None
 
 
 def _options(kind: Any) -> list[Any]:
@@ -98,7 +108,13 @@ def _metadata(kind: Any) -> tuple[Any, ...]:
 def _bare(kind: Any) -> Any:
     while get_origin(kind) is Annotated:
         kind = next((mark.load() for mark in _metadata(kind) if isinstance(mark, OnDemand)), get_args(kind)[0])
-    return kind
+    return _widened(kind) if _is_model(kind) and issubclass(kind, Choice) else kind
+
+
+def _widened(choice: type[Choice]) -> type[Choice]:
+    from simscen.spec.choice import widened  # only where something is wrong: nothing else looks for packages
+
+    return widened(choice)
 
 
 def _is_model(kind: Any) -> bool:

@@ -104,6 +104,8 @@ def explain(kind: str, context: Mapping[str, Any], node: Node, text: str) -> Mes
             if told.startswith("expected one of")
             else Message("SC016", told)
         )
+    if kind == "plugin":
+        return Message("SC019", str(context["problem"]), str(context["hint"]))
     if kind == "quantity":
         return Message("SC015", str(context["problem"]), f"units: {context['units']}; a bare number is SI")
     if "names" in context:

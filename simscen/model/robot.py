@@ -1,12 +1,13 @@
 """A robot as a user writes it (`*.robot.yaml`)."""
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
 from simscen.core.mecanum import MecanumWheels
-from simscen.spec.base import Choice, Ranged, Spec, by_default
+from simscen.spec.base import Ranged, Spec, by_default
+from simscen.spec.choice import Choice
 from simscen.spec.objects import Shaped
 from simscen.spec.places import Name, PoseSpec, Ring
 from simscen.spec.quantities import (
@@ -190,6 +191,8 @@ class Camera(Spec):
 
 class Sensor(Choice):
     """One sensor."""
+
+    group: ClassVar[str] = "sensor"
 
     lidar: Lidar | None = None
     odometry: WheelOdometry | None = None

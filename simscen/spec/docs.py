@@ -14,14 +14,17 @@ def field_docs(model: type) -> dict[str, str]:
     """Field name → docstring, those of base classes included."""
     docs: dict[str, str] = {}
     for base in reversed(model.__mro__):
-        if base.__module__.startswith("simscen."):
+        if base.__module__.partition(".")[0] not in ("builtins", "pydantic", "abc", "typing"):
             docs.update(_of_module(base.__module__).get(base.__name__, {}))
     return docs
 
 
 @cache
 def _of_module(module: str) -> dict[str, dict[str, str]]:
-    tree = ast.parse(inspect.getsource(sys.modules[module]))
+    try:
+        tree = ast.parse(inspect.getsource(sys.modules[module]))
+    except OSError:  # a package that was installed without its source
+        return {}
     return {node.name: _of_class(node) for node in tree.body if isinstance(node, ast.ClassDef)}
 
 

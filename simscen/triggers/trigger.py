@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from simscen.spec.base import Choice
+from simscen.spec.choice import Choice
 from simscen.spec.ondemand import OnDemand
 from simscen.spec.quantities import Duration, Probability
 from simscen.triggers.base import Condition
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 class Test(Choice):
     """One condition, or several combined."""
+
+    group: ClassVar[str] = "trigger"
 
     time: Annotated[Condition | None, OnDemand("simscen.triggers.time", "Time")] = None
     robot_within: Annotated[Condition | None, OnDemand("simscen.triggers.robot_within", "RobotWithin")] = None

@@ -1,0 +1,57 @@
+"""A choice with what installed packages add to it."""
+
+import pickle
+from copy import deepcopy
+
+import pytest
+from pydantic import ValidationError
+
+from simscen.criteria.criterion import AnyCriterion
+from simscen.spec.choice import added, widened
+
+
+def test_a_name_that_a_package_adds_is_one_of_the_choices(calm) -> None:
+    entry = AnyCriterion.model_validate({"calm": {"max": "0.5 m/s"}, "severity": "warn"}, by_alias=True, by_name=False)
+    assert isinstance(entry, AnyCriterion)
+    assert (entry.kind, entry.severity, entry.chosen.max) == ("calm", "warn", 0.5)
+    assert set(added(AnyCriterion)) == {"calm"}
+
+
+def test_without_the_package_it_is_an_unknown_key() -> None:
+    with pytest.raises(ValidationError) as told:
+        AnyCriterion.model_validate({"calm": {}})
+    assert "extra_forbidden" in {error["type"] for error in told.value.errors()}
+    assert widened(AnyCriterion) is AnyCriterion
+
+
+@pytest.mark.parametrize(
+    ("words", "loc", "kind"),
+    [
+        ({"calm": {"max": -1}}, ("calm", "max"), "greater_than"),
+        ({"calm": {"min": 1}}, ("calm", "min"), "extra_forbidden"),
+        ({"calm": {}, "collisions": {}}, (), "value_error"),
+        ({"calm": {}, "clam": {}}, ("clam",), "extra_forbidden"),
+    ],
+)
+def test_a_mistake_in_it_is_told_where_it_is(calm, words, loc, kind) -> None:
+    with pytest.raises(ValidationError) as told:
+        AnyCriterion.model_validate(words)
+    assert [(error["loc"], error["type"]) for error in told.value.errors()] == [(loc, kind)]
+
+
+def test_a_package_that_is_broken_is_a_problem_of_the_key_that_needs_it(packages) -> None:
+    packages("calm", "1.0", {"criterion": {"calm": "calm:Calm"}}, calm="import nowhere")
+    assert AnyCriterion.model_validate({"collisions": {}}).kind == "collisions"
+    with pytest.raises(ValidationError) as told:
+        AnyCriterion.model_validate({"calm": {}})
+    (error,) = told.value.errors()
+    assert error["loc"] == ("calm",)
+    assert error["msg"].startswith("criterion `calm` of calm 1.0 cannot be used: `calm:Calm` cannot be loaded: ")
+    assert added(AnyCriterion) == {}
+
+
+def test_it_survives_being_copied_and_sent_to_another_process(calm) -> None:
+    entry = AnyCriterion.model_validate({"calm": {"max": 2.0}})
+    for again in (pickle.loads(pickle.dumps(entry)), deepcopy(entry), entry.model_copy()):
+        assert again == entry
+        assert again.chosen.max == 2.0

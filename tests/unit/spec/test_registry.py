@@ -1,0 +1,108 @@
+import subprocess
+import sys
+
+import pytest
+
+from simscen.model.disturbance import FaultEntry
+from simscen.model.robot import Sensor
+from simscen.spec.choice import Choice
+from simscen.spec.registry import GROUPS, BrokenPlugin, entries, find, installed, shipped, strangers
+from simscen.triggers.trigger import Trigger
+
+
+def test_shipped_types_come_first_in_the_order_of_their_list_and_installed_ones_by_name(packages, calm_module) -> None:
+    packages("zeta", "2.0", {"criterion": {"zen": "calm:Calm"}}, calm=calm_module)
+    packages("alpha", "1.0", {"criterion": {"calm": "calm:Calm"}})
+    names = [entry.name for entry in entries("criterion")]
+    own = [entry.name for entry in shipped("criterion")]
+    assert own[:3] == ["goals_reached", "result", "error_code"]
+    assert names == [*own, "calm", "zen"]
+    assert [entry.origin for entry in installed("criterion")] == ["alpha 1.0", "zeta 2.0"]
+
+
+def test_shipped_and_installed_types_are_loaded_through_the_same_door(packages, calm_module) -> None:
+    packages("calm", "1.0", {"criterion": {"calm": "calm:Calm"}}, calm=calm_module)
+    for name, wanted in (("calm", "Calm"), ("speed", "Speed")):
+        entry = find("criterion", name)
+        assert entry is not None
+        assert entry.load().__name__ == wanted
+    assert find("criterion", "clam") is None
+    assert [find("criterion", name).shipped for name in ("calm", "speed")] == [False, True]
+
+
+@pytest.mark.parametrize("group", GROUPS)
+def test_everything_shipped_keeps_the_promise_of_its_group(group: str) -> None:
+    for entry in shipped(group):
+        if (group, entry.name) != ("criterion", "whenever"):  # half of one, `then` is the other
+            assert entry.load() is not None, entry
+
+
+@pytest.mark.parametrize(
+    ("group", "name", "value", "why"),
+    [
+        ("criterion", "calm", "nowhere:Calm", "ModuleNotFoundError: No module named 'nowhere'"),
+        ("criterion", "calm", "calm:Clam", "`calm:Clam` is not there"),
+        ("criterion", "calm", "calm:Lax", "neither a simscen.spec.base.Spec nor a Value"),
+        ("criterion", "calm", "calm:Stranger", "is no simscen.criteria.base.Criterion"),
+        ("criterion", "calm", "calm:Vague", "judge is missing"),
+        ("criterion", "calm", "calm", "not of the form package.module:Class"),
+        ("criterion", "Calm", "calm:Calm", "a name is a small letter"),
+        ("criterion", "severity", "calm:Calm", "`severity` means something else there"),
+        ("criterion", "speed", "calm:Calm", "simscen itself has one of that name"),
+        ("trigger", "all", "calm:Calm", "`all` means something else there"),
+        ("fault", "calm", "calm:Calm", "is no simscen.faults.base.Fault"),
+    ],
+)
+def test_what_cannot_be_used_says_why_and_whose_it_is(packages, group, name, value, why, calm_module) -> None:
+    packages("calm-driving", "1.0", {group: {name: value}}, calm=calm_module)
+    (entry,) = installed(group)
+    with pytest.raises(BrokenPlugin) as broken:
+        entry.load()
+    assert why in str(broken.value)
+    assert f"{group} `{name}` of calm-driving 1.0 cannot be used" in str(broken.value)
+
+
+@pytest.mark.parametrize("text", ["raise RuntimeError('first line\\nsecond')", "import sys; sys.exit(3)", "def ("])
+def test_a_module_that_fails_while_it_is_imported_is_a_broken_plugin(packages, text: str) -> None:
+    packages("calm", "1.0", {"criterion": {"calm": "calm:Calm"}}, calm=text)
+    with pytest.raises(BrokenPlugin, match="`calm:Calm` cannot be loaded: "):
+        find("criterion", "calm").load()
+
+
+def test_a_name_that_two_packages_add_is_usable_from_neither(packages, calm_module) -> None:
+    packages("b", "1.0", {"criterion": {"calm": "calm:Calm"}}, calm=calm_module)
+    packages("a", "2.0", {"criterion": {"calm": "calm:Calm"}})
+    with pytest.raises(BrokenPlugin, match=r"added by a 2.0 \(calm:Calm\) and by b 1.0"):
+        find("criterion", "calm").load()
+
+
+def test_a_name_of_simscen_keeps_its_meaning_whoever_wants_it(packages, calm_module) -> None:
+    packages("calm", "1.0", {"criterion": {"speed": "calm:Calm"}}, calm=calm_module)
+    assert find("criterion", "speed").shipped
+    assert [entry.name for entry in entries("criterion")].count("speed") == 1
+
+
+def test_a_group_that_there_is_not_is_told(packages, calm_module) -> None:
+    packages("calm", "1.0", {"criteria": {"calm": "calm:Calm"}}, calm=calm_module)
+    assert [entry.flaw for entry in strangers()] == ["there is no group `simscen.criteria`"]
+
+
+def test_what_a_module_prints_while_it_is_imported_does_not_get_into_the_output(packages, capsys, calm_module) -> None:
+    packages("calm", "1.0", {"criterion": {"calm": "calm:Calm"}}, calm=calm_module + "\nprint('hello')\n")
+    find("criterion", "calm").load()
+    assert capsys.readouterr() == ("", "hello\n")
+
+
+@pytest.mark.parametrize(("group", "choice"), [("trigger", Trigger), ("fault", FaultEntry), ("sensor", Sensor)])
+def test_what_stands_beside_a_choice_is_reserved(group: str, choice: type[Choice]) -> None:
+    beside = choice.known_keys() - {entry.name for entry in shipped(group)}
+    assert beside == set(GROUPS[group].reserved)
+
+
+def test_nothing_is_looked_for_before_a_name_is_used_that_is_not_shipped() -> None:
+    code = (
+        "import sys; from simscen.criteria.criterion import AnyCriterion;"
+        "AnyCriterion.model_validate({'collisions': {}}); print('simscen.spec.registry' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "False\n"
