@@ -7,27 +7,43 @@ from pydantic import BaseModel, RootModel
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
+from simscen.loading.stackchoice import OF_THE_SCENARIO
 from simscen.model.robot import RobotSpec
 from simscen.model.scenario import ScenarioSpec
+from simscen.model.stackfile import StackFileSpec
 from simscen.model.world import WorldSpec
 from simscen.spec.choice import Choice, added, widened
 
 Schema = dict[str, Any]
 
-MODELS: dict[str, type[BaseModel]] = {"scenario": ScenarioSpec, "world": WorldSpec, "robot": RobotSpec}
+MODELS: dict[str, type[BaseModel]] = {
+    "scenario": ScenarioSpec,
+    "world": WorldSpec,
+    "robot": RobotSpec,
+    "stack": StackFileSpec,
+}
 DRAFT = "http://json-schema.org/draft-07/schema#"
 """What yaml-language-server knows best; nothing newer is needed."""
 
 
 def schema_of(name: str, installed: bool = False) -> Schema:
-    """The JSON Schema of a "scenario", "world" or "robot" file; with what `installed` packages add, if asked."""
+    """The JSON Schema of a "scenario", "world", "robot" or "stack" file; with what `installed` packages add, if asked."""
     model = MODELS[name]
     generated = model.model_json_schema(schema_generator=_WithInstalled if installed else _Generator)
+    if name == "stack":
+        _leave_to_the_scenario(generated)
     schema = _mended(
         {**generated, "properties": {"extends": _EXTENDS, **generated["properties"]}}, generated.get("$defs", {})
     )
     # Any other key may come from the file it extends or from the defaults.yaml beside it.
     return {"$schema": DRAFT, "title": f"simscen {name}", **schema, "required": ["simscen"]}
+
+
+def _leave_to_the_scenario(generated: Schema) -> None:
+    """What a stack file may not say of a stack."""
+    for definition in generated["$defs"].values():
+        for key in OF_THE_SCENARIO:
+            definition.get("properties", {}).pop(key, None)
 
 
 def as_text(schema: Schema) -> str:

@@ -16,7 +16,7 @@ from simscen.core.errors import Exit, InvalidInput, SimscenError
 
 COMMANDS = {
     "run": "Run scenarios and report what passed.",
-    "validate": "Check scenario, world and robot files without running anything.",
+    "validate": "Check scenario, world, robot and stack files without running anything.",
     "list": "List the scenarios that a selection means.",
     "judge": "Judge recorded runs, without simulating them.",
     "report": "Write the reports of an output folder anew.",

@@ -66,6 +66,14 @@ def command(
         Path | None, typer.Option(help="Go on in this output folder: only what has no verdict yet, or has changed.")
     ] = None,
     shard: Annotated[str, typer.Option(help="i/n: only every n-th scenario, from the i-th on.")] = "1/1",
+    stack: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=VALUE",
+            help="Run every scenario with this stack instead of its own: a *.stack.yaml file or `reference`. "
+            "Repeatable: each scenario runs with each.",
+        ),
+    ] = None,
     root: Annotated[Path | None, typer.Option(help="Files inside scenarios stay in this folder.")] = None,
     world_path: Annotated[list[Path] | None, typer.Option(help="Folder with worlds and models; repeatable.")] = None,
     lenient: Annotated[
@@ -84,7 +92,7 @@ def command(
     if check_determinism and (earlier := [path for path in paths if (path / NAME).is_file()]):
         paths, check_determinism, check_against = [p for p in paths if p not in earlier], False, earlier[0]
     wanted = Selection(keyword, tag or [], shard_of(shard))
-    scenarios, warnings = load_all(paths, root, world_path or [], lenient, wanted)
+    scenarios, warnings = load_all(paths, root, world_path or [], lenient, wanted, stack or [])
     if warnings:
         print_text(as_text(warnings), sys.stderr)
     options = Options(workers or _cores(), seed, repeat, check_determinism, fail_fast, wall_limit, check_against)

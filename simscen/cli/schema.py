@@ -18,6 +18,7 @@ class Kind(str, Enum):
     SCENARIO = "scenario"
     WORLD = "world"
     ROBOT = "robot"
+    STACK = "stack"
 
 
 def command(

@@ -2,9 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from pathlib import Path
 
 from simscen.cli.diagnostics import from_here, harmless
+from simscen.cli.stacks import choices_of
 from simscen.core.errors import InvalidInput, NothingSelected, UsageError
 from simscen.core.filesread import files_read
 from simscen.core.problems import Problem
@@ -13,6 +15,7 @@ from simscen.loading.keywords import select
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.robotfile import load_robot_file
 from simscen.loading.scenario import try_scenario
+from simscen.loading.stackchoice import StackChoice
 from simscen.loading.worldfile import load_world_file
 from simscen.run.precheck.feasibility import check, notes_of
 from simscen.run.precheck.worldchecks import misnamed
@@ -31,28 +34,35 @@ class Selection:
 
 
 def load_all(
-    paths: Sequence[Path], root: Path | None, world_path: Sequence[Path], lenient: bool, wanted: Selection
+    paths: Sequence[Path],
+    root: Path | None,
+    world_path: Sequence[Path],
+    lenient: bool,
+    wanted: Selection,
+    stacks: Sequence[str] = (),
 ) -> tuple[list[LoadedScenario], list[Problem]]:
-    """The selected scenarios, all of them valid, and warnings about them, each once.
+    """The selected scenarios, all of them valid, each with every one of `stacks`, and warnings about them, each once.
 
     Raises InvalidInput with every problem of every file, selected or not, and NothingSelected.
     """
     home = root if root is not None else default_root(paths)
     checks = Checks(home, world_path, lenient)
-    loaded: list[LoadedScenario] = []
+    choices: Sequence[StackChoice | None] = choices_of(stacks, home, world_path) or [None]
+    loaded: dict[str, list[LoadedScenario]] = {}
     problems: dict[Problem, None] = {}
     warnings: dict[str, list[Problem]] = {}
-    for file in discover(paths, home):
-        scenario, found = checks.scenario(file)
+    for file, choice in product(discover(paths, home), choices):
+        scenario, found = checks.scenario(file, choice)
         if scenario is not None:
-            loaded.append(scenario)
-            warnings[scenario.id] = found
+            loaded.setdefault(scenario.id, []).append(replace(scenario, several_stacks=len(choices) > 1))
+            warnings.setdefault(scenario.id, []).extend(found)
         problems.update(dict.fromkeys(found))
     if any(problem.severity == "error" for problem in problems):
         raise InvalidInput(from_here(problems, home))
-    chosen = _shard(select(loaded, wanted.keyword, wanted.tags), *wanted.shard)
-    told = dict.fromkeys(warning for scenario in chosen for warning in warnings[scenario.id])
-    return chosen, from_here(told, home)
+    firsts = [variants[0] for variants in loaded.values()]
+    chosen = [one.id for one in _shard(select(firsts, wanted.keyword, wanted.tags), *wanted.shard)]
+    told = dict.fromkeys(warning for name in chosen for warning in warnings[name])
+    return [variant for name in chosen for variant in loaded[name]], from_here(told, home)
 
 
 def shard_of(text: str) -> tuple[int, int]:
@@ -85,9 +95,9 @@ class Checks:
     pictures: Path | None = None
     cache: WorldCache = field(default_factory=WorldCache)
 
-    def scenario(self, file: Path) -> tuple[LoadedScenario | None, list[Problem]]:
+    def scenario(self, file: Path, choice: StackChoice | None = None) -> tuple[LoadedScenario | None, list[Problem]]:
         """The scenario, unless it is unusable, and its problems: a usable one has none that are errors."""
-        loaded = try_scenario(file, self.root, self.world_path)
+        loaded = try_scenario(file, self.root, self.world_path, choice)
         if isinstance(loaded, list):
             return None, loaded
         loaded = replace(loaded, lenient=self.lenient)

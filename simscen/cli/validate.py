@@ -14,7 +14,7 @@ from simscen.cli.select import Checks
 from simscen.core.errors import Exit
 from simscen.core.problems import Problem
 from simscen.loading.anyfile import kind_of, problems_of
-from simscen.loading.discovery import ROBOT, SCENARIO, WORLD, default_root, discover
+from simscen.loading.discovery import ROBOT, SCENARIO, STACK, WORLD, default_root, discover
 
 
 class Format(str, Enum):
@@ -40,17 +40,17 @@ def command(
         Path | None, typer.Option(help="Folder for a picture of each scenario whose geometry is wrong.")
     ] = None,
 ) -> None:
-    """Check scenario, world and robot files without running anything.
+    """Check scenario, world, robot and stack files without running anything.
 
-    Every problem of every file is listed with its line. Folders are searched for *.scenario.yaml, *.world.yaml and
-    *.robot.yaml. Scenarios are looked at in their worlds: is the robot free at its start and goals, can it get there in
-    time, can all events happen, can all criteria hold and fail?
+    Every problem of every file is listed with its line. Folders are searched for *.scenario.yaml, *.world.yaml,
+    *.robot.yaml and *.stack.yaml. Scenarios are looked at in their worlds: is the robot free at its start and goals, can
+    it get there in time, can all events happen, can all criteria hold and fail?
 
     Exit code 0: all are valid; 2: some are not; 5: there are none.
     """
     home = root if root is not None else default_root(paths)
     checks, checked = Checks(home, world_path or [], lenient, fast, picture), _Checked()
-    for file in discover(paths, home, SCENARIO + WORLD + ROBOT):
+    for file in discover(paths, home, SCENARIO + WORLD + ROBOT + STACK):
         kind = kind_of(file, home)
         checked.add(kind, from_here(_problems(kind, file, checks), home))
     _PRINT[format_](checked)
@@ -63,9 +63,10 @@ def _problems(kind: str, file: Path, checks: Checks) -> list[Problem]:
     if kind == "scenario":
         return checks.scenario(file)[1]
     found = problems_of(kind, file, checks.root, checks.world_path)
-    wrong = any(problem.severity == "error" for problem in found)
+    if kind == "stack" or any(problem.severity == "error" for problem in found):
+        return found
     built = checks.robot if kind == "robot" else checks.world
-    return found if wrong else [*found, *built(file)]
+    return [*found, *built(file)]
 
 
 @dataclass

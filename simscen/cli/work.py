@@ -38,8 +38,9 @@ def begin(journal: Journal, jobs: Sequence[Job], workers: int) -> Work:
     Kept are verdicts, not errors, on scenarios that are as they were; of two runs that are to be compared, both or
     none.
     """
-    digests = {job.scenario.id: digest(job.scenario) for job in jobs}
-    planned = [_planned(job, digests[job.scenario.id]) for job in jobs]
+    scenarios = {_asked(job): job.scenario for job in jobs}
+    digests = {asked: digest(scenario) for asked, scenario in scenarios.items()}
+    planned = [_planned(job, digests[_asked(job)]) for job in jobs]
     known = _verdicts(journal)
     answers = [known.get(run) for run in planned]
     kept: list[RunFinished] = []
@@ -59,7 +60,8 @@ def begin(journal: Journal, jobs: Sequence[Job], workers: int) -> Work:
 
 def _planned(job: Job, digest: str) -> Planned:
     scenario = job.scenario
-    return Planned(job.key, scenario.path, digest, repeat_command(scenario, job.key.seed), shown(scenario.file))
+    again = repeat_command(scenario, job.key.seed)
+    return Planned(job.key, scenario.path, digest, again, shown(scenario.file), scenario.stack)
 
 
 def _verdicts(journal: Journal) -> dict[Planned, RunFinished]:
@@ -75,10 +77,11 @@ def _verdicts(journal: Journal) -> dict[Planned, RunFinished]:
 def _twin(jobs: Sequence[Job], number: int) -> int:
     """The number of the run that is to be compared with this one (--check-determinism); its own when there is none."""
     twin = number ^ 1
-    if twin < len(jobs) and jobs[twin].key != jobs[number].key and _question(jobs[twin]) == _question(jobs[number]):
+    if twin < len(jobs) and jobs[twin].key != jobs[number].key and jobs[twin].key.first == jobs[number].key.first:
         return twin
     return number
 
 
-def _question(job: Job) -> tuple[str, int]:
-    return job.key.scenario, job.key.seed
+def _asked(job: Job) -> tuple[str, str]:
+    """Scenario and stack."""
+    return job.scenario.id, job.scenario.variation

@@ -2,7 +2,7 @@
 
 import shlex
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 from simscen.core.disturbance import Happening
@@ -17,9 +17,16 @@ class Outcome(str, Enum):
     ERROR = "error"
 
 
+AGAIN = "again"
+"""What the second of two runs is called that must be equal; no stack may be called so."""
+
+
 @dataclass(frozen=True, order=True)
 class RunKey:
-    """Names one run: the scenario's id, the seed, and a label of the variation where there are several."""
+    """Names one run: the scenario's id, the seed, and a label of the variation where there are several.
+
+    The variation is the name of the stack where there are several, with `.again` for the second of two equal runs.
+    """
 
     scenario: str
     seed: int
@@ -29,6 +36,21 @@ class RunKey:
     def folder(self) -> str:
         """The run's folder inside its scenario's, e.g. "seed-7" or "seed-7-slow"."""
         return "-".join(part for part in (f"seed-{self.seed}", self.variation) if part)
+
+    @property
+    def twin(self) -> "RunKey":
+        """The second of two runs that must be equal."""
+        return replace(self, variation=".".join(part for part in (self.variation, AGAIN) if part))
+
+    @property
+    def first(self) -> "RunKey":
+        """The first of two runs that must be equal; itself where it is no second one."""
+        return replace(self, variation=self.variation[: -len(AGAIN)].removesuffix(".")) if self.repeats else self
+
+    @property
+    def repeats(self) -> bool:
+        """Whether it is a second run, there only to be compared with the first."""
+        return self.variation == AGAIN or self.variation.endswith(f".{AGAIN}")
 
 
 @dataclass(frozen=True)
@@ -53,6 +75,7 @@ class RunResult:
     by kind. `disturbances` is what became of each event and fault of the scenario; each that had to happen and did not
     has a verdict of its own, before those of the criteria. `ended` is why the simulation stopped, `simulated` is in
     seconds, `tick_rate` turns the findings' ticks into seconds. `error` is set exactly when the outcome is ERROR.
+    `stack` is the NAME=VALUE of the --stack that it ran with, files seen from the root; "" = the scenario's own stack.
     """
 
     key: RunKey
@@ -68,6 +91,7 @@ class RunResult:
     simulated: float = 0.0
     tick_rate: int = 240
     error: RunFailure | None = None
+    stack: str = ""
 
     def __post_init__(self) -> None:
         if (self.error is not None) != (self.outcome is Outcome.ERROR):
@@ -76,9 +100,10 @@ class RunResult:
     @property
     def again(self) -> str:
         """The command that repeats the run, from the scenario's root."""
-        return shlex.join(["simscen", "run", self.path, "--seed", str(self.key.seed)])
+        chosen = ["--stack", self.stack] if self.stack else []
+        return shlex.join(["simscen", "run", self.path, "--seed", str(self.key.seed), *chosen])
 
 
-def unfinished(key: RunKey, path: str, failure: RunFailure) -> RunResult:
+def unfinished(key: RunKey, path: str, failure: RunFailure, stack: str = "") -> RunResult:
     """The result of a run that could not be completed."""
-    return RunResult(key, path, Outcome.ERROR, error=failure)
+    return RunResult(key, path, Outcome.ERROR, error=failure, stack=stack)

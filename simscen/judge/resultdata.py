@@ -27,6 +27,7 @@ def as_data(result: RunResult) -> dict[str, Any]:
         "seed": result.key.seed,
         "variation": result.key.variation,
         "path": result.path,
+        "stack": result.stack,
         "outcome": result.outcome.value,
         "ended": result.ended,
         "simulated_seconds": result.simulated,
@@ -72,6 +73,7 @@ def from_data(data: dict[str, Any]) -> RunResult:
         simulated=data["simulated_seconds"],
         tick_rate=data["tick_rate"],
         error=None if data["error"] is None else RunFailure(**data["error"]),
+        stack=data.get("stack", ""),  # older ones knew no other than the scenario's own
     )
 
 

@@ -5,11 +5,12 @@ from pathlib import Path
 
 from simscen.core.problems import Problem
 from simscen.loading.assets import GAZEBO, URDF, Assets, is_ros_map
-from simscen.loading.discovery import ROBOT, WORLD
+from simscen.loading.discovery import ROBOT, STACK, WORLD
 from simscen.loading.document import Library
 from simscen.loading.paths import Fence
 from simscen.loading.scenario import try_scenario
 from simscen.loading.sense.worldsense import senseless
+from simscen.loading.stackfile import stack_file
 from simscen.loading.tree import Fields
 
 _ONLY_ROBOTS = frozenset({"drive", "sensors", "limits", "body", "urdf"})
@@ -18,13 +19,18 @@ _ONLY_SCENARIOS = frozenset({"world", "robot", "goals", "pass", "events", "fault
 
 
 def problems_of(kind: str, file: Path, root: Path, world_path: Sequence[Path] = ()) -> list[Problem]:
-    """All that is wrong with a "scenario", "world", "robot" or "map" file and the files it names; some are warnings."""
+    """All that is wrong with a "scenario", "world", "robot", "stack" or "map" file and the files it names.
+
+    Some are warnings.
+    """
     if kind == "scenario":
         loaded = try_scenario(file, root, world_path)
         return loaded if isinstance(loaded, list) else list(loaded.notes)
     library = Library(Fence.around(root, world_path))
     if isinstance(path := library.fence.entered(file), Problem):
         return [path]
+    if kind == "stack":
+        return found if isinstance(found := stack_file(path, library), list) else []
     assets = Assets(library)
     senses: list[Problem] = []
     if kind == "world":
@@ -39,7 +45,7 @@ def problems_of(kind: str, file: Path, root: Path, world_path: Sequence[Path] = 
 
 def kind_of(file: Path, root: Path) -> str:
     """By its name where that tells, else by the keys that only one kind has."""
-    for kind, suffixes in (("world", (*WORLD, *GAZEBO)), ("robot", (*ROBOT, *URDF))):
+    for kind, suffixes in (("world", (*WORLD, *GAZEBO)), ("robot", (*ROBOT, *URDF)), ("stack", STACK)):
         if file.name.endswith(suffixes):
             return kind
     tree, _ = Library(Fence.around(root)).read(file.absolute())

@@ -14,6 +14,7 @@ from simscen.loading.source import reason
 SCENARIO = (".scenario.yaml", ".scenario.yml")
 WORLD = (".world.yaml", ".world.yml")
 ROBOT = (".robot.yaml", ".robot.yml")
+STACK = (".stack.yaml", ".stack.yml")
 
 REPOSITORY = (".git", ".hg", ".jj", ".svn")
 PROJECT = ("pyproject.toml", "package.xml", "setup.py")

@@ -1,6 +1,7 @@
 """One YAML document out of several files: `extends:` and the `defaults.yaml` beside it."""
 
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -39,6 +40,11 @@ class Library:
             elif not more and below is not None:
                 problems.append(Problem(self.fence.shown(beside), 0, 0, "SC004", "expected a mapping at top level"))
         return tree, problems
+
+    def add(self, texts: Mapping[str, str], files: Mapping[str, Path]) -> None:
+        """Know files that were read elsewhere, by the names that problems use for them here."""
+        self.texts |= texts
+        self.files |= files
 
     def folder_of(self, place: Place) -> Path:
         """The folder of the file in which something stands: what paths there are relative to."""

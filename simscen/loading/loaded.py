@@ -6,6 +6,8 @@ from pathlib import Path
 from typing import Literal
 
 from simscen.core.problems import Problem
+from simscen.core.result import RunKey
+from simscen.loading.stackchoice import StackChoice
 from simscen.loading.tree import Fields, Key, Place, key_place, value_place
 from simscen.model.robot import RobotSpec
 from simscen.model.rosmap import RosMapSpec
@@ -65,6 +67,8 @@ class LoadedScenario:
     read, by shown path, and `files` their absolute paths. `read` are the files that the world and the robot were made
     of besides, once they were built.
     `notes` are warnings. With `lenient`, what of an SDF world cannot be used is left out and noted.
+    `choice` is the stack that was chosen in place of its own; it is part of the runs' keys where the session has
+    `several_stacks`.
     """
 
     id: str
@@ -85,6 +89,22 @@ class LoadedScenario:
     lenient: bool = False
     keepout_mask: LoadedMap | None = None
     speed_mask: LoadedMap | None = None
+    choice: StackChoice | None = None
+    several_stacks: bool = False
+
+    @property
+    def variation(self) -> str:
+        """What tells its runs from those of the same scenario with other stacks."""
+        return self.choice.name if self.choice is not None and self.several_stacks else ""
+
+    @property
+    def stack(self) -> str:
+        """NAME=VALUE of the chosen stack, a file as seen from the root; "" = its own."""
+        return "" if self.choice is None else self.choice.seen_from(self.root)
+
+    def key(self, seed: int) -> RunKey:
+        """The key of its run with this seed."""
+        return RunKey(self.id, seed, self.variation)
 
     def place_of(self, *keys: Key) -> Place:
         """Where the value at `keys` stands in its file, e.g. `place_of("goals", 0, "pose")`."""

@@ -12,6 +12,7 @@ from simscen.loading.consistency import inconsistencies
 from simscen.loading.document import Library
 from simscen.loading.loaded import LoadedMap, LoadedScenario, LoadedWorld
 from simscen.loading.paths import Fence
+from simscen.loading.stackchoice import StackChoice, with_stack
 from simscen.loading.tree import Fields, Key, Leaf, Node, at, child, value_place
 from simscen.loading.validation import check
 from simscen.model.scenario import ScenarioSpec
@@ -20,18 +21,23 @@ from simscen.model.world import WorldSpec
 SUFFIXES = (".scenario.yaml", ".scenario.yml", ".yaml", ".yml")
 
 
-def load_scenario(path: Path, root: Path, world_path: Sequence[Path] = ()) -> LoadedScenario:
+def load_scenario(
+    path: Path, root: Path, world_path: Sequence[Path] = (), choice: StackChoice | None = None
+) -> LoadedScenario:
     """The scenario in the file `path`; paths in it stay inside `root` and the folders of `world_path`.
 
-    Raises InvalidInput with every problem of the scenario and of the files it names.
+    The chosen stack takes the place of its own. Raises InvalidInput with every problem of the scenario and of the files
+    it names.
     """
-    loaded = try_scenario(path, root, world_path)
+    loaded = try_scenario(path, root, world_path, choice)
     if isinstance(loaded, list):
         raise InvalidInput(loaded)
     return loaded
 
 
-def try_scenario(path: Path, root: Path, world_path: Sequence[Path] = ()) -> LoadedScenario | list[Problem]:
+def try_scenario(
+    path: Path, root: Path, world_path: Sequence[Path] = (), choice: StackChoice | None = None
+) -> LoadedScenario | list[Problem]:
     """As load_scenario, but returns the problems."""
     fence = Fence.around(root, world_path)
     library = Library(fence)
@@ -42,10 +48,14 @@ def try_scenario(path: Path, root: Path, world_path: Sequence[Path] = ()) -> Loa
         message, hint = f"its id would end in {name!r}, which is no folder", "give the file a name before its suffix"
         return [Problem(fence.shown(file), 0, 0, "SC041", message, hint)]
     tree, problems = library.read(file, defaults=True)
+    if choice is not None and isinstance(tree, Fields):
+        tree = with_stack(tree, choice)
+        library.add(choice.texts, choice.files)
     if not problems and tree is not None:
         spec = check(ScenarioSpec, tree)
         if not isinstance(spec, list) and isinstance(tree, Fields):
-            return _with_assets(spec, tree, library, file)
+            loaded = _with_assets(spec, tree, library, file)
+            return loaded if isinstance(loaded, list) else replace(loaded, choice=choice)
         problems = [*(spec if isinstance(spec, list) else ()), *_problems_of_world(tree, library)]
     return library.with_source(sorted(problems))
 

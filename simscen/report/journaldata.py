@@ -18,7 +18,8 @@ class Planned:
     """A run that a session has taken on; `path` is the scenario's file.
 
     `digest` changes with everything the run depends on, so that an old answer is not kept for a new question. `again`
-    and `file` are as in RunFinished; they depend on where the session was started, which is no other question.
+    and `file` are as in RunFinished; they depend on where the session was started, which is no other question. `stack`
+    is as in RunResult; what it stands for is in the digest.
     """
 
     key: RunKey
@@ -26,18 +27,19 @@ class Planned:
     digest: str = ""
     again: str = field(default="", compare=False)
     file: str = field(default="", compare=False)
+    stack: str = field(default="", compare=False)
 
 
 def planned_data(run: Planned) -> dict[str, Any]:
     """A planned run as plain data."""
-    where = {"path": run.path, "file": run.file, "again": run.again}
+    where = {"path": run.path, "file": run.file, "again": run.again, "stack": run.stack}
     return {**asdict(run.key), **where, "digest": run.digest}
 
 
 def read_planned(data: dict[str, Any]) -> Planned:
     """The run that `planned_data` described. Raises KeyError or TypeError when it is none."""
     key = RunKey(data["scenario"], data["seed"], data["variation"])
-    return Planned(key, data["path"], data["digest"], data["again"], data["file"])
+    return Planned(key, data["path"], data["digest"], data["again"], data["file"], data.get("stack", ""))
 
 
 def run_data(run: RunFinished, folder: Path) -> dict[str, Any]:

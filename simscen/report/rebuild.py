@@ -45,7 +45,7 @@ class Past:
         kind = "interrupted" if run.key in self.begun else "not-run"
         why = "before it was finished" if run.key in self.begun else "before it began"
         failure = RunFailure(kind, f"simscen ended {why}")
-        return RunFinished(unfinished(run.key, run.path, failure), again=run.again, file=run.file)
+        return RunFinished(unfinished(run.key, run.path, failure, run.stack), again=run.again, file=run.file)
 
 
 def read_journal(folder: Path) -> Past:

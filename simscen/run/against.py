@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from simscen.core.errors import InvalidInput
-from simscen.core.result import Outcome, RunFailure, RunKey, RunResult
+from simscen.core.result import Outcome, RunFailure, RunResult
 from simscen.core.sessionevents import RunFinished
 from simscen.judge.resultdata import from_json
 from simscen.run.outfolder import run_folder
@@ -18,7 +18,7 @@ def agreed(run: RunFinished, earlier: Path) -> RunFinished:
     """
     if run.result.outcome is Outcome.ERROR or not run.artifacts.mcap:
         return run
-    there = run_folder(earlier, RunKey(run.key.scenario, run.key.seed)) / "run.mcap"
+    there = run_folder(earlier, run.key.first) / "run.mcap"
     try:
         if there.read_bytes() == Path(run.artifacts.mcap).read_bytes():
             return run

@@ -33,6 +33,7 @@ def _circumstances(loaded: LoadedScenario) -> dict[str, object]:
         "cpu_flags": cpu_flags(),
         "arithmetic": arithmetic(),
         "lenient": loaded.lenient,
+        **({} if loaded.choice is None else {"stack": loaded.tree.plain.get("stack")}),
     }
 
 

@@ -14,13 +14,14 @@ class PreparedCache:
 
     def __init__(self) -> None:
         self._worlds: dict[str, BuiltWorld] = {}
-        self._scenarios: dict[str, Prepared] = {}
+        self._scenarios: dict[tuple[str, str], Prepared] = {}
 
     def prepared(self, loaded: LoadedScenario) -> Prepared:
         """The prepared scenario; the first one in a world builds it. Raises InvalidInput."""
-        if loaded.id not in self._scenarios:
-            self._scenarios[loaded.id] = prepare(loaded, self._world)
-        return self._scenarios[loaded.id]
+        name = loaded.id, loaded.variation
+        if name not in self._scenarios:
+            self._scenarios[name] = prepare(loaded, self._world)
+        return self._scenarios[name]
 
     def clear(self) -> None:
         """Forget everything."""

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from simscen.loading.discovery import default_root
 from simscen.loading.loaded import LoadedScenario
+from simscen.loading.stackchoice import StackChoice
 
 
 def repeat_command(scenario: LoadedScenario, seed: int) -> str:
@@ -15,7 +16,13 @@ def repeat_command(scenario: LoadedScenario, seed: int) -> str:
         words += ["--root", shown(scenario.root)]
     for folder in scenario.world_path:
         words += ["--world-path", shown(folder)]
+    if scenario.choice is not None:
+        words += ["--stack", _seen_from_here(scenario.choice)]
     return shlex.join([*words, *(["--lenient"] if scenario.lenient else [])])
+
+
+def _seen_from_here(choice: StackChoice) -> str:
+    return choice.written if choice.file is None else f"{choice.name}={shown(choice.file)}"
 
 
 def shown(path: Path) -> str:

@@ -3,11 +3,12 @@
 import filecmp
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 from pathlib import Path
 
 from simscen.core.chance import LARGEST_SEED
 from simscen.core.errors import Exit, UsageError
-from simscen.core.result import Outcome, RunFailure, RunKey
+from simscen.core.result import Outcome, RunFailure
 from simscen.core.sessionevents import Listener, RunFinished, RunProgress, RunStarted
 from simscen.loading.loaded import LoadedScenario
 from simscen.run.against import agreed
@@ -44,13 +45,15 @@ def seeds_of(scenario: LoadedScenario, options: Options) -> range:
 
 
 def plan(scenarios: Sequence[LoadedScenario], options: Options, out: Path) -> list[Job]:
-    """All runs of a session in the order they are started: scenario by scenario, seed by seed."""
+    """All runs of a session in the order they are started: scenario by scenario, seed by seed, stack by stack."""
     jobs: list[Job] = []
-    for scenario in scenarios:
-        for seed in seeds_of(scenario, options):
-            for variation in ("", "again") if options.twice else ("",):
-                key = RunKey(scenario.id, seed, variation)
-                jobs.append(Job(len(jobs), scenario, key, run_folder(out, key), options.wall_limit))
+    for _, group in groupby(scenarios, key=lambda scenario: scenario.id):
+        variants = list(group)
+        for seed in seeds_of(variants[0], options):
+            for scenario in variants:
+                key = scenario.key(seed)
+                for each in (key, key.twin) if options.twice else (key,):
+                    jobs.append(Job(len(jobs), scenario, each, run_folder(out, each), options.wall_limit))
     return jobs
 
 

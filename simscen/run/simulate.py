@@ -2,10 +2,10 @@
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 
 from simscen.core.geometry import Pose3
-from simscen.core.result import RunKey
 from simscen.core.run import Run
 from simscen.core.time import Clock
 from simscen.core.trace import Trace
@@ -63,8 +63,8 @@ def judged(prepared: Prepared, seed: int, trace: Trace, log: Path | None = None)
     places = [loaded.place_of("pass", index) for index in range(len(prepared.spec.pass_))]
     # One that the scenario extends or takes from defaults.yaml has its line in another file than reports name.
     lines = tuple(place.line if place.path == loaded.path else 0 for place in places)
-    result = result_of(RunKey(loaded.id, seed), loaded.path, prepared.spec.pass_, trace, prepared.case, lines)
-    return Run(result, trace, prepared.case, log)
+    result = result_of(loaded.key(seed), loaded.path, prepared.spec.pass_, trace, prepared.case, lines)
+    return Run(replace(result, stack=loaded.stack), trace, prepared.case, log)
 
 
 def log_header(prepared: Prepared, seed: int) -> LogHeader:

@@ -22,7 +22,11 @@ def answer_to(job: Job, end: ProcessEnd | PreparerDeath) -> RunFinished:
     """The answer to a run. It passed or failed only if its process ended by itself, with status 0 and a last word."""
     failure = _with_log(_failure(end), job.folder)
     printed = tail(end.printed)
-    result = _result(job, printed) if failure is None else unfinished(job.key, job.scenario.path, failure)
+    result = (
+        _result(job, printed)
+        if failure is None
+        else unfinished(job.key, job.scenario.path, failure, job.scenario.stack)
+    )
     return RunFinished(
         result,
         wall=end.wall if isinstance(end, ProcessEnd) else 0.0,
@@ -34,7 +38,7 @@ def answer_to(job: Job, end: ProcessEnd | PreparerDeath) -> RunFinished:
 
 def not_done(job: Job, failure: RunFailure) -> RunFinished:
     """The answer to a run that was never finished, or never begun."""
-    result = unfinished(job.key, job.scenario.path, failure)
+    result = unfinished(job.key, job.scenario.path, failure, job.scenario.stack)
     return RunFinished(result, again=repeat_command(job.scenario, job.key.seed), file=shown(job.scenario.file))
 
 
@@ -44,7 +48,7 @@ def _result(job: Job, said: str) -> RunResult:
         return replace(from_json((job.folder / "result.json").read_text(encoding="utf-8")), key=job.key)
     except (OSError, ValueError) as error:
         failure = RunFailure("crashed", f"its result cannot be read: {error}", said)
-        return unfinished(job.key, job.scenario.path, failure)
+        return unfinished(job.key, job.scenario.path, failure, job.scenario.stack)
 
 
 def _artifacts(folder: Path) -> Artifacts:

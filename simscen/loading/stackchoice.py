@@ -1,0 +1,69 @@
+"""A stack that the command line chooses for every scenario, in place of the scenario's own."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from simscen.loading.tree import Entry, Fields, Leaf, Node, Place, child
+
+OF_THE_SCENARIO = ("keepout", "keepout_mask", "speed_zones", "speed_mask")
+"""What of a `stack:` section is about the world rather than the stack: it stays, whichever stack drives there."""
+REFERENCE = "reference"
+
+
+@dataclass(frozen=True)
+class StackChoice:
+    """What `--stack NAME=VALUE` means; `value` is as it was given.
+
+    `file` is the stack file that it names, `section` the `stack:` of that; otherwise `type` is the type of stack that
+    it names. `texts` and `files` are those of the stack file and what it extends, as in Library.
+    """
+
+    name: str
+    value: str
+    type: str = ""
+    file: Path | None = None
+    section: Fields | None = field(default=None, repr=False)
+    texts: Mapping[str, str] = field(default_factory=dict, repr=False)
+    files: Mapping[str, Path] = field(default_factory=dict, repr=False)
+
+    @property
+    def written(self) -> str:
+        """NAME=VALUE."""
+        return f"{self.name}={self.value}"
+
+    def seen_from(self, folder: Path) -> str:
+        """NAME=VALUE, for a command that is called in another folder; what is not below it is absolute."""
+        if self.file is None:
+            return self.written
+        file = self.file.relative_to(folder).as_posix() if self.file.is_relative_to(folder) else str(self.file)
+        return f"{self.name}={file}"
+
+
+def with_stack(tree: Fields, choice: StackChoice) -> Fields:
+    """A scenario with the chosen stack in place of its own.
+
+    Its zones and masks stay. A type of stack that is the scenario's own type keeps its parameters; a file says all.
+    """
+    own = child(tree, "stack")
+    if own is not None and not isinstance(own, Fields):
+        return tree  # which is a mistake that is told as such
+    own = own or Fields(tree.place, {})
+    if choice.section is None and type_of(own) == choice.type:
+        return tree
+    key = tree.entries["stack"].key if "stack" in tree.entries else tree.place
+    return Fields(tree.place, {**tree.entries, "stack": Entry(key, _section(own, choice))})
+
+
+def _section(own: Fields, choice: StackChoice) -> Fields:
+    kept = {name: own.entries[name] for name in OF_THE_SCENARIO if name in own.entries}
+    if choice.section is not None:
+        return Fields(choice.section.place, {**choice.section.entries, **kept})
+    place = Place(f"--stack {choice.written}", 0, 0)
+    return Fields(place, {"type": Entry(place, Leaf(place, choice.type)), **kept})
+
+
+def type_of(section: Node) -> str | None:
+    """The type of stack of a `stack:` section, as far as it has a plain one."""
+    written = child(section, "type")
+    return REFERENCE if written is None else written.value if isinstance(written, Leaf) else None  # type: ignore[return-value]

@@ -1,0 +1,51 @@
+"""Read a `*.stack.yaml`: the parameters of a stack, for every scenario that is run with it."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from simscen.core.errors import InvalidInput
+from simscen.core.problems import Problem
+from simscen.loading.document import Library
+from simscen.loading.paths import Fence
+from simscen.loading.stackchoice import OF_THE_SCENARIO, StackChoice
+from simscen.loading.tree import Fields, child, key_place
+from simscen.loading.validation import check
+from simscen.model.stackfile import StackFileSpec
+
+
+def load_stack_file(name: str, value: str, path: Path, root: Path, world_path: Sequence[Path] = ()) -> StackChoice:
+    """The stack in `path`, which may lie outside `root`: whoever calls the command chooses it.
+
+    Raises InvalidInput with all that is wrong with it.
+    """
+    library = Library(Fence.around(root, [*world_path, path.parent]))
+    found = stack_file(path, library)
+    if isinstance(found, list):
+        raise InvalidInput(found)
+    return StackChoice(name, value, "", path.absolute(), found, dict(library.texts), dict(library.files))
+
+
+def stack_file(path: Path, library: Library) -> Fields | list[Problem]:
+    """The `stack:` section of a stack file, or all that is wrong with the file."""
+    file = library.fence.entered(path)
+    if isinstance(file, Problem):
+        return [file]
+    tree, problems = library.read(file)
+    if problems or tree is None:
+        return library.with_source(problems)
+    spec = check(StackFileSpec, tree)
+    section = child(tree, "stack")
+    misplaced = _misplaced(section) if isinstance(section, Fields) else []
+    if isinstance(spec, list) or misplaced or not isinstance(section, Fields):
+        return library.with_source(sorted([*misplaced, *(spec if isinstance(spec, list) else [])]))
+    return section
+
+
+def _misplaced(section: Fields) -> list[Problem]:
+    """What belongs into a scenario: regions and masks are of a world, and a stack is to drive in many."""
+    hint = "write it under `stack:` of the scenario, where it holds for every stack"
+    return [
+        Problem(*key_place(section, (name,)), "SC016", f"`{name}` is the scenario's, not the stack's", hint)
+        for name in OF_THE_SCENARIO
+        if name in section.entries
+    ]

@@ -1,0 +1,25 @@
+"""The parameters of a stack, without a scenario around them."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from simscen.model.stack import StackSpec
+from simscen.spec.base import Spec
+from simscen.spec.places import Name
+
+
+class StackFileSpec(Spec):
+    """A stack that `--stack NAME=FILE` runs scenarios with: a `stack:` section as a scenario has it.
+
+    It is the whole stack: what it does not say is at its default, whatever the scenarios say. Only keepout regions,
+    speed zones and filter masks are the scenario's, in its own `stack:` section.
+    """
+
+    simscen: Literal[1]
+    """Version of this language."""
+    name: Name | None = None
+    """For people."""
+    description: Annotated[str, Field(max_length=10_000)] = ""
+    """What is special about it."""
+    stack: StackSpec

@@ -1,0 +1,141 @@
+"""`--stack`: every selected scenario runs with each stack that is given, and everything tells them apart."""
+
+import json
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+COMMAND = [sys.executable, "-c", "import sys; from simscen.cli.start import start; sys.exit(start())"]
+SHORT = """\
+simscen: 1
+world: {simscen: 1, walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]}
+robot: {pose: {x: 1, y: 1}}
+goals: [{pose: {x: 5, y: 3}}]
+time_limit: 1 s
+pass: [{collisions: {max: 0}}]
+"""
+DWB = "simscen: 1\nstack: {controller: {type: dwb}}\n"
+BOTH = ("--stack", "ref=reference", "--stack", "dwb=dwb.stack.yaml")
+
+
+@pytest.fixture
+def project(simscen, tmp_path: Path) -> Path:
+    """A folder with two scenarios of a second, and a stack file."""
+    (tmp_path / "good.scenario.yaml").unlink()
+    for name in ("a", "b"):
+        (tmp_path / f"{name}.scenario.yaml").write_text(SHORT)
+    (tmp_path / "dwb.stack.yaml").write_text(DWB)
+    return tmp_path
+
+
+def runs(folder: Path) -> list[str]:
+    """The folders of runs that hold a log."""
+    return sorted(str(log.parent.relative_to(folder / "runs")) for log in folder.rglob("run.mcap"))
+
+
+def test_each_scenario_runs_with_each_stack_and_seed_in_a_folder_and_case_of_its_own(simscen, project: Path) -> None:
+    ended = simscen("run", ".", *BOTH, "--repeat", "2", "--out", "out")
+    assert ended.code == 0, ended.err
+    names = [f"{name}/seed-{seed}-{stack}" for name in "ab" for seed in (1, 2) for stack in ("dwb", "ref")]
+    assert runs(project / "out") == names
+    cases = [case.get("name") for case in ElementTree.parse(project / "out/junit.xml").iter("testcase")]
+    assert sorted(cases) == sorted(f"{n} [seed {s}, {k}]" for n in "ab" for s in (1, 2) for k in ("ref", "dwb"))
+    listed = json.loads((project / "out/results.json").read_text())["runs"]
+    assert {(run["variation"], run["stack"]) for run in listed} == {
+        ("ref", "ref=reference"),
+        ("dwb", "dwb=dwb.stack.yaml"),
+    }
+    texts = {stack: (project / f"out/runs/a/seed-1-{stack}/scenario.yaml").read_text() for stack in ("ref", "dwb")}
+    assert texts["ref"] == SHORT
+    assert "type: dwb" in texts["dwb"]
+
+
+def test_a_single_stack_needs_no_label_and_the_reference_is_what_runs_without(simscen, project: Path) -> None:
+    assert simscen("run", "a.scenario.yaml", "--out", "plain").code == 0
+    ended = simscen("run", "a.scenario.yaml", "--stack", "mine=reference", "--out", "mine", "--check-against", "plain")
+    assert ended.code == 0, ended.out
+    assert runs(project / "mine") == ["a/seed-1"]
+    other = simscen("run", "a.scenario.yaml", "--stack", "d=dwb.stack.yaml", "--out", "d", "--check-against", "plain")
+    assert other.code == 3
+    assert "nondeterministic" in other.out
+
+
+def test_the_command_that_repeats_a_run_repeats_it_with_its_stack(simscen, project: Path) -> None:
+    simscen("run", "a.scenario.yaml", *BOTH, "--seed", "7", "--out", "out")
+    listed = json.loads((project / "out/results.json").read_text())["runs"]
+    again = next(run["again"] for run in listed if run["variation"] == "dwb")
+    assert again == "simscen run a.scenario.yaml --seed 7 --stack dwb=dwb.stack.yaml"
+    assert simscen(*shlex.split(again)[1:], "--out", "again").code == 0
+    text = (project / "again/runs/a/seed-7/scenario.yaml").read_text()
+    assert text == (project / "out/runs/a/seed-7-dwb/scenario.yaml").read_text()
+
+
+def test_equal_runs_are_checked_for_each_stack_by_itself(simscen, project: Path) -> None:
+    ended = simscen("run", "a.scenario.yaml", *BOTH, "--check-determinism", "--out", "out")
+    assert ended.code == 0, ended.out
+    assert runs(project / "out") == [f"a/seed-1-{stack}" for stack in ("dwb", "dwb.again", "ref", "ref.again")]
+
+
+def test_resume_runs_what_a_changed_stack_file_asks_anew_and_keeps_the_other_stack(simscen, project: Path) -> None:
+    def call(*options: str) -> None:
+        """In a process of its own, since one holds the folder until it ends."""
+        subprocess.run([*COMMAND, "run", "a.scenario.yaml", *BOTH, *options], check=True, capture_output=True)
+
+    call("--out", "out")
+    logs = {stack: (project / f"out/runs/a/seed-1-{stack}/run.mcap") for stack in ("ref", "dwb")}
+    before = {stack: log.stat().st_mtime_ns for stack, log in logs.items()}
+    call("--resume", "out")
+    assert {stack: log.stat().st_mtime_ns for stack, log in logs.items()} == before
+    (project / "dwb.stack.yaml").write_text(DWB.replace("dwb", "mppi"))
+    call("--resume", "out")
+    after = {stack: log.stat().st_mtime_ns for stack, log in logs.items()}
+    assert after["ref"] == before["ref"]
+    assert after["dwb"] > before["dwb"]
+
+
+def test_keywords_and_shards_choose_scenarios_so_that_pairs_stay_whole(simscen, project: Path) -> None:
+    assert simscen("run", ".", *BOTH, "--shard", "2/2", "--out", "shard").code == 0
+    assert runs(project / "shard") == ["b/seed-1-dwb", "b/seed-1-ref"]
+    assert simscen("run", ".", *BOTH, "-k", "a", "--out", "word").code == 0
+    assert runs(project / "word") == ["a/seed-1-dwb", "a/seed-1-ref"]
+    assert simscen("run", ".", *BOTH, "-k", "dwb", "--out", "none").code == 5
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        (("reference",), "cannot read --stack reference: expected NAME=VALUE"),
+        (("a b=reference",), "cannot read --stack a b=reference: expected NAME=VALUE"),
+        (("../x=reference",), "expected NAME=VALUE"),
+        (("=reference",), "expected NAME=VALUE"),
+        (("again=reference",), "no stack may be called `again`"),
+        (("a=reference", "A=reference"), "--stack A=reference: there is another stack of that name"),
+        (("a=nowhere.stack.yaml",), "nowhere.stack.yaml: error[SC001] no such file or directory"),
+        (("a=bad.stack.yaml",), "bad.stack.yaml:2:9: error[SC012] unknown key `controler` in `stack`"),
+    ],
+)
+def test_what_cannot_be_a_stack_is_told_before_anything_runs(simscen, project: Path, given, told: str) -> None:
+    (project / "bad.stack.yaml").write_text("simscen: 1\nstack: {controler: {}}\n")
+    ended = simscen("run", ".", *(word for text in given for word in ("--stack", text)))
+    assert ended.code == 2
+    assert told in ended.err
+    assert not (project / "simscen-out").exists()
+
+
+def test_stack_files_are_validated_like_any_other(simscen, project: Path) -> None:
+    (project / "bad.stack.yaml").write_text("simscen: 1\nstack: {controler: {}}\n")
+    ended = simscen("validate", ".")
+    assert ended.code == 2
+    assert "bad.stack.yaml:2:9: error[SC012]" in ended.out
+    (project / "bad.stack.yaml").unlink()
+    assert simscen("validate", ".").out == "2 scenarios and 1 stack are valid\n"
+
+
+def test_the_schema_of_a_stack_file_is_for_editors(simscen, project: Path) -> None:
+    schema = json.loads(simscen("schema", "stack").out)
+    assert schema["title"] == "simscen stack"
+    assert "keepout" not in schema["$defs"]["StackSpec"]["properties"]
