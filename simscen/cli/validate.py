@@ -43,8 +43,8 @@ def command(
     """Check scenario, world, robot and stack files without running anything.
 
     Every problem of every file is listed with its line. Folders are searched for *.scenario.yaml, *.world.yaml,
-    *.robot.yaml and *.stack.yaml. Scenarios are looked at in their worlds: is the robot free at its start and goals, can
-    it get there in time, can all events happen, can all criteria hold and fail?
+    *.robot.yaml and *.stack.yaml. Scenarios are looked at in their worlds: is the robot free at its start and goals,
+    can it get there in time, can all events happen, can all criteria hold and fail?
 
     Exit code 0: all are valid; 2: some are not; 5: there are none.
     """
