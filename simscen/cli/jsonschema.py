@@ -27,7 +27,7 @@ DRAFT = "http://json-schema.org/draft-07/schema#"
 
 
 def schema_of(name: str, installed: bool = False) -> Schema:
-    """The JSON Schema of a "scenario", "world", "robot" or "stack" file; with what `installed` packages add, if asked."""
+    """The JSON Schema of a "scenario", "world", "robot" or "stack" file; of what is `installed`, too, if asked."""
     model = MODELS[name]
     generated = model.model_json_schema(schema_generator=_WithInstalled if installed else _Generator)
     if name == "stack":
