@@ -104,8 +104,8 @@ _SCENARIO: dict[str, type[BaseModel]] = {
 _STACK: dict[str, type[BaseModel]] = {
     "stack": stack.StackSpec,
     "costmap": stack.Costmap,
-    "planner": stack.Planner,
-    "goal_checker": stack.GoalChecker,
+    "planner": stack.OmplPlanner,
+    "goal_checker": stack.SimpleGoalChecker,
     "progress_checker": stack.ProgressChecker,
     "recovery": stack.Recovery,
     "velocity_smoother": stack.VelocitySmoother,

@@ -1,11 +1,12 @@
 """The navigation stack's parameters, with Nav2's names and defaults."""
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Discriminator, Field, Tag
 
 from simscen.core.navigation import RecoveryBehavior
 from simscen.spec.base import Ranged, Spec, by_default, type_or
+from simscen.spec.component import Component
 from simscen.spec.quantities import (
     Angle,
     Duration,
@@ -27,9 +28,14 @@ Noise = Annotated[float, Field(ge=0, le=100)]
 Iterations = Annotated[int, Field(ge=1, le=1_000_000)]
 
 
-class Amcl(Ranged):
+class LocalizerSpec(Component):
+    """What knows where the robot is."""
+
+
+class Amcl(Ranged, LocalizerSpec):
     """Particle-filter localisation: nav2_amcl's parameters (Thrun et al., Probabilistic Robotics, ch. 8)."""
 
+    component: ClassVar[str] = "simscen.stack.localizers.build:amcl"
     type: Literal["amcl"] = "amcl"
     robot_model: Literal["differential", "omni"] | None = None
     """Motion model; default: as the robot's drive."""
@@ -73,9 +79,10 @@ class Amcl(Ranged):
     beam_skip_error_threshold: Probability = 0.9
 
 
-class Ekf(Spec):
+class Ekf(LocalizerSpec):
     """Odometry and gyroscope in an extended Kalman filter; no map, so it drifts."""
 
+    component: ClassVar[str] = "simscen.stack.localizers.build:ekf"
     type: Literal["ekf"]
     translation_noise: Noise = 0.02
     """Standard deviation in m after one metre."""
@@ -85,15 +92,17 @@ class Ekf(Spec):
     """Standard deviation of the turn rate in rad/s."""
 
 
-class GroundTruth(Spec):
+class GroundTruth(LocalizerSpec):
     """The true pose, to tell faults of localisation from faults of navigation."""
 
+    component: ClassVar[str] = "simscen.stack.localizers.build:ground_truth"
     type: Literal["ground_truth"]
 
 
-class OdometryOnly(Spec):
+class OdometryOnly(LocalizerSpec):
     """Dead reckoning from the start pose."""
 
+    component: ClassVar[str] = "simscen.stack.localizers.build:odometry"
     type: Literal["odometry"]
 
 
@@ -123,26 +132,37 @@ class Costmap(Ranged):
     """Edge of the rolling window when driving without a map."""
 
 
-class Planner(Spec):
-    """A planner of OMPL on the costmap."""
+class PlannerSpec(Component):
+    """What finds a way, and when it is asked for another one."""
 
-    type: Literal["rrt_connect", "rrt_star", "informed_rrt_star", "bit_star", "aorrtc", "kpiece"] = "rrt_connect"
     tolerance: NonNegativeLength = 0.5
     """How far from an unreachable goal the plan may end."""
+    replanning: Literal["on_invalid", "rate"] = "on_invalid"
+    """Replan when the plan is blocked or clearly worse than a new one, or at a rate."""
+    replanning_rate: Frequency = 1.0
+
+
+class OmplPlanner(PlannerSpec):
+    """A planner of OMPL on the costmap."""
+
+    component: ClassVar[str] = "simscen.stack.planners.build:ompl_planner"
+    type: Literal["rrt_connect", "rrt_star", "informed_rrt_star", "bit_star", "aorrtc", "kpiece"] = "rrt_connect"
     allow_unknown: bool = True
     max_iterations: Iterations = 20_000
     """Iterations before NO_VALID_PATH; never seconds."""
     simplify: bool = True
     state_space: Literal["auto", "holonomic", "se2", "dubins", "reeds_shepp"] = "auto"
     """auto: Reeds-Shepp for an Ackermann drive, se2 for a long footprint, else holonomic."""
-    replanning: Literal["on_invalid", "rate"] = "on_invalid"
-    """Replan when the plan is blocked or clearly worse than a new one, or at a rate."""
-    replanning_rate: Frequency = 1.0
 
 
-class RegulatedPurePursuit(Ranged):
+class ControllerSpec(Component):
+    """What follows a path."""
+
+
+class RegulatedPurePursuit(Ranged, ControllerSpec):
     """nav2_regulated_pure_pursuit_controller (Macenski et al. 2023)."""
 
+    component: ClassVar[str] = "simscen.stack.controllers.regulated_pure_pursuit:RegulatedPurePursuit"
     type: Literal["regulated_pure_pursuit"] = "regulated_pure_pursuit"
     desired_linear_vel: PositiveSpeed | None = None
     """Default: 0.5 m/s, or what the robot can do if that is less."""
@@ -168,9 +188,10 @@ class RegulatedPurePursuit(Ranged):
     allow_reversing: bool = False
 
 
-class DynamicWindow(Spec):
+class DynamicWindow(ControllerSpec):
     """A dynamic-window controller with DWB's critics (Fox et al. 1997; nav2_dwb_controller)."""
 
+    component: ClassVar[str] = "simscen.stack.controllers.dwb:DynamicWindowController"
     type: Literal["dwb"]
     max_vel_x: PositiveSpeed | None = None
     min_vel_x: Annotated[float, Field(ge=-10, le=0)] = 0.0
@@ -188,9 +209,10 @@ class DynamicWindow(Spec):
     forward_point_distance: NonNegativeLength = 0.1
 
 
-class Mppi(Spec):
+class Mppi(ControllerSpec):
     """Model predictive path integral control (Williams et al. 2017; nav2_mppi_controller)."""
 
+    component: ClassVar[str] = "simscen.stack.controllers.mppi:MppiController"
     type: Literal["mppi"]
     time_steps: Annotated[int, Field(ge=5, le=200)] = 56
     model_dt: PositiveDuration = 0.05
@@ -212,11 +234,18 @@ Controller = Annotated[
 ]
 
 
-class GoalChecker(Spec):
-    """nav2_controller::SimpleGoalChecker."""
+class GoalCheckerSpec(Component):
+    """What says whether a goal is reached; the tolerances are those of goals that name none."""
 
     xy_goal_tolerance: PositiveLength = 0.25
     yaw_goal_tolerance: PositiveAngle = 0.25
+
+
+class SimpleGoalChecker(GoalCheckerSpec):
+    """nav2_controller::SimpleGoalChecker."""
+
+    component: ClassVar[str] = "simscen.stack.goal_checker:SimpleGoalChecker"
+    type: Literal["simple"] = "simple"
     stateful: bool = True
 
 
@@ -226,6 +255,57 @@ class ProgressChecker(Spec):
     required_movement_radius: PositiveLength = 0.5
     required_movement_angle: Angle | None = None
     movement_time_allowance: PositiveDuration = 10.0
+
+
+class BehaviorSpec(Component):
+    """What a robot does when planning or control has failed."""
+
+    turns_in_place: ClassVar[bool] = False
+    """Whether only a base that turns in place can do it; others leave it out."""
+
+
+class Spin(BehaviorSpec):
+    """Turn in place, to see what is around (nav2_behaviors::Spin)."""
+
+    component: ClassVar[str] = "simscen.stack.behaviors.motions:Spin"
+    turns_in_place: ClassVar[bool] = True
+    type: Literal["spin"] = "spin"
+    spin_dist: Angle = 1.57
+    max_rotational_vel: PositiveAngularSpeed = 1.0
+    simulate_ahead_time: PositiveDuration = 2.0
+
+
+class Wait(BehaviorSpec):
+    """Stand still: what is in the way may go by itself (nav2_behaviors::Wait)."""
+
+    component: ClassVar[str] = "simscen.stack.behaviors.motions:Wait"
+    type: Literal["wait"] = "wait"
+    wait_duration: Duration = 5.0
+
+
+class BackUp(BehaviorSpec):
+    """Drive straight back (nav2_behaviors::BackUp)."""
+
+    component: ClassVar[str] = "simscen.stack.behaviors.motions:BackUp"
+    type: Literal["backup"] = "backup"
+    backup_dist: NonNegativeLength = 0.30
+    backup_speed: PositiveSpeed = 0.15
+    simulate_ahead_time: PositiveDuration = 2.0
+
+
+class ClearCostmap(BehaviorSpec):
+    """Forget live obstacles that are not seen any more."""
+
+    component: ClassVar[str] = "simscen.stack.behaviors.motions:ClearCostmap"
+    type: Literal["clear_costmap"] = "clear_costmap"
+
+
+_BEHAVIORS: dict[str, type[BehaviorSpec]] = {
+    "clear_costmap": ClearCostmap,
+    "spin": Spin,
+    "wait": Wait,
+    "backup": BackUp,
+}
 
 
 class Recovery(Spec):
@@ -244,6 +324,14 @@ class Recovery(Spec):
     backup_speed: PositiveSpeed = 0.15
     simulate_ahead_time: PositiveDuration = 2.0
     max_rotational_vel: PositiveAngularSpeed = 1.0
+
+    def chosen(self) -> list[BehaviorSpec]:
+        """The behaviours in turn; one that is only named takes what it knows of from the parameters here."""
+        return [self._named(_BEHAVIORS[name]) for name in self.behaviors]
+
+    def _named(self, behavior: type[BehaviorSpec]) -> BehaviorSpec:
+        shared = type(self).model_fields.keys() & behavior.model_fields.keys()
+        return behavior.model_validate({name: getattr(self, name) for name in sorted(shared)})
 
 
 class VelocitySmoother(Spec):
@@ -303,9 +391,9 @@ class StackSpec(Spec):
     controller_frequency: Frequency = 20.0
     localizer: Localizer = by_default()
     costmap: Costmap = by_default()
-    planner: Planner = by_default()
+    planner: OmplPlanner = by_default()
     controller: Controller = by_default()
-    goal_checker: GoalChecker = by_default()
+    goal_checker: SimpleGoalChecker = by_default()
     progress_checker: ProgressChecker = by_default()
     recovery: Recovery = by_default()
     velocity_smoother: VelocitySmoother = by_default()

@@ -3,30 +3,24 @@
 import math
 from dataclasses import replace
 
-import numpy as np
-from typing_extensions import assert_never
-
-from simscen.core.belief import Estimate
 from simscen.core.chance import Streams
 from simscen.core.events import Event
 from simscen.core.time import Clock
 from simscen.model import stack as model
-from simscen.stack.behaviors.motions import BackUp, ClearCostmap, Spin, Wait
 from simscen.stack.collision_monitor import CollisionMonitor
-from simscen.stack.controllers.dwb import DynamicWindowController
-from simscen.stack.controllers.mppi import MppiController
-from simscen.stack.controllers.regulated_pure_pursuit import RegulatedPurePursuit
 from simscen.stack.costmap.costmap import Costmap
-from simscen.stack.footprint import Footprint
-from simscen.stack.goal_checker import GoalChecker
-from simscen.stack.localizers.build import build_localizer
+from simscen.stack.installed.behavior import InstalledBehavior
+from simscen.stack.installed.controller import InstalledController
+from simscen.stack.installed.goal_checker import InstalledGoalChecker
+from simscen.stack.installed.localizer import InstalledLocalizer
+from simscen.stack.installed.planner import InstalledPlanner
 from simscen.stack.navigator import Navigator
 from simscen.stack.plan_keeper import PlanKeeper
-from simscen.stack.planners.build import build_planner
 from simscen.stack.progress_checker import ProgressChecker
-from simscen.stack.protocols import Behavior, Controller, RobotModel, Stack, Surroundings
+from simscen.stack.protocols import Behavior, Stack, Surroundings
 from simscen.stack.recovery import RoundRobin
 from simscen.stack.reference import ReferenceStack
+from simscen.stack.setting import Setting
 from simscen.stack.tasks import Task
 from simscen.stack.velocity_smoother import VelocitySmoother
 
@@ -51,12 +45,18 @@ def build_stack(
     seconds = clock.seconds(period)
     journal: list[Event] = []
     costmap = Costmap(spec.costmap, surroundings)
-    footprint = Footprint(robot, costmap.view.resolution)
-    controller = build_controller(spec.controller, robot, footprint, seconds, streams.generator("controller"))
-    localizer = build_localizer(spec.localizer, surroundings, Estimate(None), streams.generator("localizer"))
+    shared = Setting(
+        surroundings,
+        "planner",
+        streams,
+        control_period=seconds,
+        resolution=costmap.view.resolution,
+        clear_costmap=costmap.clear,
+    )
+    controller = InstalledController(spec.controller, shared.named("controller"))
     plans = PlanKeeper(
         spec.planner,
-        build_planner(spec.planner, robot, footprint),
+        InstalledPlanner(spec.planner, shared),
         controller,
         costmap,
         lambda number: streams.integer(f"planner#{number}"),
@@ -67,8 +67,8 @@ def build_stack(
     navigator = Navigator(
         plans,
         controller,
-        RoundRobin(_behaviors(spec.recovery, robot, footprint, costmap), spec.recovery.number_of_retries),
-        GoalChecker(spec.goal_checker.stateful),
+        RoundRobin(_behaviors(spec.recovery, shared), spec.recovery.number_of_retries),
+        InstalledGoalChecker(spec.goal_checker, shared.named("goal_checker")),
         ProgressChecker(spec.progress_checker),
         costmap,
         seconds,
@@ -76,7 +76,7 @@ def build_stack(
     )
     return ReferenceStack(
         surroundings,
-        localizer,
+        InstalledLocalizer(spec.localizer, shared.named("localizer")),
         costmap,
         controller,
         navigator,
@@ -89,26 +89,9 @@ def build_stack(
     )
 
 
-def build_controller(
-    spec: model.Controller, robot: RobotModel, footprint: Footprint, period: float, chance: np.random.Generator
-) -> Controller:
-    """The controller of a specification, called every `period` seconds; `chance` is its own random stream."""
-    match spec:
-        case model.RegulatedPurePursuit():
-            return RegulatedPurePursuit(spec, robot, footprint, period)
-        case model.DynamicWindow():
-            return DynamicWindowController(spec, robot, footprint, period)
-        case model.Mppi():
-            return MppiController(spec, robot, footprint, period, chance)
-        case _:
-            assert_never(spec)
-
-
-def _behaviors(spec: model.Recovery, robot: RobotModel, footprint: Footprint, costmap: Costmap) -> list[Behavior]:
-    known: dict[str, Behavior] = {
-        "clear_costmap": ClearCostmap(costmap.clear),
-        "spin": Spin(spec, robot, footprint),
-        "wait": Wait(spec),
-        "backup": BackUp(spec, robot, footprint),
-    }
-    return [known[name] for name in spec.behaviors if name != "spin" or robot.turning_radius == 0.0]
+def _behaviors(spec: model.Recovery, shared: Setting) -> list[Behavior]:
+    """The recovery behaviours that the robot can do, each with a random stream of its own."""
+    possible = [each for each in spec.chosen() if shared.robot.turning_radius == 0.0 or not each.turns_in_place]
+    return [
+        InstalledBehavior(each, shared.named(f"behavior#{number}")) for number, each in enumerate(possible, start=1)
+    ]

@@ -3,6 +3,8 @@
 from simscen.core.geometry import Pose2, wrap
 from simscen.core.motion import Twist
 from simscen.core.navigation import Goal
+from simscen.model.stack import SimpleGoalChecker as Spec
+from simscen.stack.setting import Setting
 
 WELL_INSIDE = 0.5
 """Part of the tolerance at which the goal counts as reached while still moving.
@@ -17,11 +19,11 @@ AT_REST = 10
 stands for a moment between driving up to the goal and turning to its heading."""
 
 
-class GoalChecker:
+class SimpleGoalChecker:
     """Position first, heading then; a position once reached stays reached (`stateful`) while the robot turns."""
 
-    def __init__(self, stateful: bool) -> None:
-        self._stateful = stateful
+    def __init__(self, spec: Spec, setting: Setting) -> None:
+        self._stateful = spec.stateful
         self._there, self._stood = False, 0
 
     def reset(self) -> None:

@@ -11,10 +11,9 @@ from simscen.core.geometry import Pose2
 from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import ErrorCode, Goal
 from simscen.stack.costmap.costmap import Costmap
-from simscen.stack.goal_checker import GoalChecker
 from simscen.stack.plan_keeper import PlanKeeper
 from simscen.stack.progress_checker import ProgressChecker
-from simscen.stack.protocols import Behavior, Controller, NavigationFailure, Planner
+from simscen.stack.protocols import Behavior, Controller, GoalChecker, NavigationFailure, Planner
 from simscen.stack.recovery import RoundRobin
 from simscen.stack.replanning import PlanInForce
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 from simscen.core.events import Event, EventKind, Value
 from simscen.core.geometry import Pose2
 from simscen.core.navigation import ErrorCode, Goal, Path
-from simscen.model.stack import Planner as PlannerSpec
+from simscen.model.stack import PlannerSpec
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.protocols import Controller, NavigationFailure, Planner
 from simscen.stack.replanning import PlanInForce

@@ -176,6 +176,22 @@ class Behavior(Protocol):
         ...
 
 
+class GoalChecker(Protocol):
+    """Says whether a goal is reached.
+
+    *Given* a robot that stands on the goal *then* it says so within two seconds. *Given* one that is outside the goal's
+    tolerances *then* it never does.
+    """
+
+    def reset(self) -> None:
+        """A new goal: nothing of the last one counts."""
+        ...
+
+    def reached(self, goal: Goal, pose: Pose2, twist: Twist) -> bool:
+        """Whether the robot, believed at `pose` in the map and moving at `twist`, has reached the goal."""
+        ...
+
+
 class Stack(Protocol):
     """A whole navigation stack: readings in, one command out, each beat.
 

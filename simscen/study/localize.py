@@ -15,8 +15,9 @@ from simscen.core.sensing import Odometry, Scan
 from simscen.model.stack import StackSpec
 from simscen.record.foreign.sensed import Sensed
 from simscen.record.foreign.sensedrows import TICK_RATE
-from simscen.stack.localizers.build import build_localizer
+from simscen.stack.installed.localizer import InstalledLocalizer
 from simscen.stack.protocols import Surroundings
+from simscen.stack.setting import Setting
 
 LONGEST_GAP = TICK_RATE
 """Ticks between two poses of the reference above which nothing is said in between."""
@@ -69,8 +70,8 @@ def localize(sensed: Sensed, spec: StackSpec, surroundings: Surroundings, estima
 
     The same arguments give the same beliefs.
     """
-    chance = Streams(seed).generator("localizer")
-    localizer = build_localizer(spec.localizer, surroundings, estimate, chance)
+    setting = Setting(surroundings, "localizer", Streams(seed), estimate=estimate)
+    localizer = InstalledLocalizer(spec.localizer, setting)
     began, times, poses, scans = time.process_time(), [], [], 0
     for reading in sensed.readings:
         match reading:

@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "unit" / "stack"))
-from flatland import RATE, Flatland, box_robot, round_robot
-
 from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
 from simscen.core.navigation import ErrorCode, Goal
@@ -17,10 +15,10 @@ from simscen.model.stack import Controller as Spec
 from simscen.model.stack import Costmap as CostmapSpec
 from simscen.model.stack import DynamicWindow, Mppi, RegulatedPurePursuit
 from simscen.stack.arcs import poses_along
-from simscen.stack.build import build_controller
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.footprint import Footprint
 from simscen.stack.protocols import Controller, CostmapView, NavigationFailure, RobotModel, Surroundings
+from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot, setting
 
 PERIOD = 0.05
 SPECS: dict[str, Spec] = {
@@ -45,7 +43,7 @@ def view_of(robot: RobotModel, *discs: tuple[float, float, float]) -> CostmapVie
 
 
 def controller(spec: Spec, robot: RobotModel, view: CostmapView) -> Controller:
-    built = build_controller(spec, robot, Footprint(robot, view.resolution), PERIOD, np.random.default_rng(1))
+    built = spec.implementation()(spec, setting(robot))
     built.set_path(STRAIGHT)
     return built
 

@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "unit" / "stack" / "localizers"))
-from localizer_room import BEAMS, Drive, Noise, drive, errors, localizer, record, run, scan
-
 from simscen.core.belief import Belief, Estimate
 from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
 from simscen.core.sensing import Imu, Odometry
 from simscen.model.stack import Amcl, Ekf, GroundTruth, OdometryOnly
 from simscen.model.stack import Localizer as Spec
+from simscen.testing.room import BEAMS, Drive, Noise, drive, errors, localizer, record, run, scan
 
 SPECS: dict[str, Spec] = {
     "amcl": Amcl(),

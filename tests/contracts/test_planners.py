@@ -7,16 +7,14 @@ import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "unit" / "stack"))
-from flatland import RATE, Flatland, box_robot, round_robot
-
 from simscen.core.geometry import Pose2
 from simscen.core.navigation import ErrorCode
 from simscen.model.stack import Costmap as CostmapSpec
-from simscen.model.stack import Planner as Spec
+from simscen.model.stack import OmplPlanner as Spec
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.footprint import Footprint
-from simscen.stack.planners.build import build_planner
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner, RobotModel, Surroundings
+from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot, setting
 
 CAR = RobotModel(box_robot(0.6, 0.4).footprint, None, 1.0, 1.0, 0.0, 1.5, 2.0, 2.0, 3.0, turning_radius=0.6)
 SPECS: dict[str, tuple[Spec, RobotModel]] = {
@@ -46,7 +44,7 @@ def view_of(robot: RobotModel) -> CostmapView:
 
 
 def planner(spec: Spec, robot: RobotModel, view: CostmapView) -> Planner:
-    return build_planner(spec, robot, Footprint(robot, view.resolution))
+    return spec.implementation()(spec, setting(robot))
 
 
 @every

@@ -6,12 +6,11 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "unit" / "stack"))
-from flatland import Drive, Flatland, drive
-
 from simscen.core.geometry import Pose2
 from simscen.core.motion import STOP
 from simscen.core.navigation import Goal
 from simscen.model.stack import DynamicWindow, GroundTruth, Mppi, RegulatedPurePursuit, StackSpec
+from simscen.testing.flatland import Drive, Flatland, drive
 
 SPECS = {
     controller.type: StackSpec(localizer=GroundTruth(type="ground_truth"), controller=controller)

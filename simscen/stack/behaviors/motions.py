@@ -1,15 +1,14 @@
 """Recovery behaviours that move the robot or let it wait (nav2_behaviors)."""
 
 import math
-from collections.abc import Callable
 
 from simscen.core.geometry import Pose2, wrap
 from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import ErrorCode
-from simscen.model.stack import Recovery as RecoverySpec
-from simscen.stack.footprint import Footprint
+from simscen.model import stack as model
 from simscen.stack.lookahead import time_free
-from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
+from simscen.stack.protocols import CostmapView, NavigationFailure
+from simscen.stack.setting import Setting
 
 TIME_ALLOWANCE = 10.0
 """Nav2's default for every behaviour, in seconds."""
@@ -22,8 +21,8 @@ class Spin:
 
     name = "spin"
 
-    def __init__(self, spec: RecoverySpec, robot: RobotModel, footprint: Footprint) -> None:
-        self._spec, self._robot, self._footprint = spec, robot, footprint
+    def __init__(self, spec: model.Spin, setting: Setting) -> None:
+        self._spec, self._robot, self._footprint = spec, setting.robot, setting.footprint
         self._turned, self._yaw = 0.0, 0.0
 
     def start(self, pose: Pose2) -> None:
@@ -56,8 +55,8 @@ class BackUp:
 
     name = "backup"
 
-    def __init__(self, spec: RecoverySpec, robot: RobotModel, footprint: Footprint) -> None:
-        self._spec, self._robot, self._footprint = spec, robot, footprint
+    def __init__(self, spec: model.BackUp, setting: Setting) -> None:
+        self._spec, self._robot, self._footprint = spec, setting.robot, setting.footprint
         self._from = Pose2(0.0, 0.0)
 
     def start(self, pose: Pose2) -> None:
@@ -87,7 +86,7 @@ class Wait:
 
     name = "wait"
 
-    def __init__(self, spec: RecoverySpec) -> None:
+    def __init__(self, spec: model.Wait, setting: Setting) -> None:
         self._duration = spec.wait_duration
 
     def start(self, pose: Pose2) -> None:
@@ -103,8 +102,8 @@ class ClearCostmap:
 
     name = "clear_costmap"
 
-    def __init__(self, clear: Callable[[], None]) -> None:
-        self._clear = clear
+    def __init__(self, spec: model.ClearCostmap, setting: Setting) -> None:
+        self._clear = setting.clear_costmap
 
     def start(self, pose: Pose2) -> None:
         """Clear."""

@@ -11,8 +11,8 @@ from simscen.core.navigation import ErrorCode, Goal, Path
 from simscen.model.stack import DynamicWindow as DwbSpec
 from simscen.stack.controllers.goal_pose import GoalPose
 from simscen.stack.controllers.tracking import PathTracker
-from simscen.stack.footprint import Footprint
-from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
+from simscen.stack.protocols import CostmapView, NavigationFailure
+from simscen.stack.setting import Setting
 
 STEP = 0.1
 """Seconds between two poses of a trajectory."""
@@ -27,11 +27,12 @@ TURN = 1.0
 class DynamicWindowController:
     """Tries the velocities that can be reached within `sim_time` and takes the one the critics like best."""
 
-    def __init__(self, spec: DwbSpec, robot: RobotModel, footprint: Footprint, period: float) -> None:
-        self._spec, self._robot, self._footprint = spec, robot, footprint
+    def __init__(self, spec: DwbSpec, setting: Setting) -> None:
+        robot = setting.robot
+        self._spec, self._robot, self._footprint = spec, robot, setting.footprint
         self._fastest = min(spec.max_vel_x or robot.max_linear, robot.max_linear)
         self._times = np.arange(1, round(spec.sim_time / STEP) + 1) * STEP
-        self._goal_pose = GoalPose(robot, TURN, robot.angular_acceleration, period)
+        self._goal_pose = GoalPose(robot, TURN, robot.angular_acceleration, setting.control_period)
         self._limit = math.inf
         self._track: PathTracker | None = None
         self._best: Array | None = None

@@ -16,9 +16,9 @@ from simscen.model.stack import Mppi as MppiSpec
 from simscen.stack.controllers.goal_pose import GoalPose
 from simscen.stack.controllers.mppi_critics import Rollouts, score
 from simscen.stack.controllers.tracking import PathTracker
-from simscen.stack.footprint import Footprint
 from simscen.stack.lookahead import time_free
-from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
+from simscen.stack.protocols import CostmapView, NavigationFailure
+from simscen.stack.setting import Setting
 
 Floats = npt.NDArray[np.float32]
 SURE = 0.5
@@ -31,10 +31,9 @@ class MppiController:
     The noise is drawn once (nav2's regenerate_noises: false), so that a call costs no random numbers.
     """
 
-    def __init__(
-        self, spec: MppiSpec, robot: RobotModel, footprint: Footprint, period: float, chance: np.random.Generator
-    ) -> None:
-        self._spec, self._robot, self._footprint = spec, robot, footprint
+    def __init__(self, spec: MppiSpec, setting: Setting) -> None:
+        robot, chance, period = setting.robot, setting.chance, setting.control_period
+        self._spec, self._robot, self._footprint = spec, robot, setting.footprint
         self._fastest = min(spec.vx_max or robot.max_linear, robot.max_linear)
         self._slowest = max(spec.vx_min, -robot.max_reverse)
         self._turn = min(spec.wz_max, robot.max_angular)

@@ -12,9 +12,10 @@ from simscen.stack.arcs import poses_along
 from simscen.stack.controllers.goal_pose import GoalPose
 from simscen.stack.controllers.tracking import AT_CUSP, PathTracker
 from simscen.stack.controllers.turning import TurningRoom
-from simscen.stack.footprint import Footprint, distance_at
+from simscen.stack.footprint import distance_at
 from simscen.stack.lookahead import time_free
-from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
+from simscen.stack.protocols import CostmapView, NavigationFailure
+from simscen.stack.setting import Setting
 
 DEFAULT_SPEED = 0.5
 """Nav2's desired_linear_vel."""
@@ -33,7 +34,8 @@ shorter ones keep to it. nav2_graceful_controller goes through its targets likew
 class RegulatedPurePursuit:
     """Steers at a carrot on the path and regulates its speed by curvature, nearness of obstacles and of the goal."""
 
-    def __init__(self, spec: RppSpec, robot: RobotModel, footprint: Footprint, period: float) -> None:
+    def __init__(self, spec: RppSpec, setting: Setting) -> None:
+        robot, footprint, period = setting.robot, setting.footprint, setting.control_period
         self._spec, self._robot, self._footprint = spec, robot, footprint
         self._desired = min(spec.desired_linear_vel or DEFAULT_SPEED, robot.max_linear)
         self._goal_pose = GoalPose(robot, spec.rotate_to_heading_angular_vel, spec.max_angular_accel, period)

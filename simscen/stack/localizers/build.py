@@ -1,9 +1,5 @@
-"""From a specification to a localizer."""
+"""From the specifications of the shipped localizers to localizers."""
 
-import numpy as np
-from typing_extensions import assert_never
-
-from simscen.core.belief import Estimate
 from simscen.core.grid import OccupancyGrid
 from simscen.model import stack as model
 from simscen.stack.localizers.amcl import AmclLocalizer
@@ -20,33 +16,35 @@ from simscen.stack.localizers.likelihood_field import (
 from simscen.stack.localizers.motion_models import Differential, MotionModel, Omni
 from simscen.stack.localizers.particle_filter import ParticleFilter
 from simscen.stack.localizers.particles import FreeSpace
-from simscen.stack.protocols import Localizer, Surroundings
+from simscen.stack.protocols import Localizer
+from simscen.stack.setting import Setting
 
 
-def build_localizer(
-    spec: model.Localizer, surroundings: Surroundings, estimate: Estimate, chance: np.random.Generator
-) -> Localizer:
-    """A localizer at its start, told `estimate`; `chance` is its own random stream.
+def amcl(spec: model.Amcl, setting: Setting) -> Localizer:
+    """A particle filter; without a map there is nothing to match scans with, then it is dead reckoning."""
+    if setting.map is None:
+        return DeadReckoning(setting.estimate)
+    motion = _motion_model(spec, setting.robot.holonomic)
+    sensor, anywhere = _sensor_model(spec, setting.map), FreeSpace(setting.map)
+    particles = ParticleFilter(spec, motion, sensor, anywhere, setting.chance)
+    return AmclLocalizer(spec, particles, motion, setting.estimate, setting.surroundings.tick_rate)
 
-    Without a map there is nothing to match scans with: then `amcl` is dead reckoning.
-    """
-    rate = surroundings.tick_rate
-    match spec:
-        case model.Amcl() if surroundings.map is not None:
-            motion = _motion_model(spec, surroundings.robot.holonomic)
-            sensor, anywhere = _sensor_model(spec, surroundings.map), FreeSpace(surroundings.map)
-            particles = ParticleFilter(spec, motion, sensor, anywhere, chance)
-            return AmclLocalizer(spec, particles, motion, estimate, rate)
-        case model.Amcl() | model.OdometryOnly():
-            return DeadReckoning(estimate)
-        case model.Ekf():
-            from simscen.stack.localizers.ekf import EkfLocalizer
 
-            return EkfLocalizer(spec, estimate, rate)
-        case model.GroundTruth():
-            return GroundTruthLocalizer(estimate)
-        case _:
-            assert_never(spec)
+def ekf(spec: model.Ekf, setting: Setting) -> Localizer:
+    """An extended Kalman filter of odometry and gyroscope."""
+    from simscen.stack.localizers.ekf import EkfLocalizer
+
+    return EkfLocalizer(spec, setting.estimate, setting.surroundings.tick_rate)
+
+
+def ground_truth(_spec: model.GroundTruth, setting: Setting) -> Localizer:
+    """The true pose."""
+    return GroundTruthLocalizer(setting.estimate)
+
+
+def odometry(_spec: model.OdometryOnly, setting: Setting) -> Localizer:
+    """Dead reckoning."""
+    return DeadReckoning(setting.estimate)
 
 
 def _motion_model(spec: model.Amcl, holonomic: bool) -> MotionModel:

@@ -7,7 +7,7 @@ import numpy as np
 
 from simscen.core.geometry import Pose2
 from simscen.core.navigation import ErrorCode, Path
-from simscen.model.stack import Planner as PlannerSpec
+from simscen.model.stack import OmplPlanner as PlannerSpec
 from simscen.stack.planners.ends import Ends, find_ends, roomier_ends
 from simscen.stack.planners.field import Field
 from simscen.stack.planners.informed_set import InformedSet

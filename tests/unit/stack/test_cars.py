@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from flatland import box_robot
 
 from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
@@ -13,6 +12,7 @@ from simscen.stack.cusps import cusps
 from simscen.stack.protocols import RobotModel
 from simscen.stack.replanning import PlanInForce
 from simscen.stack.velocity_smoother import VelocitySmoother
+from simscen.testing.flatland import box_robot
 
 CAR = RobotModel(box_robot(0.6, 0.4).footprint, None, 1.0, 1.0, 0.0, 1.5, 2.0, 2.0, 3.0, turning_radius=0.6)
 OPEN = CostmapView(np.zeros((80, 80), np.uint8), np.full((80, 80), 2.0, np.float32), 0.05, (-2.0, -2.0), 1)

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from flatland import RATE, Flatland, box_robot, round_robot
 
 from simscen.core.events import Event
 from simscen.core.filtermasks import FilterMasks, SpeedLimits
@@ -16,13 +15,14 @@ from simscen.core.sensing import Scan
 from simscen.model.stack import CollisionMonitor as MonitorSpec
 from simscen.model.stack import Costmap as CostmapSpec
 from simscen.model.stack import ProgressChecker as ProgressSpec
+from simscen.model.stack import SimpleGoalChecker as CheckerSpec
 from simscen.model.stack import VelocitySmoother as SmootherSpec
 from simscen.stack.arcs import poses_along
 from simscen.stack.behaviors.motions import Wait
 from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.footprint import Footprint
-from simscen.stack.goal_checker import AT_REST, GoalChecker
+from simscen.stack.goal_checker import AT_REST, SimpleGoalChecker
 from simscen.stack.lookahead import time_free
 from simscen.stack.progress_checker import ProgressChecker
 from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
@@ -31,9 +31,14 @@ from simscen.stack.replanning import PlanInForce
 from simscen.stack.tasks import Task
 from simscen.stack.velocity_smoother import VelocitySmoother
 from simscen.stack.zones import SpeedFilter
+from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot, setting
 
 GOAL = Goal("g", Pose2(1.0, 0.0, 0.0), xy_tolerance=0.2, yaw_tolerance=0.2)
 DRIVING = Twist(0.3)
+
+
+def checker_that(*, stateful: bool) -> SimpleGoalChecker:
+    return SimpleGoalChecker(CheckerSpec(stateful=stateful), setting(round_robot()))
 
 
 def view_of(world: Flatland, robot: RobotModel) -> CostmapView:
@@ -55,16 +60,16 @@ def view_of(world: Flatland, robot: RobotModel) -> CostmapView:
 def test_a_goal_is_reached_well_inside_its_tolerance_or_standing_anywhere_inside(
     pose: Pose2, twist: Twist, reached: bool
 ) -> None:
-    checker = GoalChecker(True)
+    checker = checker_that(stateful=True)
     assert [checker.reached(GOAL, pose, twist) for _ in range(AT_REST)][-1] == reached
 
 
 def test_a_robot_that_stands_for_a_moment_between_driving_and_turning_is_not_there_yet() -> None:
-    assert not GoalChecker(True).reached(GOAL, Pose2(0.95, 0.0, 0.15), STOP)
+    assert not checker_that(stateful=True).reached(GOAL, Pose2(0.95, 0.0, 0.15), STOP)
 
 
 def test_a_stateful_goal_checker_lets_the_robot_turn_without_losing_its_place() -> None:
-    stateful, forgetful = GoalChecker(True), GoalChecker(False)
+    stateful, forgetful = checker_that(stateful=True), checker_that(stateful=False)
     for checker in (stateful, forgetful):
         checker.reached(GOAL, Pose2(0.95, 0.0, 1.0), DRIVING)
     assert stateful.reached(GOAL, Pose2(0.85, 0.0, 0.05), DRIVING)

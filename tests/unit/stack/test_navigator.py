@@ -3,13 +3,13 @@
 import math
 
 import pytest
-from flatland import Drive, Flatland, box_robot, drive, round_robot
 
 from simscen.core.geometry import Pose2
 from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import Goal
-from simscen.model.stack import Costmap, GroundTruth, Planner, ProgressChecker, Recovery, StackSpec
+from simscen.model.stack import Costmap, GroundTruth, OmplPlanner, ProgressChecker, Recovery, StackSpec
 from simscen.stack.protocols import RobotModel
+from simscen.testing.flatland import Drive, Flatland, box_robot, drive, round_robot
 
 TRUTH = GroundTruth(type="ground_truth")
 BOUNDS = (-0.5, -0.5, 10.5, 6.5)
@@ -190,7 +190,9 @@ def test_a_task_that_has_ended_can_be_given_a_new_goal() -> None:
 
 
 def test_replanning_at_a_rate_replans_at_that_rate() -> None:
-    d = start(rooms(), spec=StackSpec(localizer=TRUTH, planner=Planner(replanning="rate", replanning_rate=0.5))).run(60)
+    d = start(
+        rooms(), spec=StackSpec(localizer=TRUTH, planner=OmplPlanner(replanning="rate", replanning_rate=0.5))
+    ).run(60)
     assert d.result == "SUCCEEDED"
     assert reasons(d).count("rate") == pytest.approx(d.tick / 480, abs=2)
 

@@ -2,7 +2,6 @@ import math
 
 import numpy as np
 import pytest
-from flatland import RATE, Flatland, round_robot
 
 from simscen.core.events import Event
 from simscen.core.geometry import Pose2
@@ -10,10 +9,11 @@ from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import ErrorCode, Goal, Path
 from simscen.core.sensing import Scan
 from simscen.model.stack import Costmap as CostmapSpec
-from simscen.model.stack import Planner as PlannerSpec
+from simscen.model.stack import OmplPlanner as PlannerSpec
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.plan_keeper import PlanKeeper
 from simscen.stack.protocols import CostmapView, NavigationFailure, Surroundings
+from simscen.testing.flatland import RATE, Flatland, round_robot
 
 GOAL = Goal("g", Pose2(7.0, 3.0))
 HERE = Pose2(1.0, 3.0)

@@ -1,19 +1,19 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from flatland import RATE, Flatland, box_robot, round_robot
 
 from simscen.core.geometry import Pose2
 from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import ErrorCode
+from simscen.model import stack as model
 from simscen.model.stack import Costmap as CostmapSpec
-from simscen.model.stack import Recovery as Spec
 from simscen.stack.arcs import poses_along
 from simscen.stack.behaviors.motions import BackUp, ClearCostmap, Spin, Wait
 from simscen.stack.costmap.costmap import Costmap
-from simscen.stack.footprint import Footprint
 from simscen.stack.protocols import Behavior, CostmapView, NavigationFailure, RobotModel, Surroundings
+from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot, setting
 
 ROUND, LONG = round_robot(), box_robot()
 
@@ -37,20 +37,20 @@ def run(behavior: Behavior, view: CostmapView, pose: Pose2 = Pose2(0, 0)) -> tup
 
 @pytest.mark.parametrize("angle", [1.57, -1.57, 4.0])
 def test_spin_turns_by_its_angle_and_no_faster_than_allowed(angle: float) -> None:
-    pose, _, commands = run(Spin(Spec(spin_dist=angle), ROUND, Footprint(ROUND, 0.05)), view_of(ROUND))
+    pose, _, commands = run(Spin(model.Spin(spin_dist=angle), setting(ROUND)), view_of(ROUND))
     assert pose.yaw == pytest.approx(angle, abs=0.05)
     assert max(abs(c.wz) for c in commands) <= 1.0
     assert all(c.vx == 0.0 for c in commands)
 
 
 def test_backup_drives_back_by_its_distance_at_its_speed() -> None:
-    pose, seconds, _ = run(BackUp(Spec(), ROUND, Footprint(ROUND, 0.05)), view_of(ROUND), Pose2(0, 0, math.pi / 2))
+    pose, seconds, _ = run(BackUp(model.BackUp(), setting(ROUND)), view_of(ROUND), Pose2(0, 0, math.pi / 2))
     assert pose[:2] == pytest.approx((0.0, -0.30), abs=0.01)
     assert seconds == pytest.approx(2.0, abs=0.1)
 
 
 def test_wait_stands_still_for_its_time() -> None:
-    pose, seconds, commands = run(Wait(Spec(wait_duration=1.0)), view_of(ROUND))
+    pose, seconds, commands = run(Wait(model.Wait(wait_duration=1.0), setting(ROUND)), view_of(ROUND))
     assert pose == Pose2(0, 0)
     assert seconds == pytest.approx(1.0)
     assert set(commands) == {STOP}
@@ -58,31 +58,37 @@ def test_wait_stands_still_for_its_time() -> None:
 
 def test_clear_costmap_clears_once_and_is_done() -> None:
     calls: list[int] = []
-    assert run(ClearCostmap(lambda: calls.append(1)), view_of(ROUND))[2] == []
+    assert (
+        run(
+            ClearCostmap(model.ClearCostmap(), replace(setting(ROUND), clear_costmap=lambda: calls.append(1))),
+            view_of(ROUND),
+        )[2]
+        == []
+    )
     assert calls == [1]
 
 
 def test_backup_fails_where_there_is_something_behind() -> None:
     with pytest.raises(NavigationFailure) as failed:
-        run(BackUp(Spec(), ROUND, Footprint(ROUND, 0.05)), view_of(ROUND, (-0.6, -1.0, -0.26, 1.0)))
+        run(BackUp(model.BackUp(), setting(ROUND)), view_of(ROUND, (-0.6, -1.0, -0.26, 1.0)))
     assert failed.value.code == ErrorCode.BACKUP_COLLISION_AHEAD
 
 
 def test_backup_uses_what_room_there_is() -> None:
-    pose, _, _ = run(BackUp(Spec(), ROUND, Footprint(ROUND, 0.05)), view_of(ROUND, (-0.6, -1.0, -0.4, 1.0)))
+    pose, _, _ = run(BackUp(model.BackUp(), setting(ROUND)), view_of(ROUND, (-0.6, -1.0, -0.4, 1.0)))
     assert -0.2 < pose.x < -0.05
 
 
 def test_a_long_robot_does_not_spin_beside_a_wall_but_a_round_one_does() -> None:
     wall = (-3.0, 0.24, 3.0, 0.4)
     with pytest.raises(NavigationFailure) as failed:
-        run(Spin(Spec(), LONG, Footprint(LONG, 0.05)), view_of(LONG, wall))
+        run(Spin(model.Spin(), setting(LONG)), view_of(LONG, wall))
     assert failed.value.code == ErrorCode.SPIN_COLLISION_AHEAD
-    assert run(Spin(Spec(), ROUND, Footprint(ROUND, 0.05)), view_of(ROUND, wall))[0].yaw > 1.5
+    assert run(Spin(model.Spin(), setting(ROUND)), view_of(ROUND, wall))[0].yaw > 1.5
 
 
 def test_a_spin_that_does_not_turn_times_out() -> None:
-    spin = Spin(Spec(), ROUND, Footprint(ROUND, 0.05))
+    spin = Spin(model.Spin(), setting(ROUND))
     spin.start(Pose2(0, 0))
     with pytest.raises(NavigationFailure) as failed:
         spin.step(Pose2(0, 0), view_of(ROUND), 10.1)

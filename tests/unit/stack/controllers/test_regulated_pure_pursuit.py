@@ -2,7 +2,6 @@ import math
 
 import numpy as np
 import pytest
-from flatland import RATE, Flatland, round_robot
 
 from simscen.core.geometry import Pose2
 from simscen.core.motion import STOP, Twist
@@ -11,8 +10,8 @@ from simscen.model.stack import Costmap as CostmapSpec
 from simscen.model.stack import RegulatedPurePursuit as Spec
 from simscen.stack.controllers.regulated_pure_pursuit import RegulatedPurePursuit
 from simscen.stack.costmap.costmap import Costmap
-from simscen.stack.footprint import Footprint
 from simscen.stack.protocols import CostmapView, NavigationFailure, Surroundings
+from simscen.testing.flatland import RATE, Flatland, round_robot, setting
 
 ROBOT = round_robot(speed=1.0)
 FAR = Goal("far", Pose2(8.0, 0.0, 0.0))
@@ -25,7 +24,7 @@ def view_of(*boxes: tuple[float, float, float, float]) -> CostmapView:
 
 
 def rpp(path: np.ndarray, **options: object) -> RegulatedPurePursuit:
-    controller = RegulatedPurePursuit(Spec(**{**PLAIN, **options}), ROBOT, Footprint(ROBOT, 0.05), 0.05)
+    controller = RegulatedPurePursuit(Spec(**{**PLAIN, **options}), setting(ROBOT))
     controller.set_path(Path(path))
     return controller
 

@@ -3,7 +3,6 @@
 import math
 
 import pytest
-from flatland import RATE, Flatland, box_robot, round_robot
 
 from simscen.core.geometry import Pose2
 from simscen.model.stack import Costmap as CostmapSpec
@@ -11,6 +10,7 @@ from simscen.stack.controllers.turning import TurningRoom
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.footprint import Footprint
 from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
+from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot
 
 LONG = box_robot(0.8, 0.4)
 ROUND = round_robot()

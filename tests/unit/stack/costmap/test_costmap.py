@@ -2,7 +2,6 @@ import math
 
 import numpy as np
 import pytest
-from flatland import RATE, Flatland, round_robot
 from scipy.ndimage import distance_transform_edt
 
 from simscen.core.geometry import Pose2
@@ -11,6 +10,7 @@ from simscen.core.sensing import Scan
 from simscen.model.stack import Costmap as Spec
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.protocols import Surroundings
+from simscen.testing.flatland import RATE, Flatland, round_robot
 
 ROBOT = round_robot()
 BOUNDS = (-0.5, -0.5, 8.5, 6.5)

@@ -1,4 +1,4 @@
-"""Lets the tests of this folder share `room`, whatever pytest's import mode."""
+"""Lets the tests of this folder share `hard_drives`, whatever pytest's import mode."""
 
 import sys
 from pathlib import Path

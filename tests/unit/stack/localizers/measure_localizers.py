@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
-from localizer_room import USUAL, Drive, Noise, crowded, drive, errors, kidnapped, localizer, nees, run, scan
+from hard_drives import crowded, kidnapped
 
 from simscen.core.belief import Estimate
 from simscen.core.geometry import Array, Pose2
@@ -17,6 +17,7 @@ from simscen.core.motion import Twist
 from simscen.core.sensing import Odometry
 from simscen.model.stack import Amcl, Ekf
 from simscen.model.stack import Localizer as Spec
+from simscen.testing.room import USUAL, Drive, Noise, drive, errors, localizer, nees, run, scan
 
 PROB = Amcl(laser_model_type="likelihood_field_prob")
 BEAM = Amcl(laser_model_type="beam")

@@ -4,15 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from localizer_room import BEAMS, cast, drive, grid, localizer, scan, surroundings
 
 from simscen.core.belief import Belief, Estimate
+from simscen.core.chance import Streams
 from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
 from simscen.core.sensing import Odometry, Scan
 from simscen.model.stack import Amcl
-from simscen.stack.localizers.build import build_localizer
+from simscen.stack.localizers.build import amcl
 from simscen.stack.protocols import Localizer
+from simscen.stack.setting import Setting
+from simscen.testing.room import BEAMS, cast, drive, grid, localizer, scan, surroundings
 
 START = Pose2(-2.5, -1.8, 0.6)
 DEFAULT = Amcl()
@@ -197,7 +199,7 @@ def test_a_map_that_is_turned_changes_nothing() -> None:
     assert straight is not None
     turned = replace(surroundings(), map=replace(straight, origin=turn.compose(straight.origin)))
     start = Estimate(turn.compose(Pose2(-2.3, -1.9, 0.5)), (0.3, 0.3, 0.2))
-    subject = build_localizer(Amcl(), turned, start, np.random.default_rng((1, 1)))
+    subject = amcl(Amcl(), Setting(turned, "localizer", Streams(1), estimate=start))
     subject.on_odometry(odometry(0, Pose2(0, 0, 0)))
     subject.on_scan(seen(START, 0))
     error = turn.compose(START).between(subject.belief.pose)

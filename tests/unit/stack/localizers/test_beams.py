@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from localizer_room import scan
 
 from simscen.core.geometry import Pose2
 from simscen.stack.localizers.beams import select_beams
+from simscen.testing.room import scan
 
 inf, nan = np.inf, np.nan
 

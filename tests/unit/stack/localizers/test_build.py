@@ -4,23 +4,25 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from localizer_room import ROBOT, surroundings
 
 from simscen.core.belief import Estimate
+from simscen.core.chance import Streams
 from simscen.core.geometry import Pose2
 from simscen.model import stack as model
 from simscen.stack.localizers.amcl import AmclLocalizer
-from simscen.stack.localizers.build import build_localizer
 from simscen.stack.localizers.dead_reckoning import DeadReckoning
 from simscen.stack.localizers.ekf import EkfLocalizer
 from simscen.stack.localizers.ground_truth import GroundTruthLocalizer
 from simscen.stack.protocols import Localizer, Surroundings
+from simscen.stack.setting import Setting
+from simscen.testing.room import ROBOT, surroundings
 
 HERE = Estimate(Pose2(0, 0, 0))
 
 
-def built(spec: model.Localizer, around: Surroundings) -> Localizer:
-    return build_localizer(spec, around, HERE, np.random.default_rng(1))
+def built(spec: model.LocalizerSpec, around: Surroundings) -> Localizer:
+    made: Localizer = spec.implementation()(spec, Setting(around, "localizer", Streams(1), estimate=HERE))
+    return made
 
 
 @pytest.mark.parametrize(
@@ -32,7 +34,7 @@ def built(spec: model.Localizer, around: Surroundings) -> Localizer:
         (model.OdometryOnly(type="odometry"), DeadReckoning),
     ],
 )
-def test_each_type_becomes_its_localizer(spec: model.Localizer, kind: type) -> None:
+def test_each_type_becomes_its_localizer(spec: model.LocalizerSpec, kind: type) -> None:
     assert isinstance(built(spec, surroundings()), kind)
 
 

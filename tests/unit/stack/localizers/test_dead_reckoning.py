@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from localizer_room import Noise, drive, errors, localizer, run
 
 from simscen.core.belief import Estimate
 from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
 from simscen.core.sensing import Odometry
 from simscen.model.stack import OdometryOnly
+from simscen.testing.room import Noise, drive, errors, localizer, run
 
 SPEC = OdometryOnly(type="odometry")
 SILENT = Noise(translation=0, rotation=0, drift=0)

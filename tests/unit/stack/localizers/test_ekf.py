@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from localizer_room import Noise, drive, errors, localizer, nees, run
 from measure_localizers import STD
 from scipy import stats
 
@@ -12,6 +11,7 @@ from simscen.core.motion import Twist
 from simscen.core.sensing import Imu, Odometry
 from simscen.model.stack import Ekf
 from simscen.stack.protocols import Localizer
+from simscen.testing.room import Noise, drive, errors, localizer, nees, run
 
 SPEC = Ekf(type="ekf", translation_noise=0.01, rotation_noise=0.01, gyro_noise=0.002)
 AS_SPECIFIED = Noise(drift=0.01, gyro_bias=0.002)

@@ -1,11 +1,11 @@
 import numpy as np
-from flatland import RATE, Flatland, round_robot
 
 from simscen.core.geometry import Pose2
 from simscen.model.stack import Costmap as Spec
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.planners.field import Field
 from simscen.stack.protocols import Surroundings
+from simscen.testing.flatland import RATE, Flatland, round_robot
 
 
 def field(seed: int = 1) -> Field:

@@ -3,7 +3,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from flatland import RATE, Flatland, round_robot
 
 from simscen.model.stack import Costmap as Spec
 from simscen.stack.costmap.costmap import Costmap
@@ -11,6 +10,7 @@ from simscen.stack.planners.field import Field
 from simscen.stack.planners.informed_set import InformedSet
 from simscen.stack.planners.polish import length, pull_tight, relaxed, spaced
 from simscen.stack.protocols import Surroundings
+from simscen.testing.flatland import RATE, Flatland, round_robot
 
 
 def field(*boxes: tuple[float, float, float, float]) -> Field:

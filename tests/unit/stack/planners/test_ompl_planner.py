@@ -2,17 +2,17 @@ import math
 
 import numpy as np
 import pytest
-from flatland import RATE, Flatland, box_robot, round_robot
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from simscen.core.geometry import Pose2
 from simscen.core.navigation import ErrorCode
 from simscen.model.stack import Costmap as CostmapSpec
-from simscen.model.stack import Planner as PlannerSpec
+from simscen.model.stack import OmplPlanner as PlannerSpec
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.planners.ompl_planner import OmplPlanner
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel, Surroundings
+from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot
 
 ROBOT = round_robot()
 

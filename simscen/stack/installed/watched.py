@@ -1,0 +1,109 @@
+"""A component behind its door: what it should never do becomes an error of the run that names it."""
+
+import math
+import traceback
+from collections.abc import Callable
+from typing import Any, ClassVar, NoReturn, ParamSpec, TypeVar
+
+import numpy as np
+
+from simscen.core.errors import RunError
+from simscen.core.geometry import Pose2
+from simscen.core.motion import Twist
+from simscen.core.navigation import ErrorCode, Path
+from simscen.spec.component import Component
+from simscen.stack.protocols import NavigationFailure
+from simscen.stack.setting import Setting
+
+P = ParamSpec("P")
+T = TypeVar("T")
+BROKEN = "broken-component"
+"""The kind of error of a run whose component answered with what its protocol does not allow."""
+
+
+class Watched:
+    """A component that was built from its specification; `role` is what it is in a stack.
+
+    An exception that is no NavigationFailure is the component's own fault, and an answer that is none (not finite, not
+    of its shape) is found where it comes from rather than three components later. Neither says anything of a scenario,
+    so both end the run with an error and not with a verdict.
+    """
+
+    may_fail: ClassVar[bool] = True
+    """Whether a NavigationFailure is an answer of this role."""
+
+    def __init__(self, role: str, spec: Component, setting: Setting, protocol: type) -> None:
+        self.role, self._spec = role, spec
+        self.inner: Any = self.ask(lambda: spec.implementation()(spec, setting))
+        for name in promised(protocol):
+            if not hasattr(type(self.inner), name) and name not in vars(self.inner):
+                self.broke(f"{type(self.inner).__name__} has no `{name}`, which every {role} has")
+
+    @property
+    def who(self) -> str:
+        """What it is called in a message, e.g. "planner `theta_star` (theta_star.planner:ThetaStar)"."""
+        kind = getattr(self._spec, "type", "")
+        return f"{self.role} `{kind}` ({self._spec.component})" if kind else f"{self.role} ({self._spec.component})"
+
+    def ask(self, method: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """Call it; a failure to do what was asked passes, everything else is its own fault."""
+        try:
+            return method(*args, **kwargs)
+        except (RunError, MemoryError):
+            raise
+        except Exception as error:  # the boundary to code of others, which can raise anything
+            if isinstance(error, NavigationFailure) and self.may_fail:
+                if not isinstance(error.code, ErrorCode):
+                    self.broke(f"fails with {error.code!r}, which is no ErrorCode")
+                raise
+            raise RunError("crashed", f"{self.who}: {type(error).__name__}: {error} ({self._place(error)})") from error
+
+    def broke(self, what: str) -> NoReturn:
+        """End the run: it answered with something that is no answer."""
+        raise RunError(BROKEN, f"{self.who} {what}")
+
+    def checked_path(self, path: object, what: str) -> Path:
+        """A path of finite poses (n, 3)."""
+        if not isinstance(path, Path):
+            self.broke(f"{what} {type(path).__name__} instead of a Path")
+        points = path.points
+        if not isinstance(points, np.ndarray) or points.ndim != 2 or points.shape[1] != 3:
+            self.broke(f"{what} a path whose points are {_shape(points)} instead of (n, 3): x, y, yaw")
+        if points.dtype.kind != "f" or not np.isfinite(points).all():
+            self.broke(f"{what} a path with points that are no finite numbers")
+        return path
+
+    def checked_twist(self, command: object) -> Twist:
+        """A velocity of three finite numbers."""
+        if not isinstance(command, Twist):
+            self.broke(f"commanded {type(command).__name__} instead of a Twist")
+        try:
+            finite = all(map(math.isfinite, command))
+        except TypeError:
+            finite = False
+        if not finite:
+            self.broke(f"commanded {tuple(command)}, which is no velocity")
+        return command
+
+    def checked_pose(self, pose: object, what: str) -> Pose2:
+        """A pose of three finite numbers."""
+        if not isinstance(pose, Pose2) or not all(isinstance(v, float | int) and math.isfinite(v) for v in pose):
+            self.broke(f"{what} {pose!r}, which is no finite pose")
+        return pose
+
+    def _place(self, error: Exception) -> str:
+        """The innermost line of its own package; where that is not among them, the innermost of all."""
+        package = self._spec.component.partition(":")[0].partition(".")[0]
+        frames = list(traceback.walk_tb(error.__traceback__))
+        own = [at for at in frames if str(at[0].f_globals.get("__name__", "")).partition(".")[0] == package]
+        frame, line = (own or frames)[-1]
+        return f"{frame.f_code.co_filename.rpartition('/')[2]}:{line}"
+
+
+def promised(protocol: type) -> list[str]:
+    """The methods and properties of a protocol."""
+    return sorted(name for name in (*vars(protocol), *protocol.__annotations__) if not name.startswith("_"))
+
+
+def _shape(points: object) -> str:
+    return str(points.shape) if isinstance(points, np.ndarray) else type(points).__name__

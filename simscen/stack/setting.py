@@ -1,0 +1,71 @@
+"""What a component of a stack is installed in."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from simscen.core.belief import Estimate
+from simscen.core.chance import Streams
+from simscen.core.grid import OccupancyGrid
+from simscen.core.time import Clock
+from simscen.stack.footprint import Footprint
+from simscen.stack.protocols import RobotModel, Surroundings
+
+ANYWHERE = Estimate(None)
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """All that a component, or a whole stack, may know besides its specification. `Class(specification, setting)`.
+
+    SI units, angles in rad; the map frame is that of `map`, the base frame has x forward and y to the left.
+
+    surroundings:     the robot's datasheet, its map, what it must not enter, its lidars by name, ticks a second
+    name:             its random stream: "planner", "controller", "localizer", "behavior.spin", …, "stack"
+    streams:          random streams by name, derived from the run's seed; `chance` is the one it should use
+    control_period:   seconds between two calls of a controller, a goal checker or a behaviour
+    resolution:       metres, the edge of a cell of the costmaps that it is shown
+    estimate:         where the robot is said to be when it is switched on; `reset` or `start` says it again
+    stop_on_failure:  whether a goal that fails ends the task (for a whole stack)
+    clear_costmap:    forgets live obstacles that are not seen any more (for a behaviour)
+    """
+
+    surroundings: Surroundings
+    name: str
+    streams: Streams
+    control_period: float = 0.05
+    resolution: float = 0.05
+    estimate: Estimate = ANYWHERE
+    stop_on_failure: bool = True
+    clear_costmap: Callable[[], None] = lambda: None
+
+    def named(self, name: str) -> "Setting":
+        """The same for another component, which has a random stream of its own."""
+        return replace(self, name=name)
+
+    @property
+    def robot(self) -> RobotModel:
+        """The robot's datasheet."""
+        return self.surroundings.robot
+
+    @property
+    def map(self) -> OccupancyGrid | None:
+        """The robot's map; None where it drives without one."""
+        return self.surroundings.map
+
+    @property
+    def clock(self) -> Clock:
+        """What makes seconds of the ticks that readings carry."""
+        return Clock(self.surroundings.tick_rate)
+
+    @cached_property
+    def chance(self) -> np.random.Generator:
+        """Its own random generator. Nobody else draws from it, so that it changes nobody else's numbers."""
+        return self.streams.generator(self.name)
+
+    @cached_property
+    def footprint(self) -> Footprint:
+        """Says whether the robot's hull fits at poses (n, 3) on a costmap: `footprint.free(costmap, poses)`."""
+        return Footprint(self.robot, self.resolution)

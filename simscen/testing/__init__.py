@@ -1,0 +1,1 @@
+"""Contract tests for everybody's own components."""

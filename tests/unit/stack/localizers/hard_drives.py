@@ -1,0 +1,49 @@
+"""Drives in the room that are hard on localizers: kidnapped, and among people with the furniture moved."""
+
+import numpy as np
+
+from simscen.testing.room import BEAMS, BOXES, EACH, SCAN_PERIOD, TICK_RATE, Drive, cast
+
+
+def kidnapped(before: Drive, after: Drive) -> Drive:
+    """The robot is carried from the end of one drive to the start of the next; its wheels do not notice."""
+    count = len(before.truth) // EACH * EACH
+    return Drive(
+        np.concatenate((before.truth[:count], after.truth)),
+        np.concatenate((before.steps[:count], after.steps)),
+        np.concatenate((before.ranges[: count // EACH], after.ranges)),
+    )
+
+
+# Furniture that was moved since the map was drawn: what is gone from BOXES, and what is new.
+GONE = (6, 7, 9)
+NEW = np.array([
+    (1.6, -0.3, 2.4, 0.4), (3.2, -3.2, 4.2, -2.6), (0.2, 1.2, 0.8, 1.6), (3.9, 2.2, 4.4, 3.0), (1.0, -3.9, 1.5, -3.4),
+    (4.6, -1.5, 4.9, -0.5),
+])  # fmt: skip
+
+
+def crowded(way: Drive, seed: int, people: int = 8) -> Drive:
+    """The same drive, but with the furniture moved, among people that come and go, and on slipping wheels.
+
+    People are 0.6 m wide and walk 0.5 to 3 m from the robot. Slipping wheels turn up to 30 % too far, for seconds.
+    """
+    chance, angles = np.random.default_rng((seed, 7)), -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS)
+    ranges = cast(way.truth[::EACH], angles, np.concatenate((np.delete(BOXES, GONE, axis=0), NEW)))
+    bearing, distance = chance.uniform(-np.pi, np.pi, people), chance.uniform(0.6, 2.5, people)
+    phase, period = chance.uniform(0, 2 * np.pi, people), chance.uniform(8, 30, people)
+    for row, (seen, yaw) in enumerate(zip(ranges, way.truth[::EACH, 2], strict=True)):
+        bearing += chance.normal(0, 0.05, people)
+        distance = np.clip(distance + chance.normal(0, 0.05, people), 0.5, 3)
+        here = np.sin(2 * np.pi * row * SCAN_PERIOD / TICK_RATE / period + phase) > 0
+        for towards, far in zip(bearing[here], distance[here], strict=True):
+            off = np.abs((angles - towards + yaw + np.pi) % (2 * np.pi) - np.pi)
+            np.minimum(seen, far, out=seen, where=off < np.arctan(0.3 / far))
+    slip = np.ones((len(way.steps), 3))
+    row = 0
+    while row < len(slip):
+        end = row + int(chance.integers(20, 80))
+        slip[row:end, 0] += chance.choice([0, 0, 0.1, -0.1, 0.3])
+        row = end
+    slip[:, 2] += (slip[:, 0] - 1) / 6
+    return Drive(way.truth, way.steps * slip, ranges)
