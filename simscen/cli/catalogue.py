@@ -14,7 +14,7 @@ from pydantic_core import PydanticUndefined
 from simscen.actions.action import AnyAction
 from simscen.criteria.criterion import AnyCriterion
 from simscen.faults.fault import AnyFault
-from simscen.model import robot, scenario, stack, world
+from simscen.model import anystack, robot, scenario, stack, world
 from simscen.model.disturbance import EventEntry, FaultEntry
 from simscen.model.rosmap import RosMapSpec
 from simscen.spec import registry
@@ -103,6 +103,7 @@ _SCENARIO: dict[str, type[BaseModel]] = {
 }
 _STACK: dict[str, type[BaseModel]] = {
     "stack": stack.StackSpec,
+    "external": anystack.ExternalStackSpec,
     "costmap": stack.Costmap,
     "planner": stack.OmplPlanner,
     "goal_checker": stack.SimpleGoalChecker,

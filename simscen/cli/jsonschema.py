@@ -110,8 +110,11 @@ def _by_type(node: Schema, definitions: Schema) -> Schema:
         ref["$ref"]: definitions[ref["$ref"].rpartition("/")[2]] for ref in node.get("oneOf", []) if "$ref" in ref
     }
     types = {ref: member["properties"].get("type", {}).get("const") for ref, member in members.items()}
-    if len(members) < 2 or None in types.values():
+    apart = {ref: members[ref].get("required", []) for ref, kind in types.items() if kind is None}
+    if len(members) < 2 or any(len(required) != 1 for required in apart.values()):
         return node
+    if apart:
+        return _by_key(node, {ref: required[0] for ref, required in apart.items()}, definitions)
     rest = {key: value for key, value in node.items() if key not in ("oneOf", "discriminator")}
     cases = []
     for ref, kind in types.items():
@@ -121,6 +124,16 @@ def _by_type(node: Schema, definitions: Schema) -> Schema:
         cases.append({"if": condition, "then": {"$ref": ref}})
     needed = {"required": ["type"]} if all("required" in case["if"] for case in cases) else {}
     return {**rest, "type": "object", "properties": {"type": {"enum": list(types.values())}}, **needed, "allOf": cases}
+
+
+def _by_key(node: Schema, apart: dict[str, str], definitions: Schema) -> Schema:
+    """A union some members of which have no `type`: each is known by the one key that it requires."""
+    rest = {key: value for key, value in node.items() if key not in ("oneOf", "discriminator")}
+    others = [option for option in node["oneOf"] if option.get("$ref") not in apart]
+    made = others[0] if len(others) == 1 else _by_type({"oneOf": others}, definitions)
+    for ref, key in apart.items():
+        made = {"if": {"type": "object", "required": [key]}, "then": {"$ref": ref}, "else": made}
+    return {**rest, **made}
 
 
 def _by_json_type(node: Schema) -> Schema:

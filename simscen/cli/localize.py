@@ -15,9 +15,10 @@ from simscen.core.errors import InvalidInput, UsageError
 from simscen.core.geometry import Pose2
 from simscen.core.grid import OccupancyGrid
 from simscen.core.problems import Problem
-from simscen.loading.criteria_file import load_criteria
+from simscen.loading.criteria_file import LoadedCriteria, load_criteria
 from simscen.loading.discovery import default_root
 from simscen.loading.robotfile import load_robot_file
+from simscen.loading.tree import value_place
 from simscen.loading.worldfile import load_world_file
 from simscen.model.stack import StackSpec
 from simscen.record.foreign.sensed import Sensed, read_sensed
@@ -83,9 +84,12 @@ def _given(
     if scenario is not None:
         home = root if root is not None else default_root([scenario])
         try:
-            spec = load_criteria(scenario, home).spec.stack
+            written = load_criteria(scenario, home)
         except InvalidInput as error:
             raise InvalidInput(from_here(error.problems, home)) from error
+        if not isinstance(written.spec.stack, StackSpec):
+            raise InvalidInput(from_here([_without_localizer(written)], home))
+        spec = written.spec.stack
     home = root if root is not None else default_root([map_])
     try:
         world = load_world_file(map_, home)
@@ -102,6 +106,13 @@ def _given(
     except InvalidInput as error:
         raise InvalidInput(from_here(error.problems, home)) from error
     return spec, load_map(world.map), robot_model(body)
+
+
+def _without_localizer(written: LoadedCriteria) -> Problem:
+    """Another stack's localizer is its own affair."""
+    place = value_place(written.tree, ("stack",))
+    hint = "name a file whose `stack` is simscen's own"
+    return written.library.with_source([Problem(*place, "SC016", "this stack has no localizer of simscen's", hint)])[0]
 
 
 def _estimate(start: str | None, sensed: Sensed) -> Estimate:

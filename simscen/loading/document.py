@@ -107,22 +107,28 @@ class Library:
 def merge(over: Fields, under: Fields) -> Fields:
     """Keys of `over` win; mappings on both sides are merged, everything else is replaced as a whole.
 
-    Mappings whose `type` differs are different things and are replaced, too.
+    Mappings whose `type` differs are different things and are replaced, too, as is a stack by an `external` one.
     """
     entries = dict(over.entries)
     for key, below in under.entries.items():
         above = entries.get(key)
         if above is None:
             entries[key] = below
-        elif isinstance(above.value, Fields) and isinstance(below.value, Fields) and _same_type(above, below):
+        elif isinstance(above.value, Fields) and isinstance(below.value, Fields) and _same_type(key, above, below):
             entries[key] = Entry(above.key, merge(above.value, below.value))
     return Fields(over.place, entries)
 
 
-def _same_type(above: Entry, below: Entry) -> bool:
+def _same_type(key: str, above: Entry, below: Entry) -> bool:
+    if key == "stack" and _has(above, "external") and not _has(below, "external"):
+        return False
     types = [
         entry.value.entries["type"].value.plain
         for entry in (above, below)
         if isinstance(entry.value, Fields) and "type" in entry.value.entries
     ]
     return len(types) < 2 or types[0] == types[1]
+
+
+def _has(entry: Entry, key: str) -> bool:
+    return isinstance(entry.value, Fields) and key in entry.value.entries

@@ -64,6 +64,8 @@ def _section(own: Fields, choice: StackChoice) -> Fields:
 
 
 def type_of(section: Node) -> str | None:
-    """The type of stack of a `stack:` section, as far as it has a plain one."""
+    """The type of stack of a `stack:` section, as far as it has a plain one; an external one has none."""
+    if child(section, "external") is not None:
+        return None
     written = child(section, "type")
     return REFERENCE if written is None else written.value if isinstance(written, Leaf) else None  # type: ignore[return-value]

@@ -8,7 +8,7 @@ from simscen.core.belief import Estimate
 from simscen.core.chance import LARGEST_SEED
 from simscen.core.geometry import Pose2
 from simscen.criteria.criterion import AnyCriterion
-from simscen.model.stack import StackSpec
+from simscen.model.anystack import AnyStack
 from simscen.model.world import WorldSpec
 from simscen.spec.base import Spec, by_default
 from simscen.spec.ondemand import OnDemand
@@ -121,7 +121,8 @@ class ScenarioSpec(Spec):
     map: FilePath | None = None
     """The map the robot gets, if it is not that of the world; `none` = no map, odometry only."""
     robot: RobotEntry
-    stack: StackSpec = by_default()
+    stack: AnyStack = by_default()
+    """The stack under test: simscen's own, or `{external: NAME}`, a process."""
     goals: Annotated[list[GoalEntry], Field(max_length=1000)] = []
     """In this order."""
     on_goal_failure: Literal["stop", "continue"] = "stop"

@@ -5,6 +5,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Discriminator, Field, Tag
 
 from simscen.core.navigation import RecoveryBehavior
+from simscen.model.stackbase import GoalTolerances, StackBase
 from simscen.spec.base import Ranged, Spec, by_default, type_or
 from simscen.spec.component import Component
 from simscen.spec.quantities import (
@@ -22,7 +23,6 @@ from simscen.spec.quantities import (
     PositiveSpeed,
     Probability,
 )
-from simscen.spec.references import RegionName
 
 Noise = Annotated[float, Field(ge=0, le=100)]
 Iterations = Annotated[int, Field(ge=1, le=1_000_000)]
@@ -234,11 +234,8 @@ Controller = Annotated[
 ]
 
 
-class GoalCheckerSpec(Component):
+class GoalCheckerSpec(GoalTolerances, Component):
     """What says whether a goal is reached; the tolerances are those of goals that name none."""
-
-    xy_goal_tolerance: PositiveLength = 0.25
-    yaw_goal_tolerance: PositiveAngle = 0.25
 
 
 class SimpleGoalChecker(GoalCheckerSpec):
@@ -355,40 +352,10 @@ class CollisionMonitor(Spec):
     """STOP: nothing may be nearer to the footprint than this, in the direction of travel."""
 
 
-class SpeedZone(Spec):
-    """A part of the world with a speed limit (nav2_costmap_2d's SpeedFilter)."""
-
-    region: RegionName
-    """A region of the world, by name."""
-    speed_limit: PositiveSpeed
-    """While the robot believes itself inside."""
-
-
-MaskFile = Annotated[str, Field(min_length=1, max_length=4096)]
-
-
-class SpeedMask(Spec):
-    """A filter mask of speed limits (nav2_costmap_2d's SpeedFilter and its CostmapFilterInfo).
-
-    What a cell of the mask says is `base + multiplier · value`, its value being 0 … 100 as map_server reads the mask
-    (`mode: scale` keeps the greys). Cells of value 0 and unknown ones limit nothing, nor does a limit of 0 or less.
-    """
-
-    file: MaskFile
-    """Map yaml of the mask, relative to this file; its resolution and origin may differ from the map's."""
-    type: Literal["percent", "absolute"] = "percent"
-    """Percent of the controller's full speed (CostmapFilterInfo type 1), or m/s (type 2)."""
-    base: Annotated[float, Field(ge=-1000, le=1000)] = 0.0
-    """CostmapFilterInfo's base: percent or m/s."""
-    multiplier: Annotated[float, Field(ge=-1000, le=1000)] = 1.0
-    """CostmapFilterInfo's multiplier: percent or m/s for each unit of a cell's value."""
-
-
-class StackSpec(Spec):
+class StackSpec(StackBase):
     """The navigation stack under test: Nav2 in miniature."""
 
     type: Literal["reference"] = "reference"
-    controller_frequency: Frequency = 20.0
     localizer: Localizer = by_default()
     costmap: Costmap = by_default()
     planner: OmplPlanner = by_default()
@@ -398,11 +365,8 @@ class StackSpec(Spec):
     recovery: Recovery = by_default()
     velocity_smoother: VelocitySmoother = by_default()
     collision_monitor: CollisionMonitor = by_default()
-    keepout: Annotated[list[RegionName], Field(max_length=100)] = []
-    """Regions of the world that the robot must not enter (nav2_costmap_2d's KeepoutFilter)."""
-    speed_zones: Annotated[list[SpeedZone], Field(max_length=100)] = []
-    """Regions of the world with a speed limit."""
-    keepout_mask: MaskFile | None = None
-    """Map yaml of a filter mask: its occupied cells are lethal to the costmap (nav2_costmap_2d's KeepoutFilter)."""
-    speed_mask: SpeedMask | None = None
-    """A filter mask of speed limits."""
+
+    @property
+    def told_truth(self) -> bool:
+        """Whether its localizer is told where the robot truly is."""
+        return isinstance(self.localizer, GroundTruth)

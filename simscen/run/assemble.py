@@ -3,15 +3,17 @@
 from collections.abc import Mapping
 
 from simscen.core.chance import Streams
+from simscen.core.errors import RunError
 from simscen.core.events import Event, EventKind
 from simscen.core.geometry import Array, Pose3
 from simscen.core.sensing import Odometry
 from simscen.core.shapes import TriangleMesh
 from simscen.core.time import Clock
 from simscen.faults.base import Wheels
-from simscen.model.stack import GroundTruth
+from simscen.model.stack import StackSpec
 from simscen.run.director import Director
 from simscen.run.ending import Ending
+from simscen.run.external.command import ExternalCommand
 from simscen.run.faultrig import FaultRig
 from simscen.run.live import LiveStage, described
 from simscen.run.lockstep import Rig
@@ -28,8 +30,8 @@ from simscen.worlds.meshing import fuse, triangulate
 from simscen.worlds.rays import RayScene
 
 
-def assemble(prepared: Prepared, seed: int) -> Rig:
-    """Build the rig of one run of a prepared scenario with this seed."""
+def assemble(prepared: Prepared, seed: int, external: ExternalCommand | None = None) -> Rig:
+    """Build the rig of one run of a prepared scenario with this seed; `external` is what its external stack runs."""
     spec, world = prepared.spec, prepared.built.world
     clock, streams = Clock(spec.physics.tick_rate), Streams(seed)
     simulation = Simulation(
@@ -45,7 +47,7 @@ def assemble(prepared: Prepared, seed: int) -> Rig:
     rays = LiveRays(RayScene(prepared.built.mesh), simulation)
     sensors: tuple[Sensor, ...] = build_sensors(prepared.robot, clock, streams, simulation, rays)
     truth_period = clock.period(spec.physics.truth_rate)
-    if isinstance(prepared.stack.localizer, GroundTruth):
+    if prepared.stack.told_truth:
         # Last, because the log takes the first odometry for the robot's own.
         sensors = (*sensors, TruthSensor(simulation, clock.period(prepared.stack.controller_frequency)))
     senses = Senses(sensors)
@@ -59,6 +61,8 @@ def assemble(prepared: Prepared, seed: int) -> Rig:
         masks=prepared.masks,
         lidars=tuple(name for name, sensor in prepared.robot.sensors.items() if sensor.lidar),
     )
+    if not isinstance(prepared.stack, StackSpec):
+        raise RunError("stack-crashed", f"there is no process for {prepared.stack.external} and {external}")
     stack = build_stack(prepared.stack, surroundings, streams, clock, stop_on_failure=spec.on_goal_failure == "stop")
     stack.start(prepared.estimate, prepared.case.goals)
 

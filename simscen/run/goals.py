@@ -5,7 +5,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.navigation import Goal
 from simscen.core.world import World
 from simscen.model.scenario import GoalEntry, ScenarioSpec
-from simscen.model.stack import StackSpec
+from simscen.model.stackbase import StackBase
 from simscen.spec.places import PoseSpec
 
 
@@ -38,7 +38,7 @@ def sent_goals(spec: ScenarioSpec) -> dict[tuple[str | int, ...], Goal]:
     return found
 
 
-def _goal(number: int, entry: GoalEntry, stack: StackSpec, world: World) -> Goal:
+def _goal(number: int, entry: GoalEntry, stack: StackBase, world: World) -> Goal:
     place = entry.pose if isinstance(entry.pose, str) else f"goal-{number}"
     return Goal(
         name=entry.name or place,

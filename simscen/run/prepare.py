@@ -15,6 +15,7 @@ from simscen.core.world import BuiltWorld
 from simscen.criteria.base import Criterion
 from simscen.loading.disturbances import disturbances_of
 from simscen.loading.loaded import LoadedScenario
+from simscen.model.anystack import AnyStack
 from simscen.model.robot import RobotSpec
 from simscen.model.scenario import ScenarioSpec, estimate_of
 from simscen.model.stack import Amcl, OdometryOnly, StackSpec
@@ -39,7 +40,7 @@ class Prepared:
     masks: FilterMasks
     robot: RobotSpec
     body: RobotBody
-    stack: StackSpec
+    stack: AnyStack
     start: Pose2
     estimate: Estimate
     case: Case
@@ -120,9 +121,12 @@ def lidar_height(robot: RobotSpec) -> float:
     return heights[0] if heights else DEFAULT_LIDAR_HEIGHT
 
 
-def stack_of(spec: ScenarioSpec) -> StackSpec:
+def stack_of(spec: ScenarioSpec) -> AnyStack:
     """The stack as written; without a map, AMCL cannot work, so dead reckoning is the default there."""
-    unwritten = "localizer" not in spec.stack.model_fields_set
-    if spec.map == "none" and unwritten and isinstance(spec.stack.localizer, Amcl):
-        return spec.stack.model_copy(update={"localizer": OdometryOnly(type="odometry")})
-    return spec.stack
+    stack = spec.stack
+    if not isinstance(stack, StackSpec):
+        return stack
+    unwritten = "localizer" not in stack.model_fields_set
+    if spec.map == "none" and unwritten and isinstance(stack.localizer, Amcl):
+        return stack.model_copy(update={"localizer": OdometryOnly(type="odometry")})
+    return stack

@@ -19,6 +19,7 @@ from simscen.record.header import LogHeader
 from simscen.record.recorder import Recorder
 from simscen.record.tracebuilder import TraceBuilder
 from simscen.run.assemble import assemble
+from simscen.run.external.command import Commands, ExternalCommand, command_of
 from simscen.run.lockstep import Log, Rig, run_lockstep
 from simscen.run.prepare import Prepared, prepare
 from simscen.sim.urdf.describe import describe
@@ -28,9 +29,16 @@ Attach = Callable[[Rig, Sequence[Log]], Sequence[Log]]
 
 
 def simulate(
-    prepared: Prepared, seed: int | None = None, *, log: Path | None = None, attach: Attach | None = None
+    prepared: Prepared,
+    seed: int | None = None,
+    *,
+    log: Path | None = None,
+    attach: Attach | None = None,
+    external: ExternalCommand | None = None,
 ) -> Run:
     """Run a prepared scenario with this seed (default: its own) and judge it; `log` is the MCAP file to write.
+
+    `external` is what the stack runs that the scenario names.
 
     *Given* the same scenario and seed *then* the same run and the same bytes in `log`, whatever ran before in this
     process. Raises RunError when the run cannot be completed, OSError when the log cannot be written.
@@ -40,7 +48,7 @@ def simulate(
     builder = TraceBuilder(clock)
     with ExitStack() as closing:
         recorder = log and closing.enter_context(Recorder(log, clock, log_header(prepared, seed)))
-        rig = assemble(prepared, seed)
+        rig = assemble(prepared, seed, external)
         closing.callback(rig.simulation.close)
         own: tuple[Log, ...] = (builder, recorder) if recorder else (builder,)
         end = run_lockstep(rig, (*own, *(attach(rig, own) if attach else ())))
@@ -51,10 +59,17 @@ def simulate(
 
 
 def simulate_file(
-    file: Path, seed: int | None, log: Path | None, root: Path | None, world_path: Sequence[Path] = ()
+    file: Path,
+    seed: int | None,
+    log: Path | None,
+    root: Path | None,
+    world_path: Sequence[Path] = (),
+    stacks: Commands | None = None,
 ) -> Run:
     """Load, prepare and simulate a scenario file. Raises InvalidInput, and what `simulate` raises."""
-    return simulate(prepare(load_scenario(file, root or default_root([file]), world_path)), seed, log=log)
+    loaded = load_scenario(file, root or default_root([file]), world_path)
+    external = command_of(loaded, stacks or {})
+    return simulate(prepare(loaded), seed, log=log, external=external)
 
 
 def judged(prepared: Prepared, seed: int, trace: Trace, log: Path | None = None) -> Run:

@@ -47,7 +47,7 @@ class Group:
 
 
 GROUPS: dict[str, Group] = {
-    "stack": Group("simscen.spec.base:Spec", reserved=("reference", "external")),
+    "stack": Group("simscen.model.stackbase:StackBase", reserved=("reference", "external")),
     "localizer": Group("simscen.spec.base:Spec"),
     "planner": Group("simscen.spec.base:Spec"),
     "controller": Group("simscen.spec.base:Spec"),

@@ -175,7 +175,7 @@ def _idle_stack(loaded: LoadedScenario) -> Iterator[Problem]:
             message = f"no limit: the robot's top speed is {fastest:g} m/s"
             yield loaded.problem(("stack", "speed_zones", index, "speed_limit"), "SC055", message)
     for key in ("desired_linear_vel", "max_vel_x", "vx_max"):
-        wanted = getattr(stack.controller, key, None)
+        wanted = getattr(getattr(stack, "controller", None), key, None)
         if wanted is not None and wanted > robot.limits.linear:
             message = f"{wanted:g} m/s is never reached: the robot's top speed is {robot.limits.linear:g} m/s"
             yield loaded.problem(("stack", "controller", key), "SC055", message)

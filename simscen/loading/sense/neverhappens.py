@@ -11,6 +11,7 @@ from simscen.loading.names import event_names, own_goal_names
 from simscen.loading.tree import Key
 from simscen.model.disturbance import EventEntry
 from simscen.model.robot import Holonomic, RobotSpec
+from simscen.model.stack import StackSpec
 from simscen.triggers.trigger import Test, Trigger
 
 Keys = tuple[Key, ...]
@@ -126,7 +127,8 @@ class _Run:
         return None if self.sent(None) else "the robot has no goal"
 
     def _localization_error(self, error: Any) -> str | None:
-        told = self.loaded.spec.stack.localizer.type == "ground_truth"
+        stack = self.loaded.spec.stack
+        told = isinstance(stack, StackSpec) and stack.told_truth
         return "the localizer is told the truth" if told and error.root >= LOST else None
 
     def _goal(self, goal: Any) -> str | None:
@@ -184,6 +186,8 @@ def top_speed(robot: RobotSpec) -> float:
 
 def no_recovery(loaded: LoadedScenario, behaviour: str | None) -> str | None:
     """Why a recovery behaviour (any, for None) never runs."""
+    if not isinstance(loaded.spec.stack, StackSpec):
+        return None
     recovery = loaded.spec.stack.recovery
     if not recovery.behaviors or recovery.number_of_retries == 0:
         return "the stack has no recoveries"

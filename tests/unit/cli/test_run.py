@@ -62,3 +62,14 @@ def test_what_of_sdf_cannot_be_used_is_an_error_or_with_lenient_a_warning(simsce
         lenient = simscen("validate", argument, "--lenient")
         assert lenient.code == 0
         assert "shop.sdf: warning[SC311] world[w]/include/uri: skipped: model://nowhere" in lenient.out
+
+
+def test_a_stack_that_nobody_defines_runs_nothing(simscen, tmp_path: Path) -> None:
+    (tmp_path / "good.scenario.yaml").write_text(
+        (tmp_path / "good.scenario.yaml").read_text() + "stack: {external: mine}\n"
+    )
+    ended = simscen("run", "good.scenario.yaml", "--out", "out")
+    assert ended.code == 2
+    assert "good.scenario.yaml:11:19: error[SC060] nobody says what the stack `mine` runs" in ended.err
+    assert "--stack mine='COMMAND'" in ended.err
+    assert not (tmp_path / "out").exists()

@@ -62,6 +62,8 @@ def _errors(text: str) -> list[str]:
     [
         ("simscen: 1\nseeed: 7", ": Additional properties are not allowed ('seeed' was unexpected)"),
         ("simscen: 1\nstack: {controller: {type: dwb, gamma: 1}}", "stack.controller: Additional properties"),
+        ("simscen: 1\nstack: {external: mine, planner: {}}", "stack: Additional properties are not allowed ('planner'"),
+        ("simscen: 1\nstack: {external: 7}", "stack.external: 7 is not of type 'string'"),
         ("simscen: 1\nstack: {localizer: {alpha1: x}}", "stack.localizer.alpha1: 'x' is not of type 'number'"),
         ("simscen: 1\nrobot: {pose: {x: 1}}", "robot.pose: 'y' is a required property"),
         ("simscen: 1\nevents: [{when: {time: 1}, do: {spwan: {}}}]", "events.0.do: Additional properties"),

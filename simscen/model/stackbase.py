@@ -1,0 +1,67 @@
+"""What the engine and the criteria read of any stack, whoever wrote it."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from simscen.spec.base import Spec, by_default
+from simscen.spec.quantities import Frequency, PositiveAngle, PositiveLength, PositiveSpeed
+from simscen.spec.references import RegionName
+
+
+class GoalTolerances(Spec):
+    """How near is near enough for goals that do not say: the stack is told, and criteria judge by it."""
+
+    xy_goal_tolerance: PositiveLength = 0.25
+    yaw_goal_tolerance: PositiveAngle = 0.25
+
+
+class SpeedZone(Spec):
+    """A part of the world with a speed limit (nav2_costmap_2d's SpeedFilter)."""
+
+    region: RegionName
+    """A region of the world, by name."""
+    speed_limit: PositiveSpeed
+    """While the robot believes itself inside."""
+
+
+MaskFile = Annotated[str, Field(min_length=1, max_length=4096)]
+
+
+class SpeedMask(Spec):
+    """A filter mask of speed limits (nav2_costmap_2d's SpeedFilter and its CostmapFilterInfo).
+
+    What a cell of the mask says is `base + multiplier · value`, its value being 0 … 100 as map_server reads the mask
+    (`mode: scale` keeps the greys). Cells of value 0 and unknown ones limit nothing, nor does a limit of 0 or less.
+    """
+
+    file: MaskFile
+    """Map yaml of the mask, relative to this file; its resolution and origin may differ from the map's."""
+    type: Literal["percent", "absolute"] = "percent"
+    """Percent of the controller's full speed (CostmapFilterInfo type 1), or m/s (type 2)."""
+    base: Annotated[float, Field(ge=-1000, le=1000)] = 0.0
+    """CostmapFilterInfo's base: percent or m/s."""
+    multiplier: Annotated[float, Field(ge=-1000, le=1000)] = 1.0
+    """CostmapFilterInfo's multiplier: percent or m/s for each unit of a cell's value."""
+
+
+class StackBase(Spec):
+    """What every stack is given, and what the engine asks of it."""
+
+    controller_frequency: Frequency = 20.0
+    """How often it is asked for a command."""
+    goal_checker: GoalTolerances = by_default()
+    """Its tolerances are those of goals that name none of their own."""
+    keepout: Annotated[list[RegionName], Field(max_length=100)] = []
+    """Regions of the world that the robot must not enter (nav2_costmap_2d's KeepoutFilter)."""
+    speed_zones: Annotated[list[SpeedZone], Field(max_length=100)] = []
+    """Regions of the world with a speed limit."""
+    keepout_mask: MaskFile | None = None
+    """Map yaml of a filter mask: its occupied cells are lethal to the costmap (nav2_costmap_2d's KeepoutFilter)."""
+    speed_mask: SpeedMask | None = None
+    """A filter mask of speed limits."""
+
+    @property
+    def told_truth(self) -> bool:
+        """Whether it is also told where it truly is."""
+        return False
