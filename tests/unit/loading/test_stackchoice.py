@@ -9,6 +9,7 @@ from simscen.loading.resolved import resolved_text, spec_of_text
 from simscen.loading.scenario import load_scenario
 from simscen.loading.stackchoice import StackChoice
 from simscen.loading.stackfile import load_stack_file
+from simscen.model.stack import StackSpec
 
 ZONES = "stack: {keepout: [hall], speed_zones: [{region: hall, speed_limit: 0.2}], costmap: {inflation_radius: 1}}\n"
 
@@ -82,3 +83,10 @@ def test_a_scenario_may_extend_a_stack_file(write, scenario, tmp_path: Path) -> 
     write("m.stack.yaml", "simscen: 1\nstack: {controller: {type: mppi}}\n")
     loaded = load_scenario(write("a.scenario.yaml", "extends: m.stack.yaml\n" + scenario), tmp_path)
     assert loaded.spec.stack.controller.type == "mppi"
+
+
+def test_the_reference_stack_takes_the_place_of_an_external_one(write, scenario, tmp_path: Path) -> None:
+    file = write("a.scenario.yaml", scenario + "stack: {external: mine, keepout: [hall]}\n")
+    stack = load_scenario(file, tmp_path, (), StackChoice("ref", "reference", "reference")).spec.stack
+    assert isinstance(stack, StackSpec)
+    assert stack.keepout == ["hall"]
