@@ -16,10 +16,10 @@ from simscen.cli.select import Selection, load_all, shard_of
 from simscen.cli.work import Work, begin
 from simscen.core.errors import Exit, InvalidInput, UsageError
 from simscen.core.sessionevents import SessionEvent
+from simscen.loading.externalstack import undefined
 from simscen.report.journal import Journal, require_free
 from simscen.report.journaldata import NAME
 from simscen.report.rebuild import read_journal
-from simscen.run.external.command import undefined
 from simscen.run.outfolder import RUNS, make_folder
 from simscen.run.session import Options, plan, run_session, seeds_of
 
@@ -101,7 +101,7 @@ def command(
         raise UsageError(f"--check-against {check_against}: there are no runs in it")
     for scenario in scenarios:
         seeds_of(scenario, options)
-    if problems := [found for scenario in scenarios if (found := undefined(scenario, options.stacks))]:
+    if problems := [found for scenario in scenarios if (found := undefined(scenario))]:
         raise InvalidInput(from_here(problems, scenarios[0].root))
     require_writable(junit, out or resume, {file for each in scenarios for file in (*each.files.values(), *each.read)})
     folder, journal = _output_folder(out, resume)

@@ -41,7 +41,7 @@ def _memory() -> int:
 def _perform(job: Job, tell: Callable[[float], None]) -> dict[str, Any]:
     prepared = _PREPARED.prepared(job.scenario)
     progress = Progress(prepared.spec.physics.tick_rate, tell)
-    return perform(prepared, job.key.seed, job.folder, (progress,), _finish, job.external)
+    return perform(prepared, job.key.seed, job.folder, (progress,), _finish)
 
 
 def _finish(prepared: Prepared, run: Run, folder: Path) -> None:

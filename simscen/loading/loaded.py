@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
+from simscen.core.externalcommand import ExternalCommand
 from simscen.core.problems import Problem
 from simscen.core.result import RunKey
 from simscen.loading.stackchoice import StackChoice
@@ -68,7 +69,7 @@ class LoadedScenario:
     of besides, once they were built.
     `notes` are warnings. With `lenient`, what of an SDF world cannot be used is left out and noted.
     `choice` is the stack that was chosen in place of its own; it is part of the runs' keys where the session has
-    `several_stacks`.
+    `several_stacks`. `runs` is what an external stack runs, as far as anybody has said so.
     """
 
     id: str
@@ -91,6 +92,7 @@ class LoadedScenario:
     speed_mask: LoadedMap | None = None
     choice: StackChoice | None = None
     several_stacks: bool = False
+    runs: ExternalCommand | None = None
 
     @property
     def variation(self) -> str:

@@ -13,7 +13,6 @@ from simscen.faults.base import Wheels
 from simscen.model.stack import StackSpec
 from simscen.run.director import Director
 from simscen.run.ending import Ending
-from simscen.run.external.command import ExternalCommand
 from simscen.run.faultrig import FaultRig
 from simscen.run.live import LiveStage, described
 from simscen.run.lockstep import Rig
@@ -30,8 +29,8 @@ from simscen.worlds.meshing import fuse, triangulate
 from simscen.worlds.rays import RayScene
 
 
-def assemble(prepared: Prepared, seed: int, external: ExternalCommand | None = None) -> Rig:
-    """Build the rig of one run of a prepared scenario with this seed; `external` is what its external stack runs."""
+def assemble(prepared: Prepared, seed: int) -> Rig:
+    """Build the rig of one run of a prepared scenario with this seed."""
     spec, world = prepared.spec, prepared.built.world
     clock, streams = Clock(spec.physics.tick_rate), Streams(seed)
     simulation = Simulation(
@@ -62,7 +61,7 @@ def assemble(prepared: Prepared, seed: int, external: ExternalCommand | None = N
         lidars=tuple(name for name, sensor in prepared.robot.sensors.items() if sensor.lidar),
     )
     if not isinstance(prepared.stack, StackSpec):
-        raise RunError("stack-crashed", f"there is no process for {prepared.stack.external} and {external}")
+        raise RunError("stack-crashed", f"there is no process for {prepared.stack.external}")
     stack = build_stack(prepared.stack, surroundings, streams, clock, stop_on_failure=spec.on_goal_failure == "stop")
     stack.start(prepared.estimate, prepared.case.goals)
 

@@ -8,7 +8,6 @@ from typing import Any
 from simscen.core.run import Run
 from simscen.judge.resultdata import to_json
 from simscen.loading.resolved import resolved_text
-from simscen.run.external.command import ExternalCommand
 from simscen.run.lockstep import Log
 from simscen.run.prepare import Prepared
 from simscen.run.simulate import simulate
@@ -17,22 +16,14 @@ Finish = Callable[[Prepared, Run, Path], None]
 """What is made of a run in its folder besides its log and its result, e.g. a picture."""
 
 
-def perform(
-    prepared: Prepared,
-    seed: int,
-    folder: Path,
-    logs: tuple[Log, ...],
-    finish: Finish,
-    external: ExternalCommand | None = None,
-) -> dict[str, Any]:
+def perform(prepared: Prepared, seed: int, folder: Path, logs: tuple[Log, ...], finish: Finish) -> dict[str, Any]:
     """Do the run and leave run.mcap, result.json, scenario.yaml and what `finish` makes in `folder`.
 
-    `external` is what the scenario's external stack runs. Returns the end record: the outcome and the log's SHA-256,
-    for the supervisor.
+    Returns the end record: the outcome and the log's SHA-256, for the supervisor.
     """
     log = folder / "run.mcap"
     (folder / "scenario.yaml").write_text(resolved_text(prepared.loaded), encoding="utf-8")
-    run = simulate(prepared, seed, log=log, attach=lambda *_: logs, external=external)
+    run = simulate(prepared, seed, log=log, attach=lambda *_: logs)
     (folder / "result.json").write_text(to_json(run.result), encoding="utf-8")
     finish(prepared, run, folder)
     return {"outcome": run.result.outcome.value, "sha256": hashlib.sha256(log.read_bytes()).hexdigest()}

@@ -2,7 +2,7 @@
 
 import filecmp
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
 
@@ -12,7 +12,6 @@ from simscen.core.result import Outcome, RunFailure
 from simscen.core.sessionevents import Listener, RunFinished, RunProgress, RunStarted
 from simscen.loading.loaded import LoadedScenario
 from simscen.run.against import agreed
-from simscen.run.external.command import Commands, command_of
 from simscen.run.outfolder import run_folder
 from simscen.run.process.answer import answer_to, not_done
 from simscen.run.process.jobs import Job
@@ -24,7 +23,7 @@ class Options:
     """How to run. `seed` None = each scenario's own; `repeat` runs use consecutive seeds.
 
     `twice` runs everything a second time with the same seed, to compare; `against` is the output folder of an earlier
-    session to compare with. `wall_limit` in seconds bounds each run. `stacks` tells what external stacks run.
+    session to compare with. `wall_limit` in seconds bounds each run.
     """
 
     workers: int = 1
@@ -34,7 +33,6 @@ class Options:
     fail_fast: bool = False
     wall_limit: float = 300.0
     against: Path | None = None
-    stacks: Commands = field(default_factory=dict)
 
 
 def seeds_of(scenario: LoadedScenario, options: Options) -> range:
@@ -47,18 +45,15 @@ def seeds_of(scenario: LoadedScenario, options: Options) -> range:
 
 
 def plan(scenarios: Sequence[LoadedScenario], options: Options, out: Path) -> list[Job]:
-    """All runs of a session in the order they are started: scenario by scenario, seed by seed, stack by stack.
-
-    Raises InvalidInput when a scenario's external stack is nobody's.
-    """
+    """All runs of a session in the order they are started: scenario by scenario, seed by seed, stack by stack."""
     jobs: list[Job] = []
     for _, group in groupby(scenarios, key=lambda scenario: scenario.id):
-        variants = [(scenario, command_of(scenario, options.stacks)) for scenario in group]
-        for seed in seeds_of(variants[0][0], options):
-            for scenario, external in variants:
+        variants = list(group)
+        for seed in seeds_of(variants[0], options):
+            for scenario in variants:
                 key = scenario.key(seed)
                 for each in (key, key.twin) if options.twice else (key,):
-                    jobs.append(Job(len(jobs), scenario, each, run_folder(out, each), options.wall_limit, external))
+                    jobs.append(Job(len(jobs), scenario, each, run_folder(out, each), options.wall_limit))
     return jobs
 
 

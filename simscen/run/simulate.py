@@ -19,7 +19,6 @@ from simscen.record.header import LogHeader
 from simscen.record.recorder import Recorder
 from simscen.record.tracebuilder import TraceBuilder
 from simscen.run.assemble import assemble
-from simscen.run.external.command import Commands, ExternalCommand, command_of
 from simscen.run.lockstep import Log, Rig, run_lockstep
 from simscen.run.prepare import Prepared, prepare
 from simscen.sim.urdf.describe import describe
@@ -29,16 +28,9 @@ Attach = Callable[[Rig, Sequence[Log]], Sequence[Log]]
 
 
 def simulate(
-    prepared: Prepared,
-    seed: int | None = None,
-    *,
-    log: Path | None = None,
-    attach: Attach | None = None,
-    external: ExternalCommand | None = None,
+    prepared: Prepared, seed: int | None = None, *, log: Path | None = None, attach: Attach | None = None
 ) -> Run:
     """Run a prepared scenario with this seed (default: its own) and judge it; `log` is the MCAP file to write.
-
-    `external` is what the stack runs that the scenario names.
 
     *Given* the same scenario and seed *then* the same run and the same bytes in `log`, whatever ran before in this
     process. Raises RunError when the run cannot be completed, OSError when the log cannot be written.
@@ -48,7 +40,7 @@ def simulate(
     builder = TraceBuilder(clock)
     with ExitStack() as closing:
         recorder = log and closing.enter_context(Recorder(log, clock, log_header(prepared, seed)))
-        rig = assemble(prepared, seed, external)
+        rig = assemble(prepared, seed)
         closing.callback(rig.simulation.close)
         own: tuple[Log, ...] = (builder, recorder) if recorder else (builder,)
         end = run_lockstep(rig, (*own, *(attach(rig, own) if attach else ())))
@@ -59,17 +51,10 @@ def simulate(
 
 
 def simulate_file(
-    file: Path,
-    seed: int | None,
-    log: Path | None,
-    root: Path | None,
-    world_path: Sequence[Path] = (),
-    stacks: Commands | None = None,
+    file: Path, seed: int | None, log: Path | None, root: Path | None, world_path: Sequence[Path] = ()
 ) -> Run:
     """Load, prepare and simulate a scenario file. Raises InvalidInput, and what `simulate` raises."""
-    loaded = load_scenario(file, root or default_root([file]), world_path)
-    external = command_of(loaded, stacks or {})
-    return simulate(prepare(loaded), seed, log=log, external=external)
+    return simulate(prepare(load_scenario(file, root or default_root([file]), world_path)), seed, log=log)
 
 
 def judged(prepared: Prepared, seed: int, trace: Trace, log: Path | None = None) -> Run:

@@ -10,21 +10,19 @@ from typing import Any
 
 from simscen.core.result import RunKey
 from simscen.loading.loaded import LoadedScenario
-from simscen.run.external.command import ExternalCommand
 
 _LENGTH = struct.Struct("<I")
 
 
 @dataclass(frozen=True)
 class Job:
-    """One run: a validated scenario, a seed, the folder its files go to, and what its external stack runs."""
+    """One run: a scenario that has been validated, a seed, and the folder its files go to."""
 
     number: int
     scenario: LoadedScenario
     key: RunKey
     folder: Path
     wall_limit: float
-    external: ExternalCommand | None = None
 
 
 @dataclass(frozen=True)
