@@ -1,5 +1,6 @@
 """The composition root: the only place that builds engines, sensors and stacks."""
 
+import math
 from collections.abc import Mapping
 
 from simscen.core.chance import Streams
@@ -91,10 +92,10 @@ class LiveRays:
         self._scene, self._simulation = scene, simulation
         self._meshes: dict[str, TriangleMesh] = {}
 
-    def cast(self, origins: Array, directions: Array) -> Array:
+    def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
         """See core.rays.RayCaster."""
         self._scene.set_moving(self._placed())
-        return self._scene.cast(origins, directions)
+        return self._scene.cast(origins, directions, reach)
 
     def _placed(self) -> Mapping[str, tuple[TriangleMesh, Pose3]]:
         moving = self._simulation.moving()

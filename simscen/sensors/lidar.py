@@ -10,6 +10,9 @@ from simscen.core.sensing import Scan
 from simscen.model.robot import Lidar
 from simscen.sensors.sensor import SensorView
 
+CERTAIN = 10.0
+"""Standard deviations that noise never exceeds."""
+
 
 class LidarSensor:
     """Measures along `spec.beams` directions at once; a scan is an instant, as in Gazebo.
@@ -28,6 +31,7 @@ class LidarSensor:
         self._mount = Pose2(spec.mount.x, spec.mount.y, spec.mount.yaw)
         angles = self._first + self._increment * np.arange(spec.beams, dtype=np.float64)
         self._directions = _directions(angles + spec.mount.yaw)
+        self._reach = spec.max_range + CERTAIN * spec.noise
         self._lens = np.array([[spec.mount.x, spec.mount.y, spec.mount.z]])
 
     def read(self, tick: int) -> Scan:
@@ -35,7 +39,7 @@ class LidarSensor:
         pose = self._view.base_pose()
         directions = self._directions @ pose.rotation().T
         origins = np.repeat(pose.apply(self._lens), len(directions), axis=0)
-        ranges = self._measured(self._rays.cast(origins, directions))
+        ranges = self._measured(self._rays.cast(origins, directions, self._reach))
         spec = self._spec
         return Scan(self.name, tick, ranges, self._first, self._increment, spec.min_range, spec.max_range, self._mount)
 

@@ -1,6 +1,7 @@
 """Things that move: by a script, or because they are pushed."""
 
 import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +19,7 @@ from simscen.sim.outline import reach
 FRICTION = 0.6
 """Of pushable things on the ground: about that of wood or cardboard on concrete."""
 Vector = tuple[float, float, float]
+Placing = tuple[Vector, tuple[float, float, float, float]]
 JUMP = 50.0
 """A script that asks for more m/s than this sets its body down elsewhere, rather than hurl it through the world."""
 
@@ -39,6 +41,12 @@ class Actor:
     speed: float
     size: float
     surface: Mesh | None
+    placed: tuple[Placing, Pose3] | None = None
+    """What the engine last said of its centre of mass, and the pose that comes of it."""
+    sound: tuple[Placing, Pose3] | None = None
+    """What of that was last found not to be lost."""
+    resting: bool = False
+    """Whether it has not moved at all since the engine was asked before."""
 
     @property
     def pushable(self) -> bool:
@@ -58,6 +66,11 @@ class Actors:
         self._client, self._rate, self._triangulate = client, tick_rate, triangulate
         self._actors: dict[str, Actor] = {}
         self._travelling: list[Actor] = []
+        self._poses: Mapping[str, Pose3] = {}
+        self._posed_at: int | None = None
+        self._still_since: int | None = None
+        self._until_asleep = math.ceil(2 * engine.UNTIL_ASLEEP * tick_rate)
+        self._undisturbed_until = -1
         self.pushing = False
         """Whether scripted bodies might push pushable ones."""
 
@@ -95,12 +108,17 @@ class Actors:
     def move(self, name: str, path: MotionPath, tick: int) -> None:
         """Let a body follow a path from `tick` on; from then on nothing can push it."""
         actor = self._actors[name]
-        self.add(replace(actor.body, pose=self._pose(actor, tick), mass=0.0, path=path), tick)
+        self.add(replace(actor.body, pose=self.poses(tick)[name], mass=0.0, path=path), tick)
 
     def _sort(self) -> None:
+        self._posed_at = self._still_since = None
         self._actors = dict(sorted(self._actors.items()))
         self._travelling = [actor for actor in self._actors.values() if actor.path is not None]
-        self.pushing = bool(self._travelling) and any(actor.pushable for actor in self._actors.values())
+        pushable = [actor for actor in self._actors.values() if actor.pushable]
+        self.pushing = bool(self._travelling and pushable)
+        for actor in pushable:
+            # What lay on something that is gone has to fall; and what a script moves does not wake what it meets.
+            engine.wake(self._client, actor.id, may_sleep=not self._travelling)
 
     def begin(self, tick: int) -> None:
         """Before the step that leads from `tick` to the next: scripted bodies in place and with their velocity."""
@@ -137,49 +155,80 @@ class Actors:
                     actor.id, pose.position, pose.quaternion, physicsClientId=self._client
                 )
 
-    def poses(self, tick: int) -> dict[str, Pose3]:
-        """Where everything is, by name in order."""
-        return {name: self._pose(actor, tick) for name, actor in self._actors.items()}
+    def poses(self, tick: int) -> Mapping[str, Pose3]:
+        """Where everything is, by name in order; the engine is asked at most once for each tick."""
+        if self._posed_at != tick and not self._asleep(tick):
+            self._poses = {name: self._pose(actor, tick) for name, actor in self._actors.items()}
+            self._posed_at = tick
+            if self._still_since is None or not all(actor.resting for actor in self._actors.values()):
+                self._still_since = tick
+        return self._poses
+
+    def _asleep(self, tick: int) -> bool:
+        """Whether everything has long been lying, so that the engine lets it lie, and nothing can have touched it.
+
+        What something only comes near to wakes in the engine and creeps by less than a micrometre until it is touched.
+        """
+        still = self._still_since is not None and tick - self._still_since > self._until_asleep
+        return still and tick <= self._undisturbed_until
+
+    def undisturbed(self, until: int) -> None:
+        """Nothing else can touch any of these until this tick."""
+        self._undisturbed_until = until
 
     def placed(self, tick: int) -> dict[str, tuple[Body, Pose3]]:
         """Everything and where it is, by name in order."""
-        return {name: (actor.body, self._pose(actor, tick)) for name, actor in self._actors.items()}
+        return {name: (self._actors[name].body, pose) for name, pose in self.poses(tick).items()}
 
     def _pose(self, actor: Actor, tick: int) -> Pose3:
+        actor.resting = not actor.pushable and actor.path is None
         if actor.path is not None:
             return Pose3.planar(pose_at(actor.path, (tick - actor.since) / self._rate), actor.body.pose.z)
         if not actor.pushable:
             return actor.body.pose
-        position, turn = pybullet.getBasePositionAndOrientation(actor.id, physicsClientId=self._client)
-        return Pose3(*position, *turn).compose(actor.centre_from_base)
+        said: Placing = pybullet.getBasePositionAndOrientation(actor.id, physicsClientId=self._client)
+        actor.resting = actor.placed is not None and actor.placed[0] == said
+        if actor.placed is None or not actor.resting:
+            actor.placed = said, Pose3(*said[0], *said[1]).compose(actor.centre_from_base)
+        return actor.placed[1]
 
     def around(self, place: Vector, tick: int) -> str | None:
         """The first thing that a place is inside of, of those that the engine knows as a surface only."""
-        for name, actor in self._actors.items():
-            if actor.surface is not None:
-                x, y, z = self._pose(actor, tick).inverse().apply(np.array(place)).tolist()
-                if winds_around(actor.surface.vertices[actor.surface.faces], (x, y, z)):
+        for name, pose in self.poses(tick).items():
+            surface = self._actors[name].surface
+            if surface is not None:
+                x, y, z = pose.inverse().apply(np.array(place)).tolist()
+                if winds_around(surface.vertices[surface.faces], (x, y, z)):
                     return name
         return None
 
-    def lost(self) -> str | None:
+    def lost(self, tick: int) -> str | None:
         """What has become of the first thing that the engine has lost, or None."""
+        self.poses(tick)
         for name, actor in self._actors.items():
-            if actor.pushable:
-                place, turn = pybullet.getBasePositionAndOrientation(actor.id, physicsClientId=self._client)
+            if actor.placed is not None and actor.placed is not actor.sound:
+                place, turn = actor.placed[0]
                 if trouble := lost(f'object "{name}"', *place, *turn):
                     return trouble
+                actor.sound = actor.placed
         return None
+
+    def within(self, place: Vector, distance: float, tick: int) -> Iterator[int]:
+        """The engine's numbers of those that may be as near to a place as a distance in metres."""
+        for name, pose in self.poses(tick).items():
+            if math.dist(pose[:3], place) <= distance + self._actors[name].size:
+                yield self._actors[name].id
 
     def ids(self) -> dict[int, str | None]:
         """Names by the engine's numbers."""
         return {actor.id: name for name, actor in self._actors.items()}
 
-    def top_speed(self) -> float:
-        """How fast anything may come along within a tenth of a second, in m/s.
+    def top_speed(self, tick: int) -> float:
+        """How fast anything may come along within a tenth of a second from `tick` on, which is now, in m/s.
 
         A thing that is hit by a heavier one leaves with up to twice its speed.
         """
+        self.poses(tick)
         speeds = [self._speed(actor) for actor in self._actors.values()]
         several = sum(actor.pushable for actor in self._actors.values()) > 1
         return max(speeds, default=0.0) * (2 if several else 1)
@@ -187,6 +236,8 @@ class Actors:
     def _speed(self, actor: Actor) -> float:
         if not actor.pushable:
             return actor.speed
+        falling = 0.1 * GRAVITY  # what it may gain within that time
+        if actor.resting:
+            return falling
         linear, angular = pybullet.getBaseVelocity(actor.id, physicsClientId=self._client)
-        # What it may gain by falling for 0.1 s.
-        return math.hypot(*linear) + math.hypot(*angular) * actor.size + 0.1 * GRAVITY
+        return math.hypot(*linear) + math.hypot(*angular) * actor.size + falling

@@ -16,6 +16,8 @@ HORIZON = 0.1
 """Seconds for which a clearance may at most rule out a contact."""
 TOLERANCE = 0.002
 """m of clearance that count as none: corners of shapes are rounded by up to 0.4 mm."""
+ROUNDED = 0.05
+"""m that shapes may extend further than their corners, which is where sizes come from."""
 
 Vector = tuple[float, float, float]
 
@@ -41,6 +43,7 @@ class Clearance:
         """`reach` is how far is searched, in metres."""
         self._client, self._rate, self._base, self._actors = client, tick_rate, base, actors
         self._limits, (self._radius, self._height) = robot.limits, reach_of(robot.solid)
+        self._size = ROUNDED + math.hypot(self._radius, self._height)
         self._proximity = Proximity(static, robot, reach)
         self._reach = reach
         self._shaken_at = -1
@@ -55,6 +58,7 @@ class Clearance:
         """Something was put into or taken out of the world, or set down elsewhere: measure anew."""
         self._distance = 0.0
         self._measured_at, self.no_contact_before = -1, 0
+        self._actors.undisturbed(until=-1)
         self.enclosed_by: str | None = None
         """The solid that the robot is wholly inside of, where it touches no surface."""
         self.unsure = True
@@ -64,26 +68,29 @@ class Clearance:
         """A push will change the robot's velocity during the step from `tick` on: how it moves now says nothing."""
         self._shaken_at = tick
         self._measured_at, self.no_contact_before = -1, tick
+        self._actors.undisturbed(until=tick)
 
     def measure(self, tick: int) -> float:
         """The clearance at `tick`, which is now, in metres; the reach where nothing is nearer."""
         if self._measured_at == tick:
             return self._distance
         self._actors.show(tick)
-        self._distance = self._search()
+        self._distance = self._search(tick)
         self._measured_at = tick
         if self.unsure:
             self.enclosed_by = self._enclosing(tick)
             self.unsure = self.enclosed_by is not None
         if self.enclosed_by is not None:
             self._distance = -abs(self._distance)
-        free = min(HORIZON, max(0.0, self._distance - TOLERANCE) / self._fastest())
+        free = min(HORIZON, max(0.0, self._distance - TOLERANCE) / self._fastest(tick))
         self.no_contact_before = tick + (math.floor(free * self._rate) if tick != self._shaken_at else 0)
+        self._actors.undisturbed(until=self.no_contact_before)
         return self._distance
 
-    def _search(self) -> float:
-        nearest = min(self._reach, self._proximity.distance(self._base.pose()))
-        for other in self._actors.ids():
+    def _search(self, tick: int) -> float:
+        pose = self._base.pose()
+        nearest = min(self._reach, self._proximity.distance(pose))
+        for other in self._actors.within(pose.position, nearest + self._size, tick):
             for link in self._base.hull_links:
                 points = pybullet.getClosestPoints(self._base.id, other, nearest, link, physicsClientId=self._client)
                 nearest = min((point[8] for point in points), default=nearest)
@@ -99,13 +106,13 @@ class Clearance:
         around = self._proximity.around(place, but=self._buildings)
         return self._proximity.name(around[0]) if around else self._actors.around(place, tick)
 
-    def _fastest(self) -> float:
+    def _fastest(self, tick: int) -> float:
         """The greatest speed in m/s at which the robot and anything else can approach each other for a while."""
         limits, (linear, angular) = self._limits, self._base.velocity()
         forward = max(limits.linear, limits.reverse or 0.0, limits.lateral or 0.0, math.hypot(*linear))
         turning = max(limits.angular, math.hypot(*angular)) * self._radius
         tipping = math.hypot(*angular[:2]) * self._height
-        return 1.25 * (forward + turning + tipping) + self._actors.top_speed() + 0.1
+        return 1.25 * (forward + turning + tipping) + self._actors.top_speed(tick) + 0.1
 
     def owner(self, place: Vector) -> str:
         """The static solid that is touched at a place; remembered by the centimetre, since contacts last."""

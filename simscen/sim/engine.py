@@ -24,6 +24,11 @@ CONVEX_FACES = 400
 FLAT = 1e-6
 """m by which corners may stand out of a face of a convex mesh."""
 
+AT_REST = 1e-6
+"""(m/s)² below which a body is at rest; Bullet's own 0.05 would stop a ball that rolls at 0.2 m/s."""
+UNTIL_ASLEEP = 2.0
+"""Seconds at rest after which Bullet lets a body lie until it is touched (btMultiBody's SLEEP_TIMEOUT)."""
+
 GROUND, HULL, WHEEL = 64, 32, 16
 """Collision groups of the ground and of a robot's parts; everything else is in Bullet's own 1 and 2."""
 EVERYTHING = -1
@@ -255,6 +260,15 @@ def body(client: int, mass: float, shapes: tuple[int, int], pose: Pose3, frame: 
         pybullet.changeDynamics(number, -1, localInertiaDiagonal=moments, physicsClientId=client)
         pybullet.resetBasePositionAndOrientation(number, centre.position, centre.quaternion, physicsClientId=client)
     return number
+
+
+def wake(client: int, number: int, may_sleep: bool) -> None:
+    """Wake a body; one that `may_sleep` lies still from UNTIL_ASLEEP after it came to rest until it is touched."""
+    allowed = pybullet.ACTIVATION_STATE_ENABLE_SLEEPING if may_sleep else pybullet.ACTIVATION_STATE_DISABLE_SLEEPING
+    pybullet.changeDynamics(
+        number, -1, activationState=allowed | pybullet.ACTIVATION_STATE_WAKE_UP, sleepThreshold=AT_REST,
+        physicsClientId=client,
+    )  # fmt: skip
 
 
 def fixed(client: int, shape: int) -> int:

@@ -112,7 +112,7 @@ class Simulation:
     def truth(self) -> Truth:
         """The robot as it really is. Raises RunError when the physics has lost it or anything else."""
         pose, velocity = self._base.pose(), self._base.velocity()
-        trouble = lost("the robot", *pose, *velocity[0], *velocity[1]) or self._actors.lost()
+        trouble = lost("the robot", *pose, *velocity[0], *velocity[1]) or self._actors.lost(self.tick)
         if trouble is not None:
             raise RunError("diverged", f"simulation diverged at t={self.tick / self._rate:.3f} s: {trouble}")
         clearance, objects = self._clearance.measure(self.tick), self._actors.poses(self.tick)

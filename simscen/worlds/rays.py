@@ -1,7 +1,9 @@
 """Ray casting with Embree: one scene for what never moves, and one for each thing that does, in its own frame."""
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -33,33 +35,42 @@ class RayScene:
         self._device = EmbreeDevice()
         self._static = _Part(self._device, static)
         self._movers: dict[str, _Mover] = {}
+        self._solid: list[_Mover] = []
 
     def set_moving(self, bodies: Mapping[str, Placed]) -> None:
         """Say where the bodies are now: by name, the triangles in a body's frame and the pose of that frame."""
-        self._movers = {name: _Mover(self._part(name, mesh), pose) for name, (mesh, pose) in bodies.items()}
+        movers = {name: self._mover(name, mesh, pose) for name, (mesh, pose) in bodies.items()}
+        if movers != self._movers:
+            self._movers, solid = movers, [mover for mover in movers.values() if len(mover.part.mesh.faces)]
+            self._solid = solid
+            self._centres = np.array([mover.centre for mover in solid]).reshape(-1, 3)
+            self._radii = np.array([[mover.part.radius] for mover in solid]).reshape(-1, 1)
 
-    def cast(self, origins: Array, directions: Array) -> Array:
-        """Distances (n,) in metres along unit `directions` (n, 3) from `origins` (n, 3); inf for no hit."""
+    def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
+        """See core.rays.RayCaster."""
         distances = self._static.distances(origins, directions)
-        for mover, rays in self._near(origins, directions):
+        for mover, rays in self._near(origins, directions, np.minimum(distances, reach)):
             distances[rays] = np.minimum(distances[rays], mover.distances(origins[rays], directions[rays]))
-        return np.where(distances < _NO_HIT, distances, np.inf).astype(np.float64)
+        return np.where(distances <= min(reach, _NO_HIT), distances, np.inf).astype(np.float64)
 
-    def _part(self, name: str, mesh: TriangleMesh) -> "_Part":
+    def _mover(self, name: str, mesh: TriangleMesh, pose: Pose3) -> "_Mover":
         known = self._movers.get(name)
-        return known.part if known and known.part.mesh is mesh else _Part(self._device, mesh)
+        if known is None or known.part.mesh is not mesh:
+            return _Mover(_Part(self._device, mesh), pose)
+        return known if known.pose == pose else _Mover(known.part, pose)
 
-    def _near(self, origins: Array, directions: Array) -> Iterator[tuple["_Mover", npt.NDArray[np.int64]]]:
-        """The moving bodies and the numbers of the rays that meet the sphere around them."""
-        movers = [mover for mover in self._movers.values() if len(mover.part.mesh.faces)]
-        if not movers:
+    def _near(
+        self, origins: Array, directions: Array, ends: Singles
+    ) -> Iterator[tuple["_Mover", npt.NDArray[np.int64]]]:
+        """The moving bodies and the numbers of the rays that meet the sphere around them before they end."""
+        if not self._solid:
             return
-        centres, radii = np.array([mover.centre for mover in movers]), np.array([mover.part.radius for mover in movers])
+        centres, radii = self._centres, self._radii
         ahead = centres @ directions.T - (origins * directions).sum(axis=1)
         off = (centres**2).sum(axis=1)[:, np.newaxis] - 2 * (centres @ origins.T) + (origins**2).sum(axis=1) - ahead**2
-        meets = (off <= radii[:, np.newaxis] ** 2) & (ahead >= -radii[:, np.newaxis])
+        meets = (ahead >= -radii) & (ahead - radii <= ends) & (off <= radii**2)
         for number in np.flatnonzero(meets.any(axis=1)):
-            yield movers[number], np.flatnonzero(meets[number])
+            yield self._solid[number], np.flatnonzero(meets[number])
 
 
 class _Part:
@@ -91,16 +102,19 @@ class _Mover:
     part: _Part
     pose: Pose3
 
-    @property
+    @cached_property
     def centre(self) -> Array:
         """The middle of the body in the world."""
         centre: Array = self.pose.apply(self.part.middle[np.newaxis])[0]
         return centre
 
+    @cached_property
+    def _turn(self) -> Array:
+        return self.pose.rotation()
+
     def distances(self, origins: Array, directions: Array) -> Singles:
         """As _Part.distances, of rays in the world."""
-        turn = self.pose.rotation()
-        return self.part.distances((origins - self.pose.position) @ turn, directions @ turn)
+        return self.part.distances((origins - self.pose.position) @ self._turn, directions @ self._turn)
 
 
 def _middle(vertices: Array) -> Array:

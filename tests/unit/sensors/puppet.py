@@ -1,5 +1,6 @@
 """A robot that stands or moves as told, and walls to look at, for tests of sensors."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,7 +40,7 @@ class SquareRoom:
     def __init__(self, half):
         self.half = half
 
-    def cast(self, origins, directions):
+    def cast(self, origins, directions, reach=math.inf):
         with np.errstate(divide="ignore", invalid="ignore"):
             walls = (np.sign(directions[:, :2]) * self.half - origins[:, :2]) / directions[:, :2]
         return np.nanmin(np.where(walls > 0, walls, np.inf), axis=1)
@@ -48,7 +49,7 @@ class SquareRoom:
 class Nothing:
     """An empty world."""
 
-    def cast(self, origins, directions):
+    def cast(self, origins, directions, reach=math.inf):
         return np.full(len(origins), np.inf)
 
 

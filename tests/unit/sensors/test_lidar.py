@@ -68,7 +68,7 @@ def test_a_robot_that_leans_shines_into_the_air():
     seen = []
 
     class Watcher:
-        def cast(self, origins, directions):
+        def cast(self, origins, directions, reach=math.inf):
             seen.append((origins[0], directions[180]))
             return np.ones(len(origins))
 

@@ -1,0 +1,99 @@
+"""What lies still costs nothing, and is awake the moment that anything touches it."""
+
+import pybullet
+import pytest
+from playground import box
+
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.motion import Twist
+from simscen.core.shapes import Body, MotionPath, Solid, Sphere
+
+CRATE = (box("crate", 0, 0, 0.4, 0.4, 0.4),)
+BALL = (Solid(Sphere(0.1), Pose3(z=0.1), "ball"),)
+LONG = 5 * 240
+"""Ticks after which everything that rests is asleep."""
+
+
+def run(simulation, ticks, every=6):
+    for _ in range(ticks // every):
+        simulation.step(every)
+        simulation.truth()
+
+
+def engine_pose(simulation, name):
+    """What the engine itself says of a body whose centre of mass is above its origin."""
+    number = simulation._actors._actors[name].id
+    return pybullet.getBasePositionAndOrientation(number, physicsClientId=simulation._client)[0]
+
+
+def test_what_rests_does_not_creep(simulate):
+    simulation = simulate(bodies=[Body("crate", CRATE, Pose3(2.0), 5.0)])
+    run(simulation, LONG)
+    before = simulation.object_pose("crate")
+    run(simulation, 20 * 240)
+    assert simulation.object_pose("crate") == before
+
+
+def test_what_rolls_slowly_rolls_on(simulate):
+    """Bullet's own threshold would stop a ball of 0.1 m/s after two seconds."""
+    simulation = simulate(bodies=[Body("ball", BALL, Pose3(2.0), 1.0)])
+    run(simulation, LONG)
+    simulation.spawn(Body("other", CRATE, Pose3(-5.0)))  # what is changed wakes everything
+    run(simulation, 6)
+    number = simulation._actors._actors["ball"].id
+    pybullet.resetBaseVelocity(number, (0.1, 0, 0), (0, 1.0, 0), physicsClientId=simulation._client)
+    run(simulation, LONG)
+    assert engine_pose(simulation, "ball")[0] == pytest.approx(2.5, abs=0.02)
+
+
+def test_a_robot_that_comes_slowly_wakes_and_pushes_what_sleeps(simulate):
+    simulation = simulate("amr", bodies=[Body("crate", CRATE, Pose3(1.2), 3.0)])
+    run(simulation, LONG)
+    before = simulation.object_pose("crate").x
+    simulation.drive(Twist(0.1, 0.0, 0.0))
+    run(simulation, 12 * 240)
+    assert simulation.object_pose("crate").x > before + 0.2
+
+
+def test_what_is_told_is_what_the_engine_says_at_every_sample(simulate):
+    simulation = simulate("amr", bodies=[Body("crate", CRATE, Pose3(1.6), 3.0)])
+    run(simulation, LONG)
+    for tick in range(0, 8 * 240, 6):
+        if tick == 240:
+            simulation.drive(Twist(0.4, 0.0, 0.0))
+        simulation.step(6)
+        x, y, _ = engine_pose(simulation, "crate")
+        told = simulation.truth().objects["crate"]
+        upright = told.apply([[0.0, 0.0, 0.2]])[0]
+        assert upright[:2] == pytest.approx([x, y], abs=1e-6)
+    assert x > 1.65
+
+
+@pytest.mark.parametrize("looked", [True, False])
+def test_what_lay_on_something_that_is_gone_falls(simulate, looked):
+    upper = Body("upper", CRATE, Pose3(2.0, 0.0, 0.4), 2.0)
+    simulation = simulate(bodies=[Body("lower", CRATE, Pose3(2.0), 5.0), upper])
+    run(simulation, LONG)
+    assert simulation.object_pose("upper").z == pytest.approx(0.4, abs=2e-3)
+    simulation.remove("lower")
+    if looked:
+        simulation.truth()
+    run(simulation, 240)
+    assert simulation.object_pose("upper").z == pytest.approx(0.0, abs=2e-3)
+
+
+def test_a_scripted_cart_pushes_what_slept(simulate):
+    simulation = simulate(bodies=[Body("crate", CRATE, Pose3(3.0), 3.0), Body("cart", CRATE, Pose3(2.0))])
+    run(simulation, LONG)
+    simulation.move("cart", MotionPath((0.0, 4.0), (Pose2(2.0, 0.0, 0.0), Pose2(4.0, 0.0, 0.0))))
+    run(simulation, 5 * 240)
+    assert simulation.object_pose("crate").x > 4.3
+
+
+def test_what_is_put_onto_something_asleep_wakes_it(simulate):
+    simulation = simulate(bodies=[Body("crate", CRATE, Pose3(2.0), 0.5)])
+    run(simulation, LONG)
+    simulation.spawn(Body("anvil", CRATE, Pose3(2.3, 0.0, 0.5), 50.0))
+    run(simulation, 240)
+    assert simulation.object_pose("crate") != Pose3(2.0)
+    assert simulation.object_pose("anvil").z < 0.35
