@@ -6,6 +6,7 @@ Casting for Accelerated Localization (ICRA 2018), section II.
 """
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from simscen.core.geometry import Array
 from simscen.core.grid import FREE, OccupancyGrid
 from simscen.stack.localizers.beams import Beams
 from simscen.stack.localizers.distance_field import DistanceField, by_blocks
+from simscen.stack.localizers.likelihood_field import PEAK_OF_SUMS
 
 
 def opaque_field(grid: OccupancyGrid, max_distance: float) -> DistanceField:
@@ -49,6 +51,8 @@ def _march(field: DistanceField, x: Array, y: Array, angle: Array, limit: float)
 @dataclass(frozen=True, eq=False)
 class BeamModel:
     """Each beam's range is a hit, something short before it, nothing, or chance; a particle weighs 1 + Σ p³."""
+
+    peak: ClassVar[float] = PEAK_OF_SUMS
 
     field: DistanceField
     z_hit: float

@@ -15,9 +15,17 @@ from simscen.core.grid import OCCUPIED, OccupancyGrid
 from simscen.stack.localizers.beams import Beams
 from simscen.stack.localizers.distance_field import DistanceField, Float32, by_blocks
 
+PEAK_OF_SUMS = 16.0
+"""Of models whose particles weigh 1 + Σ p³: over 60 beams, one that fits makes a particle but 1 or 2 % heavier."""
+
 
 class SensorModel(Protocol):
     """Judges particles by a scan."""
+
+    @property
+    def peak(self) -> float:
+        """The power that brings out which particles are best: 1 where weights are the likelihood of all beams."""
+        ...
 
     def log_likelihood(self, poses: Array, beams: Beams, converged: bool) -> Array:
         """Logarithms (n,) of how likely the beams are at each of `poses` (n, 3); -inf for impossible, never nan.
@@ -53,6 +61,8 @@ class LikelihoodField:
     Not a product of probabilities: Nav2 calls it "an ad-hoc weighting scheme" that "works well". It forgives beams
     that hit what is not on the map, and it never says that a pose is impossible.
     """
+
+    peak = PEAK_OF_SUMS
 
     def __init__(self, field: DistanceField, z_hit: float, z_rand: float, sigma_hit: float) -> None:
         self._field, self._z_rand = field, np.float32(z_rand)
@@ -91,6 +101,8 @@ class BeamSkipping:
 
 class LikelihoodFieldProb:
     """A particle weighs the product of its beams' probabilities (table 6.3), with optional beam skipping."""
+
+    peak = 1.0
 
     def __init__(
         self, field: DistanceField, z_hit: float, z_rand: float, sigma_hit: float, skipping: BeamSkipping | None = None

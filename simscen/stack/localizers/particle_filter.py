@@ -65,7 +65,7 @@ class ParticleFilter:
         if self._recovery.wanted:
             self._observe(beams, weights, shift)
         self.particles = Particles(poses, weights / total) if total > 0 else Particles.equal(poses)
-        answer = summarise(self.particles) if total > 0 else None
+        answer = summarise(self.particles, self._sensor.peak) if total > 0 else None
         self._resample()
         return answer
 

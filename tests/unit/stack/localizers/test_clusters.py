@@ -55,13 +55,70 @@ def test_the_covariance_is_the_weighted_one_about_the_pose() -> None:
     assert np.allclose(about, np.cov(poses.T, aweights=weights, ddof=0) + np.outer(shift, shift))
 
 
-def test_the_pose_is_the_mean_of_the_particles_near_the_best_one() -> None:
-    """A tail on one side, which belongs to the same cluster, does not draw the pose away."""
-    peak, tail = group(Pose2(0, 0, 0), 0.03, 300, 6), group(Pose2(0.6, 0, 0), 0.1, 300, 7)
-    weights = np.concatenate((np.full(300, 2.0), np.full(300, 1.0)))
-    weights[0] = 2.1
-    pose, _ = summarise(Particles(np.concatenate((peak, tail)), weights / weights.sum()))
-    assert pose == pytest.approx((0, 0, 0), abs=0.01)
+def between_two(far: float, heavier: float, peak: float, inside: tuple[float, float]) -> float:
+    """Where two groups are summed up: one at 0 and `heavier` times as heavy, one at `far`; variances `inside` (m²)."""
+    means, widths = [], []
+    for power in (1.0, peak):
+        share = 1 / (1 + heavier**power)
+        means.append(far * share)
+        widths.append((1 - share) * inside[0] + share * inside[1] + far**2 * share * (1 - share))
+    return (means[0] * widths[1] + means[1] * widths[0]) / sum(widths)
+
+
+@pytest.mark.parametrize("peak", [1.0, 2.0, 16.0])
+def test_a_tail_of_lighter_particles_draws_the_pose_as_far_as_the_power_of_their_weights(peak: float) -> None:
+    poses = np.concatenate((group(Pose2(0, 0, 0), 0.03, 300, 6), group(Pose2(0.6, 0, 0), 0.1, 300, 7)))
+    weights = np.repeat([1.3, 1.0], 300)
+    pose, _ = summarise(Particles(poses, weights / weights.sum()), peak)
+    assert pose.x == pytest.approx(between_two(0.6, 1.3, peak, (0.0018, 0.02)), abs=0.01)
+
+
+def wide(count: int = 2000, width: float = 3.0) -> Array:
+    """One cluster, evenly spread."""
+    drawn: Array = np.random.default_rng(8).uniform((-width, -width, -0.6), (width, width, 0.6), (count, 3))
+    return drawn
+
+
+def test_of_a_wide_even_cloud_the_middle_is_the_answer_whichever_particle_is_best_by_a_hair() -> None:
+    poses = wide()
+    for best in (3, 1500):
+        weights = np.ones(len(poses))
+        weights[best] += 1e-6
+        pose, covariance = summarise(Particles(poses, weights / weights.sum()), 16.0)
+        assert pose == pytest.approx(tuple(poses.mean(axis=0)), abs=1e-3)
+        assert np.sqrt(covariance[0, 0]) == pytest.approx(3 / np.sqrt(3), rel=0.05)
+
+
+@pytest.mark.parametrize("peak", [1.0, 16.0])
+def test_weights_that_change_by_a_thousandth_move_the_pose_by_that_much_of_the_clouds_width(peak: float) -> None:
+    """So there is no jump without a scan that says so."""
+    poses, chance = wide(), np.random.default_rng(9)
+    weights = chance.uniform(1, 3, len(poses))
+    before, _ = summarise(Particles(poses, weights / weights.sum()), peak)
+    changed = weights * chance.choice([1, 1.001], len(poses))
+    after, _ = summarise(Particles(poses, changed / changed.sum()), peak)
+    assert before.distance(after) < 0.001 * peak * 3
+
+
+def test_of_two_groups_in_one_cluster_the_pose_goes_from_one_to_the_other_without_a_jump() -> None:
+    poses = np.concatenate((group(Pose2(0, 0, 0), 0.05, 500, 10), group(Pose2(0.7, 0, 0), 0.05, 500, 11)))
+    found, heavier = [], np.geomspace(0.6, 1.7, 81)
+    for times in heavier:
+        weights = np.repeat([times, 1.0], 500)
+        found.append(summarise(Particles(poses, weights / weights.sum()), 16.0)[0].x)
+    assert found == pytest.approx([between_two(0.7, times, 16.0, (0.005, 0.005)) for times in heavier], abs=0.01)
+    assert found[0] > 0.6
+    assert found[-1] < 0.1
+    assert np.abs(np.diff(found)).max() < 0.05
+
+
+@pytest.mark.parametrize("peak", [1.0, 16.0])
+def test_of_a_narrow_cloud_the_pose_is_where_its_weights_are_highest(peak: float) -> None:
+    """Weights fall off as a normal distribution does, which any power leaves where it is."""
+    poses = np.random.default_rng(12).uniform((-0.2, -0.2, -0.1), (0.2, 0.2, 0.1), (4000, 3))
+    weights = np.exp(-0.5 * (np.square(poses - (0.05, -0.03, 0.02)) / 0.03**2).sum(axis=1))
+    pose, _ = summarise(Particles(poses, weights / weights.sum()), peak)
+    assert pose == pytest.approx((0.05, -0.03, 0.02), abs=0.005)
 
 
 def test_a_single_particle_is_the_answer() -> None:

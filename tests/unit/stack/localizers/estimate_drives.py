@@ -1,0 +1,237 @@
+"""Drives through whole buildings for the localizer alone: shipped worlds and generated ones, right and wrong maps."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from localizer_room import ROBOT, TICK_RATE
+
+from simscen.core.belief import Estimate
+from simscen.core.geometry import Array, Pose2
+from simscen.core.grid import OccupancyGrid
+from simscen.core.motion import Twist
+from simscen.core.sensing import Odometry, Scan
+from simscen.core.world import BuiltWorld
+from simscen.loading.worldfile import load_world_file
+from simscen.model.stack import Amcl
+from simscen.model.world import WorldSpec
+from simscen.run.worldsource import world_of
+from simscen.stack.localizers.build import build_localizer
+from simscen.stack.protocols import Localizer, Surroundings
+from simscen.worlds.build import build
+from simscen.worlds.meshing import fuse
+from simscen.worlds.own import build_own
+from simscen.worlds.rays import RayScene
+from simscen.worlds.shortest import ShortestWays
+
+PERIOD, BEAMS, HEIGHT, KIDNAPPED_AT = 24, 60, 0.2, 200
+ANGLES = -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS)
+WORLDS = Path(__file__).parents[4] / "worlds"
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """What a robot does and sees: `truth` (k, 3) at 10 Hz, `steps` (k, 3) its wheels make, `ranges` (k, 60) m."""
+
+    truth: Array
+    steps: Array
+    ranges: Array
+
+
+@cache
+def building(name: str) -> BuiltWorld:
+    """A shipped world, or a generated one; `… coarse` has a map of 20 cm cells."""
+    base, _, coarse = name.partition(" ")
+    if (WORLDS / f"{base}.world.yaml").exists():
+        world = world_of(load_world_file(WORLDS / f"{base}.world.yaml", WORLDS), WORLDS)
+    else:
+        world = build_own(WorldSpec.model_validate({"simscen": 1, **GENERATED[base]()}), base)
+    return build(world, HEIGHT, 0.2 if coarse else 0.05)
+
+
+def _hall(width: float, depth: float, boxes: list[tuple[float, float, float, float]]) -> dict[str, object]:
+    around = [[0, 0], [width, 0], [width, depth], [0, depth], [0, 0]]
+    obstacles = [
+        {"name": f"box {k}", "box": [a, b, 1.0], "pose": {"x": x, "y": y}} for k, (x, y, a, b) in enumerate(boxes)
+    ]
+    return {"walls": [{"name": "around", "points": around, "thickness": 0.2}], "obstacles": obstacles}
+
+
+def _symmetric() -> dict[str, object]:
+    """Turned by 180° it is the same but for one box."""
+    pairs = [(3.0, 2.0, 1.0, 0.6), (6.5, 1.5, 0.6, 1.2), (9.0, 5.5, 1.2, 0.4)]
+    boxes = pairs + [(12 - x, 8 - y, a, b) for x, y, a, b in pairs]
+    return _hall(12, 8, [*boxes, (6.0, 4.0, 0.5, 0.5), (11.3, 7.2, 0.5, 0.5)])
+
+
+def _corridor() -> dict[str, object]:
+    """30 m long with a few niches; a lidar of 3.5 m sees two walls for most of the way."""
+    niches = [(4.0, 0.3), (11.0, 2.7), (13.5, 0.3), (21.0, 2.7), (27.0, 0.3)]
+    return _hall(30, 3, [(x, y, 0.8, 0.4) for x, y in niches])
+
+
+def _pillars() -> dict[str, object]:
+    """A hall of 18 x 14 m full of equal pillars in rows, one row out of step."""
+    boxes = [(x, y + (0.7 if x == 9 else 0), 0.4, 0.4) for x in range(3, 17, 3) for y in range(2, 13, 3)]
+    return _hall(18, 14, boxes)
+
+
+def _clutter() -> dict[str, object]:
+    """25 boxes in a room of 16 x 10 m."""
+    chance = np.random.default_rng(5)
+    boxes = chance.uniform((1, 1, 0.3, 0.3), (15, 9, 1.2, 1.2), (25, 4)).tolist()
+    return _hall(16, 10, [(x, y, a, b) for x, y, a, b in boxes])
+
+
+GENERATED = {"symmetric": _symmetric, "corridor": _corridor, "pillars": _pillars, "clutter": _clutter}
+
+
+@cache
+def ways(name: str) -> ShortestWays:
+    """Ways that stay 0.4 m away from everything."""
+    return ShortestWays(building(name).mesh, building(name).world.bounds, 0.4)
+
+
+@cache
+def drive(name: str, seed: int, seconds: float = 60.0) -> Array:
+    """True poses (k, 3) at 10 Hz of a robot at up to 0.5 m/s and 1 rad/s between places that nobody chose."""
+    corners = _corners(name, np.random.default_rng((seed, 1)))
+    before, goal = next(corners), next(corners)
+    pose, truth = Pose2(*before, float(np.arctan2(*(goal - before)[::-1]))), []
+    while len(truth) < seconds * 10:
+        truth.append(pose)
+        if np.hypot(*(goal - pose[:2])) < 0.1:
+            goal = next(corners)
+        x, y, _ = pose.between(Pose2(*goal))
+        error = np.arctan2(y, x)
+        turn = float(np.clip(2 * error, -1, 1)) * 0.1
+        ahead = min(0.05, float(np.hypot(x, y))) * max(0.0, float(np.cos(error))) ** 16
+        pose = pose.compose(Pose2(ahead * np.cos(turn / 2), ahead * np.sin(turn / 2), turn))
+    return np.array(truth)
+
+
+def _corners(name: str, chance: np.random.Generator) -> Iterator[Array]:
+    """Places to turn at, without end, on the shortest ways between places drawn anywhere."""
+    left, low, right, high = building(name).world.bounds
+    here: Array | None = None
+    while True:
+        ends = chance.uniform((left, low), (right, high), (2, 2))
+        way = ways(name).way(Pose2(*(ends[0] if here is None else here)), Pose2(*ends[1]))
+        if way is not None:
+            yield from way if here is None else way[1:]
+            here = way[-1]
+
+
+def record(truth: Array, scene: RayScene) -> Way:
+    """What perfect wheels and a perfect lidar say along these poses."""
+    poses = [Pose2(*row) for row in truth]
+    steps = np.array([Pose2(0, 0, 0), *(a.between(b) for a, b in pairwise(poses))])
+    heading = (truth[:, 2:] + ANGLES).ravel()
+    origins = np.repeat(np.column_stack((truth[:, :2], np.full(len(truth), HEIGHT))), BEAMS, axis=0)
+    directions = np.column_stack((np.cos(heading), np.sin(heading), np.zeros_like(heading)))
+    return Way(truth, steps, scene.cast(origins, directions).reshape(len(truth), BEAMS))
+
+
+def moved_furniture(name: str, truth: Array, seed: int) -> RayScene:
+    """The world with boxes that no map shows, none on the robot's way."""
+    built, chance = building(name), np.random.default_rng((seed, 2))
+    low, high = built.world.bounds[:2], built.world.bounds[2:]
+    boxes: list[tuple[float, float, float, float]] = []
+    area = (high[0] - low[0]) * (high[1] - low[1])
+    while len(boxes) < area / 8:
+        x, y = chance.uniform(low, high)
+        a, b = chance.uniform(0.3, 1.0, 2)
+        if np.hypot(*(truth[:, :2] - (x, y)).T).min() > 0.3 + np.hypot(a, b) / 2:
+            boxes.append((float(x), float(y), float(a), float(b)))
+    spec = WorldSpec.model_validate({"simscen": 1, "obstacles": _hall(1, 1, boxes)["obstacles"]})
+    return RayScene(fuse((*built.world.solids, *build_own(spec, "more").solids)))
+
+
+def crowded(way: Way, seed: int, people: int = 6) -> Way:
+    """The same among people that come and go, on wheels that slip by up to 30 %, for seconds."""
+    chance, ranges = np.random.default_rng((seed, 3)), way.ranges.copy()
+    bearing, distance = chance.uniform(-np.pi, np.pi, people), chance.uniform(0.6, 2.5, people)
+    phase, period = chance.uniform(0, 2 * np.pi, people), chance.uniform(8, 30, people)
+    for row, yaw in enumerate(way.truth[:, 2]):
+        bearing += chance.normal(0, 0.05, people)
+        distance = np.clip(distance + chance.normal(0, 0.05, people), 0.5, 3)
+        here = np.sin(2 * np.pi * row / 10 / period + phase) > 0
+        for towards, far in zip(bearing[here], distance[here], strict=True):
+            off = np.abs((ANGLES - towards + yaw + np.pi) % (2 * np.pi) - np.pi)
+            np.minimum(ranges[row], far, out=ranges[row], where=off < np.arctan(0.3 / far))
+    slip, row = np.ones((len(way.steps), 3)), 0
+    while row < len(slip):
+        end = row + int(chance.integers(5, 20))
+        slip[row:end, 0] += chance.choice([0, 0, 0.1, -0.1, 0.3])
+        row = end
+    slip[:, 2] += (slip[:, 0] - 1) / 6
+    return Way(way.truth, way.steps * slip, ranges)
+
+
+CIRCUMSTANCES = {
+    "known": "the start known to 0.5 m and 15°",
+    "crowded": "the same among people, furniture that no map shows and wheels that slip by up to 30 %",
+    "short": "the start known, a lidar that sees 3.5 m far instead of 12 m",
+    "short, crowded": "both",
+    "wide": "told a start that is wrong by 1 m and 45° (standard deviations), and told so",
+    "unknown": "told nothing, 5000 particles",
+    "kidnapped": "carried elsewhere after 20 s, 5000 particles, recovery (0.001, 0.1)",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A drive, and what the localizer is told of it."""
+
+    way: Way
+    estimate: Estimate
+    spec: Amcl
+    map: OccupancyGrid
+    range_max: float
+    seed: int
+
+    def readings(self) -> Iterator[tuple[Odometry, Scan]]:
+        """Odometry and scan at each tenth of a second, with our sensors' default noise."""
+        chance, odometry = np.random.default_rng((self.seed, 4)), Pose2(0.0, 0.0, 0.0)
+        ranges = self.way.ranges + chance.normal(0, 0.01, self.way.ranges.shape)
+        ranges = np.where(ranges < self.range_max, ranges, np.inf)
+        for row, step in enumerate(self.way.steps):
+            far = float(np.hypot(step[0], step[1]))
+            stretched = 1 + chance.normal() * 0.01 * np.sqrt(far) / max(far, 1e-9)
+            turn = step[2] + chance.normal() * np.sqrt(1e-4 * abs(step[2]) + 2.5e-5 * far)
+            odometry = odometry.compose(Pose2(step[0] * stretched, step[1] * stretched, turn))
+            told = Odometry("odom", row * PERIOD, odometry, Twist())
+            yield told, Scan("lidar", row * PERIOD, ranges[row], -np.pi, 2 * np.pi / BEAMS, 0.05, self.range_max)
+
+    def localizer(self) -> Localizer:
+        """The localizer at its start."""
+        told = Surroundings(ROBOT, self.map, TICK_RATE)
+        return build_localizer(self.spec, told, self.estimate, np.random.default_rng((self.seed, 6)))
+
+
+def case(name: str, circumstance: str, model: str, seed: int) -> Case:
+    """One drive of a building under one of CIRCUMSTANCES, with a sensor model."""
+    built, truth = building(name), drive(name, seed)
+    changes: dict[str, object] = {"laser_model_type": model}
+    scene, estimate = RayScene(built.mesh), Estimate(Pose2(*truth[0]))
+    match circumstance:
+        case "kidnapped":
+            changes |= {"max_particles": 5000, "recovery_alpha_slow": 0.001, "recovery_alpha_fast": 0.1}
+            truth = np.concatenate((truth[:KIDNAPPED_AT], drive(name, seed + 100)))
+        case "wide":
+            std = (1.0, 1.0, 0.8)
+            estimate = Estimate(Pose2(*np.random.default_rng((seed, 5)).normal(truth[0], std)), std)
+        case "unknown":
+            estimate, changes = Estimate(None), changes | {"max_particles": 5000}
+        case "crowded" | "short, crowded":
+            scene = moved_furniture(name, truth, seed)
+    way = record(truth, scene)
+    if circumstance == "kidnapped":
+        way.steps[KIDNAPPED_AT] = 0
+    if "crowded" in circumstance:
+        way = crowded(way, seed)
+    far = 3.5 if "short" in circumstance else 12.0
+    return Case(way, estimate, Amcl.model_validate(changes), built.map.refined(0.05), far, seed)
