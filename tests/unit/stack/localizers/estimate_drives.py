@@ -87,6 +87,7 @@ def _clutter() -> dict[str, object]:
 
 
 GENERATED = {"symmetric": _symmetric, "corridor": _corridor, "pillars": _pillars, "clutter": _clutter}
+BUILDINGS = ("house", "office", "warehouse", *GENERATED, "house coarse")
 
 
 @cache
