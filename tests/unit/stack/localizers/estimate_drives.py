@@ -7,9 +7,9 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from localizer_room import ROBOT, TICK_RATE
 
 from simscen.core.belief import Estimate
+from simscen.core.chance import Streams
 from simscen.core.geometry import Array, Pose2
 from simscen.core.grid import OccupancyGrid
 from simscen.core.motion import Twist
@@ -19,8 +19,10 @@ from simscen.loading.worldfile import load_world_file
 from simscen.model.stack import Amcl
 from simscen.model.world import WorldSpec
 from simscen.run.worldsource import world_of
-from simscen.stack.localizers.build import build_localizer
+from simscen.stack.installed.localizer import InstalledLocalizer
 from simscen.stack.protocols import Localizer, Surroundings
+from simscen.stack.setting import Setting
+from simscen.testing.room import ROBOT, TICK_RATE
 from simscen.worlds.build import build
 from simscen.worlds.meshing import fuse
 from simscen.worlds.own import build_own
@@ -210,7 +212,8 @@ class Case:
     def localizer(self) -> Localizer:
         """The localizer at its start."""
         told = Surroundings(ROBOT, self.map, TICK_RATE)
-        return build_localizer(self.spec, told, self.estimate, np.random.default_rng((self.seed, 6)))
+        setting = Setting(told, "localizer", Streams(self.seed), estimate=self.estimate)
+        return InstalledLocalizer(self.spec, setting)
 
 
 def case(name: str, circumstance: str, model: str, seed: int) -> Case:
