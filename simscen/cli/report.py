@@ -10,6 +10,7 @@ from simscen.cli.diagnostics import print_text
 from simscen.cli.reports import JunitFamily, Reports, require_writable, verdict
 from simscen.cli.screen import Format, screen
 from simscen.core.errors import Exit
+from simscen.judge.measure.compare import compare
 from simscen.judge.measure.suite import suite, told
 from simscen.report.journal import require_free
 from simscen.report.rebuild import read_journal
@@ -40,8 +41,9 @@ def command(
         shown(past.started(folder))
         for answer in answers:
             shown(answer)
-        written = reports.write(answers)
-        shown(reports.closing(answers, past.wall, past.interrupted))
+        comparison = compare((answer.result for answer in answers), past.stacks)
+        written = reports.write(answers, comparison)
+        shown(reports.closing(answers, past.wall, past.interrupted, comparison))
     if format_ is Format.TEXT:
         print_text(told(suite(answer.result for answer in answers)))
     code = verdict(answers) if written else Exit.INCOMPLETE

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from simscen.cli import circumstances
 from simscen.cli.diagnostics import print_text
+from simscen.core.comparison import Comparison
 from simscen.core.errors import Exit, UsageError
 from simscen.core.outputs import require_no_input
 from simscen.core.result import Outcome
@@ -47,13 +48,13 @@ class Reports:
         except OSError as error:
             raise UsageError(f"cannot use the output folder {self.folder}: {error.strerror}") from error
 
-    def write(self, answers: Sequence[RunFinished]) -> bool:
+    def write(self, answers: Sequence[RunFinished], comparison: Comparison | None = None) -> bool:
         """Write the reports; one that cannot be written is told, and the one before it stays whole."""
         junit = to_xml(answers, self._family)
         whole = {
-            self.folder / "results.json": to_json(answers, str(self.folder)).encode(),
+            self.folder / "results.json": to_json(answers, str(self.folder), comparison).encode(),
             self.folder / "junit.xml": junit,
-            self.folder / "report.html": to_html(answers).encode(),
+            self.folder / "report.html": to_html(answers, comparison=comparison).encode(),
         }
         documents = {**({} if self._only else whole), self.junit: junit}
         outcomes = [_written(path, data) for path, data in documents.items()]  # every one is tried
@@ -63,7 +64,9 @@ class Reports:
         """Write run.json anew, with the seconds that the session took."""
         return _written(self.folder / "run.json", circumstances.as_json(wall))
 
-    def closing(self, answers: Sequence[RunFinished], wall: float, interrupted: bool) -> SessionFinished:
+    def closing(
+        self, answers: Sequence[RunFinished], wall: float, interrupted: bool, comparison: Comparison | None = None
+    ) -> SessionFinished:
         """The last event of a session."""
         count = {outcome: sum(answer.outcome is outcome for answer in answers) for outcome in Outcome}
         return SessionFinished(
@@ -75,6 +78,7 @@ class Reports:
             interrupted=interrupted,
             junit=str(self.junit),
             folder=str(self.folder),
+            comparison=comparison,
         )
 
 

@@ -16,6 +16,7 @@ from simscen.cli.select import Selection, load_all, shard_of
 from simscen.cli.work import Work, begin
 from simscen.core.errors import Exit, InvalidInput, UsageError
 from simscen.core.sessionevents import SessionEvent
+from simscen.judge.measure.compare import compare
 from simscen.loading.externalstack import undefined
 from simscen.report.journal import Journal, require_free
 from simscen.report.journaldata import NAME
@@ -72,7 +73,7 @@ def command(
         typer.Option(
             metavar="NAME=VALUE",
             help="Run every scenario with this stack instead of its own: a *.stack.yaml file or `reference`. "
-            "Repeatable: each scenario runs with each.",
+            "Repeatable: each scenario runs with each, and the first is compared with the others.",
         ),
     ] = None,
     root: Annotated[Path | None, typer.Option(help="Files inside scenarios stay in this folder.")] = None,
@@ -128,9 +129,10 @@ def _run(work: Work, options: Options, reports: Reports, shown: Screen) -> Exit:
         answers, stopped = run_session(work.jobs, options, WARM_PROCESS, listen)
     answers = [*work.kept, *answers]
     work.journal.complete(answers)
-    written = reports.write(answers)
+    comparison = compare((answer.result for answer in answers), work.stacks)
+    written = reports.write(answers, comparison)
     wall = time.monotonic() - begun
-    listen(reports.closing(answers, wall, stopped is not None))
+    listen(reports.closing(answers, wall, stopped is not None, comparison))
     written = reports.end(wall) and written and _kept(work.journal)
     return stopped or (verdict(answers) if written else Exit.INCOMPLETE)
 

@@ -18,18 +18,22 @@ from simscen.run.repeat_command import repeat_command, shown
 
 @dataclass(frozen=True)
 class Work:
-    """The journal of the session, the jobs to do, and the answers that are `kept` from the session before."""
+    """The journal of the session, the jobs to do, and the answers that are `kept` from the session before.
+
+    `stacks` are the NAME=VALUE of those that were chosen.
+    """
 
     journal: Journal
     jobs: Sequence[Job]
     kept: Sequence[RunFinished]
     workers: int
+    stacks: tuple[str, ...] = ()
 
     def started(self, folder: Path) -> SessionStarted:
         """The first event of the session."""
         ids = {job.scenario.id for job in self.jobs} | {answer.key.scenario for answer in self.kept}
         total = len(self.jobs) + len(self.kept)
-        return SessionStarted(__version__, total, len(ids), self.workers, str(folder), tuple(sorted(ids)))
+        return SessionStarted(__version__, total, len(ids), self.workers, str(folder), tuple(sorted(ids)), self.stacks)
 
 
 def begin(journal: Journal, jobs: Sequence[Job], workers: int) -> Work:
@@ -55,7 +59,7 @@ def begin(journal: Journal, jobs: Sequence[Job], workers: int) -> Work:
         journal(answer)
     if journal.error:
         raise UsageError(f"cannot write the journal in {journal.folder}: {journal.error.strerror}")
-    return Work(journal, left, kept, workers)
+    return Work(journal, left, kept, workers, tuple(dict.fromkeys(run.stack for run in planned if run.stack)))
 
 
 def _planned(job: Job, digest: str) -> Planned:

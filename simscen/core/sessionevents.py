@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from simscen.core.comparison import Comparison
 from simscen.core.result import Outcome, RunKey, RunResult
 
 
@@ -20,7 +21,7 @@ class Artifacts:
 class SessionStarted:
     """The first event: `total` runs of `scenarios` files will be spread over `workers` processes.
 
-    `ids` are the scenarios' ids.
+    `ids` are the scenarios' ids, `stacks` the NAME=VALUE of those that take the place of the scenarios' own.
     """
 
     version: str
@@ -29,6 +30,7 @@ class SessionStarted:
     workers: int
     folder: str = ""
     ids: tuple[str, ...] = ()
+    stacks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -76,7 +78,10 @@ class RunFinished:
 
 @dataclass(frozen=True)
 class SessionFinished:
-    """The last event: counts, simulated and wall seconds of the whole session, and where the reports are."""
+    """The last event: counts, simulated and wall seconds of the whole session, and where the reports are.
+
+    `comparison` is what several stacks on the same scenarios say about each other.
+    """
 
     passed: int
     failed: int
@@ -86,6 +91,7 @@ class SessionFinished:
     interrupted: bool = False
     junit: str = ""
     folder: str = ""
+    comparison: Comparison | None = None
 
 
 SessionEvent = SessionStarted | RunStarted | RunProgress | RunFinished | SessionFinished

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from simscen.model.stack import StackSpec
+from simscen.model.anystack import AnyStack
 from simscen.spec.base import Spec
 from simscen.spec.places import Name
 
@@ -22,4 +22,4 @@ class StackFileSpec(Spec):
     """For people."""
     description: Annotated[str, Field(max_length=10_000)] = ""
     """What is special about it."""
-    stack: StackSpec
+    stack: AnyStack

@@ -7,6 +7,7 @@ from simscen.core.result import Outcome
 from simscen.core.sessionevents import RunFinished, SessionEvent, SessionFinished
 from simscen.judge.wording import tightest
 from simscen.report.checkout import in_checkout
+from simscen.report.comparedpage import as_markdown
 from simscen.report.complaints import broken, complaints, label, scenario_file
 from simscen.report.console import Reporter, text_reporter
 from simscen.report.text import one_line
@@ -68,11 +69,12 @@ def markdown(runs: list[RunFinished], session: SessionFinished) -> str:
     signs = {Outcome.PASSED: "✅", Outcome.FAILED: "❌", Outcome.ERROR: "⚠️"}
     errors = "error" if session.errors == 1 else "errors"
     head = f"### simscen: {session.passed} passed, {session.failed} failed, {session.errors} {errors}"
+    compared = [] if session.comparison is None else as_markdown(session.comparison, _cell)
     rows = [
         f"| {signs[run.outcome]} | {_cell(label(run.key))} | {run.result.simulated:.1f} s | {_cell(_why(run))} |"
         for run in ordered
     ]
-    return "\n".join([head, "", "| | scenario | simulated | |", "|---|---|---:|---|", *rows, "", ""])
+    return "\n".join([head, "", "| | scenario | simulated | |", "|---|---|---:|---|", *rows, *compared, "", ""])
 
 
 def _why(run: RunFinished) -> str:

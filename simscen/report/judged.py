@@ -8,7 +8,8 @@ from simscen.core.sessionevents import RunFinished
 from simscen.core.verdict import Status, Verdict
 from simscen.judge.wording import tightest
 from simscen.report.complaints import broken, complaints
-from simscen.report.lines import SIGNS, Line, Piece, Role, complained
+from simscen.report.line import Line, Piece, Role
+from simscen.report.lines import SIGNS, complained
 from simscen.report.text import one_line, visible
 
 _ROLES: dict[str, Role] = {"good": "good", "bad": "bad", "odd": "odd"}

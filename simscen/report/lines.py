@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 from simscen.core.result import Outcome, RunKey
 from simscen.core.sessionevents import (
@@ -14,10 +13,10 @@ from simscen.core.sessionevents import (
     SessionStarted,
 )
 from simscen.judge.wording import tightest, told
+from simscen.report.compared import compared
 from simscen.report.complaints import broken, complaints, failure, label, place
+from simscen.report.line import Line, Piece, Role
 from simscen.report.text import one_line
-
-Role = Literal["plain", "name", "good", "bad", "odd", "quiet"]
 
 TAIL = 12
 MOST_HAPPENINGS = 8
@@ -25,31 +24,26 @@ SIGNS = {Outcome.PASSED: ("✓", "good"), Outcome.FAILED: ("✗", "bad"), Outcom
 
 
 @dataclass(frozen=True)
-class Piece:
-    """Text of one role; a reporter chooses how the role looks."""
-
-    text: str
-    role: Role = "plain"
-
-
-Line = tuple[Piece, ...]
-
-
-@dataclass(frozen=True)
 class Naming:
-    """How runs are called in the lines of a session: short, unique, and in a column of `width`."""
+    """How runs are called in the lines of a session: short, unique, and in a column of `width`.
+
+    `columns` are those of the terminal; None where there is none.
+    """
 
     every_seed: bool = False
     prefix: str = ""
     width: int = 0
+    columns: int | None = None
 
     @classmethod
-    def of(cls, session: SessionStarted) -> "Naming":
-        """Seeds are told where a scenario runs more than once."""
-        every_seed = session.total != session.scenarios
+    def of(cls, session: SessionStarted, columns: int | None = None) -> "Naming":
+        """Seeds are told where a scenario runs more than once with a stack, stacks where there are several."""
+        stacks = [text.partition("=")[0] for text in session.stacks] if len(session.stacks) > 1 else []
+        every_seed = session.total != session.scenarios * max(1, len(stacks))
         prefix = _common_folder(session.ids)
         longest = max((len(one) for one in session.ids), default=0) - len(prefix)
-        return cls(every_seed, prefix, longest + (len(" (seed 1234)") if every_seed else 0))
+        extra = [*(["seed 1234"] if every_seed else []), *([max(stacks, key=len)] if stacks else [])]
+        return cls(every_seed, prefix, longest + (len(f" ({', '.join(extra)})") if extra else 0), columns)
 
     def name(self, key: RunKey) -> str:
         """The run's name, padded."""
@@ -73,7 +67,8 @@ def lines_of(event: SessionEvent, naming: Naming) -> list[Line]:
         case RunFinished():
             return list(finished(event, naming))
         case SessionFinished():
-            return list(closing(event))
+            told = event.comparison and compared(event.comparison, naming.prefix, naming.columns)
+            return [*(told or ()), *closing(event)]
         case RunStarted() | RunProgress():
             return []
 
@@ -82,7 +77,14 @@ def opening(started: SessionStarted) -> Line:
     """simscen 0.1.0 · 14 scenarios · 2 workers."""
     runs = "" if started.total == started.scenarios else f" · {_count(started.total, 'run')}"
     workers = _count(started.workers, "worker")
-    return (Piece(f"simscen {started.version} · {_count(started.scenarios, 'scenario')}{runs} · {workers}", "quiet"),)
+    head = f"simscen {started.version} · {_count(started.scenarios, 'scenario')}{_with(started.stacks)}"
+    return (Piece(f"{head}{runs} · {workers}", "quiet"),)
+
+
+def _with(stacks: Sequence[str]) -> str:
+    """The one stack that takes the place of the scenarios' own, or how many."""
+    told = f"stack {one_line(stacks[0])}" if len(stacks) == 1 else f"{len(stacks)} stacks"
+    return f" · {told}" if stacks else ""
 
 
 def finished(run: RunFinished, naming: Naming) -> Iterator[Line]:

@@ -16,7 +16,8 @@ from simscen.core.sessionevents import (
     SessionFinished,
     SessionStarted,
 )
-from simscen.report.lines import Line, Naming, lines_of
+from simscen.report.line import Line
+from simscen.report.lines import Naming, lines_of
 from simscen.report.text import one_line
 
 STYLES = {"plain": "", "name": "bold", "good": "green", "bad": "red", "odd": "yellow", "quiet": "dim"}
@@ -45,7 +46,7 @@ class LiveReporter:
         """Print what is final above, show what is under way below."""
         match event:
             case SessionStarted():
-                self._naming = Naming.of(event)
+                self._naming = Naming.of(event, self._console.width)
                 self._total = event.total
             case RunStarted():
                 self._under_way[event.key] = (event, 0.0, "")

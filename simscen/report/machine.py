@@ -32,5 +32,5 @@ class _Json:
         if isinstance(event, RunFinished):
             self._runs.append(event)
         if isinstance(event, SessionFinished):
-            self._out.write(no_marker_in_json(to_json(self._runs, event.folder)))
+            self._out.write(no_marker_in_json(to_json(self._runs, event.folder, event.comparison)))
             self._out.flush()

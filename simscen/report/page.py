@@ -5,9 +5,11 @@ from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
+from simscen.core.comparison import Comparison
 from simscen.core.result import Outcome
 from simscen.core.sessionevents import RunFinished
 from simscen.judge.wording import comparison, subject, tightest, when
+from simscen.report.comparedpage import as_html
 from simscen.report.complaints import broken, complaints, failure, place
 from simscen.report.text import one_line, visible
 
@@ -25,6 +27,8 @@ summary .name { font-weight: 600; flex: 1; overflow-wrap: anywhere; }
 .passed { background: #1c8042; } .failed { background: #c81e28; } .error { background: #be7800; }
 .in { padding: 4px 16px 14px; } table { border-collapse: collapse; width: 100%; margin: 6px 0 12px; }
 td, th { text-align: left; padding: 4px 10px 4px 0; border-top: 1px solid #eceef0; vertical-align: top; }
+h2 { font-size: 18px; } h3 { font-size: 15px; margin-bottom: 2px; } section { margin: 18px 0; }
+.clear td:nth-child(5) { font-weight: 600; } .count.good { color: #1c8042; } .count.bad { color: #c81e28; }
 td.margin { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 .bad td:first-child { color: #c81e28; font-weight: 600; } .odd td:first-child { color: #be7800; font-weight: 600; }
 img { max-width: 100%; border: 1px solid #dee0e3; border-radius: 6px; } code, pre { font-size: 13px; }
@@ -32,7 +36,7 @@ pre { background: #f4f5f6; padding: 10px; border-radius: 6px; overflow-x: auto; 
 """
 
 
-def to_html(runs: Sequence[RunFinished], title: str = "simscen") -> str:
+def to_html(runs: Sequence[RunFinished], title: str = "simscen", comparison: Comparison | None = None) -> str:
     """The page; what did not pass comes first and stands open. Pictures are read from the runs' artifacts."""
     order = [Outcome.ERROR, Outcome.FAILED, Outcome.PASSED]
     ordered = sorted(runs, key=lambda run: (order.index(run.outcome), run.result.path, run.key))
@@ -43,13 +47,15 @@ def to_html(runs: Sequence[RunFinished], title: str = "simscen") -> str:
     )
     simulated = sum(run.result.simulated for run in ordered)
     pictures = _pictures(ordered)
+    compared = "" if comparison is None else as_html(comparison)
     body = "\n".join(_run(run, picture) for run, picture in zip(ordered, pictures, strict=True))
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">\n'
         '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; img-src data:; '
         "style-src 'unsafe-inline'\">\n"
         f"<title>{_text(title)}: {counts}</title><style>{_STYLE}</style></head>\n<body>\n"
-        f'<h1>{counts}</h1><p class="quiet">{len(runs)} runs, {simulated:.0f} s simulated</p>\n{body}\n</body></html>\n'
+        f'<h1>{counts}</h1><p class="quiet">{len(runs)} runs, {simulated:.0f} s simulated</p>\n{compared}\n{body}\n'
+        "</body></html>\n"
     )
 
 

@@ -39,7 +39,12 @@ class Past:
     def started(self, folder: Path) -> SessionStarted:
         """The event that the session began with."""
         ids = tuple(sorted({run.key.scenario for run in self.planned}))
-        return SessionStarted(self.version, len(self.planned), len(ids), self.workers, str(folder), ids)
+        return SessionStarted(self.version, len(self.planned), len(ids), self.workers, str(folder), ids, self.stacks)
+
+    @property
+    def stacks(self) -> tuple[str, ...]:
+        """The NAME=VALUE of each stack that was chosen, in their order."""
+        return tuple(dict.fromkeys(run.stack for run in self.planned if run.stack))
 
     def _unanswered(self, run: Planned) -> RunFinished:
         kind = "interrupted" if run.key in self.begun else "not-run"

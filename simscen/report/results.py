@@ -5,20 +5,23 @@ from collections.abc import Sequence
 from pathlib import PurePath
 from typing import Any
 
+from simscen.core.comparison import Comparison
 from simscen.core.result import Outcome
 from simscen.core.sessionevents import RunFinished
+from simscen.judge.measure.comparisondata import comparison_data
 from simscen.judge.measure.suite import suite, suite_data
 from simscen.judge.resultdata import as_data
 
 FORMAT = 1
 
 
-def to_json(runs: Sequence[RunFinished], folder: str = "") -> str:
+def to_json(runs: Sequence[RunFinished], folder: str = "", comparison: Comparison | None = None) -> str:
     """The document; runs are sorted, artifacts are given relative to the session's `folder`."""
-    return json.dumps(as_document(runs, folder), sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    document = as_document(runs, folder, comparison)
+    return json.dumps(document, sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def as_document(runs: Sequence[RunFinished], folder: str = "") -> dict[str, Any]:
+def as_document(runs: Sequence[RunFinished], folder: str = "", comparison: Comparison | None = None) -> dict[str, Any]:
     """The same as plain data: counts, then one entry for each run in the form of its result.json."""
     ordered = in_order(runs)
     counts = {outcome.value: sum(run.outcome is outcome for run in runs) for outcome in Outcome}
@@ -28,6 +31,7 @@ def as_document(runs: Sequence[RunFinished], folder: str = "") -> dict[str, Any]
         **counts,
         "simulated_seconds": sum(run.result.simulated for run in ordered),
         "suite": suite_data(suite(run.result for run in ordered)),
+        **({} if comparison is None else {"comparison": comparison_data(comparison)}),
         "runs": [{**as_data(run.result), "artifacts": _artifacts(run, folder)} for run in ordered],
     }
 

@@ -17,9 +17,6 @@ Name = Annotated[
 PlaceName = Annotated[str, StringConstraints(max_length=120, pattern=r"^[A-Za-z_][\w .-]*$")]
 Point = Annotated[list[Length], Field(min_length=2, max_length=2)]
 
-StackName = Annotated[str, StringConstraints(max_length=40, pattern=r"^[A-Za-z_][A-Za-z0-9_-]*$")]
-"""What a stack is called, by whoever starts it; becomes part of the names of folders."""
-
 
 def _without_flaw(ring: list[Point]) -> list[Point]:
     wrong = flaw([(x, y) for x, y in ring])

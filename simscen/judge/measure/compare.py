@@ -1,0 +1,121 @@
+"""Compares stacks that drove the same scenarios with the same seeds, pair by pair."""
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+
+from simscen.core.chance import Streams
+from simscen.core.comparison import Against, Comparison, Difference, Flip, Outcomes
+from simscen.core.paired import mean_interval, sign_test
+from simscen.core.result import Outcome, RunKey, RunResult
+from simscen.judge.measure.table import METRICS
+from simscen.judge.wording import sentence, violations
+
+COMPARED = (
+    *("time_to_goal", "path_length", "min_clearance", "mean_jerk", "time_not_moving", "replans", "recoveries"),
+    "collisions",
+)
+"""The metrics that people choose a stack by, in the order of the table."""
+ALWAYS = frozenset({"collisions"})
+"""Metrics that mean something however far a run came; the others favour whoever gives up early."""
+_SEED = 1
+"""Of the bootstrap: the same runs give the same intervals."""
+
+Pair = tuple[RunResult, RunResult]
+
+
+def compare(results: Iterable[RunResult], stacks: Sequence[str]) -> Comparison | None:
+    """Each of the `stacks` (NAME=VALUE) against the first; None for fewer than two. The order of results is no matter.
+
+    Second runs, which are there to be equal to the first, do not count.
+    """
+    if len(stacks) < 2:
+        return None
+    given = {name: value for name, _, value in (text.partition("=") for text in stacks)}
+    runs = {result.key: result for result in results if not result.key.repeats}
+    baseline, *others = given
+    return Comparison(
+        given,
+        {scenario: _row(scenario, given, runs) for scenario in sorted({key.scenario for key in runs})},
+        tuple(_against(runs, baseline, other) for other in others),
+    )
+
+
+def _row(scenario: str, stacks: Iterable[str], runs: Mapping[RunKey, RunResult]) -> dict[str, Outcomes]:
+    own = [run for key, run in runs.items() if key.scenario == scenario]
+    return {name: _outcomes(run for run in own if run.key.variation == name) for name in stacks}
+
+
+def _outcomes(runs: Iterable[RunResult]) -> Outcomes:
+    count = Counter(run.outcome for run in runs)
+    return Outcomes(count[Outcome.PASSED], count[Outcome.FAILED], count[Outcome.ERROR])
+
+
+def _against(runs: Mapping[RunKey, RunResult], baseline: str, other: str) -> Against:
+    first, second = (
+        {(key.scenario, key.seed): run for key, run in sorted(runs.items()) if key.variation == name}
+        for name in (baseline, other)
+    )
+    pairs = [(first[case], second[case]) for case in first if case in second]
+    whole = [pair for pair in pairs if all(run.outcome is not Outcome.ERROR for run in pair)]
+    alike = [(one, two) for one, two in whole if _arrived(one) == _arrived(two)]
+    flips = tuple(flip for pair in whole if (flip := _flip(pair)))
+    won = sum(flip.passed == other for flip in flips)
+    return Against(
+        stack=other,
+        pairs=len(whole),
+        broken=len(pairs) - len(whole),
+        alone=len(first.keys() ^ second.keys()),
+        parted=len(whole) - len(alike),
+        flips=flips,
+        p=sign_test(won, len(flips) - won),
+        differences=tuple(
+            found for name in COMPARED if (found := _difference(name, whole if name in ALWAYS else alike)) is not None
+        ),
+    )
+
+
+def _arrived(run: RunResult) -> bool:
+    return run.metrics.get("time_to_goal") is not None
+
+
+def _flip(pair: Pair) -> Flip | None:
+    one, two = pair
+    if one.outcome is two.outcome:
+        return None
+    good, bad = (one, two) if one.outcome is Outcome.PASSED else (two, one)
+    return Flip(one.key.scenario, one.key.seed, good.key.variation, bad.key.variation, _why(bad))
+
+
+def _why(run: RunResult) -> str:
+    """The first thing that was violated."""
+    told = [
+        sentence(verdict, finding, run.tick_rate)
+        for verdict in run.verdicts
+        if verdict.severity != "warn"
+        for finding in violations(verdict)
+    ]
+    more = f" (and {len(told) - 1} more)" if len(told) > 1 else ""
+    return f"{told[0]}{more}" if told else run.ended
+
+
+def _difference(name: str, pairs: Sequence[Pair]) -> Difference | None:
+    """None where no pair has the metric."""
+    both = [(one.metrics.get(name), two.metrics.get(name)) for one, two in pairs]
+    known = [(one, two) for one, two in both if one is not None and two is not None]
+    if not known:
+        return None
+    differences = [two - one for one, two in known]
+    lower, higher = sum(value < 0 for value in differences), sum(value > 0 for value in differences)
+    return Difference(
+        metric=name,
+        unit=METRICS[name].unit,
+        pairs=len(known),
+        baseline=sum(one for one, _ in known) / len(known),
+        value=sum(two for _, two in known) / len(known),
+        difference=sum(differences) / len(known),
+        interval=mean_interval(differences, Streams(_SEED).generator(f"comparison.{name}")),
+        lower=lower,
+        equal=len(known) - lower - higher,
+        higher=higher,
+        p=sign_test(higher, lower),
+    )
