@@ -35,7 +35,7 @@ def left_out(against: Against) -> str:
     """What is not compared, and why; "" for nothing."""
     told = []
     if against.broken:
-        told.append(f"{_pairs(against.broken)} with a run that could not be completed")
+        told.append(f"{_pairs(against.broken)} with an error")
     if against.alone:
         told.append(f"{against.alone} {'run' if against.alone == 1 else 'runs'} without a partner")
     return "left out: " + ", ".join(told) if told else ""
@@ -45,7 +45,7 @@ def parted(against: Against) -> str:
     """Of how many pairs only one arrived; "" for none."""
     if not against.parted:
         return ""
-    return f"of {_pairs(against.parted)} only one run reached its last goal: how these drove is not compared"
+    return f"of {_pairs(against.parted)} only one run arrived, so how these drove is not compared"
 
 
 def headline(baseline: str, against: Against) -> str:

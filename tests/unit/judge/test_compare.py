@@ -1,0 +1,126 @@
+"""Stacks against each other: what is paired, what is left out, and what is said of the rest."""
+
+import json
+
+import pytest
+
+from simscen.core.comparison import Outcomes
+from simscen.core.result import Outcome, RunFailure, RunKey, RunResult
+from simscen.core.verdict import Finding, Status, Verdict
+from simscen.judge.measure.compare import COMPARED, compare
+from simscen.judge.measure.comparisondata import comparison_data
+from simscen.judge.measure.table import METRICS
+
+STACKS = ("ref=reference", "mine=./nav --fast")
+GOOD = {"time_to_goal": 10.0, "path_length": 5.0, "min_clearance": 0.5, "collisions": 0.0}
+
+
+def run(stack: str, seed: int = 1, scenario: str = "a", outcome: Outcome = Outcome.PASSED, **metrics: float | None):
+    found = Finding(Status.FAIL, "clearance", "0.03 m", "≥ 0.05 m", -0.02, "m", tick=240, place=(1.0, 2.0))
+    verdicts = (Verdict("clearance", "clearance", "fail", (found,)),) if outcome is Outcome.FAILED else ()
+    error = RunFailure("stack-crashed", "it is gone") if outcome is Outcome.ERROR else None
+    return RunResult(
+        RunKey(scenario, seed, stack),
+        f"{scenario}.scenario.yaml",
+        outcome,
+        verdicts,
+        metrics={} if error else {**GOOD, **metrics},
+        error=error,
+    )
+
+
+def against(*runs: RunResult):
+    comparison = compare(runs, STACKS)
+    assert comparison is not None
+    (one,) = comparison.against
+    return one
+
+
+def of(one, metric: str):
+    return next(found for found in one.differences if found.metric == metric)
+
+
+def test_there_is_nothing_to_compare_with_a_single_stack() -> None:
+    assert compare([run("")], ()) is None
+    assert compare([run("")], STACKS[:1]) is None
+
+
+def test_outcomes_are_counted_for_each_scenario_and_stack_and_errors_by_themselves() -> None:
+    runs = [run("ref", seed) for seed in (1, 2, 3)]
+    runs += [run("mine", 1), run("mine", 2, outcome=Outcome.FAILED), run("mine", 3, outcome=Outcome.ERROR)]
+    comparison = compare([*runs, run("ref", scenario="b")], STACKS)
+    assert comparison is not None
+    assert comparison.outcomes["a"] == {"ref": Outcomes(3, 0, 0), "mine": Outcomes(1, 1, 1)}
+    assert comparison.outcomes["b"]["mine"] == Outcomes()
+    assert comparison.total("ref") == Outcomes(4, 0, 0)
+    assert comparison.outcomes["a"]["mine"].decided == 2
+    assert dict(comparison.stacks) == {"ref": "reference", "mine": "./nav --fast"}
+
+
+def test_differences_are_of_pairs_with_the_same_scenario_and_seed() -> None:
+    """Means of all runs would differ by 100 s: only seed 1 ran with both."""
+    one = against(run("ref", 1, time_to_goal=10.0), run("mine", 1, time_to_goal=12.0), run("mine", 2, time_to_goal=210))
+    found = of(one, "time_to_goal")
+    assert (found.pairs, found.baseline, found.value, found.difference) == (1, 10.0, 12.0, 2.0)
+    assert (found.lower, found.equal, found.higher, found.p) == (0, 0, 1, 1.0)
+    assert found.interval is None
+    assert one.alone == 1
+
+
+def test_an_error_is_compared_with_nothing_and_counted() -> None:
+    one = against(run("ref", 1), run("mine", 1, outcome=Outcome.ERROR), run("ref", 2), run("mine", 2))
+    assert (one.pairs, one.broken, one.alone, one.flips) == (1, 1, 0, ())
+    assert of(one, "path_length").pairs == 1
+
+
+def test_a_flip_says_with_which_stack_it_failed_and_why() -> None:
+    one = against(
+        *(run("ref", 1), run("mine", 1, outcome=Outcome.FAILED)),
+        *(run("ref", 2, outcome=Outcome.FAILED), run("mine", 2)),
+        *(run("ref", 3, outcome=Outcome.FAILED), run("mine", 3, outcome=Outcome.FAILED)),
+    )
+    assert [(flip.seed, flip.passed, flip.failed) for flip in one.flips] == [(1, "ref", "mine"), (2, "mine", "ref")]
+    assert one.flips[0].why == "clearance: 0.03 m < 0.05 m, at t = 1.00 s, (1.00, 2.00)"
+    assert one.p == 1.0
+
+
+def test_who_gave_up_early_did_not_drive_a_shorter_way() -> None:
+    gave_up = run("mine", 1, outcome=Outcome.FAILED, time_to_goal=None, path_length=1.0, collisions=2.0)
+    one = against(run("ref", 1), gave_up, run("ref", 2), run("mine", 2, path_length=5.5))
+    assert one.parted == 1
+    assert (of(one, "path_length").pairs, of(one, "path_length").difference) == (1, 0.5)
+    assert (of(one, "collisions").pairs, of(one, "collisions").difference) == (2, 1.0)
+
+
+def test_second_runs_are_no_evidence() -> None:
+    one = against(run("ref"), run("ref.again"), run("mine"), run("mine.again"))
+    assert one.pairs == 1
+
+
+def test_the_order_of_runs_changes_nothing_and_every_stack_is_compared_with_the_first() -> None:
+    names = ("ref", "mine", "other")
+    runs = [run(name, seed, time_to_goal=seed * (1.0 + len(name) / 10)) for name in names for seed in range(1, 9)]
+    stacks = [f"{name}=x" for name in names]
+    assert compare(runs, stacks) == compare(runs[::-1], stacks)
+    comparison = compare(runs, stacks)
+    assert comparison is not None
+    assert [one.stack for one in comparison.against] == ["mine", "other"]
+    found = of(comparison.against[1], "time_to_goal")
+    assert found.interval is not None
+    assert found.interval[0] < found.difference < found.interval[1]
+    assert found.difference == pytest.approx(0.2 * 4.5)
+
+
+def test_as_data_it_is_strict_json_and_says_what_was_left_out() -> None:
+    runs = [run("ref", 1), run("mine", 1, outcome=Outcome.ERROR), run("mine", 2)]
+    comparison = compare(runs, STACKS)
+    assert comparison is not None
+    data = json.loads(json.dumps(comparison_data(comparison), allow_nan=False))
+    assert data["baseline"] == "ref"
+    assert data["stacks"][1] == {"name": "mine", "given": "./nav --fast", "passed": 1, "failed": 0, "errors": 1}
+    assert data["against"][0]["left_out"] == {"broken_pairs": 1, "runs_without_partner": 1}
+    assert data["against"][0]["differences"] == []
+
+
+def test_every_metric_that_is_compared_is_one() -> None:
+    assert set(COMPARED) <= set(METRICS)

@@ -1,0 +1,115 @@
+"""Stacks side by side, as people and machines read them."""
+
+import io
+import json
+import re
+
+import pytest
+
+from simscen.core.comparison import Against, Comparison, Difference, Flip, Outcomes
+from simscen.core.sessionevents import SessionFinished, SessionStarted
+from simscen.report.compared import compared, shortened
+from simscen.report.console import text_reporter
+from simscen.report.github import markdown
+from simscen.report.lines import text_of
+from simscen.report.page import to_html
+from simscen.report.results import to_json
+
+FLIP = Flip("navigation/goal", 3, "ref", "mine", "clearance: 0.03 m < 0.05 m, at t = 4.10 s, (2.59, 4.42)")
+TIME = Difference("time_to_goal", "s", 8, 25.341, 28.23, 2.889, (0.78, 4.954), 1, 0, 7, 0.070)
+REPLANS = Difference("replans", "", 2, 3.0, 3.0, 0.0, None, 0, 2, 0, 1.0)
+EXPECTED = """\
+
+  passed                     ref     mine
+  navigation/goal          10/10      6/9
+  obstacles/cart_crosses     1/1   0/0 1!
+  all                      11/11   6/9 1!
+  ! = could not be completed, and counts neither way
+
+  mine against ref: 10 pairs of the same scenario and seed, 0 better, 1 worse (p = 1)
+    worse  navigation/goal, seed 3: passed with ref, failed with mine: clearance: 0.03 m < 0.05 m, at t = 4.10 s, (2.59, 4.42)
+    mean over pairs    ref   mine  difference  95 % interval  - / = / +
+    time_to_goal, s  25.34  28.23       +2.89  +0.78 … +4.95  1 / 0 / 7
+    replans           3.00   3.00       +0.00                 0 / 2 / 0
+    of 2 pairs only one run arrived, so how these drove is not compared
+    left out: 1 pair with an error, 1 run without a partner
+
+"""  # noqa: E501 - as it is printed
+
+
+@pytest.fixture
+def comparison() -> Comparison:
+    """Two scenarios with two stacks."""
+    return Comparison(
+        {"ref": "reference", "mine": "./nav '<b>'"},
+        {
+            "navigation/goal": {"ref": Outcomes(10), "mine": Outcomes(6, 3, 0)},
+            "obstacles/cart_crosses": {"ref": Outcomes(1), "mine": Outcomes(0, 0, 1)},
+        },
+        (Against("mine", 10, 1, 1, 2, (FLIP,), 1.0, (TIME, REPLANS)),),
+    )
+
+
+def lines(comparison: Comparison, columns: int | None = None) -> list[str]:
+    return [text_of(line) for line in compared(comparison, "", columns)]
+
+
+def test_on_the_console_it_is_exactly_this(comparison) -> None:
+    assert "\n".join(lines(comparison)) + "\n" == EXPECTED
+
+
+def test_tables_fit_into_the_columns_of_a_terminal_and_use_a_wider_one(comparison) -> None:
+    long = {"a" * 90 + "/one": comparison.outcomes["navigation/goal"]}
+    for columns in (80, 200):
+        told = lines(Comparison(comparison.stacks, long, comparison.against), columns)
+        tables = [line for line in told if "worse " not in line]
+        assert max(map(len, tables)) <= columns
+        assert (next(iter(long)) in "\n".join(told)) == (columns == 200)
+
+
+def test_a_long_name_keeps_its_ends() -> None:
+    assert shortened("navigation-stack-of-january", 16) == "navigat…-january"
+    assert shortened("short", 16) == "short"
+
+
+def test_of_many_flips_the_first_are_told_and_the_rest_counted(comparison) -> None:
+    many = Against("mine", 30, 0, 0, 0, (FLIP,) * 25, 0.0, ())
+    told = lines(Comparison(comparison.stacks, comparison.outcomes, (many,)))
+    assert sum("worse " in line for line in told) == 11  # ten, and the heading
+    assert "    and 15 more, in results.json" in told
+
+
+def test_piped_and_in_ascii_it_stands_before_the_last_line(comparison) -> None:
+    out = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
+    with text_reporter(out) as listen:
+        listen(SessionStarted("0.1.0", 20, 2, 1, ids=("a/b", "a/c"), stacks=("ref=reference", "mine=./nav")))
+        listen(SessionFinished(1, 0, 0, 10.0, 1.0, comparison=comparison))
+    out.seek(0)
+    told = out.read()
+    assert told.startswith("simscen 0.1.0 - 2 scenarios - 2 stacks - 20 runs - 1 worker\n")
+    assert "+0.78 ... +4.95" in told
+    assert told.splitlines()[-1].startswith("1 passed")
+
+
+def test_on_the_page_it_is_a_section_without_live_text_from_outside(comparison, passed) -> None:
+    html = to_html([passed], comparison=comparison)
+    for tag in ("section", "table", "tr", "td", "th", "h3", "p", "div"):
+        assert len(re.findall(f"<{tag}[ >]", html)) == html.count(f"</{tag}>"), tag
+    assert "mine against ref" in html
+    assert "&lt;b&gt;" in html
+    assert "time_to_goal, s" in html
+    assert "<section" not in to_html([passed])
+
+
+def test_on_github_it_is_in_the_summary(comparison, passed) -> None:
+    session = SessionFinished(1, 0, 0, 1.0, 1.0, comparison=comparison)
+    told = markdown([passed], session)
+    assert "| navigation/goal | 10/10 | 6/9 |" in told
+    assert "- navigation/goal, seed 3: passed with ref, failed with mine: clearance" in told.replace("&#95;", "_")
+    rows = [line for line in told.splitlines() if "time" in line and "28.23" in line]
+    assert rows[0].count("|") == 9
+
+
+def test_in_results_json_it_is_data(comparison, passed) -> None:
+    assert json.loads(to_json([passed], "", comparison))["comparison"]["against"][0]["flips"][0]["seed"] == 3
+    assert "comparison" not in json.loads(to_json([passed]))
