@@ -63,6 +63,8 @@ def command(
     estimate = _estimate(start, sensed)
     localized = localize(sensed, spec, Surroundings(model, grid, TICK_RATE), estimate, seed)
     errors = errors_of(localized, sensed, lost)
+    for note in sensed.notes:
+        print_text(f"note: {harmless(note)}", sys.stderr)
     if picture is not None:
         _draw(grid, localized, sensed, picture, [log, map_])
     each = localized.cpu * 1e3 / max(1, localized.scans)
@@ -146,7 +148,7 @@ def _lines(localized: Localized, errors: Errors | None, lost: float) -> list[str
         return [*lines, "no reference to compare with"]
     figures = errors.figures()
     told = ", ".join(f"{name} {figures[name]:.3f} m" for name in ("median", "rmse", "max", "final"))
-    lines.append(f"error: {told}; heading rmse {figures['yaw_rmse']:.4f} rad")
+    lines += [f"error: {told}", f"heading: rmse {figures['yaw_rmse']:.4f} rad"]
     for one in errors.lost:
         end = "to the end" if one.until is None else f"to {one.until:.1f} s"
         lines.append(f"lost (more than {lost:g} m off) from {one.since:.1f} s {end}")

@@ -68,10 +68,10 @@ class Errors:
 def localize(sensed: Sensed, spec: StackSpec, surroundings: Surroundings, estimate: Estimate, seed: int) -> Localized:
     """Feed a log to the localizer of a stack, reading by reading; the belief is taken after each odometry.
 
-    The same arguments give the same beliefs.
+    The same arguments give the same beliefs, and those of a run of that seed: the localizer is begun as a stack does.
     """
-    setting = Setting(surroundings, "localizer", Streams(seed), estimate=estimate)
-    localizer = InstalledLocalizer(spec.localizer, setting)
+    localizer = InstalledLocalizer(spec.localizer, Setting(surroundings, "localizer", Streams(seed)))
+    localizer.reset(estimate)
     began, times, poses, scans = time.process_time(), [], [], 0
     for reading in sensed.readings:
         match reading:

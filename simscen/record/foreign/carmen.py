@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from simscen.record.foreign.sensedrows import Range, Rows, Stamped, Triple
+from simscen.record.foreign.sensedrows import FURTHEST, LATEST, Range, Rows, Stamped, Triple, usable
 from simscen.record.foreign.unusable import Unusable
 
 MOST = 81.9
@@ -31,18 +31,18 @@ def carmen_rows(path: Path) -> Rows:
 
 
 def _odom(rows: Rows, order: int, words: list[str]) -> None:
-    rows.odometry.append(Stamped(_finite(words[-3]), order, _pose(words[1:4])))
+    rows.odometry.append(Stamped(_time(words[-3]), order, _pose(words[1:4])))
 
 
 def _truepos(rows: Rows, order: int, words: list[str]) -> None:
-    rows.truth.append(Stamped(_finite(words[-3]), order, _pose(words[1:4])))
+    rows.truth.append(Stamped(_time(words[-3]), order, _pose(words[1:4])))
 
 
 def _flaser(rows: Rows, order: int, words: list[str]) -> None:
     """FLASER n r… x y theta odom_x odom_y odom_theta time host logger_time."""
     count = int(words[1])
     ranges, rest = _ranges(words[2 : 2 + count], count), words[2 + count :]
-    time = _finite(rest[6])
+    time = _time(rest[6])
     step = math.pi / max(1, count - 1) if count % 2 else math.pi / count
     rows.odometry.append(Stamped(time, order, _pose(rest[3:6])))
     mount = _between(_pose(rest[3:6]), _pose(rest[:3]))
@@ -56,7 +56,7 @@ def _robotlaser(rows: Rows, order: int, words: list[str]) -> None:
     count = int(words[8])
     ranges = _ranges(words[9 : 9 + count], count)
     rest = words[10 + count + int(words[9 + count]) :]
-    time, laser, robot = _finite(words[-3]), _pose(rest[:3]), _pose(rest[3:6])
+    time, laser, robot = _time(words[-3]), _pose(rest[:3]), _pose(rest[3:6])
     rows.odometry.append(Stamped(time, order, robot))
     rows.scans.append(Range(time, order, ranges, (first, step, 0.0, most), _between(robot, laser)))
 
@@ -69,12 +69,20 @@ def _ranges(words: list[str], count: int) -> "np.ndarray[tuple[int, ...], np.dty
 
 def _pose(words: list[str]) -> Triple:
     x, y, yaw = (_finite(word) for word in words)
+    if not usable((x, y, yaw), FURTHEST):
+        raise ValueError(f"no place is at {x:g}, {y:g}")
     return x, y, yaw
 
 
 def _between(base: Triple, other: Triple) -> Triple:
     dx, dy, c, s = other[0] - base[0], other[1] - base[1], math.cos(base[2]), math.sin(base[2])
     return c * dx + s * dy, c * dy - s * dx, math.remainder(other[2] - base[2], 2 * math.pi)
+
+
+def _time(word: str) -> float:
+    if not usable((value := _finite(word),), LATEST):
+        raise ValueError(f"{word} is not a time")
+    return value
 
 
 def _finite(word: str) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,12 +24,13 @@ from simscen.record.replay import DAMAGE, invalid
 class Sensed:
     """`readings` in the order in which the robot received them; `truth` (n, 3) x, y, yaw in the map at `ticks` (n,).
 
-    Ticks are of 1/TICK_RATE s, from the log's first reading on.
+    Ticks are of 1/TICK_RATE s, from the log's first reading on. `notes` are what is odd about the log.
     """
 
     readings: Sequence[Odometry | Scan]
     ticks: Ticks
     truth: Array
+    notes: Sequence[str] = ()
 
 
 def read_sensed(path: Path, odometry: str, scan: str, reference: str | None) -> Sensed:
@@ -73,7 +74,21 @@ def _sensed(rows: Rows) -> Sensed:
     truth = {tick(row.time): row.pose for row in rows.truth}
     ticks = np.array(sorted(truth), dtype=np.int64)
     poses = np.array([truth[int(one)] for one in ticks], dtype=np.float64).reshape(-1, 3)
-    return Sensed([one for *_, one in told], ticks, poses)
+    readings = [one for *_, one in told]
+    return Sensed(readings, ticks, poses, [*rows.notes, *_odd(readings)])
+
+
+def _odd(readings: Sequence[Odometry | Scan]) -> Iterator[str]:
+    """Readings that no localizer can use. Raises Unusable where that is every scan."""
+    odometry = np.array([one.tick for one in readings if isinstance(one, Odometry)])
+    scans = np.array([one.tick for one in readings if isinstance(one, Scan)])
+    if late := int((np.diff(np.maximum.accumulate(odometry)) == 0).sum()):
+        yield f"{late} of {len(odometry)} odometry readings are not newer than one before, and count for nothing"
+    outside = int(((scans < odometry[0]) | (scans > odometry.max())).sum())
+    if outside == len(scans):
+        raise Unusable("no scan was taken while there was odometry", "their clocks differ, or a topic is another's")
+    if outside:
+        yield f"{outside} of {len(scans)} scans were taken before the odometry begins or after it ends"
 
 
 def _scan(row: Range, tick: int) -> Scan:

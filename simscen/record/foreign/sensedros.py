@@ -4,20 +4,34 @@ from __future__ import annotations
 
 import math
 import struct
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from simscen.core.geometry import Pose3
 from simscen.record import topics
 from simscen.record.foreign import messages
 from simscen.record.foreign.bagfolder import messages_of
 from simscen.record.foreign.mcapfile import Raw
-from simscen.record.foreign.sensedrows import Range, Rows, Stamped, Triple
+from simscen.record.foreign.mounts import Mount, mount_of
+from simscen.record.foreign.sensedrows import FURTHEST, Range, Rows, Stamped, Triple, usable
 from simscen.record.foreign.unusable import Unusable
 from simscen.record.simtime import SECOND
 
 _SCAN, _TRANSFORMS = "sensor_msgs/msg/LaserScan", "tf2_msgs/msg/TFMessage"
-_BASES = ("base_link", "base_footprint")
+Said = tuple[int, int, Any]
+"""When a message was logged in ns, its place in the log, and what it says."""
+
+
+@dataclass
+class _Heard:
+    """The messages that matter."""
+
+    odometry: list[Said] = field(default_factory=list)
+    scans: list[Said] = field(default_factory=list)
+    truth: list[Said] = field(default_factory=list)
+    links: dict[str, messages.Posed] = field(default_factory=dict)
+    topics: dict[str, str] = field(default_factory=dict)
 
 
 def ros_rows(path: Path, odometry: str, scan: str, reference: str | None) -> Rows:
@@ -25,34 +39,39 @@ def ros_rows(path: Path, odometry: str, scan: str, reference: str | None) -> Row
 
     Without a `reference`, the truth of simscen's own logs is one. The lidar's mount is what /tf_static says.
     """
-    truth = reference or topics.TRUTH.name
-    wanted = {odometry, scan, truth, topics.TF_STATIC.name}
-    stream, rows, links = messages_of(path, wanted), Rows(), {}
-    scans: list[tuple[int, str, int, Any]] = []
-    for order, raw in enumerate(stream):
-        if raw.topic not in wanted:
-            continue
-        if raw.topic == topics.TF_STATIC.name:
-            links.update({one.child: one for one in _read(raw, {_TRANSFORMS: messages.transforms})})
-            continue
-        if raw.topic == scan:
-            one = _read(raw, {_SCAN: messages.laser_scan})
-            scans.append((one.stamp, one.frame, order, one))
-        if raw.topic == odometry:
-            rows.odometry.append(_stamped(_read(raw, messages.POSES), order))
-        if raw.topic == truth:
-            rows.truth.append(_stamped(_read(raw, messages.POSES), order))
-    for stamp, frame, order, one in scans:
-        layout = (one.angle_min, one.angle_increment, one.range_min, one.range_max)
-        rows.scans.append(Range(stamp / SECOND, order, one.ranges, layout, _mount(frame, links)))
-    if reference is not None and not rows.truth:
-        raise Unusable(f"it has no messages on {reference}", _told(stream.topics))
-    rows.hint = _told(stream.topics)
+    heard = _heard(path, odometry, scan, reference or topics.TRUTH.name)
+    known = f"its topics: {', '.join(sorted(heard.topics)[:12]) or 'none'}"
+    rows = Rows(hint=f"{known}; name others with --odom, --scan and --reference")
+    if reference is not None and not heard.truth:
+        raise Unusable(f"it has no messages on {reference}", rows.hint)
+    named = {odometry: heard.odometry, scan: heard.scans, reference or topics.TRUTH.name: heard.truth}
+    unstamped = [topic for topic, said in named.items() if said and not any(one.stamp for *_, one in said)]
+    if unstamped:
+        rows.notes.append(f"{', '.join(unstamped)}: its stamps are all zero; all times are those of logging")
+    by_log = bool(unstamped)
+    rows.odometry += _poses(odometry, heard.odometry, by_log, rows.notes)
+    rows.truth += _poses(reference or "the truth", heard.truth, by_log, rows.notes)
+    rows.scans += _scans(scan, heard, by_log, rows.notes)
+    frames = sorted({one.frame for *_, one in heard.truth if one.frame != "map"})
+    if frames:
+        rows.notes.append(f"{reference} is told in frame {', '.join(frames)!r}; it is taken for that of the map")
     return rows
 
 
-def _told(known: dict[str, str]) -> str:
-    return f"its topics: {', '.join(sorted(known)[:12]) or 'none'}; name others with --odom, --scan and --reference"
+def _heard(path: Path, odometry: str, scan: str, truth: str) -> _Heard:
+    wanted = {odometry, scan, truth, topics.TF_STATIC.name}
+    stream, heard = messages_of(path, wanted), _Heard()
+    for order, raw in enumerate(stream):
+        if raw.topic == topics.TF_STATIC.name:
+            heard.links.update({one.child: one for one in _read(raw, {_TRANSFORMS: messages.transforms})})
+        elif raw.topic == scan:
+            heard.scans.append((raw.time, order, _read(raw, {_SCAN: messages.laser_scan})))
+        elif raw.topic in (odometry, truth):
+            said = (raw.time, order, _read(raw, messages.POSES))
+            heard.odometry += [said] if raw.topic == odometry else []
+            heard.truth += [said] if raw.topic == truth else []
+    heard.topics = stream.topics
+    return heard
 
 
 def _read(raw: Raw, readers: dict[str, Any]) -> Any:
@@ -64,22 +83,44 @@ def _read(raw: Raw, readers: dict[str, Any]) -> Any:
         raise Unusable(f"a message of {raw.topic} cannot be read as {raw.type}: {error}") from error
 
 
-def _stamped(posed: messages.Posed, order: int) -> Stamped:
-    return Stamped(posed.stamp / SECOND, order, _plane(posed.pose))
+def _time(logged: int, said: Any, by_log: bool) -> float:
+    return (logged if by_log else said.stamp) / SECOND
 
 
-def _plane(pose: messages.Numbers) -> Triple:
+def _poses(topic: str, said: Iterable[Said], by_log: bool, notes: list[str]) -> Iterator[Stamped]:
+    """Where something was; what is no place is left out."""
+    left_out = 0
+    for logged, order, one in said:
+        if usable(one.pose, FURTHEST):
+            yield Stamped(_time(logged, one, by_log), order, plane(one.pose))
+        else:
+            left_out += 1
+    if left_out:
+        notes.append(f"{topic}: {left_out} poses are not numbers, or no place that there is; they are left out")
+
+
+def _scans(topic: str, heard: _Heard, by_log: bool, notes: list[str]) -> Iterator[Range]:
+    """Scans as a lidar would have taken them that is the right way up."""
+    base = next((one.child for *_, one in heard.odometry if one.child), "")
+    mounts: dict[str, Mount | None] = {}
+    for logged, order, one in heard.scans:
+        layout = (one.angle_min, one.angle_increment, one.range_min, one.range_max)
+        if any(math.isnan(value) for value in layout) or not usable(layout[:2], FURTHEST):
+            raise Unusable(f"a scan of {topic} says that its angles and ranges are {layout}")
+        if one.frame not in mounts:
+            mounts[one.frame] = mount_of(one.frame, base, heard.links)
+            if mounts[one.frame] is None:
+                told = f"/tf_static does not say where {one.frame!r} is on {base or 'base_link'!r}"
+                notes.append(f"{told}: the lidar is taken to be at its origin")
+        pose, hangs = mounts[one.frame] or Mount((0.0, 0.0, 0.0), False)
+        ranges = one.ranges
+        if hangs:
+            ranges = ranges[::-1]
+            layout = (-(one.angle_min + (len(ranges) - 1) * one.angle_increment), *layout[1:])
+        yield Range(_time(logged, one, by_log), order, ranges, layout, pose)
+
+
+def plane(pose: messages.Numbers) -> Triple:
+    """x, y and yaw of x, y, z and a unit quaternion."""
     x, y, _, qx, qy, qz, qw = pose
     return x, y, math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
-
-
-def _mount(frame: str, links: dict[str, messages.Posed]) -> Triple:
-    """Where a lidar is on the base, by the chain of static transforms; at its origin where they do not say."""
-    pose, seen = Pose3(0, 0, 0, 0, 0, 0, 1), set()
-    while frame in links and frame not in _BASES and frame not in seen:
-        seen.add(frame)
-        link = links[frame]
-        pose, frame = Pose3(*link.pose).compose(pose), link.frame
-    if frame not in _BASES:
-        return 0.0, 0.0, 0.0
-    return _plane((*pose.position, *pose.quaternion))

@@ -1,11 +1,14 @@
 """The rows of a log that a localizer needs."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from simscen.core.geometry import Array
 
 TICK_RATE = 1000
 """Ticks a second."""
+LATEST, FURTHEST = 1e11, 1e6
+"""No reading has a time beyond this (s) or a place (m): squares of what a broken sensor may say would overflow."""
 Triple = tuple[float, float, float]
 
 
@@ -31,9 +34,15 @@ class Range:
 
 @dataclass
 class Rows:
-    """What a log says; `hint` is what helps where something is missing."""
+    """What a log says; `hint` is what helps where something is missing, `notes` are what is odd."""
 
     odometry: list[Stamped] = field(default_factory=list)
     scans: list[Range] = field(default_factory=list)
     truth: list[Stamped] = field(default_factory=list)
     hint: str = ""
+    notes: list[str] = field(default_factory=list)
+
+
+def usable(values: Iterable[float], largest: float) -> bool:
+    """Whether all of these are numbers, and none too large."""
+    return all(-largest < value < largest for value in values)

@@ -1,0 +1,238 @@
+"""`simscen localize` on logs as real recorders write them: rosbag2 folders, odd mounts, odd clocks, and nonsense."""
+
+import json
+import math
+import sys
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rosbags.rosbag2 import StoragePlugin
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "record"))
+sys.path.insert(0, str(Path(__file__).parent))
+from foreign_logs import BEGIN, LATENCY, SECOND, STORE, Said, T, header, pose, write_bag, write_mcap
+from recorded_drives import drive, ranges_at, write_map
+
+GIVEN = ("--map", "room.yaml", "--robot", "turtlebot")
+HUNG = math.pi
+
+
+def transform(child: str, parent: str, x: float, yaw: float, roll: float = 0.0) -> Any:
+    """tf2_msgs/TFMessage with one transform of fixed-axis roll, then yaw."""
+    half, turned = roll / 2, yaw / 2
+    rotation = T["geometry_msgs/msg/Quaternion"](
+        x=math.sin(half) * math.cos(turned),
+        y=math.sin(half) * math.sin(turned),
+        z=math.cos(half) * math.sin(turned),
+        w=math.cos(half) * math.cos(turned),
+    )
+    where = T["geometry_msgs/msg/Transform"](
+        translation=T["geometry_msgs/msg/Vector3"](x=x, y=0.0, z=0.2), rotation=rotation
+    )
+    one = T["geometry_msgs/msg/TransformStamped"](header=header(BEGIN, parent), child_frame_id=child, transform=where)
+    return T["tf2_msgs/msg/TFMessage"](transforms=[one])
+
+
+def said(
+    mount: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    base: str = "base_link",
+    stamp: Callable[[int], int] = lambda time: time,
+    frame: str = "laser",
+    every: int = 1,
+) -> list[Said]:
+    """The drive as messages: /odom, /scan by a lidar at `mount` (x, yaw, roll) on the base, and /gt of the truth."""
+    forward, turned, roll = mount
+    found = [Said("/tf_static", BEGIN, transform("laser", base, forward, turned, roll))]
+    for t, (x, y, yaw), odom in drive()[::every]:
+        time = BEGIN + round(t * SECOND)
+        found.append(Said("/odom", time + LATENCY, odometry(stamp(time), odom, base)))
+        found.append(Said("/gt", time + LATENCY, posed(stamp(time), (x, y, yaw))))
+        at = (x + forward * math.cos(yaw), y + forward * math.sin(yaw), yaw + turned)
+        ranges = ranges_at(*at)
+        found.append(Said("/scan", time + LATENCY, scan(stamp(time), ranges[::-1] if roll else ranges, frame)))
+    return found
+
+
+def odometry(time: int, at: tuple[float, float, float], base: str) -> Any:
+    """nav_msgs/Odometry."""
+    where = T["geometry_msgs/msg/PoseWithCovariance"](pose=pose(*at), covariance=np.zeros(36))
+    zero = T["geometry_msgs/msg/Vector3"](x=0.0, y=0.0, z=0.0)
+    fast = T["geometry_msgs/msg/TwistWithCovariance"](
+        twist=T["geometry_msgs/msg/Twist"](linear=zero, angular=zero), covariance=np.zeros(36)
+    )
+    return T["nav_msgs/msg/Odometry"](header=header(time, "odom"), child_frame_id=base, pose=where, twist=fast)
+
+
+def posed(time: int, at: tuple[float, float, float], frame: str = "map") -> Any:
+    """geometry_msgs/PoseStamped."""
+    return T["geometry_msgs/msg/PoseStamped"](header=header(time, frame), pose=pose(*at))
+
+
+def scan(time: int, ranges: Iterable[float], frame: str, first: float = -math.pi / 2) -> Any:
+    """sensor_msgs/LaserScan."""
+    return T["sensor_msgs/msg/LaserScan"](
+        header=header(time, frame), angle_min=first, angle_max=math.pi / 2, angle_increment=math.pi / 180,
+        time_increment=0.0, scan_time=0.1, range_min=0.05, range_max=15.0,
+        ranges=np.array(ranges, dtype=np.float32), intensities=np.zeros(0, dtype=np.float32),
+    )  # fmt: skip
+
+
+def localized(simscen, *arguments: str) -> dict[str, Any]:
+    """The JSON of a log that goes through."""
+    ended = simscen("localize", *arguments, *GIVEN, "--reference", "/gt", "--json")
+    assert ended.code == 0, ended.err
+    found: dict[str, Any] = json.loads(ended.out)
+    return found | {"err": ended.err}
+
+
+def test_the_same_drive_gives_the_same_figures_from_every_kind_of_ros_log(simscen, tmp_path: Path) -> None:
+    write_map(tmp_path)
+    messages = said()
+    write_mcap(tmp_path / "drive.mcap", messages)
+    write_bag(tmp_path / "sqlite", messages)
+    write_bag(tmp_path / "mcap", messages, StoragePlugin.MCAP)
+    write_bag(tmp_path / "compressed", messages, compress="message")
+    found = [localized(simscen, log) for log in ("drive.mcap", "sqlite", "mcap", "compressed")]
+    assert found[0]["scans"] == 150
+    assert found[0]["error"]["max"] < 0.2
+    assert found[0]["lost"] == []
+    assert all(one["error_over_time"] == found[0]["error_over_time"] for one in found)
+
+
+@pytest.mark.parametrize(
+    ("mount", "base"),
+    [((0.25, 0.0, 0.0), "base_link"), ((0.1, 2.0, 0.0), "chassis"), ((-0.2, 0.5, HUNG), "robot1/base_footprint")],
+    ids=["in front", "turned, on a base of another name", "upside down"],
+)
+def test_a_lidar_is_where_tf_static_says_even_upside_down(
+    simscen, tmp_path: Path, mount: tuple[float, float, float], base: str
+) -> None:
+    write_map(tmp_path)
+    write_bag(tmp_path / "bag", said(mount, base))
+    found = localized(simscen, "bag")
+    assert found["error"]["max"] < 0.2
+    assert "note:" not in found["err"]
+
+
+def test_a_lidar_that_nobody_mounts_is_told(simscen, tmp_path: Path) -> None:
+    write_map(tmp_path)
+    write_mcap(tmp_path / "drive.mcap", said(frame="velodyne"))
+    found = localized(simscen, "drive.mcap")
+    assert "does not say where 'velodyne' is on 'base_link'" in found["err"]
+    assert found["error"]["max"] < 0.2
+
+
+def test_stamps_that_nobody_filled_in_are_those_of_logging(simscen, tmp_path: Path) -> None:
+    write_map(tmp_path)
+    write_mcap(tmp_path / "drive.mcap", said(stamp=lambda _: 0))
+    found = localized(simscen, "drive.mcap")
+    assert "its stamps are all zero" in found["err"]
+    assert found["error"]["max"] < 0.2
+
+
+def test_a_reference_of_another_frame_is_told(simscen, tmp_path: Path) -> None:
+    write_map(tmp_path)
+    changed = [
+        replace(one, message=replace(one.message, header=header(one.time - LATENCY, "mocap")))
+        if one.topic == "/gt"
+        else one
+        for one in said(every=3)
+    ]
+    write_mcap(tmp_path / "drive.mcap", changed)
+    assert "/gt is told in frame 'mocap'" in localized(simscen, "drive.mcap")["err"]
+
+
+def test_poses_that_are_not_numbers_are_left_out_and_counted(simscen, tmp_path: Path) -> None:
+    write_map(tmp_path)
+    broken = said()
+    for k, x in ((60, math.nan), (90, math.inf), (120, 1e300)):
+        for one in (broken[3 * k + 1], broken[3 * k + 2]):
+            inner = one.message.pose.pose if one.topic == "/odom" else one.message.pose
+            inner.position.x = x
+    write_mcap(tmp_path / "drive.mcap", broken)
+    found = localized(simscen, "drive.mcap")
+    assert "/odom: 3 poses are not numbers" in found["err"]
+    assert "/gt: 3 poses are not numbers" in found["err"]
+    assert found["error"]["max"] < 0.3
+
+
+def test_scans_of_another_clock_than_odometrys_are_refused(simscen, tmp_path: Path) -> None:
+    write_map(tmp_path)
+    other = [
+        replace(one, message=scan(5 * SECOND, one.message.ranges, "laser")) if one.topic == "/scan" else one
+        for one in said(every=10)
+    ]
+    write_mcap(tmp_path / "drive.mcap", other)
+    ended = simscen("localize", "drive.mcap", *GIVEN, "--start", "1,0.8,0")
+    assert ended.code == 2
+    assert "no scan was taken while there was odometry" in ended.err
+
+
+def test_readings_that_count_for_nothing_are_told(simscen, tmp_path: Path) -> None:
+    write_map(tmp_path)
+    looped = said()
+    write_mcap(tmp_path / "drive.mcap", [*looped, *looped[1:31]])
+    assert "10 of 160 odometry readings are not newer" in localized(simscen, "drive.mcap")["err"]
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (lambda one: replace(one, message=scan(one.time, [1.0], "laser", math.nan)), "its angles and ranges are"),
+        (lambda one: replace(one, message=posed(one.time, (0, 0, 0))), "/scan is a geometry_msgs/msg/PoseStamped"),
+        (lambda one: replace(one, topic="/front/scan"), "it holds no scans"),
+    ],
+    ids=["angles that are not numbers", "another type", "another topic"],
+)
+def test_scans_that_are_none_are_told_with_what_there_is(
+    simscen, tmp_path: Path, change: Callable[[Said], Said], told: str
+) -> None:
+    write_map(tmp_path)
+    write_mcap(tmp_path / "drive.mcap", [change(one) if one.topic == "/scan" else one for one in said(every=15)])
+    ended = simscen("localize", "drive.mcap", *GIVEN, "--reference", "/gt")
+    assert ended.code == 2
+    assert told in ended.err
+    assert "Traceback" not in ended.err
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "odom,1e300,0,0,0\nscan,1e300,0,0.1,0.1,9,1\n",
+        "odom,0,1e200,0,0\nscan,0,0,0.1,0.1,9,1\n",
+        "odom,0,0,0,0\nscan,inf,0,0.1,0.1,9,1\n",
+        "odom,0,0,0,0\nscan,0,nan,0.1,0.1,9,1\n",
+        "odom,0,0,0\x000,0\n",
+        "odom," + "1" * 200_000 + ",0,0,0\n",
+        '"odom\n' * 3,
+        "mount,1,2\n",
+        "",
+    ],
+)
+def test_a_csv_log_of_nonsense_is_refused_in_words(simscen, tmp_path: Path, text: str) -> None:
+    write_map(tmp_path)
+    Path("bad.csv").write_text(text)
+    ended = simscen("localize", "bad.csv", *GIVEN, "--start", "1,1,0")
+    assert ended.code == 2
+    assert "bad.csv" in ended.err
+    assert "Traceback" not in ended.err
+
+
+def test_every_cut_of_a_log_ends_in_figures_or_in_words(simscen, tmp_path: Path) -> None:
+    write_map(tmp_path)
+    whole = write_mcap(tmp_path / "drive.mcap", said(every=15)).read_bytes()
+    for share in (0.0, 0.02, 0.3, 0.6, 0.95, 0.999):
+        Path("cut.mcap").write_bytes(whole[: int(share * len(whole))])
+        ended = simscen("localize", "cut.mcap", *GIVEN, "--start", "1,0.8,0")
+        assert ended.code in (0, 2), (share, ended.err)
+        assert "Traceback" not in ended.err
+
+
+def test_messages_fit_their_definitions() -> None:
+    """So that what is tested here is what a recorder writes."""
+    for one in said(every=50):
+        assert STORE.deserialize_cdr(STORE.serialize_cdr(one.message, one.message.__msgtype__), one.message.__msgtype__)
