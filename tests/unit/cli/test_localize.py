@@ -9,34 +9,7 @@ import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
-from recorded_drives import drive, ranges_at, write_map
-
-
-def write_csv(folder: Path, pose_rows: bool = True) -> None:
-    """Rows of odometry, scans and truth."""
-    lines = ["# a drive"]
-    for t, true, odom in drive():
-        lines.append("odom," + ",".join(map(str, (t, *odom))))
-        lines.append("scan," + ",".join(map(str, (t, -math.pi / 2, math.pi / 180, 0.05, 15, *ranges_at(*true)))))
-        if pose_rows:
-            lines.append("truth," + ",".join(map(str, (t, *true))))
-    (folder / "drive.csv").write_text("\n".join(lines) + "\n")
-
-
-def write_carmen(folder: Path, kind: str) -> None:
-    """FLASER lines, or ROBOTLASER1 lines, with TRUEPOS."""
-    lines = ["# CARMEN Logfile"]
-    for t, true, odom in drive():
-        ranges, place = " ".join(map(str, ranges_at(*true))), " ".join(map(str, odom))
-        tail = f"{t} host {t}"
-        if kind == "FLASER":
-            lines.append(f"FLASER 181 {ranges} {place} {place} {tail}")
-        else:
-            head = f"ROBOTLASER1 0 {-math.pi / 2} {math.pi} {math.pi / 180} 15 0.01 0 181"
-            lines.append(f"{head} {ranges} 0 {place} {place} 0 0 0.3 0.3 0 {tail}")
-        lines.append(f"TRUEPOS {' '.join(map(str, true))} {place} {tail}")
-    (folder / "drive.log").write_text("\n".join(lines) + "\n")
-
+from recorded_drives import drive, ranges_at, write_carmen, write_csv, write_map
 
 GIVEN = ("--map", "room.yaml", "--robot", "turtlebot")
 
