@@ -29,4 +29,8 @@ class AnyAction(Choice):
         """Do it now, and say what came of it."""
         action = self.chosen
         assert isinstance(action, Action)
-        return action.perform(stage)
+        if self.narrow is None:
+            return action.perform(stage)
+        from simscen.actions.watched import perform_watched
+
+        return perform_watched(action, stage, self.added_by)

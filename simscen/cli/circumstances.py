@@ -4,13 +4,17 @@ import json
 import os
 import platform
 import sys
+from collections.abc import Mapping
 from datetime import datetime, timezone
 
 from simscen.run.versions import arithmetic, cpu_flags, versions
 
 
-def as_json(wall: float | None = None) -> bytes:
-    """run.json; `wall` is how many seconds the session took, None while it is under way."""
+def as_json(plugins: Mapping[str, object], wall: float | None = None) -> bytes:
+    """run.json; `plugins` are the installed packages that are used, `wall` the seconds that the session took.
+
+    While it is under way `wall` is None.
+    """
     return json.dumps(
         {
             "written": datetime.now(timezone.utc).isoformat(timespec="seconds"),
@@ -22,6 +26,7 @@ def as_json(wall: float | None = None) -> bytes:
             "cpu_flags": cpu_flags(),
             "arithmetic": arithmetic(),
             "packages": versions(),
+            "plugins": plugins,
         },
         indent=2,
     ).encode()

@@ -16,7 +16,7 @@ from simscen.core.trace import Trace
 from simscen.judge.result import result_of
 from simscen.loading.criteria_file import LoadedCriteria, load_criteria
 from simscen.loading.discovery import default_root
-from simscen.loading.resolved import spec_of_text
+from simscen.loading.resolved import criteria_of_text
 from simscen.record.foreign.mcapfile import is_own
 from simscen.record.foreign.read import read_foreign
 from simscen.record.foreign.wanted import Wanted
@@ -61,8 +61,8 @@ class Judging:
         about, case = read.about, read.about.case
         key = RunKey(about.name, about.seed)
         if self._criteria is None:
-            spec = spec_of_text(about.scenario, str(log))
-            result = result_of(key, str(log), spec.pass_, read.trace, case)
+            spec = criteria_of_text(about.scenario, str(log), about.facts)
+            result = result_of(key, str(log), spec.pass_, read.trace, case, metrics=spec.metrics)
             return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=str(log))
         # What had to happen stands in the scenario of the log, at lines that the file of criteria does not have.
         case = replace(case, disturbances=tuple(replace(one, line=0) for one in case.disturbances))
@@ -98,7 +98,7 @@ class Judging:
         """Judged by the file of criteria."""
         criteria, file = self._criteria, str(self._scenario)
         assert criteria is not None
-        result = result_of(key, file, criteria.spec.pass_, trace, case, criteria.lines, coverage)
+        result = result_of(key, file, criteria.spec.pass_, trace, case, criteria.lines, coverage, criteria.spec.metrics)
         return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=file)
 
 

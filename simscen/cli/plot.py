@@ -15,7 +15,7 @@ from simscen.core.problems import Problem
 from simscen.core.result import RunKey, RunResult
 from simscen.judge.result import result_of
 from simscen.judge.resultdata import from_json
-from simscen.loading.resolved import spec_of_text
+from simscen.loading.resolved import criteria_of_text
 from simscen.record.replay import Log, read_run
 
 LOGS = ("run.mcap", "run.partial.mcap")
@@ -61,8 +61,10 @@ def _result(log: Log, file: Path) -> RunResult:
     if log.result:
         return from_json(log.result)
     about = log.about
-    spec = spec_of_text(about.scenario, str(file))
-    return result_of(RunKey(about.name, about.seed), about.name, spec.pass_, log.trace, about.case)
+    spec = criteria_of_text(about.scenario, str(file), about.facts)
+    return result_of(
+        RunKey(about.name, about.seed), about.name, spec.pass_, log.trace, about.case, metrics=spec.metrics
+    )
 
 
 def _nothing(log: Log) -> OccupancyGrid:

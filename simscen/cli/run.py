@@ -18,10 +18,12 @@ from simscen.core.errors import Exit, InvalidInput, UsageError
 from simscen.core.sessionevents import SessionEvent
 from simscen.judge.measure.compare import compare
 from simscen.loading.externalstack import undefined
+from simscen.loading.plugins import plugins_of_all
 from simscen.report.journal import Journal, require_free
 from simscen.report.journaldata import NAME
 from simscen.report.rebuild import read_journal
 from simscen.run.outfolder import RUNS, make_folder
+from simscen.run.plugincode import packages_of
 from simscen.run.session import Options, plan, run_session, seeds_of
 
 WARM_PROCESS = ("-m", "simscen.cli.warm_process")
@@ -106,7 +108,7 @@ def command(
         raise InvalidInput(from_here(problems, scenarios[0].root))
     require_writable(junit, out or resume, {file for each in scenarios for file in (*each.files.values(), *each.read)})
     folder, journal = _output_folder(out, resume)
-    reports = Reports(folder, junit, junit_family.value)
+    reports = Reports(folder, junit, junit_family.value, plugins=packages_of(plugins_of_all(scenarios)))
     reports.begin()
     work = begin(journal, plan(scenarios, options, folder), options.workers)
     with screen(format_) as shown:

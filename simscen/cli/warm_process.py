@@ -1,4 +1,4 @@
-"""The program of the warm process: `python -I -m simscen.cli.warm_process FD`. Not for people."""
+"""The program of the warm process: `python -I -m simscen.cli.warm_process [WHEREABOUTS] FD`. Not for people."""
 
 import resource
 import sys
@@ -15,6 +15,7 @@ from simscen.run.prepare import Prepared
 from simscen.run.prepared_cache import PreparedCache
 from simscen.run.process.confine import MEMORY_BYTES
 from simscen.run.process.jobs import Job
+from simscen.run.process.whereabouts import settle_in
 from simscen.run.process.worker import Progress
 from simscen.run.process.zygote import Zygote
 
@@ -23,7 +24,10 @@ _PREPARED = PreparedCache()
 
 def main() -> None:
     """Serve the supervisor until it closes its end."""
-    Zygote(0, int(sys.argv[1]), _warm_up, _perform).serve()
+    *told, replies = sys.argv[1:]
+    for whereabouts in told:
+        settle_in(whereabouts)
+    Zygote(0, int(replies), _warm_up, _perform).serve()
 
 
 def _warm_up(job: Job) -> None:

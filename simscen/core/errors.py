@@ -47,6 +47,10 @@ class NothingSelected(SimscenError):
     exit = Exit.NOTHING_SELECTED
 
 
+BROKEN = "broken-component"
+"""The kind of error of a run in which something that was installed answered with what is no answer."""
+
+
 class RunError(SimscenError):
     """A run could not be completed; `kind` is JUnit's error type: crashed, timeout, out-of-memory, invalid, …"""
 

@@ -9,6 +9,7 @@ from simscen.core.verdict import Finding
 
 if TYPE_CHECKING:
     from simscen.core.case import Case
+    from simscen.core.evidence import Evidence
     from simscen.core.trace import Trace
 
 
@@ -28,6 +29,11 @@ class Criterion(ABC):
     def horizon(self) -> float:
         """Seconds of simulated time before which it cannot be known that it holds."""
         return 0.0
+
+    @property
+    def evidence(self) -> frozenset[Evidence] | None:
+        """What a log must hold for it to be decided; None = everything that a log of simscen holds."""
+        return None
 
     @abstractmethod
     def judge(self, trace: Trace, case: Case) -> list[Finding]:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from simscen.core.readings import COMMAND, READINGS
+
 if TYPE_CHECKING:
     from simscen.core.motion import Twist
     from simscen.core.sensing import Reading
@@ -47,6 +49,14 @@ class Fault(ABC):
     """
 
     affects: ClassVar[frozenset[str]]
+
+    @classmethod
+    def broken_promise(cls) -> str:
+        """Why it is no specification of a fault; "" for one that is."""
+        affects: object = getattr(cls, "affects", None)
+        known = {*READINGS, COMMAND}
+        fine = isinstance(affects, frozenset) and affects and affects <= known
+        return "" if fine else f"its `affects` is no set of {', '.join([*READINGS, COMMAND])}"
 
     @abstractmethod
     def begin(self, chance: np.random.Generator, wheels: Wheels) -> Disturbance:

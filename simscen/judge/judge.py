@@ -14,6 +14,7 @@ from simscen.criteria.bounds import NotRecorded, undecided
 from simscen.criteria.criterion import AnyCriterion
 from simscen.criteria.moments import finished
 from simscen.judge.needs import doubt, undecidable
+from simscen.judge.sound import flaw_of
 
 
 def judge(
@@ -48,23 +49,28 @@ def outcome(verdicts: Sequence[Verdict]) -> Outcome:
 
 
 def _findings(entry: AnyCriterion, trace: Trace, case: Case, coverage: Coverage) -> tuple[Finding, ...]:
-    if (unknown := undecidable(entry, coverage)) is not None:
-        return (unknown,)
     criterion = entry.chosen
     assert isinstance(criterion, Criterion)
     try:
+        if (unknown := undecidable(entry, coverage)) is not None:
+            return (unknown,)
         findings = criterion.judge(trace, case)
     except NotRecorded as missing:
         return (undecided(entry.kind, str(missing)),)
     except Exception as error:  # the boundary: one criterion must not silence the others
-        return (Finding(Status.ERROR, entry.kind, f"{type(error).__name__}: {error}", "a judgement"),)
-    if not findings:
-        return (Finding(Status.ERROR, entry.kind, "it checked nothing", "a judgement"),)
+        return (_broken(entry, f"{type(error).__name__}: {error}"),)
+    if flaw := flaw_of(findings):
+        return (_broken(entry, flaw),)
     if not finished(trace):
         return _reserved(findings, f"so far, but the log stops at t = {trace.seconds(trace.end):.2f} s")
     if doubts := doubt(entry, coverage):
         return _reserved(findings, f"so far, but {doubts}")
     return _reserved(findings, "in a log with nothing in it") if _empty(trace) else tuple(findings)
+
+
+def _broken(entry: AnyCriterion, what: str) -> Finding:
+    """The finding of a criterion that gave none; one of an installed package is named with it."""
+    return Finding(Status.ERROR, entry.kind, f"{what}{entry.added_by}", "a judgement")
 
 
 def _reserved(findings: Sequence[Finding], because: str) -> tuple[Finding, ...]:

@@ -3,7 +3,6 @@
 from simscen.core.evidence import Coverage, Evidence
 from simscen.core.verdict import Finding, Status
 from simscen.criteria.criterion import AnyCriterion
-from simscen.criteria.temporal import Temporal
 from simscen.judge.measure.metrics import Measures
 
 _TRUTH, _BELIEF, _GOALS = Evidence.TRUTH, Evidence.BELIEF, Evidence.NAVIGATION
@@ -56,8 +55,9 @@ _METRICS: dict[str, frozenset[Evidence]] = {
 
 def needs(entry: AnyCriterion) -> frozenset[Evidence]:
     """The evidence that decides a criterion as it is written."""
-    if isinstance(entry.chosen, Temporal):
-        return entry.chosen.evidence
+    own = getattr(entry.chosen, "evidence", None)
+    if own is not None:
+        return frozenset(own)
     wanted = _NEEDS.get(entry.kind, frozenset(Evidence))
     if getattr(entry.chosen, "in_", None) is not None:
         wanted |= _PLACE
@@ -80,7 +80,7 @@ def undecidable(entry: AnyCriterion, coverage: Coverage) -> Finding | None:
 
 def known(measures: Measures, coverage: Coverage) -> Measures:
     """The metrics, without those that the log cannot tell: no collision recorded is not the same as none."""
-    lacking = {name: lack for name in measures.values if (lack := _lacking(_METRICS[name], coverage))}
+    lacking = {name: lack for name in measures.values if (lack := _lacking(_METRICS.get(name, frozenset()), coverage))}
     return Measures(
         {name: None if name in lacking else value for name, value in measures.values.items()},
         {

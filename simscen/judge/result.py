@@ -10,9 +10,11 @@ from simscen.core.trace import Trace
 from simscen.core.verdict import Status, Verdict
 from simscen.criteria.bounds import BrokenTrace
 from simscen.criteria.criterion import AnyCriterion
+from simscen.criteria.measure import AnyMeasure
 from simscen.criteria.moments import ending
 from simscen.judge.disturbances import happenings, missing
 from simscen.judge.judge import judge, outcome
+from simscen.judge.measure.added import with_added
 from simscen.judge.measure.metrics import Measures, measure
 from simscen.judge.needs import known
 from simscen.judge.why.cause import explained
@@ -26,8 +28,9 @@ def result_of(
     case: Case,
     lines: tuple[int, ...] = (),
     coverage: Coverage = WHOLE,
+    metrics: Sequence[AnyMeasure] = (),
 ) -> RunResult:
-    """Judge a trace and sum it up.
+    """Judge a trace and sum it up; `metrics` are measured besides those of every run.
 
     `path` is the scenario's file, `lines` where each criterion stands in it, () for a file that does not hold them.
     What had to happen and did not is a verdict, too; it comes first, for it is the reason of what follows.
@@ -41,7 +44,7 @@ def result_of(
     failure = _why(verdicts) if came_out is Outcome.ERROR else None
     measures = Measures({}, {})
     try:
-        measures = known(measure(trace, case), coverage)
+        measures = with_added(known(measure(trace, case), coverage), metrics, trace, case, coverage)
     except BrokenTrace as broken:  # whatever the criteria looked at, a run with such a signal is no run
         came_out, failure = Outcome.ERROR, failure or RunFailure("invalid", str(broken))
     return RunResult(

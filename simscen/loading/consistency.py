@@ -20,8 +20,6 @@ from simscen.model.robot import RobotSpec
 from simscen.triggers.trigger import Trigger
 
 COMMAND = "cmd_vel"
-READINGS = {"lidar": "Scan", "odometry": "Odometry", "imu": "Imu", "bumper": "Bump", "camera": "Image"}
-"""What each kind of sensor says, by class name in core.sensing: the kinds that faults affect."""
 
 
 def inconsistencies(loaded: LoadedScenario, world: World | None = None) -> list[Problem]:
@@ -55,7 +53,8 @@ def _unknown_names(loaded: LoadedScenario, world: World | None) -> Iterator[Prob
 def _unfit_faults(loaded: LoadedScenario) -> Iterator[Problem]:
     if loaded.robot.spec is None:
         return
-    says = {COMMAND: "Command", **{n: READINGS[s.kind] for n, s in loaded.robot.spec.sensors.items()}}
+    sensors = loaded.robot.spec.sensors
+    says = {COMMAND: "Command", **{name: sensor.says for name, sensor in sensors.items()}}
     for index, entry in enumerate(loaded.spec.faults):
         kind = says.get(entry.sensor)
         if kind is None:
@@ -64,7 +63,8 @@ def _unfit_faults(loaded: LoadedScenario) -> Iterator[Problem]:
         elif kind not in entry.fault.affects:
             fitting = [name for name, said in says.items() if said in entry.fault.affects]
             hint = f"it can happen to: {', '.join(fitting)}" if fitting else "this robot has nothing it can happen to"
-            message = f"fault `{entry.kind}` makes no sense on {_article(kind)} (`{entry.sensor}`)"
+            what = sensors[entry.sensor].kind if entry.sensor in sensors else "velocity command"
+            message = f"fault `{entry.kind}` makes no sense on {_article(what)} (`{entry.sensor}`)"
             yield loaded.problem_at(loaded.key_place_of("faults", index, entry.kind), "SC032", message, hint)
 
 
@@ -95,9 +95,8 @@ def _begin(when: Trigger | None) -> float | None:
     return float(when.chosen.root) + when.delay if when.time is not None else None  # type: ignore[attr-defined]
 
 
-def _article(reading: str) -> str:
-    kinds = {said: kind for kind, said in READINGS.items()} | {"Command": "velocity command"}
-    return f"an {kinds[reading]}" if kinds[reading][0] in "aeiou" else f"a {kinds[reading]}"
+def _article(noun: str) -> str:
+    return f"an {noun}" if noun[0] in "aeiou" else f"a {noun}"
 
 
 def _twice_named(loaded: LoadedScenario) -> Iterator[Problem]:

@@ -1,12 +1,21 @@
 """A scenario as one self-contained text: what a log and an output folder keep of it."""
 
+from collections.abc import Mapping
+from dataclasses import replace
+
 from simscen.core.errors import InvalidInput
 from simscen.loading.compose import compose
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.tree import Fields
-from simscen.loading.validation import check
+from simscen.loading.plugins import absent
+from simscen.loading.tree import Fields, Node
+from simscen.loading.validation import Model, check
 from simscen.loading.writing import to_yaml
+from simscen.model.criteria_file import CriteriaSpec
 from simscen.model.scenario import ScenarioSpec
+
+JUDGING = frozenset({"criterion", "metric"})
+"""The kinds of types that a judgement needs."""
+_JUDGED = frozenset({"simscen", "pass", "metrics"})
 
 
 def resolved_text(loaded: LoadedScenario) -> str:
@@ -19,10 +28,32 @@ def resolved_text(loaded: LoadedScenario) -> str:
 
 def spec_of_text(text: str, name: str) -> ScenarioSpec:
     """The specification in a resolved text; `name` is what problems call it. Raises InvalidInput."""
+    return _checked(ScenarioSpec, _read(text, name))
+
+
+def criteria_of_text(text: str, name: str, facts: Mapping[str, str]) -> CriteriaSpec:
+    """What a resolved text says must hold; `name` is what problems call it, `facts` are those of the log it is from.
+
+    Only that is looked at: what else of installed packages the run was made with need not be there to judge it. Raises
+    InvalidInput, also where a criterion is not installed that judged the run then.
+    """
+    if missing := absent(facts, JUDGING):
+        raise InvalidInput([replace(problem, path=name) for problem in missing])
+    tree = _read(text, name)
+    if isinstance(tree, Fields):
+        tree = replace(tree, entries={key: entry for key, entry in tree.entries.items() if key in _JUDGED})
+    return _checked(CriteriaSpec, tree)
+
+
+def _read(text: str, name: str) -> Node:
     tree, problems = compose(text, name)
     if tree is None or problems:
         raise InvalidInput(problems)
-    spec = check(ScenarioSpec, tree)
+    return tree
+
+
+def _checked(model: type[Model], tree: Node) -> Model:
+    spec = check(model, tree)
     if isinstance(spec, list):
         raise InvalidInput(spec)
     return spec

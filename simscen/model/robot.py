@@ -6,8 +6,10 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from simscen.core.mecanum import MecanumWheels
+from simscen.core.readings import READINGS
 from simscen.spec.base import Ranged, Spec, by_default
 from simscen.spec.choice import Choice
+from simscen.spec.component import Component
 from simscen.spec.objects import Shaped
 from simscen.spec.places import Name, PoseSpec, Ring
 from simscen.spec.quantities import (
@@ -131,8 +133,31 @@ class Mount(Spec):
     yaw: Angle = 0.0
 
 
-class Lidar(Ranged):
+class SensorSpec(Component):
+    """A sensor: what it says, and how often. Its component is called with a simscen.sensors.sensor.SensorSetting."""
+
+    says: ClassVar[str]
+    """The kind of its readings: Scan, Odometry, Imu, Bump or Image of simscen.core.sensing."""
+    localizes: ClassVar[bool] = False
+    """Whether a localizer matches its scans with the map; all scans show a costmap what is around."""
+
+    rate: Frequency = 10.0
+
+    @classmethod
+    def broken_promise(cls) -> str:
+        """Why it is no specification of a sensor; "" for one that is."""
+        return super().broken_promise() or ("" if getattr(cls, "says", None) in READINGS else _UNSAID)
+
+
+_UNSAID = f"its `says` is none of {', '.join(READINGS)}"
+
+
+class Lidar(Ranged, SensorSpec):
     """A planar lidar."""
+
+    component: ClassVar[str] = "simscen.sensors.lidar:LidarSensor"
+    says: ClassVar[str] = "Scan"
+    localizes: ClassVar[bool] = True
 
     rate: Frequency = 10.0
     beams: Annotated[int, Field(ge=1, le=4096)] = 360
@@ -147,8 +172,11 @@ class Lidar(Ranged):
     mount: Mount = by_default()
 
 
-class WheelOdometry(Spec):
+class WheelOdometry(SensorSpec):
     """Dead reckoning from the wheels' encoders, with the error model of Thrun, Probabilistic Robotics, table 5.6."""
+
+    component: ClassVar[str] = "simscen.sensors.odometry:WheelOdometrySensor"
+    says: ClassVar[str] = "Odometry"
 
     rate: Frequency = 40.0
     translation_noise: NonNegativeLength = 0.01
@@ -159,8 +187,11 @@ class WheelOdometry(Spec):
     """Standard deviation of the heading error in rad after driving one metre straight."""
 
 
-class InertialUnit(Spec):
+class InertialUnit(SensorSpec):
     """Gyroscope and accelerometer."""
+
+    component: ClassVar[str] = "simscen.sensors.imu:ImuSensor"
+    says: ClassVar[str] = "Imu"
 
     rate: Frequency = 60.0
     gyro_noise: Annotated[float, Field(ge=0, le=10)] = 0.002
@@ -171,14 +202,20 @@ class InertialUnit(Spec):
     """Standard deviation in m/s²."""
 
 
-class Bumper(Spec):
+class Bumper(SensorSpec):
     """Pressed while the base touches something."""
+
+    component: ClassVar[str] = "simscen.sensors.bumper:BumperSensor"
+    says: ClassVar[str] = "Bump"
 
     rate: Frequency = 40.0
 
 
-class Camera(Spec):
+class Camera(SensorSpec):
     """A colour and depth camera."""
+
+    component: ClassVar[str] = "simscen.sensors.camera:CameraSensor"
+    says: ClassVar[str] = "Image"
 
     rate: Frequency = 5.0
     width: Annotated[int, Field(ge=8, le=640)] = 64
@@ -199,6 +236,18 @@ class Sensor(Choice):
     imu: InertialUnit | None = None
     bumper: Bumper | None = None
     camera: Camera | None = None
+
+    @property
+    def says(self) -> str:
+        """The kind of its readings."""
+        assert isinstance(self.chosen, SensorSpec)
+        return self.chosen.says
+
+    @property
+    def localizes(self) -> bool:
+        """Whether a localizer matches its scans with the map."""
+        assert isinstance(self.chosen, SensorSpec)
+        return self.chosen.localizes
 
 
 class Part(Shaped):

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import AfterValidator, Discriminator, Field, Tag
 
 from simscen.core.belief import Estimate
 from simscen.core.chance import LARGEST_SEED
@@ -26,8 +26,10 @@ from simscen.spec.quantities import (
 from simscen.spec.references import Refers
 
 if TYPE_CHECKING:
+    from simscen.criteria.measure import AnyMeasure
     from simscen.model.disturbance import EventEntry, FaultEntry
 else:
+    AnyMeasure = Annotated[Spec, OnDemand("simscen.criteria.measure", "AnyMeasure")]
     EventEntry = Annotated[Spec, OnDemand("simscen.model.disturbance", "EventEntry")]
     FaultEntry = Annotated[Spec, OnDemand("simscen.model.disturbance", "FaultEntry")]
 
@@ -103,6 +105,14 @@ class Physics(Spec):
     """How often the truth is recorded and judged."""
 
 
+def _once(measures: list[AnyMeasure]) -> list[AnyMeasure]:
+    kinds = [measure.kind for measure in measures]
+    twice = [kind for index, kind in enumerate(kinds) if kind in kinds[:index]]
+    if twice:
+        raise ValueError(f"`{twice[0]}` is there twice: a run reports one number of a name")
+    return measures
+
+
 class ScenarioSpec(Spec):
     """One navigation test: a world, a robot, goals, disturbances, and what must hold."""
 
@@ -136,6 +146,8 @@ class ScenarioSpec(Spec):
     physics: Physics = by_default()
     pass_: Annotated[list[AnyCriterion], Field(min_length=1, max_length=200, alias="pass")]
     """All of these must hold."""
+    metrics: Annotated[list[AnyMeasure], Field(max_length=100), AfterValidator(_once)] = []
+    """What is measured besides what every run reports; each is a type that an installed package adds."""
 
 
 def estimate_of(entry: RobotEntry, truth: Pose2) -> Estimate:

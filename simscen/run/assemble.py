@@ -59,7 +59,7 @@ def assemble(prepared: Prepared, seed: int) -> Rig:
         keepout=tuple(world.regions[name] for name in prepared.stack.keepout),
         speed_zones=tuple((world.regions[zone.region], zone.speed_limit) for zone in prepared.stack.speed_zones),
         masks=prepared.masks,
-        lidars=tuple(name for name, sensor in prepared.robot.sensors.items() if sensor.lidar),
+        lidars=tuple(name for name, sensor in prepared.robot.sensors.items() if sensor.localizes),
     )
     if not isinstance(prepared.stack, StackSpec):
         raise RunError("stack-crashed", f"there is no process for {prepared.stack.external}")

@@ -6,6 +6,8 @@ import platform
 from pathlib import Path
 
 from simscen.loading.loaded import LoadedScenario
+from simscen.loading.plugins import plugins_of
+from simscen.run.plugincode import fingerprints
 from simscen.run.versions import arithmetic, code, cpu_flags, versions
 
 
@@ -14,7 +16,8 @@ def digest(loaded: LoadedScenario) -> str:
 
     Files are those of the language (`extends`, `defaults.yaml`, world, map and robot) and those their content names:
     map images, SDF and URDF files, what these include, meshes, heightmaps, xacro's includes. A file that moves, or that
-    another folder of --world-path now offers first, changes it too. Raises OSError.
+    another folder of --world-path now offers first, changes it too, and so does an installed package whose types the
+    scenario uses. Raises OSError.
     """
     sha = hashlib.sha256(json.dumps(_circumstances(loaded), sort_keys=True).encode())
     for name, text in sorted(loaded.sources.items()):
@@ -33,6 +36,7 @@ def _circumstances(loaded: LoadedScenario) -> dict[str, object]:
         "cpu_flags": cpu_flags(),
         "arithmetic": arithmetic(),
         "lenient": loaded.lenient,
+        "plugins": fingerprints(plugins_of(loaded)),
         **({} if loaded.choice is None else {"stack": loaded.tree.plain.get("stack")}),
     }
 

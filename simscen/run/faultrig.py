@@ -1,12 +1,15 @@
 """The faults of a scenario, between the sensors and the stack, and between the stack and the wheels."""
 
+import math
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, fields
+from typing import NoReturn
 
 import numpy as np
 
 from simscen.core.chance import Streams
+from simscen.core.errors import BROKEN, RunError
 from simscen.core.events import Event, EventKind
 from simscen.core.motion import Twist
 from simscen.core.sensing import Reading, Readings
@@ -46,7 +49,10 @@ class FaultRig:
         entry = self._faults[index]
         self._begun[index] += 1
         chance = self._streams.generator(f"fault{self._names[index]}#{self._begun[index]}")
-        self._active[index, self._begun[index]] = _Active(entry.sensor, entry.fault.begin(chance, self._wheels))
+        disturbance: object = entry.fault.begin(chance, self._wheels)
+        if not isinstance(disturbance, Disturbance):
+            self._broke(index, f"begins as {disturbance!r}, which is no Disturbance")
+        self._active[index, self._begun[index]] = _Active(entry.sensor, disturbance)
 
     def end(self, index: int) -> int:
         """End it; what it leaves behind stays at work. Returns how many messages and commands it has touched."""
@@ -67,6 +73,8 @@ class FaultRig:
         """The command as the wheels get it."""
         for (index, _), active in self._at_work():
             disturbed = active.disturbance.command(command)
+            if not isinstance(disturbed, Twist) or not all(map(math.isfinite, disturbed)):
+                self._broke(index, f"makes {disturbed!r} of a command")
             if not np.allclose(disturbed, command, rtol=0.0, atol=ROUNDING):
                 self._count(index, active)
             command = disturbed
@@ -79,11 +87,17 @@ class FaultRig:
         current: Reading | None = reading
         for (index, _), active in self._at_work():
             if current is not None and active.sensor == reading.sensor:
-                disturbed = active.disturbance.reading(current)
+                disturbed = active.disturbance.reading(_kept(current))
+                if disturbed is not None and _signed(disturbed) != _signed(current):
+                    self._broke(index, f"makes {type(disturbed).__name__} of the {type(current).__name__} of a sensor")
                 if disturbed is None or not _equal(disturbed, current):
                     self._count(index, active)
                 current = disturbed
         return current
+
+    def _broke(self, index: int, what: str) -> NoReturn:
+        entry = self._faults[index]
+        raise RunError(BROKEN, f"fault `{entry.label}` {what}{entry.added_by}")
 
     def _count(self, index: int, active: _Active) -> None:
         if active.over:
@@ -91,6 +105,18 @@ class FaultRig:
         if not active.touched:
             self._note(Event(0, EventKind.FAULT_TOOK_EFFECT, self._faults[index].label, {"entry": index}))
         active.touched += 1
+
+
+def _kept(reading: Reading) -> Reading:
+    """The reading, its arrays kept from being written to: what a fault changes in place would not count as changed."""
+    for array in (getattr(reading, field.name) for field in fields(reading)):
+        if isinstance(array, np.ndarray):
+            array.flags.writeable = False
+    return reading
+
+
+def _signed(reading: object) -> tuple[type, object]:
+    return type(reading), getattr(reading, "sensor", None)
 
 
 def _equal(one: Reading, other: Reading) -> bool:

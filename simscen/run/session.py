@@ -11,11 +11,13 @@ from simscen.core.errors import Exit, UsageError
 from simscen.core.result import Outcome, RunFailure
 from simscen.core.sessionevents import Listener, RunFinished, RunProgress, RunStarted
 from simscen.loading.loaded import LoadedScenario
+from simscen.loading.plugins import plugins_of_all
 from simscen.run.against import agreed
 from simscen.run.outfolder import run_folder
 from simscen.run.process.answer import answer_to, not_done
 from simscen.run.process.jobs import Job
 from simscen.run.process.supervisor import Advanced, Ended, Interrupted, Started, supervise
+from simscen.run.process.whereabouts import whereabouts
 
 
 @dataclass(frozen=True)
@@ -72,7 +74,8 @@ def run_session(
         return not options.fail_fast or all(answer.outcome is Outcome.PASSED for answer in answers.values())
 
     try:
-        for happening in supervise(jobs, options.workers, entry, go_on):
+        told = whereabouts(plugins_of_all([job.scenario for job in jobs]))
+        for happening in supervise(jobs, options.workers, (*entry, *told), go_on):
             job = happening.job
             match happening:
                 case Started():

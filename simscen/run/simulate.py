@@ -1,10 +1,12 @@
 """The one way from a description to a result: assemble, step in lockstep, record, judge."""
 
+import traceback
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
+from simscen.core.errors import InvalidInput, RunError
 from simscen.core.geometry import Pose3
 from simscen.core.run import Run
 from simscen.core.time import Clock
@@ -12,13 +14,15 @@ from simscen.core.trace import Trace
 from simscen.judge.result import result_of
 from simscen.judge.resultdata import to_json
 from simscen.loading.discovery import default_root
+from simscen.loading.plugins import fact_of, origin, plugins_of
 from simscen.loading.resolved import resolved_text
 from simscen.loading.scenario import load_scenario
-from simscen.model.robot import RobotSpec
+from simscen.model.robot import Mount, RobotSpec
 from simscen.record.header import LogHeader
 from simscen.record.recorder import Recorder
 from simscen.record.tracebuilder import TraceBuilder
 from simscen.run.assemble import assemble
+from simscen.run.blame import blamed
 from simscen.run.lockstep import Log, Rig, run_lockstep
 from simscen.run.prepare import Prepared, prepare
 from simscen.sim.urdf.describe import describe
@@ -35,7 +39,18 @@ def simulate(
     *Given* the same scenario and seed *then* the same run and the same bytes in `log`, whatever ran before in this
     process. Raises RunError when the run cannot be completed, OSError when the log cannot be written.
     """
-    seed = prepared.spec.seed if seed is None else seed
+    try:
+        return _simulated(prepared, prepared.spec.seed if seed is None else seed, log, attach)
+    except (RunError, InvalidInput, MemoryError):
+        raise
+    except Exception as error:  # the boundary to code of others, which can raise anything
+        if (whose := blamed(error, plugins_of(prepared.loaded))) is None:
+            raise
+        traceback.print_exc()  # into the run's own log: what its author wants to see
+        raise whose from error
+
+
+def _simulated(prepared: Prepared, seed: int, log: Path | None, attach: Attach | None) -> Run:
     clock = Clock(prepared.spec.physics.tick_rate)
     builder = TraceBuilder(clock)
     with ExitStack() as closing:
@@ -63,7 +78,9 @@ def judged(prepared: Prepared, seed: int, trace: Trace, log: Path | None = None)
     places = [loaded.place_of("pass", index) for index in range(len(prepared.spec.pass_))]
     # One that the scenario extends or takes from defaults.yaml has its line in another file than reports name.
     lines = tuple(place.line if place.path == loaded.path else 0 for place in places)
-    result = result_of(loaded.key(seed), loaded.path, prepared.spec.pass_, trace, prepared.case, lines)
+    result = result_of(
+        loaded.key(seed), loaded.path, prepared.spec.pass_, trace, prepared.case, lines, metrics=prepared.spec.metrics
+    )
     return Run(replace(result, stack=loaded.stack), trace, prepared.case, log)
 
 
@@ -77,14 +94,15 @@ def log_header(prepared: Prepared, seed: int) -> LogHeader:
         map=prepared.map,
         robot_description=describe(prepared.body),
         frames=_sensor_frames(prepared.robot),
+        facts={fact_of(entry): origin(entry) for entry in plugins_of(prepared.loaded)},
     )
 
 
 def _sensor_frames(robot: RobotSpec) -> dict[str, Pose3]:
-    """Where lidars and cameras sit on the base."""
-    mounts = {name: (s.lidar or s.camera) for name, s in robot.sensors.items()}
+    """Where sensors that look somewhere sit on the base."""
+    mounts = {name: getattr(sensor.chosen, "mount", None) for name, sensor in robot.sensors.items()}
     return {
-        name: Pose3.from_rpy(sensor.mount.x, sensor.mount.y, sensor.mount.z, 0.0, 0.0, sensor.mount.yaw)
-        for name, sensor in mounts.items()
-        if sensor is not None
+        name: Pose3.from_rpy(mount.x, mount.y, mount.z, 0.0, 0.0, mount.yaw)
+        for name, mount in mounts.items()
+        if isinstance(mount, Mount)
     }

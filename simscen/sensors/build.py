@@ -3,13 +3,9 @@
 from simscen.core.chance import Streams
 from simscen.core.rays import RayCaster
 from simscen.core.time import Clock
-from simscen.model.robot import Bumper, Camera, InertialUnit, Lidar, RobotSpec, WheelOdometry
-from simscen.sensors.bumper import BumperSensor
-from simscen.sensors.camera import CameraSensor
-from simscen.sensors.imu import ImuSensor
-from simscen.sensors.lidar import LidarSensor
-from simscen.sensors.odometry import WheelOdometrySensor
-from simscen.sensors.sensor import Sensor, SensorView
+from simscen.model.robot import RobotSpec, SensorSpec
+from simscen.sensors.installed import InstalledSensor
+from simscen.sensors.sensor import Sensor, SensorSetting, SensorView
 
 
 def build_sensors(
@@ -17,24 +13,22 @@ def build_sensors(
 ) -> tuple[Sensor, ...]:
     """The robot's sensors in the order of their names, each with its own stream `sensor.<name>`.
 
-    Raises ValueError when a rate does not divide the clock.
+    Those of installed packages come last: the log calls the first of a kind by the plain name. Raises ValueError when a
+    rate does not divide the clock, RunError where what a package installed is no sensor.
     """
-    return tuple(_build(name, spec, clock, streams, view, rays) for name in sorted(spec.sensors))
+    return tuple(
+        _build(name, spec, clock, streams, view, rays)
+        for name in sorted(spec.sensors, key=lambda name: (spec.sensors[name].narrow is not None, name))
+    )
 
 
 def _build(name: str, robot: RobotSpec, clock: Clock, streams: Streams, view: SensorView, rays: RayCaster) -> Sensor:
-    spec = robot.sensors[name].chosen
-    assert isinstance(spec, Lidar | WheelOdometry | InertialUnit | Bumper | Camera)
-    period = clock.period(spec.rate)
-    chance = streams.generator(f"sensor.{name}")
-    match spec:
-        case Lidar():
-            return LidarSensor(name, spec, period, chance, view, rays)
-        case WheelOdometry():
-            return WheelOdometrySensor(name, spec, period, clock.seconds(period), chance, view, robot.drive)
-        case InertialUnit():
-            return ImuSensor(name, spec, period, clock.seconds(period), chance, view)
-        case Bumper():
-            return BumperSensor(name, period, view)
-        case Camera():
-            return CameraSensor(name, spec, period, view)
+    entry = robot.sensors[name]
+    spec = entry.chosen
+    assert isinstance(spec, SensorSpec)
+    period, chance = clock.period(spec.rate), streams.generator(f"sensor.{name}")
+    setting = SensorSetting(name, period, clock.seconds(period), chance, view, rays, robot.drive)
+    if entry.narrow is not None:
+        return InstalledSensor(entry.kind, spec, setting)
+    sensor: Sensor = spec.implementation()(spec, setting)
+    return sensor

@@ -1,14 +1,15 @@
 """A bumper around the hull."""
 
 from simscen.core.sensing import Bump
-from simscen.sensors.sensor import SensorView
+from simscen.model.robot import Bumper
+from simscen.sensors.sensor import SensorSetting
 
 
 class BumperSensor:
     """Pressed while the hull touches something, and for a tenth of a second after."""
 
-    def __init__(self, name: str, period: int, view: SensorView) -> None:
-        self.name, self.period, self._view = name, period, view
+    def __init__(self, spec: Bumper, setting: SensorSetting) -> None:
+        self.name, self.period, self._view = setting.name, setting.period, setting.view
 
     def read(self, tick: int) -> Bump:
         """Whether it is pressed now."""

@@ -3,14 +3,14 @@
 from simscen.core.geometry import Pose3
 from simscen.core.sensing import Image
 from simscen.model.robot import Camera
-from simscen.sensors.sensor import SensorView
+from simscen.sensors.sensor import SensorSetting
 
 
 class CameraSensor:
     """A pinhole without noise or distortion; costs milliseconds a picture, so robots have none unless asked."""
 
-    def __init__(self, name: str, spec: Camera, period: int, view: SensorView) -> None:
-        self.name, self.period, self._spec, self._view = name, period, spec, view
+    def __init__(self, spec: Camera, setting: SensorSetting) -> None:
+        self.name, self.period, self._spec, self._view = setting.name, setting.period, spec, setting.view
         mount = spec.mount
         self._mount = Pose3.from_rpy(mount.x, mount.y, mount.z, 0.0, 0.0, mount.yaw)
 

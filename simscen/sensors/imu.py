@@ -5,7 +5,7 @@ import numpy as np
 from simscen.core.geometry import Array
 from simscen.core.sensing import Imu
 from simscen.model.robot import InertialUnit
-from simscen.sensors.sensor import SensorView
+from simscen.sensors.sensor import SensorSetting
 
 GRAVITY = np.array([0.0, 0.0, 9.81])
 
@@ -13,19 +13,11 @@ GRAVITY = np.array([0.0, 0.0, 9.81])
 class ImuSensor:
     """Turn rates with a bias that stays for a run, and specific force: the mean since the last reading."""
 
-    def __init__(
-        self,
-        name: str,
-        spec: InertialUnit,
-        period: int,
-        seconds: float,
-        chance: np.random.Generator,
-        view: SensorView,
-    ) -> None:
-        self.name, self.period = name, period
-        self._spec, self._seconds, self._chance, self._view = spec, seconds, chance, view
-        self._bias = chance.normal(0.0, spec.gyro_bias, 3)
-        self._velocity = np.array(view.base_velocity()[0])
+    def __init__(self, spec: InertialUnit, setting: SensorSetting) -> None:
+        self.name, self.period = setting.name, setting.period
+        self._spec, self._seconds, self._chance, self._view = spec, setting.seconds, setting.chance, setting.view
+        self._bias = self._chance.normal(0.0, spec.gyro_bias, 3)
+        self._velocity = np.array(self._view.base_velocity()[0])
 
     def read(self, tick: int) -> Imu:
         """Measure in the base frame; at rest and level the accelerometer shows +9.81 m/s² along z."""

@@ -5,10 +5,9 @@ import math
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
-from simscen.core.rays import RayCaster
 from simscen.core.sensing import Scan
 from simscen.model.robot import Lidar
-from simscen.sensors.sensor import SensorView
+from simscen.sensors.sensor import SensorSetting
 
 CERTAIN = 10.0
 """Standard deviations that noise never exceeds."""
@@ -20,11 +19,9 @@ class LidarSensor:
     A full circle has no beam twice; any other field of view has beams on both of its edges.
     """
 
-    def __init__(
-        self, name: str, spec: Lidar, period: int, chance: np.random.Generator, view: SensorView, rays: RayCaster
-    ) -> None:
-        self.name, self.period = name, period
-        self._spec, self._chance, self._view, self._rays = spec, chance, view, rays
+    def __init__(self, spec: Lidar, setting: SensorSetting) -> None:
+        self.name, self.period = setting.name, setting.period
+        self._spec, self._chance, self._view, self._rays = spec, setting.chance, setting.view, setting.rays
         full = spec.field_of_view >= 2 * math.pi - 1e-9
         self._increment = spec.field_of_view / max(1, spec.beams if full else spec.beams - 1)
         self._first = -spec.field_of_view / 2 if spec.beams > 1 else 0.0

@@ -2,14 +2,12 @@
 
 import math
 
-import numpy as np
-
 from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
 from simscen.core.sensing import Odometry
-from simscen.model.robot import Drive, WheelOdometry
+from simscen.model.robot import WheelOdometry
 from simscen.sensors.kinematics import kinematics_of
-from simscen.sensors.sensor import SensorView
+from simscen.sensors.sensor import SensorSetting
 
 
 class WheelOdometrySensor:
@@ -19,20 +17,11 @@ class WheelOdometrySensor:
     so they do not depend on the rate, and after one metre have the standard deviation that the specification says.
     """
 
-    def __init__(
-        self,
-        name: str,
-        spec: WheelOdometry,
-        period: int,
-        seconds: float,
-        chance: np.random.Generator,
-        view: SensorView,
-        drive: Drive,
-    ) -> None:
-        self.name, self.period = name, period
-        self._spec, self._seconds, self._chance, self._view = spec, seconds, chance, view
-        self._motion = kinematics_of(drive)
-        self._rolled = view.encoders()
+    def __init__(self, spec: WheelOdometry, setting: SensorSetting) -> None:
+        self.name, self.period = setting.name, setting.period
+        self._spec, self._seconds, self._chance, self._view = spec, setting.seconds, setting.chance, setting.view
+        self._motion = kinematics_of(setting.drive)
+        self._rolled = self._view.encoders()
         self._pose = Pose2(0.0, 0.0, 0.0)
 
     def read(self, tick: int) -> Odometry:

@@ -1,12 +1,15 @@
 """What a sensor is, and what it may look at."""
 
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Pose3
+from simscen.core.rays import RayCaster
 from simscen.core.sensing import Reading
+from simscen.model.robot import Drive
 
 Vector = tuple[float, float, float]
 
@@ -44,6 +47,28 @@ class SensorView(Protocol):
         in rad.
         """
         ...
+
+
+@dataclass(frozen=True, eq=False)
+class SensorSetting:
+    """All that a sensor may know besides its specification: `Class(specification, setting)`. SI units.
+
+    name:     what the robot's file calls it; its readings carry it
+    period:   ticks between two readings
+    seconds:  the same in seconds
+    chance:   its own random generator, `sensor.<name>` of the run's seed
+    view:     the truth, as far as sensors may see it
+    rays:     distances to what is around
+    drive:    what the robot drives with, for what is measured at its wheels
+    """
+
+    name: str
+    period: int
+    seconds: float
+    chance: np.random.Generator
+    view: SensorView
+    rays: RayCaster
+    drive: Drive
 
 
 class Sensor(Protocol):

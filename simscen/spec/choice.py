@@ -80,6 +80,16 @@ class Choice(Spec):
         assert isinstance(spec, BaseModel)
         return spec
 
+    @property
+    def added_by(self) -> str:
+        """Whose it is, as a message ends: " (criterion `dwell` of yardwork 1.2)"; "" where simscen ships it."""
+        if self.narrow is None:
+            return ""
+        from simscen.spec.registry import find
+
+        found = find(self.group, self.kind)
+        return f" ({self.group} `{self.kind}` of {found.origin})" if found is not None and not found.shipped else ""
+
     def __reduce_ex__(self, protocol: Any) -> Any:
         if self.narrow is None:
             return super().__reduce_ex__(protocol)

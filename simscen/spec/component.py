@@ -1,5 +1,6 @@
 """Specifications of what is built when a run is assembled: parts of a stack, whole stacks, sensors."""
 
+import re
 from importlib import import_module
 from typing import Any, ClassVar
 
@@ -14,6 +15,12 @@ class Component(Spec):
 
     component: ClassVar[str]
     """`package.module:Class`, called as `Class(specification, setting)`."""
+
+    @classmethod
+    def broken_promise(cls) -> str:
+        """Why it is no specification of a component; "" for one that is."""
+        named = isinstance(getattr(cls, "component", None), str) and re.fullmatch(r"[\w.]+:\w+", cls.component)
+        return "" if named else "it does not say what its `component` is, as package.module:Class"
 
     @classmethod
     def implementation(cls) -> Any:

@@ -14,16 +14,18 @@ from __future__ import annotations
 
 import contextlib
 import inspect
+import os
 import re
 import sys
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-    from importlib.metadata import EntryPoint
+    from collections.abc import Iterator
+    from importlib.metadata import EntryPoints
 
     from pydantic import BaseModel
 
@@ -65,8 +67,8 @@ GROUPS: dict[str, Group] = {
         ("edge", "delay", "times", "probability", "all", "any", "not"),
     ),
     "action": Group("simscen.actions.base:Action", "simscen.actions.action:AnyAction"),
-    "sensor": Group("simscen.spec.base:Spec", "simscen.model.robot:Sensor"),
-    "metric": Group("simscen.spec.base:Spec"),
+    "sensor": Group("simscen.model.robot:SensorSpec", "simscen.model.robot:Sensor"),
+    "metric": Group("simscen.criteria.measure:Measure", "simscen.judge.measure.table:ADDRESSES", ("metrics",)),
 }
 """Kind → what is known of its group `simscen.<kind>`, in the order of the language."""
 
@@ -85,6 +87,8 @@ class Entry:
     distribution: str = ""
     version: str = ""
     flaw: str = ""
+    folder: str = ""
+    """Where its package is installed: a folder of the search path."""
 
     @property
     def shipped(self) -> bool:
@@ -145,27 +149,63 @@ def strangers() -> tuple[Entry, ...]:
     return tuple(entry for entry in _scanned() if entry.group not in GROUPS)
 
 
+def origin_of(spec: type) -> tuple[Entry, ...]:
+    """The entries of installed packages that stand for a specification; () for what is shipped."""
+    package = spec.__module__.partition(".")[0]
+    if package == "simscen":
+        return ()
+    near = [
+        entry for entry in _scanned() if not entry.flaw and entry.value.partition(".")[0].partition(":")[0] == package
+    ]
+    return tuple(entry for entry in near if _is(entry, spec))
+
+
+def _is(entry: Entry, spec: type) -> bool:
+    try:
+        return entry.load() is spec
+    except BrokenPlugin:
+        return False
+
+
 @cache
 def _scanned() -> tuple[Entry, ...]:
     """Every entry point of a group of ours, group by group, by name, then by distribution."""
-    from importlib.metadata import entry_points
-
-    everything: Any = entry_points()
-    points: Iterable[EntryPoint] = (
-        [point for group in everything for point in everything[group]] if isinstance(everything, dict) else everything
-    )
     found = sorted(
-        {_entry(point) for point in points if point.group.startswith(PREFIX)},
+        {
+            Entry(point.group.removeprefix(PREFIX), point.name, point.value, name, version, folder=folder)
+            for name, version, folder, points in _packages()
+            for point in points
+            if point.group.startswith(PREFIX)
+        },
         key=lambda e: (e.group, e.name, e.distribution, e.version, e.value),
     )
     return tuple(replace(entry, flaw=_flaw(entry, found)) for entry in found)
 
 
-def _entry(point: EntryPoint) -> Entry:
-    package = getattr(point, "dist", None)
-    name = package.metadata["Name"] if package is not None else None
-    version = package.metadata["Version"] if package is not None else None
-    return Entry(point.group.removeprefix(PREFIX), point.name, point.value, name or "an unnamed package", version or "")
+def _packages() -> Iterator[tuple[str, str, str, EntryPoints]]:
+    """Name, version, folder and entry points of every package that can be imported: of two of a name the first."""
+    from importlib.metadata import distributions
+
+    seen: set[str] = set()
+    for package in distributions(path=search_path()):
+        points = package.entry_points
+        name = package.metadata["Name"] or "an unnamed package"  # an installation that broke off has no METADATA
+        key = re.sub("[-_.]+", "-", name).lower()
+        if points and key not in seen:
+            seen.add(key)
+            yield name, package.metadata["Version"] or "", str(package.locate_file("")), points
+
+
+def search_path() -> list[str]:
+    """Where Python looks for modules, without the folders that it adds by itself for where and how it was called.
+
+    These are the working directory and that of the program: a folder of scenarios with a dist-info would be code.
+    """
+    program = getattr(sys.modules.get("__main__"), "__file__", None)
+    implied = {"", str(Path.cwd()), *([str(Path(program).absolute().parent)] if program else [])}
+    said = os.environ.get("PYTHONPATH", "").split(os.pathsep)
+    wanted = {str(Path(folder).absolute()) for folder in said if folder}
+    return [folder for folder in sys.path if folder not in implied - wanted]
 
 
 def _flaw(entry: Entry, everything: list[Entry]) -> str:
@@ -217,7 +257,8 @@ def _unfit(entry: Entry, model: Any) -> str | None:
     if inspect.isabstract(model):
         missing = ", ".join(sorted(getattr(model, "__abstractmethods__", ())))
         return f"`{entry.value}` does not say what it does: {missing} is missing"
-    return None
+    broken = model.broken_promise() if hasattr(model, "broken_promise") else ""
+    return f"`{entry.value}`: {broken}" if broken else None
 
 
 def _resolved(address: str) -> Any:

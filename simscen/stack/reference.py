@@ -49,7 +49,7 @@ class ReferenceStack:
         self._speed_filter = SpeedFilter(surroundings)
         self._localizer, self._costmap, self._controller = localizer, costmap, controller
         self._navigator, self._task, self._smoother, self._monitor = navigator, task, smoother, monitor
-        self._tick_rate = surroundings.tick_rate
+        self._tick_rate, self._lidars = surroundings.tick_rate, frozenset(surroundings.lidars)
         self._control_period, self._costmap_period = control_period, costmap_period
         self._publishing = Publishing(surroundings.tick_rate, localizer, controller)
         self._journal = journal
@@ -128,7 +128,8 @@ class ReferenceStack:
                 case Imu():
                     self._localizer.on_imu(reading)
                 case Scan():
-                    self._localizer.on_scan(reading)
+                    if reading.sensor in self._lidars:  # echoes of a sonar show obstacles, but no walls to match
+                        self._localizer.on_scan(reading)
                     scans.append(reading)
                 case _:
                     pass

@@ -2,8 +2,10 @@
 
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
+import numpy as np
 from pydantic import Field
 
+from simscen.core.errors import BROKEN, RunError
 from simscen.spec.choice import Choice
 from simscen.spec.ondemand import OnDemand
 from simscen.spec.quantities import Duration, Probability
@@ -48,7 +50,10 @@ class Test(Choice):
             return not self.not_.holds(now)
         condition = self.chosen
         assert isinstance(condition, Condition)
-        return condition.holds(now)
+        answer: object = condition.holds(now)
+        if not isinstance(answer, bool | np.bool_):
+            raise RunError(BROKEN, f"a condition says neither True nor False, but {answer!r}{self.added_by}")
+        return bool(answer)
 
 
 def all_hold(tests: list[Test], now: "Situation") -> bool:

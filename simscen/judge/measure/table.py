@@ -90,3 +90,6 @@ METRICS: dict[str, Metric] = {
     ),
 }  # fmt: skip
 """Every metric by name, in the order of the reference."""
+
+ADDRESSES = dict.fromkeys(METRICS, "simscen.judge.measure.metrics:measure")
+"""Where each is measured, for the registry: no package may add another of its name."""

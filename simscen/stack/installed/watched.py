@@ -7,7 +7,7 @@ from typing import Any, ClassVar, NoReturn, ParamSpec, TypeVar
 
 import numpy as np
 
-from simscen.core.errors import RunError
+from simscen.core.errors import BROKEN, RunError
 from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
 from simscen.core.navigation import ErrorCode, Path
@@ -17,8 +17,6 @@ from simscen.stack.setting import Setting
 
 P = ParamSpec("P")
 T = TypeVar("T")
-BROKEN = "broken-component"
-"""The kind of error of a run whose component answered with what its protocol does not allow."""
 
 
 class Watched:

@@ -7,12 +7,14 @@ from puppet import Puppet
 from simscen.core.geometry import Pose3
 from simscen.model.robot import InertialUnit
 from simscen.sensors.imu import ImuSensor
+from simscen.sensors.sensor import SensorSetting
 
 EXACT = {"gyro_noise": 0.0, "gyro_bias": 0.0, "accelerometer_noise": 0.0}
 
 
 def imu(view, seed=1, **spec):
-    return ImuSensor("imu", InertialUnit(**spec), 4, 1 / 60, np.random.default_rng(seed), view)
+    setting = SensorSetting("imu", 4, 1 / 60, np.random.default_rng(seed), view, None, None)
+    return ImuSensor(InertialUnit(**spec), setting)
 
 
 def test_at_rest_and_level_it_feels_gravity_upwards():

@@ -8,12 +8,14 @@ from puppet import Nothing, Puppet, SquareRoom, at
 from simscen.core.geometry import Pose3
 from simscen.model.robot import Lidar, Mount
 from simscen.sensors.lidar import LidarSensor
+from simscen.sensors.sensor import SensorSetting
 
 QUIET = {"noise": 0.0, "mount": Mount(z=0.2)}
 
 
 def lidar(view, rays, seed=1, **spec):
-    return LidarSensor("lidar", Lidar(**spec), 24, np.random.default_rng(seed), view, rays)
+    setting = SensorSetting("lidar", 24, 0.1, np.random.default_rng(seed), view, rays, None)
+    return LidarSensor(Lidar(**spec), setting)
 
 
 def test_a_square_room_is_measured_within_half_a_step():

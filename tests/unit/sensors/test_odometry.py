@@ -10,13 +10,16 @@ from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
 from simscen.model.robot import Ackermann, Differential, Omnidirectional, SkidSteer, WheelOdometry
 from simscen.sensors.odometry import WheelOdometrySensor, along_arc
+from simscen.sensors.sensor import SensorSetting
 
 DRIVE = Differential(type="differential", wheel_radius=0.033, wheel_separation=0.287)
 EXACT = {"translation_noise": 0.0, "rotation_noise": 0.0, "drift_noise": 0.0}
 
 
 def odometry(view, drive=DRIVE, seed=1, seconds=0.025, **spec):
-    return WheelOdometrySensor("odom", WheelOdometry(**spec), 6, seconds, np.random.default_rng(seed), view, drive)
+    chance = np.random.default_rng(seed)
+    setting = SensorSetting("odom", 6, seconds, chance, view, None, drive)
+    return WheelOdometrySensor(WheelOdometry(**spec), setting)
 
 
 def roll(view, vx, wz, seconds, drive=DRIVE):

@@ -30,7 +30,7 @@ def test_shipped_and_installed_types_are_loaded_through_the_same_door(packages, 
     assert [find("criterion", name).shipped for name in ("calm", "speed")] == [False, True]
 
 
-@pytest.mark.parametrize("group", GROUPS)
+@pytest.mark.parametrize("group", sorted(GROUPS.keys() - {"metric"}))  # what simscen measures has no parameters
 def test_everything_shipped_keeps_the_promise_of_its_group(group: str) -> None:
     for entry in shipped(group):
         if (group, entry.name) != ("criterion", "whenever"):  # half of one, `then` is the other

@@ -1,0 +1,32 @@
+"""An action of an installed package: what it says came of it is compared with what it did."""
+
+from typing import Any, cast
+
+from simscen.actions.base import Action
+from simscen.core.errors import BROKEN, RunError
+from simscen.core.stage import Effect, Stage
+
+_DOING = frozenset({"spawn", "remove", "move", "place_robot", "push", "send_goal", "cancel_goal", "note"})
+"""What changes a run; everything else of a stage only tells how it stands."""
+
+
+def perform_watched(action: Action, stage: Stage, whose: str) -> Effect:
+    """Do it, and say what came of it. `whose` ends a message. Raises RunError where that is not so."""
+    watched = _Watched(stage)
+    effect: object = action.perform(cast(Stage, watched))
+    if not isinstance(effect, Effect) or not isinstance(effect.happened, bool) or not isinstance(effect.what, str):
+        raise RunError(BROKEN, f"an action says {effect!r}, which is no Effect{whose}")
+    if effect.happened and not watched.done:
+        raise RunError(BROKEN, f"an action says `{effect.what}`, but did nothing{whose}")
+    return effect
+
+
+class _Watched:
+    """The stage, and whether anything was done on it."""
+
+    def __init__(self, stage: Stage) -> None:
+        self._stage, self.done = stage, False
+
+    def __getattr__(self, name: str) -> Any:
+        self.done = self.done or name in _DOING
+        return getattr(self._stage, name)

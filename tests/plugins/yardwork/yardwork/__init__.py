@@ -1,0 +1,1 @@
+"""Types for simscen as another maker would ship them."""

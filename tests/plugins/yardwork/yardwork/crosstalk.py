@@ -1,0 +1,51 @@
+"""`crosstalk`: the beams of somebody else's lidar."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+
+from simscen.core.sensing import Reading, Scan
+from simscen.faults.base import Disturbance, Fault, Wheels
+from simscen.spec.base import Spec
+from simscen.spec.quantities import Angle, AngularSpeed, PositiveAngle
+
+
+class Crosstalk(Spec, Fault):
+    """Another lidar shines into this one: within a window of beams, what is measured is nearer than what is there.
+
+    The window wanders from scan to scan, because the two spin at slightly different rates (Zhang et al. 2018, mutual
+    interference of lidars); each echo in it is anywhere between the lidar and what it would have seen.
+
+    Example: `{sensor: lidar, crosstalk: {width: 20 deg, drift: 0.5 rad/s}}`
+    """
+
+    affects: ClassVar[frozenset[str]] = frozenset({"Scan"})
+    width: PositiveAngle = math.radians(15)
+    """Of the window."""
+    direction: Angle = 0.0
+    """Of its middle in the first scan, in the lidar's frame."""
+    drift: AngularSpeed = math.radians(30)
+    """How fast it wanders, for a lidar with ten scans a second."""
+
+    def begin(self, chance: np.random.Generator, wheels: Wheels) -> Disturbance:
+        """Begin in the direction that it says."""
+        return _Interference(self, chance)
+
+
+class _Interference(Disturbance):
+    def __init__(self, spec: Crosstalk, chance: np.random.Generator) -> None:
+        self._spec, self._chance, self._scans = spec, chance, 0
+
+    def reading(self, reading: Reading) -> Reading | None:
+        if not isinstance(reading, Scan):
+            return reading
+        middle = self._spec.direction + self._spec.drift * self._scans / 10
+        self._scans += 1
+        off = np.remainder(reading.angles() - middle + math.pi, 2 * math.pi) - math.pi
+        seen = np.where(np.isfinite(reading.ranges), reading.ranges, reading.range_max)
+        echo = self._chance.uniform(reading.range_min, np.maximum(seen, reading.range_min))
+        return replace(reading, ranges=np.where(np.abs(off) <= self._spec.width / 2, echo, reading.ranges))

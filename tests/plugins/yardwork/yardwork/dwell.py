@@ -1,0 +1,56 @@
+"""`dwell`: how long the robot stays in a region in one go."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from simscen.core.evidence import Evidence
+from simscen.core.geometry import Pose2
+from simscen.core.polygons import distance_to_polygon
+from simscen.core.verdict import Finding
+from simscen.criteria.base import Criterion
+from simscen.criteria.bounds import at_most, undecided
+from simscen.criteria.signals import truth
+from simscen.spec.base import Spec
+from simscen.spec.quantities import PositiveDuration
+from simscen.spec.references import RegionName
+
+if TYPE_CHECKING:
+    from simscen.core.case import Case
+    from simscen.core.trace import Trace
+
+
+class Dwell(Spec, Criterion):
+    """The robot leaves a region again soon enough.
+
+    What is measured: the longest time that its centre stays in the region without a break.
+    When it fails: that is longer than `max`.
+    Why this: a robot that waits in a doorway or before a fire door blocks everybody, and reaches its goal all the same.
+
+    Example: `dwell: {region: doorway, max: 5 s}`
+    """
+
+    region: RegionName
+    """By name."""
+    max: PositiveDuration
+    """How long it may stay."""
+
+    @property
+    def evidence(self) -> frozenset[Evidence]:
+        """The true way, on the map."""
+        return frozenset({Evidence.TRUTH, Evidence.ALIGNMENT})
+
+    def judge(self, trace: Trace, case: Case) -> list[Finding]:
+        """The longest stay."""
+        what, limit = f"dwell {self.region}", f"≤ {self.max:.2f} s"
+        poses = truth(trace)
+        if self.region not in case.regions or not len(poses):
+            return [undecided(what, "the region or the robot's way was not recorded", limit)]
+        inside = [distance_to_polygon(Pose2(*pose), case.regions[self.region]) <= 0 for pose in poses.values.tolist()]
+        edges = np.diff(np.array([0, *inside, 0], dtype=np.int8))
+        ticks = np.append(poses.ticks, trace.end)
+        stays = list(zip(ticks[np.flatnonzero(edges == 1)], ticks[np.flatnonzero(edges == -1)], strict=True))
+        longest, left = max(((int(end - begin), int(end)) for begin, end in stays), default=(0, 0))
+        return [at_most(what, trace.seconds(longest), self.max, "s", at=(trace, left))]

@@ -1,0 +1,30 @@
+"""`sonar`: what a ring of ultrasonic sensors is, without what it takes to simulate one."""
+
+from typing import Annotated, ClassVar
+
+from pydantic import Field
+
+from simscen.model.robot import Mount, SensorSpec
+from simscen.spec.base import by_default
+from simscen.spec.quantities import Frequency, NonNegativeLength, PositiveAngle, PositiveLength
+
+
+class Sonar(SensorSpec):
+    """A ring of ultrasonic sensors: each tells the nearest thing in its cone, as one beam of a scan.
+
+    Example: `sonar: {rate: 20 Hz, sensors: 8}`
+    """
+
+    component: ClassVar[str] = "yardwork.sonar_ring:SonarRing"
+    says: ClassVar[str] = "Scan"
+
+    rate: Frequency = 20.0
+    sensors: Annotated[int, Field(ge=1, le=64)] = 8
+    """All around, the first straight ahead."""
+    cone: PositiveAngle = 0.5
+    """Opening angle of each."""
+    min_range: NonNegativeLength = 0.02
+    max_range: PositiveLength = 4.0
+    noise: NonNegativeLength = 0.01
+    """Standard deviation of a range."""
+    mount: Mount = by_default()

@@ -1,0 +1,25 @@
+"""`turn_robot`: somebody turns the robot around."""
+
+from simscen.actions.base import Action
+from simscen.core.geometry import Pose2
+from simscen.core.stage import Effect, Stage
+from simscen.spec.base import Spec
+from simscen.spec.quantities import Angle
+
+
+class TurnRobot(Spec, Action):
+    """Turn the robot on the spot; its stack is not told, and its wheels do not notice.
+
+    Example: `do: {turn_robot: {by: 90 deg}}`
+    """
+
+    by: Angle
+    """Counter-clockwise."""
+
+    def perform(self, stage: Stage) -> Effect:
+        """Turn it; nothing comes of no turn at all."""
+        if self.by == 0:
+            return Effect(False, "a turn of nothing turns nothing")
+        here = stage.robot
+        stage.place_robot(Pose2(here.x, here.y, here.yaw + self.by))
+        return Effect(True, f"turned the robot by {self.by:.2f} rad")
