@@ -133,6 +133,7 @@ class Drive:
     tick: int = 0
     twist: Twist = STOP
     blind: bool = False
+    odometry: tuple[str, ...] = ("ground_truth", "odom")
 
     def __post_init__(self) -> None:
         self.chance = np.random.default_rng(1)
@@ -154,7 +155,7 @@ class Drive:
         """One beat of 6 ticks."""
         readings: list[Reading] = []
         if self.tick % ODOMETRY == 0:
-            readings += [Odometry(name, self.tick, self.pose, self.twist) for name in ("ground_truth", "odom")]
+            readings += [Odometry(name, self.tick, self.pose, self.twist) for name in self.odometry]
         if self.tick % SCAN == 0 and not self.blind:
             readings.append(self.scan())
         decision = self.stack.decide(self.tick, tuple(readings))

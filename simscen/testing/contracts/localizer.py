@@ -1,0 +1,182 @@
+"""The promises of a localizer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from simscen.core.belief import Belief, Estimate
+from simscen.core.geometry import Array, Pose2
+from simscen.core.motion import Twist
+from simscen.core.sensing import Imu, Odometry
+from simscen.stack.protocols import Localizer
+from simscen.testing.contracts.component import heard
+from simscen.testing.promise import Contract, demand, promise
+from simscen.testing.room import BEAMS, Drive, Noise, drive, errors, localizer, record, run, scan
+
+SILENT = Noise(lidar=0, translation=0, rotation=0, drift=0, gyro=0, gyro_bias=0)
+
+
+@cache
+def short() -> Drive:
+    """Six seconds of a drive through the room."""
+    return drive(6.0)
+
+
+def here() -> Estimate:
+    """Where that drive begins."""
+    return Estimate(Pose2(*short().truth[0]), (0.1, 0.1, 0.05))
+
+
+@dataclass(frozen=True, eq=False)
+class LocalizerContract(Contract):
+    """Tried in a room of 10 m by 8 m with a lidar of 360 beams at 10 Hz and odometry at 40 Hz."""
+
+    role = "localizer"
+    spec: Any
+    subject: str = ""
+
+    def told(self, estimate: Estimate) -> Localizer:
+        """A new one that starts from this estimate."""
+        subject = heard("is built", lambda: localizer(self.spec, estimate, 1))
+        heard("is reset", lambda: subject.reset(estimate))
+        return subject
+
+    @promise
+    def the_same_calls_give_the_same_beliefs_bit_for_bit(self) -> None:
+        """Given the same readings with the same generator then bit-identical beliefs: no clock, no global chance."""
+        for pose in (here().pose, None):
+            first, again = (heard("localizes", run, self.told(Estimate(pose)), short(), 4, imu=True) for _ in range(2))
+            for one, other in zip(first, again, strict=True):
+                demand(one.pose == other.pose and one.map_from_odom == other.map_from_odom, "two runs differ in pose")
+                demand(np.array_equal(one.covariance, other.covariance), "two runs differ in covariance")
+                demand(np.array_equal(one.particles, other.particles), "two runs differ in particles")
+
+    @promise
+    def without_motion_and_with_perfect_readings_the_belief_does_not_wander_off(self) -> None:
+        """Given no motion and perfect readings then the belief stays within 5 cm and 0.03 rad."""
+        still = record(np.tile(short().truth[:1], (400, 1)))
+        start = Estimate(here().pose, (0.02, 0.02, 0.01))
+        beliefs = heard("localizes", lambda: run(self.told(start), still, 1, SILENT, imu=True))
+        error = errors(beliefs, still.truth)
+        off, turn = float(np.abs(error[:, :2]).max()), float(np.abs(error[:, 2]).max())
+        demand(off < 0.05, f"wanders off by {off:.3f} m while the robot stands")
+        demand(turn < 0.03, f"turns away by {turn:.3f} rad while the robot stands")
+
+    @promise
+    def a_belief_does_not_change_after_it_was_given(self) -> None:
+        """Given a belief then nothing that comes later changes its arrays."""
+        subject = self.told(here())
+        step(subject, 0, Pose2(0, 0, 0))
+        belief = sane(subject)
+        covariance, particles = belief.covariance.copy(), belief.particles.copy()
+        for k in range(1, 20):
+            step(subject, k, Pose2(0.3 * k, 0, 0.1 * k))
+            heard("takes a scan", subject.on_scan, scan(short().ranges[k], 24 * k))
+        demand(np.array_equal(belief.covariance, covariance), "a covariance changes after it was given")
+        demand(np.array_equal(belief.particles, particles), "particles change after they were given")
+
+    @promise
+    def a_scan_is_neither_changed_nor_kept_to_be_changed_later(self) -> None:
+        """Given a scan then its ranges are not changed, and what becomes of them later changes no belief."""
+        subject, ranges = self.told(here()), short().ranges[0].copy()
+        heard("takes a scan", lambda: subject.on_scan(scan(ranges, 24)))
+        demand(np.array_equal(ranges, short().ranges[0]), "the ranges of a scan are not what they were")
+        ranges[:] = np.nan
+        step(subject, 1, Pose2(0, 0, 0))
+        other = self.told(here())
+        heard("takes a scan", lambda: other.on_scan(scan(short().ranges[0], 24)))
+        step(other, 1, Pose2(0, 0, 0))
+        demand(subject.belief.pose == other.belief.pose, "a scan that was changed later shows in the belief")
+
+    @promise
+    def a_lidar_that_is_blind_or_lies_never_makes_the_belief_insane(self) -> None:
+        """Given ranges that are nan, infinite, negative or huge then the belief stays finite and semidefinite."""
+        for start in (here(), Estimate(None)):
+            subject = self.told(start)
+            for k in range(30):
+                step(subject, k, Pose2(0.3 * k, 0.01 * k, 0.3 * k))
+                heard("takes a scan", subject.on_scan, scan(_lies(k % 14), 24 * k))
+                sane(subject)
+
+    @promise
+    def odometry_and_gyroscope_that_lie_never_make_the_belief_insane(self) -> None:
+        """Given odometry and turn rates that are nan, infinite or huge then the belief stays sane."""
+        subject, chance = self.told(here()), np.random.default_rng(5)
+        for k in range(40):
+            x, y, yaw = chance.choice([0.0, np.nan, np.inf, -np.inf, 1e300, -9e5, 4.0, 1e-300], 3).tolist()
+            rate = float(chance.choice([np.nan, np.inf, 99.0, -1e9]))
+            imu = Imu("imu", 24 * k, (0.0, 0.0, rate), (0.0, 0.0, 9.8))
+            heard("takes a turn rate", subject.on_imu, imu)
+            step(subject, k, Pose2(x, y, yaw))
+            heard("takes a scan", subject.on_scan, scan(short().ranges[k % 20], 24 * k))
+            sane(subject)
+
+    @promise
+    def scans_of_any_size_range_and_place_are_taken(self) -> None:
+        """Given a scan of 0 to 4096 beams, of any range and mount, then the belief stays finite and semidefinite."""
+        subject = self.told(here())
+        for k, size in enumerate((0, 1, 2, 3, 59, 60, 61, 4096)):
+            step(subject, k, Pose2(0.3 * k, 0, 0))
+            limits = {"range_max": [12.0, 0.0, np.nan, 1e6][k % 4], "mount": Pose2(0.3, -2.0, 5.0)}
+            taken = scan(np.full(size, 2.0), 24 * k, **limits)
+            heard("takes a scan", subject.on_scan, taken)
+            sane(subject)
+
+    @promise
+    def a_reset_forgets_everything(self) -> None:
+        """Given a reset then the belief is the estimate's, within three standard deviations, wherever it was before."""
+        used = self.told(Estimate(Pose2(3, 3, 3)))
+        drive_ = short()
+        begun = Drive(drive_.truth[:80], drive_.steps[:80], drive_.ranges[:20])
+        heard("localizes", lambda: run(used, begun, 1, imu=True))
+        heard("is reset", lambda: used.reset(here()))
+        near(sane(used), "after a reset")
+        step(used, 0, Pose2(-8, 4, 2))
+        near(sane(used), "after a reset and the first odometry")
+
+
+def near(belief: Belief, when: str) -> None:
+    """Whether a belief is that of `here`."""
+    start = here()
+    assert start.pose is not None
+    x, y, yaw = np.abs(tuple(start.pose.between(belief.pose))).tolist()
+    close = max(x, y) <= 3 * start.std[0] and yaw <= 3 * start.std[2]
+    demand(close, f"believes to be at {belief.pose} {when}, and was told {start.pose}")
+
+
+def step(subject: Localizer, number: int, pose: Pose2) -> None:
+    """Odometry at 10 Hz."""
+    heard("takes odometry", lambda: subject.on_odometry(Odometry("odom", 24 * number, pose, Twist())))
+
+
+def sane(subject: Localizer) -> Belief:
+    """Its belief: finite, symmetric, positive semidefinite, with weights that add up to one."""
+    belief: Belief = heard("is asked for its belief", lambda: subject.belief)
+    demand(isinstance(belief, Belief), f"believes {type(belief).__name__}, not a Belief")
+    covariance, particles = belief.covariance, belief.particles
+    demand(np.isfinite([*belief.pose, *belief.map_from_odom]).all(), f"believes to be at {belief.pose}")
+    demand(
+        covariance.shape == (3, 3) and np.isfinite(covariance).all(), "believes with a covariance that is not finite"
+    )
+    demand(np.allclose(covariance, covariance.T), "believes with a covariance that is not symmetric")
+    least = float(np.linalg.eigvalsh(covariance).min())
+    demand(least >= -1e-9 * float(np.trace(covariance)), "believes with a covariance that is not positive semidefinite")
+    demand(
+        particles.shape[1:] == (4,) and np.isfinite(particles).all(),
+        "believes with particles that are not finite (n, 4)",
+    )
+    weight = float(particles[:, 3].sum())
+    demand(not len(particles) or abs(weight - 1) < 1e-9, f"believes with weights that add up to {weight:g}")
+    return belief
+
+
+def _lies(seed: int) -> Array:
+    """Ranges that no lidar should give, of a different kind for each seed."""
+    chance = np.random.default_rng(seed)
+    kinds = [np.nan, np.inf, -np.inf, 0.0, -5.0, 1e300, 12.0, 0.05, 3.0]
+    wild = chance.choice([np.nan, np.inf, -1.0, 1e9, 2.0, 0.3], BEAMS)
+    return np.full(BEAMS, kinds[seed]) if seed < len(kinds) else chance.choice([wild, chance.uniform(0, 12, BEAMS)])

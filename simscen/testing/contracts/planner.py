@@ -1,0 +1,122 @@
+"""The promises of a planner."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from simscen.core.geometry import Array, Pose2
+from simscen.core.navigation import ErrorCode, Path
+from simscen.stack.footprint import Footprint
+from simscen.stack.protocols import CostmapView, NavigationFailure, Planner, RobotModel
+from simscen.testing.contracts.component import ComponentContract, copied, heard, same, scribble, view_of
+from simscen.testing.flatland import Flatland
+from simscen.testing.promise import demand, promise
+
+START, GOAL = Pose2(1.5, 1.5, 0.3), Pose2(10.0, 5.5, 0.5)
+APART = 0.1
+IMPOSSIBLE = (
+    (Pose2(-3, 1), GOAL, ErrorCode.START_OUTSIDE_MAP),
+    (START, Pose2(30, 1), ErrorCode.GOAL_OUTSIDE_MAP),
+    (Pose2(4.05, 1), GOAL, ErrorCode.START_OCCUPIED),
+    (START, Pose2(8.05, 5), ErrorCode.GOAL_OCCUPIED),
+    (START, Pose2(15, 3.5), ErrorCode.NO_VALID_PATH),
+)
+"""A start or a goal off the map or in a wall, and a goal in a room without a door."""
+
+
+@cache
+def house() -> Flatland:
+    """Two walls with gaps, a cupboard, and a room without a door."""
+    room = Flatland().room(12, 7)
+    room.boxes += [(4.0, 0.0, 4.1, 4.5), (8.0, 2.5, 8.1, 7.0), (14.0, 1.0, 16.0, 1.1), (14.0, 1.0, 14.1, 6.0)]
+    room.boxes += [(14.0, 5.9, 16.0, 6.0), (15.9, 1.0, 16.0, 6.0), (1.0, 5.0, 2.5, 6.0)]
+    return room
+
+
+@cache
+def _house_for(robot: RobotModel) -> CostmapView:
+    return view_of(house(), robot, (-0.5, -0.5, 17.0, 7.5))
+
+
+class PlannerContract(ComponentContract):
+    """Tried in a house of 12 m by 7 m with a goal two rooms away."""
+
+    role = "planner"
+
+    def view(self) -> CostmapView:
+        """The costmap of the house, in arrays of its own."""
+        return copied(_house_for(self.robot))
+
+    def planned(
+        self, planner: Planner, view: CostmapView, seed: int, ends: tuple[Pose2, Pose2] = (START, GOAL)
+    ) -> Array:
+        """The points of a plan, looked at for shape and finiteness."""
+        path = heard("plans", lambda: planner.plan(view, *ends, seed))
+        demand(isinstance(path, Path), f"returns {type(path).__name__}, not a Path")
+        points = path.points
+        demand(isinstance(points, np.ndarray) and points.ndim == 2 and points.shape[1] == 3, "points are not (n, 3)")
+        demand(len(points) > 0, "returns a path without points instead of failing with NO_VALID_PATH")
+        demand(points.dtype == np.float64 and np.isfinite(points).all(), "points are no finite float64 numbers")
+        return points
+
+    @promise
+    def success_begins_at_the_start_and_ends_near_the_goal(self) -> None:
+        """Given success then the path begins at the start and ends within the tolerance of the goal."""
+        for seed in (1, 2, 3):
+            points = self.planned(self.built(), self.view(), seed)
+            off = float(np.hypot(*(points[0, :2] - START[:2])))
+            demand(off < 1e-9, f"the path begins {off:.3f} m from the start")
+            off = float(np.hypot(*(points[-1, :2] - GOAL[:2])))
+            demand(
+                off <= self.spec.tolerance,
+                f"the path ends {off:.3f} m from the goal, tolerance {self.spec.tolerance:g}",
+            )
+
+    @promise
+    def points_are_at_most_a_tenth_of_a_metre_apart(self) -> None:
+        """Given success then no two points that follow each other are further apart than 0.1 m."""
+        widest = float(np.hypot(*np.diff(self.planned(self.built(), self.view(), 1)[:, :2], axis=0).T).max())
+        demand(widest <= APART + 1e-9, f"two points are {widest:.3f} m apart")
+
+    @promise
+    def the_footprint_is_never_on_a_lethal_cell(self) -> None:
+        """Given success then at no point after the start does the robot's hull touch a lethal cell."""
+        footprint = Footprint(self.robot, 0.05)
+        for seed in (1, 2, 3):
+            view = self.view()
+            points = self.planned(self.built(), view, seed)
+            bad = ~footprint.free(view, points)
+            bad[0] = False
+            demand(not bad.any(), f"the robot does not fit at {points[bad.argmax()].round(3).tolist()} (x, y, yaw)")
+
+    @promise
+    def what_cannot_be_fails_with_its_code(self) -> None:
+        """Given a start or goal off the map, in an obstacle, or no way between them then fails with its code."""
+        for start, goal, code in IMPOSSIBLE:
+            try:
+                self.planned(self.built(), self.view(), 1, (start, goal))
+            except NavigationFailure as failure:
+                demand(failure.code == code, f"fails with {failure.code.name}, not with {code.name}")
+            else:
+                demand(False, f"finds a path where {code.name} is the only answer")
+
+    @promise
+    def the_same_seed_gives_the_same_path_bit_for_bit_whatever_was_planned_before(self) -> None:
+        """Given the same costmap, ends and seed then bit-identical paths: no clock, no global chance, no memory."""
+        one = self.planned(self.built(), self.view(), 7)
+        again = self.built()
+        self.planned(again, self.view(), 3, (GOAL, START))
+        demand(np.array_equal(self.planned(again, self.view(), 7), one), "two paths from the same seed differ")
+
+    @promise
+    def a_costmap_is_neither_changed_nor_kept(self) -> None:
+        """Given a costmap then it is not changed, and what becomes of it later changes no later plan."""
+        planner, view, untouched = self.built(), self.view(), self.view()
+        first = self.planned(planner, view, 1)
+        demand(same(view, untouched), "the costmap is not what it was before planning")
+        kept = first.copy()
+        scribble(view)
+        demand(np.array_equal(self.planned(planner, untouched, 1), kept), "an old costmap shows in a new plan")
+        demand(np.array_equal(first, kept), "a path changes after it was returned")
