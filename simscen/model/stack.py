@@ -1,13 +1,13 @@
 """The navigation stack's parameters, with Nav2's names and defaults."""
 
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, get_args
 
 from pydantic import Discriminator, Field, Tag
 
 from simscen.core.navigation import RecoveryBehavior
 from simscen.model.stackbase import GoalTolerances, StackBase
 from simscen.spec.base import Ranged, Spec, by_default, type_or
-from simscen.spec.component import Component
+from simscen.spec.component import Typed
 from simscen.spec.quantities import (
     Angle,
     Duration,
@@ -28,7 +28,7 @@ Noise = Annotated[float, Field(ge=0, le=100)]
 Iterations = Annotated[int, Field(ge=1, le=1_000_000)]
 
 
-class LocalizerSpec(Component):
+class LocalizerSpec(Typed):
     """What knows where the robot is."""
 
 
@@ -132,7 +132,7 @@ class Costmap(Ranged):
     """Edge of the rolling window when driving without a map."""
 
 
-class PlannerSpec(Component):
+class PlannerSpec(Typed):
     """What finds a way, and when it is asked for another one."""
 
     tolerance: NonNegativeLength = 0.5
@@ -155,7 +155,7 @@ class OmplPlanner(PlannerSpec):
     """auto: Reeds-Shepp for an Ackermann drive, se2 for a long footprint, else holonomic."""
 
 
-class ControllerSpec(Component):
+class ControllerSpec(Typed):
     """What follows a path."""
 
 
@@ -234,7 +234,7 @@ Controller = Annotated[
 ]
 
 
-class GoalCheckerSpec(GoalTolerances, Component):
+class GoalCheckerSpec(GoalTolerances, Typed):
     """What says whether a goal is reached; the tolerances are those of goals that name none."""
 
 
@@ -254,7 +254,7 @@ class ProgressChecker(Spec):
     movement_time_allowance: PositiveDuration = 10.0
 
 
-class BehaviorSpec(Component):
+class BehaviorSpec(Typed):
     """What a robot does when planning or control has failed."""
 
     turns_in_place: ClassVar[bool] = False
@@ -352,9 +352,14 @@ class CollisionMonitor(Spec):
     """STOP: nothing may be nearer to the footprint than this, in the direction of travel."""
 
 
-class StackSpec(StackBase):
+class InProcessStack(StackBase, Typed):
+    """A whole stack that lives in the process of its run: simscen's own, or one that an installed package adds."""
+
+
+class StackSpec(InProcessStack):
     """The navigation stack under test: Nav2 in miniature."""
 
+    component: ClassVar[str] = "simscen.stack.build:reference_stack"
     type: Literal["reference"] = "reference"
     localizer: Localizer = by_default()
     costmap: Costmap = by_default()
@@ -370,3 +375,26 @@ class StackSpec(StackBase):
     def told_truth(self) -> bool:
         """Whether its localizer is told where the robot truly is."""
         return isinstance(self.localizer, GroundTruth)
+
+
+_HERE = "simscen.model.stack:"
+LOCALIZERS = {
+    "amcl": _HERE + "Amcl",
+    "ekf": _HERE + "Ekf",
+    "ground_truth": _HERE + "GroundTruth",
+    "odometry": _HERE + "OdometryOnly",
+}
+PLANNERS = dict.fromkeys(get_args(OmplPlanner.model_fields["type"].annotation), _HERE + "OmplPlanner")
+CONTROLLERS = {
+    "regulated_pure_pursuit": _HERE + "RegulatedPurePursuit",
+    "dwb": _HERE + "DynamicWindow",
+    "mppi": _HERE + "Mppi",
+}
+BEHAVIORS = {
+    "clear_costmap": _HERE + "ClearCostmap",
+    "spin": _HERE + "Spin",
+    "wait": _HERE + "Wait",
+    "backup": _HERE + "BackUp",
+}
+GOAL_CHECKERS = {"simple": _HERE + "SimpleGoalChecker"}
+STACKS = {"reference": _HERE + "StackSpec"}

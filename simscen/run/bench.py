@@ -20,6 +20,7 @@ from simscen.run.prepare import Prepared, lidar_height, prepare
 from simscen.run.simulate import simulate
 from simscen.run.stopwatch import Stopwatch
 from simscen.sim.bare import BareWorld
+from simscen.stack.installed.stack import InstalledStack
 from simscen.stack.reference import ReferenceStack
 from simscen.worlds.meshing import fuse, triangulate
 from simscen.worlds.rays import RayScene
@@ -87,8 +88,8 @@ def _watched(watch: Stopwatch, rig: Rig, own: Sequence[Log]) -> Sequence[Log]:
     watch.watch("physics", rig.simulation, "step", "drive")
     watch.watch("truth and contacts", rig.simulation, "truth", "collisions")
     watch.watch("sensors", rig.senses, "read")
-    if isinstance(rig.stack, ReferenceStack):
-        for name, (component, *methods) in rig.stack.components.items():
+    if isinstance(rig.stack, InstalledStack) and isinstance(rig.stack.inner, ReferenceStack):
+        for name, (component, *methods) in rig.stack.inner.components.items():
             watch.watch(name, component, *methods)
     watch.watch("navigator", rig.stack, "decide")
     for name, listener in zip(("trace", "log"), own, strict=True):

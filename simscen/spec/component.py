@@ -27,3 +27,10 @@ class Component(Spec):
         """The class that `component` names. Raises ImportError or AttributeError where there is none."""
         module, _, name = cls.component.partition(":")
         return getattr(import_module(module), name)
+
+
+class Typed(Component):
+    """A component that a file chooses by its `type`: the name of its entry point."""
+
+    type: str = ""
+    """Which one it is."""

@@ -49,12 +49,12 @@ class Group:
 
 
 GROUPS: dict[str, Group] = {
-    "stack": Group("simscen.model.stackbase:StackBase", reserved=("reference", "external")),
-    "localizer": Group("simscen.spec.base:Spec"),
-    "planner": Group("simscen.spec.base:Spec"),
-    "controller": Group("simscen.spec.base:Spec"),
-    "behavior": Group("simscen.spec.base:Spec"),
-    "goal_checker": Group("simscen.spec.base:Spec"),
+    "stack": Group("simscen.model.stack:InProcessStack", "simscen.model.stack:STACKS", ("external",)),
+    "localizer": Group("simscen.model.stack:LocalizerSpec", "simscen.model.stack:LOCALIZERS"),
+    "planner": Group("simscen.model.stack:PlannerSpec", "simscen.model.stack:PLANNERS"),
+    "controller": Group("simscen.model.stack:ControllerSpec", "simscen.model.stack:CONTROLLERS"),
+    "behavior": Group("simscen.model.stack:BehaviorSpec", "simscen.model.stack:BEHAVIORS"),
+    "goal_checker": Group("simscen.model.stack:GoalCheckerSpec", "simscen.model.stack:GOAL_CHECKERS"),
     "criterion": Group(
         "simscen.criteria.base:Criterion", "simscen.criteria.criterion:AnyCriterion", ("id", "severity", "then")
     ),

@@ -14,10 +14,11 @@ from simscen.stack.installed.controller import InstalledController
 from simscen.stack.installed.goal_checker import InstalledGoalChecker
 from simscen.stack.installed.localizer import InstalledLocalizer
 from simscen.stack.installed.planner import InstalledPlanner
+from simscen.stack.installed.stack import InstalledStack
 from simscen.stack.navigator import Navigator
 from simscen.stack.plan_keeper import PlanKeeper
 from simscen.stack.progress_checker import ProgressChecker
-from simscen.stack.protocols import Behavior, Stack, Surroundings
+from simscen.stack.protocols import Behavior, Surroundings
 from simscen.stack.recovery import RoundRobin
 from simscen.stack.reference import ReferenceStack
 from simscen.stack.setting import Setting
@@ -26,30 +27,35 @@ from simscen.stack.velocity_smoother import VelocitySmoother
 
 
 def build_stack(
-    spec: model.StackSpec,
+    spec: model.InProcessStack,
     surroundings: Surroundings,
     streams: Streams,
     clock: Clock,
     *,
     stop_on_failure: bool = True,
-) -> Stack:
-    """The stack of a specification, ready to `start`. It works on its map in cells no larger than the costmap's.
+) -> InstalledStack:
+    """The stack of a specification, ready to `start`. Raises ValueError when a rate does not divide the clock."""
+    period = clock.seconds(clock.period(spec.controller_frequency))
+    setting = Setting(surroundings, "stack", streams, control_period=period, stop_on_failure=stop_on_failure)
+    return InstalledStack(spec, setting)
 
-    Its random streams are "localizer", "controller" and "planner#1", "planner#2", … for the plans of a run. Raises
-    ValueError when a rate does not divide the clock.
+
+def reference_stack(spec: model.StackSpec, setting: Setting) -> ReferenceStack:
+    """Nav2 in miniature. It works on its map in cells no larger than the costmap's.
+
+    Its random streams are "localizer", "controller" and "planner#1", "planner#2", … for the plans of a run; components
+    of others have theirs besides, so that one more of them changes nobody's numbers.
     """
+    surroundings, clock, streams = setting.surroundings, setting.clock, setting.streams
     if surroundings.map is not None:
         surroundings = replace(surroundings, map=surroundings.map.refined(spec.costmap.resolution))
-    robot = surroundings.robot
-    period = clock.period(spec.controller_frequency)
-    seconds = clock.seconds(period)
+    robot, period = surroundings.robot, clock.period(spec.controller_frequency)
     journal: list[Event] = []
     costmap = Costmap(spec.costmap, surroundings)
-    shared = Setting(
-        surroundings,
-        "planner",
-        streams,
-        control_period=seconds,
+    shared = replace(
+        setting,
+        surroundings=surroundings,
+        name="planner",
         resolution=costmap.view.resolution,
         clear_costmap=costmap.clear,
     )
@@ -71,7 +77,7 @@ def build_stack(
         InstalledGoalChecker(spec.goal_checker, shared.named("goal_checker")),
         ProgressChecker(spec.progress_checker),
         costmap,
-        seconds,
+        setting.control_period,
         journal,
     )
     return ReferenceStack(
@@ -80,8 +86,8 @@ def build_stack(
         costmap,
         controller,
         navigator,
-        Task(stop_on_failure, journal),
-        VelocitySmoother(spec.velocity_smoother, robot, seconds),
+        Task(setting.stop_on_failure, journal),
+        VelocitySmoother(spec.velocity_smoother, robot, setting.control_period),
         CollisionMonitor(spec.collision_monitor, robot, surroundings.lidars, surroundings.tick_rate),
         period,
         math.ceil(surroundings.tick_rate / spec.costmap.update_frequency),

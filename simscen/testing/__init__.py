@@ -1,1 +1,35 @@
-"""Contract tests for everybody's own components."""
+"""Contract tests for everybody's own planners, controllers, localizers, behaviors, stacks, criteria, faults and so on.
+
+    @pytest.mark.parametrize("promise", promises_of(MyPlannerSpec()), ids=str)
+    def test_my_planner(promise):
+        promise.check()
+
+`pytest --simscen-contract my_package:MyPlanner` does the same without a test.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from simscen.testing.promise import Contract, Promise, PromiseBroken
+    from simscen.testing.subjects import contracts_of, promises_of
+
+__all__ = ["Contract", "Promise", "PromiseBroken", "contracts_of", "promises_of"]
+
+_WHERE = {
+    "Contract": "promise",
+    "Promise": "promise",
+    "PromiseBroken": "promise",
+    "contracts_of": "subjects",
+    "promises_of": "subjects",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import what is asked for, and no sooner: pytest imports this package whenever it starts."""
+    if name not in _WHERE:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib import import_module
+
+    return getattr(import_module(f"{__name__}.{_WHERE[name]}"), name)

@@ -1,15 +1,11 @@
 """A whole stack keeps the promises of simscen.stack.protocols.Stack, with every controller."""
 
-import sys
-from pathlib import Path
-
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "unit" / "stack"))
 from simscen.core.geometry import Pose2
-from simscen.core.motion import STOP
 from simscen.core.navigation import Goal
 from simscen.model.stack import DynamicWindow, GroundTruth, Mppi, RegulatedPurePursuit, StackSpec
+from simscen.testing import Promise, promises_of
 from simscen.testing.flatland import Drive, Flatland, drive
 
 SPECS = {
@@ -39,33 +35,6 @@ def test_it_reaches_a_goal_around_an_unmapped_obstacle_without_contact(spec: Sta
     assert d.least > 0
 
 
-@every
-def test_without_a_goal_it_commands_zero(spec: StackSpec) -> None:
-    d = start(spec).run(0.5)
-    assert set(d.commands) == {STOP}
-    assert d.stack.goal is None
-    assert d.stack.plan is None
-
-
-@every
-def test_once_a_task_has_ended_it_commands_zero(spec: StackSpec) -> None:
-    d = start(spec, Goal("g", Pose2(1.6, 1.0))).run(20)
-    ended = len(d.commands) - 1
-    d.run(0.5, until="")
-    assert set(d.commands[ended:]) == {STOP}
-
-
-@every
-def test_the_same_seed_gives_the_same_drive_bit_for_bit(spec: StackSpec) -> None:
-    one, other = (start(spec, Goal("g", Pose2(5, 1, 0.5))).run(4) for _ in range(2))
-    assert one.commands == other.commands
-    assert one.log == other.log
-
-
-@every
-def test_every_goal_is_accepted_once_and_ends_once(spec: StackSpec) -> None:
-    d = start(spec, Goal("a", Pose2(1.6, 1.0)), Goal("b", Pose2(40.0, 0.0))).run(30)
-    assert [e.name for e in d.kinds("goal.accepted")] == ["a", "b"]
-    assert [e.name for e in d.kinds("goal.reached")] == ["a"]
-    assert [e.name for e in d.kinds("goal.failed")] == ["b"]
-    assert [e.name for e in d.kinds("navigation.ended")] == ["FAILED"]
+@pytest.mark.parametrize("promise", [p for name, spec in SPECS.items() for p in promises_of(spec, name)], ids=str)
+def test_it_keeps_its_promise(promise: Promise) -> None:
+    promise.check()

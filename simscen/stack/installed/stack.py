@@ -1,0 +1,71 @@
+"""A whole stack behind its door."""
+
+from simscen.core.belief import Estimate
+from simscen.core.events import Event, EventKind
+from simscen.core.navigation import Goal, Path
+from simscen.core.sensing import Readings
+from simscen.core.trace import Decision
+from simscen.model.stack import InProcessStack
+from simscen.stack.installed.localizer import checked_belief
+from simscen.stack.installed.watched import Watched
+from simscen.stack.protocols import Stack
+from simscen.stack.setting import Setting
+
+
+class InstalledStack(Watched):
+    """Asks the stack, and looks at each new decision before anybody acts on it."""
+
+    may_fail = False
+
+    def __init__(self, spec: InProcessStack, setting: Setting) -> None:
+        super().__init__("stack", spec, setting, Stack)
+        self._last: Decision | None = None
+
+    def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:
+        """Localise at the estimate, then drive to the goals in order."""
+        self.ask(self.inner.start, estimate, goals)
+
+    def preempt(self, tick: int, goal: Goal) -> None:
+        """Drive to this goal first."""
+        self.ask(self.inner.preempt, tick, goal)
+
+    def cancel(self, tick: int) -> None:
+        """Cancel the current goal and all after it."""
+        self.ask(self.inner.cancel, tick)
+
+    def decide(self, tick: int, readings: Readings) -> Decision:
+        """The stack's decision. Raises RunError when it is none."""
+        decision = self.ask(self.inner.decide, tick, readings)
+        if decision is not self._last:  # a stack that repeats itself does so with the same object
+            self._last = self._checked(decision, tick)
+        return self._last
+
+    @property
+    def plan(self) -> Path | None:
+        """The plan being followed."""
+        plan = self.ask(lambda: self.inner.plan)
+        return None if plan is None else self.checked_path(plan, "follows")
+
+    @property
+    def goal(self) -> Goal | None:
+        """The goal being driven to; None when the task has ended."""
+        goal = self.ask(lambda: self.inner.goal)
+        if goal is not None and not isinstance(goal, Goal):
+            self.broke(f"drives to {goal!r}, which is no Goal")
+        return goal
+
+    def _checked(self, decision: object, tick: int) -> Decision:
+        if not isinstance(decision, Decision):
+            self.broke(f"decided {type(decision).__name__} instead of a Decision")
+        self.checked_twist(decision.command)
+        if decision.belief is not None:
+            checked_belief(self, decision.belief)
+        for path, what in ((decision.plan, "planned"), (decision.local_plan, "expects to drive")):
+            if path is not None:
+                self.checked_path(path, what)
+        for event in decision.events:
+            if not isinstance(event, Event) or not isinstance(event.kind, EventKind):
+                self.broke(f"told of {event!r}, which is no Event")
+            if event.tick != tick:
+                self.broke(f"told at tick {tick} of `{event.kind}` at tick {event.tick}")
+        return decision

@@ -1,0 +1,100 @@
+"""The pytest plug-in: `pytest --simscen-contract my_package:MyPlanner` tries every promise that it has to keep.
+
+It is loaded by every pytest in an environment where simscen is installed, so it imports nothing until it is asked.
+"""
+
+from __future__ import annotations
+
+import traceback
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from simscen.testing.promise import Promise
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the options."""
+    group = parser.getgroup("simscen", "contracts of simscen's plug-ins")
+    group.addoption(
+        "--simscen-contract",
+        action="append",
+        default=[],
+        metavar="TARGET",
+        help="try every promise that package.module:Class, or an entry point's name, has to keep (repeatable); "
+        "TARGET={JSON} gives its specification values; without paths nothing else is run",
+    )
+    group.addoption(
+        "--simscen-contract-limit",
+        type=float,
+        default=60.0,
+        metavar="SECONDS",
+        help="wall time after which a promise counts as broken because its component does not end (default: 60)",
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Without paths on the command line, contracts are all that is asked for."""
+    if config.getoption("--simscen-contract") and config.args_source is not pytest.Config.ArgsSource.ARGS:
+        config.args[:] = []
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(session: pytest.Session, config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Add one item for each promise, before others select."""
+    for target in config.getoption("--simscen-contract"):
+        from simscen.testing.subjects import NoSubject, named
+
+        try:
+            promises = named(target)
+        except NoSubject as wrong:
+            raise pytest.UsageError(f"--simscen-contract {wrong}") from wrong
+        items.extend(_items(session, promises, config.getoption("--simscen-contract-limit")))
+
+
+def _items(session: pytest.Session, promises: list[Promise], limit: float) -> Iterator[pytest.Item]:
+    for subject in dict.fromkeys((promise.role, promise.subject) for promise in promises):
+        title = f"{subject[0]} {subject[1]}"
+        node = Subject.from_parent(session, name=title, nodeid=title)
+        for promise in promises:
+            if (promise.role, promise.subject) == subject:
+                yield Tried.from_parent(node, name=promise.name, promise=promise, limit=limit)
+
+
+class Subject(pytest.Collector):
+    """What is tried."""
+
+    def collect(self) -> list[pytest.Item]:
+        """Nothing: its items are added by hand."""
+        return []
+
+
+class Tried(pytest.Item):
+    """One promise."""
+
+    def __init__(self, *, promise: Promise, limit: float, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        self._promise, self._limit = promise, limit
+
+    def runtest(self) -> None:
+        """Try it."""
+        self._promise.check(self._limit)
+
+    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
+        """What was seen, what was promised, and where the component raised if it did."""
+        from simscen.testing.promise import PromiseBroken
+
+        if not isinstance(excinfo.value, PromiseBroken):
+            return super().repr_failure(excinfo)
+        told = [f"{self._promise.subject}: {excinfo.value}", f"promised: {self._promise.keep.__doc__}"]
+        if (cause := excinfo.value.__cause__) is not None:
+            told += ["", *traceback.format_exception(cause)]
+        return "\n".join(told).rstrip()
+
+    def reportinfo(self) -> tuple[Path, int | None, str]:
+        """The promise as a sentence."""
+        return self.path, None, f"{self._promise.role} {self._promise}"

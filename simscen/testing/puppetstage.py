@@ -1,0 +1,75 @@
+"""A run as triggers and actions see it, without a run: everything is as it is set, and what is done is written down."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from simscen.core.belief import Belief
+from simscen.core.events import Event
+from simscen.core.geometry import Pose2
+from simscen.core.motion import STOP, Twist
+from simscen.core.navigation import Goal, Path
+from simscen.core.shapes import Body, MotionPath
+from simscen.core.time import Clock
+from simscen.core.world import Polygon
+
+
+@dataclass
+class PuppetStage:
+    """A core.stage.Stage. `regions` and `objects` that nobody has set are squares and places near the origin."""
+
+    tick: int = 0
+    clock: Clock = field(default_factory=Clock)
+    robot: Pose2 = Pose2(0.0, 0.0, 0.0)
+    twist: Twist = STOP
+    travelled: float = 0.0
+    belief: Belief | None = None
+    events: tuple[Event, ...] = ()
+    plan: Path | None = None
+    goal: Goal | None = None
+    regions: dict[str, Polygon] = field(default_factory=dict)
+    objects: dict[str, Pose2 | None] = field(default_factory=dict)
+    done: list[Any] = field(default_factory=list)
+
+    def region(self, name: str) -> Polygon:
+        """A named region of the world."""
+        return self.regions.get(name, ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)))
+
+    def object(self, name: str) -> Pose2 | None:
+        """Where a named object is now."""
+        return self.objects.get(name, Pose2(0.5, 0.5, 0.0))
+
+    def door(self, name: str) -> tuple[Pose2, Pose2]:
+        """A door that slides by a metre."""
+        return Pose2(0.0, 0.0, 0.0), Pose2(1.0, 0.0, 0.0)
+
+    def spawn(self, body: Body) -> None:
+        """Write it down."""
+        self.done.append(("spawn", body))
+
+    def remove(self, name: str) -> None:
+        """Write it down."""
+        self.done.append(("remove", name))
+
+    def move(self, name: str, path: MotionPath) -> None:
+        """Write it down."""
+        self.done.append(("move", name, path))
+
+    def place_robot(self, pose: Pose2) -> None:
+        """Write it down."""
+        self.done.append(("place_robot", pose))
+
+    def push(self, impulse: tuple[float, float]) -> None:
+        """Write it down."""
+        self.done.append(("push", impulse))
+
+    def send_goal(self, name: str) -> None:
+        """Write it down."""
+        self.done.append(("send_goal", name))
+
+    def cancel_goal(self) -> None:
+        """Write it down."""
+        self.done.append(("cancel_goal",))
+
+    def note(self, event: Event) -> None:
+        """Write it down."""
+        self.done.append(("note", event))

@@ -1,0 +1,138 @@
+"""From what a user names to the contracts that it has to keep."""
+
+from __future__ import annotations
+
+import inspect
+import json
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from typing import Any, get_type_hints
+
+from pydantic import ValidationError
+
+from simscen.actions.base import Action
+from simscen.criteria.base import Criterion
+from simscen.faults.base import Fault
+from simscen.model.stack import BehaviorSpec, ControllerSpec, GoalCheckerSpec, LocalizerSpec, PlannerSpec
+from simscen.model.stackbase import StackBase
+from simscen.spec.registry import GROUPS, BrokenPlugin, Entry, find
+from simscen.stack.protocols import RobotModel
+from simscen.testing.contracts.action import ActionContract
+from simscen.testing.contracts.behavior import BehaviorContract
+from simscen.testing.contracts.controller import ControllerContract
+from simscen.testing.contracts.criterion import CriterionContract
+from simscen.testing.contracts.fault import FaultContract
+from simscen.testing.contracts.goal_checker import GoalCheckerContract
+from simscen.testing.contracts.localizer import LocalizerContract
+from simscen.testing.contracts.planner import PlannerContract
+from simscen.testing.contracts.stack import StackContract
+from simscen.testing.contracts.trigger import TriggerContract
+from simscen.testing.flatland import box_robot, round_robot
+from simscen.testing.promise import Contract, Promise
+from simscen.triggers.base import Condition
+
+ROBOTS = {"round robot": round_robot(), "long robot": box_robot(speed=0.8)}
+"""What planners, controllers and behaviours are tried with where nobody says: 0.44 m wide, and 0.42 m by 0.31 m."""
+
+_WITH_ROBOTS: dict[type, Callable[..., Contract]] = {
+    PlannerSpec: PlannerContract,
+    ControllerSpec: ControllerContract,
+    BehaviorSpec: BehaviorContract,
+}
+_ALONE: dict[type, Callable[..., Contract]] = {
+    LocalizerSpec: LocalizerContract,
+    StackBase: StackContract,
+    Criterion: CriterionContract,
+    Fault: FaultContract,
+    Condition: TriggerContract,
+    Action: ActionContract,
+}
+
+
+class NoSubject(Exception):
+    """What was named cannot be tried; the message says why."""
+
+
+def contracts_of(spec: Any, subject: str = "", robots: dict[str, RobotModel] | None = None) -> list[Contract]:
+    """The contracts of a specification; one for each robot where it makes a difference."""
+    for kind, contract in _WITH_ROBOTS.items():
+        if isinstance(spec, kind):
+            several = (robots or ROBOTS).items()
+            return [contract(spec, robot, f"{subject} on a {name}".strip()) for name, robot in several]
+    if isinstance(spec, GoalCheckerSpec):
+        return [GoalCheckerContract(spec, ROBOTS["round robot"], subject)]
+    for kind, contract in _ALONE.items():
+        if isinstance(spec, kind):
+            return [contract(spec, subject=subject)]
+    raise NoSubject(f"{type(spec).__name__} is no specification of {', '.join(GROUPS)}")
+
+
+def promises_of(spec: Any, subject: str = "", robots: dict[str, RobotModel] | None = None) -> list[Promise]:
+    """Every promise that a specification's component has to keep, to be tried one by one.
+
+    `spec` is a specification: of a planner, a controller, a localizer, a behavior, a goal checker, a whole stack, a
+    criterion, a fault, a trigger or an action. `robots` are those to try it with, by name.
+    """
+    return [each for contract in contracts_of(spec, subject, robots) for each in contract.promises()]
+
+
+def named(target: str) -> list[Promise]:
+    """The promises of what a user names: `package.module:Class`, or the name of an entry point.
+
+    The class is a specification, or a component whose first argument is one. A specification that needs values gets
+    them as JSON behind a `=`: `my_planner={"weight": 2}`. Raises NoSubject.
+    """
+    what, _, written = target.partition("=")
+    try:
+        values = json.loads(written) if written else {}
+    except ValueError as error:
+        raise NoSubject(f"{target}: {written} is no JSON: {error}") from error
+    if not isinstance(values, dict):
+        raise NoSubject(f"{target}: {written} is no JSON object")
+    return [each for model in _models(what) for each in promises_of(_instance(model, values, target), what)]
+
+
+def _models(what: str) -> Sequence[Any]:
+    if ":" in what:
+        return [specification_of(_resolved(what), what)]
+    entries = [entry for group in GROUPS if (entry := find(group, what)) is not None]
+    if not entries:
+        raise NoSubject(f"{what}: no installed package adds anything of that name, and it is no package.module:Class")
+    return [_loaded(entry) for entry in entries]
+
+
+def _loaded(entry: Entry) -> Any:
+    try:
+        return entry.load()
+    except BrokenPlugin as broken:
+        raise NoSubject(str(broken)) from broken
+
+
+def _resolved(what: str) -> Any:
+    module, _, name = what.partition(":")
+    try:
+        return getattr(import_module(module), name)
+    except (ImportError, AttributeError) as error:
+        raise NoSubject(f"{what}: {error}") from error
+
+
+def specification_of(named: Any, what: str) -> Any:
+    """A specification as it is; of a component the specification that its constructor takes."""
+    if not inspect.isclass(named):
+        raise NoSubject(f"{what} is no class")
+    if hasattr(named, "model_validate"):
+        return named
+    parameters = list(inspect.signature(named).parameters)
+    hint = get_type_hints(named.__init__).get(parameters[0]) if parameters else None
+    if not inspect.isclass(hint) or not hasattr(hint, "model_validate"):
+        raise NoSubject(f"{what}: its first argument is not annotated with a specification, so name that one")
+    return hint
+
+
+def _instance(model: Any, values: dict[str, Any], target: str) -> Any:
+    try:
+        return model.model_validate(values, by_alias=True, by_name=False)
+    except ValidationError as error:
+        wrong = "; ".join(f"{'.'.join(map(str, each['loc']))}: {each['msg']}" for each in error.errors())
+        hint = "" if values else ", e.g. " + target + '={"key": 1}'
+        raise NoSubject(f"{target}: {model.__name__} needs other values ({wrong}){hint}") from error

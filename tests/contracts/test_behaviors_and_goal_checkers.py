@@ -1,0 +1,21 @@
+"""Every recovery behaviour and goal checker keeps the promises of its protocol."""
+
+import pytest
+
+from simscen.model.stack import BackUp, ClearCostmap, SimpleGoalChecker, Spin, Wait
+from simscen.testing import Promise, promises_of
+
+SPECS = {
+    "spin": Spin(),
+    "spin the other way": Spin(spin_dist=-3.0, max_rotational_vel=0.5),
+    "wait": Wait(),
+    "backup": BackUp(),
+    "clear_costmap": ClearCostmap(),
+    "simple": SimpleGoalChecker(),
+    "forgetful": SimpleGoalChecker(stateful=False),
+}
+
+
+@pytest.mark.parametrize("promise", [p for name, spec in SPECS.items() for p in promises_of(spec, name)], ids=str)
+def test_it_keeps_its_promise(promise: Promise) -> None:
+    promise.check()

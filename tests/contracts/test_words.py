@@ -1,0 +1,39 @@
+"""Every shipped criterion, fault, trigger and action keeps the promises of its base, as its docstring's example."""
+
+import re
+from collections.abc import Iterator
+
+import pytest
+import yaml
+
+from simscen.actions.action import AnyAction
+from simscen.criteria.criterion import AnyCriterion
+from simscen.faults.fault import AnyFault
+from simscen.spec.choice import Choice
+from simscen.spec.ondemand import type_of
+from simscen.testing import Promise, promises_of
+from simscen.triggers.trigger import Trigger
+
+
+def examples(choice: type[Choice], below: str = "", skipped: tuple[str, ...] = ()) -> Iterator[Promise]:
+    for key, field in choice.choices().items():
+        if key not in skipped:
+            text = re.search(r"Example: `(.+)`", type_of(choice.model_fields[field]).__doc__ or "")
+            assert text, key
+            words = yaml.safe_load(text[1])
+            words = {"off" if name is False else name: value for name, value in words.get(below, words).items()}
+            chosen = {name: value for name, value in words.items() if name in {*choice.choices(), *choice.modifiers}}
+            yield from promises_of(choice.model_validate(chosen).chosen, key)
+
+
+PROMISES = [
+    *examples(AnyCriterion),
+    *examples(AnyFault),
+    *examples(Trigger, "when", ("all", "any", "not")),
+    *examples(AnyAction, "do"),
+]
+
+
+@pytest.mark.parametrize("promise", PROMISES, ids=str)
+def test_it_keeps_its_promise(promise: Promise) -> None:
+    promise.check()

@@ -1,0 +1,100 @@
+"""`pytest --simscen-contract` as a plug-in author calls it, in a pytest of its own."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+OWN = """
+from simscen.model.stack import GoalCheckerSpec
+from simscen.stack.setting import Setting
+
+
+class Spec(GoalCheckerSpec):
+    component = "own:Checker"
+    part: float
+
+
+class Checker:
+    def __init__(self, spec: Spec, setting: Setting):
+        self.part = spec.part
+
+    def reset(self):
+        pass
+
+    def reached(self, goal, pose, twist):
+        from simscen.core.geometry import wrap
+
+        near = goal.pose.distance(pose) <= self.part * goal.xy_tolerance
+        return near and abs(wrap(goal.pose.yaw - pose.yaw)) <= goal.yaw_tolerance
+
+
+class Unannotated:
+    def __init__(self, spec, setting):
+        pass
+"""
+
+
+@pytest.fixture
+def run(tmp_path: Path):
+    (tmp_path / "own.py").write_text(OWN)
+    (tmp_path / "test_theirs.py").write_text("def test_theirs():\n    pass\n")
+
+    def call(*arguments: str, probe: str = "pass") -> tuple[int, str]:
+        code = f"import sys, pytest; sys.path.insert(0, '.'); code = pytest.main(sys.argv[1:]); {probe}; sys.exit(code)"
+        plugin = ("-p", "simscen.testing.plugin", "-p", "no:cacheprovider")
+        done = subprocess.run([sys.executable, "-c", code, *plugin, *arguments],
+                              cwd=tmp_path, capture_output=True, text=True, check=False)  # fmt: skip
+        return done.returncode, done.stdout + done.stderr
+
+    return call
+
+
+def test_every_promise_of_a_component_is_an_item_and_nothing_else_is_run(run) -> None:
+    code, told = run("-v", "-p", "no:xdist", "--simscen-contract", 'own:Checker={"part": 0.9}')
+    assert code == 0, told
+    assert "a reset forgets the goal before" in told
+    assert "6 passed" in told
+    assert "test_theirs" not in told
+
+
+def test_a_broken_promise_says_what_was_seen_and_what_was_promised(run) -> None:
+    code, told = run("-p", "no:xdist", "--simscen-contract", 'own:Spec={"part": 3.0}', "test_theirs.py")
+    assert code == 1, told
+    assert "says that a robot at (2.26, -1.0, 0.5) has reached (2.0, -1.0, 0.5)" in told
+    assert "promised: Given a robot outside a tolerance of the goal" in told
+    assert "Traceback" not in told
+    assert "1 failed, 6 passed" in told  # with their own test, as a path was given
+
+
+def test_the_name_of_a_shipped_type_and_workers_do_as_well(run) -> None:
+    code, told = run("-n1", "--simscen-contract", "simple", "-k", "reset")
+    assert code == 0, told
+    assert "1 passed" in told
+
+
+@pytest.mark.parametrize(
+    ("target", "why"),
+    [
+        ("own:Checker", "part: Field required"),
+        ("own:Checker={part: 1}", "is no JSON"),
+        ("own:Unannotated", "its first argument is not annotated with a specification"),
+        ("own:Nothing", "has no attribute 'Nothing'"),
+        ("nowhere:Nothing", "No module named 'nowhere'"),
+        ("headless", "no installed package adds anything of that name"),
+    ],
+)
+def test_what_cannot_be_tried_is_an_error_in_words(run, target: str, why: str) -> None:
+    code, told = run("-p", "no:xdist", "--simscen-contract", target)
+    assert code == 4
+    assert why in told
+    assert "Traceback" not in told
+
+
+def test_a_pytest_that_asks_for_no_contract_imports_nothing_of_simscen_but_the_plug_in(run) -> None:
+    probe = "print('loaded', *sorted(m for m in sys.modules if m.startswith('simscen') or m in ('numpy', 'pydantic')))"
+    code, told = run("-q", "-p", "no:xdist", probe=probe)
+    assert code == 0, told
+    loaded = told.splitlines()[-1].split()[1:]
+    assert loaded == ["simscen", "simscen.core", "simscen.core.version", "simscen.testing", "simscen.testing.plugin"]
