@@ -1,5 +1,7 @@
 """Packages that add to simscen, laid out as an installer leaves them, without installing anything."""
 
+import re
+import shutil
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -27,6 +29,20 @@ def lay(site: Path, name: str, version: str, points: Mapping[str, Mapping[str, s
     return site
 
 
+def lay_out(folder: Path, site: Path) -> Path:
+    """Install a package from its folder, as `pip install --target` would: its modules, and what pyproject.toml says."""
+    text = (folder / "pyproject.toml").read_text()
+    name, version = (re.findall(rf'^{key} = "(.*)"$', text, re.MULTILINE)[0] for key in ("name", "version"))
+    points = {
+        kind: dict(re.findall(r'^(\w+) = "(.*)"$', rows, re.MULTILINE))
+        for kind, rows in re.findall(r'^\[project.entry-points."simscen.(\w+)"\]\n((?:.+\n)*)', text, re.MULTILINE)
+    }
+    lay(site, name, version, points)
+    module = name.replace("-", "_")
+    shutil.copytree(folder / module, site / module, ignore=shutil.ignore_patterns("__pycache__"))
+    return site
+
+
 def forget() -> None:
     """Let the next look for packages see what is there then."""
     for known in (registry._scanned, registry._loaded, choice.widened):
@@ -45,8 +61,15 @@ def packages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Lay]:
         forget()
         return lay(site, name, version, points, **modules)
 
+    add.site, add.lay = site, lay  # type: ignore[attr-defined]
     yield add
     for module in set(sys.modules) - before:
         if str(getattr(sys.modules[module], "__file__", "")).startswith(str(site)):
             del sys.modules[module]
     forget()
+
+
+@pytest.fixture
+def yardwork(packages: Lay) -> Path:
+    """The package tests/plugins/yardwork, installed for this test; where it is."""
+    return lay_out(Path(__file__).parent / "plugins" / "yardwork", packages.site)  # type: ignore[attr-defined]

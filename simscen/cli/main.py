@@ -26,6 +26,7 @@ COMMANDS = {
     "new": "Write a commented scenario to start from.",
     "explain": "Explain a trigger, action, fault, criterion, signal, metric, component or error code.",
     "schema": "Print or write the JSON Schemas that editors use.",
+    "plugins": "List the types that installed packages add to the language and to the stack.",
     "world": "Inspect, convert and export worlds.",
     "robot": "Drive a robot once and compare command, odometry and truth.",
     "bench": "Measure how fast simscen runs here.",

@@ -22,6 +22,7 @@ from simscen.loading.tree import (
     real_keys,
     value_place,
 )
+from simscen.spec.choice import Choice
 
 Model = TypeVar("Model", bound=BaseModel)
 VERSION = 1
@@ -73,7 +74,10 @@ def _unknown_key(model: type[BaseModel], tree: Node, loc: tuple[Key, ...]) -> Pr
     key = str(loc[-1])
     holder = dotted(real_keys(tree, loc[:-1]))
     where = f" in `{holder}`" if holder else ""
-    hint = messages.suggestion(key, keys_of(models_at(model, loc[:-1])))
+    models = models_at(model, loc[:-1])
+    hint = messages.suggestion(key, keys_of(models))
+    if not hint.startswith("did") and any(issubclass(one, Choice) and one.group for one in models):
+        hint = "; ".join(filter(None, (hint, "`simscen plugins` lists what installed packages add")))
     return _problem(key_place(tree, loc), "SC012", f"unknown key {messages.quoted(key)}{where}", hint)
 
 

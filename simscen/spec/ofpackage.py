@@ -1,5 +1,6 @@
 """Specifications of installed packages: imported when a file uses them, and a problem of that file where broken."""
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,6 +9,9 @@ from pydantic_core import PydanticCustomError
 
 from simscen.spec.ondemand import OnDemand
 from simscen.spec.registry import BrokenPlugin, Entry
+
+_ASKED = ("horizon", "clearance_range")
+"""What a criterion says of itself, in seconds and metres."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +27,21 @@ class OfPackage(OnDemand):
     def _validate(self, value: Any) -> BaseModel:
         try:
             self.load()
+            return _kept(self.entry, super()._validate(value))
         except BrokenPlugin as broken:
             told = {"problem": str(broken), "hint": broken.hint}
             raise PydanticCustomError("plugin", "{problem}", told) from broken
-        return super()._validate(value)
+        except (ValueError, AssertionError):  # what pydantic takes for a mistake in the file, ValidationError included
+            raise
+        except Exception as error:  # the boundary to code of others, which can raise anything
+            why = BrokenPlugin(self.entry, f"it breaks down over what is written here: {type(error).__name__}: {error}")
+            raise PydanticCustomError("plugin", "{problem}", {"problem": str(why), "hint": why.hint}) from error
+
+
+def _kept(entry: Entry, spec: BaseModel) -> BaseModel:
+    """The specification. Raises BrokenPlugin where what simscen asks of it before any run is no number."""
+    for name in _ASKED:
+        number = getattr(spec, name) if hasattr(type(spec), name) else 0.0
+        if isinstance(number, bool) or not isinstance(number, int | float) or not (0 <= number < math.inf):
+            raise BrokenPlugin(entry, f"its `{name}` is {number!r}, no finite number from 0 on")
+    return spec

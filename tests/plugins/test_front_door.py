@@ -1,0 +1,189 @@
+"""A package of another maker, through the front door: files, schema, explain, runs, reports, and life without it."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import jsonschema
+import pytest
+import yaml
+
+from simscen.record.replay import read_log
+
+SIMSCEN = [sys.executable, "-c", "import sys; from simscen.cli.start import start; sys.exit(start())"]
+ROBOT = """\
+simscen: 1
+name: yard robot
+mass: 8 kg
+radius: 0.2
+body: [{cylinder: [0.2, 0.25], z: 0.05}]
+drive: {type: differential, wheel_radius: 0.05, wheel_separation: 0.3}
+limits: {linear: 0.6, angular: 1.5, linear_acceleration: 1.5, angular_acceleration: 3}
+sensors:
+  lidar: {lidar: {}}
+  odom: {odometry: {}}
+  imu: {imu: {}}
+  ring: {sonar: {sensors: 6, mount: {z: 0.15}}}
+"""
+DRIVE = """\
+simscen: 1
+name: doorway
+world:
+  simscen: 1
+  walls:
+    - {points: [[0, 0], [6, 0], [6, 3], [0, 3], [0, 0]]}
+  regions: {doorway: [[2.5, 0], [3.5, 0], [3.5, 3], [2.5, 3]]}
+robot: {model: yard.robot.yaml, pose: {x: 1, y: 1.5}}
+goals: [{pose: {x: 5, y: 1.5}}]
+time_limit: 60 s
+events:
+  - {name: bumped, when: {travelled: 1 m}, do: {turn_robot: {by: 20 deg}}}
+  - {name: backwards, when: {reversing: 0.3 m/s}, do: {push: {impulse: [0, 1]}}, required: false}
+faults:
+  - {sensor: lidar, crosstalk: {width: 10 deg}, when: {time: 2 s}, for: 3 s}
+pass:
+  - goals_reached: {}
+  - dwell: {region: doorway, max: 30 s}
+metrics:
+  - reversed_length: {}
+"""
+
+
+@pytest.fixture
+def yard(tmp_path, monkeypatch, yardwork) -> Path:
+    """A folder with a scenario that uses everything of the package, which comes by PYTHONPATH."""
+    folder = tmp_path / "work"
+    folder.mkdir()
+    (folder / "yard.robot.yaml").write_text(ROBOT)
+    (folder / "door.scenario.yaml").write_text(DRIVE)
+    monkeypatch.chdir(folder)
+    monkeypatch.setenv("PYTHONPATH", str(yardwork))
+    return folder
+
+
+def simscen(*arguments: str, **more: str) -> subprocess.CompletedProcess[str]:
+    """Call the command in a process of its own."""
+    env = {**os.environ, "COLUMNS": "100", **more}
+    return subprocess.run([*SIMSCEN, *arguments], capture_output=True, text=True, check=False, env=env)
+
+
+def test_a_run_uses_what_the_package_adds_and_every_report_knows_it(yard) -> None:
+    done = simscen("run", "door.scenario.yaml", "--out", "out")
+    assert done.returncode == 0, done.stdout + done.stderr
+    log = read_log(yard / "out/runs/door/seed-1/run.mcap")
+    result = json.loads((yard / "out/runs/door/seed-1/result.json").read_text())
+    told = {name: fact for name, fact in log.about.facts.items() if name.startswith("plugin.")}
+    kinds = ["action.turn_robot", "criterion.dwell", "fault.crosstalk", "metric.reversed_length", "sensor.sonar"]
+    kinds.append("trigger.reversing")
+    assert told == {f"plugin.{kind}": "yardwork==1.2" for kind in kinds}
+    packages = json.loads((yard / "out/run.json").read_text())["plugins"]
+    used = [kind.replace(".", " ") for kind in kinds]
+    assert packages == {"yardwork": {"version": "1.2", "used": used}}
+    assert result["metrics"]["reversed_length"] == pytest.approx(0.0, abs=0.2)
+    assert [one["happened"] for one in result["disturbances"]] == [True, False, True]
+    dwell = next(verdict for verdict in result["verdicts"] if verdict["criterion"] == "dwell")
+    assert dwell["status"] == "pass" and 1.0 < dwell["findings"][0]["value"] < 30.0
+    judged = json.loads(simscen("judge", "out/runs/door/seed-1/run.mcap", "--json").stdout)
+    assert judged["metrics"] == result["metrics"]
+    assert [one["findings"] for one in judged["verdicts"]] == [one["findings"] for one in result["verdicts"]]
+
+
+def test_its_criterion_can_fail_and_says_by_how_much(yard) -> None:
+    (yard / "door.scenario.yaml").write_text(DRIVE.replace("max: 30 s", "max: 0.5 s"))
+    assert simscen("run", "door.scenario.yaml", "--out", "out").returncode == 1
+    (failure,) = ET.parse(yard / "out/junit.xml").getroot().iter("failure")
+    assert re.search(r"dwell: doorway: \d\.\d\d s > 0\.50 s", failure.get("message", "")), failure.attrib
+
+
+def test_its_sensor_is_heard_by_the_log_and_by_the_costmap(yard) -> None:
+    assert simscen("run", "door.scenario.yaml", "--out", "out").returncode == 0
+    from mcap.reader import make_reader
+
+    with (yard / "out/runs/door/seed-1/run.mcap").open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+        assert summary is not None
+        topics = {channel.topic for channel in summary.channels.values()}
+    assert "/scan" in topics and any("ring" in topic for topic in topics)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "wrong", "told", "hint"),
+    [
+        ("max: 30 s", "max: 30 m", "30 m", "`m` is a unit of length, but this is a duration", "units: s, ms"),
+        ("region: doorway,", "region: dorway,", "dorway,", "no region of the world is called `dorway`", "`doorway`?"),
+        ("dwell:", "dwel:", "dwel:", "unknown key `dwel` in `pass[1]`", "did you mean `dwell`?"),
+        (
+            "lidar, cross",
+            "imu, cross",
+            "crosstalk",
+            "fault `crosstalk` makes no sense on an imu (`imu`)",
+            "lidar, ring",
+        ),
+        ("reversing: 0.3 m/s", "reversing: -1", "-1", "must be greater than 0, got `-1`", ""),
+        ("{by: 20 deg}", "{bye: 20 deg}", "bye", "unknown key `bye`", "did you mean `by`?"),
+        ("reversed_length:", "reversed_lenght:", "reversed_lenght", "unknown key", "did you mean `reversed_length`?"),
+    ],
+)
+def test_a_mistake_is_told_at_its_place_with_what_was_meant(yard, old, new, wrong, told, hint) -> None:
+    text = DRIVE.replace(old, new)
+    (yard / "door.scenario.yaml").write_text(text)
+    done = simscen("validate", "door.scenario.yaml")
+    line = next(number for number, line in enumerate(text.splitlines(), 1) if new in line)
+    row = text.splitlines()[line - 1]
+    place = f"{line}:{row.index(wrong, row.index(new) if wrong in new else 0) + 1}"
+    assert (done.returncode, done.stderr) == (2, "")
+    assert f"door.scenario.yaml:{place}: error" in done.stdout, done.stdout
+    assert told in done.stdout and hint in done.stdout
+
+
+def test_schema_and_explain_know_it_and_what_is_committed_does_not(yard) -> None:
+    schema = json.loads(simscen("schema", "scenario").stdout)
+    jsonschema.Draft7Validator(schema).validate(yaml.safe_load(DRIVE))
+    jsonschema.Draft7Validator(json.loads(simscen("schema", "robot").stdout)).validate(yaml.safe_load(ROBOT))
+    wrong = yaml.safe_load(DRIVE.replace("max: 30 s", "maximum: 30 s"))
+    assert [list(error.path) for error in jsonschema.Draft7Validator(schema).iter_errors(wrong)] != []
+    told = simscen("explain", "dwell").stdout
+    assert "dwell (criterion of yardwork 1.2)" in told and "region: text (required)" in told
+    assert re.search(r"^  .*\bcrosstalk\b", simscen("explain").stdout, re.MULTILINE)
+    assert "dwell" not in simscen("schema", PYTHONPATH="").stdout
+    check = [sys.executable, "-m", "simscen.cli.generate", "--check"]
+    assert subprocess.run(check, capture_output=True, text=True, check=False).stdout == ""
+
+
+def test_resume_does_again_what_a_change_of_the_package_could_change(yard, yardwork) -> None:
+    assert simscen("run", "door.scenario.yaml", "--out", "out").returncode == 0
+    journal = yard / "out/events.jsonl"
+    assert simscen("run", "door.scenario.yaml", "--resume", "out").returncode == 0
+    kept = journal.read_text().count('"event": "started"')
+    module = yardwork / "yardwork/crosstalk.py"
+    module.write_text(module.read_text() + "\nTOUCHED = True\n")
+    assert simscen("run", "door.scenario.yaml", "--resume", "out").returncode == 0
+    assert (kept, journal.read_text().count('"event": "started"')) == (1, 2)
+
+
+def test_without_the_package_a_file_that_uses_it_says_what_is_missing(yard, yardwork) -> None:
+    assert simscen("run", "door.scenario.yaml", "--out", "out").returncode == 0
+    shutil.rmtree(yardwork)
+    done = simscen("validate", "door.scenario.yaml")
+    assert done.returncode == 2
+    assert "unknown key `dwell` in `pass[1]`" in done.stdout + done.stderr
+    assert "`simscen plugins` lists what installed packages add" in done.stdout + done.stderr
+    judged = simscen("judge", "out/runs/door/seed-1/run.mcap")
+    assert judged.returncode == 2
+    told = "the run was judged with criterion `dwell` of yardwork==1.2, and it is not installed"
+    assert told in judged.stdout + judged.stderr
+    (yard / "mine.yaml").write_text("pass: [{goals_reached: {}}]\n")
+    assert simscen("judge", "out/runs/door/seed-1/run.mcap", "--scenario", "mine.yaml").returncode == 0
+
+
+def test_another_version_of_the_package_does_not_judge_a_log_of_this_one(yard, yardwork) -> None:
+    assert simscen("run", "door.scenario.yaml", "--out", "out").returncode == 0
+    (yardwork / "yardwork-1.2.dist-info/METADATA").write_text("Metadata-Version: 2.1\nName: yardwork\nVersion: 2.0\n")
+    judged = simscen("judge", "out/runs/door/seed-1/run.mcap")
+    assert judged.returncode == 2
+    assert "of yardwork==1.2, and installed is yardwork==2.0" in judged.stdout + judged.stderr

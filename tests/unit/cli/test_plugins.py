@@ -1,0 +1,102 @@
+"""`simscen plugins`, and how other commands meet packages that are broken."""
+
+import json
+
+import pytest
+
+HELLO = '''
+from simscen.core.verdict import Finding, Status
+from simscen.criteria.base import Criterion
+from simscen.spec.base import Spec
+
+
+class Hello(Spec, Criterion):
+    """It says hello. And goodbye.
+
+    Twice.
+    """
+
+    def judge(self, trace, case):
+        return []
+'''
+
+
+def test_nothing_installed_is_said_in_words(simscen) -> None:
+    done = simscen("plugins")
+    assert (done.code, done.err) == (0, "")
+    assert done.out == "no installed package adds anything: none has entry points in a group `simscen.…`\n"
+
+
+def test_every_type_is_listed_with_its_package_and_its_first_sentence(simscen, yardwork) -> None:
+    done = simscen("plugins")
+    assert (done.code, done.err) == (0, "")
+    assert done.out.splitlines()[:4] == [
+        f"yardwork 1.2 ({yardwork})",
+        "  ✓ criterion dwell (yardwork.dwell:Dwell)",
+        "      The robot leaves a region again soon enough.",
+        "  ✓ fault crosstalk (yardwork.crosstalk:Crosstalk)",
+    ]
+
+
+def test_as_json(simscen, yardwork) -> None:
+    listed = json.loads(simscen("plugins", "--format", "json").out)["plugins"]
+    assert [row["kind"] for row in listed] == ["criterion", "fault", "trigger", "action", "sensor", "metric"]
+    assert listed[0] == {
+        "kind": "criterion",
+        "name": "dwell",
+        "package": "yardwork",
+        "version": "1.2",
+        "folder": str(yardwork),
+        "class": "yardwork.dwell:Dwell",
+        "text": "The robot leaves a region again soon enough.",
+        "broken": "",
+        "hint": "",
+    }
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "value", "why"),
+    [
+        ("criterion", "hello", "nowhere:Hello", "ModuleNotFoundError: No module named 'nowhere'"),
+        ("criterion", "speed", "hello:Hello", "simscen itself has one of that name"),
+        ("criteria", "hello", "hello:Hello", "there is no group `simscen.criteria`"),
+        ("metric", "success", "hello:Hello", "simscen itself has one of that name"),
+    ],
+)
+def test_one_that_is_broken_says_why_and_the_exit_code_tells(simscen, packages, kind, name, value, why) -> None:
+    packages("hello", "1.0", {kind: {name: value}}, hello=HELLO)
+    done = simscen("plugins")
+    assert done.code == 3
+    assert f"  ✗ {kind} {name} ({value})" in done.out
+    assert f"cannot be used: {why}" in " ".join(done.out.split()) or why in " ".join(done.out.split())
+
+
+def test_a_broken_package_breaks_only_files_that_use_it(simscen, packages, tmp_path) -> None:
+    packages("hello", "1.0", {"criterion": {"hello": "hello:Hello"}}, hello="raise RuntimeError('no licence')")
+    good = (tmp_path / "good.scenario.yaml").read_text()
+    (tmp_path / "uses.scenario.yaml").write_text(good.replace("goals_reached: {}", "hello: {}"))
+    assert simscen("validate", "good.scenario.yaml").code == 0
+    assert simscen("schema").code == 0
+    assert simscen("explain", "speed").code == 0
+    done = simscen("validate", ".")
+    assert done.code == 2
+    assert "uses.scenario.yaml:10:16: error[SC019]" in done.out + done.err
+    told = "criterion `hello` of hello 1.0 cannot be used: `hello:Hello` cannot be loaded: RuntimeError: no licence"
+    assert told in done.out + done.err
+    assert "good.scenario.yaml" not in done.out + done.err
+
+
+def test_a_check_of_its_own_that_breaks_down_is_a_problem_of_the_file(simscen, packages, tmp_path) -> None:
+    broken = "    @property\n    def horizon(self):\n        return self.nothing\n\n    def judge"
+    packages("hello", "1.0", {"criterion": {"hello": "hello:Hello"}}, hello=HELLO.replace("    def judge", broken))
+    good = (tmp_path / "good.scenario.yaml").read_text()
+    (tmp_path / "good.scenario.yaml").write_text(good.replace("goals_reached: {}", "hello: {}"))
+    done = simscen("validate", "good.scenario.yaml")
+    assert done.code == 2
+    assert "good.scenario.yaml:10:16: error[SC019] criterion `hello` of hello 1.0 cannot be used: " in done.out
+
+
+def test_a_folder_of_scenarios_is_never_code(simscen, packages, tmp_path, monkeypatch) -> None:
+    monkeypatch.syspath_prepend(str(tmp_path))  # as `python -m` does with the working directory
+    packages.lay(tmp_path, "hello", "1.0", {"criterion": {"hello": "hello:Hello"}}, hello="raise SystemExit('it ran')")
+    assert simscen("plugins").out.startswith("no installed package adds anything")
