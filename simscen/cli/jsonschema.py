@@ -11,6 +11,7 @@ from simscen.loading.stackchoice import OF_THE_SCENARIO
 from simscen.model.robot import RobotSpec
 from simscen.model.scenario import ScenarioSpec
 from simscen.model.stackfile import StackFileSpec
+from simscen.model.userconfig import UserConfigSpec
 from simscen.model.world import WorldSpec
 from simscen.spec.choice import Choice, added, widened
 
@@ -21,13 +22,14 @@ MODELS: dict[str, type[BaseModel]] = {
     "world": WorldSpec,
     "robot": RobotSpec,
     "stack": StackFileSpec,
+    "config": UserConfigSpec,
 }
 DRAFT = "http://json-schema.org/draft-07/schema#"
 """What yaml-language-server knows best; nothing newer is needed."""
 
 
 def schema_of(name: str, installed: bool = False) -> Schema:
-    """The JSON Schema of a "scenario", "world", "robot" or "stack" file; of what is `installed`, too, if asked."""
+    """The JSON Schema of a kind of file, e.g. "scenario"; of what is `installed`, too, if asked."""
     model = MODELS[name]
     generated = model.model_json_schema(schema_generator=_WithInstalled if installed else _Generator)
     if name == "stack":
@@ -36,7 +38,8 @@ def schema_of(name: str, installed: bool = False) -> Schema:
         {**generated, "properties": {"extends": _EXTENDS, **generated["properties"]}}, generated.get("$defs", {})
     )
     # Any other key may come from the file it extends or from the defaults.yaml beside it.
-    return {"$schema": DRAFT, "title": f"simscen {name}", **schema, "required": ["simscen"]}
+    needed = ["simscen"] if model.model_fields["simscen"].is_required() else []
+    return {"$schema": DRAFT, "title": f"simscen {name}", **schema, "required": needed}
 
 
 def _leave_to_the_scenario(generated: Schema) -> None:

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from simscen.cli.called import PLUGINS
 from simscen.cli.later import import_later
 from simscen.cli.surroundings import NO_ROOM, flushed, occupy_descriptors, output_lost, require_folder
 from simscen.core.errors import Exit, InvalidInput, SimscenError
@@ -106,7 +107,7 @@ def main() -> None:
     occupy_descriptors()
     # Plug-ins of pydantic that happen to be installed could change what is valid; looking for them costs 12 ms, too,
     # and so does what it imports to look for them.
-    os.environ["PYDANTIC_DISABLE_PLUGINS"] = "__all__"
+    os.environ[PLUGINS] = "__all__"
     import_later("importlib.metadata", "entry_points")
     sys.exit(flushed(_called()))
 

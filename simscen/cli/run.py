@@ -8,16 +8,16 @@ from typing import Annotated
 
 import typer
 
-from simscen.cli.diagnostics import as_text, from_here, print_text
+from simscen.cli.diagnostics import as_text, print_text
 from simscen.cli.interrupts import signals_interrupt
 from simscen.cli.reports import JunitFamily, Reports, require_writable, verdict
 from simscen.cli.screen import Format, Screen, screen
 from simscen.cli.select import Selection, load_all, shard_of
+from simscen.cli.stacks import STACK_HELP
 from simscen.cli.work import Work, begin
-from simscen.core.errors import Exit, InvalidInput, UsageError
+from simscen.core.errors import Exit, UsageError
 from simscen.core.sessionevents import SessionEvent
 from simscen.judge.measure.compare import compare
-from simscen.loading.externalstack import undefined
 from simscen.loading.plugins import plugins_of_all
 from simscen.report.journal import Journal, require_free
 from simscen.report.journaldata import NAME
@@ -74,8 +74,7 @@ def command(
         list[str] | None,
         typer.Option(
             metavar="NAME=VALUE",
-            help="Run every scenario with this stack instead of its own: a *.stack.yaml file or `reference`. "
-            "Repeatable: each scenario runs with each, and the first is compared with the others.",
+            help=STACK_HELP + "Repeatable: each scenario runs with each, and the first is compared with the others.",
         ),
     ] = None,
     root: Annotated[Path | None, typer.Option(help="Files inside scenarios stay in this folder.")] = None,
@@ -104,8 +103,6 @@ def command(
         raise UsageError(f"--check-against {check_against}: there are no runs in it")
     for scenario in scenarios:
         seeds_of(scenario, options)
-    if problems := [found for scenario in scenarios if (found := undefined(scenario))]:
-        raise InvalidInput(from_here(problems, scenarios[0].root))
     require_writable(junit, out or resume, {file for each in scenarios for file in (*each.files.values(), *each.read)})
     folder, journal = _output_folder(out, resume)
     reports = Reports(folder, junit, junit_family.value, plugins=packages_of(plugins_of_all(scenarios)))

@@ -19,6 +19,7 @@ class Kind(str, Enum):
     WORLD = "world"
     ROBOT = "robot"
     STACK = "stack"
+    CONFIG = "config"
 
 
 def command(

@@ -6,7 +6,7 @@ from itertools import product
 from pathlib import Path
 
 from simscen.cli.diagnostics import from_here, harmless
-from simscen.cli.stacks import choices_of
+from simscen.cli.stacks import Stacks, stacks_of
 from simscen.core.errors import InvalidInput, NothingSelected, UsageError
 from simscen.core.filesread import files_read
 from simscen.core.problems import Problem
@@ -46,8 +46,8 @@ def load_all(
     Raises InvalidInput with every problem of every file, selected or not, and NothingSelected.
     """
     home = root if root is not None else default_root(paths)
-    checks = Checks(home, world_path, lenient)
-    choices: Sequence[StackChoice | None] = choices_of(stacks, home, world_path) or [None]
+    checks = Checks(home, world_path, lenient, stacks=stacks_of(stacks, home, world_path))
+    choices = checks.choices
     loaded: dict[str, list[LoadedScenario]] = {}
     problems: dict[Problem, None] = {}
     warnings: dict[str, list[Problem]] = {}
@@ -85,7 +85,8 @@ def _shard(scenarios: list[LoadedScenario], number: int, count: int) -> list[Loa
 class Checks:
     """Looks at files for all that can be wrong with them; with `fast`, for nothing that geometry is needed for.
 
-    Into the folder `pictures` goes a picture of each scenario that geometry finds something wrong with.
+    Into the folder `pictures` goes a picture of each scenario that geometry finds something wrong with. Unless `runs`,
+    it is no mistake that nobody here says what an external stack is: others may.
     """
 
     root: Path
@@ -94,15 +95,26 @@ class Checks:
     fast: bool = False
     pictures: Path | None = None
     cache: WorldCache = field(default_factory=WorldCache)
+    stacks: Stacks = field(default_factory=Stacks)
+    runs: bool = True
+
+    @property
+    def choices(self) -> Sequence[StackChoice | None]:
+        """The stacks to look at each scenario with; None = its own."""
+        return self.stacks.chosen or (None,)
 
     def scenario(self, file: Path, choice: StackChoice | None = None) -> tuple[LoadedScenario | None, list[Problem]]:
         """The scenario, unless it is unusable, and its problems: a usable one has none that are errors."""
         loaded = try_scenario(file, self.root, self.world_path, choice)
         if isinstance(loaded, list):
             return None, loaded
-        loaded = replace(loaded, lenient=self.lenient)
+        loaded, nobody = self.stacks.with_command(replace(loaded, lenient=self.lenient))
+        if nobody is not None and self.runs:
+            return None, [*loaded.notes, nobody]
         with files_read() as read:
             problems = [*loaded.notes, *([] if self.fast else checked(loaded, self.cache, self.pictures))]
+        if nobody is not None:
+            problems.append(replace(nobody, severity="warning"))
         loaded = replace(loaded, read=tuple(sorted(read)))
         usable = not any(problem.severity == "error" for problem in problems)
         return (loaded if usable else None), list(dict.fromkeys(problems))

@@ -1,48 +1,118 @@
-"""What `--stack NAME=VALUE` means."""
+"""What `--stack NAME=VALUE` and the user's own configuration say of stacks."""
 
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
+from simscen.cli.called import config_file, environment
 from simscen.cli.diagnostics import from_here, harmless
 from simscen.core.errors import InvalidInput, UsageError
-from simscen.core.result import AGAIN
+from simscen.core.externalcommand import ExternalCommand
+from simscen.core.problems import Problem
+from simscen.core.result import RunKey
 from simscen.loading.discovery import STACK
-from simscen.loading.messages import quoted
+from simscen.loading.externalstack import undefined
+from simscen.loading.loaded import LoadedScenario
+from simscen.loading.messages import quoted, suggestion
+from simscen.loading.program import command_of
 from simscen.loading.stackchoice import REFERENCE, StackChoice
 from simscen.loading.stackfile import load_stack_file
+from simscen.loading.userconfig import UserConfig, load_config
+from simscen.model.anystack import ExternalStackSpec
+from simscen.spec.registry import entries, find
 
-_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,39}")
+STACK_HELP = (
+    "Run every scenario with this stack instead of its own: a command that speaks the stack protocol, a *.stack.yaml "
+    "file, `reference`, another type of stack, or a name in the user's configuration. "
+)
+_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,59}")
 
 
-def choices_of(written: Sequence[str], root: Path, world_path: Sequence[Path]) -> list[StackChoice]:
-    """The stacks that were given, in their order.
+@dataclass
+class Stacks:
+    """The stacks that were `chosen` with --stack, in their order, and what the names of external ones run.
 
-    Raises UsageError for what cannot be read or has the name of another, InvalidInput for a stack file that is wrong.
+    The configuration is read when a name asks for it. Nothing is looked for on the network or in a scenario's folder.
     """
+
+    chosen: Sequence[StackChoice] = ()
+    _commands: dict[str, ExternalCommand | None] = field(default_factory=dict)
+
+    @cached_property
+    def config(self) -> UserConfig:
+        """The user's own configuration. Raises InvalidInput."""
+        return load_config(config_file())
+
+    def with_command(self, loaded: LoadedScenario) -> tuple[LoadedScenario, Problem | None]:
+        """The scenario with what its external stack runs, or with the problem that nobody says so.
+
+        Raises InvalidInput for a configuration that says it wrongly.
+        """
+        stack = loaded.spec.stack
+        if not isinstance(stack, ExternalStackSpec):
+            return loaded, None
+        if (command := self.command(stack.external)) is not None:
+            return replace(loaded, runs=command), None
+        names = [*(choice.name for choice in self.chosen if choice.runs), *self.config.spec.stacks]
+        return loaded, undefined(loaded, names, self.config.file)
+
+    def command(self, name: str) -> ExternalCommand | None:
+        """What an external stack's name runs: as --stack says, else as the configuration does."""
+        if name not in self._commands:
+            given = next((choice.runs for choice in self.chosen if choice.name == name and choice.runs), None)
+            self._commands[name] = given or self.config.command(name, environment(), Path.cwd())
+        return self._commands[name]
+
+
+def stacks_of(written: Sequence[str], root: Path, world_path: Sequence[Path] = ()) -> Stacks:
+    """What was given as --stack.
+
+    Raises UsageError for what cannot be read, cannot be run or has the name of another, InvalidInput for a stack file
+    or a configuration that is wrong.
+    """
+    stacks = Stacks()
     choices: dict[str, StackChoice] = {}
     for text in written:
-        choice = _choice(text, root, world_path)
+        choice = _choice(text, root, world_path, stacks)
         if choice.name.casefold() in choices:
-            raise UsageError(
-                f"--stack {harmless(text)}: there is another stack of that name; give it a name of its own"
-            )
+            raise UsageError(f"--stack {harmless(text)}: there is another stack of that name; give it its own")
         choices[choice.name.casefold()] = choice
-    return list(choices.values())
+    return Stacks(tuple(choices.values()))
 
 
-def _choice(text: str, root: Path, world_path: Sequence[Path]) -> StackChoice:
+def _choice(text: str, root: Path, world_path: Sequence[Path], stacks: Stacks) -> StackChoice:
     name, equals, value = text.partition("=")
-    if not equals or not _NAME.fullmatch(name):
-        hint = "a name begins with a letter and has letters, digits, `_` and `-`"
+    if not _NAME.fullmatch(name):
+        hint = "a name has letters, digits, `_`, `.` and `-`"
         raise UsageError(f"cannot read --stack {harmless(text)}: expected NAME=VALUE; {hint}")
-    if name.casefold() == AGAIN:
+    if RunKey("", 1, name.casefold()).repeats:
         raise UsageError(f"--stack {harmless(text)}: no stack may be called {quoted(name)}; it names second runs")
-    if value == REFERENCE:
-        return StackChoice(name, value, REFERENCE)
+    value = value if equals else name
+    if value == REFERENCE or (_NAME.fullmatch(value) and find("stack", value)):
+        return StackChoice(name, value, type=value)
     if value.endswith(STACK):
         try:
             return load_stack_file(name, value, Path(value), root, world_path)
         except InvalidInput as error:
             raise InvalidInput(from_here(error.problems, root)) from error
-    raise UsageError(f"--stack {harmless(text)}: {quoted(value)} is neither a *.stack.yaml file nor `{REFERENCE}`")
+    return StackChoice(name, value, runs=_command(text, value, bool(equals), stacks))
+
+
+def _command(text: str, value: str, may_be_new: bool, stacks: Stacks) -> ExternalCommand:
+    """A name in the configuration, or a command."""
+    if _NAME.fullmatch(value) and (known := stacks.command(value)) is not None:
+        return known
+    if not may_be_new:
+        names = [REFERENCE, *(entry.name for entry in entries("stack")), *stacks.config.spec.stacks]
+        told = f"{quoted(value)} is neither a type of stack nor a name in {stacks.config.file}"
+        raise UsageError(f"cannot read --stack {harmless(text)}: expected NAME=VALUE; {told}; {_near(value, names)}")
+    try:
+        return command_of(value, environment(), Path.cwd())
+    except ValueError as error:
+        raise UsageError(f"--stack {harmless(text)}: {harmless(str(error))}") from error
+
+
+def _near(word: str, names: Sequence[str]) -> str:
+    return suggestion(word, dict.fromkeys(names))

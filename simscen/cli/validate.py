@@ -11,6 +11,7 @@ import typer
 
 from simscen.cli.diagnostics import as_github, as_json, as_text, from_here, print_text
 from simscen.cli.select import Checks
+from simscen.cli.stacks import stacks_of
 from simscen.core.errors import Exit
 from simscen.core.problems import Problem
 from simscen.loading.anyfile import kind_of, problems_of
@@ -28,6 +29,10 @@ class Format(str, Enum):
 def command(
     paths: Annotated[list[Path], typer.Argument(help="Files, or folders to search.")],
     format_: Annotated[Format, typer.Option("--format", help="How to print problems.")] = Format.TEXT,
+    stack: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=VALUE", help="Check scenarios with this stack, as `simscen run` does. Repeatable."),
+    ] = None,
     root: Annotated[Path | None, typer.Option(help="Files inside scenarios stay in this folder.")] = None,
     world_path: Annotated[list[Path] | None, typer.Option(help="Folder with worlds and models; repeatable.")] = None,
     lenient: Annotated[
@@ -49,7 +54,9 @@ def command(
     Exit code 0: all are valid; 2: some are not; 5: there are none.
     """
     home = root if root is not None else default_root(paths)
-    checks, checked = Checks(home, world_path or [], lenient, fast, picture), _Checked()
+    stacks = stacks_of(stack or [], home, world_path or [])
+    checks = Checks(home, world_path or [], lenient, fast, picture, stacks=stacks, runs=bool(stack))
+    checked = _Checked()
     for file in discover(paths, home, SCENARIO + WORLD + ROBOT + STACK):
         kind = kind_of(file, home)
         checked.add(kind, from_here(_problems(kind, file, checks), home))
@@ -61,7 +68,8 @@ def command(
 def _problems(kind: str, file: Path, checks: Checks) -> list[Problem]:
     """What the text tells; where that is nothing, what building it tells, which needs numpy."""
     if kind == "scenario":
-        return checks.scenario(file)[1]
+        found = [problem for choice in checks.choices for problem in checks.scenario(file, choice)[1]]
+        return list(dict.fromkeys(found))
     found = problems_of(kind, file, checks.root, checks.world_path)
     if kind == "stack" or any(problem.severity == "error" for problem in found):
         return found

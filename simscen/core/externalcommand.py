@@ -1,5 +1,6 @@
 """What the name of an external stack runs, as the command line or the user's own configuration says."""
 
+import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -14,6 +15,8 @@ class ExternalCommand:
 
     `start_limit` bounds in seconds of wall time how long it may take until it has said what it wants to hear,
     `answer_limit` each answer after that. The first word is looked for in the PATH of `env`, as a shell would.
+    `digest` changes with what is run: the words, the variables that were asked for, and the content of files among the
+    words. The environment as such is not part of it, and nothing of it belongs into a log or a report.
     """
 
     argv: tuple[str, ...]
@@ -21,3 +24,15 @@ class ExternalCommand:
     cwd: str
     start_limit: float = START_LIMIT
     answer_limit: float = ANSWER_LIMIT
+    digest: str = ""
+
+
+def words_of(command: str) -> tuple[str, ...]:
+    """The words of a command line, quotes counting as in a shell. Raises ValueError with what is wrong with it."""
+    try:
+        words = tuple(shlex.split(command))
+    except ValueError as error:
+        raise ValueError(f"cannot be read as a command: {str(error).lower()}") from error
+    if not words or not words[0]:
+        raise ValueError("names no program")
+    return words

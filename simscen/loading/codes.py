@@ -40,6 +40,7 @@ CODES = {
     "SC053": "A number looks like degrees, where radians are meant.",
     "SC054": "The same is there twice.",
     "SC055": "Something changes nothing.",
+    "SC061": "What the user's configuration says an external stack runs is not there, or cannot be run.",
     "SC060": "Nobody says what an external stack runs: it needs `--stack NAME='COMMAND'`, or the user's configuration.",
     "SC301": "A start or goal is inside an obstacle or off the map.",
     "SC302": "No way leads to a goal: a room is sealed, or a gap is narrower than the robot.",

@@ -1,23 +1,26 @@
 """Whether anybody says what the external stack of a scenario runs."""
 
 from collections.abc import Iterable
+from pathlib import Path
 
 from simscen.core.problems import Problem
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.messages import quoted, suggestion
+from simscen.loading.stackchoice import EXTERNAL
 from simscen.model.anystack import ExternalStackSpec
 
 
-def undefined(loaded: LoadedScenario, known: Iterable[str] = ()) -> Problem | None:
+def undefined(loaded: LoadedScenario, known: Iterable[str] = (), config: Path | None = None) -> Problem | None:
     """The problem of a scenario whose external stack has a name of which nobody says what it runs.
 
-    `known` are the names of which somebody does.
+    `known` are the names of which somebody does; `config` is the file that could say so.
     """
     stack = loaded.spec.stack
     if not isinstance(stack, ExternalStackSpec) or loaded.runs is not None:
         return None
     name = stack.external
     near = suggestion(name, known)
-    hint = near if near.startswith("did") else f"say so with --stack {name}='COMMAND'"
+    there = f", or under `stacks:` in {config}" if config is not None else ""
+    hint = near if near.startswith("did") else f"say so with --stack {name}='COMMAND'{there}"
     message = f"nobody says what the stack {quoted(name)} runs"
-    return loaded.problem(("stack", "external"), "SC060", message, hint)
+    return loaded.problem(("stack", EXTERNAL), "SC060", message, hint)

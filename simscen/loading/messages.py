@@ -115,6 +115,8 @@ def explain(kind: str, context: Mapping[str, Any], node: Node, text: str) -> Mes
 
 
 def _type_hint(kind: str, node: Node) -> str:
+    if kind == "string_type" and isinstance(node, Leaf) and node.value is not None:
+        return "put it in quotes"
     if not isinstance(node, Leaf) or not isinstance(node.value, str):
         return ""
     if kind in ("int_type", "float_type") and _NUMBER.fullmatch(node.value):

@@ -4,19 +4,23 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from simscen.core.externalcommand import ExternalCommand
 from simscen.loading.tree import Entry, Fields, Leaf, Node, Place, child
 
 OF_THE_SCENARIO = ("keepout", "keepout_mask", "speed_zones", "speed_mask")
 """What of a `stack:` section is about the world rather than the stack: it stays, whichever stack drives there."""
-REFERENCE = "reference"
+OF_ANY_STACK = ("controller_frequency",)
+"""What a scenario may ask of a stack of any kind."""
+CHECKER, TOLERANCES = "goal_checker", ("xy_goal_tolerance", "yaw_goal_tolerance")
+REFERENCE, EXTERNAL = "reference", "external"
 
 
 @dataclass(frozen=True)
 class StackChoice:
     """What `--stack NAME=VALUE` means; `value` is as it was given.
 
-    `file` is the stack file that it names, `section` the `stack:` of that; otherwise `type` is the type of stack that
-    it names. `texts` and `files` are those of the stack file and what it extends, as in Library.
+    `file` is the stack file that it names, `section` the `stack:` of that; `type` is the type of stack that it names;
+    `runs` is the command that it is. `texts` and `files` are those of the stack file and what it extends (Library).
     """
 
     name: str
@@ -26,6 +30,7 @@ class StackChoice:
     section: Fields | None = field(default=None, repr=False)
     texts: Mapping[str, str] = field(default_factory=dict, repr=False)
     files: Mapping[str, Path] = field(default_factory=dict, repr=False)
+    runs: ExternalCommand | None = field(default=None, repr=False)
 
     @property
     def written(self) -> str:
@@ -43,7 +48,9 @@ class StackChoice:
 def with_stack(tree: Fields, choice: StackChoice) -> Fields:
     """A scenario with the chosen stack in place of its own.
 
-    Its zones and masks stay. A type of stack that is the scenario's own type keeps its parameters; a file says all.
+    Its zones and masks stay, and how near to a goal is near enough. A command or a type of stack says nothing of
+    parameters: those of the scenario's own stack stay where it is of the same kind, else those that any stack has. A
+    file says all of them.
     """
     own = child(tree, "stack")
     if own is not None and not isinstance(own, Fields):
@@ -58,14 +65,33 @@ def with_stack(tree: Fields, choice: StackChoice) -> Fields:
 def _section(own: Fields, choice: StackChoice) -> Fields:
     kept = {name: own.entries[name] for name in OF_THE_SCENARIO if name in own.entries}
     if choice.section is not None:
-        return Fields(choice.section.place, {**choice.section.entries, **kept})
+        return _asked(Fields(choice.section.place, {**choice.section.entries, **kept}), own)
     place = Place(f"--stack {choice.written}", 0, 0)
-    return Fields(place, {"type": Entry(place, Leaf(place, choice.type)), **kept})
+    if choice.runs is not None:
+        named = {EXTERNAL: Entry(place, Leaf(place, choice.name))}
+        if child(own, EXTERNAL) is not None:
+            return Fields(own.place, {**own.entries, **named})
+    else:
+        named = {"type": Entry(place, Leaf(place, choice.type))}
+    rate = {name: own.entries[name] for name in OF_ANY_STACK if name in own.entries}
+    return _asked(Fields(place, {**named, **rate, **kept}), own)
+
+
+def _asked(section: Fields, own: Fields) -> Fields:
+    """The section with the tolerances of goals that the scenario asks for: every stack is judged by them."""
+    checker, below = child(own, CHECKER), child(section, CHECKER)
+    if not isinstance(checker, Fields) or not isinstance(below, Fields | None):
+        return section
+    asked = {name: checker.entries[name] for name in TOLERANCES if name in checker.entries}
+    if not asked:
+        return section
+    whole = Fields(checker.place, {**(below.entries if below else {}), **asked})
+    return Fields(section.place, {**section.entries, CHECKER: Entry(own.entries[CHECKER].key, whole)})
 
 
 def type_of(section: Node) -> str | None:
     """The type of stack of a `stack:` section, as far as it has a plain one; an external one has none."""
-    if child(section, "external") is not None:
+    if child(section, EXTERNAL) is not None:
         return None
     written = child(section, "type")
     return REFERENCE if written is None else written.value if isinstance(written, Leaf) else None  # type: ignore[return-value]

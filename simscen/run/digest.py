@@ -38,6 +38,7 @@ def _circumstances(loaded: LoadedScenario) -> dict[str, object]:
         "lenient": loaded.lenient,
         "plugins": fingerprints(plugins_of(loaded)),
         **({} if loaded.choice is None else {"stack": loaded.tree.plain.get("stack")}),
+        **({} if loaded.runs is None else {"runs": loaded.runs.digest}),
     }
 
 

@@ -108,7 +108,7 @@ def test_keywords_and_shards_choose_scenarios_so_that_pairs_stay_whole(simscen, 
 @pytest.mark.parametrize(
     ("given", "told"),
     [
-        (("reference",), "cannot read --stack reference: expected NAME=VALUE"),
+        (("refrence",), "cannot read --stack refrence: expected NAME=VALUE"),
         (("a b=reference",), "cannot read --stack a b=reference: expected NAME=VALUE"),
         (("../x=reference",), "expected NAME=VALUE"),
         (("=reference",), "expected NAME=VALUE"),

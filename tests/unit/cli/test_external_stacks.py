@@ -1,0 +1,212 @@
+"""What the name of an external stack runs: the command line says so, or the user's own configuration."""
+
+from pathlib import Path
+
+import pytest
+
+from simscen.cli.called import config_file, environment
+from simscen.cli.select import Selection, load_all
+from simscen.run.digest import digest
+
+SHORT = """\
+simscen: 1
+world: {simscen: 1, walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}], regions: {r: [[0, 0], [1, 0], [1, 1]]}}
+robot: {pose: {x: 1, y: 1}}
+goals: [{pose: {x: 5, y: 3}}]
+time_limit: 1 s
+pass: [{collisions: {max: 0}}]
+"""
+MINE = (
+    SHORT
+    + "stack: {external: mine, controller_frequency: 10 Hz, keepout: [r], goal_checker: {xy_goal_tolerance: 0.1}}\n"
+)
+
+
+@pytest.fixture
+def project(simscen, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with a scenario that names a stack, one that does not, a program, and a home of its own."""
+    (tmp_path / "good.scenario.yaml").unlink()
+    (tmp_path / "mine.scenario.yaml").write_text(MINE)
+    (tmp_path / "plain.scenario.yaml").write_text(SHORT)
+    (tmp_path / "nav").write_text("#!/bin/sh\n")
+    (tmp_path / "nav").chmod(0o755)
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "home"))
+    return tmp_path
+
+
+def configure(project: Path, text: str) -> Path:
+    file = project / "home/simscen/config.yaml"
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(text)
+    return file
+
+
+def loaded(name: str, *stacks: str):
+    return load_all([Path(f"{name}.scenario.yaml")], None, [], False, Selection(), stacks)[0]
+
+
+def test_a_name_that_nobody_defines_is_exit_2_at_its_place_when_it_is_run(simscen, project: Path) -> None:
+    ended = simscen("run", ".")
+    assert ended.code == 2
+    assert "mine.scenario.yaml:7:19: error[SC060] nobody says what the stack `mine` runs" in ended.err
+    assert "--stack mine='COMMAND'" in ended.err
+    assert not (project / "simscen-out").exists()
+
+
+def test_a_file_that_names_a_stack_of_others_is_valid_with_a_warning(simscen, project: Path) -> None:
+    ended = simscen("validate", "mine.scenario.yaml")
+    assert ended.code == 0
+    assert "mine.scenario.yaml:7:19: warning[SC060]" in ended.out
+    checked = simscen("validate", "mine.scenario.yaml", "--stack", "mine=./nav --fast")
+    assert (checked.code, checked.out) == (0, "1 scenario is valid\n")
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ("mine=./nowhere", "--stack mine=./nowhere: no such file or directory: `./nowhere`"),
+        ("mine=./plain.scenario.yaml", "permission denied: `./plain.scenario.yaml` is not executable"),
+        ("mine=./home", "`./home` is not a program but a folder"),
+        ("mine=no-such-program-anywhere -x", "there is no program `no-such-program-anywhere` in the PATH"),
+        ("mine='unclosed", "cannot be read as a command: no closing quotation"),
+        ("mine=", "names no program"),
+        ("mine=''", "names no program"),
+        ("mein", "`mein` is neither a type of stack nor a name in"),
+        ("refrence", "did you mean `reference`?"),
+    ],
+)
+@pytest.mark.parametrize("command", ["run", "validate"])
+def test_a_program_that_cannot_be_run_is_told_before_anything_runs(simscen, project, command, given, told) -> None:
+    (project / "home").mkdir()
+    ended = simscen(command, ".", "--stack", given)
+    assert ended.code == 2
+    assert told in ended.err
+
+
+def test_the_command_line_wins_over_the_configuration(project: Path) -> None:
+    configure(project, "stacks: {mine: {command: sh -c true}, other: {command: ./nav --other}}\n")
+    assert loaded("mine")[0].runs.argv == ("sh", "-c", "true")
+    assert loaded("mine", "mine=./nav 'a b'")[0].runs.argv == ("./nav", "a b")
+    both = loaded("mine", "mine", "x=other", "ref=reference")
+    assert [(one.variation, one.runs and one.runs.argv) for one in both] == [
+        ("mine", ("sh", "-c", "true")),
+        ("x", ("./nav", "--other")),
+        ("ref", None),
+    ]
+
+
+def test_a_command_keeps_what_the_scenario_asks_of_its_own_stack_and_takes_only_its_name(project: Path) -> None:
+    for name in ("mine", "v2"):
+        stack = loaded("mine", f"{name}=./nav")[0].spec.stack
+        assert (stack.external, stack.controller_frequency, stack.keepout) == (name, 10.0, ["r"])
+    assert loaded("plain", "v2=./nav")[0].spec.stack.external == "v2"
+
+
+def test_every_stack_is_judged_by_the_tolerances_that_the_scenario_asks_for(project: Path) -> None:
+    (project / "lax.stack.yaml").write_text(
+        "simscen: 1\nstack: {goal_checker: {xy_goal_tolerance: 1, stateful: false}}\n"
+    )
+    for given in ("ref=reference", "lax=lax.stack.yaml", "v2=./nav"):
+        stack = loaded("mine", given)[0].spec.stack
+        assert stack.goal_checker.xy_goal_tolerance == 0.1
+        assert stack.keepout == ["r"]
+    assert loaded("mine", "lax=lax.stack.yaml")[0].spec.stack.goal_checker.stateful is False
+    assert loaded("mine", "ref=reference")[0].spec.stack.controller_frequency == 10.0
+
+
+def test_limits_folder_and_variables_come_from_the_configuration(project: Path, monkeypatch) -> None:
+    monkeypatch.setenv("HOME", str(project))
+    monkeypatch.setenv("ROS_DOMAIN_ID", "1")
+    monkeypatch.setenv("PYTHONPATH", "/opt/mine")
+    text = "{command: ./nav, cwd: ~/, env: {ROS_DOMAIN_ID: '7'}, start_limit: 2 min, answer_limit: 500 ms}"
+    configure(project, f"stacks: {{mine: {text}}}\n")
+    (project / "deep").mkdir()
+    monkeypatch.chdir(project / "deep")
+    runs = load_all([project / "mine.scenario.yaml"], None, [], False, Selection(), ())[0][0].runs
+    assert runs is not None
+    assert (runs.cwd, runs.start_limit, runs.answer_limit) == (f"{project}", 120.0, 0.5)
+    assert (runs.env["ROS_DOMAIN_ID"], runs.env["PYTHONPATH"]) == ("7", "/opt/mine")
+
+
+def test_the_users_environment_is_as_simscen_was_called_with(simscen, project: Path, monkeypatch) -> None:
+    """Whatever simscen sets for itself."""
+    monkeypatch.delenv("PYDANTIC_DISABLE_PLUGINS", raising=False)
+    monkeypatch.setenv("SOME_SECRET", "x")
+    simscen("list", ".")
+    assert "PYDANTIC_DISABLE_PLUGINS" not in environment()
+    assert environment()["SOME_SECRET"] == "x"
+
+
+def test_the_configuration_is_where_xdg_says(monkeypatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    for given in ("", "relative/is/ignored"):
+        monkeypatch.setenv("XDG_CONFIG_HOME", given)
+        assert config_file() == tmp_path / ".config/simscen/config.yaml"
+    monkeypatch.setenv("XDG_CONFIG_HOME", "/etc/x")
+    assert config_file() == Path("/etc/x/simscen/config.yaml")
+
+
+WRONG = """\
+stack: {}
+stacks:
+  mine:
+    command: "./nav 'x"
+    env: {ROS_DOMAIN_ID: 7, A-B: x}
+    cwd: relative
+    answer_limit: 0
+    comand: x
+"""
+
+
+def test_mistakes_in_the_configuration_are_told_where_they_stand(simscen, project: Path) -> None:
+    file = configure(project, WRONG)
+    ended = simscen("run", "mine.scenario.yaml")
+    assert ended.code == 2
+    found = [line.partition(" ")[0] for line in ended.err.splitlines() if line.startswith(str(file))]
+    places = [place.removeprefix(str(file)) for place in found]
+    assert places == [":1:1:", ":4:14:", ":5:26:", ":5:29:", ":6:10:", ":7:19:", ":8:5:"]
+    assert "put it in quotes" in ended.err
+
+
+def test_a_configuration_that_nothing_asks_for_is_not_read(simscen, project: Path) -> None:
+    configure(project, WRONG)
+    assert simscen("validate", "plain.scenario.yaml").code == 0
+    assert simscen("validate", "mine.scenario.yaml", "--stack", "mine=./nav").code == 0
+
+
+def test_a_program_of_the_configuration_that_is_not_there_is_told_in_it(simscen, project: Path) -> None:
+    file = configure(project, "stacks:\n  mine: {command: ./gone}\n")
+    ended = simscen("run", "mine.scenario.yaml")
+    assert ended.code == 2
+    assert f"{file}:2:19: error[SC061] no such file or directory: `./gone`" in ended.err
+
+
+def test_the_digest_holds_words_the_variables_asked_for_and_the_content_of_files(project: Path, monkeypatch) -> None:
+    def of(*given: str) -> str:
+        return digest(loaded("mine", *given)[0])
+
+    before = of("mine=./nav --map map.yaml")
+    assert of("mine=./nav --map map.yaml") == before
+    monkeypatch.setenv("TERM_SESSION", "another shell")
+    assert of("mine=./nav --map map.yaml") == before
+    assert of("mine=./nav --map other.yaml") != before
+    (project / "map.yaml").write_text("x")
+    assert (with_map := of("mine=./nav --map map.yaml")) != before
+    (project / "nav").write_text("#!/bin/sh\nexit 1\n")
+    assert of("mine=./nav --map map.yaml") != with_map
+    configure(project, "stacks: {mine: {command: ./nav, env: {A: '1'}}}\n")
+    one = of()
+    configure(project, "stacks: {mine: {command: ./nav, env: {A: '2'}}}\n")
+    assert of() != one
+
+
+def test_a_program_in_the_path_is_looked_for_in_the_path_of_its_own_environment(project: Path) -> None:
+    (project / "bin").mkdir()
+    (project / "bin/only-here").write_text("#!/bin/sh\n")
+    (project / "bin/only-here").chmod(0o755)
+    configure(project, f"stacks: {{mine: {{command: only-here, env: {{PATH: {project}/bin}}}}}}\n")
+    assert loaded("mine")[0].runs.argv == ("only-here",)
+
+
+def test_the_schema_of_the_configuration_is_for_editors(simscen, project: Path) -> None:
+    assert '"title": "simscen config"' in simscen("schema", "config").out
