@@ -52,10 +52,13 @@ BROKEN = "broken-component"
 
 
 class RunError(SimscenError):
-    """A run could not be completed; `kind` is JUnit's error type: crashed, timeout, out-of-memory, invalid, …"""
+    """A run could not be completed; `kind` is JUnit's error type: crashed, timeout, out-of-memory, invalid, …
+
+    `tail` is the end of what an external stack printed.
+    """
 
     exit = Exit.INCOMPLETE
 
-    def __init__(self, kind: str, message: str) -> None:
-        self.kind = kind
+    def __init__(self, kind: str, message: str, tail: str = "") -> None:
+        self.kind, self.tail = kind, tail
         super().__init__(message)

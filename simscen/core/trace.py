@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,6 +35,14 @@ class Truth:
     objects: Mapping[str, Pose3] = field(default_factory=dict)
 
 
+class LogLine(NamedTuple):
+    """A line that a stack would write to /rosout: its severity in rcl_interfaces' numbers, who says it, and what."""
+
+    level: int
+    name: str
+    text: str
+
+
 @dataclass(frozen=True, eq=False)
 class Decision:
     """What the stack made of a beat: its `command`, and what it would publish. None means: nothing new."""
@@ -43,6 +52,7 @@ class Decision:
     plan: Path | None = None
     local_plan: Path | None = None
     events: tuple[Event, ...] = ()
+    lines: tuple[LogLine, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

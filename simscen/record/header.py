@@ -14,6 +14,8 @@ from simscen.core.grid import OccupancyGrid
 from simscen.core.time import Clock
 
 FORMAT = "1"
+STACK = "simscen.stack"
+"""The metadata record that says what an external stack was: known to its end, so it stands at the end of the log."""
 _FACT = "fact."
 OWN_FILES = CASE, SCENARIO, RESULT = "case.json", "scenario.yaml", "result.json"
 _MEDIA_TYPES = {
@@ -31,7 +33,8 @@ class LogHeader:
     """A run as it was ordered.
 
     `name` is the scenario's id, `scenario` its resolved YAML text. `map` is what the robot was given. `frames` are
-    where sensors sit on the robot's base; a lidar that is not among them is placed by its first scan.
+    where sensors sit on the robot's base; a lidar that is not among them is placed by its first scan. `sensors` are
+    their kinds by name, in the order in which they get their topics; a log that is read does not know them.
     `robot_description` is URDF. `files` travel along under their names, `facts` as metadata; neither may hold a wall
     clock, a host or a process number, or equal runs would differ.
     """
@@ -43,6 +46,7 @@ class LogHeader:
     map: OccupancyGrid | None = None
     robot_description: str = ""
     frames: Mapping[str, Pose3] = field(default_factory=dict)
+    sensors: Mapping[str, str] = field(default_factory=dict)
     files: Mapping[str, bytes] = field(default_factory=dict)
     facts: Mapping[str, str] = field(default_factory=dict)
 

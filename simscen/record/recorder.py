@@ -1,5 +1,6 @@
 """Writes a run to an MCAP log that ROS 2 tools open."""
 
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
@@ -38,7 +39,7 @@ class Recorder:
         out, thinning = Publisher(self._writer), Thinning(clock.rate)
         _write_header(self._writer, out, clock, about)
         self._truth = TruthTopics(out, self._time, thinning)
-        self._sensors = SensorTopics(out, self._time, thinning, about.frames)
+        self._sensors = SensorTopics(out, self._time, thinning, about.frames, about.sensors)
         self._stack = StackTopics(out, self._time, thinning)
         self._events = EventTopics(out, self._time, about.case)
 
@@ -55,10 +56,12 @@ class Recorder:
         for event in (*moment.events, *decision.events):
             self._events.write(now, event)
 
-    def close(self, end_tick: int, result: str = "") -> None:
-        """Write the end of the run and its result (JSON), then give the file its name."""
+    def close(self, end_tick: int, result: str = "", stack: Mapping[str, str] | None = None) -> None:
+        """Write the end of the run, its result (JSON) and what an external stack was, then give the file its name."""
         if result:
             self._writer.attach(header.RESULT, "application/json", result.encode())
+        if stack:
+            self._writer.note(header.STACK, dict(stack))
         self._writer.note("simscen.end", {"tick": str(end_tick)})
         self._writer.finish()
         if self._file is not None:

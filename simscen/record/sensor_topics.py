@@ -12,18 +12,35 @@ from simscen.record.pack import ImuPacker, OdometryPacker
 from simscen.record.pack_many import LaserScanPacker, TransformsPacker
 from simscen.record.simtime import SimTime, Stamp
 from simscen.record.thinning import Thinning
-from simscen.record.topics import Publisher, Topic
+from simscen.record.topics import Out, Topic
 
 _START: Stamp = (0, 0)
+_PLAIN = {
+    "lidar": ("scan", topics.SCAN_TYPE),
+    "odometry": ("odom", topics.ODOMETRY_TYPE),
+    "imu": ("imu", topics.IMU_TYPE),
+    "bumper": ("bumper", topics.BUMPER_TYPE),
+}
+"""Kind of sensor → its plain topic, and the type of it."""
 
 
 class SensorTopics:
     """Writes readings. The first sensor of a kind gets the plain topic, others theirs under their name.
 
+    `sensors` are their kinds by name, in order, as far as they are known; of others the first that speaks is the first.
+    `declared` are the known ones with their topics.
+
     Messages are written when the stack received them; their header's stamp is when they were measured.
     """
 
-    def __init__(self, out: Publisher, time: SimTime, thinning: Thinning, mounts: Mapping[str, Pose3]) -> None:
+    def __init__(
+        self,
+        out: Out,
+        time: SimTime,
+        thinning: Thinning,
+        mounts: Mapping[str, Pose3],
+        sensors: Mapping[str, str] | None = None,
+    ) -> None:
         self._out, self._time, self._thinning = out, time, thinning
         self._topics: dict[tuple[str, str], Topic] = {}
         self._plain: set[str] = set()
@@ -33,6 +50,7 @@ class SensorTopics:
         self._transforms = TransformsPacker()
         self._mounts = dict(mounts)
         self._correction: Pose3 | None = None
+        self.declared = [(name, topic) for name, kind in (sensors or {}).items() for topic in self._known(name, kind)]
         self._publish_mounts(0)
 
     def correct(self, map_from_odom: Pose3) -> None:
@@ -58,10 +76,19 @@ class SensorTopics:
                 case _:
                     assert_never(reading)
 
+    def topic_of(self, reading: Odometry | Scan) -> Topic:
+        """The topic on which a reading is written."""
+        plain, kind = _PLAIN["odometry" if isinstance(reading, Odometry) else "lidar"]
+        return self._topic(reading.sensor, plain, kind)
+
+    def _known(self, sensor: str, kind: str) -> list[Topic]:
+        if kind == "camera":
+            return [image for image, _ in _images(sensor)]
+        return [self._topic(sensor, *_PLAIN[kind])] if kind in _PLAIN else []
+
     def _write_odometry(self, now: int, odometry: Odometry) -> None:
         stamp, pose = self._time.stamp(odometry.tick), Pose3.planar(odometry.pose)
-        topic = self._topic(odometry.sensor, "odom", topics.ODOMETRY_TYPE)
-        self._out.publish(topic, now, self._odometry(stamp, pose, odometry.twist))
+        self._out.publish(self.topic_of(odometry), now, self._odometry(stamp, pose, odometry.twist))
         if not self._thinning.keeps_odometry(odometry):
             return
         links = [(frames.ODOM, frames.BASE, stamp, pose)]
@@ -76,15 +103,13 @@ class SensorTopics:
         if scan.sensor not in self._mounts:
             self._mounts[scan.sensor] = Pose3.planar(scan.mount)
             self._publish_mounts(now)
-        topic = self._topic(scan.sensor, "scan", topics.SCAN_TYPE)
-        self._out.publish(topic, now, packer(self._time.stamp(scan.tick), scan))
+        self._out.publish(self.topic_of(scan), now, packer(self._time.stamp(scan.tick), scan))
 
     def _write_image(self, now: int, image: Image) -> None:
         frame, stamp = frames.of_sensor(image.sensor), self._time.stamp(image.tick)
-        root = f"/{_ros_name(image.sensor)}"
-        for name, pixels in (("image_raw", image.rgb), ("depth/image_raw", image.depth)):
+        for topic, depth in _images(image.sensor):
+            pixels = image.depth if depth else image.rgb
             if pixels.size:
-                topic = Topic(f"{root}/{name}", topics.IMAGE_TYPE)
                 self._out.publish(topic, now, pack_rare.image(frame, stamp, pixels))
 
     def _publish_mounts(self, now: int) -> None:
@@ -100,6 +125,13 @@ class SensorTopics:
             self._plain.add(plain)
             topic = self._topics[sensor, plain] = Topic(name, kind)
         return topic
+
+
+def _images(sensor: str) -> list[tuple[Topic, bool]]:
+    """A camera's topics; whether they tell depths."""
+    root = f"/{_ros_name(sensor)}"
+    names = ("image_raw", False), ("depth/image_raw", True)
+    return [(Topic(f"{root}/{name}", topics.IMAGE_TYPE), depth) for name, depth in names]
 
 
 def _ros_name(text: str) -> str:

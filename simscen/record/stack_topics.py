@@ -3,7 +3,7 @@
 from simscen.core.belief import Belief
 from simscen.core.geometry import Pose3
 from simscen.core.trace import Decision
-from simscen.record import frames, topics
+from simscen.record import frames, pack_rare, topics
 from simscen.record.pack import PoseWithCovariancePacker, TwistPacker
 from simscen.record.pack_many import ParticleCloudPacker, PathPacker
 from simscen.record.simtime import SimTime
@@ -38,6 +38,8 @@ class StackTopics:
             self._out.publish(topics.LOCAL_PLAN, now, self._path(stamp, decision.local_plan.points))
         if self._thinning.keeps_command(tick, decision.command):
             self._out.publish(topics.COMMAND, now, self._command(decision.command))
+        for line in decision.lines:
+            self._out.publish(topics.ROSOUT, now, pack_rare.log(self._time.stamp(tick), *line))
 
     def _write_belief(self, now: int, tick: int, belief: Belief) -> None:
         stamp = self._time.stamp(tick)

@@ -1,7 +1,7 @@
 """The topics of a log, with the types and quality of service that ROS 2's nodes would have given them."""
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from simscen.record.schemas import MessageType, load
 from simscen.record.writer import McapWriter
@@ -61,6 +61,14 @@ _QOS = """\
 def qos(latched: bool) -> str:
     """`offered_qos_profiles` as rosbag2 writes it."""
     return _QOS.format(depth=1, durability=1) if latched else _QOS.format(depth=10, durability=2)
+
+
+class Out(Protocol):
+    """Takes messages: a log, or a stack that is told them."""
+
+    def publish(self, topic: Topic, time: int, data: bytes) -> None:
+        """Take a message at `time` nanoseconds."""
+        ...
 
 
 class Publisher:

@@ -2,18 +2,19 @@
 
 import math
 from collections.abc import Mapping
+from pathlib import Path
 
 from simscen.core.chance import Streams
-from simscen.core.errors import RunError
 from simscen.core.events import Event, EventKind
 from simscen.core.geometry import Array, Pose3
 from simscen.core.sensing import Odometry
 from simscen.core.shapes import TriangleMesh
 from simscen.core.time import Clock
 from simscen.faults.base import Wheels
-from simscen.model.stack import StackSpec
+from simscen.model.anystack import ExternalStackSpec
 from simscen.run.director import Director
 from simscen.run.ending import Ending
+from simscen.run.external.build import build_external
 from simscen.run.faultrig import FaultRig
 from simscen.run.live import LiveStage, described
 from simscen.run.lockstep import Rig
@@ -25,13 +26,16 @@ from simscen.sensors.build import build_sensors
 from simscen.sensors.sensor import Sensor
 from simscen.sim.simulation import Simulation
 from simscen.stack.build import build_stack
-from simscen.stack.protocols import Surroundings
+from simscen.stack.protocols import Stack, Surroundings
 from simscen.worlds.meshing import fuse, triangulate
 from simscen.worlds.rays import RayScene
 
 
-def assemble(prepared: Prepared, seed: int) -> Rig:
-    """Build the rig of one run of a prepared scenario with this seed."""
+def assemble(prepared: Prepared, seed: int, printed: Path | None = None) -> Rig:
+    """Build the rig of one run of a prepared scenario with this seed; its stack has not been started.
+
+    `printed` is the file for what an external stack prints.
+    """
     spec, world = prepared.spec, prepared.built.world
     clock, streams = Clock(spec.physics.tick_rate), Streams(seed)
     simulation = Simulation(
@@ -61,10 +65,12 @@ def assemble(prepared: Prepared, seed: int) -> Rig:
         masks=prepared.masks,
         lidars=tuple(name for name, sensor in prepared.robot.sensors.items() if sensor.localizes),
     )
-    if not isinstance(prepared.stack, StackSpec):
-        raise RunError("stack-crashed", f"there is no process for {prepared.stack.external}")
-    stack = build_stack(prepared.stack, surroundings, streams, clock, stop_on_failure=spec.on_goal_failure == "stop")
-    stack.start(prepared.estimate, prepared.case.goals)
+    stack: Stack
+    if isinstance(prepared.stack, ExternalStackSpec):
+        stack = build_external(prepared, prepared.stack, surroundings, seed, printed)
+    else:
+        goes_on = spec.on_goal_failure == "continue"
+        stack = build_stack(prepared.stack, surroundings, streams, clock, stop_on_failure=not goes_on)
 
     stage = LiveStage(world, simulation, stack, clock, prepared.case.sent)
     wheels = Wheels(getattr(prepared.robot.drive, "wheel_separation", 0.0))

@@ -19,11 +19,13 @@ Finish = Callable[[Prepared, Run, Path], None]
 def perform(prepared: Prepared, seed: int, folder: Path, logs: tuple[Log, ...], finish: Finish) -> dict[str, Any]:
     """Do the run and leave run.mcap, result.json, scenario.yaml and what `finish` makes in `folder`.
 
+    What an external stack prints goes to stack.log there.
+
     Returns the end record: the outcome and the log's SHA-256, for the supervisor.
     """
     log = folder / "run.mcap"
     (folder / "scenario.yaml").write_text(resolved_text(prepared.loaded), encoding="utf-8")
-    run = simulate(prepared, seed, log=log, attach=lambda *_: logs)
+    run = simulate(prepared, seed, log=log, attach=lambda *_: logs, printed=folder / "stack.log")
     (folder / "result.json").write_text(to_json(run.result), encoding="utf-8")
     finish(prepared, run, folder)
     return {"outcome": run.result.outcome.value, "sha256": hashlib.sha256(log.read_bytes()).hexdigest()}

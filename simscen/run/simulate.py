@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 
 from simscen.core.errors import InvalidInput, RunError
-from simscen.core.geometry import Pose3
 from simscen.core.run import Run
 from simscen.core.time import Clock
 from simscen.core.trace import Trace
@@ -17,14 +16,15 @@ from simscen.loading.discovery import default_root
 from simscen.loading.plugins import fact_of, origin, plugins_of
 from simscen.loading.resolved import resolved_text
 from simscen.loading.scenario import load_scenario
-from simscen.model.robot import Mount, RobotSpec
 from simscen.record.header import LogHeader
 from simscen.record.recorder import Recorder
 from simscen.record.tracebuilder import TraceBuilder
 from simscen.run.assemble import assemble
 from simscen.run.blame import blamed
+from simscen.run.external.stack import ExternalStack
 from simscen.run.lockstep import Log, Rig, run_lockstep
 from simscen.run.prepare import Prepared, prepare
+from simscen.run.sensornames import sensor_frames, sensor_kinds
 from simscen.sim.urdf.describe import describe
 
 Attach = Callable[[Rig, Sequence[Log]], Sequence[Log]]
@@ -32,15 +32,22 @@ Attach = Callable[[Rig, Sequence[Log]], Sequence[Log]]
 
 
 def simulate(
-    prepared: Prepared, seed: int | None = None, *, log: Path | None = None, attach: Attach | None = None
+    prepared: Prepared,
+    seed: int | None = None,
+    *,
+    log: Path | None = None,
+    attach: Attach | None = None,
+    printed: Path | None = None,
 ) -> Run:
     """Run a prepared scenario with this seed (default: its own) and judge it; `log` is the MCAP file to write.
+
+    `printed` is the file for what an external stack prints.
 
     *Given* the same scenario and seed *then* the same run and the same bytes in `log`, whatever ran before in this
     process. Raises RunError when the run cannot be completed, OSError when the log cannot be written.
     """
     try:
-        return _simulated(prepared, prepared.spec.seed if seed is None else seed, log, attach)
+        return _simulated(prepared, prepared.spec.seed if seed is None else seed, log, attach, printed)
     except (RunError, InvalidInput, MemoryError):
         raise
     except Exception as error:  # the boundary to code of others, which can raise anything
@@ -50,18 +57,26 @@ def simulate(
         raise whose from error
 
 
-def _simulated(prepared: Prepared, seed: int, log: Path | None, attach: Attach | None) -> Run:
+def _simulated(
+    prepared: Prepared, seed: int, log: Path | None, attach: Attach | None, printed: Path | None = None
+) -> Run:
     clock = Clock(prepared.spec.physics.tick_rate)
     builder = TraceBuilder(clock)
     with ExitStack() as closing:
         recorder = log and closing.enter_context(Recorder(log, clock, log_header(prepared, seed)))
-        rig = assemble(prepared, seed)
+        rig = assemble(prepared, seed, printed)
         closing.callback(rig.simulation.close)
+        external = rig.stack if isinstance(rig.stack, ExternalStack) else None
+        if external:
+            closing.callback(external.close)
+        rig.stack.start(prepared.estimate, prepared.case.goals)
         own: tuple[Log, ...] = (builder, recorder) if recorder else (builder,)
         end = run_lockstep(rig, (*own, *(attach(rig, own) if attach else ())))
+        if external:
+            external.finish(end.name)
         run = judged(prepared, seed, builder.finish(end.tick), log)
         if recorder:
-            recorder.close(end.tick, to_json(run.result))
+            recorder.close(end.tick, to_json(run.result), external.facts if external else None)
     return run
 
 
@@ -93,16 +108,7 @@ def log_header(prepared: Prepared, seed: int) -> LogHeader:
         scenario=resolved_text(prepared.loaded),
         map=prepared.map,
         robot_description=describe(prepared.body),
-        frames=_sensor_frames(prepared.robot),
+        frames=sensor_frames(prepared.robot),
+        sensors=sensor_kinds(prepared),
         facts={fact_of(entry): origin(entry) for entry in plugins_of(prepared.loaded)},
     )
-
-
-def _sensor_frames(robot: RobotSpec) -> dict[str, Pose3]:
-    """Where sensors that look somewhere sit on the base."""
-    mounts = {name: getattr(sensor.chosen, "mount", None) for name, sensor in robot.sensors.items()}
-    return {
-        name: Pose3.from_rpy(mount.x, mount.y, mount.z, 0.0, 0.0, mount.yaw)
-        for name, mount in mounts.items()
-        if isinstance(mount, Mount)
-    }

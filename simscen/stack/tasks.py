@@ -11,7 +11,7 @@ class Task:
         self._stop_on_failure, self._events = stop_on_failure, journal
         self._waiting: list[Goal] = []
         self._accepted = 0
-        self._failure: ErrorCode | None = None
+        self._failure: ErrorCode | int | None = None
         self.goal: Goal | None = None
         self.since = 0
 
@@ -33,9 +33,9 @@ class Task:
         self._note(tick, EventKind.GOAL_REACHED, index=self._accepted - 1)
         self._close(tick, TaskResult.SUCCEEDED)
 
-    def failed(self, tick: int, code: ErrorCode, message: str) -> None:
-        """The goal has failed; so has the task when it stops on failures."""
-        said: dict[str, Value] = {"error_code": int(code), "error_name": code.name, "message": message}
+    def failed(self, tick: int, code: ErrorCode | int, message: str) -> None:
+        """The goal has failed; so has the task when it stops on failures. A number is a code that has no name here."""
+        said: dict[str, Value] = {"error_code": int(code), "error_name": _name(code), "message": message}
         self._note(tick, EventKind.GOAL_FAILED, index=self._accepted - 1, **said)
         self._failure = code
         if self._stop_on_failure:
@@ -65,11 +65,20 @@ class Task:
             result = TaskResult.FAILED
         code = self._failure or ErrorCode.NONE
         self._events.append(
-            Event(tick, EventKind.NAVIGATION_ENDED, result.value, {"error_code": int(code), "error_name": code.name})
+            Event(tick, EventKind.NAVIGATION_ENDED, result.value, {"error_code": int(code), "error_name": _name(code)})
         )
         self._failure = None
+
+    @property
+    def following(self) -> Goal | None:
+        """The goal that is next."""
+        return self._waiting[0] if self._waiting else None
 
     def _note(self, tick: int, kind: EventKind, **data: Value) -> None:
         assert self.goal is not None
         data.setdefault("index", self._accepted)
         self._events.append(Event(tick, kind, self.goal.name, data))
+
+
+def _name(code: ErrorCode | int) -> str:
+    return code.name if isinstance(code, ErrorCode) else ""

@@ -75,7 +75,8 @@ def _failure(end: ProcessEnd | PreparerDeath) -> RunFailure | None:
     if end.last_word is None:
         return _fault(end, "exited 0 without a result")
     if "error" in end.last_word:
-        return _fault(end, end.last_word["message"], end.last_word["error"])
+        printed = end.last_word.get("tail") or tail(end.printed)
+        return RunFailure(end.last_word["error"], end.last_word["message"], printed)
     if end.left_processes:
         return _fault(end, "left a process behind, which was killed")
     return None

@@ -37,7 +37,10 @@ def offer_to_the_oom_killer() -> None:
 
 
 def limit_resources() -> None:
-    """Bound memory, file sizes and open files of this process; no core dumps."""
+    """Bound memory, file sizes and open files of this process; no core dumps.
+
+    The hard limits stay, so that what an external stack may do can be given back to it.
+    """
     for what, most in (
         (resource.RLIMIT_AS, MEMORY_BYTES),
         (resource.RLIMIT_FSIZE, FILE_BYTES),
@@ -46,7 +49,7 @@ def limit_resources() -> None:
     ):
         hard = resource.getrlimit(what)[1]
         bound = most if hard == resource.RLIM_INFINITY else min(most, hard)
-        resource.setrlimit(what, (bound, bound))
+        resource.setrlimit(what, (bound, hard))
 
 
 def environment() -> dict[str, str]:

@@ -11,14 +11,16 @@ AT_ONCE = 1 << 20
 class KeptLog:
     """Takes what a process writes: the first HEAD bytes go to the file at once, of the rest the last TAIL at the end.
 
-    A file that cannot be written costs nothing but the file: `last` still has the end.
+    A file that cannot be written, or none at all, costs nothing but the file: `last` still has the end.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path | None) -> None:
         self._room, self._left_out = HEAD, 0
         self._end = bytearray()  # the last TAIL bytes of all, written or not
         self._waiting = 0  # how many of these are not in the file
         self._file: int | None = None
+        if path is None:
+            return
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o644)

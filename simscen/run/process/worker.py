@@ -73,7 +73,7 @@ def _end_record(job: Job, report: int, perform: Perform) -> dict[str, Any]:
         job.folder.mkdir(parents=True, exist_ok=True)
         return perform(job, lambda seconds: _tell(report, seconds))
     except RunError as error:
-        return {"error": error.kind, "message": str(error)}
+        return {"error": error.kind, "message": str(error), "tail": error.tail}
     except InvalidInput as error:
         return {"error": "invalid", "message": str(error)}
     except MemoryError:

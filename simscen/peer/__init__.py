@@ -1,0 +1,22 @@
+"""The client of the stack protocol, for a navigation stack that simscen runs as a process of its own.
+
+It needs Python 3.8 or later and nothing else: no numpy, nothing of simscen. A stack begins so:
+
+    from simscen.peer import Peer
+
+    peer = Peer("my stack", "1.0", topics=["/scan", "/odom"])
+    for step in peer:
+        goal = peer.goals.accept()
+        scan = step.get("/scan")
+        ...
+        step.drive(0.2, 0.0)
+
+Where simscen is not installed beside it, `sys.path.append(os.environ["SIMSCEN_PEER_PATH"])` and `import simscen_peer`
+do the same: simscen sets that variable. docs/reference/stack-protocol.md is what both sides go by.
+"""
+
+from .client import Message, Peer, Step
+from .connection import Connection, Gone, Refused
+from .goals import Goal, Goals
+
+__all__ = ["Connection", "Goal", "Goals", "Gone", "Message", "Peer", "Refused", "Step"]

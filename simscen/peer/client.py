@@ -1,0 +1,184 @@
+"""A stack's side of the protocol: say hello, then answer steps until simscen ends the run."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from . import messages, wire
+from .connection import Connection, Gone, Refused
+from .goals import Goal, Goals
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+COMMAND, EVENTS, LOG = "/cmd_vel", "/simscen/events", "/rosout"
+
+
+class Message(NamedTuple):
+    """A message on a topic: its CDR bytes as they came, and what they say."""
+
+    topic: str
+    type: str
+    raw: bytes
+
+    @property
+    def content(self) -> Any:
+        """As simscen.peer.messages reads it."""
+        return messages.read(self.type, self.raw)
+
+
+class Step:
+    """One step: what the sensors said, and the answer in the making. It is sent when the loop goes on."""
+
+    def __init__(self, peer: Peer, header: wire.StepHeader, heard: list[Message], canceled: bool) -> None:
+        self._peer, self._header = peer, header
+        self.messages = heard
+        self.canceled = canceled
+        self._said: wire.Messages = []
+        self._commanded = False
+
+    @property
+    def tick(self) -> int:
+        """Physics ticks since the start."""
+        return self._header.tick
+
+    @property
+    def seconds(self) -> float:
+        """Simulated time."""
+        return self._header.sec + self._header.nanosec * 1e-9
+
+    @property
+    def stamp(self) -> messages.Stamp:
+        """Simulated time as a ROS stamp."""
+        return self._header.sec, self._header.nanosec
+
+    @property
+    def command_due(self) -> bool:
+        """Whether a command is asked for."""
+        return bool(self._header.flags & wire.COMMAND_DUE)
+
+    def get(self, topic: str) -> Any:
+        """What the newest message on a topic says; None when there is none in this step."""
+        found = [message for message in self.messages if message.topic == topic]
+        return found[-1].content if found else None
+
+    def drive(self, vx: float, wz: float, vy: float = 0.0) -> None:
+        """Command a velocity: m/s forward, rad/s anticlockwise, m/s to the left. It holds until the next one."""
+        self._peer.command = (float(vx), float(vy), float(wz))
+        self._commanded = True
+
+    def publish(self, topic: str, data: bytes) -> None:
+        """Say a message on one of the topics that simscen hears; see simscen.peer.messages. Raises KeyError."""
+        self._said.append((self._peer.hears[topic], data))
+
+    def log(self, text: str, level: int = 20) -> None:
+        """Write a line to /rosout of the run's log; 10 debug, 20 info, 30 warning, 40 error."""
+        self.publish(LOG, messages.log(self.stamp, level, self._peer.name, text))
+
+    def _answer(self) -> bytes:
+        if self.command_due or self._commanded:
+            self.publish(COMMAND, messages.twist(*self._peer.command))
+        for event in self._peer.goals.take():
+            self.publish(EVENTS, messages.string(json.dumps(event, allow_nan=False)))
+        return wire.answer_frame(self.tick, self._said)
+
+
+class Peer:
+    """A stack as simscen sees it. Iterating gives one Step after another until the run ends.
+
+    `topics` are those it wants to hear, None = all that there are; `every_beat` asks for a step whenever a sensor
+    speaks, where otherwise there is one for each command and the readings since the last come with it. `about` is kept
+    in the run's log.
+    Raises wire.Malformed or Refused when the two sides do not understand each other, Gone when simscen hung up.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        version: str = "",
+        topics: Sequence[str] | None = (),
+        *,
+        every_beat: bool = False,
+        about: dict[str, Any] | None = None,
+        connection: Connection | None = None,
+    ) -> None:
+        self.name = name
+        self.goals = Goals()
+        self.command: tuple[float, float, float] = (0.0, 0.0, 0.0)
+        self._connection = connection or Connection.inherited()
+        self._canceled = False
+        self._farewell: dict[str, Any] = {}
+        self.hello = self._expect(wire.HELLO)
+        if wire.PROTOCOL not in self.hello["protocols"]:
+            self.give_up(f"{name} speaks version {wire.PROTOCOL} of the stack protocol")
+        self._topics: dict[int, tuple[str, str]] = {t["number"]: (t["topic"], t["type"]) for t in self.hello["says"]}
+        self.hears: dict[str, int] = {topic["topic"]: topic["number"] for topic in self.hello["hears"]}
+        self._connection.send_json(
+            wire.WELCOME,
+            {
+                "protocol": wire.PROTOCOL,
+                "name": name,
+                "version": version,
+                "topics": [topic for topic, _ in self._topics.values()] if topics is None else list(topics),
+                "step": "beat" if every_beat else "control",
+                "about": about or {},
+            },
+        )
+
+    @property
+    def robot(self) -> dict[str, Any]:
+        """The robot's datasheet, see HELLO in the protocol."""
+        robot: dict[str, Any] = self.hello["robot"]
+        return robot
+
+    def __iter__(self) -> Iterator[Step]:
+        """Steps until the run ends; each is answered when the next one is asked for."""
+        while True:
+            kind, body = self._connection.receive()
+            if kind == wire.STEP:
+                header, heard = wire.from_step(body)
+                step = Step(self, header, [self._message(*each) for each in heard], self._canceled)
+                self._canceled = False
+                yield step
+                self._connection.send(step._answer())
+            elif kind == wire.END:
+                self._connection.send_json(wire.BYE, {"about": self._farewell})
+                self._connection.close()
+                return
+            else:
+                self._take(kind, wire.from_json(body))
+
+    def add(self, **about: Any) -> None:
+        """Tell more about this stack at the end, for the run's log."""
+        self._farewell.update(about)
+
+    def give_up(self, message: str) -> None:
+        """End the run with an error that says this. Raises Refused, with the same message."""
+        self._connection.send_json(wire.ERROR, {"message": message})
+        self._connection.close()
+        raise Refused(message)
+
+    def _take(self, kind: int, content: dict[str, Any]) -> None:
+        if kind == wire.GOAL:
+            self.task = content
+            self.goals.start([Goal.of(goal) for goal in content["goals"]])
+        elif kind == wire.PREEMPT:
+            self.goals.preempted(Goal.of(content["goal"]))
+        elif kind == wire.CANCEL:
+            self._canceled = True
+            self.goals.canceled(content["all"])
+        else:
+            raise wire.Malformed(f"a frame of kind {kind} is not for a peer")
+
+    def _message(self, number: int, data: bytes) -> Message:
+        return Message(*self._topics[number], data)
+
+    def _expect(self, kind: int) -> dict[str, Any]:
+        got, body = self._connection.receive()
+        if got != kind:
+            raise wire.Malformed(f"a frame of kind {got} where {wire.KINDS[kind]} was to come")
+        return wire.from_json(body)
+
+
+__all__ = ["Connection", "Goal", "Goals", "Gone", "Message", "Peer", "Refused", "Step"]

@@ -1,0 +1,276 @@
+"""The ROS 2 messages of the stack protocol, as plain Python; each type is read and written by its name.
+
+Definitions: ROS 2 Humble's common_interfaces, nav2_msgs and tf2_msgs. Poses of the ground are x, y and yaw.
+"""
+
+from __future__ import annotations
+
+import math
+from array import array
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from .cdr import Reader, Writer
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    Stamp = tuple[int, int]  # seconds and nanoseconds
+
+
+class Pose2D(NamedTuple):
+    """geometry_msgs/msg/Pose2D: metres and radians."""
+
+    x: float
+    y: float
+    yaw: float
+
+
+class LaserScan(NamedTuple):
+    """sensor_msgs/msg/LaserScan: beam k points at `angle_min + k * angle_increment`.
+
+    A range is inf where nothing was hit, nan where the beam gave no answer.
+    """
+
+    stamp: Stamp
+    frame: str
+    angle_min: float
+    angle_max: float
+    angle_increment: float
+    time_increment: float
+    scan_time: float
+    range_min: float
+    range_max: float
+    ranges: array[float]
+
+
+class Odometry(NamedTuple):
+    """nav_msgs/msg/Odometry on the ground: the pose of `child` in `frame`, and its velocity in its own frame."""
+
+    stamp: Stamp
+    frame: str
+    child: str
+    pose: Pose2D
+    vx: float
+    vy: float
+    wz: float
+
+
+class Imu(NamedTuple):
+    """sensor_msgs/msg/Imu: rad/s and m/s² about and along x, y, z."""
+
+    stamp: Stamp
+    frame: str
+    angular_velocity: tuple[float, float, float]
+    linear_acceleration: tuple[float, float, float]
+
+
+class Image(NamedTuple):
+    """sensor_msgs/msg/Image."""
+
+    stamp: Stamp
+    frame: str
+    height: int
+    width: int
+    encoding: str
+    step: int
+    data: bytes
+
+
+class OccupancyGrid(NamedTuple):
+    """nav_msgs/msg/OccupancyGrid: cell (column, row) is `data[row * width + column]`, 0 … 100, or -1 = unknown."""
+
+    stamp: Stamp
+    frame: str
+    resolution: float
+    width: int
+    height: int
+    origin: Pose2D
+    data: array[int]
+
+
+class PoseWithCovariance(NamedTuple):
+    """geometry_msgs/msg/PoseWithCovarianceStamped on the ground; the covariance has 36 numbers."""
+
+    stamp: Stamp
+    frame: str
+    pose: Pose2D
+    covariance: tuple[float, ...]
+
+
+class Transform(NamedTuple):
+    """A link of tf2_msgs/msg/TFMessage: where `child` is in `frame`, x, y, z and a quaternion."""
+
+    stamp: Stamp
+    frame: str
+    child: str
+    pose: tuple[float, ...]
+
+    @property
+    def pose2d(self) -> Pose2D:
+        """The same on the ground."""
+        return _on_the_ground(self.pose)
+
+
+def quaternion(yaw: float) -> tuple[float, float, float, float]:
+    """x, y, z, w of a heading."""
+    return 0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2)
+
+
+def _on_the_ground(pose: Sequence[float]) -> Pose2D:
+    x, y, _, qx, qy, qz, qw = pose
+    return Pose2D(x, y, math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz)))
+
+
+def _header(reader: Reader) -> tuple[Stamp, str]:
+    sec, nanosec = reader.take("iI")
+    return (sec, nanosec), reader.string()
+
+
+def _laser_scan(reader: Reader) -> LaserScan:
+    stamp, frame = _header(reader)
+    first, last, step, between, whole, least, most = reader.take("7f")
+    return LaserScan(stamp, frame, first, last, step, between, whole, least, most, reader.numbers("f"))
+
+
+def _odometry(reader: Reader) -> Odometry:
+    stamp, frame = _header(reader)
+    child = reader.string()
+    pose = reader.take("7d")
+    reader.take("36d")
+    twist = reader.take("6d")
+    return Odometry(stamp, frame, child, _on_the_ground(pose), twist[0], twist[1], twist[5])
+
+
+def _imu(reader: Reader) -> Imu:
+    stamp, frame = _header(reader)
+    reader.take("13d")
+    turn = reader.take("3d")
+    reader.take("9d")
+    return Imu(stamp, frame, turn, reader.take("3d"))
+
+
+def _image(reader: Reader) -> Image:
+    stamp, frame = _header(reader)
+    height, width = reader.take("2I")
+    encoding = reader.string()
+    reader.take("B")
+    step, size = reader.take("2I")
+    return Image(stamp, frame, height, width, encoding, step, reader.blob(size))
+
+
+def _occupancy_grid(reader: Reader) -> OccupancyGrid:
+    stamp, frame = _header(reader)
+    reader.take("iI")
+    (resolution,) = reader.take("f")
+    width, height = reader.take("2I")
+    origin = _on_the_ground(reader.take("7d"))
+    return OccupancyGrid(stamp, frame, resolution, width, height, origin, reader.numbers("b"))
+
+
+def _pose_with_covariance(reader: Reader) -> PoseWithCovariance:
+    stamp, frame = _header(reader)
+    return PoseWithCovariance(stamp, frame, _on_the_ground(reader.take("7d")), reader.take("36d"))
+
+
+def _transforms(reader: Reader) -> list[Transform]:
+    (count,) = reader.take("I")
+    links = []
+    for _ in range(count):
+        stamp, frame = _header(reader)
+        links.append(Transform(stamp, frame, reader.string(), reader.take("7d")))
+    return links
+
+
+def _float64_array(reader: Reader) -> array[float]:
+    (dimensions,) = reader.take("I")
+    for _ in range(dimensions):
+        reader.string()
+        reader.take("2I")
+    reader.take("I")
+    return reader.numbers("d")
+
+
+READERS: dict[str, Callable[[Reader], Any]] = {
+    "sensor_msgs/msg/LaserScan": _laser_scan,
+    "nav_msgs/msg/Odometry": _odometry,
+    "sensor_msgs/msg/Imu": _imu,
+    "sensor_msgs/msg/Image": _image,
+    "std_msgs/msg/Bool": lambda reader: bool(reader.take("B")[0]),
+    "std_msgs/msg/String": lambda reader: reader.string(),
+    "std_msgs/msg/Float64MultiArray": _float64_array,
+    "nav_msgs/msg/OccupancyGrid": _occupancy_grid,
+    "geometry_msgs/msg/PoseWithCovarianceStamped": _pose_with_covariance,
+    "geometry_msgs/msg/Pose2D": lambda reader: Pose2D(*reader.take("3d")),
+    "tf2_msgs/msg/TFMessage": _transforms,
+}
+"""Type → what reads it."""
+
+
+def read(kind: str, data: bytes) -> Any:
+    """A message of a type that `READERS` has. Raises ValueError for one that does not fit."""
+    return READERS[kind](Reader(data))
+
+
+def twist(vx: float, vy: float, wz: float) -> bytes:
+    """geometry_msgs/msg/Twist of the ground."""
+    return Writer().put("6d", vx, vy, 0.0, 0.0, 0.0, wz).done()
+
+
+def string(text: str) -> bytes:
+    """std_msgs/msg/String."""
+    return Writer().string(text).done()
+
+
+def pose2d(x: float, y: float, yaw: float) -> bytes:
+    """geometry_msgs/msg/Pose2D."""
+    return Writer().put("3d", x, y, yaw).done()
+
+
+def float64_array(values: Sequence[float]) -> bytes:
+    """std_msgs/msg/Float64MultiArray without a layout."""
+    return Writer().put("2I", 0, 0).numbers("d", values).done()
+
+
+def pose_with_covariance(stamp: Stamp, pose: Sequence[float], covariance: Sequence[float]) -> bytes:
+    """geometry_msgs/msg/PoseWithCovarianceStamped in the map; `covariance` has 36 numbers, or 9 over x, y, yaw."""
+    if len(covariance) == 9:
+        c, full = covariance, [0.0] * 36
+        for row, start in enumerate((0, 6, 30)):
+            full[start], full[start + 1], full[start + 5] = c[3 * row], c[3 * row + 1], c[3 * row + 2]
+        covariance = full
+    x, y, yaw = pose
+    return (
+        Writer().put("iI", *stamp).string("map").put("7d", x, y, 0.0, *quaternion(yaw)).put("36d", *covariance).done()
+    )
+
+
+def path(stamp: Stamp, poses: Sequence[Sequence[float]]) -> bytes:
+    """nav_msgs/msg/Path of poses x, y, yaw in the map."""
+    message = Writer().put("iI", *stamp).string("map").put("I", len(poses))
+    for x, y, yaw in poses:
+        message.put("iI", *stamp).string("map").put("7d", x, y, 0.0, *quaternion(yaw))
+    return message.done()
+
+
+def transforms(links: Sequence[tuple[Stamp, str, str, Sequence[float]]]) -> bytes:
+    """tf2_msgs/msg/TFMessage; each link is stamp, frame, child frame, and the child's x, y, yaw in the frame."""
+    message = Writer().put("I", len(links))
+    for stamp, frame, child, (x, y, yaw) in links:
+        message.put("iI", *stamp).string(frame).string(child).put("7d", x, y, 0.0, *quaternion(yaw))
+    return message.done()
+
+
+def particle_cloud(stamp: Stamp, particles: Sequence[Sequence[float]]) -> bytes:
+    """nav2_msgs/msg/ParticleCloud in the map; each particle is x, y, yaw, weight."""
+    message = Writer().put("iI", *stamp).string("map").put("I", len(particles))
+    for x, y, yaw, weight in particles:
+        message.put("8d", x, y, 0.0, *quaternion(yaw), weight)
+    return message.done()
+
+
+def log(stamp: Stamp, level: int, name: str, text: str) -> bytes:
+    """rcl_interfaces/msg/Log."""
+    message = Writer().put("iI", *stamp).put("B", level)
+    for field in (name, text, "", ""):
+        message.string(field)
+    return message.put("I", 0).done()

@@ -1,0 +1,115 @@
+"""Frames of the stack protocol: what simscen and a stack that runs as a process of its own send each other.
+
+docs/reference/stack-protocol.md is its definition. This file is read by both sides, on Python 3.8 and later.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+PROTOCOL = 1
+"""The version of the protocol."""
+DESCRIPTOR = "SIMSCEN_STACK_FD"
+"""The environment variable with the number of the inherited socket."""
+
+HELLO, WELCOME, GOAL, STEP, ANSWER, PREEMPT, CANCEL, END, ERROR, BYE = range(1, 11)
+"""The kinds of frames."""
+KINDS = ("", "HELLO", "WELCOME", "GOAL", "STEP", "ANSWER", "PREEMPT", "CANCEL", "END", "ERROR", "BYE")
+
+COMMAND_DUE = 1
+"""Flag of a STEP: its answer must hold a command."""
+LONGEST = 256 << 20
+"""Bytes of the longest frame."""
+
+SIZE = struct.Struct("<I")
+_STEP = struct.Struct("<QiIIII")
+_ANSWER = struct.Struct("<QI")
+_MESSAGE = struct.Struct("<II")
+
+if TYPE_CHECKING:
+    Messages = list[tuple[int, bytes]]  # numbers of topics, each with one message as CDR
+
+
+class Malformed(ValueError):
+    """A frame that is not what the protocol says."""
+
+
+class StepHeader(NamedTuple):
+    """When it is: the tick, and the simulated time in whole seconds and nanoseconds.
+
+    `deadline` is how many milliseconds of wall time the answer may take.
+    """
+
+    tick: int
+    sec: int
+    nanosec: int
+    deadline: int
+    flags: int
+
+
+def frame(kind: int, body: bytes) -> bytes:
+    """A frame: its size, its kind, its body."""
+    return SIZE.pack(len(body) + 1) + bytes((kind,)) + body
+
+
+def json_frame(kind: int, content: dict[str, Any]) -> bytes:
+    """A frame with an object in JSON."""
+    return frame(kind, json.dumps(content, separators=(",", ":"), allow_nan=False).encode())
+
+
+def from_json(body: bytes) -> dict[str, Any]:
+    """The object of a JSON frame. Raises Malformed."""
+    try:
+        content = json.loads(body.decode())
+    except (ValueError, RecursionError) as error:
+        raise Malformed(f"its body is not JSON: {error}") from None
+    if not isinstance(content, dict):
+        raise Malformed("its body is not a JSON object")
+    return content
+
+
+def step_frame(header: StepHeader, messages: Messages) -> bytes:
+    """A STEP."""
+    return frame(STEP, _STEP.pack(*header, len(messages)) + _packed(messages))
+
+
+def answer_frame(tick: int, messages: Messages) -> bytes:
+    """An ANSWER to the STEP of that tick."""
+    return frame(ANSWER, _ANSWER.pack(tick, len(messages)) + _packed(messages))
+
+
+def from_step(body: bytes) -> tuple[StepHeader, Messages]:
+    """What a STEP says. Raises Malformed."""
+    *header, count = _taken(_STEP, body, 0)
+    return StepHeader(*header), _unpacked(body, _STEP.size, count)
+
+
+def from_answer(body: bytes) -> tuple[int, Messages]:
+    """The tick that is answered, and the messages. Raises Malformed."""
+    tick, count = _taken(_ANSWER, body, 0)
+    return tick, _unpacked(body, _ANSWER.size, count)
+
+
+def _packed(messages: Messages) -> bytes:
+    return b"".join(_MESSAGE.pack(number, len(data)) + data for number, data in messages)
+
+
+def _unpacked(body: bytes, offset: int, count: int) -> Messages:
+    messages = []
+    for _ in range(count):
+        number, size = _taken(_MESSAGE, body, offset)
+        offset += _MESSAGE.size + size
+        if offset > len(body):
+            raise Malformed("it ends before its messages do")
+        messages.append((number, body[offset - size : offset]))
+    if offset != len(body):
+        raise Malformed("it goes on after its last message")
+    return messages
+
+
+def _taken(layout: struct.Struct, body: bytes, offset: int) -> tuple[Any, ...]:
+    if offset + layout.size > len(body):
+        raise Malformed("it ends before its header does")
+    return layout.unpack_from(body, offset)

@@ -1,0 +1,194 @@
+"""A stack in a process of its own that keeps the promises of any stack: readings in, one command out, each beat."""
+
+from collections.abc import Callable
+from pathlib import Path as FilePath
+from typing import Any, TypeVar
+
+from simscen.core.belief import Estimate
+from simscen.core.errors import RunError
+from simscen.core.events import EventKind
+from simscen.core.externalcommand import ExternalCommand
+from simscen.core.geometry import Pose2
+from simscen.core.motion import STOP
+from simscen.core.navigation import Goal, Path
+from simscen.core.sensing import Odometry, Readings
+from simscen.core.trace import Decision
+from simscen.peer import wire
+from simscen.record import topics
+from simscen.record.simtime import SimTime
+from simscen.run.external import errors
+from simscen.run.external.errors import NotAllowed
+from simscen.run.external.feed import Feed
+from simscen.run.external.goals import ToldGoals
+from simscen.run.external.hello import Ordered, goal_data, hello, task
+from simscen.run.external.process import StackProcess
+from simscen.run.external.topics import KEEPOUT_MASK, SPEED_MASK
+from simscen.run.external.understand import Answer, by_topic, understood
+from simscen.run.external.welcome import Welcome
+from simscen.stack.protocols import Surroundings
+
+GRACE = 2.0
+"""Seconds of wall time that a stack may take to end by itself after the last step."""
+T = TypeVar("T")
+_GOAL_ENDS = (EventKind.GOAL_REACHED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED)
+
+
+class ExternalStack:
+    """Speaks with the process of a stack; `start` starts it, `finish` and `close` end it.
+
+    Raises RunError of a kind in simscen.run.external.errors from whatever needs the process.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        command: ExternalCommand,
+        surroundings: Surroundings,
+        ordered: Ordered,
+        printed: FilePath | None = None,
+    ) -> None:
+        self._name, self._command, self._printed = name, command, printed
+        self._surroundings, self._ordered = surroundings, ordered
+        self._time = SimTime(surroundings.tick_rate)
+        self._goals = ToldGoals(ordered.stop_on_failure, surroundings.tick_rate)
+        self._feed = Feed(surroundings.tick_rate, ordered.sensors, ordered.mounts)
+        self._process: StackProcess | None = None
+        self._welcome = Welcome()
+        self._plan: Path | None = None
+        self._held = Decision(STOP)
+        self._told, self._canceling = False, False
+        self._correction: Pose2 | None = None
+        self._odometry: Odometry | None = None
+
+    def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:
+        """Start the process, say hello, and tell it its goals."""
+        surroundings, feed = self._surroundings, self._feed
+        feed.latch(surroundings.map, topics.MAP)
+        feed.latch(surroundings.masks.keepout, KEEPOUT_MASK)
+        speed = surroundings.masks.speed
+        feed.latch(None if speed is None else speed.grid, SPEED_MASK)
+        feed.latch_robot(self._ordered.robot_description, estimate)
+        offer = feed.offer()
+        self._answers = offer.answers
+        self._process = StackProcess(self._name, self._command, self._printed)
+        told = hello(surroundings, self._ordered, offer, feed.named, self._command.answer_limit)
+        try:
+            frame, limit = wire.json_frame(wire.HELLO, told), self._command.start_limit
+            kind, body = self._process.exchange(frame, limit, "answer to HELLO")
+            self._welcome = self._allowed("the answer to HELLO", lambda: Welcome.of(kind, body, offer))
+            feed.want(offer, self._welcome.topics)
+            self._process.send(wire.json_frame(wire.GOAL, task(estimate, goals, self._ordered.stop_on_failure)))
+        except RunError:
+            self.close()
+            raise
+        self._goals.start(goals)
+
+    def preempt(self, tick: int, goal: Goal) -> None:
+        """Drive to this goal first; it takes the place of the current one."""
+        self._goals.preempt(tick, goal)
+        self._interrupt(wire.PREEMPT, {"tick": tick, "goal": goal_data(goal)})
+
+    def cancel(self, tick: int) -> None:
+        """Cancel the current goal and all after it."""
+        self._canceling = True
+        self._interrupt(wire.CANCEL, {"tick": tick, "all": True, "reason": "canceled"})
+
+    @property
+    def plan(self) -> Path | None:
+        """The plan that it says it follows."""
+        return self._plan
+
+    @property
+    def goal(self) -> Goal | None:
+        """The goal it has accepted and not yet ended, as it says."""
+        return None if self._canceling else self._goals.goal
+
+    @property
+    def facts(self) -> dict[str, str]:
+        """What ran, for the log."""
+        return {"external": self._name, **self._welcome.facts}
+
+    def decide(self, tick: int, readings: Readings) -> Decision:
+        """Take the readings of this beat and say what to drive."""
+        self._feed.take(tick, readings)
+        self._odometry = next((r for r in reversed(readings) if isinstance(r, Odometry)), self._odometry)
+        due = tick % self._ordered.control_period == 0
+        if not (due or self._told or (self._welcome.every_beat and self._feed.waiting)):
+            return self._held
+        answer = self._asked(tick, due)
+        self._told = self._canceling = False
+        return self._decided(tick, answer, due)
+
+    def finish(self, reason: str) -> None:
+        """Tell the stack that the run is over, and let it end by itself."""
+        if self._process is not None:
+            farewell = self._process.farewell(wire.json_frame(wire.END, {"reason": reason}), GRACE)
+            self._welcome = self._welcome.with_farewell(farewell)
+        self.close()
+
+    def close(self) -> None:
+        """End the process and all that it has started."""
+        if self._process is not None:
+            self._process.close()
+            self._process = None
+
+    def _asked(self, tick: int, due: bool) -> Answer:
+        """The answer to the step of `tick`."""
+        assert self._process is not None
+        limit = self._command.answer_limit
+        sec, nanosec = self._time.stamp(tick)
+        flags = wire.COMMAND_DUE if due else 0
+        header = wire.StepHeader(tick, sec, nanosec, round(limit * 1e3), flags)
+        when = f"the step of t = {tick / self._time.rate:.3f} s"
+        kind, body = self._process.exchange(
+            wire.step_frame(header, self._feed.drain()), limit, f"answer to {when} (tick {tick})"
+        )
+        return self._allowed(f"the answer to {when}", lambda: self._understood(kind, body, tick, due))
+
+    def _understood(self, kind: int, body: bytes, tick: int, due: bool) -> Answer:
+        if kind != wire.ANSWER:
+            raise NotAllowed(f"a frame {_name(kind)} instead of an ANSWER")
+        answered, said = wire.from_answer(body)
+        if answered != tick:
+            raise NotAllowed(f"it answers tick {answered} instead of {tick}")
+        dead_reckoned = None if self._odometry is None else self._odometry.pose
+        answer = understood(by_topic(said, self._answers), tick, self._time, self._correction, dead_reckoned)
+        self._correction = answer.correction
+        if due and answer.command is None:
+            raise NotAllowed(f"no message on {topics.COMMAND.name}, though a command is due")
+        for event in answer.events:
+            self._goals.hear(tick, event)
+        return answer
+
+    def _decided(self, tick: int, answer: Answer, due: bool) -> Decision:
+        if due and self._goals.overdue(tick):
+            self._send(wire.CANCEL, {"tick": tick, "all": self._ordered.stop_on_failure, "reason": "timeout"})
+        events = self._goals.take()
+        if answer.plan is not None:
+            self._plan = answer.plan if len(answer.plan.points) else None
+        if any(event.kind in _GOAL_ENDS for event in events):
+            self._plan = None
+        command = answer.command if answer.command is not None else self._held.command
+        self._held = Decision(command)
+        followed = answer.plan if answer.plan is not None and len(answer.plan.points) else None
+        return Decision(command, answer.belief, followed, answer.local_plan, events, answer.lines)
+
+    def _interrupt(self, kind: int, content: dict[str, Any]) -> None:
+        """Tell the stack something that it answers at this very beat."""
+        self._told, self._plan = True, None
+        self._send(kind, content)
+
+    def _send(self, kind: int, content: dict[str, Any]) -> None:
+        if self._process is not None:
+            self._process.send(wire.json_frame(kind, content))
+
+    def _allowed(self, what: str, take: Callable[[], T]) -> T:
+        assert self._process is not None
+        try:
+            return take()
+        except (NotAllowed, wire.Malformed) as error:
+            raise self._process.error(errors.PROTOCOL, f"{what}: {error}") from error
+
+
+def _name(kind: int) -> str:
+    return wire.KINDS[kind] if 0 < kind < len(wire.KINDS) else f"of kind {kind}"

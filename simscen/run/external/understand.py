@@ -1,0 +1,207 @@
+"""What an external stack says in an answer, message by message; what does not fit its type is refused."""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from simscen.core.belief import Belief
+from simscen.core.geometry import Array, Pose2
+from simscen.core.motion import Twist
+from simscen.core.navigation import Path
+from simscen.core.trace import LogLine
+from simscen.peer.cdr import Reader
+from simscen.peer.messages import read
+from simscen.record import frames, topics, unpack
+from simscen.record.foreign import messages
+from simscen.record.foreign.messages import Posed
+from simscen.record.rows import on_the_ground
+from simscen.record.simtime import SimTime
+from simscen.run.external.errors import NotAllowed
+from simscen.run.external.topics import EXACT, HEARD, NUMBERS, POSE2D
+
+if TYPE_CHECKING:
+    from simscen.peer.wire import Messages
+
+MOST_PARTICLES = 1_000_000
+_PLANE = (0, 1, 5, 6, 7, 11, 30, 31, 35)
+"""Where the nine numbers of a covariance over x, y, yaw stand among the 36 of a message."""
+_TYPES = {topic.name: topic.type for topic in HEARD}
+
+Said = dict[str, list[bytes]]
+"""The messages of an answer by topic, in order."""
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """An answer, understood. None: nothing was said. A path without poses says that no plan is followed."""
+
+    command: Twist | None = None
+    plan: Path | None = None
+    local_plan: Path | None = None
+    belief: Belief | None = None
+    correction: Pose2 | None = None
+    events: tuple[dict[str, Any], ...] = ()
+    lines: tuple[LogLine, ...] = field(default=())
+
+
+def by_topic(said: Messages, answers: dict[int, str]) -> Said:
+    """The messages of an answer. Raises NotAllowed for a topic that no stack may speak on."""
+    found: Said = {}
+    for number, data in said:
+        if number not in answers:
+            raise NotAllowed(f"a message on topic {number}, which there is not")
+        found.setdefault(answers[number], []).append(data)
+    return found
+
+
+def understood(said: Said, tick: int, time: SimTime, correction: Pose2 | None, dead_reckoned: Pose2 | None) -> Answer:
+    """The answer at `tick`.
+
+    Where no transform was ever told (`correction`, the last one), a belief is one of the odometry's pose
+    `dead_reckoned`. Raises NotAllowed.
+    """
+    if len(said.get(topics.COMMAND.name, ())) > 1:
+        raise NotAllowed("two commands in one answer")
+    correction = _correction(said) or correction
+    return Answer(
+        command=_last(said, topics.COMMAND.name, _twist),
+        plan=_path(said, topics.PLAN.name, tick, time),
+        local_plan=_path(said, topics.LOCAL_PLAN.name, tick, time),
+        belief=_belief(said, correction, dead_reckoned),
+        correction=correction,
+        events=tuple(_told(said, topics.EVENTS.name, _event)),
+        lines=tuple(_told(said, topics.ROSOUT.name, _line)),
+    )
+
+
+def _belief(said: Said, correction: Pose2 | None, dead_reckoned: Pose2 | None) -> Belief | None:
+    name = topics.BELIEF.name
+    told = _last(said, name, _posed)
+    if told is None:
+        return None
+    exact = _last(said, name + EXACT, _pose2d)
+    pose = exact if exact is not None else _ground(told)
+    if correction is None:
+        correction = pose if dead_reckoned is None else pose.compose(dead_reckoned.inverse())
+    covariance = _taken(name, _covariance, said[name][-1])
+    particles = _last(said, topics.PARTICLES.name, _particles)
+    exactly = _last(said, topics.PARTICLES.name + EXACT, lambda data: _table(data, 4))
+    cloud = exactly if exactly is not None else particles
+    return Belief(pose, covariance, correction, cloud if cloud is not None else np.empty((0, 4)))
+
+
+def _correction(said: Said) -> Pose2 | None:
+    """Where the odometry's frame is in the map."""
+    exact = _last(said, topics.TF.name + EXACT, _pose2d)
+    if exact is not None:
+        return exact
+    links = [link for part in _told(said, topics.TF.name, messages.transforms) for link in part]
+    found = [link for link in links if (link.frame, link.child) == (frames.MAP, frames.ODOM)]
+    return _ground(found[-1]) if found else None
+
+
+def _path(said: Said, name: str, tick: int, time: SimTime) -> Path | None:
+    told = _last(said, name, messages.path)
+    exact = _last(said, name + EXACT, lambda data: _table(data, 3))
+    if told is None and exact is None:
+        return None
+    made = tick if told is None else time.tick(told.stamp)
+    points = exact if exact is not None else on_the_ground(told.poses) if told is not None else np.empty((0, 3))
+    if not np.isfinite(points).all():
+        raise NotAllowed(f"a path on {name} that is not finite")
+    return Path(points, made)
+
+
+def _twist(data: bytes) -> Twist:
+    command = Twist(*messages.twist(data).values)
+    if not all(map(math.isfinite, command)):
+        raise NotAllowed(f"a command that is not finite: {', '.join(f'{value:g}' for value in command)}")
+    return command
+
+
+def _posed(data: bytes) -> Posed:
+    told = messages.pose_with_covariance_stamped(data)
+    if told.frame not in (frames.MAP, ""):
+        raise NotAllowed(f"a pose on {topics.BELIEF.name} in the frame `{told.frame}` instead of `{frames.MAP}`")
+    if not all(map(math.isfinite, (*told.pose, *told.covariance))):
+        raise NotAllowed(f"a pose on {topics.BELIEF.name} that is not finite")
+    return told
+
+
+def _covariance(data: bytes) -> Array:
+    reader = Reader(data)
+    reader.take("iI")
+    reader.string()
+    reader.take("7d")
+    numbers = reader.take("36d")
+    return np.array([numbers[i] for i in _PLANE], dtype=np.float64).reshape(3, 3)
+
+
+def _ground(told: Posed) -> Pose2:
+    x, y, yaw = on_the_ground(np.array([told.pose]))[0].tolist()
+    return Pose2(x, y, yaw)
+
+
+def _particles(data: bytes) -> Array:
+    reader = Reader(data)
+    reader.take("iI")
+    reader.string()
+    (count,) = reader.take("I")
+    if count > MOST_PARTICLES:
+        raise NotAllowed(f"{count} particles")
+    poses = np.array([reader.take("8d") for _ in range(count)], dtype=np.float64).reshape(-1, 8)
+    return np.column_stack((on_the_ground(poses[:, :7]), poses[:, 7]))
+
+
+def _pose2d(data: bytes) -> Pose2:
+    pose = Pose2(*read(POSE2D, data))
+    if not all(map(math.isfinite, pose)):
+        raise NotAllowed("a pose that is not finite")
+    return pose
+
+
+def _table(data: bytes, width: int) -> Array:
+    numbers = np.array(read(NUMBERS, data), dtype=np.float64)
+    if len(numbers) % width:
+        raise NotAllowed(f"{len(numbers)} numbers, which are no rows of {width}")
+    return numbers.reshape(-1, width)
+
+
+def _event(data: bytes) -> dict[str, Any]:
+    said = json.loads(unpack.string(data))
+    if not isinstance(said, dict):
+        raise NotAllowed("an event that is not a JSON object")
+    return said
+
+
+def _line(data: bytes) -> LogLine:
+    reader = Reader(data)
+    reader.take("iI")
+    (level,) = reader.take("B")
+    return LogLine(level, reader.string(), reader.string())
+
+
+def _last(said: Said, name: str, take: Callable[[bytes], T]) -> T | None:
+    found = said.get(name)
+    return _taken(name, take, found[-1]) if found else None
+
+
+def _told(said: Said, name: str, take: Callable[[bytes], T]) -> list[T]:
+    return [_taken(name, take, data) for data in said.get(name, ())]
+
+
+def _taken(name: str, take: Callable[[bytes], T], data: bytes) -> T:
+    try:
+        return take(data)
+    except NotAllowed:
+        raise
+    except (ValueError, struct.error, RecursionError) as error:
+        raise NotAllowed(f"a message on {name} that is no {_TYPES[name]}: {error}") from error
