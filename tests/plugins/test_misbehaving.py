@@ -1,0 +1,180 @@
+"""What a package of another maker may do wrong in a run, and what becomes of it: never a pass, and always its name."""
+
+from textwrap import dedent
+
+import pytest
+
+from simscen.core.errors import RunError
+from simscen.core.result import Outcome
+from simscen.run.simulate import simulate_file
+
+ROBOT = """\
+simscen: 1
+name: r
+mass: 8 kg
+radius: 0.2
+body: [{cylinder: [0.2, 0.25], z: 0.05}]
+drive: {type: differential, wheel_radius: 0.05, wheel_separation: 0.3}
+limits: {linear: 0.6, angular: 1.5, linear_acceleration: 1.5, angular_acceleration: 3}
+sensors: {lidar: {lidar: {beams: 90}}, odom: {odometry: {}}, %s}
+"""
+SCENARIO = """\
+simscen: 1
+world: {simscen: 1, walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]}
+robot: {model: r.robot.yaml, pose: {x: 1, y: 1}}
+goals: [{pose: {x: 5, y: 3}}]
+time_limit: 2 s
+pass: [{collisions: {}}%s]
+"""
+HEAD = """\
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+
+from simscen.actions.base import Action
+from simscen.core.motion import Twist
+from simscen.core.sensing import Bump, Scan
+from simscen.core.stage import Effect
+from simscen.core.verdict import Finding, Status
+from simscen.criteria.base import Criterion
+from simscen.criteria.measure import Measure
+from simscen.faults.base import Disturbance, Fault
+from simscen.model.robot import SensorSpec
+from simscen.spec.base import Spec
+from simscen.triggers.base import Condition
+"""
+HEADS = {
+    "criterion": "class Mine(Spec, Criterion):\n    def judge(self, trace, case):\n        ",
+    "metric": "class Mine(Spec, Measure):\n    def measure(self, trace, case):\n        ",
+    "trigger": "class Mine(Spec, Condition):\n    def holds(self, now):\n        ",
+    "action": "class Mine(Spec, Action):\n    def perform(self, stage):\n        ",
+    "fault": "class Mine(Spec, Fault):\n    affects: ClassVar = frozenset({'Scan', 'Command'})\n"
+    "    def begin(self, chance, wheels):\n        return Broken()\n\nclass Broken(Disturbance):\n    ",
+    "sensor": "class Mine(SensorSpec):\n    component: ClassVar = 'mine:Device'\n    says: ClassVar = 'Scan'\n\n"
+    "class Device:\n    def __init__(self, spec, setting): self.setting = setting\n    def read(self, tick):\n        ",
+}
+USES = {
+    "criterion": (", {mine: {}}", ""),
+    "metric": ("]\nmetrics: [{mine: {}}", ""),
+    "trigger": ("]\nevents: [{when: {mine: {}}, do: {push: {impulse: [0, 1]}}}", ""),
+    "action": ("]\nevents: [{when: {time: 0.5}, do: {mine: {}}}", ""),
+    "fault": ("]\nfaults: [{sensor: lidar, mine: {}, when: {time: 0.5}}", ""),
+    "sensor": ("", "extra: {mine: {rate: 10}}"),
+}
+
+
+@pytest.fixture
+def run(packages, tmp_path):
+    """`run(kind, text)` drives two seconds with a package whose `mine` is of this kind and does this."""
+
+    def driven(kind: str, text: str, sensor: str = "lidar"):
+        packages("mines", "0.3", {kind: {"mine": "mine:Mine"}}, mine=f"{HEAD}\n\n{HEADS[kind]}{dedent(text)}\n")
+        scenario, robot = USES[kind]
+        (tmp_path / "r.robot.yaml").write_text(ROBOT % robot)
+        (tmp_path / "s.scenario.yaml").write_text((SCENARIO % scenario).replace("sensor: lidar", f"sensor: {sensor}"))
+        return simulate_file(tmp_path / "s.scenario.yaml", None, None, tmp_path).result
+
+    return driven
+
+
+FINDING = "Finding(Status.{}, 'mine', '1', '2', {})"
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("return []", "it checked nothing (criterion `mine` of mines 0.3)"),
+        ("return None", "it checked nothing"),
+        ("return [None]", "its finding is NoneType, which is none"),
+        (
+            f"return [{FINDING.format('PASS', 'float(chr(110) + chr(97) + chr(110))')}]",
+            "the margin of mine is no number",
+        ),
+        (f"return [{FINDING.format('PASS', -1.0)}]", "mine is a pass by a margin of -1"),
+        (f"return [{FINDING.format('FAIL', 1.0)}]", "mine is a fail by a margin of 1"),
+        ("return [Finding(Status.PASS, 'mine', 1, '2')]", "its finding says something that is no text"),
+        ("raise KeyError('gone')", "KeyError: 'gone' (criterion `mine` of mines 0.3)"),
+    ],
+)
+def test_a_criterion_that_does_not_judge_makes_the_run_an_error(run, text: str, told: str) -> None:
+    result = run("criterion", text)
+    assert result.outcome is Outcome.ERROR
+    assert result.error is not None and told in result.error.message
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("return float(chr(110) + chr(97) + chr(110))", "metric mine is no number: nan (metric `mine` of mines 0.3)"),
+        ("return None", "metric mine is no number: None"),
+        ("return True", "metric mine is no number: True"),
+        ("return 1 / 0", "metric mine: ZeroDivisionError: division by zero (metric `mine` of mines 0.3)"),
+    ],
+)
+def test_a_metric_that_is_no_number_makes_the_run_an_error(run, text: str, told: str) -> None:
+    result = run("metric", text)
+    assert result.outcome is Outcome.ERROR
+    assert result.error is not None and told in result.error.message
+
+
+def test_a_metric_that_a_run_does_not_have_says_why(run) -> None:
+    result = run("metric", "return 'nobody came'")
+    assert result.outcome is Outcome.PASSED
+    assert (result.metrics["mine"], result.undefined["mine"]) == (None, "nobody came")
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "error", "told"),
+    [
+        ("trigger", "return 1", "broken-component", "neither True nor False, but 1 (trigger `mine` of mines 0.3)"),
+        ("trigger", "return now.nothing", "crashed", "trigger `mine` of mines 0.3: AttributeError: "),
+        ("action", "return None", "broken-component", "None, which is no Effect (action `mine` of mines 0.3)"),
+        ("action", "return Effect(True, 'done')", "broken-component", "says `done`, but did nothing (action `mine`"),
+        ("action", "raise ValueError('no')", "crashed", "action `mine` of mines 0.3: ValueError: no (mine.py:"),
+        ("fault", "def reading(self, reading): return 3", "broken-component", "makes int of the Scan of a sensor"),
+        ("fault", "def reading(self, reading): reading.ranges[:] = 0; return reading", "crashed", "read-only"),
+        ("fault", "def reading(self, reading): return 1 / 0", "crashed", "fault `mine` of mines 0.3: ZeroDivision"),
+        ("sensor", "return 1 / 0", "crashed", "sensor `extra` (mine, mine:Device): ZeroDivisionError: "),
+        (
+            "sensor",
+            "return Bump('extra', tick, True)",
+            "broken-component",
+            "says Bump, but its specification says Scan",
+        ),
+        ("sensor", "return Scan('x', tick, np.ones(3), 0., 1., 0., 9.)", "broken-component", "signs its reading `x`"),
+        ("sensor", "return Scan('extra', tick, -np.ones(3), 0., 1., 0., 9.)", "broken-component", "ranges that are no"),
+        ("sensor", "return Scan('extra', tick, np.ones(3), np.nan, 1., 0., 9.)", "broken-component", "is not finite"),
+    ],
+)
+def test_an_answer_that_is_none_ends_the_run_with_its_name(run, kind, text, error, told) -> None:
+    with pytest.raises(RunError) as raised:
+        run(kind, text)
+    assert raised.value.kind == error
+    assert told in str(raised.value)
+
+
+def test_a_command_that_is_none_ends_the_run_with_the_faults_name(run) -> None:
+    with pytest.raises(RunError, match=r"makes Twist\(vx=nan.* of a command \(fault `mine` of mines 0.3\)"):
+        run("fault", "def command(self, command): return Twist(float('nan'), 0.0, 0.0)", sensor="cmd_vel")
+
+
+def test_a_fault_that_changes_nothing_is_told_and_does_not_pass(run) -> None:
+    result = run("fault", "pass")
+    assert result.outcome is Outcome.FAILED
+    assert [one.happened for one in result.disturbances] == [False]
+
+
+def test_an_action_that_did_nothing_is_told_and_does_not_pass(run) -> None:
+    result = run("action", "return Effect(False, 'it was there already')")
+    assert result.outcome is Outcome.FAILED
+
+
+def test_an_event_whose_trigger_never_holds_is_told_and_does_not_pass(run) -> None:
+    result = run("trigger", "return np.bool_(False)")
+    assert result.outcome is Outcome.FAILED
+
+
+def test_a_component_that_is_not_there_ends_the_run_with_its_name(run, packages) -> None:
+    with pytest.raises(RunError, match=r"sensor `extra`.*ModuleNotFoundError"):
+        run("sensor", "pass\n\nMine.component = 'nowhere:Device'")
