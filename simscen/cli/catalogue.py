@@ -17,7 +17,8 @@ from simscen.faults.fault import AnyFault
 from simscen.model import anystack, robot, scenario, stack, world
 from simscen.model.disturbance import EventEntry, FaultEntry
 from simscen.model.rosmap import RosMapSpec
-from simscen.spec import registry
+from simscen.spec import bytype, registry
+from simscen.spec.bytype import ByType
 from simscen.spec.choice import Choice, added
 from simscen.spec.docs import field_docs
 from simscen.spec.ondemand import type_of
@@ -83,8 +84,15 @@ def topics(installed: bool = False) -> list[Topic]:
         _topic("criterion", "pass", AnyCriterion),
         *(_topic("scenario", name, model) for name, model in _SCENARIO.items()),
         *(_topic("stack", name, model) for name, model in _STACK.items()),
+        *_more("stack", installed),
         *(_topic("localizer", kind, model) for kind, model in by_type(stack.Localizer)),
+        *_more("localizer", installed),
+        *_more("planner", installed),
         *(_topic("controller", kind, model) for kind, model in by_type(stack.Controller)),
+        *_more("controller", installed),
+        *(_topic("behavior", name, model) for name, model in _BEHAVIORS.items()),
+        *_more("behavior", installed),
+        *_more("goal_checker", installed),
         *(_topic("world", name, model) for name, model in _WORLD.items()),
         *(_topic("robot", name, model) for name, model in _ROBOT.items()),
         *(_topic("drive", kind, model) for kind, model in by_type(robot.Drive)),
@@ -111,6 +119,12 @@ _STACK: dict[str, type[BaseModel]] = {
     "recovery": stack.Recovery,
     "velocity_smoother": stack.VelocitySmoother,
     "collision_monitor": stack.CollisionMonitor,
+}
+_BEHAVIORS: dict[str, type[BaseModel]] = {
+    "clear_costmap": stack.ClearCostmap,
+    "spin": stack.Spin,
+    "wait": stack.Wait,
+    "backup": stack.BackUp,
 }
 _WORLD: dict[str, type[BaseModel]] = {
     "world": world.WorldSpec,
@@ -144,6 +158,8 @@ def kind_of(kind: Any, metadata: tuple[Any, ...] = ()) -> str:
     """A type in words, with unit and range: "length in m, ≥ 0"."""
     if isinstance(kind, FieldInfo):
         return kind_of(kind.annotation, tuple(kind.metadata))
+    if mark := next((mark for mark in metadata if isinstance(mark, ByType)), None):
+        return kind_of(mark.own)
     if get_origin(kind) is Annotated:
         return kind_of(get_args(kind)[0], (*get_args(kind)[1:], *metadata))
     if get_origin(kind) in (Union, UnionType):
@@ -160,8 +176,9 @@ def kind_of(kind: Any, metadata: tuple[Any, ...] = ()) -> str:
 
 
 def by_type(union: Any) -> Iterator[tuple[str, type[BaseModel]]]:
-    """The members of a union told apart by `type`."""
-    members = get_args(get_args(union)[0])
+    """The shipped members of a union told apart by `type`."""
+    mark = next((mark for mark in get_args(union)[1:] if isinstance(mark, ByType)), None)
+    members = get_args(get_args(union if mark is None else mark.own)[0])
     for member in members:
         model = get_args(member)[0] if get_origin(member) is Annotated else member
         yield get_args(model.model_fields["type"].annotation)[0], model
@@ -219,6 +236,14 @@ def _added(choice: type[Choice], wanted: bool) -> Iterator[Topic]:
     origins = {entry.name: entry.origin for entry in registry.installed(choice.group)}
     for key, model in added(choice).items():
         yield replace(_topic(choice.group, key, model), origin=origins[key])
+
+
+def _more(group: str, wanted: bool) -> Iterator[Topic]:
+    """What installed packages add to a group that is told apart by `type`."""
+    if wanted:
+        origins = {entry.name: entry.origin for entry in registry.installed(group)}
+        for name, model in bytype.added(group):
+            yield replace(_topic(group, name, model), origin=origins[name])
 
 
 def _topic(group: str, name: str, model: type[BaseModel]) -> Topic:

@@ -13,6 +13,8 @@ from simscen.model.scenario import ScenarioSpec
 from simscen.model.stackfile import StackFileSpec
 from simscen.model.userconfig import UserConfigSpec
 from simscen.model.world import WorldSpec
+from simscen.spec import bytype
+from simscen.spec.bytype import GROUP
 from simscen.spec.choice import Choice, added, widened
 
 Schema = dict[str, Any]
@@ -82,6 +84,18 @@ class _WithInstalled(_Generator):
         for key, found in added(model).items():
             made["properties"][key] = self.generate_inner(core_schema.nullable_schema(found.__pydantic_core_schema__))
         return {**made, **_exactly_one(model, [*model.choices(), *added(model)])}
+
+    def function_wrap_schema(self, schema: core_schema.WrapValidatorFunctionSchema) -> JsonSchemaValue:
+        made = super().function_wrap_schema(schema)
+        group = schema.get("metadata", {}).get(GROUP)
+        more = [self._named(name, model) for name, model in bytype.added(group)] if group else []
+        return {"anyOf": [made, *more]} if more else made
+
+    def _named(self, name: str, model: type[BaseModel]) -> JsonSchemaValue:
+        """The schema of a specification that is chosen by the name of its entry point."""
+        typed: Schema = {"properties": {"type": {"const": name}}, "required": ["type"]}
+        model.model_rebuild()
+        return {"allOf": [self.generate_inner(model.__pydantic_core_schema__), typed]}
 
 
 def _exactly_one(model: type[Choice], keys: list[str]) -> Schema:

@@ -20,6 +20,11 @@ _GROUPS = {
     "stack": ("The stack", "Under `stack`; every key may be left out."),
     "localizer": ("Localizers", "Under `stack.localizer`, told apart by `type`; `amcl` where it is left out."),
     "controller": ("Controllers", "Under `stack.controller`, told apart by `type`."),
+    "behavior": (
+        "Recovery behaviours",
+        "Entries of `stack.recovery.behaviors`: a name, or a mapping with that name as its `type`; a parameter that is "
+        "left out is the one of `stack.recovery`.",
+    ),
     "world": ("World files", "`*.world.yaml`, or inline under `world`."),
     "robot": ("Robot files", "`*.robot.yaml`."),
     "drive": ("Drives", "Under `drive` of a robot, told apart by `type`."),

@@ -7,9 +7,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from simscen.core.navigation import RecoveryBehavior
 from simscen.criteria.signal_table import SIGNALS, Signal, SignalName
 from simscen.spec.base import Spec
+from simscen.spec.bytype import BehaviorName
 from simscen.spec.places import Point
 from simscen.spec.quantities import UNITS, Duration, PositiveDuration, Quantity
 from simscen.spec.references import EventName, GoalName, HappeningName, MovableName, ObjectName, RegionName
@@ -45,7 +45,7 @@ class Condition(Spec):
     """The fault that `fault_active` or `started` is about, e.g. `lidar.off`."""
     event: EventName | None = None
     """The event that `event_active` or `started` is about."""
-    recovery: RecoveryBehavior | None = None
+    recovery: BehaviorName | None = None
     """The recovery that `recovery_active` is about."""
     with_: ObjectName | None = Field(default=None, alias="with")
     """The thing that `in_collision` is about."""

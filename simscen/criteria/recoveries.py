@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from simscen.core.events import EventKind
-from simscen.core.navigation import RecoveryBehavior
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.counts import Counts
+from simscen.spec.bytype import BehaviorName
 
 if TYPE_CHECKING:
     from simscen.core.case import Case
@@ -27,7 +27,7 @@ class Recoveries(Counts, Criterion):
     Example: `recoveries: {min: 1, name: spin}`
     """
 
-    name: RecoveryBehavior | None = None
+    name: BehaviorName | None = None
     """Only this behaviour."""
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:

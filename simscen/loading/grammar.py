@@ -12,6 +12,7 @@ from pydantic import BaseModel, RootModel, Tag
 from pydantic.fields import FieldInfo
 
 from simscen.loading.tree import Key
+from simscen.spec.bytype import ByType, added
 from simscen.spec.choice import Choice
 from simscen.spec.ondemand import OnDemand, type_of
 
@@ -55,6 +56,8 @@ def field_type(model: type[BaseModel], key: str) -> Any:
 def _type_of(field: FieldInfo) -> Any:
     from simscen.spec.registry import BrokenPlugin
 
+    if mark := next((mark for mark in field.metadata if isinstance(mark, ByType)), None):
+        return Annotated[field.annotation, mark]
     try:
         return type_of(field)
     except BrokenPlugin:
@@ -63,6 +66,8 @@ def _type_of(field: FieldInfo) -> Any:
 
 def _options(kind: Any) -> list[Any]:
     """The members of a union, tagged or not; any other type is its own only option."""
+    if mark := _by_type(kind):
+        return [*_options(mark.own), *(Annotated[model, Tag(name)] for name, model in added(mark.group))]
     bare = _bare(kind)
     if get_origin(bare) in (Union, UnionType):
         return [option for member in get_args(bare) if member is not NoneType for option in _options(member)]
@@ -103,6 +108,10 @@ def _types(model: type[BaseModel]) -> tuple[Any, ...]:
 
 def _metadata(kind: Any) -> tuple[Any, ...]:
     return tuple(get_args(kind)[1:]) if get_origin(kind) is Annotated else ()
+
+
+def _by_type(kind: Any) -> ByType | None:
+    return next((mark for mark in _metadata(kind) if isinstance(mark, ByType)), None)
 
 
 def _bare(kind: Any) -> Any:

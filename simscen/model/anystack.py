@@ -4,8 +4,9 @@ from typing import Annotated, Any
 
 from pydantic import Discriminator, StringConstraints, Tag
 
-from simscen.model.stack import StackSpec
+from simscen.model.stack import InProcessStack, StackSpec
 from simscen.model.stackbase import StackBase
+from simscen.spec.bytype import ByType
 
 _TAG = "an external stack"
 """No key of a stack: problems are told by keys and tags in one path."""
@@ -39,6 +40,7 @@ def _kind(value: Any) -> str:
     return _TAG if isinstance(value, ExternalStackSpec) else str(getattr(value, "type", "reference"))
 
 
-AnyStack = Annotated[
+_Stacks = Annotated[
     Annotated[StackSpec, Tag("reference")] | Annotated[ExternalStackSpec, Tag(_TAG)], Discriminator(_kind)
 ]
+AnyStack = Annotated[InProcessStack | ExternalStackSpec, ByType("stack", _Stacks)]

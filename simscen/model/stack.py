@@ -7,6 +7,7 @@ from pydantic import Discriminator, Field, Tag
 from simscen.core.navigation import RecoveryBehavior
 from simscen.model.stackbase import GoalTolerances, StackBase
 from simscen.spec.base import Ranged, Spec, by_default, type_or
+from simscen.spec.bytype import ByType
 from simscen.spec.component import Typed
 from simscen.spec.quantities import (
     Angle,
@@ -106,13 +107,14 @@ class OdometryOnly(LocalizerSpec):
     type: Literal["odometry"]
 
 
-Localizer = Annotated[
+_Localizers = Annotated[
     Annotated[Amcl, Tag("amcl")]
     | Annotated[Ekf, Tag("ekf")]
     | Annotated[GroundTruth, Tag("ground_truth")]
     | Annotated[OdometryOnly, Tag("odometry")],
     Discriminator(type_or("amcl")),
 ]
+Localizer = Annotated[LocalizerSpec, ByType("localizer", _Localizers)]
 
 
 class Costmap(Ranged):
@@ -153,6 +155,9 @@ class OmplPlanner(PlannerSpec):
     simplify: bool = True
     state_space: Literal["auto", "holonomic", "se2", "dubins", "reeds_shepp"] = "auto"
     """auto: Reeds-Shepp for an Ackermann drive, se2 for a long footprint, else holonomic."""
+
+
+Planner = Annotated[PlannerSpec, ByType("planner", OmplPlanner)]
 
 
 class ControllerSpec(Typed):
@@ -226,12 +231,13 @@ class Mppi(ControllerSpec):
     gamma: Annotated[float, Field(ge=0, le=10)] = 0.015
 
 
-Controller = Annotated[
+_Controllers = Annotated[
     Annotated[RegulatedPurePursuit, Tag("regulated_pure_pursuit")]
     | Annotated[DynamicWindow, Tag("dwb")]
     | Annotated[Mppi, Tag("mppi")],
     Discriminator(type_or("regulated_pure_pursuit")),
 ]
+Controller = Annotated[ControllerSpec, ByType("controller", _Controllers)]
 
 
 class GoalCheckerSpec(GoalTolerances, Typed):
@@ -244,6 +250,9 @@ class SimpleGoalChecker(GoalCheckerSpec):
     component: ClassVar[str] = "simscen.stack.goal_checker:SimpleGoalChecker"
     type: Literal["simple"] = "simple"
     stateful: bool = True
+
+
+GoalChecker = Annotated[GoalCheckerSpec, ByType("goal_checker", SimpleGoalChecker)]
 
 
 class ProgressChecker(Spec):
@@ -297,19 +306,25 @@ class ClearCostmap(BehaviorSpec):
     type: Literal["clear_costmap"] = "clear_costmap"
 
 
-_BEHAVIORS: dict[str, type[BehaviorSpec]] = {
-    "clear_costmap": ClearCostmap,
-    "spin": Spin,
-    "wait": Wait,
-    "backup": BackUp,
-}
+_Behaviors = Annotated[
+    Annotated[Spin, Tag("spin")]
+    | Annotated[Wait, Tag("wait")]
+    | Annotated[BackUp, Tag("backup")]
+    | Annotated[ClearCostmap, Tag("clear_costmap")],
+    Field(discriminator="type"),
+]
+_NamedOrWhole = Annotated[
+    Annotated[RecoveryBehavior, Tag("a name")] | Annotated[_Behaviors, Tag("a behaviour")],
+    Discriminator(lambda value: "a name" if isinstance(value, str) else "a behaviour"),
+]
+Behavior = Annotated[str | BehaviorSpec, ByType("behavior", _NamedOrWhole, named=True)]
 
 
 class Recovery(Spec):
     """Behaviours of Nav2's default tree, taken in turn when planning or control fails."""
 
     number_of_retries: Annotated[int, Field(ge=0, le=100)] = 6
-    behaviors: Annotated[list[RecoveryBehavior], Field(max_length=20)] = [
+    behaviors: Annotated[list[Behavior], Field(max_length=20)] = [
         "clear_costmap",
         "spin",
         "wait",
@@ -322,13 +337,28 @@ class Recovery(Spec):
     simulate_ahead_time: PositiveDuration = 2.0
     max_rotational_vel: PositiveAngularSpeed = 1.0
 
-    def chosen(self) -> list[BehaviorSpec]:
-        """The behaviours in turn; one that is only named takes what it knows of from the parameters here."""
-        return [self._named(_BEHAVIORS[name]) for name in self.behaviors]
+    @property
+    def names(self) -> list[str]:
+        """What the behaviours are called, in turn."""
+        return [entry if isinstance(entry, str) else entry.type for entry in self.behaviors]
 
-    def _named(self, behavior: type[BehaviorSpec]) -> BehaviorSpec:
-        shared = type(self).model_fields.keys() & behavior.model_fields.keys()
-        return behavior.model_validate({name: getattr(self, name) for name in sorted(shared)})
+    def chosen(self) -> list[BehaviorSpec]:
+        """The behaviours in turn; each takes what it does not say itself from the parameters of the same name here."""
+        return [self._completed(entry) for entry in self.behaviors]
+
+    def _completed(self, entry: str | BehaviorSpec) -> BehaviorSpec:
+        model = _SHIPPED[entry] if isinstance(entry, str) else type(entry)
+        shared = type(self).model_fields.keys() & model.model_fields.keys()
+        own = {} if isinstance(entry, str) else {name: getattr(entry, name) for name in entry.model_fields_set}
+        return model.model_validate({**{name: getattr(self, name) for name in sorted(shared)}, **own})
+
+
+_SHIPPED: dict[str, type[BehaviorSpec]] = {
+    "clear_costmap": ClearCostmap,
+    "spin": Spin,
+    "wait": Wait,
+    "backup": BackUp,
+}
 
 
 class VelocitySmoother(Spec):
@@ -363,9 +393,9 @@ class StackSpec(InProcessStack):
     type: Literal["reference"] = "reference"
     localizer: Localizer = by_default()
     costmap: Costmap = by_default()
-    planner: OmplPlanner = by_default()
+    planner: Planner = by_default()
     controller: Controller = by_default()
-    goal_checker: SimpleGoalChecker = by_default()
+    goal_checker: GoalChecker = by_default()
     progress_checker: ProgressChecker = by_default()
     recovery: Recovery = by_default()
     velocity_smoother: VelocitySmoother = by_default()

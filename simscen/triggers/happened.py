@@ -5,9 +5,9 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from simscen.core.events import EventKind
-from simscen.core.navigation import RecoveryBehavior
 from simscen.core.stage import Situation
 from simscen.spec.base import Spec
+from simscen.spec.bytype import BehaviorName
 from simscen.spec.references import EventName, ObjectName
 from simscen.triggers.base import Condition
 
@@ -56,7 +56,7 @@ class RecoveryStatus(Spec, Condition):
 
     status: Literal["started", "ended"] = "started"
     """What it must have done."""
-    name: RecoveryBehavior | None = None
+    name: BehaviorName | None = None
     """Which one; default: any."""
     count: Count = 1
     """How often."""

@@ -191,8 +191,8 @@ def no_recovery(loaded: LoadedScenario, behaviour: str | None) -> str | None:
     recovery = loaded.spec.stack.recovery
     if not recovery.behaviors or recovery.number_of_retries == 0:
         return "the stack has no recoveries"
-    if behaviour is not None and behaviour not in recovery.behaviors:
-        return f"the stack's recoveries are {', '.join(dict.fromkeys(recovery.behaviors))}"
+    if behaviour is not None and behaviour not in recovery.names:
+        return f"the stack's recoveries are {', '.join(dict.fromkeys(recovery.names))}"
     return None
 
 

@@ -34,7 +34,7 @@ class Watched:
         self.role, self._spec = role, spec
         self.inner: Any = self.ask(lambda: spec.implementation()(spec, setting))
         for name in promised(protocol):
-            if not hasattr(type(self.inner), name) and name not in vars(self.inner):
+            if not callable(getattr(self.inner, name, None)):
                 self.broke(f"{type(self.inner).__name__} has no `{name}`, which every {role} has")
 
     @property
@@ -99,8 +99,8 @@ class Watched:
 
 
 def promised(protocol: type) -> list[str]:
-    """The methods and properties of a protocol."""
-    return sorted(name for name in (*vars(protocol), *protocol.__annotations__) if not name.startswith("_"))
+    """The methods of a protocol; what it has besides may come to be when it is used."""
+    return [name for name, what in vars(protocol).items() if callable(what) and not name.startswith("_")]
 
 
 def _shape(points: object) -> str:

@@ -1,0 +1,101 @@
+"""Mappings that are told apart by their `type`: what simscen ships, or what an installed package adds."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from pydantic import BaseModel, GetCoreSchemaHandler
+from pydantic_core import CoreSchema, InitErrorDetails, PydanticCustomError, ValidationError, core_schema
+
+from simscen.core.navigation import RecoveryBehavior
+from simscen.spec.component import Typed
+from simscen.spec.registry import BrokenPlugin, Entry, find, installed, shipped
+
+GROUP = "simscen group"
+"""Under this key the metadata of a schema says to which group packages add."""
+
+
+@dataclass(frozen=True)
+class ByType:
+    """Marks a field that holds a specification of a group; `own` is the type that holds for what is shipped.
+
+    A mapping whose `type` is not shipped is validated by the specification that an installed package adds by that name;
+    so is a bare name, where a name is enough (`named`).
+    """
+
+    group: str
+    own: Any
+    named: bool = False
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        inner = handler.generate_schema(self.own)
+        return core_schema.no_info_wrap_validator_function(self._validate, inner, metadata={GROUP: self.group})
+
+    def _validate(self, value: Any, own: core_schema.ValidatorFunctionWrapHandler) -> Any:
+        if isinstance(value, Typed) and not type(value).__module__.startswith("simscen."):
+            return value
+        if self.named and isinstance(value, str) and value not in _names(self.group):
+            return specification(_found(self.group, value), {})
+        name = value.get("type") if isinstance(value, dict) else None
+        if not isinstance(name, str) or name in _names(self.group):
+            return own(value)
+        entry = find(self.group, name)
+        if entry is not None:
+            return specification(entry, value)
+        details = InitErrorDetails(type=_unknown(self.group, name), loc=("type",), input=name)
+        raise ValidationError.from_exception_data("type", [details])
+
+
+@dataclass(frozen=True)
+class NameOf:
+    """Marks a text that is the name of a shipped type, as the field says, or of one that an installed package adds."""
+
+    group: str
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_wrap_validator_function(self._validate, handler(source))
+
+    def _validate(self, value: Any, own: core_schema.ValidatorFunctionWrapHandler) -> Any:
+        if isinstance(value, str) and value not in _names(self.group):
+            return _found(self.group, value).name
+        return own(value)
+
+
+BehaviorName = Annotated[RecoveryBehavior, NameOf("behavior")]
+"""The name of a recovery behaviour, as events of the log have it."""
+
+
+def specification(entry: Entry, value: dict[str, Any]) -> BaseModel:
+    """The specification of an installed package with these values, which may lack its `type`."""
+    try:
+        model = entry.load()
+    except BrokenPlugin as broken:
+        told = {"problem": str(broken), "hint": broken.hint}
+        raise PydanticCustomError("plugin", "{problem}", told) from broken
+    return model.model_validate({**value, "type": entry.name}, by_alias=True, by_name=False)
+
+
+def added(group: str) -> Iterator[tuple[str, type[BaseModel]]]:
+    """The specifications that installed packages add to a group, by name; broken ones are left out."""
+    for entry in installed(group):
+        if entry.flaw or entry.name in _names(group):
+            continue
+        try:
+            yield entry.name, entry.load()
+        except BrokenPlugin:
+            continue
+
+
+def _names(group: str) -> frozenset[str]:
+    return frozenset(entry.name for entry in shipped(group))
+
+
+def _found(group: str, name: str) -> Entry:
+    if (entry := find(group, name)) is None:
+        raise _unknown(group, name)
+    return entry
+
+
+def _unknown(group: str, name: str) -> PydanticCustomError:
+    every = [*(entry.name for entry in shipped(group)), *(entry.name for entry in installed(group))]
+    return PydanticCustomError("unknown_type", "no such type", {"value": name, "names": ", ".join(every)})

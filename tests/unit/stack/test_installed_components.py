@@ -1,0 +1,355 @@
+"""Components that packages add: chosen by `type`, built by one door, and named where they break."""
+
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from simscen.core.chance import Streams
+from simscen.core.errors import InvalidInput, RunError
+from simscen.core.geometry import Pose2
+from simscen.core.navigation import ErrorCode, Goal
+from simscen.core.time import Clock
+from simscen.loading.scenario import load_scenario
+from simscen.model.stack import StackSpec
+from simscen.stack.build import build_stack
+from simscen.stack.protocols import NavigationFailure
+from simscen.testing.flatland import RATE, Drive, Flatland, drive, round_robot
+
+ODD = '''
+import math
+
+import numpy as np
+
+from simscen.core.belief import Belief
+from simscen.core.motion import STOP, Twist
+from simscen.core.navigation import Path
+from simscen.core.trace import Decision
+from simscen.model.stack import (BehaviorSpec, ControllerSpec, GoalCheckerSpec, InProcessStack, LocalizerSpec,
+                                 OmplPlanner, PlannerSpec, RegulatedPurePursuit)
+from simscen.spec.quantities import PositiveLength
+from simscen.stack.planners.build import ompl_planner
+
+
+class Straight(PlannerSpec):
+    """A straight line."""
+
+    component = "odd:StraightPlanner"
+    spacing: PositiveLength = 0.05
+    """Between two points."""
+    does: str = ""
+
+
+class StraightPlanner:
+    def __init__(self, spec, setting):
+        self.spec, self.setting = spec, setting
+        setting.chance.random(1000)
+        if spec.does == "not begin":
+            raise OSError("no such model")
+
+    def plan(self, costmap, start, goal, seed):
+        count = max(2, math.ceil(start.distance(goal) / self.spec.spacing) + 1)
+        points = np.array(start) + np.linspace(0, 1, count)[:, None] * (np.array(goal) - np.array(start))
+        match self.spec.does:
+            case "raise":
+                return {}["no such key"]
+            case "raise deep":
+                return np.linalg.inv(np.zeros((2, 2)))
+            case "nan":
+                points[1, 0] = math.nan
+            case "shape":
+                points = points[:, :2]
+            case "list":
+                return points.tolist()
+            case "nothing":
+                points = points[:0]
+            case "elsewhere":
+                points = points + 0.5
+        return Path(points)
+
+
+class Careful(PlannerSpec):
+    """OMPL's, drawing a lot."""
+
+    component = "odd:careful"
+
+
+def careful(spec, setting):
+    setting.chance.random(1000)
+    return ompl_planner(OmplPlanner(), setting)
+
+
+class Wild(ControllerSpec):
+    component = "odd:WildController"
+
+
+class WildController:
+    full_speed, local_plan = 0.5, None
+
+    def __init__(self, spec, setting):
+        pass
+
+    def set_path(self, path):
+        pass
+
+    def set_speed_limit(self, limit):
+        pass
+
+    def command(self, pose, twist, costmap, goal):
+        return Twist(math.inf)
+
+
+class Lost(LocalizerSpec):
+    component = "odd:LostLocalizer"
+
+
+class LostLocalizer:
+    def __init__(self, spec, setting):
+        pass
+
+    def reset(self, estimate):
+        self.belief = Belief(estimate.pose, np.eye(2))
+
+    def on_odometry(self, odometry):
+        pass
+
+    on_scan = on_imu = on_odometry
+
+
+class Half(LocalizerSpec):
+    component = "odd:HalfLocalizer"
+
+
+class HalfLocalizer:
+    def __init__(self, spec, setting):
+        pass
+
+    def reset(self, estimate):
+        pass
+
+
+class Nod(BehaviorSpec):
+    """Wait a little."""
+
+    component = "odd:Nodding"
+    wait_duration: float = 0.2
+
+
+class Nodding:
+    name = "nod"
+
+    def __init__(self, spec, setting):
+        self.spec = spec
+
+    def start(self, pose):
+        pass
+
+    def step(self, pose, costmap, seconds):
+        return STOP if seconds < self.spec.wait_duration else None
+
+
+class Unsure(GoalCheckerSpec):
+    component = "odd:UnsureChecker"
+
+
+class UnsureChecker:
+    def __init__(self, spec, setting):
+        pass
+
+    def reset(self):
+        pass
+
+    def reached(self, goal, pose, twist):
+        return "perhaps"
+
+
+class Still(InProcessStack):
+    """Does nothing."""
+
+    component = "odd:StillStack"
+    patience: float = 1.0
+
+
+class StillStack:
+    plan = goal = None
+
+    def __init__(self, spec, setting):
+        self.setting = setting
+
+    def start(self, estimate, goals):
+        pass
+
+    def preempt(self, tick, goal):
+        pass
+
+    cancel = preempt
+
+    def decide(self, tick, readings):
+        return Decision(STOP) if tick < 60 else "stop"
+'''
+POINTS = {
+    "planner": {"straight": "odd:Straight", "careful": "odd:Careful", "gone": "odd:Gone", "foreign": "odd:Wild"},
+    "controller": {"wild": "odd:Wild"},
+    "localizer": {"lost": "odd:Lost", "half": "odd:Half"},
+    "behavior": {"nod": "odd:Nod"},
+    "goal_checker": {"unsure": "odd:Unsure"},
+    "stack": {"still": "odd:Still"},
+}
+TRUTH = {"type": "ground_truth"}
+
+
+@pytest.fixture
+def odd(packages) -> None:
+    packages("odd", "1.2", POINTS, odd=ODD)
+
+
+def driven(goal: Pose2 = Pose2(2.5, 1.0, 0.0), **stack: object) -> Drive:
+    spec = StackSpec.model_validate({"localizer": TRUTH, **stack})
+    world = Flatland().room(6, 4)
+    world.boxes.append((2.9, 0.0, 3.0, 2.4))
+    return drive(world, Pose2(1, 1), Goal("g", goal), grid=world.grid((-0.5, -0.5, 6.5, 4.5)), spec=spec)
+
+
+def scenario(folder: Path, stack: str) -> Path:
+    file = folder / "a.scenario.yaml"
+    world = "{simscen: 1, walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]}"
+    start = "robot: {model: turtlebot, pose: {x: 1, y: 1}}\ngoals: [{pose: {x: 2, y: 1}}]"
+    file.write_text(
+        f"simscen: 1\nworld: {world}\n{start}\ntime_limit: 20 s\nstack: {stack}\npass: [goals_reached: {{}}]\n"
+    )
+    return file
+
+
+def test_a_planner_of_a_package_is_chosen_by_its_type_and_drives(odd) -> None:
+    d = driven(planner={"type": "straight", "spacing": "4 cm"}).run(30)
+    assert d.result == "SUCCEEDED"
+    assert np.hypot(*np.diff(d.plans[0].points[:, :2], axis=0).T).max() <= 0.04
+
+
+@pytest.mark.parametrize(
+    ("stack", "told"),
+    [
+        ("{planner: {type: strait}}", "`strait` is not one of the choices"),
+        ("{planner: {type: straight, spacin: 1}}", "unknown key `spacin` in `stack.planner`"),
+        ("{planner: {type: straight, spacing: -1}}", "must be greater than 0"),
+        ("{planner: {type: gone}}", "planner `gone` of odd 1.2 cannot be used: `odd:Gone` is not there"),
+        ("{planner: {type: foreign}}", "is no simscen.model.stack.PlannerSpec"),
+        ("{recovery: {behaviors: [nood]}}", "`nood` is not one of the choices"),
+        ("{recovery: {behaviors: [{type: nood}]}}", "`nood` is not one of the choices"),
+        ("{type: stil}", "`stil` is not one of the choices"),
+        ("{type: still, patiance: 1}", "unknown key `patiance` in `stack`"),
+    ],
+)
+def test_a_mistake_is_told_at_its_place(odd, tmp_path: Path, stack: str, told: str) -> None:
+    with pytest.raises(InvalidInput) as wrong:
+        load_scenario(scenario(tmp_path, stack), tmp_path)
+    (problem,) = wrong.value.problems
+    assert told in problem.message
+    assert problem.line == 6
+    if told.startswith("`"):
+        assert problem.hint.startswith("did you mean"), problem.hint
+
+
+@pytest.mark.parametrize(
+    ("does", "kind", "told"),
+    [
+        ("raise", "crashed", "KeyError: 'no such key' (odd.py:37)"),
+        ("raise deep", "crashed", "LinAlgError: Singular matrix (odd.py:39)"),
+        ("not begin", "crashed", "OSError: no such model (odd.py:30)"),
+        ("nan", "broken-component", "returned a path with points that are no finite numbers"),
+        ("shape", "broken-component", "returned a path whose points are (31, 2) instead of (n, 3): x, y, yaw"),
+        ("list", "broken-component", "returned list instead of a Path"),
+        ("nothing", "broken-component", "returned a path without points"),
+        ("elsewhere", "broken-component", "begins at (1.50, 1.50), not at the start (1.00, 1.00)"),
+    ],
+)
+def test_a_planner_that_breaks_ends_the_run_with_its_name(odd, does: str, kind: str, told: str) -> None:
+    with pytest.raises(RunError) as broken:
+        driven(planner={"type": "straight", "does": does}).run(1)
+    assert broken.value.kind == kind
+    assert str(broken.value).startswith("planner `straight` (odd:StraightPlanner)")
+    assert told in str(broken.value)
+
+
+def test_a_path_through_a_wall_ends_the_run(odd) -> None:
+    with pytest.raises(RunError, match=r"through an obstacle: the cell at \(2\.9., 1\.00\) is lethal"):
+        driven(Pose2(5.0, 1.0, 0.0), planner={"type": "straight"}).run(1)
+
+
+@pytest.mark.parametrize(
+    ("stack", "told"),
+    [
+        ({"controller": {"type": "wild"}}, "controller `wild` (odd:WildController) commanded (inf, 0.0, 0.0)"),
+        ({"localizer": {"type": "lost"}}, "localizer `lost` (odd:LostLocalizer) believes with a covariance that is no"),
+        ({"localizer": {"type": "half"}}, "HalfLocalizer has no `on_odometry`, which every localizer has"),
+        ({"goal_checker": {"type": "unsure"}}, "goal_checker `unsure` (odd:UnsureChecker) answered 'perhaps'"),
+    ],
+)
+def test_every_role_is_named_where_it_breaks(odd, stack: dict, told: str) -> None:
+    with pytest.raises(RunError) as broken:
+        driven(**stack).run(1)
+    assert broken.value.kind == "broken-component"
+    assert told in str(broken.value)
+
+
+def test_a_failure_to_navigate_is_no_error_of_the_run(odd) -> None:
+    assert driven(Pose2(40.0, 0.0)).run(5).result == "FAILED"
+
+
+def test_a_behaviour_is_named_or_written_out_and_takes_what_it_does_not_say_from_recovery(odd) -> None:
+    words = ["nod", {"type": "nod", "wait_duration": 1.0}, {"type": "spin", "spin_dist": 3.0}, "spin"]
+    recovery = StackSpec.model_validate(
+        {"recovery": {"behaviors": words, "wait_duration": 2.0, "spin_dist": 1.0}}
+    ).recovery
+    assert recovery.names == ["nod", "nod", "spin", "spin"]
+    nod, long_nod, wide, spin = recovery.chosen()
+    assert (nod.wait_duration, long_nod.wait_duration) == (2.0, 1.0)  # type: ignore[attr-defined]
+    assert (wide.spin_dist, spin.spin_dist) == (3.0, 1.0)  # type: ignore[attr-defined]
+
+
+def test_a_behaviour_of_a_package_runs_and_is_in_the_log_by_its_name(odd) -> None:
+    d = driven(Pose2(2.95, 1.0, 0.0), recovery={"behaviors": ["nod"], "number_of_retries": 2}).run(20)
+    assert [event.name for event in d.kinds("recovery.started")] in ([], ["nod", "nod"])
+    d = driven(Pose2(2.5, 1.0), controller={"type": "regulated_pure_pursuit"}, recovery={"behaviors": ["nod"]})
+    d.world.boxes.append((1.6, 0.0, 1.7, 4.0))
+    d.run(30)
+    assert {event.name for event in d.kinds("recovery.started")} == {"nod"}
+
+
+def test_what_one_component_draws_changes_no_other(odd) -> None:
+    own, others = driven(Pose2(5, 1)), driven(Pose2(5, 1), planner={"type": "careful"})
+    assert own.run(20).commands == others.run(20).commands
+
+
+def test_a_stack_of_a_package_is_checked_beat_by_beat(odd, tmp_path: Path) -> None:
+    spec = load_scenario(scenario(tmp_path, "{type: still, keepout: []}"), tmp_path).spec.stack
+    assert type(pickle.loads(pickle.dumps(spec))) is type(spec)
+    stack = build_stack(spec, driven_setting(), Streams(1), Clock(RATE))
+    assert stack.decide(0, ()).command == (0.0, 0.0, 0.0)
+    with pytest.raises(RunError, match=r"stack `still` \(odd:StillStack\) decided str instead of a Decision"):
+        stack.decide(60, ())
+
+
+def driven_setting():
+    from simscen.stack.protocols import Surroundings
+
+    return Surroundings(round_robot(), None, RATE)
+
+
+def test_a_failure_without_a_code_of_nav2_is_a_broken_promise(odd) -> None:
+    from simscen.model.stack import OmplPlanner
+    from simscen.stack.installed.planner import InstalledPlanner
+    from simscen.testing.flatland import setting
+
+    class Own(OmplPlanner):
+        @classmethod
+        def implementation(cls):
+            return lambda spec, setting: type("P", (), {"plan": staticmethod(fail)})()
+
+    def fail(*asked: object) -> None:
+        raise NavigationFailure(208, "no way")  # type: ignore[arg-type]
+
+    with pytest.raises(RunError, match="fails with 208, which is no ErrorCode"):
+        InstalledPlanner(Own(), setting(round_robot())).plan(None, Pose2(0, 0), Pose2(1, 1), 1)  # type: ignore[arg-type]
+    assert ErrorCode.NO_VALID_PATH == 208
