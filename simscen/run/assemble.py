@@ -8,7 +8,7 @@ from simscen.core.chance import Streams
 from simscen.core.events import Event, EventKind
 from simscen.core.geometry import Array, Pose3
 from simscen.core.sensing import Odometry
-from simscen.core.shapes import TriangleMesh
+from simscen.core.shapes import Body, Solid, TriangleMesh
 from simscen.core.time import Clock
 from simscen.faults.base import Wheels
 from simscen.model.anystack import ExternalStackSpec
@@ -96,7 +96,7 @@ class LiveRays:
 
     def __init__(self, scene: RayScene, simulation: Simulation) -> None:
         self._scene, self._simulation = scene, simulation
-        self._meshes: dict[str, TriangleMesh] = {}
+        self._meshes: dict[str, tuple[tuple[Solid, ...], TriangleMesh]] = {}
 
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
         """See core.rays.RayCaster."""
@@ -104,13 +104,20 @@ class LiveRays:
         return self._scene.cast(origins, directions, reach)
 
     def _placed(self) -> Mapping[str, tuple[TriangleMesh, Pose3]]:
-        moving = self._simulation.moving()
-        for name in self._meshes.keys() - moving.keys():
-            del self._meshes[name]
+        moving, known = self._simulation.moving(), self._meshes
+        self._meshes = {}
         for name, (body, _) in moving.items():
-            if name not in self._meshes:
-                self._meshes[name] = fuse(body.solids)
-        return {name: (self._meshes[name], pose) for name, (_, pose) in moving.items()}
+            before = known.get(name)
+            self._meshes[name] = before if before and before[0] is body.solids else (body.solids, self._fused(body))
+        return {name: (self._meshes[name][1], pose) for name, (_, pose) in moving.items()}
+
+    def _fused(self, body: Body) -> TriangleMesh:
+        """Its surface, which is the same one for all that are alike: a row of chairs is built once."""
+        shapes = [(solid.shape, solid.pose) for solid in body.solids]
+        for solids, mesh in self._meshes.values():
+            if len(solids) == len(shapes) and shapes == [(solid.shape, solid.pose) for solid in solids]:
+                return mesh
+        return fuse(body.solids)
 
 
 class TruthSensor:

@@ -82,10 +82,7 @@ class Actors:
         number = engine.body(
             self._client,
             body.mass if pushable else 0.0,
-            (
-                engine.body_shape(self._client, body.solids, pushable, self._triangulate),
-                engine.body_visual(self._client, body.solids, self._triangulate),
-            ),
+            engine.body_shape(self._client, body.solids, pushable, self._triangulate),
             body.pose,
             frame,
             FRICTION,

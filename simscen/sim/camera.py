@@ -7,34 +7,9 @@ import numpy.typing as npt
 import pybullet
 
 from simscen.core.geometry import Pose3
-from simscen.core.shapes import Mesh, TriangleMesh
 
-FACES_AT_ONCE = 20_000
-"""Bullet's commands hold at most 131072 vertices, and here every face brings its own three."""
 NEAR = 0.02
 """m in front of the lens from which on something is seen."""
-
-
-def visible(client: int, mesh: Mesh) -> int:
-    """A shape for the renderer: it does not see collision shapes made of triangles. Every face has its own normal."""
-    corners = mesh.vertices[mesh.faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    shape: int = pybullet.createVisualShape(
-        pybullet.GEOM_MESH,
-        vertices=corners.reshape(-1, 3).tolist(),
-        indices=list(range(3 * len(corners))),
-        normals=np.repeat(normals, 3, axis=0).tolist(),
-        physicsClientId=client,
-    )
-    return shape
-
-
-def show_static(client: int, mesh: TriangleMesh) -> None:
-    """Let the renderer see what never moves."""
-    for k in range(0, len(mesh.faces), FACES_AT_ONCE):
-        shape = visible(client, Mesh(mesh.vertices, mesh.faces[k : k + FACES_AT_ONCE]))
-        pybullet.createMultiBody(0, -1, shape, physicsClientId=client)
 
 
 def picture(

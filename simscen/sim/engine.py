@@ -8,11 +8,11 @@ import pybullet
 
 from simscen.core.geometry import Array, Pose3
 from simscen.core.shapes import Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere, TriangleMesh
-from simscen.sim.camera import visible
+from simscen.sim.hull import few_corners
 from simscen.sim.inertia import GRAVITY
 from simscen.sim.outline import extremes
 
-FACES_AT_ONCE, VERTICES_AT_ONCE = 40_000, 120_000
+FACES_AT_ONCE = 40_000
 """Bullet's shared-memory commands hold at most 131072 vertices and 524288 indices."""
 STRIP = 20.0
 """m of x that lie together in one lot of faces."""
@@ -149,25 +149,10 @@ def concave_shape(client: int, mesh: Mesh) -> int:
     return _made(shape)
 
 
-def convex_shape(client: int, mesh: Mesh) -> int:
-    """The convex hull of a mesh's vertices."""
-    mesh = _thinned(mesh)
-    shape: int = pybullet.createCollisionShape(
-        pybullet.GEOM_MESH, vertices=mesh.vertices.tolist(), physicsClientId=client
-    )
+def convex_shape(client: int, corners: Array) -> int:
+    """The convex hull of points (n, 3)."""
+    shape: int = pybullet.createCollisionShape(pybullet.GEOM_MESH, vertices=corners.tolist(), physicsClientId=client)
     return _made(shape)
-
-
-def _thinned(mesh: Mesh) -> Mesh:
-    """A mesh of more vertices than Bullet takes at once: those of its convex hull."""
-    if len(mesh.vertices) <= VERTICES_AT_ONCE:
-        return mesh
-    from scipy.spatial import ConvexHull
-
-    corners = mesh.vertices[np.sort(ConvexHull(mesh.vertices).vertices)]
-    if len(corners) > VERTICES_AT_ONCE:
-        raise RuntimeError(f"a convex hull of {len(corners)} corners; PyBullet takes {VERTICES_AT_ONCE}")
-    return Mesh(corners, np.empty((0, 3), np.int32))
 
 
 def compound_shape(client: int, solids: Iterable[Solid]) -> int:
@@ -195,8 +180,11 @@ def compound_shape(client: int, solids: Iterable[Solid]) -> int:
 
 def hull_shape(client: int, solids: Iterable[Solid]) -> int:
     """The convex hull of solids of any kind."""
-    points = np.concatenate([solid.pose.apply(extremes(solid.shape)) for solid in solids])
-    return convex_shape(client, Mesh(points, np.empty((0, 3), np.int32)))
+    return convex_shape(client, np.concatenate([solid.pose.apply(_corners(solid.shape)) for solid in solids]))
+
+
+def _corners(shape: Shape) -> Array:
+    return few_corners(shape) if isinstance(shape, Mesh) else extremes(shape)
 
 
 def hull_shapes(client: int, solids: Sequence[Solid]) -> list[int]:
@@ -212,22 +200,18 @@ def body_shape(client: int, solids: Sequence[Solid], pushable: bool, triangulate
 
     Bullet moves convex shapes only, so what it pushes and cannot build from primitives becomes its convex hull.
     """
-    if _simple(solids):
+    if simple(solids):
         return compound_shape(client, solids)
     return hull_shape(client, solids) if pushable else concave_shape(client, fused(solids, triangulate))
 
 
 def hollow(solids: Sequence[Solid], pushable: bool) -> bool:
     """Whether the collision shape of something that moves is a surface without an inside."""
-    return not _simple(solids) and not pushable
+    return not simple(solids) and not pushable
 
 
-def body_visual(client: int, solids: Sequence[Solid], triangulate: Triangulate) -> int:
-    """What the renderer shows of it; -1 where that is the collision shape itself."""
-    return -1 if _simple(solids) else visible(client, fused(solids, triangulate))
-
-
-def _simple(solids: Sequence[Solid]) -> bool:
+def simple(solids: Sequence[Solid]) -> bool:
+    """Whether the engine knows all of them as such."""
     return all(isinstance(solid.shape, PRIMITIVES) for solid in solids)
 
 
@@ -240,15 +224,15 @@ def fused(solids: Sequence[Solid], triangulate: Triangulate) -> Mesh:
     return Mesh(vertices, np.concatenate(faces))
 
 
-def body(client: int, mass: float, shapes: tuple[int, int], pose: Pose3, frame: Frame, friction: float) -> int:
-    """A rigid body of a collision and a visual shape, with principal moments and centre of mass in `frame`.
+def body(client: int, mass: float, shape: int, pose: Pose3, frame: Frame, friction: float) -> int:
+    """A rigid body of a collision shape, with principal moments and centre of mass in `frame`.
 
     Nothing pushes one of mass 0.
     """
     moments, base_from_centre = frame
     centre = pose.compose(base_from_centre)
     number: int = pybullet.createMultiBody(
-        mass, *shapes, pose.position, pose.quaternion,
+        mass, shape, -1, pose.position, pose.quaternion,
         baseInertialFramePosition=base_from_centre.position,
         baseInertialFrameOrientation=base_from_centre.quaternion, physicsClientId=client,
     )  # fmt: skip
@@ -273,7 +257,7 @@ def wake(client: int, number: int, may_sleep: bool) -> None:
 
 def fixed(client: int, shape: int) -> int:
     """A body that never moves."""
-    return body(client, 0.0, (shape, -1), Pose3(), ((0.0, 0.0, 0.0), Pose3()), 1.0)
+    return body(client, 0.0, shape, Pose3(), ((0.0, 0.0, 0.0), Pose3()), 1.0)
 
 
 def _primitive(shape: Shape) -> tuple[int, Sequence[float], float, float]:

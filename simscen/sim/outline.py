@@ -9,6 +9,8 @@ from simscen.core.geometry import Array
 from simscen.core.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Shape, Solid, Sphere
 from simscen.core.world import Polygon
 
+FEW = 200
+"""Points up to which it does not pay to look which of them may be corners."""
 _CIRCLE = 64
 """Corners of a circle's outline: within 0.03 % of the radius."""
 
@@ -70,10 +72,24 @@ def reach(solids: Iterable[Solid]) -> tuple[float, float]:
 
 def convex_hull(points: Array) -> Polygon:
     """The convex hull of points (n, 2), anticlockwise (Andrew's monotone chain, 1979)."""
-    ordered = sorted({(round(x, 9), round(y, 9)) for x, y in points.tolist()})
+    ordered = sorted({(round(x, 9), round(y, 9)) for x, y in _outer(points).tolist()})
     if len(ordered) < 3:
         return tuple(ordered)
     return (*_chain(ordered)[:-1], *_chain(ordered[::-1])[:-1])
+
+
+def _outer(points: Array) -> Array:
+    """Without most of those that are no corners: they lie inside of what spans the outermost (Akl, Toussaint 1978)."""
+    if len(points) < FEW:
+        return points
+    angles = np.arange(32) * (math.pi / 16)
+    outermost = (points @ np.array([np.cos(angles), np.sin(angles)])).argmax(axis=0)
+    ring = points[outermost]
+    sides = np.roll(ring, -1, axis=0) - ring
+    across = (points @ np.array([-sides[:, 1], sides[:, 0]])) - (ring[:, 1] * sides[:, 0] - ring[:, 0] * sides[:, 1])
+    inside = ((across > 1e-6) | (np.abs(sides).sum(axis=1) == 0.0)).all(axis=1)
+    kept: Array = points[~inside]
+    return kept
 
 
 def _chain(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:

@@ -98,7 +98,7 @@ class Proximity:
     def _build(self, part: int) -> list[int]:
         vertices, faces = self._mesh.vertices, self._mesh.faces[self._parts.faces(part)]
         if self._parts.whole(part) and engine.is_convex(engine.compact(vertices, faces)):
-            shapes = [engine.convex_shape(self._client, engine.compact(vertices, faces))]
+            shapes = [engine.convex_shape(self._client, engine.compact(vertices, faces).vertices)]
         else:
             lots = engine.tiles(vertices, engine.above_floor(vertices, faces))
             shapes = [engine.concave_shape(self._client, engine.compact(vertices, lot)) for lot in lots]

@@ -15,10 +15,11 @@ from simscen.core.shapes import Body, MotionPath, TriangleMesh
 from simscen.core.trace import Truth
 from simscen.sim import engine
 from simscen.sim.actors import Actors
-from simscen.sim.camera import picture, show_static
+from simscen.sim.camera import picture
 from simscen.sim.clearance import Clearance
 from simscen.sim.contacts import Contacts, Motion, inside, touches
 from simscen.sim.drives import build
+from simscen.sim.film import Film
 from simscen.sim.lost import lost
 from simscen.sim.robot_body import RobotBody
 from simscen.sim.vehicle import base_twist
@@ -54,7 +55,7 @@ class Simulation:
         self._client = engine.connect(tick_rate, solver_iterations)
         engine.ground(self._client)
         self._static = engine.static_mesh(self._client, static)
-        self._mesh, self._filmed = static, False
+        self._film = Film(self._client, static, triangulate)
         self._actors = Actors(self._client, tick_rate, triangulate)
         self._firmware = max(1, round(tick_rate / FIRMWARE_RATE))
         self._base, self._drive = build(self._client, robot, pose, self._firmware / tick_rate)
@@ -195,9 +196,7 @@ class Simulation:
     ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float32]]:
         """What a camera at `mount` in the base frame sees; see `camera.picture`."""
         self._actors.show(self.tick)
-        if not self._filmed:
-            show_static(self._client, self._mesh)
-            self._filmed = True
+        self._film.set(self._actors.placed(self.tick))
         return picture(self._client, self._base.pose().compose(mount), width, height, field_of_view, far)
 
     def close(self) -> None:

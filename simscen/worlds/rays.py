@@ -34,11 +34,13 @@ class RayScene:
     def __init__(self, static: TriangleMesh) -> None:
         self._device = EmbreeDevice()
         self._static = _Part(self._device, static)
+        self._parts: dict[int, _Part] = {}
         self._movers: dict[str, _Mover] = {}
         self._solid: list[_Mover] = []
 
     def set_moving(self, bodies: Mapping[str, Placed]) -> None:
         """Say where the bodies are now: by name, the triangles in a body's frame and the pose of that frame."""
+        self._parts = {id(mesh): self._parts.get(id(mesh)) or _Part(self._device, mesh) for mesh, _ in bodies.values()}
         movers = {name: self._mover(name, mesh, pose) for name, (mesh, pose) in bodies.items()}
         if movers != self._movers:
             self._movers, solid = movers, [mover for mover in movers.values() if len(mover.part.mesh.faces)]
@@ -54,10 +56,8 @@ class RayScene:
         return np.where(distances <= min(reach, _NO_HIT), distances, np.inf).astype(np.float64)
 
     def _mover(self, name: str, mesh: TriangleMesh, pose: Pose3) -> "_Mover":
-        known = self._movers.get(name)
-        if known is None or known.part.mesh is not mesh:
-            return _Mover(_Part(self._device, mesh), pose)
-        return known if known.pose == pose else _Mover(known.part, pose)
+        known, part = self._movers.get(name), self._parts[id(mesh)]
+        return known if known and known.part is part and known.pose == pose else _Mover(part, pose)
 
     def _near(
         self, origins: Array, directions: Array, ends: Singles

@@ -48,3 +48,23 @@ def test_a_circle_has_its_corners_on_the_circle_anticlockwise():
     corners = circle(0.22)
     assert [math.hypot(x, y) for x, y in corners] == pytest.approx([0.22] * len(corners))
     assert Polygon(corners).exterior.is_ccw
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("shape", ["cloud", "disc", "square", "line", "far", "same"])
+def test_the_hull_of_many_points_is_shapelys(shape, seed):
+    """Of many, most are left out beforehand; none of the corners is."""
+    rng = np.random.default_rng(seed)
+    cloud = rng.normal(size=(3000, 2))
+    points = {
+        "cloud": cloud,
+        "disc": cloud / np.linalg.norm(cloud, axis=1, keepdims=True),
+        "square": rng.integers(0, 30, (3000, 2)) * 0.1,
+        "line": np.column_stack((cloud[:, 0], 2 * cloud[:, 0])),
+        "far": cloud * 0.01 + 1e4,
+        "same": np.ones((3000, 2)),
+    }[shape]
+    ours = MultiPoint(convex_hull(points)).convex_hull
+    theirs = MultiPoint(points).convex_hull
+    assert ours.hausdorff_distance(theirs) <= 2e-6
+    assert ours.area == pytest.approx(theirs.area, rel=1e-6, abs=1e-9)

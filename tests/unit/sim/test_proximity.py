@@ -9,7 +9,7 @@ from playground import box, shipped
 from simscen.core.geometry import Pose3
 from simscen.core.shapes import Box, Cylinder, Extrusion, Mesh, Solid
 from simscen.sim.embody import robot_body
-from simscen.sim.engine import convex_shape, fixed, tiles
+from simscen.sim.engine import fixed, hull_shape, tiles
 from simscen.sim.proximity import Proximity, point_to_triangles
 from simscen.worlds.meshing import fuse
 
@@ -91,7 +91,7 @@ def test_every_face_is_in_one_tile():
 def test_a_hull_of_more_corners_than_bullet_takes_at_once_is_that_of_its_outermost():
     points = np.random.default_rng(4).uniform(-0.2, 0.2, size=(150_000, 3))
     made = Proximity(fuse([]), robot_body(shipped("turtlebot")), 2.0)
-    shape = convex_shape(made._client, Mesh(points, np.empty((0, 3), np.int32)))
+    shape = hull_shape(made._client, [Solid(Mesh(points, np.empty((0, 3), np.int32)), Pose3(), "cloud")])
     low, high = pybullet.getAABB(fixed(made._client, shape), physicsClientId=made._client)
     assert low == pytest.approx(points.min(axis=0), abs=0.05)
     assert high == pytest.approx(points.max(axis=0), abs=0.05)
