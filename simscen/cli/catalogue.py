@@ -14,7 +14,7 @@ from pydantic_core import PydanticUndefined
 from simscen.actions.action import AnyAction
 from simscen.criteria.criterion import AnyCriterion
 from simscen.faults.fault import AnyFault
-from simscen.model import anystack, robot, scenario, stack, world
+from simscen.model import anystack, robot, scenario, stack, stackfile, userconfig, world
 from simscen.model.disturbance import EventEntry, FaultEntry
 from simscen.model.rosmap import RosMapSpec
 from simscen.spec import bytype, registry
@@ -85,6 +85,7 @@ def topics(installed: bool = False) -> list[Topic]:
         *(_topic("scenario", name, model) for name, model in _SCENARIO.items()),
         *(_topic("stack", name, model) for name, model in _STACK.items()),
         *_more("stack", installed),
+        *(_topic("stack file", name, model) for name, model in _STACK_FILES.items()),
         *(_topic("localizer", kind, model) for kind, model in by_type(stack.Localizer)),
         *_more("localizer", installed),
         *_more("planner", installed),
@@ -125,6 +126,11 @@ _BEHAVIORS: dict[str, type[BaseModel]] = {
     "spin": stack.Spin,
     "wait": stack.Wait,
     "backup": stack.BackUp,
+}
+_STACK_FILES: dict[str, type[BaseModel]] = {
+    "stack file": stackfile.StackFileSpec,
+    "configuration": userconfig.UserConfigSpec,
+    "stacks": userconfig.StackCommandSpec,
 }
 _WORLD: dict[str, type[BaseModel]] = {
     "world": world.WorldSpec,

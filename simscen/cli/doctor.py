@@ -1,6 +1,7 @@
 """`simscen doctor`."""
 
 import hashlib
+import shlex
 import shutil
 import sys
 import tempfile
@@ -12,7 +13,7 @@ from pathlib import Path
 from simscen.cli import machine
 from simscen.cli.diagnostics import harmless, print_text
 from simscen.cli.machine import Ill
-from simscen.core.errors import Exit, SimscenError
+from simscen.core.errors import Exit, InvalidInput, SimscenError
 
 SCENARIO = """\
 simscen: 1
@@ -34,8 +35,9 @@ def command() -> None:
     """Check that this installation can run scenarios.
 
     Python, packages and their versions, what Linux must offer, limits of memory and files, room on the disk; one second
-    of a real run, twice, whose logs must be equal; and the speed of a patrol, beside PyBullet alone. What is not well
-    is told with what helps. Exit code 0: all is well; 3: something is not.
+    of a real run, twice, whose logs must be equal; and the speed of a patrol, beside PyBullet alone. Also what your own
+    configuration says that the names of external stacks run, and whether these programs are there. What is not well is
+    told with what helps. Exit code 0: all is well; 3: something is not.
     """
     well = True
     for name, check in checks():
@@ -59,6 +61,7 @@ def checks() -> Iterator[Check]:
     yield "shared", machine.shared_memory
     yield "temporary", partial(machine.writable, Path(tempfile.gettempdir()))
     yield "here", partial(machine.room, Path.cwd())
+    yield "stacks", stacks
     yield "run", run_twice
     yield "speed", speed
 
@@ -69,6 +72,22 @@ def _line(sign: str, name: str, told: str) -> str:
     first = f"  {sign} {name:10} "
     wrapper = textwrap.TextWrapper(width, first, " " * INDENT, break_long_words=False, break_on_hyphens=False)
     return wrapper.fill(told)
+
+
+def stacks() -> str:
+    """What the names of external stacks run, by the user's own configuration."""
+    from simscen.cli.called import config_file, environment
+    from simscen.loading.userconfig import load_config
+
+    try:
+        config = load_config(config_file())
+        commands = {name: config.command(name, environment(), Path.cwd()) for name in config.spec.stacks}
+    except InvalidInput as error:
+        raise Ill(str(error)) from error
+    if config.tree is None:
+        return f"no {config.file}, so --stack alone says what external stacks run"
+    told = ", ".join(f"{name} = {shlex.join(command.argv)}" for name, command in commands.items() if command)
+    return f"{config.file}: {told or 'no stacks'}"
 
 
 def speed() -> str:

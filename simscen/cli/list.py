@@ -11,6 +11,7 @@ from simscen.loading.discovery import default_root, discover
 from simscen.loading.keywords import select
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import try_scenario
+from simscen.model.anystack import ExternalStackSpec
 
 
 def command(
@@ -22,7 +23,8 @@ def command(
 ) -> None:
     """List the scenarios that a selection means.
 
-    One line each: id, name and tags. Exit code 0; 2 if a scenario is invalid; 5 if nothing is selected.
+    One line each: id, name, tags and the external stack that it names. Exit code 0; 2 if a scenario is invalid; 5 if
+    nothing is selected.
     """
     home = root if root is not None else default_root(paths)
     tried = [try_scenario(file, home, world_path or ()) for file in discover(paths, home)]
@@ -31,8 +33,13 @@ def command(
     chosen = select([found for found in tried if isinstance(found, LoadedScenario)], keyword, tag or ())
     width = max(len(scenario.id) for scenario in chosen)
     for scenario in chosen:
-        about = f"{scenario.spec.name or ''} {_tags(scenario)}"
+        about = f"{scenario.spec.name or ''} {_tags(scenario)} {_stack(scenario)}"
         print_text(f"{harmless(scenario.id):{width}}  {harmless(about)}".rstrip())
+
+
+def _stack(scenario: LoadedScenario) -> str:
+    stack = scenario.spec.stack
+    return f"(stack {stack.external})" if isinstance(stack, ExternalStackSpec) else ""
 
 
 def _tags(scenario: LoadedScenario) -> str:

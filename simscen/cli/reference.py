@@ -18,6 +18,11 @@ _GROUPS = {
     "criterion": ("Criteria", "Entries of `pass`: exactly one of these, with modifiers beside it."),
     "scenario": ("Scenario files", "`*.scenario.yaml`. `extends: FILE` takes what is not given from another file."),
     "stack": ("The stack", "Under `stack`; every key may be left out."),
+    "stack file": (
+        "Stacks from outside",
+        "`*.stack.yaml`, given as `--stack NAME=FILE`; and the user's own configuration, which says what the names of "
+        "external stacks run.",
+    ),
     "localizer": ("Localizers", "Under `stack.localizer`, told apart by `type`; `amcl` where it is left out."),
     "controller": ("Controllers", "Under `stack.controller`, told apart by `type`."),
     "behavior": (

@@ -1,6 +1,7 @@
 """`simscen report`."""
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +11,8 @@ from simscen.cli.diagnostics import print_text
 from simscen.cli.reports import JunitFamily, Reports, require_writable, verdict
 from simscen.cli.screen import Format, screen
 from simscen.core.errors import Exit
+from simscen.core.result import RunResult
+from simscen.core.sessionevents import RunFinished
 from simscen.judge.measure.compare import compare
 from simscen.judge.measure.suite import suite, told
 from simscen.report.journal import require_free
@@ -45,6 +48,16 @@ def command(
         written = reports.write(answers, comparison)
         shown(reports.closing(answers, past.wall, past.interrupted, comparison))
     if format_ is Format.TEXT:
-        print_text(told(suite(answer.result for answer in answers)))
+        for stack, results in _by_stack(answers).items():
+            print_text(f"{stack}: {told(suite(results))}" if stack else told(suite(results)))
     code = verdict(answers) if written else Exit.INCOMPLETE
     sys.exit(shown.exit(code))
+
+
+def _by_stack(answers: Sequence[RunFinished]) -> dict[str, list[RunResult]]:
+    """The results of each stack, in the order of the first of each; second runs are no more evidence."""
+    found: dict[str, list[RunResult]] = {}
+    for answer in answers:
+        if not answer.key.repeats:
+            found.setdefault(answer.key.variation, []).append(answer.result)
+    return found

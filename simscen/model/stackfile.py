@@ -12,8 +12,9 @@ from simscen.spec.places import Name
 class StackFileSpec(Spec):
     """A stack that `--stack NAME=FILE` runs scenarios with: a `stack:` section as a scenario has it.
 
-    It is the whole stack: what it does not say is at its default, whatever the scenarios say. Only keepout regions,
-    speed zones and filter masks are the scenario's, in its own `stack:` section.
+    It is the whole stack: what it does not say is at its default, whatever the scenarios say. Only what is asked of any
+    stack is the scenario's, in its own `stack:` section: keepout regions, speed zones, filter masks, and tolerances of
+    goals where it gives them.
     """
 
     simscen: Literal[1]

@@ -32,7 +32,8 @@ def project(tmp_path_factory):
 
 @pytest.mark.parametrize("block", blocks())
 def test_a_complete_example_is_valid(block, project):
-    kind = "scenario" if "\npass:" in block else "robot" if "\ndrive:" in block else "world"
+    told = {"\npass:": "scenario", "\ndrive:": "robot", "\nstack:": "stack"}
+    kind = next((kind for key, kind in told.items() if key in block), "world")
     folder = "scenarios/theme" if "../../worlds" in block else "scenarios"
     file = project / folder / f"example.{kind}.yaml"
     file.write_text(block, encoding="utf-8")

@@ -21,6 +21,12 @@ def test_each_scenario_is_a_line(simscen) -> None:
     )
 
 
+def test_an_external_stack_is_named(simscen, tmp_path: Path) -> None:
+    file = tmp_path / "faults/slip.scenario.yaml"
+    file.write_text(file.read_text() + "stack: {external: mine}\n")
+    assert simscen("list", "faults").out.splitlines()[-1].split() == ["faults/slip", "(stack", "mine)"]
+
+
 def test_keyword_and_tag_select(simscen) -> None:
     assert simscen("list", ".", "-k", "faults and not slip").out.split()[0] == "faults/off"
     assert simscen("list", ".", "--tag", "smoke", "--tag", "lidar").out.count("\n") == 2
