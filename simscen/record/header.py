@@ -34,7 +34,7 @@ class LogHeader:
 
     `name` is the scenario's id, `scenario` its resolved YAML text. `map` is what the robot was given. `frames` are
     where sensors sit on the robot's base; a lidar that is not among them is placed by its first scan. `sensors` are
-    their kinds by name, in the order in which they get their topics; a log that is read does not know them.
+    the kinds of their readings by name, in the order in which they get their topics; a log that is read does not know.
     `robot_description` is URDF. `files` travel along under their names, `facts` as metadata; neither may hold a wall
     clock, a host or a process number, or equal runs would differ.
     """

@@ -16,19 +16,19 @@ from simscen.record.topics import Out, Topic
 
 _START: Stamp = (0, 0)
 _PLAIN = {
-    "lidar": ("scan", topics.SCAN_TYPE),
-    "odometry": ("odom", topics.ODOMETRY_TYPE),
-    "imu": ("imu", topics.IMU_TYPE),
-    "bumper": ("bumper", topics.BUMPER_TYPE),
+    "Scan": ("scan", topics.SCAN_TYPE),
+    "Odometry": ("odom", topics.ODOMETRY_TYPE),
+    "Imu": ("imu", topics.IMU_TYPE),
+    "Bump": ("bumper", topics.BUMPER_TYPE),
 }
-"""Kind of sensor → its plain topic, and the type of it."""
+"""Kind of reading, a class of simscen.core.sensing → its plain topic, and the type of it."""
 
 
 class SensorTopics:
     """Writes readings. The first sensor of a kind gets the plain topic, others theirs under their name.
 
-    `sensors` are their kinds by name, in order, as far as they are known; of others the first that speaks is the first.
-    `declared` are the known ones with their topics.
+    `sensors` are the kinds of their readings by name, in order, as far as known; of others the first that speaks is the
+    first. `declared` are the known ones with their topics.
 
     Messages are written when the stack received them; their header's stamp is when they were measured.
     """
@@ -78,11 +78,11 @@ class SensorTopics:
 
     def topic_of(self, reading: Odometry | Scan) -> Topic:
         """The topic on which a reading is written."""
-        plain, kind = _PLAIN["odometry" if isinstance(reading, Odometry) else "lidar"]
+        plain, kind = _PLAIN[type(reading).__name__]
         return self._topic(reading.sensor, plain, kind)
 
     def _known(self, sensor: str, kind: str) -> list[Topic]:
-        if kind == "camera":
+        if kind == "Image":
             return [image for image, _ in _images(sensor)]
         return [self._topic(sensor, *_PLAIN[kind])] if kind in _PLAIN else []
 

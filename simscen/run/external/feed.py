@@ -30,7 +30,7 @@ class Feed:
     """Collects what is to be said with the next step."""
 
     def __init__(self, tick_rate: int, sensors: Mapping[str, str], mounts: Mapping[str, Pose3]) -> None:
-        """`sensors` are the kinds of sensors by name, in the order of the robot; `mounts` where they sit on it."""
+        """`sensors` are the kinds of readings by sensor, in the order of the robot; `mounts` where they sit on it."""
         self._waiting: Messages = []
         self._numbers: dict[str, int] = {}
         self._heard: Collection[str] = ()

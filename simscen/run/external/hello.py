@@ -96,7 +96,7 @@ def _robot(robot: RobotModel) -> dict[str, Any]:
 
 def _sensor(name: str, ordered: Ordered) -> dict[str, Any]:
     mount = ordered.mounts.get(name)
-    return {"kind": ordered.sensors[name], "rate": ordered.rates.get(name), "mount": mount and list(mount)}
+    return {"says": ordered.sensors[name], "rate": ordered.rates.get(name), "mount": mount and list(mount)}
 
 
 def _topic(topic: Topic, number: int, sensor_of: dict[str, str]) -> dict[str, Any]:
