@@ -88,6 +88,7 @@ def _outer(points: Array) -> Array:
     sides = np.roll(ring, -1, axis=0) - ring
     across = (points @ np.array([-sides[:, 1], sides[:, 0]])) - (ring[:, 1] * sides[:, 0] - ring[:, 0] * sides[:, 1])
     inside = ((across > 1e-6) | (np.abs(sides).sum(axis=1) == 0.0)).all(axis=1)
+    inside[outermost] = False
     kept: Array = points[~inside]
     return kept
 

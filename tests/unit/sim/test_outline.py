@@ -65,6 +65,4 @@ def test_the_hull_of_many_points_is_shapelys(shape, seed):
         "same": np.ones((3000, 2)),
     }[shape]
     ours = MultiPoint(convex_hull(points)).convex_hull
-    theirs = MultiPoint(points).convex_hull
-    assert ours.hausdorff_distance(theirs) <= 2e-6
-    assert ours.area == pytest.approx(theirs.area, rel=1e-6, abs=1e-9)
+    assert ours.hausdorff_distance(MultiPoint(points).convex_hull) <= 2e-9
