@@ -1,0 +1,89 @@
+"""The warm process, which is started in isolation, finds the packages that the command line found."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from simscen.run.process.whereabouts import whereabouts
+from simscen.spec.registry import Entry, installed
+
+ROOT = Path(__file__).parents[2]
+ISOLATED = (
+    f"import sys; sys.path.insert(0, {str(ROOT)!r});"
+    "from simscen.run.process.whereabouts import settle_in; settle_in(sys.argv[1]);"
+    "from simscen.spec.registry import installed;"
+    "print([(entry.version, entry.load().__module__) for entry in installed('criterion')], sys.path.index({0!r}))"
+)
+
+
+def isolated(told: str, folder: Path) -> str:
+    """What a process finds that knows nothing of this one's environment but what it is told."""
+    code = ISOLATED.replace("{0!r}", repr(str(folder)))
+    done = subprocess.run([sys.executable, "-I", "-c", code, told], capture_output=True, text=True, check=False, env={})
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+def test_nothing_is_told_where_nothing_is_used() -> None:
+    assert whereabouts([]) == ()
+
+
+def test_a_package_on_the_path_is_found_behind_all_that_was_there(yardwork) -> None:
+    (told,) = whereabouts(installed("criterion"))
+    found, place = isolated(told, yardwork).rsplit(" ", 1)
+    assert found == "[('1.2', 'yardwork.dwell')]"
+    assert int(place) > 2
+
+
+def test_the_users_own_packages_are_found_with_those_that_a_pth_file_leads_to(tmp_path, packages) -> None:
+    """As an editable installation in the user's site-packages lies there."""
+    from_home, source = tmp_path / "home", tmp_path / "source"
+    lay = packages.lay  # type: ignore[attr-defined]
+    text = "from simscen.core.verdict import Finding\nfrom simscen.criteria.base import Criterion\n"
+    text += "from simscen.spec.base import Spec\n"
+    text += "class Mine(Spec, Criterion):\n    def judge(self, trace, case): return []\n"
+    lay(source, "elsewhere", "0", {}, mine=text)
+    lay(from_home, "mine", "3.0", {"criterion": {"mine": "mine:Mine"}})
+    (from_home / "mine.pth").write_text(f"{source}\n")
+    used = [["mine", str(from_home)]]
+    told = json.dumps({"path": [str(from_home)], "user": str(from_home), "used": used})
+    assert isolated(told, from_home).startswith("[('3.0', 'mine')]")
+
+
+def test_of_two_versions_the_one_is_taken_that_was_validated(tmp_path, packages) -> None:
+    lay, old, new = packages.lay, tmp_path / "old", tmp_path / "new"  # type: ignore[attr-defined]
+    for folder, version in ((old, "1.0"), (new, "2.0")):
+        text = (ROOT / "tests/plugins/yardwork/yardwork/dwell.py").read_text()
+        lay(folder, "yard", version, {"criterion": {"dwell": "dwell:Dwell"}}, dwell=text)
+    told = json.dumps({"path": [str(old), str(new)], "user": "", "used": [["yard", str(new)]]})
+    assert isolated(told, new) == "[('2.0', 'dwell')] 0"
+
+
+def test_the_folder_that_the_command_was_called_in_is_not_handed_over(yardwork, tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [str(tmp_path), "", *sys.path])
+    (told,) = whereabouts(
+        [Entry("criterion", "dwell", "yardwork.dwell:Dwell", "yardwork", "1.2", folder=str(yardwork))]
+    )
+    assert str(tmp_path) not in json.loads(told)["path"]
+    assert str(yardwork) in json.loads(told)["path"]
+
+
+def test_pip_installs_what_the_tests_lay_out(tmp_path, yardwork) -> None:
+    """The fixture that lays packages out leaves what an installer leaves."""
+    call = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation", "--no-index"]
+    folder, target = ROOT / "tests/plugins/yardwork", tmp_path / "target"
+    done = subprocess.run([*call, "--target", str(target), str(folder)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    code = (
+        "from simscen.spec.registry import GROUPS, installed; print(*(e.value for g in GROUPS for e in installed(g)))"
+    )
+    env = {**os.environ, "PYTHONPATH": f"{target}{os.pathsep}{ROOT}"}
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=env).stdout
+    assert found.split() == [
+        entry.value
+        for group in ("criterion", "fault", "trigger", "action", "sensor", "metric")
+        for entry in installed(group)
+    ]
