@@ -10,6 +10,7 @@ from pathlib import Path
 
 from simscen.core.externalcommand import ANSWER_LIMIT, START_LIMIT, ExternalCommand, words_of
 from simscen.loading.messages import quoted
+from simscen.loading.paths import exists
 from simscen.loading.source import reason
 
 AT_ONCE = 1 << 20
@@ -48,7 +49,27 @@ def missing(program: str, env: Mapping[str, str], folder: Path) -> str:
         return f"{reason(error)}: {quoted(program)}"
     if not stat.S_ISREG(mode):
         return f"{quoted(program)} is not a program but {'a folder' if stat.S_ISDIR(mode) else 'something else'}"
-    return "" if os.access(file, os.X_OK) else f"permission denied: {quoted(program)} is not executable"
+    if not os.access(file, os.X_OK):
+        return f"permission denied: {quoted(program)} is not executable"
+    return _without_interpreter(program, file)
+
+
+def _without_interpreter(program: str, file: Path) -> str:
+    """Why a script cannot be run, of which the kernel would say that it is the script that does not exist."""
+    try:
+        with file.open("rb") as stream:
+            first = stream.read(256).partition(b"\n")[0]
+    except OSError:  # one that may be run, but not be read
+        return ""
+    if not first.startswith(b"#!"):
+        return ""
+    words = first[2:].decode(errors="replace").split()
+    if first.endswith(b"\r"):
+        return f"the first line of {quoted(program)} ends as on Windows; save it with plain line ends"
+    if not words:
+        return f"the first line of {quoted(program)} names no interpreter"
+    written = quoted("#!" + words[0])
+    return "" if exists(Path(words[0])) else f"{quoted(program)} begins with {written}, which is not there"
 
 
 def _path(env: Mapping[str, str], folder: Path) -> str:

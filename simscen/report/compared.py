@@ -53,6 +53,8 @@ def headline(baseline: str, against: Against) -> str:
     won = sum(flip.passed == against.stack for flip in against.flips)
     lost = len(against.flips) - won
     told = f"{against.stack} against {baseline}: {_pairs(against.pairs)} of the same scenario and seed"
+    if not against.pairs:
+        return f"{against.stack} against {baseline}: nothing to compare"
     if not against.flips:
         return f"{told}, none came out otherwise"
     return f"{told}, {won} better, {lost} worse (p = {against.p:.2g})"

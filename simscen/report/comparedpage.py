@@ -67,7 +67,8 @@ def _against(baseline: str, against: Against) -> str:
         f"<td>{_text(flip.why)}</td></tr>"
         for flip in against.flips
     )
-    heads = "".join(f"<th>{_text(head.format(baseline, against.stack))}</th>" for head in _HEAD)
+    _, *named = (_text(head.format(baseline, against.stack)) for head in _HEAD)
+    heads = "<th></th>" + "".join(f'<th class="margin">{head}</th>' for head in named)
     rows = "".join(_difference(one) for one in against.differences)
     notes = "".join(f'<p class="quiet">{_text(note)}</p>' for note in (parted(against), left_out(against)) if note)
     return (

@@ -29,7 +29,7 @@ summary .name { font-weight: 600; flex: 1; overflow-wrap: anywhere; }
 td, th { text-align: left; padding: 4px 10px 4px 0; border-top: 1px solid #eceef0; vertical-align: top; }
 h2 { font-size: 18px; } h3 { font-size: 15px; margin-bottom: 2px; } section { margin: 18px 0; }
 .clear td:nth-child(5) { font-weight: 600; } .count.good { color: #1c8042; } .count.bad { color: #c81e28; }
-td.margin { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+.margin { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 .bad td:first-child { color: #c81e28; font-weight: 600; } .odd td:first-child { color: #be7800; font-weight: 600; }
 img { max-width: 100%; border: 1px solid #dee0e3; border-radius: 6px; } code, pre { font-size: 13px; }
 pre { background: #f4f5f6; padding: 10px; border-radius: 6px; overflow-x: auto; white-space: pre-wrap; }

@@ -5,6 +5,7 @@ of it, it ends the stack with all that the stack has started. Not for people.
 """
 
 import ctypes
+import errno
 import json
 import os
 import resource
@@ -15,6 +16,7 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 from simscen.run.process.orphans import adopt_orphans, kill_children_but
@@ -44,12 +46,23 @@ def main() -> None:
             preexec_fn=_die_with_keeper,  # noqa: PLW1509 - this program has one thread
         )
     except (OSError, ValueError) as error:
-        _tell(report, {"failed": getattr(error, "strerror", None) or str(error)})
+        _tell(report, {"failed": _why(error)})
         return
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.close(stream)
     _watch(process, control, report)
     _end(process)
+
+
+def _why(error: Exception) -> str:
+    """Why the program could not be started, in more words than the kernel has."""
+    if not isinstance(error, OSError) or error.strerror is None:
+        return str(error)
+    if error.errno == errno.ENOEXEC:
+        return f"{error.strerror}: neither a program for this machine nor a script that begins with #!"
+    if error.errno == errno.ENOENT and error.filename and Path(error.filename).exists():
+        return f"{error.strerror}: it is there, but not what it needs to be run, such as its dynamic linker"
+    return f"{error.strerror}: {error.filename}" if error.filename else error.strerror
 
 
 def _watch(process: "subprocess.Popen[bytes]", control: int, report: int) -> None:

@@ -1,0 +1,163 @@
+"""An external stack meets the environment that its user called simscen with; what keeps it from starting is shown."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SCENARIO = """\
+simscen: 1
+world: {simscen: 1, walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]}
+robot: {pose: {x: 1, y: 1}}
+stack: {external: mine}
+goals: [{pose: {x: 5, y: 3}}]
+time_limit: 1 s
+pass: [{collisions: {max: 0}}]
+"""
+TELLS = "#!/bin/sh\nenv > seen.txt\npwd > where.txt\nulimit -v > memory.txt\nexit 7\n"
+DRIVES = """\
+import os, sys
+sys.path.insert(0, os.environ["SIMSCEN_PEER_PATH"])
+import simscen_peer
+import helper_of_mine
+
+for step in simscen_peer.Peer("mine"):
+    step.drive(helper_of_mine.SPEED, 0.0)
+"""
+
+
+@pytest.fixture
+def run(simscen, tmp_path: Path):
+    """Runs the scenario with a command; gives how it ended and the folder of the run."""
+    (tmp_path / "good.scenario.yaml").unlink()
+    (tmp_path / "mine.scenario.yaml").write_text(SCENARIO)
+
+    def call(command: str, *options: str):
+        return simscen("run", "mine.scenario.yaml", "--stack", f"mine={command}", "--out", "out", *options)
+
+    return call
+
+
+def program(folder: Path, text: str, name: str = "nav") -> Path:
+    file = folder / name
+    file.write_text(text)
+    file.chmod(0o755)
+    return file
+
+
+def test_it_meets_the_environment_and_folder_of_its_user(run, tmp_path: Path, monkeypatch) -> None:
+    program(tmp_path, TELLS)
+    given = {"ROS_DOMAIN_ID": "42", "LD_LIBRARY_PATH": "/opt/x", "PYTHONPATH": "/opt/y", "LINES_": "with\nlines"}
+    for name, value in given.items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.delenv("PYTHONHASHSEED", raising=False)
+    ended = run("./nav")
+    assert ended.code == 3
+    assert "its process exited 7" in ended.out
+    seen = (tmp_path / "seen.txt").read_text()
+    assert all(f"{name}={value}\n" in seen for name, value in given.items())
+    assert "PYTHONHASHSEED" not in seen, "the engine's own"
+    assert "OMP_NUM_THREADS" not in seen or "OMP_NUM_THREADS" in os.environ
+    assert (tmp_path / "where.txt").read_text().strip() == str(tmp_path)
+
+
+def test_its_memory_is_bounded_as_its_user_says_and_not_as_an_engines_is(run, tmp_path: Path) -> None:
+    program(tmp_path, TELLS)
+    run("./nav")
+    own = subprocess.run(["sh", "-c", "ulimit -H -v"], capture_output=True, text=True, check=True).stdout
+    assert (tmp_path / "memory.txt").read_text() == own
+
+
+def test_a_python_stack_finds_what_pythonpath_offers_and_the_engine_does_not(run, tmp_path: Path, monkeypatch) -> None:
+    (tmp_path / "lib").mkdir()
+    (tmp_path / "lib/helper_of_mine.py").write_text("SPEED = 0.1\n")
+    (tmp_path / "lib/numpy.py").write_text("raise RuntimeError('a numpy of the user')\n")
+    (tmp_path / "nav.py").write_text(DRIVES)
+    without = run(f"{sys.executable} nav.py")
+    assert without.code == 3
+    assert "ModuleNotFoundError: No module named 'helper_of_mine'" in without.out
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path / "lib"))
+    shutil.rmtree(tmp_path / "out")
+    ended = run(f"{sys.executable} nav.py")
+    assert ended.code == 0, ended.out
+
+
+def test_nothing_of_the_environment_is_in_what_a_session_leaves(run, tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setenv("MY_TOKEN", "s3cr3t-of-the-user")
+    (tmp_path / "helper_of_mine.py").write_text("SPEED = 0.1\n")
+    (tmp_path / "nav.py").write_text(DRIVES)
+    assert run(f"{sys.executable} nav.py").code == 0
+    files = [file for file in (tmp_path / "out").rglob("*") if file.is_file()]
+    assert len(files) >= 8
+    assert [file for file in files if b"s3cr3t" in file.read_bytes()] == []
+
+
+@pytest.mark.parametrize(
+    ("first", "told"),
+    [
+        ("#!/no/such/python3", "`./nav` begins with `#!/no/such/python3`, which is not there"),
+        ("#!/bin/sh\r", "the first line of `./nav` ends as on Windows; save it with plain line ends"),
+        ("#! ", "the first line of `./nav` names no interpreter"),
+    ],
+)
+def test_a_script_whose_interpreter_is_not_there_is_told_before_anything_runs(run, tmp_path, first, told) -> None:
+    """The kernel would say "no such file or directory" of the script, which is there."""
+    program(tmp_path, f"{first}\nexit 0\n")
+    ended = run("./nav")
+    assert ended.code == 2
+    assert told in ended.err
+
+
+def test_a_program_that_cannot_go_on_is_an_error_with_what_it_printed(run, simscen, tmp_path: Path) -> None:
+    """Each of its own run only."""
+    programs = {
+        "text": ("hello\n", "cannot be started: Exec format error: neither a program for this machine nor a script"),
+        "env": ("#!/usr/bin/env no-such-python\n", "no-such-python"),
+        "shell": ("#!/bin/sh\nno-such-command --x\n", "no-such-command: not found"),
+        "python": (f"#!{sys.executable}\nimport no_such_module\n", "No module named 'no_such_module'"),
+        "silent": ("#!/bin/sh\n", "its process exited 0"),
+    }
+    for name, (text, _) in programs.items():
+        program(tmp_path, text, name)
+    stacks = [word for name in programs for word in ("--stack", f"{name}=./{name}")]
+    ended = simscen("run", "mine.scenario.yaml", *stacks, "--stack", "ref=reference", "--out", "out")
+    assert ended.code == 3
+    listed = json.loads((tmp_path / "out/results.json").read_text())["runs"]
+    errors = {run["variation"]: run["error"] for run in listed}
+    assert errors.pop("ref") is None
+    for name, (_, told) in programs.items():
+        assert errors[name]["kind"] == "stack-crashed"
+        assert told in errors[name]["message"] + errors[name]["tail"]
+        assert told in ended.out
+    assert "nothing to compare" in ended.out
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc to make a program with a library of its own")
+def test_a_library_that_is_missing_is_told_as_the_linker_does_and_found_where_its_user_says(run, tmp_path, monkeypatch):
+    (tmp_path / "lib").mkdir()
+    (tmp_path / "it.c").write_text("int answer(void) { return 42; }\n")
+    (tmp_path / "main.c").write_text("int answer(void); int main(void) { return answer(); }\n")
+    library = str(tmp_path / "lib/libanswer.so")
+    subprocess.run(["gcc", "-shared", "-fPIC", "-o", library, str(tmp_path / "it.c")], check=True)
+    subprocess.run(["gcc", "-o", str(tmp_path / "nav"), str(tmp_path / "main.c"), library[:-3] + ".so"], check=True)
+    (tmp_path / "lib").rename(tmp_path / "elsewhere")
+    monkeypatch.delenv("LD_LIBRARY_PATH", raising=False)
+    without = run("./nav")
+    assert "error while loading shared libraries: " in without.out
+    monkeypatch.setenv("LD_LIBRARY_PATH", str(tmp_path / "elsewhere"))
+    shutil.rmtree(tmp_path / "out")
+    assert "its process exited" in run("./nav").out
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc to make a program with a linker of its own")
+def test_a_program_whose_dynamic_linker_is_not_there_says_so(run, tmp_path: Path) -> None:
+    (tmp_path / "main.c").write_text("int main(void) { return 0; }\n")
+    linker = "-Wl,--dynamic-linker=/no/such/ld.so"
+    subprocess.run(["gcc", linker, "-o", str(tmp_path / "nav"), str(tmp_path / "main.c")], check=True)
+    ended = run("./nav")
+    assert ended.code == 3
+    assert "cannot be started: No such file or directory: it is there, but not what it needs to be run" in ended.out
