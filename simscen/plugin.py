@@ -1,0 +1,252 @@
+"""Everything that an author of plug-ins imports, from one place that stays: `from simscen.plugin import PlannerSpec`.
+
+SI units throughout: metres, seconds, radians, m/s, rad/s. The map frame is that of the robot's map; the base frame has
+x forward and y to the left, and yaw turns anticlockwise. Arrays are numpy's, float64 unless something else is said.
+
+Each name is imported when it is asked for: a specification imports no engine, and validating a scenario imports no more
+than specifications. What is not here may change without notice.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from simscen.actions.base import Action
+    from simscen.core.belief import Belief, Estimate
+    from simscen.core.case import Case
+    from simscen.core.chance import Streams
+    from simscen.core.events import Event, EventKind
+    from simscen.core.geometry import Array, Pose2, Pose3, wrap
+    from simscen.core.grid import OccupancyGrid
+    from simscen.core.motion import STOP, Twist
+    from simscen.core.navigation import ErrorCode, Goal, Path, TaskResult
+    from simscen.core.samples import Samples
+    from simscen.core.sensing import Bump, Image, Imu, Odometry, Reading, Readings, Scan
+    from simscen.core.stage import Effect, Situation, Stage
+    from simscen.core.time import Clock
+    from simscen.core.trace import Decision, Trace
+    from simscen.core.verdict import Finding, Status
+    from simscen.criteria.base import Criterion
+    from simscen.criteria.measure import Measure
+    from simscen.faults.base import Disturbance, Fault, Wheels
+    from simscen.model.robot import SensorSpec
+    from simscen.model.stack import (
+        BehaviorSpec,
+        ControllerSpec,
+        GoalCheckerSpec,
+        InProcessStack,
+        LocalizerSpec,
+        PlannerSpec,
+    )
+    from simscen.sensors.sensor import Sensor, SensorSetting, SensorView
+    from simscen.spec.base import Ranged, Spec, Value
+    from simscen.spec.choice import Choice
+    from simscen.spec.places import Point, PoseSpec
+    from simscen.spec.quantities import (
+        Angle,
+        Duration,
+        Frequency,
+        Length,
+        NonNegativeLength,
+        PositiveAcceleration,
+        PositiveAngle,
+        PositiveAngularAcceleration,
+        PositiveAngularSpeed,
+        PositiveDuration,
+        PositiveLength,
+        PositiveSpeed,
+        Probability,
+        Ratio,
+    )
+    from simscen.spec.references import GoalName, MovableName, ObjectName, RegionName
+    from simscen.stack.footprint import Footprint, distances
+    from simscen.stack.protocols import (
+        Behavior,
+        Controller,
+        CostmapView,
+        GoalChecker,
+        Localizer,
+        NavigationFailure,
+        Planner,
+        RobotModel,
+        Stack,
+        Surroundings,
+    )
+    from simscen.stack.setting import Setting
+    from simscen.stack.tasks import Task
+    from simscen.triggers.base import Condition
+
+__all__ = [
+    "STOP",
+    "Action",
+    "Angle",
+    "Array",
+    "Behavior",
+    "BehaviorSpec",
+    "Belief",
+    "Bump",
+    "Case",
+    "Choice",
+    "Clock",
+    "Condition",
+    "Controller",
+    "ControllerSpec",
+    "CostmapView",
+    "Criterion",
+    "Decision",
+    "Disturbance",
+    "Duration",
+    "Effect",
+    "ErrorCode",
+    "Estimate",
+    "Event",
+    "EventKind",
+    "Fault",
+    "Finding",
+    "Footprint",
+    "Frequency",
+    "Goal",
+    "GoalChecker",
+    "GoalCheckerSpec",
+    "GoalName",
+    "Image",
+    "Imu",
+    "InProcessStack",
+    "Length",
+    "Localizer",
+    "LocalizerSpec",
+    "Measure",
+    "MovableName",
+    "NavigationFailure",
+    "NonNegativeLength",
+    "ObjectName",
+    "OccupancyGrid",
+    "Odometry",
+    "Path",
+    "Planner",
+    "PlannerSpec",
+    "Point",
+    "Pose2",
+    "Pose3",
+    "PoseSpec",
+    "PositiveAcceleration",
+    "PositiveAngle",
+    "PositiveAngularAcceleration",
+    "PositiveAngularSpeed",
+    "PositiveDuration",
+    "PositiveLength",
+    "PositiveSpeed",
+    "Probability",
+    "Ranged",
+    "Ratio",
+    "Reading",
+    "Readings",
+    "RegionName",
+    "RobotModel",
+    "Samples",
+    "Scan",
+    "Sensor",
+    "SensorSetting",
+    "SensorSpec",
+    "SensorView",
+    "Setting",
+    "Situation",
+    "Spec",
+    "Stack",
+    "Stage",
+    "Status",
+    "Streams",
+    "Surroundings",
+    "Task",
+    "TaskResult",
+    "Trace",
+    "Twist",
+    "Value",
+    "Wheels",
+    "distances",
+    "wrap",
+]
+
+_WHERE = {
+    # What a specification is made of.
+    "simscen.spec.base": ("Spec", "Value", "Ranged"),
+    "simscen.spec.choice": ("Choice",),
+    "simscen.spec.quantities": (
+        "Angle",
+        "Duration",
+        "Frequency",
+        "Length",
+        "NonNegativeLength",
+        "PositiveAcceleration",
+        "PositiveAngle",
+        "PositiveAngularAcceleration",
+        "PositiveAngularSpeed",
+        "PositiveDuration",
+        "PositiveLength",
+        "PositiveSpeed",
+        "Probability",
+        "Ratio",
+    ),
+    "simscen.spec.places": ("Point", "PoseSpec"),
+    "simscen.spec.references": ("GoalName", "MovableName", "ObjectName", "RegionName"),
+    # What a specification is: one base for each kind.
+    "simscen.model.stack": (
+        "BehaviorSpec",
+        "ControllerSpec",
+        "GoalCheckerSpec",
+        "InProcessStack",
+        "LocalizerSpec",
+        "PlannerSpec",
+    ),
+    "simscen.model.robot": ("SensorSpec",),
+    "simscen.criteria.base": ("Criterion",),
+    "simscen.criteria.measure": ("Measure",),
+    "simscen.faults.base": ("Disturbance", "Fault", "Wheels"),
+    "simscen.triggers.base": ("Condition",),
+    "simscen.actions.base": ("Action",),
+    # What a component promises, and what it is installed in.
+    "simscen.stack.protocols": (
+        "Behavior",
+        "Controller",
+        "CostmapView",
+        "GoalChecker",
+        "Localizer",
+        "NavigationFailure",
+        "Planner",
+        "RobotModel",
+        "Stack",
+        "Surroundings",
+    ),
+    "simscen.stack.setting": ("Setting",),
+    "simscen.stack.footprint": ("Footprint", "distances"),
+    "simscen.stack.tasks": ("Task",),
+    "simscen.sensors.sensor": ("Sensor", "SensorSetting", "SensorView"),
+    # The words that all speak.
+    "simscen.core.belief": ("Belief", "Estimate"),
+    "simscen.core.case": ("Case",),
+    "simscen.core.chance": ("Streams",),
+    "simscen.core.events": ("Event", "EventKind"),
+    "simscen.core.geometry": ("Array", "Pose2", "Pose3", "wrap"),
+    "simscen.core.grid": ("OccupancyGrid",),
+    "simscen.core.motion": ("STOP", "Twist"),
+    "simscen.core.navigation": ("ErrorCode", "Goal", "Path", "TaskResult"),
+    "simscen.core.samples": ("Samples",),
+    "simscen.core.sensing": ("Bump", "Image", "Imu", "Odometry", "Reading", "Readings", "Scan"),
+    "simscen.core.stage": ("Effect", "Situation", "Stage"),
+    "simscen.core.time": ("Clock",),
+    "simscen.core.trace": ("Decision", "Trace"),
+    "simscen.core.verdict": ("Finding", "Status"),
+}
+_MODULE_OF = {name: module for module, names in _WHERE.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULE_OF:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_MODULE_OF[name]), name)
+
+
+def __dir__() -> list[str]:
+    return __all__
