@@ -1,0 +1,35 @@
+"""Lazy Theta* keeps what every planner promises, and is as short as an any-angle path can be."""
+
+import math
+
+import pytest
+from theta_star.spec import ThetaStar
+
+from simscen.plugin import Pose2
+from simscen.testing import promises_of
+from simscen.testing.contracts.component import view_of
+from simscen.testing.flatland import Flatland, round_robot, setting
+
+
+@pytest.mark.parametrize("promise", promises_of(ThetaStar()), ids=str)
+def test_it_keeps_its_promise(promise) -> None:
+    promise.check()
+
+
+def test_in_the_open_its_path_is_the_straight_line() -> None:
+    robot = round_robot()
+    view = view_of(Flatland().room(8, 6), robot, (-0.5, -0.5, 8.5, 6.5))
+    planner = ThetaStar.implementation()(ThetaStar(), setting(robot))
+    start, goal = Pose2(1.0, 1.0), Pose2(7.0, 4.3)
+    assert planner.plan(view, start, goal, 1).length() == pytest.approx(start.distance(goal), rel=0.02)
+
+
+def test_around_a_corner_its_path_is_taut() -> None:
+    robot = round_robot()
+    world = Flatland().room(8, 6)
+    world.boxes.append((3.9, 0.0, 4.1, 3.0))
+    view = view_of(world, robot, (-0.5, -0.5, 8.5, 6.5))
+    planner = ThetaStar.implementation()(ThetaStar(clearance=0.0), setting(robot))
+    start, goal = Pose2(1.0, 1.0), Pose2(7.0, 1.0)
+    shortest = 2 * math.dist((1.0, 1.0), (3.9, 3.24)) + 0.2
+    assert planner.plan(view, start, goal, 1).length() == pytest.approx(shortest, rel=0.05)

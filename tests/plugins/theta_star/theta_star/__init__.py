@@ -1,0 +1,1 @@
+"""Lazy Theta* for simscen."""
