@@ -73,3 +73,9 @@ def packages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Lay]:
 def yardwork(packages: Lay) -> Path:
     """The package tests/plugins/yardwork, installed for this test; where it is."""
     return lay_out(Path(__file__).parent / "plugins" / "yardwork", packages.site)  # type: ignore[attr-defined]
+
+
+@pytest.fixture(name="lay_out")
+def how_to_lay_out() -> Callable[[Path, Path], Path]:
+    """`lay_out(folder, site)`, for tests that start commands of their own."""
+    return lay_out

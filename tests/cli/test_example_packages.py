@@ -1,0 +1,84 @@
+"""Two packages as another maker would ship them, a planner and a whole stack: their contracts, and the front door."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PLUGINS = ROOT / "tests" / "plugins"
+SIMSCEN = "import sys; from simscen.cli.start import start; sys.exit(start())"
+NAMES = ("theta_star", "vfh_plus")
+
+
+@pytest.fixture
+def call(tmp_path: Path, lay_out):
+    """Calls Python where both packages are installed."""
+    site = tmp_path / "site"
+    for name in NAMES:
+        lay_out(PLUGINS / name, site)
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(site), str(ROOT)])}
+
+    def run(*arguments: str, folder: Path = ROOT) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [sys.executable, *arguments], cwd=folder, env=env, capture_output=True, text=True, check=False
+        )
+
+    return run
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_its_own_tests_pass(call, name: str) -> None:
+    pytest_ = ("-m", "pytest", "-q", "-n0", "-p", "no:cacheprovider", "--import-mode=importlib", "-o", "addopts=")
+    done = call(*pytest_, "tests", folder=PLUGINS / name)
+    assert done.returncode == 0, done.stdout
+
+
+def test_its_contract_is_asked_for_by_the_name_of_its_entry_point(call, tmp_path: Path) -> None:
+    pytest_ = (
+        "-m",
+        "pytest",
+        "-q",
+        "-n0",
+        "-p",
+        "no:cacheprovider",
+        "-p",
+        "simscen.testing.plugin",
+        "-k",
+        "without a goal",
+    )
+    done = call(*pytest_, "-k", "without and goal", "--simscen-contract", "vfh_plus", folder=tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "1 passed" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("stack", "used", "scenarios"),
+    [
+        ("{planner: {type: theta_star}}", "theta-star", ("navigation/goal", "corner_cases/person_stops_in_front")),
+        ("{type: vfh_plus}", "vfh-plus", ("navigation/goal", "obstacles/cart_crossing", "obstacles/pallet_on_plan")),
+    ],
+    ids=NAMES,
+)
+def test_shipped_scenarios_pass_with_it_twice_with_equal_logs(
+    call, tmp_path: Path, stack: str, used: str, scenarios
+) -> None:
+    (tmp_path / "theirs.stack.yaml").write_text(f"simscen: 1\nstack: {stack}\n")
+    files = [f"scenarios/{name}.scenario.yaml" for name in scenarios]
+    chosen = ("--stack", f"theirs={tmp_path}/theirs.stack.yaml", "--check-determinism", "--out", str(tmp_path / "out"))
+    done = call("-c", SIMSCEN, "run", *files, *chosen)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert f"{2 * len(scenarios)} passed" in done.stdout
+    record = json.loads((tmp_path / "out" / "run.json").read_text())
+    assert record["plugins"].keys() == {used}
+
+
+def test_its_keys_are_explained_and_in_the_schema(call) -> None:
+    assert "Lazy Theta*" in call("-c", SIMSCEN, "explain", "theta_star").stdout
+    assert "Room that is kept around the hull." in call("-c", SIMSCEN, "explain", "vfh_plus").stdout
+    schema = call("-c", SIMSCEN, "schema").stdout
+    assert '"const": "theta_star"' in schema
+    assert '"const": "vfh_plus"' in schema

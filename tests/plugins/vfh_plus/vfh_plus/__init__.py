@@ -1,0 +1,1 @@
+"""VFH+ for simscen."""
