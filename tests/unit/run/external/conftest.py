@@ -1,0 +1,82 @@
+"""Runs of a small scenario whose stack is a program that a test writes."""
+
+import os
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from simscen.core.externalcommand import ExternalCommand
+from simscen.core.run import Run
+from simscen.loading.loaded import LoadedScenario
+from simscen.loading.scenario import load_scenario
+from simscen.run.prepare import prepare
+from simscen.run.simulate import simulate
+
+SCENARIO = """\
+simscen: 1
+world: {simscen: 1, walls: [{points: [[0, 0], [8, 0], [8, 6], [0, 6], [0, 0]]}]}
+robot: {pose: {x: 1, y: 1}}
+stack: {external: mine}
+goals: [{name: desk, pose: {x: 2, y: 1}}]
+time_limit: 4
+pass: [{goals_reached: {}}]
+"""
+BEGIN = """\
+import os, sys, time, signal, socket
+sys.path.append(os.environ["SIMSCEN_PEER_PATH"])
+from simscen_peer import Connection, Peer, messages, wire
+"""
+DRIVE = """\
+for step in peer:
+    odom, goal = step.get("/odom"), peer.goals.accept()
+    there = odom is not None and odom.pose.x > 0.9
+    if goal and there:
+        peer.goals.reached()
+    step.drive(0.0 if there or not goal else 0.4, 0.0)
+"""
+"""Drives the metre to the desk."""
+
+Program = Callable[..., ExternalCommand]
+Load = Callable[..., LoadedScenario]
+Play = Callable[..., Run]
+
+
+@pytest.fixture
+def program(tmp_path: Path) -> Program:
+    """A command that runs a program in Python which knows nothing but the standard library and the peer."""
+
+    def write(text: str, start_limit: float = 20.0, answer_limit: float = 20.0) -> ExternalCommand:
+        file = tmp_path / f"stack-{len(list(tmp_path.iterdir()))}.py"
+        file.write_text(BEGIN + text)
+        argv = (sys.executable, "-I", "-S", str(file))
+        return ExternalCommand(argv, dict(os.environ), str(tmp_path), start_limit, answer_limit)
+
+    return write
+
+
+@pytest.fixture
+def load(tmp_path: Path, program: Program) -> Load:
+    """The scenario with that program for a stack, and with other lines instead of or besides its own."""
+
+    def write(text: str, name: str = "a", start_limit: float = 20.0, answer_limit: float = 20.0, **lines: str):
+        written = {line.split(":")[0]: line for line in SCENARIO.splitlines()}
+        written |= {key: f"{key}: {value}" for key, value in lines.items()}
+        file = tmp_path / f"{name}.scenario.yaml"
+        file.write_text("\n".join(written.values()) + "\n")
+        loaded = load_scenario(file, tmp_path)
+        return replace(loaded, runs=program(text, start_limit, answer_limit))
+
+    return write
+
+
+@pytest.fixture
+def play(load: Load, tmp_path: Path) -> Play:
+    """Runs the scenario in this process; the log is run.mcap, what the program prints is in stack.log."""
+
+    def run(text: str, **lines):
+        return simulate(prepare(load(text, **lines)), log=tmp_path / "run.mcap", printed=tmp_path / "stack.log")
+
+    return run

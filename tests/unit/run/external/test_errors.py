@@ -1,0 +1,172 @@
+"""What becomes of a run whose stack breaks off, hangs, or does not keep to the protocol: real processes."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from simscen.core.errors import RunError
+
+HELLO = 'peer = Peer("mine", topics=["/odom"])\n'
+ONE = HELLO + "steps = iter(peer); step = next(steps)\n"
+"""Says hello and hears the first step."""
+RAW = "c = Connection.inherited(); c.receive()\n"
+"""Hears HELLO, and says nothing."""
+WELCOMED = RAW + 'c.send_json(wire.WELCOME, {"protocol": 1, "topics": []}); c.receive(); c.receive()\n'
+"""Says hello, hears GOAL and the first step, frame by frame."""
+COMMAND = "[(1, messages.twist(0.0, 0.0, 0.0))]"
+FOREVER = "while True: time.sleep(60)\n"
+
+
+def failed(play, text: str, **limits: float) -> RunError:
+    with pytest.raises(RunError) as told:
+        play(text, **limits)
+    return told.value
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("print('out of memory'); sys.exit(3)", "its process exited 3"),
+        (ONE + "print('bye'); sys.exit(0)", "its process exited 0"),
+        (ONE + "os.kill(os.getpid(), signal.SIGKILL)", "its process was killed (SIGKILL)"),
+        (ONE + "os.kill(os.getpid(), signal.SIGSEGV)", "its process was killed (SIGSEGV)"),
+        (ONE + "raise KeyError('scan')", "its process exited 1"),
+        (ONE + "peer._connection.close(); time.sleep(60)", "closed its socket, but still runs"),
+    ],
+)
+def test_a_process_that_is_gone_has_crashed(play, text: str, says: str) -> None:
+    error = failed(play, text)
+    assert error.kind == "stack-crashed"
+    assert says in str(error)
+
+
+def test_a_crash_shows_the_end_of_what_was_printed(play, tmp_path: Path) -> None:
+    error = failed(play, ONE + "print('on the way', flush=True)\nraise KeyError('no scan')")
+    assert error.tail.splitlines()[0] == "on the way"
+    assert error.tail.splitlines()[-1] == "KeyError: 'no scan'"
+    assert (tmp_path / "stack.log").read_text().strip() == error.tail
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (FOREVER, "no answer to HELLO within 0.2 s"),
+        (RAW + FOREVER, "no answer to HELLO within 0.2 s"),
+        (RAW + "os.kill(os.getpid(), signal.SIGSTOP)", "no answer to HELLO within 0.2 s"),
+    ],
+)
+def test_a_stack_that_never_says_hello_is_not_waited_for(play, text: str, says: str) -> None:
+    error = failed(play, text, start_limit=0.2)
+    assert error.kind == "stack-timeout"
+    assert says in str(error)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        ONE + FOREVER,
+        ONE + "os.kill(os.getpid(), signal.SIGSTOP)",
+        ONE + "signal.signal(signal.SIGTERM, signal.SIG_IGN)\n" + FOREVER,
+        ONE + "peer._connection.send(bytes(3)); time.sleep(60)",
+        ONE + "while True: print('x' * 60000)",
+    ],
+)
+def test_an_answer_has_its_limit_of_wall_time(play, text: str) -> None:
+    error = failed(play, text, answer_limit=0.2)
+    assert error.kind == "stack-timeout"
+    assert "no answer to the step of t = 0.000 s (tick 0) within 0.2 s" in str(error)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("c = socket.socket(fileno=int(os.environ['SIMSCEN_STACK_FD'])); c.sendall(b'GET / HTTP/1.1\\r\\n' * 9)\n", "bytes"),
+        (RAW + "c.send(wire.frame(wire.WELCOME, b'{]'))", "its body is not JSON"),
+        (RAW + "c.send(wire.frame(wire.WELCOME, b'[1]'))", "its body is not a JSON object"),
+        (RAW + "c.send(wire.frame(wire.ANSWER, b''))", "its first frame is no WELCOME"),
+        (RAW + "c.send(wire.frame(77, b''))", "its first frame is no WELCOME"),
+        (RAW + "c.send_json(wire.WELCOME, {'protocol': 2})", "it speaks version 2 of the protocol, simscen 1"),
+        (RAW + "c.send_json(wire.WELCOME, {})", "it speaks version None of the protocol, simscen 1"),
+        (RAW + "c.send_json(wire.WELCOME, {'protocol': 1, 'topics': ['/scam']})", "it wants `/scam`, which there is not"),
+        (RAW + "c.send_json(wire.WELCOME, {'protocol': 1, 'topics': 'all'})", "`topics` is no list"),
+        (RAW + "c.send_json(wire.WELCOME, {'protocol': 1, 'step': 'often'})", "`step` is 'often'"),
+        (RAW + "c.send_json(wire.WELCOME, {'protocol': 1, 'name': 7})", "`name` is no text"),
+        (RAW + "c.send_json(wire.WELCOME, {'protocol': 1, 'about': 'x' * 10})", "`about` is no object"),
+        (WELCOMED + "c.send(bytes(4))", "a frame of 0 bytes"),
+        (WELCOMED + f"c.send(wire.answer_frame(12, {COMMAND}))", "it answers tick 12 instead of 0"),
+        (WELCOMED + "c.send(wire.frame(wire.WELCOME, b'{}'))", "a frame WELCOME instead of an ANSWER"),
+        (WELCOMED + "c.send(wire.frame(wire.ANSWER, bytes(8)))", "it ends before its header does"),
+        (WELCOMED + f"c.send(wire.frame(wire.ANSWER, wire.answer_frame(0, {COMMAND})[5:-1]))", "ends before its messages"),
+        (WELCOMED + f"c.send(wire.frame(wire.ANSWER, wire.answer_frame(0, {COMMAND})[5:] + b'x'))", "goes on after its last"),
+        (WELCOMED + "c.send(wire.answer_frame(0, [(99, b'')]))", "a message on topic 99, which there is not"),
+        (WELCOMED + "c.send(wire.answer_frame(0, []))", "no message on /cmd_vel, though a command is due"),
+        (WELCOMED + f"c.send(wire.answer_frame(0, 2 * {COMMAND}))", "two commands in one answer"),
+        (WELCOMED + f"c.send(wire.answer_frame(0, {COMMAND}) * 2); c.receive(); time.sleep(60)", "it answers tick 0 instead of 12"),
+        (WELCOMED + "c.send(wire.answer_frame(0, [(1, b'')]))", "no geometry_msgs/msg/Twist: a message is not plain CDR"),
+        (WELCOMED + "c.send(wire.answer_frame(0, [(1, bytes([0, 1, 0, 0]) + bytes(40))]))", "no geometry_msgs/msg/Twist"),
+        (WELCOMED + "c.send(wire.answer_frame(0, [(1, bytes([0, 1, 0, 0]) + bytes(64))]))", "longer than its type"),
+        (ONE + "step.drive(float('nan'), 0.0)\nnext(steps)", "a command that is not finite: nan, 0, 0"),
+        (ONE + "step.drive(0.0, float('-inf'))\nnext(steps)", "a command that is not finite: 0, 0, -inf"),
+        (ONE + "step.publish('/amcl_pose', messages.pose_with_covariance((0, 0), (float('nan'), 0, 0), [0] * 9))\nnext(steps)",
+         "a pose on /amcl_pose that is not finite"),
+        (ONE + "step.publish('/plan', messages.path((0, 0), [(float('inf'), 0, 0)]))\nnext(steps)", "a path on /plan that is not finite"),
+        (ONE + "step.publish('/plan/exact', messages.float64_array([1.0, 2.0]))\nnext(steps)", "2 numbers, which are no rows of 3"),
+        (ONE + "step.publish('/simscen/events', messages.string('{'))\nnext(steps)", "no std_msgs/msg/String"),
+        (ONE + "step.publish('/simscen/events', messages.string('[' * 100000))\nnext(steps)", "no std_msgs/msg/String"),
+        (ONE + "step.publish('/simscen/events', messages.string('7'))\nnext(steps)", "an event that is not a JSON object"),
+        (ONE + "peer.goals.say('collision.ended', 'wall')\nnext(steps)", "`collision.ended`, which is not a stack's to tell"),
+        (ONE + "peer.goals.say('run.ended')\nnext(steps)", "`run.ended`, which is not a stack's to tell"),
+        (ONE + "peer.goals.say('navigation.ended', 'SUCCEEDED')\nnext(steps)", "`navigation.ended`, which is not a stack's"),
+    ],
+)  # fmt: skip
+def test_what_the_protocol_does_not_allow_is_told(play, text: str, says: str) -> None:
+    error = failed(play, text)
+    assert error.kind == "stack-protocol"
+    assert says in str(error)
+
+
+def test_a_stack_that_cannot_go_on_says_why(play) -> None:
+    error = failed(play, HELLO + "peer.give_up('no map server is active')")
+    assert (error.kind, str(error)) == ("stack-failed", "stack mine: no map server is active")
+
+
+def test_a_stack_that_gives_up_on_its_way_says_why(play) -> None:
+    error = failed(play, ONE + "peer.give_up('the battery is empty')")
+    assert (error.kind, str(error)) == ("stack-failed", "stack mine: the battery is empty")
+
+
+@pytest.mark.parametrize("argv", [("/no/such/program",), ("no-such-program", "-x"), ("/etc/passwd",)])
+def test_a_program_that_cannot_be_started_is_told(load, argv: tuple[str, ...]) -> None:
+    from dataclasses import replace
+
+    from simscen.run.prepare import prepare
+    from simscen.run.simulate import simulate
+
+    loaded = load("")
+    assert loaded.runs is not None
+    with pytest.raises(RunError, match="its process cannot be started: (No such file|Permission denied)") as told:
+        simulate(prepare(replace(loaded, runs=replace(loaded.runs, argv=argv))))
+    assert told.value.kind == "stack-crashed"
+
+
+def test_nothing_is_left_of_a_stack_and_what_it_started(play, tmp_path: Path) -> None:
+    """Its children leave session, group and standard streams behind, and ignore SIGTERM."""
+    escape = (
+        "def escape(name):\n"
+        "    if os.fork() == 0:\n"
+        "        os.setsid()\n"
+        "        if os.fork() == 0:\n"
+        "            signal.signal(signal.SIGTERM, signal.SIG_IGN)\n"
+        "            open(name, 'w').write(str(os.getpid()))\n"
+        "            os.closerange(0, 64)\n"
+        "            while True: time.sleep(60)\n"
+        "        os._exit(0)\n"
+        "    os.wait()\n"
+        "    while not os.path.exists(name) or not open(name).read(): time.sleep(0.001)\n"
+    )
+    failed(play, escape + ONE + "escape('a.pid')\nsys.exit(3)")
+    play(escape + HELLO + "escape('b.pid')\n" + "for step in peer: step.drive(0.0, 0.0)\n", time_limit="0.5")
+    for name in ("a.pid", "b.pid"):
+        with pytest.raises(ProcessLookupError):
+            os.kill(int((tmp_path / name).read_text()), 0)
