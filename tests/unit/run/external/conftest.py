@@ -1,4 +1,4 @@
-"""Runs of a small scenario whose stack is a program that a test writes."""
+"""Runs of a small scenario whose stack is a program that a test writes; the tests here share stack_programs.py."""
 
 import os
 import sys
@@ -15,6 +15,7 @@ from simscen.loading.scenario import load_scenario
 from simscen.run.prepare import prepare
 from simscen.run.simulate import simulate
 
+sys.path.insert(0, str(Path(__file__).parent))
 SCENARIO = """\
 simscen: 1
 world: {simscen: 1, walls: [{points: [[0, 0], [8, 0], [8, 6], [0, 6], [0, 0]]}]}
@@ -29,16 +30,6 @@ import os, sys, time, signal, socket
 sys.path.append(os.environ["SIMSCEN_PEER_PATH"])
 from simscen_peer import Connection, Peer, messages, wire
 """
-DRIVE = """\
-for step in peer:
-    odom, goal = step.get("/odom"), peer.goals.accept()
-    there = odom is not None and odom.pose.x > 0.9
-    if goal and there:
-        peer.goals.reached()
-    step.drive(0.0 if there or not goal else 0.4, 0.0)
-"""
-"""Drives the metre to the desk."""
-
 Program = Callable[..., ExternalCommand]
 Load = Callable[..., LoadedScenario]
 Play = Callable[..., Run]

@@ -14,7 +14,9 @@ RAW = "c = Connection.inherited(); c.receive()\n"
 """Hears HELLO, and says nothing."""
 WELCOMED = RAW + 'c.send_json(wire.WELCOME, {"protocol": 1, "topics": []}); c.receive(); c.receive()\n'
 """Says hello, hears GOAL and the first step, frame by frame."""
+ON = "\nnext(steps)"
 COMMAND = "[(1, messages.twist(0.0, 0.0, 0.0))]"
+NAN_POSE = "step.publish('/amcl_pose', messages.pose_with_covariance((0, 0), (float('nan'), 0, 0), [0] * 9))"
 FOREVER = "while True: time.sleep(60)\n"
 
 
@@ -81,14 +83,20 @@ def test_an_answer_has_its_limit_of_wall_time(play, text: str) -> None:
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("c = socket.socket(fileno=int(os.environ['SIMSCEN_STACK_FD'])); c.sendall(b'GET / HTTP/1.1\\r\\n' * 9)\n", "bytes"),
+        (
+            "c = socket.socket(fileno=int(os.environ['SIMSCEN_STACK_FD'])); c.sendall(b'GET / HTTP/1.1\\r\\n' * 9)\n",
+            "bytes",
+        ),
         (RAW + "c.send(wire.frame(wire.WELCOME, b'{]'))", "its body is not JSON"),
         (RAW + "c.send(wire.frame(wire.WELCOME, b'[1]'))", "its body is not a JSON object"),
         (RAW + "c.send(wire.frame(wire.ANSWER, b''))", "its first frame is no WELCOME"),
         (RAW + "c.send(wire.frame(77, b''))", "its first frame is no WELCOME"),
         (RAW + "c.send_json(wire.WELCOME, {'protocol': 2})", "it speaks version 2 of the protocol, simscen 1"),
         (RAW + "c.send_json(wire.WELCOME, {})", "it speaks version None of the protocol, simscen 1"),
-        (RAW + "c.send_json(wire.WELCOME, {'protocol': 1, 'topics': ['/scam']})", "it wants `/scam`, which there is not"),
+        (
+            RAW + "c.send_json(wire.WELCOME, {'protocol': 1, 'topics': ['/scam']})",
+            "it wants `/scam`, which there is not",
+        ),
         (RAW + "c.send_json(wire.WELCOME, {'protocol': 1, 'topics': 'all'})", "`topics` is no list"),
         (RAW + "c.send_json(wire.WELCOME, {'protocol': 1, 'step': 'often'})", "`step` is 'often'"),
         (RAW + "c.send_json(wire.WELCOME, {'protocol': 1, 'name': 7})", "`name` is no text"),
@@ -97,29 +105,49 @@ def test_an_answer_has_its_limit_of_wall_time(play, text: str) -> None:
         (WELCOMED + f"c.send(wire.answer_frame(12, {COMMAND}))", "it answers tick 12 instead of 0"),
         (WELCOMED + "c.send(wire.frame(wire.WELCOME, b'{}'))", "a frame WELCOME instead of an ANSWER"),
         (WELCOMED + "c.send(wire.frame(wire.ANSWER, bytes(8)))", "it ends before its header does"),
-        (WELCOMED + f"c.send(wire.frame(wire.ANSWER, wire.answer_frame(0, {COMMAND})[5:-1]))", "ends before its messages"),
-        (WELCOMED + f"c.send(wire.frame(wire.ANSWER, wire.answer_frame(0, {COMMAND})[5:] + b'x'))", "goes on after its last"),
+        (
+            WELCOMED + f"c.send(wire.frame(wire.ANSWER, wire.answer_frame(0, {COMMAND})[5:-1]))",
+            "ends before its messages",
+        ),
+        (
+            WELCOMED + f"c.send(wire.frame(wire.ANSWER, wire.answer_frame(0, {COMMAND})[5:] + b'x'))",
+            "goes on after its last",
+        ),
         (WELCOMED + "c.send(wire.answer_frame(0, [(99, b'')]))", "a message on topic 99, which there is not"),
         (WELCOMED + "c.send(wire.answer_frame(0, []))", "no message on /cmd_vel, though a command is due"),
         (WELCOMED + f"c.send(wire.answer_frame(0, 2 * {COMMAND}))", "two commands in one answer"),
-        (WELCOMED + f"c.send(wire.answer_frame(0, {COMMAND}) * 2); c.receive(); time.sleep(60)", "it answers tick 0 instead of 12"),
-        (WELCOMED + "c.send(wire.answer_frame(0, [(1, b'')]))", "no geometry_msgs/msg/Twist: a message is not plain CDR"),
-        (WELCOMED + "c.send(wire.answer_frame(0, [(1, bytes([0, 1, 0, 0]) + bytes(40))]))", "no geometry_msgs/msg/Twist"),
+        (
+            WELCOMED + f"c.send(wire.answer_frame(0, {COMMAND}) * 2); c.receive(); time.sleep(60)",
+            "it answers tick 0 instead of 12",
+        ),
+        (
+            WELCOMED + "c.send(wire.answer_frame(0, [(1, b'')]))",
+            "no geometry_msgs/msg/Twist: a message is not plain CDR",
+        ),
+        (
+            WELCOMED + "c.send(wire.answer_frame(0, [(1, bytes([0, 1, 0, 0]) + bytes(40))]))",
+            "no geometry_msgs/msg/Twist",
+        ),
         (WELCOMED + "c.send(wire.answer_frame(0, [(1, bytes([0, 1, 0, 0]) + bytes(64))]))", "longer than its type"),
-        (ONE + "step.drive(float('nan'), 0.0)\nnext(steps)", "a command that is not finite: nan, 0, 0"),
-        (ONE + "step.drive(0.0, float('-inf'))\nnext(steps)", "a command that is not finite: 0, 0, -inf"),
-        (ONE + "step.publish('/amcl_pose', messages.pose_with_covariance((0, 0), (float('nan'), 0, 0), [0] * 9))\nnext(steps)",
-         "a pose on /amcl_pose that is not finite"),
-        (ONE + "step.publish('/plan', messages.path((0, 0), [(float('inf'), 0, 0)]))\nnext(steps)", "a path on /plan that is not finite"),
-        (ONE + "step.publish('/plan/exact', messages.float64_array([1.0, 2.0]))\nnext(steps)", "2 numbers, which are no rows of 3"),
-        (ONE + "step.publish('/simscen/events', messages.string('{'))\nnext(steps)", "no std_msgs/msg/String"),
-        (ONE + "step.publish('/simscen/events', messages.string('[' * 100000))\nnext(steps)", "no std_msgs/msg/String"),
-        (ONE + "step.publish('/simscen/events', messages.string('7'))\nnext(steps)", "an event that is not a JSON object"),
-        (ONE + "peer.goals.say('collision.ended', 'wall')\nnext(steps)", "`collision.ended`, which is not a stack's to tell"),
-        (ONE + "peer.goals.say('run.ended')\nnext(steps)", "`run.ended`, which is not a stack's to tell"),
-        (ONE + "peer.goals.say('navigation.ended', 'SUCCEEDED')\nnext(steps)", "`navigation.ended`, which is not a stack's"),
+        (ONE + "step.drive(float('nan'), 0.0)" + ON, "a command that is not finite: nan, 0, 0"),
+        (ONE + "step.drive(0.0, float('-inf'))" + ON, "a command that is not finite: 0, 0, -inf"),
+        (ONE + NAN_POSE + ON, "a pose on /amcl_pose that is not finite"),
+        (
+            ONE + "step.publish('/plan', messages.path((0, 0), [(float('inf'), 0, 0)]))" + ON,
+            "a path on /plan that is not finite",
+        ),
+        (
+            ONE + "step.publish('/plan/exact', messages.float64_array([1.0, 2.0]))" + ON,
+            "2 numbers, which are no rows of 3",
+        ),
+        (ONE + "step.publish('/simscen/events', messages.string('{'))" + ON, "no std_msgs/msg/String"),
+        (ONE + "step.publish('/simscen/events', messages.string('[' * 100000))" + ON, "no std_msgs/msg/String"),
+        (ONE + "step.publish('/simscen/events', messages.string('7'))" + ON, "an event that is not a JSON object"),
+        (ONE + "peer.goals.say('collision.ended', 'wall')" + ON, "`collision.ended`, which is not a stack's to tell"),
+        (ONE + "peer.goals.say('run.ended')" + ON, "`run.ended`, which is not a stack's to tell"),
+        (ONE + "peer.goals.say('navigation.ended', 'SUCCEEDED')" + ON, "`navigation.ended`, which is not a stack's"),
     ],
-)  # fmt: skip
+)
 def test_what_the_protocol_does_not_allow_is_told(play, text: str, says: str) -> None:
     error = failed(play, text)
     assert error.kind == "stack-protocol"
@@ -145,7 +173,7 @@ def test_a_program_that_cannot_be_started_is_told(load, argv: tuple[str, ...]) -
 
     loaded = load("")
     assert loaded.runs is not None
-    with pytest.raises(RunError, match="its process cannot be started: (No such file|Permission denied)") as told:
+    with pytest.raises(RunError, match=r"its process cannot be started: (No such file|Permission denied)") as told:
         simulate(prepare(replace(loaded, runs=replace(loaded.runs, argv=argv))))
     assert told.value.kind == "stack-crashed"
 

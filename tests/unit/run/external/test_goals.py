@@ -1,0 +1,176 @@
+"""What a stack says of its goals, and what a run makes of it: its word never makes green what is not so."""
+
+import pytest
+from stack_programs import DRIVE
+
+from simscen.core.errors import RunError
+from simscen.core.result import Outcome
+
+HELLO = 'peer = Peer("mine", "2.1", topics=["/odom"])\n'
+STAND = "    step.drive(0.0, 0.0)\n"
+THREE = "[{name: a, pose: {x: 2, y: 1}}, {name: b, pose: {x: 3, y: 1}}, {name: c, pose: {x: 4, y: 1}}]"
+
+
+def told(run) -> list[tuple[str, str]]:
+    return [
+        (str(event.kind), event.name)
+        for event in run.trace.events
+        if event.kind.split(".")[0] in ("goal", "navigation")
+    ]
+
+
+def test_a_stack_that_drives_to_its_goal_and_says_so_passes(play) -> None:
+    run = play(HELLO + DRIVE)
+    assert run.result.outcome is Outcome.PASSED
+    assert told(run) == [("goal.accepted", "desk"), ("goal.reached", "desk"), ("navigation.ended", "SUCCEEDED")]
+    assert run.result.ended == "navigation ended"
+    accepted = next(event for event in run.trace.events if event.kind == "goal.accepted")
+    assert accepted.data == {"x": 2.0, "y": 1.0, "yaw": 0.0, "index": 0}
+
+
+def test_a_stack_that_says_reached_where_it_is_not_fails(play) -> None:
+    run = play(HELLO + "for step in peer:\n    if peer.goals.accept(): peer.goals.reached()\n" + STAND)
+    assert told(run)[-1] == ("navigation.ended", "SUCCEEDED")
+    assert run.result.outcome is Outcome.FAILED
+    run = play(
+        HELLO + "for step in peer:\n    if peer.goals.accept(): peer.goals.reached()\n" + STAND,
+        **{"pass": "[{no_false_success: {tolerance: 0.5}}]"},
+    )
+    assert run.result.outcome is Outcome.FAILED
+
+
+def test_a_stack_that_is_there_and_says_nothing_has_not_reached_its_goal(play) -> None:
+    silent = DRIVE.replace("peer.goals.accept()", "True").replace("peer.goals.reached()", "pass")
+    run = play(HELLO + silent)
+    assert told(run) == []
+    assert (run.result.outcome, run.result.ended) == (Outcome.FAILED, "time limit")
+    run = play(
+        HELLO + silent,
+        **{"pass": "[{eventually: {signal: goal_distance, op: '<=', value: 0.3 m}}, {collisions: {max: 0}}]"},
+    )
+    assert run.result.outcome is Outcome.PASSED  # what is about the truth needs no word of the stack
+
+
+@pytest.mark.parametrize(
+    ("said", "name", "number"),
+    [
+        ("'NO_VALID_PATH', 'walled in'", "NO_VALID_PATH", 208),
+        ("208", "NO_VALID_PATH", 208),
+        ("0", "NONE", 0),
+        ("109", "", 109),
+        ("None", "NAVIGATE_UNKNOWN", 9000),
+    ],
+)
+def test_a_failure_has_one_of_nav2s_codes(play, said: str, name: str, number: int) -> None:
+    run = play(HELLO + f"for step in peer:\n    if peer.goals.accept(): peer.goals.failed({said})\n" + STAND)
+    failed = next(event for event in run.trace.events if event.kind == "goal.failed")
+    assert (failed.data["error_name"], failed.data["error_code"]) == (name, number)
+    ended = next(event for event in run.trace.events if event.kind == "navigation.ended")
+    assert (ended.name, ended.data["error_code"]) == ("FAILED", number)
+
+
+def test_after_a_failure_the_other_goals_are_dropped_or_follow_as_the_scenario_says(play) -> None:
+    text = HELLO + "for step in peer:\n    if peer.goals.accept(): peer.goals.failed(208, go_on={})\n" + STAND
+    assert told(play(text.format(False), goals=THREE))[-1] == ("navigation.ended", "FAILED")
+    assert len(told(play(text.format(False), goals=THREE))) == 3
+    run = play(text.format(True), goals=THREE, on_goal_failure="continue")
+    assert [name for kind, name in told(run) if kind == "goal.failed"] == ["a", "b", "c"]
+
+
+@pytest.mark.parametrize(
+    ("events", "says"),
+    [
+        ([("goal.reached", "desk")], "goal.reached `desk`, but none is under way"),
+        ([("goal.accepted", "shelf")], "goal.accepted `shelf`, but the next one is `desk`"),
+        ([("goal.accepted", "desk")] * 2, "goal.accepted, but goal `desk` is under way"),
+        ([("goal.accepted", ""), ("goal.reached", "shelf")], "goal.reached `shelf`, but the current one is `desk`"),
+        ([("goal.accepted", ""), ("goal.reached", ""), ("goal.accepted", "")], "but none is waiting"),
+        ([("goal.canceled", "desk")], "goal.canceled `desk`, but none is under way"),
+    ],
+)
+def test_a_word_about_a_goal_that_cannot_be_is_an_error(play, events: list[tuple[str, str]], says: str) -> None:
+    said = "".join(f"    peer.goals.say({kind!r}, {name!r})\n" for kind, name in events)
+    with pytest.raises(RunError) as error:
+        play(HELLO + "for step in peer:\n" + said + STAND)
+    assert error.value.kind == "stack-protocol"
+    assert says in str(error.value)
+
+
+def test_a_stack_cannot_claim_that_a_goal_was_preempted(play) -> None:
+    """A goal that another preempted need not be reached: that it was is the engine's to say."""
+    claim = "    if peer.goals.accept(): peer.goals._end('goal.canceled', preempted_by='desk')\n"
+    run = play(HELLO + "for step in peer:\n" + claim + STAND)
+    assert told(run)[-1] == ("navigation.ended", "CANCELED")
+    assert run.result.outcome is Outcome.FAILED
+
+
+def test_a_goal_that_an_event_sends_goes_first_and_those_that_wait_follow(play) -> None:
+    events = "[{when: {time: 0.5}, do: {new_goal: {name: detour, pose: {x: 1, y: 2}}}}]"
+    accept = (
+        "for step in peer:\n    goal = peer.goals.accept()\n    if goal and step.seconds > 1: peer.goals.reached()\n"
+    )
+    run = play(HELLO + accept + STAND, goals=THREE, events=events)
+    assert told(run)[:4] == [
+        ("goal.accepted", "a"),
+        ("goal.canceled", "a"),
+        ("goal.accepted", "detour"),
+        ("goal.reached", "detour"),
+    ]
+    canceled = run.trace.events[next(k for k, e in enumerate(run.trace.events) if e.kind == "goal.canceled")]
+    assert canceled.data["preempted_by"] == "detour"
+    assert canceled.tick == 120
+    assert [name for kind, name in told(run) if kind == "goal.reached"] == ["detour", "b", "c"]
+
+
+def test_a_stack_that_is_told_to_cancel_says_so_at_once(play) -> None:
+    events = "[{when: {time: 0.5}, do: {cancel_goal: {}}}]"
+    run = play(HELLO + "for step in peer:\n    peer.goals.accept()\n" + STAND, goals=THREE, events=events)
+    assert told(run) == [("goal.accepted", "a"), ("goal.canceled", "a"), ("navigation.ended", "CANCELED")]
+    assert run.trace.events[-2].tick == 120 or run.trace.events[-3].tick == 120
+
+
+def test_the_time_of_a_goal_is_kept_even_if_the_stack_does_not(play) -> None:
+    goals = "[{name: a, pose: {x: 2, y: 1}, timeout: 0.5}, {name: b, pose: {x: 3, y: 1}}]"
+    text = HELLO + "for step in peer:\n    peer.goals.accept()\n" + STAND
+    run = play(text, goals=goals)
+    failed = next(event for event in run.trace.events if event.kind == "goal.failed")
+    assert (failed.name, failed.data["error_name"]) == ("a", "NAVIGATE_TIMEOUT")
+    assert told(run)[-1] == ("navigation.ended", "FAILED")
+    run = play(text, goals=goals, on_goal_failure="continue")
+    assert told(run) == [("goal.accepted", "a"), ("goal.failed", "a"), ("goal.accepted", "b")]
+
+
+def test_replans_and_recoveries_that_a_stack_tells_of_are_counted(play) -> None:
+    said = (
+        "    if step.tick == 12:\n"
+        "        peer.goals.say('plan.made', 'desk', reason='blocked', length=1.5)\n"
+        "        peer.goals.say('recovery.started', 'spin', error_code=208)\n"
+        "        peer.goals.say('recovery.ended', 'spin', outcome='done')\n"
+    )
+    text = HELLO + "for step in peer:\n    peer.goals.accept()\n" + said + STAND
+    run = play(text, **{"pass": "[{replans: {min: 1, max: 1}}, {recoveries: {min: 1, max: 1, name: spin}}]"})
+    assert [verdict.outcome for verdict in run.result.verdicts] == ["passed", "passed"], run.result.verdicts
+
+
+def test_what_the_stack_is_stands_in_the_log(play, tmp_path) -> None:
+    from mcap.reader import make_reader
+
+    play(HELLO.replace('"2.1"', '"2.1", about={"sync": "lockstep"}') + "peer.add(beats=7)\n" + DRIVE)
+    with (tmp_path / "run.mcap").open("rb") as stream:
+        records = {record.name: record.metadata for record in make_reader(stream).iter_metadata()}
+    assert records["simscen.stack"] == {
+        "external": "mine",
+        "name": "mine",
+        "version": "2.1",
+        "protocol": "1",
+        "about": '{"beats": 7, "sync": "lockstep"}',
+    }
+
+
+def test_its_own_lines_are_in_rosout(play, tmp_path) -> None:
+    from mcap.reader import make_reader
+
+    play(HELLO + "for step in peer:\n    if step.tick == 24: step.log('a wall', 30)\n" + STAND, time_limit="0.3")
+    with (tmp_path / "run.mcap").open("rb") as stream:
+        lines = [data for _, _, message in make_reader(stream).iter_messages(["/rosout"]) for data in [message]]
+    assert any(b"a wall\0" in line.data and line.log_time == 100_000_000 for line in lines)
