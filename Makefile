@@ -12,7 +12,7 @@ STAMP := $(VENV)/.installed
 LOWEST := .venv-lowest
 LOWEST_TESTS := tests/diagnostics tests/cases $(addprefix tests/unit/,cli loading judge report run sim worlds)
 
-.PHONY: help setup run test test-lowest check lint types layers schemas docs mutation bench campaign fuzz build clean
+.PHONY: help setup run test test-lowest served check lint types layers schemas docs mutation bench campaign fuzz build clean
 
 help:  ## Print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -46,6 +46,9 @@ test-lowest:  ## Test with the oldest packages that pyproject.toml allows, in .v
 	"pytest>=8.2" "pytest-xdist>=3.6" "hypothesis>=6.100" "junitparser>=3.1" "check-jsonschema>=0.29" "shapely>=2.0" "xacro>=2.0"
 	@$(LOWEST)/bin/python -m pytest -n 2 $(LOWEST_TESTS)
 	@$(LOWEST)/bin/simscen run scenarios/navigation scenarios/faults --out $$(mktemp -d)/out
+
+served: setup  ## Compare each shipped scenario with its stack behind the stack protocol to the same in the engine
+	@SIMSCEN_SERVED=all $(BIN)/python -m pytest tests/scenarios/test_served.py
 
 check: lint types layers schemas  ## Lint, types, layers, drift of schemas and docs
 

@@ -1,6 +1,6 @@
-"""simscen's own stack as a process of its own: `python -m simscen.run.external.served STACK.json`.
+"""simscen's own stack as a process of its own: `python -m simscen.run.external.served STACK`.
 
-STACK.json holds a `stack:` section (default: an empty one). It exists to prove the protocol: a run with this stack
+STACK is a `stack:` section as JSON (default: an empty one). It exists to prove the protocol: a run with this stack
 gives the same log as one with the stack in the engine, to the last bit. `simscen bench` measures with it what a beat
 costs.
 """
@@ -11,7 +11,6 @@ import json
 import sys
 from array import array
 from collections.abc import Iterator
-from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
@@ -176,8 +175,8 @@ def _numbers(table: Array) -> bytes:
 
 
 def main() -> None:
-    """Serve the stack of a file."""
-    written = json.loads(FilePath(sys.argv[1]).read_text(encoding="utf-8")) if len(sys.argv) > 1 else {}
+    """Serve the stack that the command line says."""
+    written = json.loads(sys.argv[1]) if len(sys.argv) > 1 else {}
     ServedReference(StackSpec.model_validate(written, by_alias=True, by_name=False)).serve()
 
 

@@ -1,0 +1,111 @@
+"""simscen's own stack behind the stack protocol gives the same log as in the engine, to the last bit.
+
+`make served` compares all shipped scenarios, `make test` a few in which different things happen.
+"""
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from simscen.loading.scenario import load_scenario
+from simscen.run.external.serving import served
+from simscen.run.prepare import prepare
+from simscen.run.simulate import simulate
+
+ROOT = Path(__file__).parents[2]
+CHOSEN = [
+    "navigation/goal",
+    "navigation/goal_outside_map",
+    "faults/lidar_off",
+    "corner_cases/goal_blocked_for_good",
+    "robots/mecanum_errand",
+]
+EVERYTHING = """\
+simscen: 1
+world:
+  simscen: 1
+  walls: [{points: [[0, 0], [8, 0], [8, 6], [0, 6], [0, 0]]}]
+  regions: {slow: [[2, 0], [3, 0], [3, 6], [2, 6]], out: [[5, 3], [5.5, 3], [5.5, 3.5]]}
+map: none
+robot: {model: watcher.robot.yaml, pose: {x: 1, y: 1}}
+stack:
+  localizer: {type: ground_truth}
+  controller: {type: mppi, batch_size: 100}
+  recovery: {number_of_retries: 0}
+  keepout: [out]
+  speed_zones: [{region: slow, speed_limit: 0.2}]
+goals:
+  - {name: a, pose: {x: 4, y: 1}}
+  - {name: late, pose: {x: 6, y: 5}, timeout: 1}
+  - {name: b, pose: {x: 2, y: 4}}
+on_goal_failure: continue
+events:
+  - {when: {time: 1}, do: {new_goal: {name: detour, pose: {x: 2, y: 2}}}}
+  - {when: {goal: {name: late, status: failed}, delay: 0.333}, do: {cancel_goal: {}}}
+faults:
+  - {sensor: odom, when: {time: 0.5}, for: 1, dropout: {probability: 0.5}}
+time_limit: 20
+pass: [{collisions: {max: 0}}]
+"""
+ROBOT = """\
+simscen: 1
+name: watcher
+body: [{cylinder: [0.18, 0.25], z: 0.03}]
+mass: 5 kg
+drive: {type: differential, wheel_radius: 5 cm, wheel_separation: 0.25}
+limits: {linear: 0.5, angular: 1, linear_acceleration: 1, angular_acceleration: 2}
+sensors:
+  front: {lidar: {rate: 8 Hz, beams: 90}}
+  rear: {lidar: {rate: 6 Hz, beams: 40, mount: {x: -0.1, yaw: 3.1}}}
+  odom: {odometry: {}}
+  gyro: {imu: {rate: 48 Hz}}
+  skirt: {bumper: {rate: 30 Hz}}
+  eye: {camera: {rate: 2 Hz, width: 16, height: 12}}
+"""
+
+
+def logs(file: Path, root: Path, folder: Path) -> tuple[bytes, bytes]:
+    """The log of the scenario with its stack in the engine and behind the protocol, without what follows the messages.
+
+    That is the note on what the stack was, in the second alone, and the index, which counts the bytes of the note.
+    """
+    prepared = prepare(load_scenario(file, root))
+    here = simulate(prepared, log=folder / "here.mcap")
+    there = simulate(served(prepared), log=folder / "there.mcap", printed=folder / "stack.log")
+    assert there.result == here.result
+    assert there.trace.events == here.trace.events
+    data = (folder / "here.mcap").read_bytes(), (folder / "there.mcap").read_bytes()
+    notes = [b"simscen.end", b"simscen.stack"]
+    ends = [log.index(len(note).to_bytes(4, "little") + note) - 9 for log, note in zip(data, notes, strict=True)]
+    return data[0][: ends[0]], data[1][: ends[1]]
+
+
+SHIPPED = sorted(str(path.relative_to(ROOT / "scenarios")) for path in (ROOT / "scenarios").rglob("*.scenario.yaml"))
+
+
+@pytest.mark.parametrize(
+    "name", SHIPPED if os.environ.get("SIMSCEN_SERVED") == "all" else [f"{name}.scenario.yaml" for name in CHOSEN]
+)
+def test_a_shipped_scenario_gives_the_same_bits_through_the_socket(name: str, tmp_path: Path) -> None:
+    here, there = logs(ROOT / "scenarios" / name, ROOT, tmp_path)
+    assert len(here) > 100_000
+    assert there == here
+
+
+def test_truth_cameras_several_lidars_preempted_late_and_canceled_goals_give_the_same_bits(tmp_path: Path) -> None:
+    (tmp_path / "a.scenario.yaml").write_text(EVERYTHING)
+    (tmp_path / "watcher.robot.yaml").write_text(ROBOT)
+    here, there = logs(tmp_path / "a.scenario.yaml", tmp_path, tmp_path)
+    assert len(here) > 100_000
+    assert there == here
+
+
+def test_another_stack_gives_other_bits(tmp_path: Path) -> None:
+    """The comparison can fail."""
+    prepared = prepare(load_scenario(ROOT / "scenarios/navigation/goal.scenario.yaml", ROOT))
+    other = served(prepared)
+    argv = other.loaded.runs and (*other.loaded.runs.argv[:-1], '{"controller": {"desired_linear_vel": 0.3}}')
+    other = replace(other, loaded=replace(other.loaded, runs=replace(other.loaded.runs, argv=argv)))
+    assert simulate(other).result.metrics != simulate(prepared).result.metrics
