@@ -1,0 +1,126 @@
+"""A session in which some stacks are processes: whatever becomes of one of them, the others are as if alone."""
+
+import os
+import signal
+import time
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+from stack_programs import DRIVE
+
+from simscen.cli.run import WARM_PROCESS
+from simscen.core.result import Outcome
+from simscen.core.sessionevents import RunStarted
+from simscen.report.junit import to_xml
+from simscen.run.session import Options, plan, run_session
+
+HELLO = 'peer = Peer("mine", topics=["/odom", "/scan"])\n'
+GOOD = HELLO + DRIVE
+BROKEN = {
+    "killed": HELLO + "next(iter(peer)); os.kill(os.getpid(), signal.SIGKILL)",
+    "stopped": HELLO + "next(iter(peer)); os.kill(os.getpid(), signal.SIGSTOP)",
+    "garbage": HELLO + "next(iter(peer)); peer._connection.send(b'garbage' * 1000); time.sleep(60)",
+    "flood": HELLO + "next(iter(peer))\nwhile True: print('x' * 60000)",
+    "fails": HELLO + "peer.give_up('no map')",
+    "fine": GOOD,
+}
+KINDS = {
+    "killed": "stack-crashed",
+    "stopped": "stack-timeout",
+    "garbage": "stack-protocol",
+    "flood": "stack-timeout",
+    "fails": "stack-failed",
+}
+
+
+@pytest.fixture
+def session(load, tmp_path: Path):
+    def run(out: str, programs: dict[str, str], listen=lambda event: None, limit: float = 1.0):
+        scenarios = [
+            load(text, name, answer_limit=20.0 if name == "fine" else limit) for name, text in programs.items()
+        ]
+        options = Options(workers=2, wall_limit=60.0)
+        answers, _ = run_session(plan(scenarios, options, tmp_path / out), options, WARM_PROCESS, listen)
+        return {answer.key.scenario: answer for answer in answers}
+
+    return run
+
+
+def log_of(answer) -> bytes:
+    return Path(answer.artifacts.mcap).read_bytes()
+
+
+def test_each_fault_is_the_error_of_its_run_alone_and_the_neighbours_log_stays_the_same(session) -> None:
+    answers = session("out", BROKEN)
+    alone = session("alone", {"fine": GOOD})["fine"]
+    assert {name: answer.result.error.kind for name, answer in answers.items() if answer.result.error} == KINDS
+    assert (answers["fine"].outcome, alone.outcome) == (Outcome.PASSED, Outcome.PASSED)
+    assert log_of(answers["fine"]) == log_of(alone)
+    cases = {case.get("classname"): case for case in ET.fromstring(to_xml(list(answers.values()))).iter("testcase")}
+    told = {name: [error.get("type") for error in cases[name].findall("error")] for name in BROKEN}
+    assert told == {**{name: [kind] for name, kind in KINDS.items()}, "fine": []}
+    printed = Path(answers["flood"].artifacts.folder, "stack.log")
+    assert 100_000 < printed.stat().st_size < 2_000_000
+
+
+def processes() -> set[int]:
+    """The processes of this user that have a socket to simscen."""
+    found = set()
+    for entry in Path("/proc").iterdir():
+        try:
+            if entry.name.isdigit() and b"SIMSCEN_STACK_FD=" in (entry / "environ").read_bytes():
+                found.add(int(entry.name))
+        except OSError:
+            continue
+    return found
+
+
+LINGERS = "if os.fork() == 0:\n    os.setsid()\n    while True: time.sleep(60)\n"
+
+
+def test_a_worker_that_is_killed_takes_its_stack_and_what_that_started_along(session, tmp_path: Path) -> None:
+    before = processes()
+    kill = "os.kill(int(open(f'/proc/{os.getppid()}/stat').read().rsplit(')', 1)[1].split()[1]), signal.SIGKILL)\n"
+    # The keeper is the parent of a stack, the worker the parent of the keeper.
+    answers = session("out", {"worker": LINGERS + HELLO + "next(iter(peer))\n" + kill + "time.sleep(60)", "fine": GOOD})
+    assert answers["worker"].result.error.kind == "crashed"
+    assert answers["fine"].outcome is Outcome.PASSED
+    assert processes() <= before
+
+
+def test_a_supervisor_that_is_killed_takes_every_stack_along(load, tmp_path: Path) -> None:
+    before, loaded = processes(), load(LINGERS + HELLO + "for step in peer: time.sleep(60)", answer_limit=60.0)
+    pid = os.fork()
+    if pid == 0:
+        options = Options()
+        run_session(plan([loaded], options, tmp_path / "out"), options, WARM_PROCESS, lambda event: None)
+        os._exit(0)
+    _until(lambda: len(processes() - before) >= 2)
+    os.kill(pid, signal.SIGKILL)
+    os.waitpid(pid, 0)
+    _until(lambda: processes() <= before)
+
+
+def _until(done) -> None:
+    end = time.monotonic() + 60
+    while not done():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def test_an_interrupted_session_leaves_no_stack_behind(load, tmp_path: Path) -> None:
+    from simscen.run.process.supervisor import Interrupted
+
+    before, loaded = processes(), load(LINGERS + HELLO + "for step in peer: time.sleep(60)", answer_limit=60.0)
+
+    def interrupt(event) -> None:
+        if isinstance(event, RunStarted):
+            _until(lambda: len(processes() - before) >= 2)
+            raise Interrupted(signal.SIGINT)
+
+    options = Options()
+    answers, stopped = run_session(plan([loaded], options, tmp_path / "out"), options, WARM_PROCESS, interrupt)
+    assert stopped is not None
+    assert [answer.result.error.kind for answer in answers] == ["interrupted"]
+    assert processes() <= before

@@ -1,0 +1,107 @@
+"""What goes over the socket: big, slow, often or seldom, it is the same run."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from stack_programs import DRIVE
+
+from simscen.core.events import EventKind
+
+HELLO = 'peer = Peer("mine", topics=["/odom", "/scan"])\n'
+
+
+def test_a_slow_stack_gives_the_same_run_as_a_fast_one(play, tmp_path: Path) -> None:
+    play(HELLO + DRIVE)
+    fast = (tmp_path / "run.mcap").read_bytes()
+    play(HELLO + DRIVE.replace("for step in peer:\n", "for step in peer:\n    if step.tick == 120: time.sleep(0.2)\n"))
+    assert (tmp_path / "run.mcap").read_bytes() == fast
+
+
+def test_big_answers_and_big_frames_do_not_block_each_other(play) -> None:
+    """A map of 4 million cells goes out, plans of 10 MB come back, and a megabyte is printed meanwhile."""
+    big = (
+        "points = [float(k) for k in range(3)] * 420_000\n"
+        "for step in peer:\n"
+        "    print('x' * 1_000_000)\n"
+        "    if step.tick == 12: step.publish('/plan/exact', messages.float64_array(points))\n"
+        "    step.drive(0.0, 0.0)\n"
+    )
+    walls = "[{points: [[0, 0], [100, 0], [100, 100], [0, 100], [0, 0]]}]"
+    run = play(
+        'peer = Peer("mine", topics=["/map"])\n' + big,
+        world=f"{{simscen: 1, walls: {walls}}}",
+        time_limit="0.2",
+    )
+    assert [len(plan.points) for plan in run.trace.plans] == [420_000]
+
+
+@pytest.mark.parametrize(("every", "ticks"), [("True", {6, 12, 18, 24}), ("False", {12, 24})])
+def test_a_stack_is_asked_for_each_command_or_whenever_a_sensor_speaks(play, tmp_path: Path, every, ticks) -> None:
+    ask = f'peer = Peer("mine", topics=["/odom"], every_beat={every})\n'
+    text = "for step in peer:\n    print(step.tick, step.command_due, len(step.messages))\n    step.drive(0.0, 0.0)\n"
+    play(ask + text, time_limit="0.1")
+    lines = [line.split() for line in (tmp_path / "stack.log").read_text().splitlines()]
+    assert {int(tick) for tick, *_ in lines if int(tick)} == ticks
+    assert {int(tick) for tick, due, _ in lines if due == "True"} == {0, 12, 24}
+    assert sum(int(count) for *_, count in lines) == 5  # each reading once, whenever it is asked
+
+
+def test_what_a_stack_hears_is_what_the_log_holds(play, tmp_path: Path) -> None:
+    from mcap.reader import make_reader
+
+    text = "import binascii\nfor step in peer:\n    for m in step.messages: print(m.topic, binascii.crc32(m.raw))\n"
+    topics = ["/scan", "/odom", "/imu", "/tf_static", "/map", "/robot_description"]
+    play(f'peer = Peer("mine", topics={topics}, every_beat=True)\n{text}    step.drive(0.3, 0.1)\n', time_limit="1")
+    heard = [tuple(line.split()) for line in (tmp_path / "stack.log").read_text().splitlines()]
+    import binascii
+
+    with (tmp_path / "run.mcap").open("rb") as stream:
+        messages = list(make_reader(stream).iter_messages(topics))
+    for topic in topics:
+        logged = [str(binascii.crc32(message.data)) for _, channel, message in messages if channel.topic == topic]
+        assert [crc for name, crc in heard if name == topic] == logged
+        assert logged
+
+
+def test_a_belief_without_a_transform_corrects_the_odometry(play, tmp_path: Path) -> None:
+    text = HELLO + (
+        "for step in peer:\n"
+        "    odom = step.get('/odom')\n"
+        "    x, y, yaw = odom.pose if odom else (0, 0, 0)\n"
+        "    step.publish('/amcl_pose', messages.pose_with_covariance(step.stamp, (x + 3, y + 4, yaw), [0.1] * 9))\n"
+        "    step.drive(0.4, 0.5)\n"
+    )
+    from mcap.reader import make_reader
+
+    from simscen.record.unpack import transforms
+
+    run = play(text, time_limit="1")
+    assert run.trace.belief.values[-1][:2] == pytest.approx(
+        run.trace.odometry.values[-1][:2] + np.array([3, 4]), abs=1e-9
+    )
+    with (tmp_path / "run.mcap").open("rb") as stream:
+        links = [link for _, _, m in make_reader(stream).iter_messages(["/tf"]) for link in transforms(m.data)]
+    corrections = [link.pose for link in links if link.child == "odom"]
+    assert corrections[-1][:2] == pytest.approx((3, 4), abs=1e-9)
+
+
+def test_a_command_holds_until_the_next_one(play) -> None:
+    run = play(HELLO + "for step in peer:\n    if step.tick == 0: step.drive(0.2, 0.0)\n", time_limit="1")
+    assert {tuple(row) for row in run.trace.command.values} == {(0.2, 0.0, 0.0)}
+
+
+def test_an_empty_plan_says_that_none_is_followed(play) -> None:
+    """An object that is to appear on the plan finds none."""
+    events = "[{when: {time: 0.5}, do: {spawn: {name: box, box: [0.1, 0.1, 0.1], on_plan: 0.5}}, required: false}]"
+    text = HELLO + (
+        "for step in peer:\n"
+        "    if step.tick == 12: step.publish('/plan', messages.path(step.stamp, [(1, 1, 0), (4, 1, 0)]))\n"
+        "    if step.tick == {}: step.publish('/plan', messages.path(step.stamp, []))\n"
+        "    step.drive(0.0, 0.0)\n"
+    )
+    for emptied, on_plan in ((108, False), (132, True)):
+        run = play(text.replace("{}", str(emptied)), events=events, time_limit="1")
+        (done,) = run.trace.of_kind(EventKind.EVENT_ENDED)
+        assert [effect["happened"] for effect in done.data["effects"]] == [on_plan]
+        assert len(run.trace.plans) == 1
