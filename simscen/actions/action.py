@@ -25,6 +25,10 @@ class AnyAction(Choice):
     new_goal: Annotated[Action | None, OnDemand("simscen.actions.goals", "NewGoal")] = None
     cancel_goal: Annotated[Action | None, OnDemand("simscen.actions.goals", "CancelGoal")] = None
 
+    def may(self, *kinds: str) -> bool:
+        """Whether it does one of these; an action of an installed package may do anything."""
+        return self.kind in kinds or self.narrow is not None
+
     def perform(self, stage: "Stage") -> "Effect":
         """Do it now, and say what came of it."""
         action = self.chosen

@@ -185,6 +185,7 @@ def _idle_actions(loaded: LoadedScenario) -> Iterator[Problem]:
     """Pushes of nothing, and doors that are as they shall be."""
     done = [(k, event, action) for k, event in enumerate(loaded.spec.events) for action in event.actions]
     kinds = {(action.kind, getattr(action.chosen, "name", "")) for _, _, action in done}
+    unknown = any(action.may() for _, _, action in done)
     shut = {door.name: door.closed for door in loaded.world.spec.doors} if loaded.world.spec else {}
     for index, event, action in done:
         keys: Keys = ("events", index, "do", *((event.actions.index(action),) if isinstance(event.do, list) else ()))
@@ -192,7 +193,7 @@ def _idle_actions(loaded: LoadedScenario) -> Iterator[Problem]:
         if action.kind == "push" and not any(getattr(action.chosen, "impulse", ())):
             yield loaded.problem((*keys, "push", "impulse"), "SC055", "a push of 0 N s changes nothing")
         for kind, undone, so in (("open", "close", False), ("close", "open", True)):
-            if action.kind == kind and shut.get(name) is so and (undone, name) not in kinds:
+            if action.kind == kind and shut.get(name) is so and (undone, name) not in kinds and not unknown:
                 state = "shut" if so else "open"
                 message = f"door `{name}` is {state} from the start, and nothing {undone}s it"
                 yield loaded.problem((*keys, kind, "name"), "SC055", message)

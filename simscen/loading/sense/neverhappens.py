@@ -93,8 +93,8 @@ class _Run:
         return [self._why(test, (*keys, k)) for k, test in enumerate(tests)]
 
     def does(self, *kinds: str) -> bool:
-        """Whether an event that may happen does any of these."""
-        return any(action.kind in kinds for e, name in self.events if name in self.alive for action in e.actions)
+        """Whether an event that may happen does, or may do, any of these."""
+        return any(action.may(*kinds) for e, name in self.events if name in self.alive for action in e.actions)
 
     def sent(self, goal: str | None) -> int:
         """How many goals of a name (or at all) the robot can be sent."""

@@ -33,8 +33,8 @@ def _without_goals(loaded: LoadedScenario, kind: str, criterion: Any) -> str | N
 
 
 def _result(loaded: LoadedScenario, result: Any) -> str | None:
-    kinds = {action.kind for event in loaded.spec.events for action in event.actions}
-    if result.status == "CANCELED" and "cancel_goal" not in kinds:
+    cancels = any(action.may("cancel_goal") for event in loaded.spec.events for action in event.actions)
+    if result.status == "CANCELED" and not cancels:
         return "no event cancels a goal"
     if result.status == "SUCCEEDED" and result.error_code not in (None, NONE):
         return f"what has SUCCEEDED has no error code, and so not {result.error_code.name}"

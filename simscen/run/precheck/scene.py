@@ -69,6 +69,8 @@ class Scene:
 
     @cached_property
     def _moved(self) -> set[str]:
+        if self.does():
+            return {body.name for body in self.world.bodies}
         return {getattr(action, "name", "") for _, kind, action in self.actions if kind in MOVING}
 
     @cached_property
@@ -94,8 +96,8 @@ class Scene:
         return [found for k, event in enumerate(self.loaded.spec.events) for found in actions_of(k, event)]
 
     def does(self, *kinds: str) -> bool:
-        """Whether an event of the scenario does any of these."""
-        return any(kind in kinds for _, kind, _ in self.actions)
+        """Whether an event of the scenario does, or may do, any of these; of none: whether one may do anything."""
+        return any(action.may(*kinds) for event in self.loaded.spec.events for action in event.actions)
 
     def footprint_at(self, pose: Pose2, solids: Iterable[Solid]) -> str | None:
         """Which of the solids the robot's own footprint would overlap, as words that follow "is"; None for none."""

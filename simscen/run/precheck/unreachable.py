@@ -38,6 +38,9 @@ def unreachable(scene: Scene, ways: Ways, misplaced: set[Keys]) -> Iterator[tupl
         if closed is not world and ways.lead(starts, goal.pose, world):
             problem = scene.loaded.problem(keys, "SC302", what, "nothing in the scenario opens, moves or removes it")
             yield replace(problem, severity="warning"), place
+        elif scene.does():
+            problem = scene.loaded.problem(keys, "SC302", what, "unless an action of an installed package opens a way")
+            yield replace(problem, severity="warning"), place
         elif len(scene.certain) < len(world) and ways.lead(starts, goal.pose, scene.certain):
             problem = scene.loaded.problem(keys, "SC302", what, "unless what is not upright there is a ramp")
             yield replace(problem, severity="warning"), place

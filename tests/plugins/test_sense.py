@@ -1,0 +1,55 @@
+"""What is refused before a run takes into account that an action of another maker may do anything."""
+
+from pathlib import Path
+
+import pytest
+
+SCENARIO = """\
+simscen: 1
+world:
+  simscen: 1
+  walls:
+    - {points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}
+    - {points: [[3, 0], [3, 4]]}
+  regions: {behind: [[4, 1], [5, 1], [5, 2], [4, 2]]}
+robot: {pose: {x: 1, y: 1}}
+goals: [{pose: {x: 5, y: 3}}]
+time_limit: 30 s
+events:
+  - {when: {time: 1 s}, do: %s}
+  - {when: {robot_in: {region: behind}}, do: {push: {impulse: [0, 1]}}}
+  - {when: {speed_above: 3 m/s}, do: {push: {impulse: [1, 0]}}}
+pass:
+  - result: {status: CANCELED}
+"""
+
+
+@pytest.fixture
+def told(yardwork, tmp_path: Path, monkeypatch, capsys):
+    """`told(action)` validates a scenario whose goal is behind a wall, with an event that does this."""
+    from simscen.cli.main import main
+
+    def validate(action: str) -> tuple[int, str]:
+        (tmp_path / "s.scenario.yaml").write_text(SCENARIO % action)
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.setattr("sys.argv", ["simscen", "validate", "s.scenario.yaml"])
+        with pytest.raises(SystemExit) as end:
+            main()
+        return int(end.value.code or 0), capsys.readouterr().out
+
+    return validate
+
+
+def test_a_shipped_action_that_changes_nothing_of_it_leaves_all_errors(told) -> None:
+    code, text = told("{remove: {name: nothing}}")
+    assert code == 2
+    code, text = told("{push: {impulse: [0, 2]}}")
+    assert code == 2
+    assert "no event cancels a goal" in text
+
+
+def test_with_an_action_of_a_package_only_what_is_sure_is_an_error(told) -> None:
+    code, text = told("{turn_robot: {by: 1}}")
+    assert code == 0, text
+    assert "error[" not in text
+    assert "unless an action of an installed package opens a way" in text
