@@ -26,7 +26,8 @@ def stream_names(entries: Sequence[EventEntry | FaultEntry]) -> list[str]:
 
 def _written(entry: BaseModel) -> str:
     _build(entry)
-    return entry.model_dump_json(exclude_defaults=True)
+    # As what they are, not as what the field says: a choice of an installed package is an instance of a wider class.
+    return entry.model_dump_json(exclude_defaults=True, serialize_as_any=True)
 
 
 def _build(value: object) -> None:

@@ -158,3 +158,10 @@ def test_streams_are_named_by_what_entries_are_called_or_say_never_by_their_plac
     assert names(push, pull, named)[0] == names(pull, named, push)[2]
     assert names(named) == names({**pull, "name": "wind"})
     assert names(push, pull)[1:] == names({**pull, "when": {"time": "1000 ms"}})
+
+
+def test_what_installed_packages_add_is_part_of_what_an_entry_says(yardwork):
+    slow, fast = ({"when": {"reversing": speed}, "do": {"turn_robot": {"by": 1.0}}} for speed in (0.1, 0.2))
+    other = {**slow, "do": {"turn_robot": {"by": 2.0}}}
+    names = stream_names([EventEntry.model_validate(words) for words in (slow, fast, other)])
+    assert len({name.rpartition("#")[0] for name in names}) == 3
