@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-    from importlib.metadata import EntryPoints
+    from importlib.metadata import Distribution
 
     from pydantic import BaseModel
 
@@ -170,30 +170,41 @@ def _is(entry: Entry, spec: type) -> bool:
 @cache
 def _scanned() -> tuple[Entry, ...]:
     """Every entry point of a group of ours, group by group, by name, then by distribution."""
-    found = sorted(
-        {
-            Entry(point.group.removeprefix(PREFIX), point.name, point.value, name, version, folder=folder)
-            for name, version, folder, points in _packages()
-            for point in points
-            if point.group.startswith(PREFIX)
-        },
-        key=lambda e: (e.group, e.name, e.distribution, e.version, e.value),
-    )
-    return tuple(replace(entry, flaw=_flaw(entry, found)) for entry in found)
+    found = sorted(set(_read()), key=lambda e: (e.group, e.name, e.distribution, e.version, e.value))
+    return tuple(replace(entry, flaw=entry.flaw or _flaw(entry, found)) for entry in found)
 
 
-def _packages() -> Iterator[tuple[str, str, str, EntryPoints]]:
-    """Name, version, folder and entry points of every package that can be imported: of two of a name the first."""
+def _read() -> Iterator[Entry]:
+    """The entry points of ours of every package that can be imported; of two packages of a name those of the first."""
     from importlib.metadata import distributions
 
     seen: set[str] = set()
     for package in distributions(path=search_path()):
-        points = package.entry_points
-        name = package.metadata["Name"] or "an unnamed package"  # an installation that broke off has no METADATA
-        key = re.sub("[-_.]+", "-", name).lower()
-        if points and key not in seen:
-            seen.add(key)
-            yield name, package.metadata["Version"] or "", str(package.locate_file("")), points
+        if not _is_about_us(package):  # to read what else there is of it, its name too, would cost ten times as much
+            continue
+        name, version = package.metadata["Name"], package.metadata["Version"] or ""
+        key = re.sub("[-_.]+", "-", name or "").lower()
+        if key and key in seen:
+            continue
+        seen.add(key)
+        whose = (name or "an unnamed package", version)  # an installation that broke off has no METADATA
+        folder = str(package.locate_file(""))
+        try:
+            points = [(point.group, point.name, point.value) for point in package.entry_points]
+        except (ValueError, TypeError, LookupError) as error:  # what importlib.metadata raises on what is none
+            yield Entry("", "", "entry_points.txt", *whose, f"its entry_points.txt is damaged: {error}", folder)
+            continue
+        for group, point, value in points:
+            if group.startswith(PREFIX):
+                yield Entry(group.removeprefix(PREFIX), point, value, *whose, folder=folder)
+
+
+def _is_about_us(package: Distribution) -> bool:
+    """Whether it may have entry points for simscen; damage to others is no concern of ours."""
+    try:
+        return PREFIX in (package.read_text("entry_points.txt") or "")
+    except UnicodeDecodeError as error:
+        return PREFIX.encode() in error.object
 
 
 def search_path() -> list[str]:

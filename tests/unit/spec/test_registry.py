@@ -106,3 +106,28 @@ def test_nothing_is_looked_for_before_a_name_is_used_that_is_not_shipped() -> No
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "False\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[simscen.criterion]\nno equals sign\n",
+        "\x00\xff",
+        "[simscen.criterion]\n\xff",
+        "[simscen.criterion\ncalm = calm:Calm\n",
+    ],
+)
+def test_an_installation_that_is_damaged_is_told_and_hides_no_other(packages, calm_module, text: str) -> None:
+    site = packages("calm", "1.0", {"criterion": {"calm": "calm:Calm"}}, calm=calm_module)
+    packages("wreck", "2.0", {})
+    (site / "wreck-2.0.dist-info" / "entry_points.txt").write_bytes(text.encode("latin-1"))
+    assert find("criterion", "calm").load().__name__ == "Calm"
+    told = [(stranger.distribution, stranger.flaw.partition(":")[0]) for stranger in strangers()]
+    assert told == ([("wreck", "its entry_points.txt is damaged")] if "simscen." in text else [])
+
+
+def test_an_installation_that_broke_off_has_no_name_and_is_usable(packages, calm_module) -> None:
+    site = packages("calm", "1.0", {"criterion": {"calm": "calm:Calm"}}, calm=calm_module)
+    (site / "calm-1.0.dist-info" / "METADATA").unlink()
+    (entry,) = installed("criterion")
+    assert (entry.origin, entry.load().__name__) == ("an unnamed package", "Calm")
