@@ -114,7 +114,7 @@ def test_nothing_is_looked_for_before_a_name_is_used_that_is_not_shipped() -> No
         "[simscen.criterion]\nno equals sign\n",
         "\x00\xff",
         "[simscen.criterion]\n\xff",
-        "[simscen.criterion\ncalm = calm:Calm\n",
+        "plain words",
     ],
 )
 def test_an_installation_that_is_damaged_is_told_and_hides_no_other(packages, calm_module, text: str) -> None:
