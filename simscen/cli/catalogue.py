@@ -72,15 +72,15 @@ def topics(installed: bool = False) -> list[Topic]:
     """Every topic, group by group, in the order of the language; with what `installed` packages add, if asked."""
     return [
         *_choices("trigger", Test),
-        *_added(Test, installed),
+        *added_topics(Test, installed),
         _topic("trigger", "when", Trigger),
         *_choices("action", AnyAction),
-        *_added(AnyAction, installed),
+        *added_topics(AnyAction, installed),
         *_choices("fault", AnyFault),
-        *_added(AnyFault, installed),
+        *added_topics(AnyFault, installed),
         _topic("fault", "faults", FaultEntry),
         *_choices("criterion", AnyCriterion),
-        *_added(AnyCriterion, installed),
+        *added_topics(AnyCriterion, installed),
         _topic("criterion", "pass", AnyCriterion),
         *(_topic("scenario", name, model) for name, model in _SCENARIO.items()),
         *(_topic("stack", name, model) for name, model in _STACK.items()),
@@ -98,7 +98,7 @@ def topics(installed: bool = False) -> list[Topic]:
         *(_topic("robot", name, model) for name, model in _ROBOT.items()),
         *(_topic("drive", kind, model) for kind, model in by_type(robot.Drive)),
         *_choices("sensor", robot.Sensor),
-        *_added(robot.Sensor, installed),
+        *added_topics(robot.Sensor, installed),
     ]
 
 
@@ -236,7 +236,8 @@ def _choices(group: str, choice: type[Choice]) -> Iterator[Topic]:
         yield _topic(group, key, model) if model is not None else Topic(group, key, None, docs.get(name, ""))
 
 
-def _added(choice: type[Choice], wanted: bool) -> Iterator[Topic]:
+def added_topics(choice: type[Choice], wanted: bool = True) -> Iterator[Topic]:
+    """What installed packages add to a choice, if that is `wanted`; without those that cannot be used."""
     if not wanted:
         return
     origins = {entry.name: entry.origin for entry in registry.installed(choice.group)}

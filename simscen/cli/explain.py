@@ -17,12 +17,20 @@ from simscen.loading.messages import quoted, suggestion
 
 def command(
     name: Annotated[str, typer.Argument(help="What to explain; nothing = list what there is.")] = "",
+    page: Annotated[
+        bool, typer.Option("--page", help="Print the reference of the language, with what is installed, as Markdown.")
+    ] = False,
 ) -> None:
     """Explain a trigger, action, fault, criterion, signal, metric, component or error code.
 
     For example `simscen explain stopped_within`, `simscen explain amcl`, `simscen explain SC012`. Where a name means
     several things, all are explained; `simscen explain trigger.localization_error` picks one.
     """
+    if page:
+        from simscen.cli.reference import language_page
+
+        print_text(language_page(installed=True).rstrip())
+        return
     width = max(40, min(100, shutil.get_terminal_size().columns))
     if not name:
         print_text(_overview(width))
@@ -33,7 +41,7 @@ def command(
 
 
 def _everything() -> list[Topic]:
-    return [*topics(installed=True), *signal_topics(), *metric_topics()]
+    return [*topics(installed=True), *signal_topics(), *metric_topics(installed=True)]
 
 
 def _called(name: str) -> list[Topic]:

@@ -1,6 +1,7 @@
 """The metrics of every run and of a session, for `simscen explain metrics` and the reference."""
 
-from simscen.cli.catalogue import OPTIONAL, Field, Topic
+from simscen.cli.catalogue import OPTIONAL, Field, Topic, added_topics
+from simscen.criteria.measure import AnyMeasure
 from simscen.judge.measure.table import METRICS, Metric
 
 REPORTED = """\
@@ -23,11 +24,15 @@ Wilson interval, of all runs, those with errors included; `spl` and `soft_spl`, 
 the `measured_runs` that came to their end."""
 
 
-def metric_topics() -> list[Topic]:
-    """The list of all, then each."""
+def metric_topics(installed: bool = False) -> list[Topic]:
+    """The list of all, then each; with those that `installed` packages add, if asked."""
     rows = tuple(Field(name, metric.unit or "number", OPTIONAL, metric.text) for name, metric in METRICS.items())
     every = [Topic("metric", name, None, _told(metric)) for name, metric in METRICS.items()]
-    return [Topic("metric", "metrics", None, f"{REPORTED}\n\n{CAVEATS}\n\n{SESSION}", rows=rows), *every]
+    return [
+        Topic("metric", "metrics", None, f"{REPORTED}\n\n{CAVEATS}\n\n{SESSION}", rows=rows),
+        *every,
+        *added_topics(AnyMeasure, installed),
+    ]
 
 
 def metrics_page() -> str:

@@ -2,11 +2,12 @@
 
 from itertools import groupby
 
-from simscen.cli.catalogue import OPTIONAL, Field, Topic, topics
+from simscen.cli.catalogue import OPTIONAL, Field, Topic, added_topics, topics
 from simscen.cli.main import COMMANDS
 from simscen.cli.metrics import metrics_page
 from simscen.cli.options import commands_of, exits, section
 from simscen.cli.signals import signals_page
+from simscen.criteria.measure import AnyMeasure
 from simscen.loading.codes import CODES
 from simscen.spec.quantities import UNITS
 
@@ -33,18 +34,23 @@ _GROUPS = {
     "world": ("World files", "`*.world.yaml`, or inline under `world`."),
     "robot": ("Robot files", "`*.robot.yaml`."),
     "drive": ("Drives", "Under `drive` of a robot, told apart by `type`."),
+    "metric": ("Metrics", "Entries of `metrics`, besides what [every run reports](metrics.md)."),
     "sensor": ("Sensors", "Under `sensors` of a robot: a name of your choice, and exactly one of these."),
 }
 _HEADINGS = ("What is measured:", "When it fails:", "Why this:", "Source:")
 
 
-def language_page() -> str:
-    """docs/reference/language.md."""
+def language_page(installed: bool = False) -> str:
+    """docs/reference/language.md; with what `installed` packages add, if asked."""
     parts = [f"{_MADE}# The language\n", _units()]
-    for group, members in groupby(topics(), key=lambda topic: topic.group):
+    for group, members in groupby(_topics(installed), key=lambda topic: topic.group):
         title, text = _GROUPS[group]
         parts += [f"## {title}\n\n{text}\n", *(_section(topic) for topic in members)]
     return "\n".join(parts)
+
+
+def _topics(installed: bool) -> list[Topic]:
+    return [*topics(installed), *added_topics(AnyMeasure, installed)]
 
 
 def problems_page() -> str:
@@ -82,7 +88,7 @@ def _units() -> str:
 
 
 def _section(topic: Topic) -> str:
-    parts = [f"### `{topic.name}`\n", _text(topic.text)]
+    parts = [f"### `{topic.name}`\n", *([f"Added by {topic.origin}.\n"] if topic.origin else []), _text(topic.text)]
     if topic.value:
         parts.append(f"\nValue: {topic.value}.")
     if topic.example:

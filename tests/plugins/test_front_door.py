@@ -149,6 +149,10 @@ def test_schema_and_explain_know_it_and_what_is_committed_does_not(yard) -> None
     assert [list(error.path) for error in jsonschema.Draft7Validator(schema).iter_errors(wrong)] != []
     told = simscen("explain", "dwell").stdout
     assert "dwell (criterion of yardwork 1.2)" in told and "region: text (required)" in told
+    page = simscen("explain", "--page").stdout
+    assert "### `dwell`\n\nAdded by yardwork 1.2.\n\nThe robot leaves a region" in page
+    assert "### `sonar`" in page and "### `reversed_length`" in page
+    assert "reversed_length (metric of yardwork 1.2)" in simscen("explain", "reversed_length").stdout
     assert re.search(r"^  .*\bcrosstalk\b", simscen("explain").stdout, re.MULTILINE)
     assert "dwell" not in simscen("schema", PYTHONPATH="").stdout
     check = [sys.executable, "-m", "simscen.cli.generate", "--check"]
@@ -187,3 +191,13 @@ def test_another_version_of_the_package_does_not_judge_a_log_of_this_one(yard, y
     judged = simscen("judge", "out/runs/door/seed-1/run.mcap")
     assert judged.returncode == 2
     assert "of yardwork==1.2, and installed is yardwork==2.0" in judged.stdout + judged.stderr
+
+
+def test_a_log_is_judged_without_what_only_its_run_needed(yard, yardwork) -> None:
+    (yard / "door.scenario.yaml").write_text(
+        DRIVE.replace("  - dwell: {region: doorway, max: 30 s}\n", "").partition("metrics:")[0]
+    )
+    assert simscen("run", "door.scenario.yaml", "--out", "out").returncode == 0
+    shutil.rmtree(yardwork)
+    judged = simscen("judge", "out/runs/door/seed-1/run.mcap")
+    assert (judged.returncode, judged.stderr) == (0, "")
