@@ -22,18 +22,23 @@ def simulate(
     log: str | PathLike[str] | None = None,
     root: str | PathLike[str] | None = None,
     world_path: Sequence[str | PathLike[str]] = (),
+    stack: str | None = None,
 ) -> Run:
     """Run a scenario file in this process and judge it: `simscen.simulate("goal.scenario.yaml", seed=7).passed`.
 
     `seed` (1 … 2³²-1) defaults to the scenario's own. `log` is where the MCAP log is written, if anywhere. `root` and
-    `world_path` mean what --root and --world-path mean on the command line. The same scenario and seed give the same
-    run to the last bit, as often as it is called and whatever ran before. Raises simscen.core.errors.InvalidInput for
-    files that cannot be used and RunError for a run that cannot be completed; an engine that crashes takes the process
-    along, which is why the command line gives each run its own.
+    `world_path` mean what --root and --world-path mean on the command line; `stack` is the NAME=VALUE of --stack. The
+    same scenario and seed give the same run to the last bit, as often as it is called and whatever ran before. Raises
+    simscen.core.errors.InvalidInput for files that cannot be used, UsageError for a stack that cannot, and RunError for
+    a run that cannot be completed; an engine that crashes takes the process along, which is why the command line gives
+    each run its own.
     """
     from pathlib import Path
 
-    from simscen.run.simulate import simulate_file
+    from simscen.cli.stacks import load_with
+    from simscen.run.prepare import prepare
+    from simscen.run.simulate import simulate as run
 
-    written, home = (None if path is None else Path(path) for path in (log, root))
-    return simulate_file(Path(scenario), seed, written, home, [Path(folder) for folder in world_path])
+    home = None if root is None else Path(root)
+    loaded = load_with(stack, Path(scenario), home, [Path(folder) for folder in world_path])
+    return run(prepare(loaded), seed, log=None if log is None else Path(log))

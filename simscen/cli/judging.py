@@ -59,7 +59,7 @@ class Judging:
     def _own(self, log: Path) -> RunFinished:
         read = read_run(log)
         about, case = read.about, read.about.case
-        key = RunKey(about.name, about.seed)
+        key = about.key
         if self._criteria is None:
             spec = criteria_of_text(about.scenario, str(log), about.facts)
             result = result_of(key, str(log), spec.pass_, read.trace, case, metrics=spec.metrics)

@@ -12,7 +12,7 @@ from simscen.core.errors import InvalidInput
 from simscen.core.geometry import Pose2
 from simscen.core.grid import UNKNOWN, OccupancyGrid
 from simscen.core.problems import Problem
-from simscen.core.result import RunKey, RunResult
+from simscen.core.result import RunResult
 from simscen.judge.result import result_of
 from simscen.judge.resultdata import from_json
 from simscen.loading.resolved import criteria_of_text
@@ -62,9 +62,7 @@ def _result(log: Log, file: Path) -> RunResult:
         return from_json(log.result)
     about = log.about
     spec = criteria_of_text(about.scenario, str(file), about.facts)
-    return result_of(
-        RunKey(about.name, about.seed), about.name, spec.pass_, log.trace, about.case, metrics=spec.metrics
-    )
+    return result_of(about.key, about.name, spec.pass_, log.trace, about.case, metrics=spec.metrics)
 
 
 def _nothing(log: Log) -> OccupancyGrid:

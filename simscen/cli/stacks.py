@@ -12,11 +12,12 @@ from simscen.core.errors import InvalidInput, UsageError
 from simscen.core.externalcommand import ExternalCommand
 from simscen.core.problems import Problem
 from simscen.core.result import RunKey
-from simscen.loading.discovery import STACK
+from simscen.loading.discovery import STACK, default_root
 from simscen.loading.externalstack import undefined
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.messages import quoted, suggestion
 from simscen.loading.program import command_of
+from simscen.loading.scenario import load_scenario
 from simscen.loading.stackchoice import REFERENCE, StackChoice
 from simscen.loading.stackfile import load_stack_file
 from simscen.loading.userconfig import UserConfig, load_config
@@ -64,6 +65,16 @@ class Stacks:
             given = next((choice.runs for choice in self.chosen if choice.name == name and choice.runs), None)
             self._commands[name] = given or self.config.command(name, environment(), Path.cwd())
         return self._commands[name]
+
+
+def load_with(stack: str | None, file: Path, root: Path | None, world_path: Sequence[Path]) -> LoadedScenario:
+    """A scenario, with the stack that a `--stack` means or its own, ready to be prepared. Raises InvalidInput."""
+    home = root or default_root([file])
+    stacks = stacks_of([] if stack is None else [stack], home, world_path)
+    loaded, problem = stacks.with_command(load_scenario(file, home, world_path, next(iter(stacks.chosen), None)))
+    if problem is not None:
+        raise InvalidInput([problem])
+    return loaded
 
 
 def stacks_of(written: Sequence[str], root: Path, world_path: Sequence[Path] = ()) -> Stacks:

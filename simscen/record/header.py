@@ -11,12 +11,15 @@ from pydantic_core import to_json
 from simscen.core.case import Case
 from simscen.core.geometry import Pose3
 from simscen.core.grid import OccupancyGrid
+from simscen.core.result import RunKey
 from simscen.core.time import Clock
 
 FORMAT = "1"
 STACK = "simscen.stack"
 """The metadata record that says what an external stack was: known to its end, so it stands at the end of the log."""
 _FACT = "fact."
+STACK, VARIATION = "stack", "variation"
+"""Facts: NAME=VALUE of the stack that took the place of the scenario's own, and what tells the run from others."""
 OWN_FILES = CASE, SCENARIO, RESULT = "case.json", "scenario.yaml", "result.json"
 _MEDIA_TYPES = {
     ".json": "application/json",
@@ -49,6 +52,11 @@ class LogHeader:
     sensors: Mapping[str, str] = field(default_factory=dict)
     files: Mapping[str, bytes] = field(default_factory=dict)
     facts: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def key(self) -> RunKey:
+        """The key of the run."""
+        return RunKey(self.name, self.seed, self.facts.get(VARIATION, ""))
 
 
 def case_to_json(case: Case) -> str:

@@ -18,7 +18,7 @@ def agreed(run: RunFinished, earlier: Path) -> RunFinished:
     """
     if run.result.outcome is Outcome.ERROR or not run.artifacts.mcap:
         return run
-    there = run_folder(earlier, run.key.first) / "run.mcap"
+    there = _folder(run, earlier) / "run.mcap"
     try:
         if there.read_bytes() == Path(run.artifacts.mcap).read_bytes():
             return run
@@ -31,6 +31,13 @@ def agreed(run: RunFinished, earlier: Path) -> RunFinished:
         return run
     failure = RunFailure("nondeterministic", f"not as in {earlier}: {why}")
     return replace(run, result=replace(run.result, outcome=Outcome.ERROR, error=failure))
+
+
+def _folder(run: RunFinished, earlier: Path) -> Path:
+    """Where the earlier session has it: a stack that is alone here may have been one of several there."""
+    stack = run.result.stack.partition("=")[0]
+    labelled = run_folder(earlier, replace(run.key.first, variation=stack))
+    return labelled if not run.key.first.variation and labelled.is_dir() else run_folder(earlier, run.key.first)
 
 
 def _disagreement(here: Path, there: Path) -> str | None:

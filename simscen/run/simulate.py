@@ -16,7 +16,7 @@ from simscen.loading.discovery import default_root
 from simscen.loading.plugins import fact_of, origin, plugins_of
 from simscen.loading.resolved import resolved_text
 from simscen.loading.scenario import load_scenario
-from simscen.record.header import LogHeader
+from simscen.record.header import STACK, VARIATION, LogHeader
 from simscen.record.recorder import Recorder
 from simscen.record.tracebuilder import TraceBuilder
 from simscen.run.assemble import assemble
@@ -110,5 +110,11 @@ def log_header(prepared: Prepared, seed: int) -> LogHeader:
         robot_description=describe(prepared.body),
         frames=sensor_frames(prepared.robot),
         sensors=sensor_kinds(prepared),
-        facts={fact_of(entry): origin(entry) for entry in plugins_of(prepared.loaded)},
+        facts={**_stack_facts(prepared), **{fact_of(entry): origin(entry) for entry in plugins_of(prepared.loaded)}},
     )
+
+
+def _stack_facts(prepared: Prepared) -> dict[str, str]:
+    """The stack that was chosen in place of the scenario's own, as it was given, and what the run is called by it."""
+    told = {STACK: prepared.loaded.stack, VARIATION: prepared.loaded.variation}
+    return {name: value for name, value in told.items() if value}

@@ -69,9 +69,16 @@ def _against(runs: Mapping[RunKey, RunResult], baseline: str, other: str) -> Aga
         flips=flips,
         p=sign_test(won, len(flips) - won),
         differences=tuple(
-            found for name in COMPARED if (found := _difference(name, whole if name in ALWAYS else alike)) is not None
+            found
+            for name in (*COMPARED, *_added(whole))
+            if (found := _difference(name, whole if name in ALWAYS else alike)) is not None
         ),
     )
+
+
+def _added(pairs: Sequence[Pair]) -> list[str]:
+    """The metrics that scenarios ask installed packages for."""
+    return sorted({name for pair in pairs for run in pair for name in run.metrics if name not in METRICS})
 
 
 def _arrived(run: RunResult) -> bool:
@@ -108,7 +115,7 @@ def _difference(name: str, pairs: Sequence[Pair]) -> Difference | None:
     lower, higher = sum(value < 0 for value in differences), sum(value > 0 for value in differences)
     return Difference(
         metric=name,
-        unit=METRICS[name].unit,
+        unit=METRICS[name].unit if name in METRICS else "",
         pairs=len(known),
         baseline=sum(one for one, _ in known) / len(known),
         value=sum(two for _, two in known) / len(known),

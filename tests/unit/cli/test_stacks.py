@@ -9,6 +9,10 @@ from xml.etree import ElementTree
 
 import pytest
 
+from simscen import simulate
+from simscen.core.errors import InvalidInput, UsageError
+from simscen.record.replay import read_log
+
 COMMAND = [sys.executable, "-c", "import sys; from simscen.cli.start import start; sys.exit(start())"]
 SHORT = """\
 simscen: 1
@@ -19,6 +23,23 @@ time_limit: 1 s
 pass: [{collisions: {max: 0}}]
 """
 DWB = "simscen: 1\nstack: {controller: {type: dwb}}\n"
+TAME = '''
+from simscen.core.motion import STOP
+from simscen.core.trace import Decision
+from simscen.model.stack import InProcessStack
+
+class Tame(InProcessStack):
+    """Does nothing."""
+    component = "tame:TameStack"
+
+class TameStack:
+    plan = goal = None
+    def __init__(self, spec, setting): pass
+    def start(self, estimate, goals): pass
+    def preempt(self, tick, goal): pass
+    cancel = preempt
+    def decide(self, tick, readings): return Decision(STOP)
+'''
 BOTH = ("--stack", "ref=reference", "--stack", "dwb=dwb.stack.yaml")
 
 
@@ -72,6 +93,42 @@ def test_the_command_that_repeats_a_run_repeats_it_with_its_stack(simscen, proje
     assert simscen(*shlex.split(again)[1:], "--out", "again").code == 0
     text = (project / "again/runs/a/seed-7/scenario.yaml").read_text()
     assert text == (project / "out/runs/a/seed-7-dwb/scenario.yaml").read_text()
+
+
+def test_a_run_that_is_repeated_agrees_with_the_one_of_several_stacks(simscen, project: Path) -> None:
+    """The command that repeats it gives one stack, which needs no label."""
+    assert simscen("run", "a.scenario.yaml", *BOTH, "--out", "out").code == 0
+    ended = simscen("run", "a.scenario.yaml", "--stack", "dwb=dwb.stack.yaml", "--check-against", "out")
+    assert ended.code == 0, ended.out
+
+
+def test_a_log_says_which_stack_it_is_of_so_that_it_is_judged_as_that(simscen, project: Path) -> None:
+    assert simscen("run", "a.scenario.yaml", *BOTH, "--out", "out").code == 0
+    judged = json.loads(simscen("judge", "out", "--json").out)
+    assert sorted(run["variation"] for run in judged["runs"]) == ["dwb", "ref"]
+    facts = read_log(project / "out/runs/a/seed-1-dwb/run.mcap").about.facts
+    assert facts["stack"] == "dwb=dwb.stack.yaml"
+
+
+def test_from_python_a_stack_is_given_as_on_the_command_line(project: Path) -> None:
+    run = simulate("a.scenario.yaml", stack="dwb=dwb.stack.yaml")
+    assert run.passed
+    assert run.result.again == "simscen run a.scenario.yaml --seed 1 --stack dwb=dwb.stack.yaml"
+    with pytest.raises(UsageError, match="expected NAME=VALUE"):
+        simulate("a.scenario.yaml", stack="a b=reference")
+    (project / "a.scenario.yaml").write_text(SHORT + "stack: {external: mine}\n")
+    with pytest.raises(InvalidInput, match="nobody says what the stack `mine` runs"):
+        simulate("a.scenario.yaml")
+    assert simulate("a.scenario.yaml", stack="dwb=dwb.stack.yaml").passed
+
+
+def test_a_type_of_stack_of_an_installed_package_is_a_stack(packages, simscen, project: Path) -> None:
+    packages("tame", "1.0", {"stack": {"tame": "tame:Tame"}}, tame=TAME)
+    ended = simscen("run", "a.scenario.yaml", "--stack", "t=tame", "--stack", "ref=reference", "--out", "out")
+    assert ended.code == 0, ended.out + ended.err
+    assert "type: tame" in (project / "out/runs/a/seed-1-t/scenario.yaml").read_text()
+    assert simscen("validate", "a.scenario.yaml", "--stack", "tame").code == 0
+    assert "did you mean `tame`" in simscen("validate", ".", "--stack", "tam").err
 
 
 def test_equal_runs_are_checked_for_each_stack_by_itself(simscen, project: Path) -> None:

@@ -122,5 +122,10 @@ def test_as_data_it_is_strict_json_and_says_what_was_left_out() -> None:
     assert data["against"][0]["differences"] == []
 
 
+def test_metrics_that_packages_add_are_compared_too() -> None:
+    found = of(against(run("ref", headway=2.0), run("mine", headway=2.5)), "headway")
+    assert (found.difference, found.unit, found.pairs) == (0.5, "", 1)
+
+
 def test_every_metric_that_is_compared_is_one() -> None:
     assert set(COMPARED) <= set(METRICS)
