@@ -12,7 +12,9 @@ STAMP := $(VENV)/.installed
 LOWEST := .venv-lowest
 LOWEST_TESTS := tests/diagnostics tests/cases $(addprefix tests/unit/,cli loading judge report run sim worlds)
 
-.PHONY: help setup run test test-lowest served check lint types layers schemas docs mutation bench campaign fuzz build clean
+ROS := .venv-ros
+
+.PHONY: help setup run test test-lowest test-ros served check lint types layers schemas docs mutation bench campaign fuzz build clean
 
 help:  ## Print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -35,7 +37,12 @@ run: setup  ## Run the scenarios that ship
 	@$(BIN)/simscen run scenarios/
 
 test: setup check  ## Run everything CI runs: checks, then the tests
+	@$(BIN)/python tests/ros/rig.py $(ROS) || true
 	@$(BIN)/python -m pytest
+
+test-ros: setup  ## Test with a real ROS 2 (rclpy on Fast DDS, from wheels into .venv-ros)
+	@$(BIN)/python tests/ros/rig.py $(ROS)
+	@$(BIN)/python -m pytest tests/ros -n 2 --durations=10
 
 test-lowest:  ## Test with the oldest packages that pyproject.toml allows, in .venv-lowest
 	@test -x $(LOWEST)/bin/python || $(PYTHON) -m venv $(LOWEST)
@@ -83,4 +90,4 @@ build: setup  ## Build the wheel into dist/
 	@$(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist .
 
 clean:  ## Remove what make made
-	rm -rf $(VENV) $(LOWEST) dist build simscen-out .mypy_cache .pytest_cache .ruff_cache
+	rm -rf $(VENV) $(LOWEST) $(ROS) dist build simscen-out .mypy_cache .pytest_cache .ruff_cache

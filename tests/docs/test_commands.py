@@ -13,6 +13,8 @@ ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 SHOWN = re.compile(r"\bsimscen ([a-z]+)\b([^`#\n]*)")
 OPTION = re.compile(r"(?<!\S)(--?[a-z][a-z-]*)(?=[\s=…]|$)")
+QUOTED = re.compile(r"\"[^\"]*\"|'[^']*'")
+"""Other commands, such as those of stacks."""
 GLOBAL = {"--help", "--version"}
 
 
@@ -20,7 +22,7 @@ def shown():
     """Page, words of the command, and the options beside it."""
     for page in PAGES:
         for match in SHOWN.finditer(page.read_text(encoding="utf-8")):
-            name, rest = match[1], match[2]
+            name, rest = match[1], QUOTED.sub("…", match[2])
             if name in COMMANDS:
                 yield page.relative_to(ROOT).as_posix(), name, rest
 

@@ -1,0 +1,108 @@
+"""A real ROS 2, made by `make test-ros`, and runs whose stack is a graph in it."""
+
+import itertools
+import json
+import os
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+ROS = ROOT / ".venv-ros"
+NODES = Path(__file__).with_name("nodes")
+SIMSCEN = str(Path(sys.executable).with_name("simscen"))
+ROOM = """\
+simscen: 1
+walls:
+  - {points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}
+obstacles:
+  - {name: crate, box: [0.6, 0.6, 0.6], pose: {x: 3, y: 1}}
+places: {start: {x: 1, y: 1}, desk: {x: 5, y: 3, yaw: 90 deg}, door: {x: 5, y: 1}}
+"""
+GOAL = """\
+simscen: 1
+world: room.world.yaml
+robot: {pose: start}
+goals: [{pose: desk, timeout: 60 s}]
+pass: [{goals_reached: {}}, {collisions: {max: 0}}, {no_false_success: {}}]
+"""
+
+
+class Ros(NamedTuple):
+    """The Python that has rclpy, and how a node of these tests is started with it."""
+
+    python: Path
+    interfaces: bool | str
+
+    def node(self, name: str, *arguments: str, sim_time: bool = True, **parameters: object) -> str:
+        """The command that starts a node."""
+        told = [*arguments, *(["-p", "use_sim_time:=true"] if sim_time else [])]
+        for key, value in parameters.items():
+            told += ["-p", f"{key}:={str(value).lower() if isinstance(value, bool) else value}"]
+        return shlex.join([str(self.python), str(NODES / f"{name}.py"), "--ros-args", *told])
+
+
+@pytest.fixture(scope="session")
+def ros() -> Ros:
+    """Skips the test where there is no ROS."""
+    try:
+        made = json.loads((ROS / "rig.json").read_text())
+    except OSError:
+        pytest.skip("there is no .venv-ros: `make test-ros` makes it where rclpy's wheels can be had")
+    return Ros(ROS / "bin" / "python", made["interfaces"])
+
+
+@pytest.fixture(scope="session")
+def with_interfaces(ros: Ros) -> Ros:
+    """Skips the test where tf2_msgs and nav2_msgs could not be built."""
+    if ros.interfaces is not True:
+        pytest.skip(f"tf2_msgs and nav2_msgs could not be built: {ros.interfaces}")
+    return ros
+
+
+class Ended(NamedTuple):
+    """How `simscen run` ended: exit code, what it printed, the folder of the session."""
+
+    code: int
+    said: str
+    out: Path
+
+    @property
+    def runs(self) -> list[dict[str, Any]]:
+        """Of each run what its result.json says."""
+        return [json.loads(path.read_text()) for path in sorted(self.out.rglob("result.json"))]
+
+    @property
+    def logs(self) -> list[Path]:
+        """The log of each run."""
+        return sorted(self.out.rglob("run.mcap"))
+
+
+Run = Callable[..., Ended]
+
+
+@pytest.fixture
+def run(ros: Ros, tmp_path: Path) -> Run:
+    """Runs a scenario with `simscen ros2 WORDS` as its stack, in a folder with a room and a goal."""
+    (tmp_path / "room.world.yaml").write_text(ROOM)
+    (tmp_path / "goal.scenario.yaml").write_text(GOAL)
+
+    numbers = itertools.count()
+
+    def call(*words: str, scenario: str | Path = "goal.scenario.yaml", options: tuple[str, ...] = ()) -> Ended:
+        out = tmp_path / f"out-{next(numbers)}"
+        stack = shlex.join([SIMSCEN, "ros2", *words])
+        command = [SIMSCEN, "run", str(scenario), "--stack", f"nav={stack}", "--out", str(out), *options]
+        environment = {**os.environ, "SIMSCEN_ROS_PYTHON": str(ros.python)}
+        done = subprocess.run(
+            command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300, check=False
+        )
+        return Ended(done.returncode, re.sub(r"\s+", " ", done.stdout + done.stderr), out)
+
+    return call

@@ -1,0 +1,92 @@
+"""What a graph lacks is said exactly, and what simscen offers is what Nav2 asks for."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+ASKED = {
+    # topic: type, reliability and durability that the subscribers of Nav2 ask for, and where that is written
+    "/clock": ("rosgraph_msgs/msg/Clock", "BEST_EFFORT", "VOLATILE"),  # rclcpp::ClockQoS
+    "/scan": ("sensor_msgs/msg/LaserScan", "BEST_EFFORT", "VOLATILE"),  # amcl, obstacle layer: SensorDataQoS
+    "/odom": ("nav_msgs/msg/Odometry", "RELIABLE", "VOLATILE"),  # bt_navigator, controller_server: odom_topic
+    "/tf": ("tf2_msgs/msg/TFMessage", "RELIABLE", "VOLATILE"),  # tf2_ros::DynamicListenerQoS
+    "/tf_static": ("tf2_msgs/msg/TFMessage", "RELIABLE", "TRANSIENT_LOCAL"),  # tf2_ros::StaticListenerQoS
+    "/map": (
+        "nav_msgs/msg/OccupancyGrid",
+        "RELIABLE",
+        "TRANSIENT_LOCAL",
+    ),  # static layer: transient local
+    "/robot_description": ("std_msgs/msg/String", "RELIABLE", "TRANSIENT_LOCAL"),  # what robot_state_publisher offers
+    "/initialpose": ("geometry_msgs/msg/PoseWithCovarianceStamped", "RELIABLE", "VOLATILE"),  # amcl
+}
+"""https://docs.nav2.org/setup_guides and /configuration; rclcpp/qos.hpp, tf2_ros/qos.hpp."""
+TREE = {("map", "odom"), ("odom", "base_link"), ("base_link", "lidar")}
+"""REP 105: localisation gives map→odom, odometry odom→base_link; https://docs.nav2.org/setup_guides/transformation."""
+READY = "6"
+"""Seconds: a node takes two or three to be there."""
+STRENGTH = {"BEST_EFFORT": 0, "RELIABLE": 1, "VOLATILE": 0, "TRANSIENT_LOCAL": 1}
+
+
+def test_topics_types_qos_and_frames_are_what_nav2_asks_for(with_interfaces, run, tmp_path: Path) -> None:
+    ros, file = with_interfaces, tmp_path / "probe.json"
+    ended = run("--launch", f"{ros.node('navigator')} & {ros.node('probe', file=file)}")
+    assert ended.code == 0, ended.said
+    seen = json.loads(file.read_text())
+    for topic, (kind, reliability, durability) in ASKED.items():
+        offered = seen["offered"][topic]
+        assert offered[0] == kind
+        assert STRENGTH[offered[1]] >= STRENGTH[reliability], topic
+        assert STRENGTH[offered[2]] >= STRENGTH[durability], topic
+    assert set(map(tuple, seen["frames"])) >= TREE
+    assert seen["scans"] == ["lidar"]
+
+
+@pytest.mark.parametrize(
+    "flaws",
+    [
+        {
+            "no command": "nobody publishes /cmd_vel (geometry_msgs/msg/Twist or geometry_msgs/msg/TwistStamped)",
+            "no goals": "nobody takes goals: no ",
+            "scan type": "/flawed subscribes to /scan as nav_msgs/msg/Odometry; it is sensor_msgs/msg/LaserScan",
+        },
+        {
+            "deaf to scans": "/flawed hears nothing of /scan: it asks for durability transient local, which",
+            "another odometry": "/flawed publishes /odom, too: leave that node out, or tell simscen to: --without",
+        },
+        {
+            "command type": "/flawed publishes /cmd_vel as geometry_msgs/msg/Vector3, not geometry_msgs/msg/Twist",
+            "no sensors": "nobody subscribes to any sensor: /",
+        },
+        {"two commands": "/cmd_vel is published both as Twist and as TwistStamped: /flawed (geometry_msgs/msg/Twist"},
+        {"another map frame": "/amcl_pose comes in the frame 'world'; simscen's map frame is 'map'"},
+    ],
+    ids=", ".join,
+)
+def test_what_a_graph_lacks_is_said_exactly(ros, run, flaws: dict[str, str]) -> None:
+    ended = run("--ready", READY, "--launch", ros.node("flawed", flaws=list(flaws)))
+    assert ended.code == 3
+    for message in flaws.values():
+        assert message in ended.said
+
+
+def test_nodes_on_wall_time_and_lifecycle_nodes_that_sleep_are_named(ros, run) -> None:
+    awake = ros.node("flawed", "-r", "cmd_vel:=other", sim_time=False)
+    ended = run("--ready", READY, "--launch", f"{awake} & {ros.node('sleeper')}")
+    assert ended.code == 3
+    assert "/flawed lives on wall time: start it with use_sim_time true" in ended.said
+    assert "the lifecycle node /sleeper is unconfigured, not active" in ended.said
+
+
+def test_a_topic_of_another_name_is_found_and_its_remapping_shown(ros, run) -> None:
+    ended = run("--ready", READY, "--launch", ros.node("navigator", "-r", "scan:=front", "-r", "cmd_vel:=base/cmd_vel"))
+    assert ended.code == 3
+    assert "--remap /cmd_vel:=/base/cmd_vel" in ended.said
+    assert "--remap /scan:=/front" in ended.said
+
+
+def test_a_command_that_ends_at_once_is_said_with_what_it_printed(ros, run) -> None:
+    ended = run("--launch", "echo no such package: nav >&2; exit 7")
+    assert ended.code == 3
+    assert "what was launched ended with exit code 7" in ended.said
+    assert "no such package: nav" in ended.said

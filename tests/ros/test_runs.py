@@ -1,0 +1,136 @@
+"""A navigation node that knows nothing of simscen drives its scenarios over a real ROS 2."""
+
+import hashlib
+import json
+import os
+import signal
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcap.reader import make_reader
+
+from simscen.record.replay import read_run
+
+ROOT = Path(__file__).parents[2]
+NODES = Path(__file__).with_name("nodes")
+SCENARIOS = ["navigation/goal", "navigation/patrol"]
+REPEATS = 20
+SHORT = """\
+simscen: 1
+world: room.world.yaml
+robot: {pose: start}
+goals: [{pose: {x: 1.6, y: 2, yaw: 60 deg}, timeout: 30 s}]
+pass: [{goals_reached: {}}, {collisions: {max: 0}}]
+"""
+BOX = """\
+simscen: 1
+world: room.world.yaml
+robot: {pose: start}
+goals: [{pose: door, timeout: 60 s}]
+events:
+  - when: {travelled: 0.5 m}
+    do: {spawn: {name: box, box: [0.4, 0.4, 0.8], pose: {x: 3.2, y: 2.2}}}
+pass: [{goals_reached: {}}, {collisions: {max: 0}}]
+"""
+
+
+def digest(log: Path) -> str:
+    return hashlib.sha256(log.read_bytes()).hexdigest()
+
+
+def about(log: Path) -> dict[str, Any]:
+    """What the log says of the stack."""
+    with log.open("rb") as file:
+        records = {record.name: record.metadata for record in make_reader(file).iter_metadata()}
+    told: dict[str, Any] = json.loads(records["simscen.stack"]["about"])
+    return told
+
+
+def alive(word: str, program: str = "") -> list[int]:
+    """The processes whose command line has `word`, and begins with `program`."""
+    found = []
+    for process in Path("/proc").iterdir():
+        if process.name.isdigit():
+            try:
+                words = (process / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace")
+            except OSError:
+                continue
+            if word in words and words.startswith(program):
+                found.append(int(process.name))
+    return sorted(found)
+
+
+@pytest.mark.parametrize("stamped", [False, True], ids=["Twist", "TwistStamped"])
+def test_it_reaches_a_goal_by_goal_pose_in_a_namespace_with_remappings(ros, run, stamped: bool) -> None:
+    names = ["-r", "__ns:=/robot1", "-r", "/tf:=tf", "-r", "/tf_static:=tf_static", "-r", "scan:=/front/scan"]
+    words = ["--namespace", "robot1", "--remap", "/scan:=/front/scan"]
+    ended = run(*words, "--launch", ros.node("navigator", *names, stamped=stamped))
+    assert ended.code == 0, ended.said
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_it_passes_a_scenario_that_ships(ros, run, name: str) -> None:
+    ended = run("--launch", ros.node("navigator"), scenario=ROOT / "scenarios" / f"{name}.scenario.yaml")
+    assert ended.code == 0, ended.said
+
+
+def test_it_drives_around_what_appears_on_its_way(ros, run, tmp_path: Path) -> None:
+    (tmp_path / "box.scenario.yaml").write_text(BOX)
+    ended = run("--launch", ros.node("navigator"), scenario="box.scenario.yaml")
+    assert ended.code == 0, ended.said
+
+
+@pytest.mark.parametrize("action", ["navigate_to_pose", "navigate_through_poses", "follow_waypoints"])
+def test_goals_go_to_an_action_of_nav2(with_interfaces, run, tmp_path: Path, action: str) -> None:
+    text = SHORT.replace("goals: [", "goals: [{name: first, pose: {x: 1.8, y: 1}, timeout: 30 s}, ")
+    (tmp_path / "short.scenario.yaml").write_text(text)
+    launch = with_interfaces.node("navigator", action=action)
+    ended = run("--goals", action, "--launch", launch, scenario="short.scenario.yaml")
+    assert ended.code == 0, ended.said
+    told = [event.kind.value for event in read_run(ended.logs[0]).trace.events if event.kind.value.startswith("goal.")]
+    assert told == ["goal.accepted", "goal.reached"] * 2
+
+
+def test_twenty_runs_in_lockstep_are_equal_bit_for_bit_two_at_a_time(ros, run, tmp_path: Path) -> None:
+    """Two at a time: neither do they hear each other."""
+    (tmp_path / "short.scenario.yaml").write_text(SHORT)
+    with ThreadPoolExecutor(2) as pool:
+        words = ["--launch", ros.node("navigator")]
+        calls = [pool.submit(run, *words, scenario="short.scenario.yaml") for _ in range(REPEATS)]
+        ended = [call.result() for call in calls]
+    assert [one.code for one in ended] == [0] * REPEATS, ended[0].said
+    assert len({digest(one.logs[0]) for one in ended}) == 1
+    told = [about(one.logs[0]) for one in ended]
+    assert all(one["sync"] == "lockstep" and one["late_commands"] == 0 for one in told)
+    assert told == [told[0]] * REPEATS
+
+
+def test_paced_runs_say_so(ros, run, tmp_path: Path) -> None:
+    (tmp_path / "short.scenario.yaml").write_text(SHORT)
+    words = ["--sync", "paced", "--factor", "4", "--launch", ros.node("navigator")]
+    ended = run(*words, scenario="short.scenario.yaml")
+    assert ended.code == 0, ended.said
+    told = about(ended.logs[0])
+    assert (told["sync"], told["factor"]) == ("paced", 4.0)
+
+
+def test_killing_the_node_is_an_error_of_that_run_only_and_nothing_is_left(ros, run, tmp_path: Path) -> None:
+    for name in ("one", "other"):
+        (tmp_path / f"{name}.scenario.yaml").write_text(SHORT)
+    tag = f"run{os.getpid()}"
+    with ThreadPoolExecutor(1) as pool:
+        words = ["--launch", ros.node("navigator", "-p", f"tag:={tag}")]
+        options = ("other.scenario.yaml", "--jobs", "2")
+        call = pool.submit(run, *words, scenario="one.scenario.yaml", options=options)
+        while len(nodes := alive(tag, f"{ros.python} {NODES}")) < 2 and not call.done():
+            time.sleep(0.05)
+        os.kill(nodes[0], signal.SIGKILL)
+        ended = call.result()
+    assert ended.code == 3, ended.said
+    results = json.loads((ended.out / "results.json").read_text())
+    assert sorted(one["outcome"] for one in results["runs"]) == ["error", "passed"]
+    assert "what was launched ended by signal 9" in ended.said, ended.said
+    assert alive(tag) == []
