@@ -30,6 +30,7 @@ COMMANDS = {
     "plugins": "List the types that installed packages add to the language and to the stack.",
     "world": "Inspect, convert and export worlds.",
     "robot": "Drive a robot once and compare command, odometry and truth.",
+    "ros2": "Stand for a ROS 2 graph, or Nav2, as the stack of a run.",
     "bench": "Measure how fast simscen runs here.",
     "doctor": "Check that this installation can run scenarios.",
 }

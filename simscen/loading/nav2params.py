@@ -1,0 +1,77 @@
+"""A parameter file of Nav2, with the lines its parameters stand in."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from simscen.core.problems import Problem
+from simscen.loading.compose import compose
+from simscen.loading.source import read_text
+from simscen.loading.tree import Fields, Node, Place
+from simscen.ros2.nav2 import Offer, check
+
+PARAMETERS = "ros__parameters"
+
+
+@dataclass(frozen=True)
+class Nav2Parameters:
+    """Node → parameter with dots → value, and where each stands; `shown` is the file for people."""
+
+    shown: str
+    nodes: Mapping[str, Mapping[str, Any]]
+    places: Mapping[tuple[str, str], Place]
+    text: str
+
+    def problems(self, offer: Offer) -> list[Problem]:
+        """What does not fit, in the order of the file."""
+        found = [
+            Problem(
+                *self.places[finding.node, finding.parameter],
+                code="SC340",
+                message=f"{finding.node}: {finding.message}",
+                severity="error" if finding.severe else "warning",
+            )
+            for finding in check(self.nodes, offer)
+        ]
+        lines = self.text.split("\n")
+        return [replace(problem, source=lines[problem.line - 1]) for problem in sorted(found)]
+
+
+def read_nav2_parameters(path: Path) -> Nav2Parameters | list[Problem]:
+    """The parameters in `path`, or what is wrong with the file."""
+    shown = str(path)
+    text = read_text(path, shown)
+    if isinstance(text, Problem):
+        return [text]
+    tree, problems = compose(text, shown)
+    if problems or tree is None:
+        return problems
+    found = dict(_nodes(tree, ""))
+    if not found:
+        return [Problem(shown, 0, 0, "SC340", f"no parameters of nodes: there is no key {PARAMETERS} in it")]
+    nodes: dict[str, dict[str, Any]] = {}
+    places: dict[tuple[str, str], Place] = {}
+    for name, parameters in found.items():
+        nodes[name] = {}
+        for key, value in _flat(parameters, ""):
+            nodes[name][key] = value.plain
+            places[name, key] = value.place
+    return Nav2Parameters(shown, nodes, places, text)
+
+
+def _nodes(node: Node, name: str) -> Iterator[tuple[str, Fields]]:
+    """Every node of the file and its parameters; namespaces around it do not count."""
+    for key, entry in node.entries.items() if isinstance(node, Fields) else ():
+        if key == PARAMETERS and isinstance(entry.value, Fields):
+            yield name, entry.value
+        else:
+            yield from _nodes(entry.value, key.rpartition("/")[2])
+
+
+def _flat(fields: Fields, prefix: str) -> Iterator[tuple[str, Node]]:
+    for key, entry in fields.entries.items():
+        if isinstance(entry.value, Fields):
+            yield from _flat(entry.value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", entry.value

@@ -1,0 +1,166 @@
+"""What Nav2's parameters must say to fit what simscen publishes: rules for a parameter file and for a running graph.
+
+Names and defaults are those of Nav2's configuration guide (https://docs.nav2.org/configuration/).
+"""
+
+from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+
+MAP, ODOM = "map", "odom"
+
+
+class Finding(NamedTuple):
+    """A parameter that does not fit: of which node, which one, and why. `severe` ones keep Nav2 from working."""
+
+    node: str
+    parameter: str
+    message: str
+    severe: bool = True
+
+
+class Offer(NamedTuple):
+    """What simscen has: topics of scans and of odometry in the user's graph, and the names of the robot's base."""
+
+    scans: Sequence[str]
+    odometry: str
+    bases: Sequence[str]
+
+
+Parameters = Mapping[str, Any]
+"""`obstacle_layer.scan.topic` → value: the parameters of one node."""
+COSTMAPS = {"local_costmap": ODOM, "global_costmap": MAP}
+"""Costmap → the frame that it usually is in."""
+
+
+def check(nodes: Mapping[str, Parameters], offer: Offer) -> List[Finding]:
+    """Everything in the parameters of Nav2's nodes that does not fit; `nodes` by their names without a namespace."""
+    found: List[Finding] = []
+    for name in sorted(nodes):
+        node = _Node(name, nodes[name], offer, found)
+        if node.get("use_sim_time") is False:
+            node.note("use_sim_time", "is false: the node would live on wall time", severe=False)
+        if name in RULES:
+            RULES[name](node)
+    return found
+
+
+def wanted(name: str, known: Iterable[str]) -> List[str]:
+    """The parameters of a node that the rules look at, to ask a running one for; `known` are those it has."""
+    if name in COSTMAPS:
+        ends: Tuple[str, ...] = (".observation_sources", ".topic", ".data_type", ".enabled")
+        return [key for key in known if key in _FRAMES or key == "plugins" or key.endswith(ends)]
+    ends = (".topic", ".type", ".enabled")
+    return [key for key in known if key in _FRAMES or (name == "collision_monitor" and key.endswith(ends))]
+
+
+_FRAMES = frozenset(
+    (
+        *("use_sim_time", "robot_base_frame", "base_frame_id", "odom_frame_id", "global_frame", "global_frame_id"),
+        *("local_frame", "odom_topic", "scan_topic", "observation_sources"),
+    )
+)
+
+
+class _Node:
+    """The parameters of a node, and where to say what is wrong with them."""
+
+    def __init__(self, name: str, parameters: Parameters, offer: Offer, found: List[Finding]) -> None:
+        self.name, self.offer = name, offer
+        self._parameters, self._found = parameters, found
+
+    def get(self, key: str) -> Optional[Any]:
+        return self._parameters.get(key)
+
+    def note(self, key: str, message: str, severe: bool = True) -> None:
+        self._found.append(Finding(self.name, key, f"{key} {message}", severe))
+
+    def base(self, key: str) -> None:
+        """A frame that must be the robot's base."""
+        value = self.get(key)
+        if value is not None and value not in self.offer.bases:
+            hint = f"--base-frame {value} gives it that name, too"
+            self.note(key, f"is {value!r}; simscen's base frame is {self.offer.bases[0]!r}: {hint}")
+
+    def frame(self, key: str, *frames: str) -> None:
+        value = self.get(key)
+        if value is not None and value not in frames:
+            self.note(key, f"is {value!r}; simscen knows {' and '.join(map(repr, frames))}")
+
+    def topic(self, key: str, topics: Sequence[str], what: str) -> None:
+        value = self.get(key)
+        if isinstance(value, str) and "/" + value.lstrip("/") not in topics:
+            there = ", ".join(topics) or "none"
+            self.note(key, f"is {value!r}, which nobody publishes; {what} of simscen: {there}")
+
+
+def _amcl(node: _Node) -> None:
+    node.base("base_frame_id")
+    node.frame("odom_frame_id", ODOM)
+    node.frame("global_frame_id", MAP)
+    node.topic("scan_topic", node.offer.scans, "scans")
+
+
+def _costmap(node: _Node) -> None:
+    node.base("robot_base_frame")
+    node.frame("global_frame", MAP, ODOM)
+    for layer in node.get("plugins") or ():
+        sources = node.get(f"{layer}.observation_sources")
+        for source in sources.split() if isinstance(sources, str) else ():
+            _source(node, f"{layer}.{source}")
+
+
+def _source(node: _Node, source: str) -> None:
+    """A sensor that a layer listens to."""
+    kind = node.get(f"{source}.data_type") or node.get(f"{source}.type") or "LaserScan"
+    if kind in ("LaserScan", "scan"):
+        node.topic(f"{source}.topic", node.offer.scans, "scans")
+    elif node.get(f"{source}.enabled") is not False:
+        key = f"{source}.data_type" if node.get(f"{source}.data_type") else f"{source}.type"
+        node.note(key, f"is {kind!r}: simscen publishes scans only", severe=False)
+
+
+def _navigator(node: _Node) -> None:
+    node.base("robot_base_frame")
+    node.frame("global_frame", MAP)
+    node.topic("odom_topic", [node.offer.odometry], "odometry")
+
+
+def _with_odometry(node: _Node) -> None:
+    node.topic("odom_topic", [node.offer.odometry], "odometry")
+
+
+def _behaviors(node: _Node) -> None:
+    node.base("robot_base_frame")
+    node.frame("local_frame", ODOM)
+    node.frame("global_frame", MAP, ODOM)
+
+
+def _monitor(node: _Node) -> None:
+    node.base("base_frame_id")
+    node.frame("odom_frame_id", ODOM)
+    for source in node.get("observation_sources") or ():
+        _source(node, str(source))
+
+
+RULES: Dict[str, Any] = {
+    "amcl": _amcl,
+    "local_costmap": _costmap,
+    "global_costmap": _costmap,
+    "bt_navigator": _navigator,
+    "controller_server": _with_odometry,
+    "velocity_smoother": _with_odometry,
+    "behavior_server": _behaviors,
+    "collision_monitor": _monitor,
+}
+NODES = ("amcl", "bt_navigator", "controller_server", "planner_server", "behavior_server", *sorted(COSTMAPS))
+"""The nodes that a run needs; `amcl` may be another localizer that publishes map→odom."""
+
+
+def flat(tree: Mapping[str, Any], prefix: str = "") -> Dict[str, Any]:
+    """Nested parameters with dots between their keys."""
+    found: Dict[str, Any] = {}
+    for key, value in tree.items():
+        if isinstance(value, Mapping):
+            found.update(flat(value, f"{prefix}{key}."))
+        else:
+            found[f"{prefix}{key}"] = value
+    return found

@@ -1,0 +1,154 @@
+"""What the adapter does without ROS: names, domains, bytes, goals, and ending what was started."""
+
+import ast
+import os
+import struct
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import simscen.ros2
+from simscen.record.pack import TwistPacker
+from simscen.ros2 import cdr
+from simscen.ros2.domain import claim, surroundings
+from simscen.ros2.failure import Failure
+from simscen.ros2.names import Names
+
+FOLDER = Path(simscen.ros2.__file__).parent
+
+
+@pytest.mark.parametrize("file", sorted(path.name for path in FOLDER.glob("*.py")))
+def test_the_adapter_is_python_3_8_and_imports_nothing_of_simscen_but_itself_and_the_peer(file: str) -> None:
+    tree = ast.parse((FOLDER / file).read_text(), feature_version=(3, 8))
+    imported = {name.name for node in ast.walk(tree) if isinstance(node, ast.Import) for name in node.names}
+    imported |= {node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    allowed = {"simscen.ros2", "simscen.peer", "rclpy"}
+    foreign = {name for name in imported if name.partition(".")[0] not in sys.stdlib_module_names}
+    assert all(any(name == root or name.startswith(root + ".") for root in allowed) for name in foreign), foreign
+
+
+@pytest.mark.parametrize(
+    ("namespace", "remappings", "topic", "name"),
+    [
+        ("", [], "/scan", "/scan"),
+        ("robot1", [], "/scan", "/robot1/scan"),
+        ("/robot1/", [], "/tf", "/robot1/tf"),
+        ("robot1", [], "/clock", "/clock"),
+        ("", ["/scan:=/front/scan"], "/scan", "/front/scan"),
+        ("robot1", ["scan:=front/scan"], "/scan", "/robot1/front/scan"),
+        ("robot1", ["/tf:=/tf"], "/tf", "/tf"),
+    ],
+)
+def test_topics_are_in_the_namespace_and_are_remapped_as_in_ros(
+    namespace: str, remappings: list[str], topic: str, name: str
+) -> None:
+    assert Names(namespace, remappings)(topic) == name
+
+
+@pytest.mark.parametrize("text", ["/scan=/front", ":=/front", "/scan:="])
+def test_a_remapping_that_is_none_is_refused(text: str) -> None:
+    with pytest.raises(Failure, match="not of the form /from:=/to"):
+        Names("", [text])
+
+
+def test_two_runs_never_have_the_same_domain(tmp_path: Path) -> None:
+    environment = {"XDG_RUNTIME_DIR": str(tmp_path)}
+    first, second = claim(None, environment), claim(None, environment)
+    assert (first.number, second.number) == (1, 2)
+    first.release()
+    assert claim(None, environment).number == 1
+
+
+def test_a_domain_that_another_run_uses_cannot_be_had_by_number(tmp_path: Path) -> None:
+    environment = {"XDG_RUNTIME_DIR": str(tmp_path)}
+    held = claim(42, environment)
+    with pytest.raises(Failure, match=r"another run is using ROS domain 42: .* --jobs 1"):
+        claim(42, environment)
+    held.release()
+    assert claim(42, environment).number == 42
+
+
+def test_the_lock_of_a_domain_goes_with_the_process_that_held_it(tmp_path: Path) -> None:
+    code = (
+        "import os, sys; from simscen.ros2.domain import claim; held = claim(7, os.environ); print(flush=True); input()"
+    )
+    environment = {**os.environ, "XDG_RUNTIME_DIR": str(tmp_path)}
+    holder = subprocess.Popen(
+        [sys.executable, "-c", code], env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    assert holder.stdout is not None
+    holder.stdout.readline()
+    with pytest.raises(Failure):
+        claim(7, environment)
+    holder.kill()
+    holder.wait()
+    assert claim(7, environment).number == 7
+
+
+@pytest.mark.parametrize(("distro", "old"), [("humble", "1"), ("jazzy", None), ("", None)])
+def test_nodes_are_told_to_stay_on_this_machine_as_their_distribution_understands(distro: str, old: str | None) -> None:
+    told = surroundings(5, "/tmp/logs", {"ROS_DISTRO": distro, "ROS_LOCALHOST_ONLY": "0"})
+    assert told["ROS_DOMAIN_ID"] == "5"
+    assert told["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
+    assert told.get("ROS_LOCALHOST_ONLY") == old
+
+
+def test_a_stamped_velocity_is_read_whatever_the_length_of_its_frame() -> None:
+    numbers = (0.5, 0.0, 0.0, 0.0, 0.0, -0.25)
+    for frame in ("", "b", "base_link", "base_footprint", "robot_1/base_link"):
+        text = frame.encode() + b"\0"
+        body = struct.pack("<iII", 12, 500_000_000, len(text)) + text
+        stamped = cdr.LITTLE_ENDIAN + body + b"\0" * (-len(body) % 8) + struct.pack("<6d", *numbers)
+        assert cdr.velocity(stamped, stamped=True) == numbers
+        assert cdr.header(stamped) == (12_500_000_000, frame)
+
+
+def test_a_velocity_of_another_byte_order_is_read_too() -> None:
+    assert cdr.velocity(b"\0\0\0\0" + struct.pack(">6d", 1, 2, 3, 4, 5, 6), stamped=False) == (1, 2, 3, 4, 5, 6)
+
+
+def test_a_twist_is_written_as_in_the_log() -> None:
+    from simscen.core.motion import Twist
+
+    assert cdr.twist((0.3, 0.1, 0, 0, 0, -0.7)) == TwistPacker()(Twist(0.3, 0.1, -0.7))
+
+
+def _alive(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+@pytest.mark.parametrize("stubborn", [False, True])
+def test_all_that_was_launched_is_ended_when_the_adapter_goes_even_what_slipped_away(
+    tmp_path: Path, stubborn: bool
+) -> None:
+    """A grandchild in a session of its own, whose parent has gone, deaf to SIGINT and SIGTERM."""
+    note = tmp_path / "pid"
+    deaf = "trap '' INT TERM; " if stubborn else ""
+    command = f"setsid sh -c '{deaf}echo $$ > {note}; while :; do sleep 0.05; done' & sleep 600"
+    if stubborn:
+        command = f'setsid sh -c "{deaf}echo \\$\\$ > {note}; while :; do sleep 0.05; done" & sleep 600'
+    keeper = subprocess.Popen([sys.executable, str(FOLDER / "keeper.py"), command], stdin=subprocess.PIPE)
+    while not note.exists() or not note.read_text():
+        time.sleep(0.02)
+    pid = int(note.read_text())
+    assert _alive(pid)
+    assert keeper.stdin is not None
+    keeper.stdin.close()
+    keeper.wait(30)
+    assert not _alive(pid)
+
+
+def test_the_keeper_ends_as_what_it_kept() -> None:
+    for command, code in (("exit 3", 3), ("kill -9 $$", 137)):
+        keeper = subprocess.Popen([sys.executable, str(FOLDER / "keeper.py"), command], stdin=subprocess.PIPE)
+        assert keeper.wait(30) == code
+
+
+def test_an_estimate_is_made_of_map_odom_and_odometry() -> None:
+    assert cdr.compose((1.0, 2.0, 0.0), (0.5, 0.0, 0.1)) == pytest.approx((1.5, 2.0, 0.1))
