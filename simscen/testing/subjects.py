@@ -8,11 +8,13 @@ from collections.abc import Callable, Sequence
 from importlib import import_module
 from typing import Any, get_type_hints
 
-from pydantic import ValidationError
+from pydantic import RootModel, ValidationError
 
 from simscen.actions.base import Action
 from simscen.criteria.base import Criterion
+from simscen.criteria.measure import Measure
 from simscen.faults.base import Fault
+from simscen.model.robot import SensorSpec
 from simscen.model.stack import BehaviorSpec, ControllerSpec, GoalCheckerSpec, LocalizerSpec, PlannerSpec
 from simscen.model.stackbase import StackBase
 from simscen.spec.registry import GROUPS, BrokenPlugin, Entry, find
@@ -24,7 +26,9 @@ from simscen.testing.contracts.criterion import CriterionContract
 from simscen.testing.contracts.fault import FaultContract
 from simscen.testing.contracts.goal_checker import GoalCheckerContract
 from simscen.testing.contracts.localizer import LocalizerContract
+from simscen.testing.contracts.metric import MetricContract
 from simscen.testing.contracts.planner import PlannerContract
+from simscen.testing.contracts.sensor import SensorContract
 from simscen.testing.contracts.stack import StackContract
 from simscen.testing.contracts.trigger import TriggerContract
 from simscen.testing.flatland import box_robot, round_robot
@@ -46,6 +50,8 @@ _ALONE: dict[type, Callable[..., Contract]] = {
     Fault: FaultContract,
     Condition: TriggerContract,
     Action: ActionContract,
+    SensorSpec: SensorContract,
+    Measure: MetricContract,
 }
 
 
@@ -71,7 +77,7 @@ def promises_of(spec: Any, subject: str = "", robots: dict[str, RobotModel] | No
     """Every promise that a specification's component has to keep, to be tried one by one.
 
     `spec` is a specification: of a planner, a controller, a localizer, a behavior, a goal checker, a whole stack, a
-    criterion, a fault, a trigger or an action. `robots` are those to try it with, by name.
+    criterion, a fault, a trigger, an action, a sensor or a metric. `robots` are those to try it with, by name.
     """
     return [each for contract in contracts_of(spec, subject, robots) for each in contract.promises()]
 
@@ -87,8 +93,6 @@ def named(target: str) -> list[Promise]:
         values = json.loads(written) if written else {}
     except ValueError as error:
         raise NoSubject(f"{target}: {written} is no JSON: {error}") from error
-    if not isinstance(values, dict):
-        raise NoSubject(f"{target}: {written} is no JSON object")
     return [each for model in _models(what) for each in promises_of(_instance(model, values, target), what)]
 
 
@@ -129,10 +133,13 @@ def specification_of(named: Any, what: str) -> Any:
     return hint
 
 
-def _instance(model: Any, values: dict[str, Any], target: str) -> Any:
+def _instance(model: Any, values: Any, target: str) -> Any:
+    if not isinstance(values, dict) and not issubclass(model, RootModel):
+        raise NoSubject(f"{target}: {json.dumps(values)} is no JSON object")
     try:
         return model.model_validate(values, by_alias=True, by_name=False)
     except ValidationError as error:
         wrong = "; ".join(f"{'.'.join(map(str, each['loc']))}: {each['msg']}" for each in error.errors())
-        hint = "" if values else ", e.g. " + target + '={"key": 1}'
+        example = "1.0" if issubclass(model, RootModel) else '{"key": 1}'
+        hint = "" if values else f", e.g. {target}={example}"
         raise NoSubject(f"{target}: {model.__name__} needs other values ({wrong}){hint}") from error
