@@ -10,8 +10,8 @@ from datetime import datetime, timezone
 from simscen.run.versions import arithmetic, cpu_flags, versions
 
 
-def as_json(plugins: Mapping[str, object], wall: float | None = None) -> bytes:
-    """run.json; `plugins` are the installed packages that are used, `wall` the seconds that the session took.
+def as_json(used: Mapping[str, object], wall: float | None = None) -> bytes:
+    """run.json; `used` are installed packages and external stacks, `wall` the seconds that the session took.
 
     While it is under way `wall` is None.
     """
@@ -26,7 +26,7 @@ def as_json(plugins: Mapping[str, object], wall: float | None = None) -> bytes:
             "cpu_flags": cpu_flags(),
             "arithmetic": arithmetic(),
             "packages": versions(),
-            "plugins": plugins,
+            **used,
         },
         indent=2,
     ).encode()

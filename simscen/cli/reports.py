@@ -34,7 +34,7 @@ class JunitFamily(str, Enum):
 class Reports:
     """The reports of one session in `folder`; `junit` is the report that is named at the end.
 
-    With `only`, that one is all that is written. `plugins` are the installed packages that its scenarios use.
+    With `only`, that one is all that is written. `used` are the installed packages and external stacks of its runs.
     """
 
     def __init__(
@@ -43,16 +43,16 @@ class Reports:
         junit: Path | None,
         family: Family,
         only: bool = False,
-        plugins: Mapping[str, object] | None = None,
+        used: Mapping[str, object] | None = None,
     ) -> None:
         self.folder, self.junit, self._only = folder, junit or folder / "junit.xml", only
-        self._plugins = plugins or {}
+        self._used = used or {}
         self._family: Family = family
 
     def begin(self) -> None:
         """Write run.json, so that a session that is killed has said where it ran. Raises UsageError."""
         try:
-            write_atomically(self.folder / "run.json", circumstances.as_json(self._plugins))
+            write_atomically(self.folder / "run.json", circumstances.as_json(self._used))
         except OSError as error:
             raise UsageError(f"cannot use the output folder {self.folder}: {error.strerror}") from error
 
@@ -70,7 +70,7 @@ class Reports:
 
     def end(self, wall: float) -> bool:
         """Write run.json anew, with the seconds that the session took."""
-        return _written(self.folder / "run.json", circumstances.as_json(self._plugins, wall))
+        return _written(self.folder / "run.json", circumstances.as_json(self._used, wall))
 
     def closing(
         self, answers: Sequence[RunFinished], wall: float, interrupted: bool, comparison: Comparison | None = None

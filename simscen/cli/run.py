@@ -13,7 +13,7 @@ from simscen.cli.interrupts import signals_interrupt
 from simscen.cli.reports import JunitFamily, Reports, require_writable, verdict
 from simscen.cli.screen import Format, Screen, screen
 from simscen.cli.select import Selection, load_all, shard_of
-from simscen.cli.stacks import STACK_HELP
+from simscen.cli.stacks import STACK_HELP, commands_of
 from simscen.cli.work import Work, begin
 from simscen.core.errors import Exit, UsageError
 from simscen.core.sessionevents import SessionEvent
@@ -105,7 +105,8 @@ def command(
         seeds_of(scenario, options)
     require_writable(junit, out or resume, {file for each in scenarios for file in (*each.files.values(), *each.read)})
     folder, journal = _output_folder(out, resume)
-    reports = Reports(folder, junit, junit_family.value, plugins=packages_of(plugins_of_all(scenarios)))
+    used = {"plugins": packages_of(plugins_of_all(scenarios)), "stacks": commands_of(scenarios)}
+    reports = Reports(folder, junit, junit_family.value, used=used)
     reports.begin()
     work = begin(journal, plan(scenarios, options, folder), options.workers)
     with screen(format_) as shown:

@@ -1,7 +1,7 @@
 """What `--stack NAME=VALUE` and the user's own configuration say of stacks."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -65,6 +65,16 @@ class Stacks:
             given = next((choice.runs for choice in self.chosen if choice.name == name and choice.runs), None)
             self._commands[name] = given or self.config.command(name, environment(), Path.cwd())
         return self._commands[name]
+
+
+def commands_of(scenarios: Iterable[LoadedScenario]) -> dict[str, dict[str, object]]:
+    """What the external stacks of scenarios run, by name: nothing of the environment, which may hold secrets."""
+    stacks = ((loaded.spec.stack, loaded.runs) for loaded in scenarios)
+    found = {stack.external: runs for stack, runs in stacks if isinstance(stack, ExternalStackSpec) and runs}
+    return {
+        name: {"command": list(runs.argv), "cwd": runs.cwd, "digest": runs.digest}
+        for name, runs in sorted(found.items())
+    }
 
 
 def load_with(stack: str | None, file: Path, root: Path | None, world_path: Sequence[Path]) -> LoadedScenario:

@@ -14,7 +14,7 @@ from simscen.core.result import Outcome
 from simscen.core.sessionevents import RunFinished
 from simscen.judge.wording import subject, told
 from simscen.report.complaints import Complaint, complaints, failure, place, scenario_file
-from simscen.report.text import one_line, visible
+from simscen.report.text import command, one_line, visible
 
 Family = Literal["simscen", "xunit2"]
 
@@ -70,8 +70,9 @@ def _properties(case: Element, run: RunFinished) -> None:
     values = {
         "seed": str(run.key.seed),
         "simulated_seconds": f"{run.result.simulated:.3f}",
+        "stack": run.result.stack,
         "ended": run.result.ended,
-        "again": run.again,
+        "again": command(run.again),
     }
     for verdict in run.result.verdicts:
         values[f"status.{verdict.id}"] = verdict.status.value
@@ -81,7 +82,7 @@ def _properties(case: Element, run: RunFinished) -> None:
                 values[f"margin.{name}"] = f"{finding.margin:.6g} {finding.unit}".rstrip()
     for key, value in values.items():
         if value:
-            SubElement(properties, "property", {"name": one_line(key), "value": one_line(value)})
+            SubElement(properties, "property", {"name": one_line(key), "value": visible(value)})
 
 
 def _failure(case: Element, run: RunFinished) -> None:
@@ -105,7 +106,7 @@ def _told(run: RunFinished, about: list[Complaint]) -> str:
     for complaint in about:
         lines.append(f"{place(run, complaint.line)}: {complaint.message}")
         lines += [f"    {text}" for text in complaint.detail]
-    return "\n".join([*lines, *([f"again: {one_line(run.again)}"] if run.again else [])])
+    return "\n".join([*lines, *([f"again: {command(run.again)}"] if run.again else [])])
 
 
 def _output(run: RunFinished) -> str:

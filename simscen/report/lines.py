@@ -16,7 +16,7 @@ from simscen.judge.wording import tightest, told
 from simscen.report.compared import compared
 from simscen.report.complaints import broken, complaints, failure, label, place
 from simscen.report.line import Line, Piece, Role
-from simscen.report.text import one_line
+from simscen.report.text import command, one_line
 
 TAIL = 12
 MOST_HAPPENINGS = 8
@@ -158,9 +158,10 @@ def _happened(run: RunFinished) -> Iterator[Line]:
 def _pointers(run: RunFinished) -> Iterator[Line]:
     first = next((complaint.line for complaint in complaints(run) if not complaint.warning), 0)
     files = [("scenario", place(run, first)), ("picture", run.artifacts.picture), ("log", run.artifacts.mcap)]
-    for name, text in (*files[:2], *(() if run.artifacts.picture else files[2:]), ("again", run.again)):
+    shown = [(name, one_line(text)) for name, text in (*files[:2], *(() if run.artifacts.picture else files[2:]))]
+    for name, text in (*shown, ("again", command(run.again))):
         if text:
-            yield (Piece(f"      {name:9} ", "quiet"), Piece(one_line(text)))
+            yield (Piece(f"      {name:9} ", "quiet"), Piece(text))
 
 
 def _count(number: int, noun: str) -> str:

@@ -11,7 +11,7 @@ from simscen.core.sessionevents import RunFinished
 from simscen.judge.wording import comparison, subject, tightest, when
 from simscen.report.comparedpage import as_html
 from simscen.report.complaints import broken, complaints, failure, place
-from simscen.report.text import one_line, visible
+from simscen.report.text import command, one_line, visible
 
 PICTURE_BYTES = 6 * 2**20
 """Of all pictures together; one weighs some 40 kB. Larger pages open slowly and are cut off by CI systems."""
@@ -33,6 +33,7 @@ h2 { font-size: 18px; } h3 { font-size: 15px; margin-bottom: 2px; } section { ma
 .bad td:first-child { color: #c81e28; font-weight: 600; } .odd td:first-child { color: #be7800; font-weight: 600; }
 img { max-width: 100%; border: 1px solid #dee0e3; border-radius: 6px; } code, pre { font-size: 13px; }
 pre { background: #f4f5f6; padding: 10px; border-radius: 6px; overflow-x: auto; white-space: pre-wrap; }
+p code { white-space: pre-wrap; }
 """
 
 
@@ -138,7 +139,7 @@ def _metrics(run: RunFinished) -> str:
 def _again(run: RunFinished) -> str:
     warned = [complaint.message for complaint in complaints(run) if complaint.warning]
     notes = "".join(f"<p>warning: {_text(message)}</p>" for message in warned)
-    return notes + (f"<p>again: <code>{_text(run.again)}</code></p>" if run.again else "")
+    return notes + (f"<p>again: <code>{escape(command(run.again))}</code></p>" if run.again else "")
 
 
 def _text(text: str) -> str:

@@ -22,6 +22,14 @@ def one_line(text: str) -> str:
     return visible(" ".join(text.split()))
 
 
+def command(text: str) -> str:
+    """A command of shlex.join on one line, to be pasted: its spaces stay, and what would break the line is quoted.
+
+    Line breaks and tabs stand between single quotes there; bash and zsh read `$'…'`.
+    """
+    return visible(text.replace("\n", "'$'\\n''").replace("\t", "'$'\\t''"))
+
+
 def ascii_only(text: str) -> str:
     """For terminals that know nothing else: our own signs have stand-ins, the rest becomes escapes."""
     return text.translate(_ASCII).encode("ascii", "backslashreplace").decode("ascii")

@@ -102,6 +102,13 @@ def test_a_command_keeps_what_the_scenario_asks_of_its_own_stack_and_takes_only_
     assert loaded("plain", "v2=./nav")[0].spec.stack.external == "v2"
 
 
+def test_a_stack_file_may_name_an_external_stack(project: Path) -> None:
+    (project / "slow.stack.yaml").write_text("simscen: 1\nstack: {external: mine, controller_frequency: 5 Hz}\n")
+    configure(project, "stacks: {mine: {command: ./nav --slow}}\n")
+    (one,) = loaded("plain", "slow=slow.stack.yaml")
+    assert (one.spec.stack.controller_frequency, one.runs.argv) == (5.0, ("./nav", "--slow"))
+
+
 def test_every_stack_is_judged_by_the_tolerances_that_the_scenario_asks_for(project: Path) -> None:
     (project / "lax.stack.yaml").write_text(
         "simscen: 1\nstack: {goal_checker: {xy_goal_tolerance: 1, stateful: false}}\n"

@@ -94,6 +94,9 @@ def test_nothing_of_the_environment_is_in_what_a_session_leaves(run, tmp_path: P
     files = [file for file in (tmp_path / "out").rglob("*") if file.is_file()]
     assert len(files) >= 8
     assert [file for file in files if b"s3cr3t" in file.read_bytes()] == []
+    said = json.loads((tmp_path / "out/run.json").read_text())["stacks"]
+    assert said["mine"]["command"] == [sys.executable, "nav.py"]
+    assert said["mine"]["cwd"] == str(tmp_path)
 
 
 @pytest.mark.parametrize(

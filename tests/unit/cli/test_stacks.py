@@ -75,6 +75,21 @@ def test_each_scenario_runs_with_each_stack_and_seed_in_a_folder_and_case_of_its
     assert "type: dwb" in texts["dwb"]
 
 
+def test_a_report_from_the_journal_compares_as_the_session_did(simscen, project: Path) -> None:
+    assert simscen("run", ".", *BOTH, "--repeat", "2", "--out", "out").code == 0
+    before = {name: (project / "out" / name).read_bytes() for name in ("results.json", "junit.xml", "report.html")}
+    assert b'"comparison"' in before["results.json"]
+    data = (project / "out/events.jsonl").read_bytes()
+    (project / "copy").mkdir()
+    (project / "copy/events.jsonl").write_bytes(data)
+    ended = simscen("report", "copy")
+    assert "dwb against ref: 4 pairs" in ended.out
+    assert (
+        json.loads((project / "copy/results.json").read_text())["comparison"]
+        == json.loads(before["results.json"])["comparison"]
+    )
+
+
 def test_a_single_stack_needs_no_label_and_the_reference_is_what_runs_without(simscen, project: Path) -> None:
     assert simscen("run", "a.scenario.yaml", "--out", "plain").code == 0
     ended = simscen("run", "a.scenario.yaml", "--stack", "mine=reference", "--out", "mine", "--check-against", "plain")

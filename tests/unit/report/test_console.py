@@ -1,6 +1,8 @@
 import io
 import json
 import re
+import shlex
+import subprocess
 from dataclasses import replace
 
 import pytest
@@ -193,3 +195,12 @@ def test_a_session_that_breaks_off_leaves_the_terminal_as_it_was(session, live):
         raise KeyboardInterrupt
     hidden, shown = out.getvalue().count("\x1b[?25l"), out.getvalue().count("\x1b[?25h")
     assert hidden == shown
+
+
+def test_a_command_that_repeats_a_run_is_one_line_that_a_shell_reads_as_it_was(failed):
+    words = ["simscen", "run", "a.yaml", "--stack", "x=sh -c 'echo  two;\n\techo \"it'\"'\"'s\"'"]
+    out = io.StringIO()
+    told(text_reporter(utf8(out)), [replace(failed, again=shlex.join(words))])
+    (line,) = [line for line in out.getvalue().splitlines() if line.startswith("      again")]
+    shell = ["bash", "-c", f"printf '%s\\0' {line.removeprefix('      again     ')}"]
+    assert subprocess.run(shell, capture_output=True, text=True, check=True).stdout.split("\0")[:-1] == words
