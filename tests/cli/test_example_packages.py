@@ -50,7 +50,7 @@ def test_its_contract_is_asked_for_by_the_name_of_its_entry_point(call, tmp_path
         "-k",
         "without a goal",
     )
-    done = call(*pytest_, "-k", "without and goal", "--simscen-contract", "vfh_plus", folder=tmp_path)
+    done = call(*pytest_, "-k", "without and goal and zero", "--simscen-contract", "vfh_plus", folder=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "1 passed" in done.stdout
 

@@ -1,4 +1,4 @@
-"""The tutorial on own criteria and faults, done step by step as it says, in an empty folder."""
+"""The tutorials on packages of one's own, done step by step as they say, in an empty folder."""
 
 import os
 import re
@@ -8,8 +8,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-PAGE = Path(__file__).parents[2] / "docs" / "tutorials" / "own-criterion.md"
-BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+import pytest
+
+TUTORIALS = Path(__file__).parents[2] / "docs" / "tutorials"
 PIP = ["-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation", "--no-index"]
 PROGRAMS = {
     "simscen": ["-c", "import sys; from simscen.cli.start import start; sys.exit(start())"],
@@ -18,10 +19,12 @@ PROGRAMS = {
 }
 
 
-def test_each_step_of_the_tutorial_does_what_it_shows(tmp_path: Path) -> None:
+@pytest.mark.parametrize("page", ["own-criterion", "own-planner-and-stack"])
+def test_each_step_of_the_tutorial_does_what_it_shows(tmp_path: Path, page: str) -> None:
+    shown_text = (TUTORIALS / f"{page}.md").read_text(encoding="utf-8")
     site, work = tmp_path / "site", tmp_path / "work"
     work.mkdir()
-    for language, text in BLOCKS:
+    for language, text in re.findall(r"^```(\w+)\n(.*?)^```", shown_text, re.MULTILINE | re.DOTALL):
         if language == "console":
             for command, shown in re.findall(r"^\$ (.*)\n((?:(?!\$ ).*\n)*)", text, re.MULTILINE):
                 _check(command, shown, _done(command, work, site))
