@@ -12,6 +12,7 @@ from simscen.cli.diagnostics import print_text
 
 if TYPE_CHECKING:
     from simscen.run.bench import Field, Patrol
+    from simscen.run.bench_external import External
 
 app = typer.Typer(rich_markup_mode=None, add_completion=False)
 app.command("nav")(bench_nav.command)
@@ -35,7 +36,8 @@ def command(
 
     A patrol of 60 s with everything on (240 Hz physics, 360 beams at 10 Hz, 500 to 2000 particles, full MCAP log) on
     one core: times real time, where the time goes, and how long PyBullet alone takes to step and scan as often. Then a
-    720-beam scan and a step in two fields of obstacles, beside PyBullet with one body for each. All times are CPU time.
+    720-beam scan and a step in two fields of obstacles, beside PyBullet with one body for each. These are CPU times.
+    Last the patrol with its stack behind the stack protocol: µs of wall time that the engine waits for it at each beat.
     """
     if ctx.invoked_subcommand is not None:
         return
@@ -43,14 +45,18 @@ def command(
 
     with engine_output_on_stderr():
         from simscen.run import bench
+        from simscen.run.bench_external import measure_external
 
         patrol = bench.measure_patrol(rounds)
         fields = [bench.measure_field(count) for count in (209, 2090)]
+        external = measure_external(max(1, rounds // 2))
     if format_ is Format.JSON:
         patrol_data = {**asdict(patrol), "real_time_factor": patrol.factor, "ratio_to_bare": patrol.cpu / patrol.bare}
-        print(json.dumps({"patrol": patrol_data, "fields": [asdict(field) for field in fields]}, indent=2))
+        external_data = {**asdict(external), "ratio": external.ratio}
+        fields_data = [asdict(field) for field in fields]
+        print(json.dumps({"patrol": patrol_data, "fields": fields_data, "external": external_data}, indent=2))
         return
-    print_text("\n".join([*_patrol_lines(patrol, rounds), *_field_lines(fields)]))
+    print_text("\n".join([*_patrol_lines(patrol, rounds), *_field_lines(fields), *_external_lines(external)]))
 
 
 def _patrol_lines(patrol: "Patrol", rounds: int) -> list[str]:
@@ -74,4 +80,11 @@ def _field_lines(fields: "list[Field]") -> list[str]:
             f" {f.step_us:6.0f} µs {f.bare_step_us:13.0f} µs"
             for f in fields
         ),
+    ]
+
+
+def _external_lines(external: "External") -> list[str]:
+    return [
+        f"the stack of the patrol as a process of its own, all it hears and says in full, {external.beats} beats",
+        f"    {external.there_us:.0f} µs a beat; in the engine {external.here_us:.0f} µs ({external.ratio:.1f} times)",
     ]

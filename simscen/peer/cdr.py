@@ -37,9 +37,13 @@ class Writer:
 
     def numbers(self, code: str, values: Sequence[float]) -> Writer:
         """Append a sequence of numbers: how many, then each."""
-        self.put("I", len(values))
-        if len(values):
-            self.put(f"{len(values)}{code}", *values)
+        numbers = array(code, values)
+        if sys.byteorder == "big":
+            numbers.byteswap()
+        self.put("I", len(numbers))
+        if numbers:
+            self._align(numbers.itemsize)
+            self._data += numbers.tobytes()
         return self
 
     def done(self) -> bytes:

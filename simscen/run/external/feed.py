@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Collection, Iterator, Mapping
 from typing import TYPE_CHECKING
 
@@ -99,7 +100,7 @@ class Feed:
             case Scan():
                 name = self._sensors.topic_of(reading).name + EXACT
                 if name in self._heard:
-                    yield name, messages.float64_array(_scan(reading).tolist())
+                    yield name, messages.float64_array(array("d", _scan(reading).tobytes()))
             case Odometry():
                 name = self._sensors.topic_of(reading).name + EXACT
                 if name in self._heard:

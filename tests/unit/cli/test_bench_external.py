@@ -1,0 +1,6 @@
+from simscen.cli.bench import _external_lines
+from simscen.run.bench_external import External
+
+
+def test_the_cost_of_a_beat_is_told_beside_that_in_the_engine() -> None:
+    assert _external_lines(External(2401, 400.0, 1000.0))[1] == "    1000 µs a beat; in the engine 400 µs (2.5 times)"
