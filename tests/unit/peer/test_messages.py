@@ -1,0 +1,94 @@
+"""The client's messages are those of a log: it reads what the engine packs, and packs what the engine does."""
+
+import contextlib
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.grid import OccupancyGrid
+from simscen.core.motion import Twist
+from simscen.core.sensing import Imu, Scan
+from simscen.peer import messages
+from simscen.peer.cdr import Reader
+from simscen.record import pack, pack_many, pack_rare
+from simscen.record.foreign.messages import path
+
+STAMP = (12, 345_000_000)
+numbers = st.floats(-1e4, 1e4)
+names = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=9)
+poses = st.lists(st.tuples(numbers, numbers, st.floats(-4, 4)), max_size=5)
+
+
+@given(numbers, numbers, numbers)
+def test_a_twist_is_what_the_engine_packs(vx: float, vy: float, wz: float) -> None:
+    assert messages.twist(vx, vy, wz) == pack.TwistPacker()(Twist(vx, vy, wz))
+
+
+@given(poses)
+def test_a_path_is_what_the_engine_packs(points) -> None:
+    table = np.array(points, dtype=np.float64).reshape(-1, 3)
+    ours, theirs = messages.path(STAMP, points), pack_many.PathPacker("map")(STAMP, table)
+    assert len(ours) == len(theirs)
+    assert ours[:24] == theirs[:24]
+    assert np.allclose(path(ours).poses, path(theirs).poses, rtol=1e-15, atol=1e-15)  # numpy's sine is not libm's
+
+
+@given(numbers, numbers, st.floats(-4, 4), st.lists(numbers, min_size=9, max_size=9))
+def test_a_pose_with_covariance_is_what_the_engine_packs(x: float, y: float, yaw: float, covariance) -> None:
+    theirs = pack.PoseWithCovariancePacker("map")
+    expected = theirs(STAMP, Pose3.planar(Pose2(x, y, yaw)), np.array(covariance).reshape(3, 3))
+    assert messages.pose_with_covariance(STAMP, (x, y, yaw), covariance) == expected
+
+
+@given(names, names)
+def test_transforms_lines_and_texts_are_what_the_engine_packs(frame: str, text: str) -> None:
+    link = (frame, text, STAMP, Pose3.planar(Pose2(1.0, 2.0, 0.5)))
+    ours = (STAMP, frame, text, (1.0, 2.0, 0.5))
+    assert messages.transforms([ours, ours]) == pack_many.TransformsPacker()([link, link])
+    assert messages.string(text) == pack_rare.string(text)
+    assert messages.log(STAMP, 30, frame, text) == pack_rare.log(STAMP, 30, frame, text)
+
+
+def test_particles_are_what_the_engine_packs() -> None:
+    cloud = [(1.0, 2.0, 0.0, 0.25), (3.0, 4.0, 1.0, 0.75)]
+    assert messages.particle_cloud(STAMP, cloud) == pack_many.ParticleCloudPacker("map")(STAMP, np.array(cloud))
+
+
+@given(names, st.lists(st.floats(0, 100, width=32) | st.just(float("inf")), max_size=9))
+def test_a_scan_is_read_as_it_was_packed(frame: str, ranges) -> None:
+    scan = Scan("lidar", 0, np.array(ranges, dtype=np.float64), -1.5, 0.25, 0.5, 12.0)
+    read = messages.read("sensor_msgs/msg/LaserScan", pack_many.LaserScanPacker(frame)(STAMP, scan))
+    assert (read.stamp, read.frame, list(read.ranges)) == (STAMP, frame, ranges)
+    assert (read.angle_min, read.angle_increment, read.range_min, read.range_max) == (-1.5, 0.25, 0.5, 12.0)
+
+
+@given(numbers, numbers, st.floats(-3, 3), names)
+def test_odometry_is_read_as_it_was_packed(x: float, y: float, yaw: float, frame: str) -> None:
+    packed = pack.OdometryPacker(frame, "base")(STAMP, Pose3.planar(Pose2(x, y, yaw)), Twist(x, y, yaw))
+    read = messages.read("nav_msgs/msg/Odometry", packed)
+    assert (read.stamp, read.frame, read.child, read.vx, read.vy, read.wz) == (STAMP, frame, "base", x, y, yaw)
+    assert read.pose == pytest.approx((x, y, yaw))
+
+
+def test_an_imu_a_picture_and_a_map_are_read_as_they_were_packed() -> None:
+    imu = Imu("imu", 0, (1.0, 2.0, 3.0), (4.0, 5.0, 6.0))
+    read = messages.read("sensor_msgs/msg/Imu", pack.ImuPacker("base")(STAMP, imu))
+    assert (read.angular_velocity, read.linear_acceleration) == ((1.0, 2.0, 3.0), (4.0, 5.0, 6.0))
+    picture = np.arange(24, dtype=np.uint8).reshape(2, 4, 3)
+    seen = messages.read("sensor_msgs/msg/Image", pack_rare.image("eye", STAMP, picture))
+    assert (seen.height, seen.width, seen.encoding, seen.step, seen.data) == (2, 4, "rgb8", 12, picture.tobytes())
+    grid = OccupancyGrid(np.array([[0, 100, -1], [1, 2, 3]], dtype=np.int8), 0.5, Pose2(1.0, 2.0, 0.5))
+    cells = messages.read("nav_msgs/msg/OccupancyGrid", pack_many.occupancy_grid("map", STAMP, grid))
+    assert (cells.width, cells.height, list(cells.data), cells.resolution) == (3, 2, [0, 100, -1, 1, 2, 3], 0.5)
+    assert cells.origin == pytest.approx((1.0, 2.0, 0.5))
+
+
+@given(st.binary(max_size=200), st.sampled_from(sorted(messages.READERS)))
+def test_bytes_that_are_no_message_are_refused(data: bytes, kind: str) -> None:
+    with contextlib.suppress(ValueError):
+        messages.read(kind, data)
+    with pytest.raises(ValueError, match="not plain CDR"):
+        Reader(b"\0\0\0\0" + data)
