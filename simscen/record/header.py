@@ -18,7 +18,7 @@ FORMAT = "1"
 STACK = "simscen.stack"
 """The metadata record that says what an external stack was: known to its end, so it stands at the end of the log."""
 _FACT = "fact."
-STACK, VARIATION = "stack", "variation"
+CHOSEN, VARIATION = "stack", "variation"
 """Facts: NAME=VALUE of the stack that took the place of the scenario's own, and what tells the run from others."""
 OWN_FILES = CASE, SCENARIO, RESULT = "case.json", "scenario.yaml", "result.json"
 _MEDIA_TYPES = {

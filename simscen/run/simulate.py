@@ -16,7 +16,7 @@ from simscen.loading.discovery import default_root
 from simscen.loading.plugins import fact_of, origin, plugins_of
 from simscen.loading.resolved import resolved_text
 from simscen.loading.scenario import load_scenario
-from simscen.record.header import STACK, VARIATION, LogHeader
+from simscen.record.header import CHOSEN, VARIATION, LogHeader
 from simscen.record.recorder import Recorder
 from simscen.record.tracebuilder import TraceBuilder
 from simscen.run.assemble import assemble
@@ -116,5 +116,5 @@ def log_header(prepared: Prepared, seed: int) -> LogHeader:
 
 def _stack_facts(prepared: Prepared) -> dict[str, str]:
     """The stack that was chosen in place of the scenario's own, as it was given, and what the run is called by it."""
-    told = {STACK: prepared.loaded.stack, VARIATION: prepared.loaded.variation}
+    told = {CHOSEN: prepared.loaded.stack, VARIATION: prepared.loaded.variation}
     return {name: value for name, value in told.items() if value}

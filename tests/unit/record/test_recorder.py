@@ -200,3 +200,11 @@ def test_a_full_disk_is_told_as_such(tmp_path: Path) -> None:
 def test_a_folder_that_is_not_there_is_told_as_such(tmp_path: Path) -> None:
     with pytest.raises(RunError, match=r"cannot write .*: No such file"):
         Recorder(tmp_path / "no" / "run.mcap", CLOCK, about())
+
+
+def test_what_an_external_stack_was_stands_in_a_record_of_its_own_at_the_end() -> None:
+    stream = io.BytesIO()
+    Recorder(stream, CLOCK, about(7)).close(0, stack={"name": "mine"})
+    log = stream.getvalue()
+    records = [(record.name, record.metadata) for record in make_reader(io.BytesIO(log)).iter_metadata()]
+    assert records[1:] == [("simscen.stack", {"name": "mine"}), ("simscen.end", {"tick": "0"})]
