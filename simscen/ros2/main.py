@@ -63,7 +63,10 @@ class Run:
             raise Failure(f"simscen ros2 speaks version {wire.PROTOCOL} of the stack protocol")
         launched = self._prepare()
         said = {one["number"]: Topic(one["topic"], one["type"]) for one in hello["says"] if _in_the_graph(one)}
-        adapter = Adapter(self._options, list(said.values()), self.goals, launched)
+        options = self._options
+        if options.warm_up:  # what is missing then must be said before simscen gives up the answer to that step
+            options = options._replace(ready=min(options.ready, 0.8 * hello["answer_limit"]))
+        adapter = Adapter(options, list(said.values()), self.goals, launched)
         self._ends.append(adapter.end)
         adapter.get_ready()
         about = adapter.about()

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
+from mcap.reader import make_reader
 
 ROOT = Path(__file__).parents[2]
 ROS = ROOT / ".venv-ros"
@@ -31,6 +32,14 @@ world: room.world.yaml
 robot: {pose: start}
 goals: [{pose: desk, timeout: 60 s}]
 pass: [{goals_reached: {}}, {collisions: {max: 0}}, {no_false_success: {}}]
+"""
+
+SHORT = """\
+simscen: 1
+world: room.world.yaml
+robot: {pose: start}
+goals: [{pose: {x: 1.6, y: 2, yaw: 60 deg}, timeout: 30 s}]
+pass: [{goals_reached: {}}, {collisions: {max: 0}}]
 """
 
 
@@ -74,14 +83,17 @@ class Ended(NamedTuple):
     out: Path
 
     @property
-    def runs(self) -> list[dict[str, Any]]:
-        """Of each run what its result.json says."""
-        return [json.loads(path.read_text()) for path in sorted(self.out.rglob("result.json"))]
-
-    @property
     def logs(self) -> list[Path]:
         """The log of each run."""
         return sorted(self.out.rglob("run.mcap"))
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """What the first log says of the stack."""
+        with self.logs[0].open("rb") as file:
+            records = {record.name: record.metadata for record in make_reader(file).iter_metadata()}
+        told: dict[str, Any] = json.loads(records["simscen.stack"]["about"])
+        return told
 
 
 Run = Callable[..., Ended]
@@ -89,9 +101,10 @@ Run = Callable[..., Ended]
 
 @pytest.fixture
 def run(ros: Ros, tmp_path: Path) -> Run:
-    """Runs a scenario with `simscen ros2 WORDS` as its stack, in a folder with a room and a goal."""
+    """Runs a scenario with `simscen ros2 WORDS` as its stack, in a folder with a room and two goals, one nearby."""
     (tmp_path / "room.world.yaml").write_text(ROOM)
     (tmp_path / "goal.scenario.yaml").write_text(GOAL)
+    (tmp_path / "short.scenario.yaml").write_text(SHORT)
 
     numbers = itertools.count()
 

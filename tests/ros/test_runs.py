@@ -7,10 +7,8 @@ import signal
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
 
 import pytest
-from mcap.reader import make_reader
 
 from simscen.record.replay import read_run
 
@@ -18,13 +16,6 @@ ROOT = Path(__file__).parents[2]
 NODES = Path(__file__).with_name("nodes")
 SCENARIOS = ["navigation/goal", "navigation/patrol"]
 REPEATS = 20
-SHORT = """\
-simscen: 1
-world: room.world.yaml
-robot: {pose: start}
-goals: [{pose: {x: 1.6, y: 2, yaw: 60 deg}, timeout: 30 s}]
-pass: [{goals_reached: {}}, {collisions: {max: 0}}]
-"""
 BOX = """\
 simscen: 1
 world: room.world.yaml
@@ -39,14 +30,6 @@ pass: [{goals_reached: {}}, {collisions: {max: 0}}]
 
 def digest(log: Path) -> str:
     return hashlib.sha256(log.read_bytes()).hexdigest()
-
-
-def about(log: Path) -> dict[str, Any]:
-    """What the log says of the stack."""
-    with log.open("rb") as file:
-        records = {record.name: record.metadata for record in make_reader(file).iter_metadata()}
-    told: dict[str, Any] = json.loads(records["simscen.stack"]["about"])
-    return told
 
 
 def alive(word: str, program: str = "") -> list[int]:
@@ -85,8 +68,10 @@ def test_it_drives_around_what_appears_on_its_way(ros, run, tmp_path: Path) -> N
 
 @pytest.mark.parametrize("action", ["navigate_to_pose", "navigate_through_poses", "follow_waypoints"])
 def test_goals_go_to_an_action_of_nav2(with_interfaces, run, tmp_path: Path, action: str) -> None:
-    text = SHORT.replace("goals: [", "goals: [{name: first, pose: {x: 1.8, y: 1}, timeout: 30 s}, ")
-    (tmp_path / "short.scenario.yaml").write_text(text)
+    file = tmp_path / "short.scenario.yaml"
+    file.write_text(
+        file.read_text().replace("goals: [", "goals: [{name: first, pose: {x: 1.8, y: 1}, timeout: 30 s}, ")
+    )
     launch = with_interfaces.node("navigator", action=action)
     ended = run("--goals", action, "--launch", launch, scenario="short.scenario.yaml")
     assert ended.code == 0, ended.said
@@ -94,37 +79,34 @@ def test_goals_go_to_an_action_of_nav2(with_interfaces, run, tmp_path: Path, act
     assert told == ["goal.accepted", "goal.reached"] * 2
 
 
-def test_twenty_runs_in_lockstep_are_equal_bit_for_bit_two_at_a_time(ros, run, tmp_path: Path) -> None:
+def test_twenty_runs_in_lockstep_are_equal_bit_for_bit_two_at_a_time(ros, run) -> None:
     """Two at a time: neither do they hear each other."""
-    (tmp_path / "short.scenario.yaml").write_text(SHORT)
     with ThreadPoolExecutor(2) as pool:
-        words = ["--launch", ros.node("navigator")]
+        words = ["--settle", "0.2", "--launch", ros.node("navigator")]
         calls = [pool.submit(run, *words, scenario="short.scenario.yaml") for _ in range(REPEATS)]
         ended = [call.result() for call in calls]
     assert [one.code for one in ended] == [0] * REPEATS, ended[0].said
     assert len({digest(one.logs[0]) for one in ended}) == 1
-    told = [about(one.logs[0]) for one in ended]
+    told = [one.about for one in ended]
     assert all(one["sync"] == "lockstep" and one["late_commands"] == 0 for one in told)
     assert told == [told[0]] * REPEATS
 
 
-def test_paced_runs_say_so(ros, run, tmp_path: Path) -> None:
-    (tmp_path / "short.scenario.yaml").write_text(SHORT)
+def test_paced_runs_say_so(ros, run) -> None:
     words = ["--sync", "paced", "--factor", "4", "--launch", ros.node("navigator")]
     ended = run(*words, scenario="short.scenario.yaml")
     assert ended.code == 0, ended.said
-    told = about(ended.logs[0])
+    told = ended.about
     assert (told["sync"], told["factor"]) == ("paced", 4.0)
 
 
 def test_killing_the_node_is_an_error_of_that_run_only_and_nothing_is_left(ros, run, tmp_path: Path) -> None:
-    for name in ("one", "other"):
-        (tmp_path / f"{name}.scenario.yaml").write_text(SHORT)
+    (tmp_path / "other.scenario.yaml").write_text((tmp_path / "short.scenario.yaml").read_text())
     tag = f"run{os.getpid()}"
     with ThreadPoolExecutor(1) as pool:
         words = ["--launch", ros.node("navigator", "-p", f"tag:={tag}")]
         options = ("other.scenario.yaml", "--jobs", "2")
-        call = pool.submit(run, *words, scenario="one.scenario.yaml", options=options)
+        call = pool.submit(run, *words, scenario="short.scenario.yaml", options=options)
         while len(nodes := alive(tag, f"{ros.python} {NODES}")) < 2 and not call.done():
             time.sleep(0.05)
         os.kill(nodes[0], signal.SIGKILL)

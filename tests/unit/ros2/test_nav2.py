@@ -1,0 +1,141 @@
+"""Parameters of Nav2 that do not fit what simscen publishes."""
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from simscen.cli.main import app
+from simscen.ros2.nav2 import Finding, Offer, check, wanted
+
+OFFER = Offer(["/scan", "/rear/scan"], "/odom", ["base_link"])
+FITS = """\
+amcl:
+  ros__parameters:
+    use_sim_time: true
+    base_frame_id: base_link
+    odom_frame_id: odom
+    global_frame_id: map
+    scan_topic: scan
+bt_navigator:
+  ros__parameters:
+    global_frame: map
+    robot_base_frame: base_link
+    odom_topic: /odom
+    plugin_lib_names: [nav2_compute_path_to_pose_action_bt_node]
+local_costmap:
+  local_costmap:
+    ros__parameters:
+      global_frame: odom
+      robot_base_frame: base_link
+      plugins: [voxel_layer, inflation_layer]
+      voxel_layer:
+        plugin: nav2_costmap_2d::VoxelLayer
+        observation_sources: scan
+        scan:
+          topic: /scan
+          data_type: LaserScan
+collision_monitor:
+  ros__parameters:
+    base_frame_id: base_link
+    odom_frame_id: odom
+    observation_sources: [scan]
+    scan: {type: scan, topic: scan}
+"""
+
+
+def found(node: str, **parameters: object) -> list[Finding]:
+    return check({node: {key.replace("__", "."): value for key, value in parameters.items()}}, OFFER)
+
+
+@pytest.mark.parametrize(
+    ("node", "parameters", "message"),
+    [
+        ("amcl", {"base_frame_id": "base_footprint"}, "base_frame_id is 'base_footprint'; simscen's base frame is"),
+        ("amcl", {"odom_frame_id": "odometry"}, "odom_frame_id is 'odometry'; simscen knows 'odom'"),
+        ("amcl", {"scan_topic": "front"}, "scan_topic is 'front', which nobody publishes; scans of simscen: /scan, "),
+        ("bt_navigator", {"global_frame": "world"}, "global_frame is 'world'; simscen knows 'map'"),
+        ("controller_server", {"odom_topic": "odometry/filtered"}, "odom_topic is 'odometry/filtered', which nobody"),
+        ("velocity_smoother", {"odom_topic": "wheels"}, "odom_topic is 'wheels', which nobody publishes"),
+        ("behavior_server", {"local_frame": "map"}, "local_frame is 'map'; simscen knows 'odom'"),
+        ("collision_monitor", {"base_frame_id": "chassis"}, "base_frame_id is 'chassis'"),
+        (
+            "global_costmap",
+            {"plugins": ["o"], "o__observation_sources": "a b", "o__a__topic": "/scan", "o__b__topic": "/front"},
+            "o.b.topic is '/front', which nobody publishes",
+        ),
+    ],
+)
+def test_what_does_not_fit_is_told_of_each_node(node: str, parameters: dict[str, object], message: str) -> None:
+    [finding] = found(node, **parameters)
+    assert (finding.node, finding.severe) == (node, True)
+    assert finding.message.startswith(message)
+
+
+def test_a_source_that_simscen_cannot_be_is_a_warning_and_one_that_is_off_is_nothing() -> None:
+    source = {"plugins": ["o"], "o__observation_sources": "cloud", "o__cloud__data_type": "PointCloud2"}
+    [finding] = found("local_costmap", **source)
+    assert (finding.parameter, finding.severe) == ("o.cloud.data_type", False)
+    assert found("local_costmap", **source, o__cloud__enabled=False) == []
+
+
+def test_wall_time_is_a_warning_because_a_launch_file_may_set_it() -> None:
+    [finding] = found("planner_server", use_sim_time=False)
+    assert not finding.severe
+
+
+def test_of_a_running_node_only_what_the_rules_read_is_asked() -> None:
+    known = ["plugins", "o.observation_sources", "o.scan.topic", "resolution", "robot_base_frame", "alpha1"]
+    assert wanted("local_costmap", known) == ["plugins", "o.observation_sources", "o.scan.topic", "robot_base_frame"]
+    assert wanted("amcl", ["alpha1", "scan_topic"]) == ["scan_topic"]
+
+
+def called(folder: Path, text: str, *options: str) -> tuple[int, str]:
+    file = folder / "nav2_params.yaml"
+    file.write_text(text)
+    try:
+        done = CliRunner().invoke(app, ["ros2", "nav2", "--params", str(file), *options], catch_exceptions=False)
+    except Exception as error:
+        from simscen.core.errors import InvalidInput
+
+        assert isinstance(error, InvalidInput)
+        return 2, "\n".join(f"{p.line}:{p.col} {p.code} {p.message}" for p in error.problems)
+    return done.exit_code, done.output
+
+
+def test_a_file_that_fits_passes(tmp_path: Path) -> None:
+    code, said = called(tmp_path, FITS)
+    assert code == 0
+    assert "nothing keeps Nav2 from working" in said
+
+
+def test_a_file_that_does_not_fit_is_told_line_by_line(tmp_path: Path) -> None:
+    text = FITS.replace(
+        "base_frame_id: base_link\n    odom_frame_id: odom\n    global", "base_frame_id: base\n    global"
+    )
+    text = text.replace("topic: /scan", "topic: /front")
+    code, said = called(tmp_path, text)
+    assert code == 2
+    lines = text.split("\n")
+    places = [next(i for i, line in enumerate(lines, 1) if key in line) for key in ("base_frame_id: base", "/front")]
+    assert [int(line.partition(":")[0]) for line in said.split("\n")] == places
+    assert all("SC340" in line for line in said.split("\n"))
+
+
+def test_a_second_name_of_the_base_makes_a_file_fit(tmp_path: Path) -> None:
+    text = FITS.replace("base_link", "base_footprint")
+    assert called(tmp_path, text)[0] == 2
+    assert called(tmp_path, text, "--base-frame", "base_footprint")[0] == 0
+
+
+def test_a_file_without_parameters_of_nodes_is_refused(tmp_path: Path) -> None:
+    code, said = called(tmp_path, "amcl: {alpha1: 0.2}\n")
+    assert code == 2
+    assert "there is no key ros__parameters in it" in said
+
+
+def test_called_by_hand_it_says_what_it_is_for() -> None:
+    from simscen.core.errors import UsageError
+
+    with pytest.raises(UsageError, match="there is no run to serve"):
+        CliRunner().invoke(app, ["ros2", "--launch", "node"], catch_exceptions=False)
