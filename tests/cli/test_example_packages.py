@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -82,3 +83,16 @@ def test_its_keys_are_explained_and_in_the_schema(call) -> None:
     schema = call("-c", SIMSCEN, "schema").stdout
     assert '"const": "theta_star"' in schema
     assert '"const": "vfh_plus"' in schema
+
+
+def test_a_scenario_that_uses_them_is_validated_without_importing_what_does_the_work(call, tmp_path: Path) -> None:
+    text = (ROOT / "scenarios/navigation/goal.scenario.yaml").read_text().replace("../../worlds", "../worlds")
+    shutil.copytree(ROOT / "worlds", tmp_path / "worlds")
+    (tmp_path / "scenarios").mkdir()
+    for name, stack in (("a", "{planner: {type: theta_star}}"), ("b", "{type: vfh_plus}")):
+        (tmp_path / "scenarios" / f"{name}.scenario.yaml").write_text(f"{text}stack: {stack}\n")
+    heavy = "{'ompl', 'scipy', 'pybullet', 'theta_star.planner', 'vfh_plus.stack', 'theta_star.spec', 'vfh_plus.spec'}"
+    probe = f"import os, sys; os._exit = lambda code: print(code, *sorted({heavy} & set(sys.modules)));"
+    done = call("-c", probe + SIMSCEN, "validate", ".", folder=tmp_path)
+    told = ["2 scenarios and 3 worlds are valid", "0 theta_star.spec vfh_plus.spec"]
+    assert done.stdout.splitlines() == told, done.stderr

@@ -17,11 +17,14 @@ from simscen.core.events import Event, EventKind
 from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
 from simscen.core.navigation import Path
+from simscen.core.sensing import Odometry
 from simscen.core.stage import Effect
 from simscen.core.trace import Decision
 from simscen.core.verdict import Finding, Status
 from simscen.criteria.base import Criterion
+from simscen.criteria.measure import Measure
 from simscen.faults.base import Disturbance, Fault
+from simscen.model.robot import Bumper, Lidar
 from simscen.model.stack import (
     BackUp,
     GroundTruth,
@@ -804,6 +807,77 @@ class ActsByChance(Spec, Action):
         return Effect(True, "pushed")
 
 
+# sensors
+
+SENSOR = Bumper()
+
+
+@breaks(SENSOR, "it says what it says", "signs a reading of tick")
+class SignsForAnother(Wrapper):
+    def read(self, tick):
+        return replace(self.inner.read(tick), sensor="other")
+
+
+@breaks(SENSOR, "it says what it says", "says Odometry, not Bump")
+class SaysSomethingElse(Wrapper):
+    def read(self, tick):
+        return Odometry(self.name, tick, Pose2(0, 0, 0), Twist())
+
+
+@breaks(Lidar(), "what it says are numbers", "says angle_min of nan")
+class KnowsNoAngles(Wrapper):
+    def read(self, tick):
+        return replace(self.inner.read(tick), angle_min=math.nan)
+
+
+@breaks(Lidar(), "the same world", "in two ways")
+class MeasuresByChance(Wrapper):
+    def read(self, tick):
+        scan = self.inner.read(tick)
+        return replace(scan, ranges=scan.ranges + random.random())
+
+
+@breaks(Lidar(), "a reading does not change", "changes when the next one is taken")
+class UsesItsArrayAgain(Wrapper):
+    kept = None
+
+    def read(self, tick):
+        scan = self.inner.read(tick)
+        self.kept = scan.ranges.copy() if self.kept is None else self.kept
+        self.kept[:] = scan.ranges
+        return replace(scan, ranges=self.kept)
+
+
+# metrics
+
+
+@word("it is a number", "measures nan")
+class MeasuresNothing(Spec, Measure):
+    def measure(self, trace, case):
+        return math.nan
+
+
+@word("the same trace gives", "measured otherwise")
+class CountsCalls(Spec, Measure):
+    def measure(self, trace, case):
+        return float(next(COUNT))
+
+
+@word("a trace is not changed", "not what it was")
+class Resets(Spec, Measure):
+    def measure(self, trace, case):
+        trace.truth.values[:] = 0.0
+        return 0.0
+
+
+@word("it says in what unit", "has the unit 3")
+class HasNoUnit(Spec, Measure):
+    unit: ClassVar[Any] = 3
+
+    def measure(self, trace, case):
+        return 0.0
+
+
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_a_component_that_breaks_a_promise_is_caught(case: Case) -> None:
     (promise,) = [each for each in promises_of(case.spec, robots=ROUND) if each.name.startswith(case.promise)]
@@ -814,6 +888,19 @@ def test_a_component_that_breaks_a_promise_is_caught(case: Case) -> None:
 
 def test_every_promise_has_a_component_that_breaks_it() -> None:
     caught = {case.promise for case in CASES}
-    specs = (PLANNER, CONTROLLER, LOCALIZER, SPIN, CHECKER, STACK, NeedsABelief(), OnScans(), Meddles(), SaysNothing())
+    specs = (
+        PLANNER,
+        CONTROLLER,
+        LOCALIZER,
+        SPIN,
+        CHECKER,
+        STACK,
+        NeedsABelief(),
+        OnScans(),
+        Meddles(),
+        SaysNothing(),
+        SENSOR,
+        HasNoUnit(),
+    )
     every = {promise.name for spec in specs for promise in promises_of(spec, robots=ROUND)}
     assert [name for name in sorted(every) if not any(name.startswith(each) for each in caught)] == []

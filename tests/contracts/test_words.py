@@ -9,9 +9,11 @@ import yaml
 from simscen.actions.action import AnyAction
 from simscen.criteria.criterion import AnyCriterion
 from simscen.faults.fault import AnyFault
+from simscen.model.robot import Bumper, Camera, InertialUnit, Lidar, WheelOdometry
 from simscen.spec.choice import Choice
 from simscen.spec.ondemand import type_of
 from simscen.testing import Promise, promises_of
+from simscen.testing.subjects import named
 from simscen.triggers.trigger import Trigger
 
 
@@ -37,3 +39,20 @@ PROMISES = [
 @pytest.mark.parametrize("promise", PROMISES, ids=str)
 def test_it_keeps_its_promise(promise: Promise) -> None:
     promise.check()
+
+
+SENSORS = {"lidar": Lidar(), "odometry": WheelOdometry(), "imu": InertialUnit(), "bumper": Bumper(), "camera": Camera()}
+
+
+@pytest.mark.parametrize("promise", [p for name, spec in SENSORS.items() for p in promises_of(spec, name)], ids=str)
+def test_a_sensor_keeps_its_promise(promise: Promise) -> None:
+    promise.check()
+
+
+NAMES = ['dwell={"region": "dock", "max": 5.0}', "crosstalk", 'turn_robot={"by": 1.0}', "sonar", "reversed_length"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_what_a_package_adds_keeps_its_promises(yardwork, name: str) -> None:
+    for promise in named(name):
+        promise.check()

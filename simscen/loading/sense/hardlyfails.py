@@ -176,7 +176,7 @@ def _idle_stack(loaded: LoadedScenario) -> Iterator[Problem]:
             yield loaded.problem(("stack", "speed_zones", index, "speed_limit"), "SC055", message)
     for key in ("desired_linear_vel", "max_vel_x", "vx_max"):
         wanted = getattr(getattr(stack, "controller", None), key, None)
-        if wanted is not None and wanted > robot.limits.linear:
+        if isinstance(wanted, int | float) and wanted > robot.limits.linear:
             message = f"{wanted:g} m/s is never reached: the robot's top speed is {robot.limits.linear:g} m/s"
             yield loaded.problem(("stack", "controller", key), "SC055", message)
 

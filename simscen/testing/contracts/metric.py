@@ -7,8 +7,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from simscen.core.case import Case
-from simscen.core.trace import Trace
+from simscen.core.evidence import Evidence
 from simscen.judge.sketch import sketch, sketch_case
 from simscen.testing.contracts.component import heard
 from simscen.testing.contracts.criterion import CASE, DRIVE, STANDS, TRACES
@@ -23,31 +22,41 @@ class MetricContract(Contract):
     spec: Any
     subject: str = ""
 
-    def measured(self, trace: Trace, case: Case, what: str) -> float | str:
-        """What it says of a trace."""
-        found: float | str = heard(f"measures {what}", self.spec.measure, trace, case)
-        return found
+    def measured(self, words: dict[str, Any], what: str) -> float | str:
+        """What it measures."""
+        value: float | str = heard(f"measures {what}", self.spec.measure, sketch(words), sketch_case(CASE))
+        return value
 
     @promise
     def it_is_a_number_or_says_why_there_is_none(self) -> None:
-        """Given any trace then it is a finite number, or a text that says why this run has none."""
+        """Given any trace then a finite number, or a text that says why there is none."""
         for what, words in TRACES.items():
-            found: object = self.measured(sketch(words), sketch_case(CASE), what)
-            number = isinstance(found, int | float) and not isinstance(found, bool) and math.isfinite(found)
-            demand(number or (isinstance(found, str) and found), f"is {found!r} for {what}")
+            value = self.measured(words, what)
+            if isinstance(value, str):
+                demand(value, f"does not say why there is no number in {what}")
+            else:
+                number = isinstance(value, float | int) and not isinstance(value, bool) and math.isfinite(value)
+                demand(number, f"measures {value!r} in {what}")
 
     @promise
     def the_same_trace_gives_the_same_number(self) -> None:
         """Given the same trace and case then the same number: no clock, no chance, nothing remembered."""
-        first = self.measured(sketch(DRIVE), sketch_case(CASE), "a drive")
-        self.measured(sketch(STANDS), sketch_case(CASE), "a robot that stands")
-        again = self.measured(sketch(DRIVE), sketch_case(CASE), "a drive")
-        demand(again == first, f"is {first} and then {again} for the same drive")
+        first = self.measured(DRIVE, "a drive")
+        self.measured(STANDS, "a robot that stands")
+        demand(self.measured(DRIVE, "a drive") == first, "the same drive is measured otherwise")
 
     @promise
     def a_trace_is_not_changed(self) -> None:
-        """Given a trace then it is not changed: others look at it, too."""
+        """Given a trace then it is not changed: criteria judge it, too."""
         trace, case = sketch(DRIVE), sketch_case(CASE)
         before = copy.deepcopy((trace, case))
-        self.measured(trace, case, "a drive")
+        heard("measures a drive", self.spec.measure, trace, case)
         demand(repr((trace, case)) == repr(before), "the trace is not what it was")
+
+    @promise
+    def it_says_in_what_unit_and_of_what(self) -> None:
+        """Given a metric then its unit is a text, and its evidence None or a set of what a log may hold."""
+        demand(isinstance(self.spec.unit, str), f"has the unit {self.spec.unit!r}")
+        evidence = heard("is asked for its evidence", getattr, self.spec, "evidence")
+        fine = evidence is None or all(isinstance(each, Evidence) for each in evidence)
+        demand(fine, f"needs {evidence!r}, which is no evidence")

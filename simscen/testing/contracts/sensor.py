@@ -3,117 +3,85 @@
 from __future__ import annotations
 
 import copy
-import math
 from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from simscen.core.chance import Streams
-from simscen.core.geometry import Array, Pose2, Pose3
+from simscen.core import sensing
 from simscen.core.sensing import Reading
 from simscen.core.time import Clock
-from simscen.model.robot import Differential
-from simscen.sensors.installed import InstalledSensor
-from simscen.sensors.sensor import SensorSetting, Vector
+from simscen.sensors.sensor import Sensor, SensorSetting
 from simscen.testing.contracts.component import heard
-from simscen.testing.promise import Contract, PromiseBroken, demand, promise
+from simscen.testing.contracts.fault import equal
+from simscen.testing.promise import Contract, demand, promise
+from simscen.testing.puppetview import DRIVE, PuppetView, SquareRoom
 
-WHEELS = Differential(type="differential", wheel_radius=0.05, wheel_separation=0.3)
-HALF = 3.0
-"""Metres from the middle of the room to its walls."""
-READINGS = 12
-
-
-class TurningRobot:
-    """A SensorView: a robot that turns on the spot, a tenth of a radian for each reading."""
-
-    def __init__(self) -> None:
-        self.turned = 0.0
-
-    def base_pose(self) -> Pose3:
-        """Beside the middle of the room."""
-        return Pose3.planar(Pose2(0.5, -0.3, self.turned))
-
-    def base_velocity(self) -> tuple[Vector, Vector]:
-        """It turns only."""
-        return (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
-
-    def encoders(self) -> tuple[float, ...]:
-        """One wheel back, one ahead."""
-        rolled = self.turned * WHEELS.wheel_separation / 2 / WHEELS.wheel_radius
-        return -rolled, rolled
-
-    def touching(self) -> bool:
-        """Never."""
-        return False
-
-    def image(
-        self, mount: Pose3, width: int, height: int, field_of_view: float, far: float
-    ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float32]]:
-        """Nothing to see."""
-        return np.zeros((height, width, 3), np.uint8), np.full((height, width), np.inf, np.float32)
-
-
-class SquareRoom:
-    """A RayCaster: four walls at x, y = ± HALF, endlessly high."""
-
-    def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
-        """Distances in closed form; inf beyond `reach` and straight up."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            walls = (np.sign(directions[:, :2]) * HALF - origins[:, :2]) / directions[:, :2]
-        found = np.where(walls > 0, walls, np.inf).min(axis=1)
-        return np.where(found <= reach, found, np.inf)
+NAME = "it"
+COUNT = 20
+MAY_BE_MISSING = ("ranges", "depth")
 
 
 @dataclass(frozen=True, eq=False)
 class SensorContract(Contract):
-    """Tried on a robot that turns in a square room."""
+    """Tried on a robot with two wheels that drives a circle in a square room."""
 
     role = "sensor"
     spec: Any
     subject: str = ""
 
     def readings(self, seed: int = 1) -> list[Reading]:
-        """What it says of a turn, by the checks of every run."""
-        robot = TurningRobot()
-        clock = Clock(round(self.spec.rate) or 1)
-        chance = Streams(seed).generator("sensor.tried")
-        setting = SensorSetting("tried", 1, clock.seconds(1), chance, robot, SquareRoom(), WHEELS)
-        sensor = heard("is built", lambda: InstalledSensor("tried", self.spec, setting))
-        said = []
-        for tick in range(READINGS):
-            robot.turned = tick / 10
-            said.append(heard("reads", sensor.read, tick))
-        return said
+        """Twenty readings of a new one."""
+        return self.measured(*self.built(seed))
+
+    def built(self, seed: int = 1) -> tuple[Sensor, PuppetView, int]:
+        """A new one, what it looks at, and ticks between two readings."""
+        clock, view = Clock(240), PuppetView()
+        period, chance = clock.period(self.spec.rate), np.random.default_rng(seed)
+        setting = SensorSetting(NAME, period, clock.seconds(period), chance, view, SquareRoom(), DRIVE)
+        return heard("is built", lambda: self.spec.implementation()(self.spec, setting)), view, period
+
+    def measured(self, sensor: Sensor, view: PuppetView, period: int) -> list[Reading]:
+        """The next twenty readings."""
+        taken = []
+        for k in range(1, COUNT + 1):
+            view.seconds = k * period / 240
+            taken.append(heard("reads", sensor.read, k * period))
+        return taken
 
     @promise
-    def it_says_what_its_specification_says(self) -> None:
-        """Given a turn in a room then each reading is of the promised kind, signed, and made of sound numbers."""
-        demand(len(self.readings()) == READINGS, "says nothing")
+    def it_says_what_it_says_it_says(self) -> None:
+        """Given a reading then it is of the kind of its specification, with the sensor's own name and the tick."""
+        sensor, view, period = self.built()
+        demand(sensor.name == NAME, f"is called {sensor.name!r}, not {NAME!r}")
+        demand(sensor.period == period, f"has a period of {sensor.period!r} ticks, not {period}")
+        kind = getattr(sensing, self.spec.says)
+        for k, reading in enumerate(self.measured(sensor, view, period), start=1):
+            demand(type(reading) is kind, f"says {type(reading).__name__}, not {self.spec.says}")
+            signed = (reading.sensor, reading.tick)
+            demand(signed == (NAME, k * period), f"signs a reading of tick {k * period} as {signed}")
 
     @promise
-    def the_same_generator_gives_the_same_readings_bit_for_bit(self) -> None:
-        """Given the same world and generator then the same readings: no clock, no chance but its own."""
-        demand(all(map(_equal, self.readings(), self.readings())), "says something else of the same turn")
+    def what_it_says_are_numbers(self) -> None:
+        """Given a reading then its numbers are finite, but for ranges and depths that may be missing."""
+        for reading in self.readings():
+            for field in fields(reading):
+                value = getattr(reading, field.name)
+                if isinstance(value, str | bool) or field.name in MAY_BE_MISSING:
+                    continue
+                demand(np.isfinite(np.asarray(value, dtype=np.float64)).all(), f"says {field.name} of {value!r}")
 
     @promise
-    def nothing_changes_a_reading_later(self) -> None:
-        """Given a reading then it stays as it is while the sensor goes on: the log and the stack keep it."""
-        robot = TurningRobot()
-        chance = Streams(1).generator("sensor.tried")
-        setting = SensorSetting("tried", 1, 0.1, chance, robot, SquareRoom(), WHEELS)
-        sensor = heard("is built", lambda: InstalledSensor("tried", self.spec, setting))
-        first = heard("reads", sensor.read, 0)
+    def the_same_world_and_generator_give_the_same_readings_bit_for_bit(self) -> None:
+        """Given the same world and generator then the same readings: no clock, no global chance."""
+        one, other = self.readings(), self.readings()
+        demand(all(map(equal, one, other)), "measures the same world in two ways")
+
+    @promise
+    def a_reading_does_not_change_after_it_was_given(self) -> None:
+        """Given a reading then nothing that is measured later changes it."""
+        sensor, view, period = self.built()
+        first = self.measured(sensor, view, period)
         kept = copy.deepcopy(first)
-        robot.turned = 0.7
-        heard("reads", sensor.read, 1)
-        demand(_equal(first, kept), "changes a reading that it has handed out")
-
-
-def _equal(one: Reading, other: Reading) -> bool:
-    if type(one) is not type(other):
-        raise PromiseBroken(f"says {type(one).__name__} and {type(other).__name__}")
-    pairs = [(getattr(one, field.name), getattr(other, field.name)) for field in fields(one)]
-    return all(np.array_equal(a, b, equal_nan=True) if isinstance(a, np.ndarray) else a == b for a, b in pairs)
+        self.measured(sensor, view, period)
+        demand(all(map(equal, first, kept)), "a reading changes when the next one is taken")

@@ -1,0 +1,39 @@
+"""simscen.plugin: every name is there, says what it is, and costs nothing before it is asked for."""
+
+import inspect
+import subprocess
+import sys
+
+import pytest
+
+import simscen.plugin as public
+
+
+@pytest.mark.parametrize("name", public.__all__)
+def test_a_name_is_what_it_says(name: str) -> None:
+    value = getattr(public, name)
+    if getattr(value, "__module__", "").startswith("simscen.") and hasattr(value, "__name__"):
+        assert value.__name__ == name
+        assert inspect.getdoc(value)
+
+
+def test_what_type_checkers_see_is_what_there_is() -> None:
+    source = inspect.getsource(public)
+    seen = source[source.index("if TYPE_CHECKING") : source.index("__all__")]
+    for module, names in public._WHERE.items():
+        assert f"from {module} import " in seen
+        for name in names:
+            assert f" {name}" in seen
+    assert sorted(public._MODULE_OF) == sorted(public.__all__)
+
+
+def test_a_name_that_is_not_there_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="has no attribute 'Nonsense'"):
+        public.Nonsense  # noqa: B018
+
+
+def test_a_specification_imports_no_engine() -> None:
+    told = "import sys; from simscen.plugin import PlannerSpec, PositiveLength, InProcessStack;"
+    heavy = "print(sorted({'scipy', 'ompl', 'pybullet', 'trimesh', 'filterpy'} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", told + heavy], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
