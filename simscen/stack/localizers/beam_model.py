@@ -14,7 +14,7 @@ from simscen.core.geometry import Array
 from simscen.core.grid import FREE, OccupancyGrid
 from simscen.stack.localizers.beams import Beams
 from simscen.stack.localizers.distance_field import DistanceField, by_blocks
-from simscen.stack.localizers.likelihood_field import PEAK_OF_SUMS
+from simscen.stack.localizers.likelihood_field import PEAK_OF_SUMS, STRAYS_OF_SUMS
 
 
 def opaque_field(grid: OccupancyGrid, max_distance: float) -> DistanceField:
@@ -53,6 +53,7 @@ class BeamModel:
     """Each beam's range is a hit, something short before it, nothing, or chance; a particle weighs 1 + Σ p³."""
 
     peak: ClassVar[float] = PEAK_OF_SUMS
+    strays: ClassVar[float] = STRAYS_OF_SUMS
 
     field: DistanceField
     z_hit: float

@@ -17,6 +17,8 @@ from simscen.stack.localizers.distance_field import DistanceField, Float32, by_b
 
 PEAK_OF_SUMS = 16.0
 """Of models whose particles weigh 1 + Σ p³: over 60 beams, one that fits makes a particle but 1 or 2 % heavier."""
+STRAYS_OF_SUMS = 0.05
+"""Of the same models: a particle anywhere weighs half as much as a good one, and outlives many scans."""
 
 
 class SensorModel(Protocol):
@@ -25,6 +27,11 @@ class SensorModel(Protocol):
     @property
     def peak(self) -> float:
         """The power that brings out which particles are best: 1 where weights are the likelihood of all beams."""
+        ...
+
+    @property
+    def strays(self) -> float:
+        """The largest share of new particles that recovery may put anywhere with each scan."""
         ...
 
     def log_likelihood(self, poses: Array, beams: Beams, converged: bool) -> Array:
@@ -62,7 +69,7 @@ class LikelihoodField:
     that hit what is not on the map, and it never says that a pose is impossible.
     """
 
-    peak = PEAK_OF_SUMS
+    peak, strays = PEAK_OF_SUMS, STRAYS_OF_SUMS
 
     def __init__(self, field: DistanceField, z_hit: float, z_rand: float, sigma_hit: float) -> None:
         self._field, self._z_rand = field, np.float32(z_rand)
@@ -102,7 +109,7 @@ class BeamSkipping:
 class LikelihoodFieldProb:
     """A particle weighs the product of its beams' probabilities (table 6.3), with optional beam skipping."""
 
-    peak = 1.0
+    peak, strays = 1.0, 1.0
 
     def __init__(
         self, field: DistanceField, z_hit: float, z_rand: float, sigma_hit: float, skipping: BeamSkipping | None = None

@@ -36,7 +36,7 @@ class ParticleFilter:
     def begin(self, estimate: Estimate) -> None:
         """Start over: particles around the estimate's pose, or over all free space when it has none."""
         self.particles = self._anywhere.begin(estimate, self._bound.most, self._chance)
-        self._recovery = Recovery(self._spec.recovery_alpha_slow, self._spec.recovery_alpha_fast)
+        self._recovery = Recovery(self._spec.recovery_alpha_slow, self._spec.recovery_alpha_fast, self._sensor.strays)
         self._put_anywhere = np.zeros(len(self.particles.weights), dtype=np.bool_)
         self._corrections = 0
 

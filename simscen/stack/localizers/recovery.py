@@ -25,7 +25,8 @@ class Recovery:
     are thrown away. Here each scan is its own yardstick: it is weighed at PROBES random poses, too, and what is
     averaged is how many times likelier it is at the particles than there. Particles are put anywhere while the fast
     average is below the slow one *and* at least KNOWS_NOTHING of the places of the map explained the recent scans
-    better than the particles.
+    better than the particles; and never more than the share `most` with one scan: where weights are flat, scans weed
+    them out slowly, and the third of the particles that averages soon ask for would take a good cloud apart.
 
     nav2_amcl sets both averages to zero when it put particles anywhere ("to avoid spiraling off into complete
     randomness"), which ends a recovery after a few dozen of them. Nothing spirals here: particles that were put
@@ -33,8 +34,8 @@ class Recovery:
     first scan on; the book begins at zero, nav2_amcl at the first scan's.
     """
 
-    def __init__(self, alpha_slow: float, alpha_fast: float) -> None:
-        self.wanted = alpha_fast > 0
+    def __init__(self, alpha_slow: float, alpha_fast: float, most: float = 1.0) -> None:
+        self.wanted, self._most = alpha_fast > 0, most
         self._slow, self._fast = RunningAverage(alpha_slow), RunningAverage(alpha_fast)
         self._better = RunningAverage(alpha_fast)
 
@@ -52,11 +53,11 @@ class Recovery:
 
     @property
     def share(self) -> float:
-        """The share of new particles to put anywhere: 1 - fast / slow, or zero."""
+        """The share of new particles to put anywhere: 1 - fast / slow, but at most what the model bears; or zero."""
         slow, fast = self._slow.value, self._fast.value
         if slow <= 0 or self._better.value < KNOWS_NOTHING:
             return 0.0
-        return max(0.0, 1 - fast / slow)
+        return min(self._most, max(0.0, 1 - fast / slow))
 
 
 class RunningAverage:

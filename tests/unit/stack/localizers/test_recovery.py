@@ -49,6 +49,15 @@ def test_nor_is_one_that_the_particles_explain_worse_than_usual_but_better_than_
         assert recovery.share == 0
 
 
+def test_no_more_particles_are_put_anywhere_than_the_sensor_model_bears() -> None:
+    free, bound = Recovery(0.001, 0.1), Recovery(0.001, 0.1, 0.01)
+    for likelihood in [6.0] * 50 + [0.8] * 50:
+        free.observe(np.log(likelihood), ANYWHERE)
+        bound.observe(np.log(likelihood), ANYWHERE)
+        assert bound.share == min(0.01, free.share)
+    assert free.share > 0.5
+
+
 def test_with_nav2s_default_of_zero_nobody_asks() -> None:
     assert not Recovery(0.0, 0.0).wanted
     assert Recovery(0.001, 0.1).wanted
