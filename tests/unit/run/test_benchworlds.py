@@ -1,0 +1,24 @@
+"""The worlds of `simscen bench worlds` are what its table says, and can be driven."""
+
+import pytest
+
+from simscen.loading.scenario import load_scenario
+from simscen.run.benchworlds import MOVABLE, write_arena, write_hall
+from simscen.run.prepare import prepare
+
+
+def test_the_hall_holds_its_movable_meshes_and_a_way_past_them(tmp_path):
+    file = write_hall(tmp_path / "hall")
+    prepared = prepare(load_scenario(file, file.parent))
+    bodies = prepared.built.world.bodies
+    assert len(bodies) == MOVABLE
+    assert all(body.mass > 0 and len(body.solids[0].shape.faces) == 432 for body in bodies)
+    assert None not in prepared.case.shortest.values()
+
+
+def test_the_arena_is_a_hundred_metres_wide_and_its_goals_can_be_reached(tmp_path):
+    file = write_arena(tmp_path / "arena")
+    prepared = prepare(load_scenario(file, file.parent))
+    cells = prepared.built.map
+    assert cells.resolution * cells.cells.shape[1] == pytest.approx(100.0)
+    assert all(length is not None and length < 100 for length in prepared.case.shortest.values())
