@@ -1,10 +1,16 @@
-"""What `--stack NAME=VALUE` and the user's own configuration say of stacks."""
+"""What `--stack NAME=VALUE` and the user's own configuration say of stacks.
+
+Light commands load this, so what reads configurations and looks for programs is imported where it is needed.
+"""
+
+from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from simscen.cli.called import config_file, environment
 from simscen.cli.diagnostics import from_here, harmless
@@ -16,11 +22,8 @@ from simscen.loading.discovery import STACK, default_root
 from simscen.loading.externalstack import undefined
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.messages import quoted, suggestion
-from simscen.loading.program import command_of
 from simscen.loading.scenario import load_scenario
 from simscen.loading.stackchoice import REFERENCE, StackChoice
-from simscen.loading.stackfile import load_stack_file
-from simscen.loading.userconfig import UserConfig, load_config
 from simscen.model.anystack import ExternalStackSpec
 from simscen.spec.registry import entries, find
 
@@ -28,6 +31,9 @@ STACK_HELP = (
     "Run every scenario with this stack instead of its own: a command that speaks the stack protocol, a *.stack.yaml "
     "file, `reference`, another type of stack, or a name in the user's configuration. "
 )
+if TYPE_CHECKING:
+    from simscen.loading.userconfig import UserConfig
+
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,59}")
 
 
@@ -44,6 +50,8 @@ class Stacks:
     @cached_property
     def config(self) -> UserConfig:
         """The user's own configuration. Raises InvalidInput."""
+        from simscen.loading.userconfig import load_config
+
         return load_config(config_file())
 
     def with_command(self, loaded: LoadedScenario) -> tuple[LoadedScenario, Problem | None]:
@@ -114,6 +122,8 @@ def _choice(text: str, root: Path, world_path: Sequence[Path], stacks: Stacks) -
     if value == REFERENCE or (_NAME.fullmatch(value) and find("stack", value)):
         return StackChoice(name, value, type=value)
     if value.endswith(STACK):
+        from simscen.loading.stackfile import load_stack_file
+
         try:
             return load_stack_file(name, value, Path(value), root, world_path)
         except InvalidInput as error:
@@ -129,6 +139,8 @@ def _command(text: str, value: str, may_be_new: bool, stacks: Stacks) -> Externa
         names = [REFERENCE, *(entry.name for entry in entries("stack")), *stacks.config.spec.stacks]
         told = f"{quoted(value)} is neither a type of stack nor a name in {stacks.config.file}"
         raise UsageError(f"cannot read --stack {harmless(text)}: expected NAME=VALUE; {told}; {_near(value, names)}")
+    from simscen.loading.program import command_of
+
     try:
         return command_of(value, environment(), Path.cwd())
     except ValueError as error:

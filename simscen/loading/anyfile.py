@@ -10,7 +10,6 @@ from simscen.loading.document import Library
 from simscen.loading.paths import Fence
 from simscen.loading.scenario import try_scenario
 from simscen.loading.sense.worldsense import senseless
-from simscen.loading.stackfile import stack_file
 from simscen.loading.tree import Fields
 
 _ONLY_ROBOTS = frozenset({"drive", "sensors", "limits", "body", "urdf"})
@@ -30,6 +29,8 @@ def problems_of(kind: str, file: Path, root: Path, world_path: Sequence[Path] = 
     if isinstance(path := library.fence.entered(file), Problem):
         return [path]
     if kind == "stack":
+        from simscen.loading.stackfile import stack_file  # a model of its own, which few commands need
+
         return found if isinstance(found := stack_file(path, library), list) else []
     assets = Assets(library)
     senses: list[Problem] = []
