@@ -5,6 +5,7 @@ import json
 import os
 import shutil
 import stat
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -14,6 +15,8 @@ from simscen.loading.paths import exists
 from simscen.loading.source import reason
 
 AT_ONCE = 1 << 20
+OWN = "simscen"
+"""Where the PATH has none it is the one that was called, of a virtual environment that nobody has activated."""
 
 
 def command_of(
@@ -30,6 +33,8 @@ def command_of(
     program, *arguments = words_of(text)
     program = str(Path(program).expanduser()) if program.startswith("~") else program
     env = {**environment, **(own or {})}
+    if program == OWN and missing(program, env, folder):
+        program = str(Path(sys.executable).parent / OWN)
     if why := missing(program, env, folder):
         raise ValueError(why)
     argv = (program, *arguments)

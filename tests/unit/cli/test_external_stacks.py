@@ -1,11 +1,13 @@
 """What the name of an external stack runs: the command line says so, or the user's own configuration."""
 
+import sys
 from pathlib import Path
 
 import pytest
 
 from simscen.cli.called import config_file, environment
 from simscen.cli.select import Selection, load_all
+from simscen.core.errors import UsageError
 from simscen.run.digest import digest
 
 SHORT = """\
@@ -205,6 +207,14 @@ def test_the_digest_holds_words_the_variables_asked_for_and_the_content_of_files
     one = of()
     configure(project, "stacks: {mine: {command: ./nav, env: {A: '2'}}}\n")
     assert of() != one
+
+
+def test_simscen_itself_is_found_where_nobody_activated_its_environment(project: Path, monkeypatch) -> None:
+    """Its adapter for ROS 2 is a command: `--stack mine='simscen ros2 …'`."""
+    monkeypatch.setenv("PATH", "/nowhere")
+    assert loaded("mine", "mine=simscen ros2")[0].runs.argv == (str(Path(sys.executable).parent / "simscen"), "ros2")
+    with pytest.raises(UsageError, match="no program `sh` in the PATH"):
+        loaded("mine", "mine=sh -c true")
 
 
 def test_a_program_in_the_path_is_looked_for_in_the_path_of_its_own_environment(project: Path) -> None:
