@@ -1,0 +1,49 @@
+"""The tutorial on a stack of one's own, done as a new user does it: an empty folder, its commands in order."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+PAGE = (Path(__file__).parents[2] / "docs/tutorials/my-stack-process.md").read_text(encoding="utf-8")
+BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+BLOCKS = [(match[1], match[2]) for match in BLOCK.finditer(PAGE)]
+NAMES = iter(["room.scenario.yaml", "my_stack.py", ".config/simscen/config.yaml"])
+FILES = {next(NAMES): text for kind, text in BLOCKS if kind in ("yaml", "python")}
+SESSIONS = [text for kind, text in BLOCKS if kind == "console"]
+COMMANDS = [tuple(part.splitlines()) for text in SESSIONS for part in text.split("$ ")[1:]]
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("home")
+    for name, text in FILES.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text, encoding="utf-8")
+    return folder
+
+
+def called(command: str, home: Path, **variables: str) -> subprocess.CompletedProcess[str]:
+    env = {**os.environ, "HOME": str(home), "XDG_CONFIG_HOME": str(home / "none"), **variables}
+    env["PATH"] = f"{Path(sys.executable).parent}:{env['PATH']}"
+    return subprocess.run(command, shell=True, cwd=home, env=env, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize(("command", "says"), COMMANDS)
+def test_a_command_says_what_the_page_says(home: Path, command: str, says: str) -> None:
+    ended = called(command, home)
+    assert says in ended.stdout + ended.stderr
+    assert ended.returncode == (0 if "passed" in says else 2 if "SC060" in says else 3)
+
+
+def test_the_configuration_says_what_the_name_runs(home: Path) -> None:
+    ended = called("simscen run room.scenario.yaml", home, XDG_CONFIG_HOME=str(home / ".config"))
+    assert (ended.returncode, ended.stderr) == (0, "")
+
+
+def test_the_page_has_all_its_parts() -> None:
+    assert len(FILES) == 3
+    assert len(COMMANDS) == 6
