@@ -18,10 +18,12 @@ if TYPE_CHECKING:
     from simscen.core.case import Case
     from simscen.core.chance import Streams
     from simscen.core.events import Event, EventKind
+    from simscen.core.evidence import Evidence
     from simscen.core.geometry import Array, Pose2, Pose3, wrap
     from simscen.core.grid import OccupancyGrid
     from simscen.core.motion import STOP, Twist
     from simscen.core.navigation import ErrorCode, Goal, Path, TaskResult
+    from simscen.core.polygons import distance_to_polygon
     from simscen.core.samples import Samples
     from simscen.core.sensing import Bump, Image, Imu, Odometry, Reading, Readings, Scan
     from simscen.core.stage import Effect, Situation, Stage
@@ -29,9 +31,11 @@ if TYPE_CHECKING:
     from simscen.core.trace import Decision, Trace
     from simscen.core.verdict import Finding, Status
     from simscen.criteria.base import Criterion
+    from simscen.criteria.bounds import at_least, at_most, counted, held, missed, undecided
     from simscen.criteria.measure import Measure
+    from simscen.criteria.signals import clearance, drive, pose_error, speed, truth, turn_rate
     from simscen.faults.base import Disturbance, Fault, Wheels
-    from simscen.model.robot import SensorSpec
+    from simscen.model.robot import Mount, SensorSpec
     from simscen.model.stack import (
         BehaviorSpec,
         ControllerSpec,
@@ -41,11 +45,12 @@ if TYPE_CHECKING:
         PlannerSpec,
     )
     from simscen.sensors.sensor import Sensor, SensorSetting, SensorView
-    from simscen.spec.base import Ranged, Spec, Value
+    from simscen.spec.base import Ranged, Spec, Value, by_default
     from simscen.spec.choice import Choice
     from simscen.spec.places import Point, PoseSpec
     from simscen.spec.quantities import (
         Angle,
+        AngularSpeed,
         Duration,
         Frequency,
         Length,
@@ -59,6 +64,7 @@ if TYPE_CHECKING:
         PositiveSpeed,
         Probability,
         Ratio,
+        Speed,
     )
     from simscen.spec.references import GoalName, MovableName, ObjectName, RegionName
     from simscen.stack.footprint import Footprint, distances
@@ -82,6 +88,7 @@ __all__ = [
     "STOP",
     "Action",
     "Angle",
+    "AngularSpeed",
     "Array",
     "Behavior",
     "BehaviorSpec",
@@ -103,6 +110,7 @@ __all__ = [
     "Estimate",
     "Event",
     "EventKind",
+    "Evidence",
     "Fault",
     "Finding",
     "Footprint",
@@ -118,6 +126,7 @@ __all__ = [
     "Localizer",
     "LocalizerSpec",
     "Measure",
+    "Mount",
     "MovableName",
     "NavigationFailure",
     "NonNegativeLength",
@@ -154,6 +163,7 @@ __all__ = [
     "Setting",
     "Situation",
     "Spec",
+    "Speed",
     "Stack",
     "Stage",
     "Status",
@@ -165,16 +175,36 @@ __all__ = [
     "Twist",
     "Value",
     "Wheels",
+    "at_least",
+    "at_most",
+    "by_default",
+    "clearance",
+    "counted",
+    "distance_to_polygon",
     "distances",
+    "drive",
+    "held",
+    "missed",
+    "pose_error",
+    "speed",
+    "truth",
+    "turn_rate",
+    "undecided",
     "wrap",
 ]
 
 _WHERE = {
     # What a specification is made of.
-    "simscen.spec.base": ("Spec", "Value", "Ranged"),
+    "simscen.spec.base": (
+        "Spec",
+        "Value",
+        "Ranged",
+        "by_default",
+    ),
     "simscen.spec.choice": ("Choice",),
     "simscen.spec.quantities": (
         "Angle",
+        "AngularSpeed",
         "Duration",
         "Frequency",
         "Length",
@@ -188,9 +218,18 @@ _WHERE = {
         "PositiveSpeed",
         "Probability",
         "Ratio",
+        "Speed",
     ),
-    "simscen.spec.places": ("Point", "PoseSpec"),
-    "simscen.spec.references": ("GoalName", "MovableName", "ObjectName", "RegionName"),
+    "simscen.spec.places": (
+        "Point",
+        "PoseSpec",
+    ),
+    "simscen.spec.references": (
+        "GoalName",
+        "MovableName",
+        "ObjectName",
+        "RegionName",
+    ),
     # What a specification is: one base for each kind.
     "simscen.model.stack": (
         "BehaviorSpec",
@@ -200,10 +239,17 @@ _WHERE = {
         "LocalizerSpec",
         "PlannerSpec",
     ),
-    "simscen.model.robot": ("SensorSpec",),
+    "simscen.model.robot": (
+        "Mount",
+        "SensorSpec",
+    ),
     "simscen.criteria.base": ("Criterion",),
     "simscen.criteria.measure": ("Measure",),
-    "simscen.faults.base": ("Disturbance", "Fault", "Wheels"),
+    "simscen.faults.base": (
+        "Disturbance",
+        "Fault",
+        "Wheels",
+    ),
     "simscen.triggers.base": ("Condition",),
     "simscen.actions.base": ("Action",),
     # What a component promises, and what it is installed in.
@@ -220,24 +266,87 @@ _WHERE = {
         "Surroundings",
     ),
     "simscen.stack.setting": ("Setting",),
-    "simscen.stack.footprint": ("Footprint", "distances"),
+    "simscen.stack.footprint": (
+        "Footprint",
+        "distances",
+    ),
     "simscen.stack.tasks": ("Task",),
-    "simscen.sensors.sensor": ("Sensor", "SensorSetting", "SensorView"),
+    "simscen.sensors.sensor": (
+        "Sensor",
+        "SensorSetting",
+        "SensorView",
+    ),
+    # What a criterion measures and says.
+    "simscen.criteria.bounds": (
+        "at_least",
+        "at_most",
+        "counted",
+        "held",
+        "missed",
+        "undecided",
+    ),
+    "simscen.criteria.signals": (
+        "clearance",
+        "drive",
+        "pose_error",
+        "speed",
+        "truth",
+        "turn_rate",
+    ),
     # The words that all speak.
-    "simscen.core.belief": ("Belief", "Estimate"),
+    "simscen.core.belief": (
+        "Belief",
+        "Estimate",
+    ),
     "simscen.core.case": ("Case",),
     "simscen.core.chance": ("Streams",),
-    "simscen.core.events": ("Event", "EventKind"),
-    "simscen.core.geometry": ("Array", "Pose2", "Pose3", "wrap"),
+    "simscen.core.events": (
+        "Event",
+        "EventKind",
+    ),
+    "simscen.core.evidence": ("Evidence",),
+    "simscen.core.geometry": (
+        "Array",
+        "Pose2",
+        "Pose3",
+        "wrap",
+    ),
     "simscen.core.grid": ("OccupancyGrid",),
-    "simscen.core.motion": ("STOP", "Twist"),
-    "simscen.core.navigation": ("ErrorCode", "Goal", "Path", "TaskResult"),
+    "simscen.core.motion": (
+        "STOP",
+        "Twist",
+    ),
+    "simscen.core.navigation": (
+        "ErrorCode",
+        "Goal",
+        "Path",
+        "TaskResult",
+    ),
+    "simscen.core.polygons": ("distance_to_polygon",),
     "simscen.core.samples": ("Samples",),
-    "simscen.core.sensing": ("Bump", "Image", "Imu", "Odometry", "Reading", "Readings", "Scan"),
-    "simscen.core.stage": ("Effect", "Situation", "Stage"),
+    "simscen.core.sensing": (
+        "Bump",
+        "Image",
+        "Imu",
+        "Odometry",
+        "Reading",
+        "Readings",
+        "Scan",
+    ),
+    "simscen.core.stage": (
+        "Effect",
+        "Situation",
+        "Stage",
+    ),
     "simscen.core.time": ("Clock",),
-    "simscen.core.trace": ("Decision", "Trace"),
-    "simscen.core.verdict": ("Finding", "Status"),
+    "simscen.core.trace": (
+        "Decision",
+        "Trace",
+    ),
+    "simscen.core.verdict": (
+        "Finding",
+        "Status",
+    ),
 }
 _MODULE_OF = {name: module for module, names in _WHERE.items() for name in names}
 

@@ -8,10 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from simscen.core.sensing import Reading, Scan
-from simscen.faults.base import Disturbance, Fault, Wheels
-from simscen.spec.base import Spec
-from simscen.spec.quantities import Angle, AngularSpeed, PositiveAngle
+from simscen.plugin import Angle, AngularSpeed, Disturbance, Fault, PositiveAngle, Reading, Scan, Spec, Wheels
 
 
 class Crosstalk(Spec, Fault):

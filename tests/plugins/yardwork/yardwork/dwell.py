@@ -6,20 +6,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simscen.core.evidence import Evidence
-from simscen.core.geometry import Pose2
-from simscen.core.polygons import distance_to_polygon
-from simscen.core.verdict import Finding
-from simscen.criteria.base import Criterion
-from simscen.criteria.bounds import at_most, undecided
-from simscen.criteria.signals import truth
-from simscen.spec.base import Spec
-from simscen.spec.quantities import PositiveDuration
-from simscen.spec.references import RegionName
+from simscen.plugin import (
+    Criterion,
+    Evidence,
+    Finding,
+    Pose2,
+    PositiveDuration,
+    RegionName,
+    Spec,
+    at_most,
+    distance_to_polygon,
+    truth,
+    undecided,
+)
 
 if TYPE_CHECKING:
-    from simscen.core.case import Case
-    from simscen.core.trace import Trace
+    from simscen.plugin import Case, Trace
 
 
 class Dwell(Spec, Criterion):

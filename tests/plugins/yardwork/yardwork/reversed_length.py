@@ -6,14 +6,10 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from simscen.core.evidence import Evidence
-from simscen.criteria.measure import Measure
-from simscen.spec.base import Spec
-from simscen.spec.quantities import Speed
+from simscen.plugin import Evidence, Measure, Spec, Speed
 
 if TYPE_CHECKING:
-    from simscen.core.case import Case
-    from simscen.core.trace import Trace
+    from simscen.plugin import Case, Trace
 
 
 class ReversedLength(Spec, Measure):

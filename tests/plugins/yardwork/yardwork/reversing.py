@@ -1,9 +1,6 @@
 """`reversing`: the robot drives backwards."""
 
-from simscen.core.stage import Situation
-from simscen.spec.base import Value
-from simscen.spec.quantities import PositiveSpeed
-from simscen.triggers.base import Condition
+from simscen.plugin import Condition, PositiveSpeed, Situation, Value
 
 
 class Reversing(Value[PositiveSpeed], Condition):

@@ -4,9 +4,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from simscen.model.robot import Mount, SensorSpec
-from simscen.spec.base import by_default
-from simscen.spec.quantities import Frequency, NonNegativeLength, PositiveAngle, PositiveLength
+from simscen.plugin import Frequency, Mount, NonNegativeLength, PositiveAngle, PositiveLength, SensorSpec, by_default
 
 
 class Sonar(SensorSpec):

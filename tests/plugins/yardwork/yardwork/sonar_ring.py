@@ -4,9 +4,7 @@ import math
 
 import numpy as np
 
-from simscen.core.geometry import Pose2
-from simscen.core.sensing import Scan
-from simscen.sensors.sensor import SensorSetting
+from simscen.plugin import Pose2, Scan, SensorSetting
 from yardwork.sonar import Sonar
 
 RAYS = 9

@@ -1,10 +1,6 @@
 """`turn_robot`: somebody turns the robot around."""
 
-from simscen.actions.base import Action
-from simscen.core.geometry import Pose2
-from simscen.core.stage import Effect, Stage
-from simscen.spec.base import Spec
-from simscen.spec.quantities import Angle
+from simscen.plugin import Action, Angle, Effect, Pose2, Spec, Stage
 
 
 class TurnRobot(Spec, Action):
