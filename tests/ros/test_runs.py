@@ -116,3 +116,19 @@ def test_killing_the_node_is_an_error_of_that_run_only_and_nothing_is_left(ros, 
     assert sorted(one["outcome"] for one in results["runs"]) == ["error", "passed"]
     assert "what was launched ended by signal 9" in ended.said, ended.said
     assert alive(tag) == []
+
+
+def test_a_ros_without_tf2_msgs_and_nav2_msgs_is_driven_by_goal_pose(ros, run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTHONPATH", str(NODES.with_name("without")))
+    ended = run("--launch", ros.node("navigator"), scenario="short.scenario.yaml")
+    assert ended.code == 0, ended.said
+    assert ended.about["not_published"] == ["/tf (tf2_msgs/msg/TFMessage)", "/tf_static (tf2_msgs/msg/TFMessage)"]
+
+
+def test_a_node_that_hangs_is_named_and_ended(ros, run) -> None:
+    tag = f"hangs{os.getpid()}"
+    launch = ros.node("navigator", "-p", f"tag:={tag}", hangs_at=1.0)
+    ended = run("--answer", "2", "--launch", launch, scenario="short.scenario.yaml")
+    assert ended.code == 3
+    assert "/navigator has not answered for 2 s: it hangs, or was killed" in ended.said
+    assert alive(tag) == []

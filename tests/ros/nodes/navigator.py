@@ -3,12 +3,13 @@
 In: /map, /scan, /odom, /initialpose, /tf_static, and goals by /goal_pose or an action of Nav2.
 Out: /cmd_vel (Twist, or TwistStamped with `stamped`), /plan, /amcl_pose, /tf map→odom.
 Parameters: `stamped`, `rate` (Hz), `speed` (m/s), `radius` (m), `action` ("", navigate_to_pose,
-navigate_through_poses or follow_waypoints).
+navigate_through_poses or follow_waypoints), `hangs_at` (s).
 """
 
 import heapq
 import math
 import os
+import time
 
 import numpy as np
 import rclpy
@@ -144,6 +145,7 @@ class Navigator(Node):
         self.radius = self.declare_parameter("radius", 0.25).value
         rate = self.declare_parameter("rate", 20.0).value
         action = self.declare_parameter("action", "").value
+        self.hangs_at = self.declare_parameter("hangs_at", math.inf).value
         self.world = self.odom = self.scan = self.correction = None
         self.mounts = {}
         self.goals, self.plan, self.planned_at, self.turning = [], None, -math.inf, False
@@ -262,6 +264,8 @@ class Navigator(Node):
 
     def drive(self):
         now = self.get_clock().now()
+        if now.nanoseconds >= self.hangs_at * 1e9:
+            time.sleep(3600)
         linear, angular = self.decide(now.nanoseconds * 1e-9)
         twist = Twist()
         twist.linear.x, twist.angular.z = linear, angular

@@ -139,3 +139,25 @@ def test_called_by_hand_it_says_what_it_is_for() -> None:
 
     with pytest.raises(UsageError, match="there is no run to serve"):
         CliRunner().invoke(app, ["ros2", "--launch", "node"], catch_exceptions=False)
+
+
+def test_the_page_on_nav2_shows_what_is_said(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[3] / "docs/tutorials/my-nav2.md").read_text(encoding="utf-8")
+    text = """\
+amcl:
+  ros__parameters:
+    base_frame_id: base_footprint
+local_costmap:
+  local_costmap:
+    ros__parameters:
+      plugins: [obstacle_layer]
+      obstacle_layer:
+        plugin: nav2_costmap_2d::ObstacleLayer
+        observation_sources: scan
+        scan:
+          topic: /front/scan
+"""
+    _, said = called(tmp_path, text)
+    for line in said.split("\n"):
+        place, code, message = line.split(" ", 2)
+        assert f"nav2_params.yaml:{place}: error[{code}] {message}\n" in page
