@@ -1,7 +1,7 @@
 """Measures what recovery's threshold finds and costs: `python tests/unit/stack/localizers/measure_recovery.py`."""
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from unittest import mock
@@ -31,9 +31,9 @@ def off(drive: Case) -> Array:
     return error
 
 
-def drives(circumstance: str, model: str, seeds: Iterable[int]) -> list[Case]:
+def drives(circumstance: str, model: str, seeds: Iterable[int], buildings: Sequence[str] = BUILDINGS) -> list[Case]:
     """A drive of each building and seed, with recovery."""
-    found = [case(name, circumstance, model, seed) for name in BUILDINGS for seed in seeds]
+    found = [case(name, circumstance, model, seed) for name in buildings for seed in seeds]
     return [replace(one, spec=one.spec.model_copy(update=RECOVERING)) for one in found]
 
 
