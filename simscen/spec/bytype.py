@@ -9,6 +9,7 @@ from pydantic_core import CoreSchema, InitErrorDetails, PydanticCustomError, Val
 
 from simscen.core.navigation import RecoveryBehavior
 from simscen.spec.component import Typed
+from simscen.spec.ofpackage import validated
 from simscen.spec.registry import BrokenPlugin, Entry, find, installed, shipped
 
 GROUP = "simscen group"
@@ -67,12 +68,7 @@ BehaviorName = Annotated[RecoveryBehavior, NameOf("behavior")]
 
 def specification(entry: Entry, value: dict[str, Any]) -> BaseModel:
     """The specification of an installed package with these values, which may lack its `type`."""
-    try:
-        model = entry.load()
-    except BrokenPlugin as broken:
-        told = {"problem": str(broken), "hint": broken.hint}
-        raise PydanticCustomError("plugin", "{problem}", told) from broken
-    return model.model_validate({**value, "type": entry.name}, by_alias=True, by_name=False)
+    return validated(entry, {**value, "type": entry.name})
 
 
 def added(group: str) -> Iterator[tuple[str, type[BaseModel]]]:

@@ -25,17 +25,24 @@ class OfPackage(OnDemand):
         return self.entry.load()
 
     def _validate(self, value: Any) -> BaseModel:
-        try:
-            self.load()
-            return _kept(self.entry, super()._validate(value))
-        except BrokenPlugin as broken:
-            told = {"problem": str(broken), "hint": broken.hint}
-            raise PydanticCustomError("plugin", "{problem}", told) from broken
-        except (ValueError, AssertionError):  # what pydantic takes for a mistake in the file, ValidationError included
-            raise
-        except Exception as error:  # the boundary to code of others, which can raise anything
-            why = BrokenPlugin(self.entry, f"it breaks down over what is written here: {type(error).__name__}: {error}")
-            raise PydanticCustomError("plugin", "{problem}", {"problem": str(why), "hint": why.hint}) from error
+        return validated(self.entry, value)
+
+
+def validated(entry: Entry, value: Any) -> BaseModel:
+    """The specification of an entry with these values; whatever its package does wrong is a problem of the file."""
+    try:
+        return _kept(entry, entry.load().model_validate(value, by_alias=True, by_name=False))
+    except BrokenPlugin as broken:
+        raise _problem(broken) from broken
+    except (ValueError, AssertionError):  # what pydantic takes for a mistake in the file, ValidationError included
+        raise
+    except Exception as error:  # the boundary to code of others, which can raise anything
+        why = f"it breaks down over what is written here: {type(error).__name__}: {error}"
+        raise _problem(BrokenPlugin(entry, why)) from error
+
+
+def _problem(broken: BrokenPlugin) -> PydanticCustomError:
+    return PydanticCustomError("plugin", "{problem}", {"problem": str(broken), "hint": broken.hint})
 
 
 def _kept(entry: Entry, spec: BaseModel) -> BaseModel:

@@ -7,6 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from simscen.criteria.criterion import AnyCriterion
+from simscen.model.stack import StackSpec
 from simscen.spec.choice import added, widened
 
 
@@ -55,3 +56,25 @@ def test_it_survives_being_copied_and_sent_to_another_process(calm) -> None:
     for again in (pickle.loads(pickle.dumps(entry)), deepcopy(entry), entry.model_copy()):
         assert again == entry
         assert again.chosen.max == 2.0
+
+
+@pytest.mark.parametrize(
+    ("kind", "choice", "before"),
+    [("criterion", AnyCriterion, "Calm(Spec, Criterion)"), ("planner", StackSpec, "Calm(PlannerSpec)")],
+)
+def test_a_check_of_its_own_that_breaks_down_is_told_where_it_is_written(packages, kind, choice, before) -> None:
+    text = (
+        "from typing import ClassVar, Literal\nfrom pydantic import model_validator\n"
+        "from simscen.criteria.base import Criterion\nfrom simscen.model.stack import PlannerSpec\n"
+        "from simscen.spec.base import Spec\n\n\n"
+        f"class {before}:\n    component: ClassVar[str] = 'calm:Device'\n    type: Literal['calm'] = 'calm'\n\n"
+        "    @model_validator(mode='after')\n    def _checked(self):\n        return {}['nothing']\n\n"
+        "    def judge(self, trace, case):\n        return []\n"
+    )
+    packages("calm", "1.0", {kind: {"calm": "calm:Calm"}}, calm=text)
+    words = {"calm": {}} if kind == "criterion" else {"planner": {"type": "calm"}}
+    with pytest.raises(ValidationError) as told:
+        choice.model_validate(words, by_alias=True, by_name=False)
+    (error,) = told.value.errors()
+    assert error["loc"] == (("calm",) if kind == "criterion" else ("planner",))
+    assert "it breaks down over what is written here: KeyError: 'nothing'" in error["msg"]
