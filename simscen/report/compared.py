@@ -61,9 +61,10 @@ def headline(baseline: str, against: Against) -> str:
 
 
 def numbers(one: Difference) -> tuple[str, str, str, str]:
-    """The two means, their difference, and its interval."""
-    interval = "" if one.interval is None else f"{one.interval[0]:+.2f} … {one.interval[1]:+.2f}"
-    return f"{one.baseline:.2f}", f"{one.value:.2f}", f"{one.difference:+.2f}", interval
+    """The two means, their difference, and its interval; what is below 1 m or 1 s with a digit more."""
+    digits = 3 if one.unit and max(abs(one.baseline), abs(one.value)) < 1 else 2
+    interval = "" if one.interval is None else " … ".join(f"{bound:+.{digits}f}" for bound in one.interval)
+    return f"{one.baseline:.{digits}f}", f"{one.value:.{digits}f}", f"{one.difference:+.{digits}f}", interval
 
 
 def _outcomes(comparison: Comparison, prefix: str, columns: int | None) -> Iterator[Line]:

@@ -8,7 +8,7 @@ import pytest
 
 from simscen.core.comparison import Against, Comparison, Difference, Flip, Outcomes
 from simscen.core.sessionevents import SessionFinished, SessionStarted
-from simscen.report.compared import compared, shortened
+from simscen.report.compared import compared, numbers, shortened
 from simscen.report.console import text_reporter
 from simscen.report.github import markdown
 from simscen.report.lines import text_of
@@ -113,3 +113,10 @@ def test_on_github_it_is_in_the_summary(comparison, passed) -> None:
 def test_in_results_json_it_is_data(comparison, passed) -> None:
     assert json.loads(to_json([passed], "", comparison))["comparison"]["against"][0]["flips"][0]["seed"] == 3
     assert "comparison" not in json.loads(to_json([passed]))
+
+
+def test_what_is_small_has_a_digit_more() -> None:
+    near = Difference("min_clearance", "m", 6, 0.0716, 0.0309, -0.0407, (-0.0512, -0.0298), 6, 0, 0, 0.03)
+    assert numbers(near) == ("0.072", "0.031", "-0.041", "-0.051 … -0.030")
+    assert numbers(TIME) == ("25.34", "28.23", "+2.89", "+0.78 … +4.95")
+    assert numbers(REPLANS)[0] == "3.00"
