@@ -84,3 +84,9 @@ def yardwork(packages: Lay) -> Path:
 def how_to_lay_out() -> Callable[[Path, Path], Path]:
     """`lay_out(folder, site)`, for tests that start commands of their own."""
     return lay_out
+
+
+@pytest.fixture(name="lay")
+def how_to_lay() -> Lay:
+    """`lay(site, name, version, points, module="…")`, for tests that start commands of their own."""
+    return lay

@@ -14,7 +14,7 @@ from simscen.model.stackfile import StackFileSpec
 from simscen.model.userconfig import UserConfigSpec
 from simscen.model.world import WorldSpec
 from simscen.spec import bytype
-from simscen.spec.bytype import GROUP
+from simscen.spec.bytype import GROUP, NAMES, WHOLE
 from simscen.spec.choice import Choice, added, widened
 
 Schema = dict[str, Any]
@@ -86,9 +86,11 @@ class _WithInstalled(_Generator):
         return {**made, **_exactly_one(model, [*model.choices(), *added(model)])}
 
     def function_wrap_schema(self, schema: core_schema.WrapValidatorFunctionSchema) -> JsonSchemaValue:
-        made = super().function_wrap_schema(schema)
-        group = schema.get("metadata", {}).get(GROUP)
-        more = [self._named(name, model) for name, model in bytype.added(group)] if group else []
+        made, told = super().function_wrap_schema(schema), schema.get("metadata", {})
+        models = dict(bytype.added(told[GROUP])) if GROUP in told else {}
+        more: list[Schema] = [self._named(name, model) for name, model in models.items() if told[WHOLE]]
+        if models and told[NAMES]:
+            more.append({"enum": list(models)})
         return {"anyOf": [made, *more]} if more else made
 
     def _named(self, name: str, model: type[BaseModel]) -> JsonSchemaValue:

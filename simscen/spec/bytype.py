@@ -12,8 +12,9 @@ from simscen.spec.component import Typed
 from simscen.spec.ofpackage import validated
 from simscen.spec.registry import BrokenPlugin, Entry, find, installed, shipped
 
-GROUP = "simscen group"
-"""Under this key the metadata of a schema says to which group packages add."""
+GROUP, NAMES, WHOLE = "simscen group", "simscen names", "simscen mappings"
+"""Under these keys the metadata of a schema says to which group packages add, and whether names and mappings may stand
+there."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,8 @@ class ByType:
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         inner = handler.generate_schema(self.own)
-        return core_schema.no_info_wrap_validator_function(self._validate, inner, metadata={GROUP: self.group})
+        told = {GROUP: self.group, NAMES: self.named, WHOLE: True}
+        return core_schema.no_info_wrap_validator_function(self._validate, inner, metadata=told)
 
     def _validate(self, value: Any, own: core_schema.ValidatorFunctionWrapHandler) -> Any:
         if isinstance(value, Typed) and not type(value).__module__.startswith("simscen."):
@@ -54,7 +56,8 @@ class NameOf:
     group: str
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_wrap_validator_function(self._validate, handler(source))
+        told = {GROUP: self.group, NAMES: True, WHOLE: False}
+        return core_schema.no_info_wrap_validator_function(self._validate, handler(source), metadata=told)
 
     def _validate(self, value: Any, own: core_schema.ValidatorFunctionWrapHandler) -> Any:
         if isinstance(value, str) and value not in _names(self.group):

@@ -96,3 +96,37 @@ def test_a_scenario_that_uses_them_is_validated_without_importing_what_does_the_
     done = call("-c", probe + SIMSCEN, "validate", ".", folder=tmp_path)
     told = ["2 scenarios and 3 worlds are valid", "0 theta_star.spec vfh_plus.spec"]
     assert done.stdout.splitlines() == told, done.stderr
+
+
+BROKEN = """
+from simscen.plugin import Path, PlannerSpec
+
+
+class Nan(PlannerSpec):
+    component = "nan_planner:Planner"
+
+
+class Planner:
+    def __init__(self, spec, setting):
+        pass
+
+    def plan(self, costmap, start, goal, seed):
+        if seed % 2:
+            raise ZeroDivisionError("half way")
+        return Path([[0.0, 0.0, float("nan")]])
+"""
+
+
+def test_a_planner_that_breaks_is_an_error_of_its_own_run(call, lay, tmp_path: Path) -> None:
+    lay(tmp_path / "site", "nan-planner", "0.9", {"planner": {"nan": "nan_planner:Nan"}}, nan_planner=BROKEN)
+    (tmp_path / "nan.stack.yaml").write_text("simscen: 1\nstack: {planner: {type: nan}}\n")
+    stacks = ("--stack", f"nan={tmp_path}/nan.stack.yaml", "--stack", "reference=reference")
+    done = call(
+        "-c", SIMSCEN, "run", "scenarios/navigation/goal.scenario.yaml", *stacks, "--out", str(tmp_path / "out")
+    )
+    assert done.returncode == 3, done.stdout + done.stderr
+    assert "1 passed, 1 error" in done.stdout
+    junit = (tmp_path / "out" / "junit.xml").read_text()
+    assert "planner `nan` (nan_planner:Planner)" in junit
+    assert 'type="crashed"' in junit or 'type="broken-component"' in junit
+    assert "(nan_planner.py:15)" in junit or "whose points are list" in junit

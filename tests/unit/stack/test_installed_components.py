@@ -1,11 +1,14 @@
 """Components that packages add: chosen by `type`, built by one door, and named where they break."""
 
 import pickle
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from simscen.cli.jsonschema import as_text, schema_of
 from simscen.core.chance import Streams
 from simscen.core.errors import InvalidInput, RunError
 from simscen.core.geometry import Pose2
@@ -315,6 +318,23 @@ def test_a_behaviour_of_a_package_runs_and_is_in_the_log_by_its_name(odd) -> Non
     d.world.boxes.append((1.6, 0.0, 1.7, 4.0))
     d.run(30)
     assert {event.name for event in d.kinds("recovery.started")} == {"nod"}
+
+
+def test_a_behaviour_of_a_package_is_named_in_triggers_criteria_and_the_schema(odd, tmp_path: Path) -> None:
+    file = scenario(tmp_path, "{recovery: {behaviors: [nod, {type: nod, wait_duration: 1.0}]}}")
+    text = file.read_text().replace("pass: [", "pass: [recoveries: {max: 3, name: nod}, ")
+    events = "events: [{name: e, when: {recovery: {name: nod}}, do: {cancel_goal: {}}}]\n"
+    file.write_text(text + events)
+    schema = tmp_path / "schema.json"
+    schema.write_text(as_text(schema_of("scenario", installed=True)))
+    assert load_scenario(file, tmp_path).spec.stack.recovery.names == ["nod", "nod"]
+    checked = [sys.executable, "-m", "check_jsonschema", "--schemafile", str(schema), str(file)]
+    assert subprocess.run(checked, check=False, capture_output=True).returncode == 0
+    file.write_text((text + events).replace("name: nod", "name: nood"))
+    with pytest.raises(InvalidInput) as wrong:
+        load_scenario(file, tmp_path)
+    assert [problem.hint for problem in wrong.value.problems] == ["did you mean `nod`?"] * 2
+    assert subprocess.run(checked, check=False, capture_output=True).returncode == 1
 
 
 def test_what_one_component_draws_changes_no_other(odd) -> None:
