@@ -23,6 +23,9 @@ COMMAND_DUE = 1
 LONGEST = 256 << 20
 """Bytes of the longest frame."""
 
+DEEPEST = 32
+"""How deep JSON may be nested."""
+
 SIZE = struct.Struct("<I")
 _STEP = struct.Struct("<QiIIII")
 _ANSWER = struct.Struct("<QI")
@@ -60,14 +63,26 @@ def json_frame(kind: int, content: dict[str, Any]) -> bytes:
 
 
 def from_json(body: bytes) -> dict[str, Any]:
-    """The object of a JSON frame. Raises Malformed."""
+    """The object of a JSON frame: strict JSON, not too deep, of text that UTF-8 can hold. Raises Malformed."""
     try:
-        content = json.loads(body.decode())
+        content = json.loads(body.decode(), parse_constant=_refused)
+        json.dumps(content, ensure_ascii=False).encode()
     except (ValueError, RecursionError) as error:
         raise Malformed(f"its body is not JSON: {error}") from None
     if not isinstance(content, dict):
         raise Malformed("its body is not a JSON object")
+    if _deep(content, DEEPEST):
+        raise Malformed(f"its body is nested deeper than {DEEPEST}")
     return content
+
+
+def _refused(word: str) -> None:
+    raise ValueError(f"{word} is no number of JSON")
+
+
+def _deep(content: Any, left: int) -> bool:
+    inner = content.values() if isinstance(content, dict) else content if isinstance(content, list) else ()
+    return left == 0 or any(_deep(item, left - 1) for item in inner)
 
 
 def step_frame(header: StepHeader, messages: Messages) -> bytes:

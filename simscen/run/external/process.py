@@ -27,6 +27,7 @@ TAIL_BYTES = 16_384
 TIME_TO_DIE = 1.0
 """Seconds in which the process of a socket that was hung up is expected to have ended."""
 TIME_TO_BURY = 5.0
+LONGEST_MESSAGE = 2000
 PEER_PATH = "SIMSCEN_PEER_PATH"
 """The environment variable with the folder of `simscen_peer`."""
 
@@ -211,6 +212,6 @@ def _ended(report: dict[str, Any]) -> str:
 
 def _message(body: bytes) -> str:
     try:
-        return str(wire.from_json(body)["message"])
+        return str(wire.from_json(body)["message"])[:LONGEST_MESSAGE]
     except (wire.Malformed, KeyError):
         return "it cannot go on, and does not say why"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import struct
 from collections.abc import Callable
@@ -16,6 +15,7 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.motion import Twist
 from simscen.core.navigation import Path
 from simscen.core.trace import LogLine
+from simscen.peer import wire
 from simscen.peer.cdr import Reader
 from simscen.peer.messages import read
 from simscen.record import frames, topics, unpack
@@ -176,10 +176,7 @@ def _table(data: bytes, width: int) -> Array:
 
 
 def _event(data: bytes) -> dict[str, Any]:
-    said = json.loads(unpack.string(data))
-    if not isinstance(said, dict):
-        raise NotAllowed("an event that is not a JSON object")
-    return said
+    return wire.from_json(unpack.string(data).encode())
 
 
 def _line(data: bytes) -> LogLine:

@@ -142,7 +142,7 @@ def test_an_answer_has_its_limit_of_wall_time(play, text: str) -> None:
         ),
         (ONE + "step.publish('/simscen/events', messages.string('{'))" + ON, "no std_msgs/msg/String"),
         (ONE + "step.publish('/simscen/events', messages.string('[' * 100000))" + ON, "no std_msgs/msg/String"),
-        (ONE + "step.publish('/simscen/events', messages.string('7'))" + ON, "an event that is not a JSON object"),
+        (ONE + "step.publish('/simscen/events', messages.string('7'))" + ON, "its body is not a JSON object"),
         (ONE + "peer.goals.say('collision.ended', 'wall')" + ON, "`collision.ended`, which is not a stack's to tell"),
         (ONE + "peer.goals.say('run.ended')" + ON, "`run.ended`, which is not a stack's to tell"),
         (ONE + "peer.goals.say('navigation.ended', 'SUCCEEDED')" + ON, "`navigation.ended`, which is not a stack's"),

@@ -1,0 +1,124 @@
+"""Whatever bytes a stack says, they are understood or refused, and never anything else."""
+
+import json
+from contextlib import suppress
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from simscen.core.geometry import Pose2
+from simscen.peer import messages, wire
+from simscen.peer.cdr import HEADER
+from simscen.record.simtime import SimTime
+from simscen.run.external.errors import NotAllowed
+from simscen.run.external.goals import ToldGoals
+from simscen.run.external.topics import HEARD, Offer
+from simscen.run.external.understand import Answer, understood
+from simscen.run.external.welcome import Welcome
+
+TIME = SimTime(240)
+EXAMPLES = {
+    "/cmd_vel": messages.twist(1, 2, 3),
+    "/plan": messages.path((1, 0), [(1, 2, 3), (4, 5, 6)]),
+    "/local_plan": messages.path((1, 0), [(1, 2, 3)]),
+    "/amcl_pose": messages.pose_with_covariance((1, 0), (1, 2, 3), [0] * 9),
+    "/particle_cloud": messages.particle_cloud((1, 0), [(1, 2, 3, 0.5)]),
+    "/tf": messages.transforms([((1, 0), "map", "odom", (1, 2, 3))]),
+    "/simscen/events": messages.string('{"kind": "plan.made"}'),
+    "/rosout": messages.log((1, 0), 20, "me", "a line"),
+    "/plan/exact": messages.float64_array([1, 2, 3]),
+    "/local_plan/exact": messages.float64_array([1, 2, 3]),
+    "/amcl_pose/exact": messages.pose2d(1, 2, 3),
+    "/particle_cloud/exact": messages.float64_array([1, 2, 3, 4]),
+    "/tf/exact": messages.pose2d(1, 2, 3),
+}
+
+
+def understand(**said: bytes) -> Answer:
+    return understood({name: [data] for name, data in said.items()}, 240, TIME, None, Pose2(0, 0, 0))
+
+
+def test_there_is_an_example_of_each_topic() -> None:
+    assert EXAMPLES.keys() == {topic.name for topic in HEARD}
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+@given(data=st.data())
+def test_bytes_gone_wrong_are_refused_or_understood(name: str, data) -> None:
+    sound = bytearray(EXAMPLES[name])
+    for _ in range(data.draw(st.integers(0, 3))):
+        sound[data.draw(st.integers(0, len(sound) - 1))] = data.draw(st.integers(0, 255))
+    cut = data.draw(st.integers(0, len(sound)))
+    with_belief = {} if name == "/amcl_pose" else {"/amcl_pose": EXAMPLES["/amcl_pose"]}
+    for garbage in (bytes(sound), bytes(sound[:cut]), HEADER + data.draw(st.binary(max_size=60))):
+        with suppress(NotAllowed):
+            understand(**{name: garbage}, **with_belief)
+
+
+json_values = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(st.characters(), max_size=5),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner, max_size=3),
+    max_leaves=6,
+)
+kinds = st.sampled_from(["goal.accepted", "goal.reached", "goal.failed", "goal.canceled", "plan.made"])
+events = st.fixed_dictionaries(
+    {"kind": kinds | json_values},
+    optional={"name": json_values, "data": json_values, "tick": json_values},
+)
+
+
+@given(events)
+def test_an_event_of_any_kind_is_heard_or_refused_and_can_be_logged(said) -> None:
+    from simscen.record.event_text import sentence, to_json
+    from simscen.record.pack_rare import log, string
+
+    goals = ToldGoals(True, 240)
+    with suppress(NotAllowed):
+        for event in understand(**{"/simscen/events": messages.string(json.dumps(said))}).events:
+            goals.hear(240, event)
+    for event in goals.take():
+        string(to_json(event))
+        log((1, 0), 20, "simscen", sentence(event))
+        assert json.loads(to_json(event), parse_constant=pytest.fail)
+
+
+@given(st.dictionaries(st.sampled_from(["protocol", "name", "version", "topics", "step", "about"]), json_values))
+def test_any_welcome_is_taken_or_refused_and_can_be_logged(told) -> None:
+    told.setdefault("protocol", 1)
+    with suppress(NotAllowed, wire.Malformed):
+        welcome = Welcome.of(wire.WELCOME, json.dumps(told).encode(), Offer.of([]))
+        assert all(text.encode() is not None for text in welcome.facts.values())
+
+
+@given(st.binary(max_size=80))
+def test_any_answer_is_read_or_malformed(body: bytes) -> None:
+    with suppress(wire.Malformed):
+        wire.from_answer(body)
+    with suppress(wire.Malformed):
+        wire.from_step(body)
+    with suppress(wire.Malformed):
+        wire.from_json(body)
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        '{"kind": "plan.made", "data": {"length": NaN}}',
+        '{"kind": "plan.made", "data": {"length": [-Infinity]}}',
+        '{"kind": "plan.made", "name": "\\ud800"}',
+        '{"kind": "goal.failed", "data": {"message": "\\udfff"}}',
+        '{"kind": "plan.made", "data": {"x": ' + 900 * "[" + 900 * "]" + "}}",
+        '{"kind": "plan.made", "data": {"x": "' + 5000 * "x" + '"}}',
+    ],
+)
+def test_an_event_that_no_log_takes_is_refused(said: str) -> None:
+    with pytest.raises(NotAllowed):
+        for event in understand(**{"/simscen/events": messages.string(said)}).events:
+            ToldGoals(True, 240).hear(240, event)
+
+
+@pytest.mark.parametrize("told", ['{"protocol": 1, "name": "\\ud800"}', '{"protocol": 1, "about": {"x": NaN}}'])
+def test_a_welcome_that_no_log_takes_is_refused(told: str) -> None:
+    with pytest.raises((NotAllowed, wire.Malformed)):
+        Welcome.of(wire.WELCOME, told.encode(), Offer.of([]))
