@@ -1,7 +1,9 @@
 """What came of a run, whether it was simulated just now or read from its log."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from simscen.core.case import Case
 from simscen.core.result import Outcome, RunResult
@@ -13,13 +15,15 @@ from simscen.core.verdict import Verdict
 class Run:
     """A run: its `result` (outcome, verdicts, metrics), the `trace` it was judged from, the `case` it was judged by.
 
-    `log` is the MCAP file that holds all of it; None when none was asked for.
+    `log` is the MCAP file that holds all of it; None when none was asked for. `stack` is what an external stack said of
+    itself; empty for one in the engine.
     """
 
     result: RunResult
     trace: Trace
     case: Case
     log: Path | None = None
+    stack: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def passed(self) -> bool:

@@ -1,6 +1,7 @@
 """One run of a session in its own process: simulate it and leave its files in its folder."""
 
 import hashlib
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ Finish = Callable[[Prepared, Run, Path], None]
 def perform(prepared: Prepared, seed: int, folder: Path, logs: tuple[Log, ...], finish: Finish) -> dict[str, Any]:
     """Do the run and leave run.mcap, result.json, scenario.yaml and what `finish` makes in `folder`.
 
-    What an external stack prints goes to stack.log there.
+    What an external stack prints goes to stack.log there, what it says of itself to stack.json.
 
     Returns the end record: the outcome and the log's SHA-256, for the supervisor.
     """
@@ -27,5 +28,7 @@ def perform(prepared: Prepared, seed: int, folder: Path, logs: tuple[Log, ...], 
     (folder / "scenario.yaml").write_text(resolved_text(prepared.loaded), encoding="utf-8")
     run = simulate(prepared, seed, log=log, attach=lambda *_: logs, printed=folder / "stack.log")
     (folder / "result.json").write_text(to_json(run.result), encoding="utf-8")
+    if run.stack:
+        (folder / "stack.json").write_text(json.dumps(run.stack, indent=1) + "\n", encoding="utf-8")
     finish(prepared, run, folder)
     return {"outcome": run.result.outcome.value, "sha256": hashlib.sha256(log.read_bytes()).hexdigest()}

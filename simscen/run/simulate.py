@@ -77,7 +77,7 @@ def _simulated(
         run = judged(prepared, seed, builder.finish(end.tick), log)
         if recorder:
             recorder.close(end.tick, to_json(run.result), external.facts if external else None)
-    return run
+    return replace(run, stack=external.described) if external else run
 
 
 def simulate_file(

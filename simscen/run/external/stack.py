@@ -108,6 +108,11 @@ class ExternalStack:
         """What ran, for the log."""
         return {"external": self._name, **self._welcome.facts}
 
+    @property
+    def described(self) -> dict[str, Any]:
+        """The same, for people and programs that read files."""
+        return {**self.facts, "about": self._welcome.about}
+
     def decide(self, tick: int, readings: Readings) -> Decision:
         """Take the readings of this beat and say what to drive."""
         self._feed.take(tick, readings)

@@ -1,5 +1,6 @@
 """A session in which some stacks are processes: whatever becomes of one of them, the others are as if alone."""
 
+import json
 import os
 import signal
 import time
@@ -57,6 +58,8 @@ def test_each_fault_is_the_error_of_its_run_alone_and_the_neighbours_log_stays_t
     assert {name: answer.result.error.kind for name, answer in answers.items() if answer.result.error} == KINDS
     assert (answers["fine"].outcome, alone.outcome) == (Outcome.PASSED, Outcome.PASSED)
     assert log_of(answers["fine"]) == log_of(alone)
+    said = json.loads(Path(alone.artifacts.folder, "stack.json").read_text())
+    assert said == {"external": "mine", "name": "mine", "version": "", "protocol": "1", "about": {}}
     cases = {case.get("classname"): case for case in ET.fromstring(to_xml(list(answers.values()))).iter("testcase")}
     told = {name: [error.get("type") for error in cases[name].findall("error")] for name in BROKEN}
     assert told == {**{name: [kind] for name, kind in KINDS.items()}, "fine": []}
