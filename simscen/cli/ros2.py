@@ -92,11 +92,12 @@ def command(
     ] = 0,
     wall_time: Annotated[bool, typer.Option(help="Accept nodes that do not use sim time.")] = False,
 ) -> None:
-    """Stand for a ROS 2 graph as the stack of a run: `simscen run --stack mine='simscen ros2 --launch …'`.
+    """Stand for a ROS 2 graph, or Nav2, as the stack of a run.
 
-    It runs under your own ROS Python, whichever distribution and RMW that is, and needs nothing there but rclpy.
-    Sensors, /tf, /map and /clock go out, commands come in, goals go to Nav2's actions or to /goal_pose. When the graph
-    is not what a run needs, the run ends in an error that says what is missing.
+    Say `simscen run SCENARIO --stack mine='simscen ros2 --launch "ros2 launch …"'`. It runs under your own ROS Python,
+    whichever distribution and RMW that is, and needs nothing there but rclpy. Sensors, /tf, /map and /clock go out,
+    commands come in, goals go to Nav2's actions or to /goal_pose. When the graph is not what a run needs, the run ends
+    in an error that says what is missing.
 
     With `nav2` and --params, called by hand, it checks the parameter file alone. Exit code 0: nothing keeps Nav2 from
     working; 2: something does, or the command line cannot be used.

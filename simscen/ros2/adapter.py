@@ -1,5 +1,6 @@
 """The stack that simscen talks to: a ROS graph behind the calls of the stack protocol."""
 
+import math
 import os
 import time
 from importlib.metadata import version
@@ -10,7 +11,7 @@ import rclpy
 from simscen.peer.goals import Goal, Goals
 from simscen.ros2 import cdr, interfaces
 from simscen.ros2.beat import CLOCK, Lockstep, Message, Paced
-from simscen.ros2.belief import Belief
+from simscen.ros2.belief import PLAN, Belief
 from simscen.ros2.failure import Failure
 from simscen.ros2.goals import Door, Doors, Failed, Now
 from simscen.ros2.graph import Graph, Heard, Topic
@@ -45,6 +46,7 @@ class Adapter:
         self._door: Optional[Door] = None
         self._velocity: Tuple[float, ...] = ZERO
         self._ready, self._go_on = False, True
+        self._planned_for: Optional[Goal] = None
         self._unsaid: List[Message] = []
         self.left_out: List[str] = []
         given = [Topic(CLOCK, "rosgraph_msgs/msg/Clock"), *topics]
@@ -182,7 +184,20 @@ class Adapter:
         if message.topic == COMMAND:
             self._velocity = cdr.velocity(message.data, message.type == TWIST_STAMPED)
             return []
-        return [(message.topic, message.data)] if self._belief.heard(message) else []
+        concerns = self._belief.heard(message)
+        if message.topic == PLAN:
+            self._tell_plan()
+        return [(message.topic, message.data)] if concerns else []
+
+    def _tell_plan(self) -> None:
+        """Every plan is an event. Why it was made, a graph does not say: for a new goal, or because it was time."""
+        goal, plan = self._goals.current, self._belief.plan
+        if goal is None or not plan:
+            return
+        length = sum(math.dist(a, b) for a, b in zip(plan, plan[1:]))
+        reason = "rate" if self._planned_for is goal else "goal"
+        self._planned_for = goal
+        self._goals.say("plan.made", goal.name, reason=reason, length=round(length, 6))
 
     def _with_initial_pose(self, messages: Sequence[Message]) -> List[Message]:
         """/initialpose is said once: not before anybody hears it."""

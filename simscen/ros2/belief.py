@@ -1,18 +1,21 @@
 """Where the stack believes to be, from what it publishes."""
 
-from typing import Any, Optional
+from typing import Any, List, Optional, Tuple
 
 from simscen.ros2 import cdr, interfaces
 from simscen.ros2.failure import Failure
 from simscen.ros2.graph import Heard
 
 MAP, ODOM = "map", "odom"
+PLAN = "/plan"
 
 
 class Belief:
     """map→odom of /tf carried on by odometry; else /amcl_pose; else the initial pose carried on by odometry."""
 
     def __init__(self) -> None:
+        self.plan: List[Tuple[float, float]] = []
+        """The points of the newest plan."""
         self._correction: Optional[cdr.Pose] = None
         self._reported: Optional[cdr.Pose] = None
         self._initial: Optional[cdr.Pose] = None
@@ -41,8 +44,9 @@ class Belief:
         if message.topic == "/amcl_pose":
             _require_map(message)
             self._reported = _pose(_read(message.type, message.data).pose.pose)
-        elif message.topic == "/plan":
+        elif message.topic == PLAN:
             _require_map(message)
+            self.plan = [(at.pose.position.x, at.pose.position.y) for at in _read(message.type, message.data).poses]
         elif message.topic == "/tf":
             return self._transforms(message)
         return True
