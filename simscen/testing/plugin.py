@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
     from simscen.testing.promise import Promise
 
+_PROMISES: pytest.StashKey[list[Promise]] = pytest.StashKey()
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options."""
@@ -38,22 +40,24 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Without paths on the command line, contracts are all that is asked for."""
-    if config.getoption("--simscen-contract") and config.args_source is not pytest.Config.ArgsSource.ARGS:
+    """Find what is to be tried; without paths on the command line, that is all that is asked for."""
+    targets: list[str] = config.getoption("--simscen-contract")
+    if not targets:
+        return
+    from simscen.testing.subjects import NoSubject, named
+
+    try:
+        config.stash[_PROMISES] = [promise for target in targets for promise in named(target)]
+    except NoSubject as wrong:
+        raise pytest.UsageError(f"--simscen-contract {wrong}") from wrong
+    if config.args_source is not pytest.Config.ArgsSource.ARGS:
         config.args[:] = []
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(session: pytest.Session, config: pytest.Config, items: list[pytest.Item]) -> None:
     """Add one item for each promise, before others select."""
-    for target in config.getoption("--simscen-contract"):
-        from simscen.testing.subjects import NoSubject, named
-
-        try:
-            promises = named(target)
-        except NoSubject as wrong:
-            raise pytest.UsageError(f"--simscen-contract {wrong}") from wrong
-        items.extend(_items(session, promises, config.getoption("--simscen-contract-limit")))
+    items.extend(_items(session, config.stash.get(_PROMISES, []), config.getoption("--simscen-contract-limit")))
 
 
 def _items(session: pytest.Session, promises: list[Promise], limit: float) -> Iterator[pytest.Item]:

@@ -39,19 +39,10 @@ def test_its_own_tests_pass(call, name: str) -> None:
 
 
 def test_its_contract_is_asked_for_by_the_name_of_its_entry_point(call, tmp_path: Path) -> None:
-    pytest_ = (
-        "-m",
-        "pytest",
-        "-q",
-        "-n0",
-        "-p",
-        "no:cacheprovider",
-        "-p",
-        "simscen.testing.plugin",
-        "-k",
-        "without a goal",
-    )
-    done = call(*pytest_, "-k", "without and goal and zero", "--simscen-contract", "vfh_plus", folder=tmp_path)
+    plugin = ("-p", "no:simscen", "-p", "simscen.testing.plugin")  # whether or not this simscen was installed anew
+    asked = ("-k", "without and goal and zero", "--simscen-contract", "vfh_plus")
+    pytest_ = ("-m", "pytest", "-q", "-n0", "-p", "no:cacheprovider", *plugin, *asked)
+    done = call(*pytest_, folder=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "1 passed" in done.stdout
 

@@ -43,7 +43,7 @@ def run(tmp_path: Path):
 
     def call(*arguments: str, probe: str = "pass") -> tuple[int, str]:
         code = f"import sys, pytest; sys.path.insert(0, '.'); code = pytest.main(sys.argv[1:]); {probe}; sys.exit(code)"
-        plugin = ("-p", "simscen.testing.plugin", "-p", "no:cacheprovider")
+        plugin = ("-p", "no:simscen", "-p", "simscen.testing.plugin", "-p", "no:cacheprovider")
         done = subprocess.run([sys.executable, "-c", code, *plugin, *arguments],
                               cwd=tmp_path, capture_output=True, text=True, check=False)  # fmt: skip
         return done.returncode, done.stdout + done.stderr
@@ -72,6 +72,12 @@ def test_the_name_of_a_shipped_type_and_workers_do_as_well(run) -> None:
     code, told = run("-n1", "--simscen-contract", "simple", "-k", "reset")
     assert code == 0, told
     assert "1 passed" in told
+
+
+def test_with_workers_a_mistake_is_told_in_words_as_well(run) -> None:
+    code, told = run("-n1", "--simscen-contract", "headless")
+    assert code == 4, told
+    assert told.strip().splitlines()[-1].startswith("ERROR: --simscen-contract headless: no installed package")
 
 
 @pytest.mark.parametrize(
