@@ -97,3 +97,18 @@ def test_a_sandbox_without_pidfd_is_ill(monkeypatch) -> None:
 def test_a_folder_that_takes_no_files_is_ill(tmp_path) -> None:
     with pytest.raises(machine.Ill, match="cannot write in"):
         machine.writable(tmp_path / "nowhere")
+
+
+def test_it_tells_what_the_names_of_stacks_run_and_what_of_that_is_not_there(monkeypatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    file = tmp_path / "simscen/config.yaml"
+    assert doctor.stacks() == f"no {file}, so --stack alone says what external stacks run"
+    file.parent.mkdir()
+    file.write_text("stacks: {mine: {command: sh -c 'exit 0'}, other: {command: sh}}\n")
+    assert doctor.stacks() == f"{file}: mine = sh -c 'exit 0', other = sh"
+    file.write_text("stacks:\n  mine: {command: ./gone}\n")
+    with pytest.raises(machine.Ill, match=r"config\.yaml:2:19: no such file or directory: `\./gone`"):
+        doctor.stacks()
+    file.write_text("stacks: [mine]\n")
+    with pytest.raises(machine.Ill, match=r"config\.yaml:1:9: expected a mapping, got a list"):
+        doctor.stacks()
