@@ -1,11 +1,15 @@
 """What the random streams of events and faults are called: never by their place in a list."""
 
+import json
 from collections import Counter
 from collections.abc import Sequence
+from typing import Any
 
-from pydantic import BaseModel
+from pydantic import BaseModel, RootModel
 
+from simscen.loading.sense.specwalk import below
 from simscen.model.disturbance import EventEntry, FaultEntry
+from simscen.spec.choice import Choice
 
 
 def stream_names(entries: Sequence[EventEntry | FaultEntry]) -> list[str]:
@@ -25,9 +29,30 @@ def stream_names(entries: Sequence[EventEntry | FaultEntry]) -> list[str]:
 
 
 def _written(entry: BaseModel) -> str:
+    if any(isinstance(part, Choice) and part.narrow is not None for _, part in below(entry)):
+        return json.dumps(_plain(entry), sort_keys=True)
     _build(entry)
-    # As what they are, not as what the field says: a choice of an installed package is an instance of a wider class.
-    return entry.model_dump_json(exclude_defaults=True, serialize_as_any=True)
+    return entry.model_dump_json(exclude_defaults=True)
+
+
+def _plain(value: Any) -> Any:
+    """What is written in a specification, without defaults.
+
+    A choice of an installed package is an instance of a wider class than its field says, of which pydantic would write
+    what the field knows alone.
+    """
+    if isinstance(value, RootModel):
+        return _plain(value.root)
+    if isinstance(value, BaseModel):
+        fields = {
+            name: field.get_default(call_default_factory=True) for name, field in type(value).model_fields.items()
+        }
+        return {name: _plain(given) for name, given in value if given != fields[name]}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    return value if isinstance(value, str | int | float | None) else str(value)
 
 
 def _build(value: object) -> None:
