@@ -130,8 +130,10 @@ class StackProcess:
         self._log.close()
 
     def _gone(self) -> RunError:
-        self._pump(lambda: bool(self._ended), TIME_TO_DIE)
-        return self.error(errors.CRASHED, self._ended or "its process has closed its socket, but still runs")
+        self._pump(lambda: bool(self._ended) or self._report not in self._takers, TIME_TO_DIE)
+        kept = self._report in self._takers
+        unsaid = "its process has closed its socket, but still runs" if kept else "what keeps its process has ended"
+        return self.error(errors.CRASHED, self._ended or unsaid)
 
     def _pump(self, done: Callable[[], bool], limit: float) -> None:
         """Take in and send whatever there is until it is `done` or `limit` seconds are over."""

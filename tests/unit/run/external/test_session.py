@@ -2,6 +2,7 @@
 
 import json
 import os
+import resource
 import signal
 import time
 import xml.etree.ElementTree as ET
@@ -67,42 +68,62 @@ def test_each_fault_is_the_error_of_its_run_alone_and_the_neighbours_log_stays_t
     assert 100_000 < printed.stat().st_size < 2_000_000
 
 
-def processes() -> set[int]:
-    """The processes of this user that have a socket to simscen."""
-    found = set()
-    for entry in Path("/proc").iterdir():
-        try:
-            if entry.name.isdigit() and b"SIMSCEN_STACK_FD=" in (entry / "environ").read_bytes():
+def test_a_stack_has_the_limits_of_the_caller_and_not_those_of_the_engines_worker(session) -> None:
+    show = (
+        "import resource\nfor what in (resource.RLIMIT_AS, resource.RLIMIT_FSIZE): print(*resource.getrlimit(what))\n"
+    )
+    also = "print(resource.getrlimit(resource.RLIMIT_NOFILE)[0])\nprint(signal.getsignal(signal.SIGINT).__name__)\n"
+    (answer,) = session("out", {"fine": show + also + GOOD}).values()
+    printed = Path(answer.artifacts.folder, "stack.log").read_text().splitlines()
+    hard = [resource.getrlimit(what)[1] for what in (resource.RLIMIT_AS, resource.RLIMIT_FSIZE)]
+    files = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
+    assert printed[:2] == [f"{bound} {bound}" for bound in hard]
+    assert printed[2:] == [str(1024 if files < 0 else min(1024, files)), "default_int_handler"]
+
+
+@pytest.fixture
+def processes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    """Gives the processes that have the environment of this test's stacks, and of no neighbour's."""
+    monkeypatch.setenv("SIMSCEN_TEST", str(tmp_path))
+    own = f"SIMSCEN_TEST={tmp_path}\0".encode()
+
+    def look() -> set[int]:
+        found = set()
+        for entry in Path("/proc").iterdir():
+            try:
+                environ = (entry / "environ").read_bytes() if entry.name.isdigit() else b""
+            except OSError:
+                continue
+            if own in environ and b"SIMSCEN_STACK_FD=" in environ:
                 found.add(int(entry.name))
-        except OSError:
-            continue
-    return found
+        return found
+
+    return look
 
 
 LINGERS = "if os.fork() == 0:\n    os.setsid()\n    while True: time.sleep(60)\n"
 
 
-def test_a_worker_that_is_killed_takes_its_stack_and_what_that_started_along(session, tmp_path: Path) -> None:
-    before = processes()
+def test_a_worker_that_is_killed_takes_its_stack_and_what_that_started_along(session, processes) -> None:
     kill = "os.kill(int(open(f'/proc/{os.getppid()}/stat').read().rsplit(')', 1)[1].split()[1]), signal.SIGKILL)\n"
     # The keeper is the parent of a stack, the worker the parent of the keeper.
     answers = session("out", {"worker": LINGERS + HELLO + "next(iter(peer))\n" + kill + "time.sleep(60)", "fine": GOOD})
     assert answers["worker"].result.error.kind == "crashed"
     assert answers["fine"].outcome is Outcome.PASSED
-    assert processes() <= before
+    assert not processes()
 
 
-def test_a_supervisor_that_is_killed_takes_every_stack_along(load, tmp_path: Path) -> None:
-    before, loaded = processes(), load(LINGERS + HELLO + "for step in peer: time.sleep(60)", answer_limit=60.0)
+def test_a_supervisor_that_is_killed_takes_every_stack_along(load, processes, tmp_path: Path) -> None:
+    loaded = load(LINGERS + HELLO + "for step in peer: time.sleep(60)", answer_limit=60.0)
     pid = os.fork()
     if pid == 0:
         options = Options()
         run_session(plan([loaded], options, tmp_path / "out"), options, WARM_PROCESS, lambda event: None)
         os._exit(0)
-    _until(lambda: len(processes() - before) >= 2)
+    _until(lambda: len(processes()) >= 2)
     os.kill(pid, signal.SIGKILL)
     os.waitpid(pid, 0)
-    _until(lambda: processes() <= before)
+    _until(lambda: not processes())
 
 
 def _until(done) -> None:
@@ -112,18 +133,18 @@ def _until(done) -> None:
         time.sleep(0.01)
 
 
-def test_an_interrupted_session_leaves_no_stack_behind(load, tmp_path: Path) -> None:
+def test_an_interrupted_session_leaves_no_stack_behind(load, processes, tmp_path: Path) -> None:
     from simscen.run.process.supervisor import Interrupted
 
-    before, loaded = processes(), load(LINGERS + HELLO + "for step in peer: time.sleep(60)", answer_limit=60.0)
+    loaded = load(LINGERS + HELLO + "for step in peer: time.sleep(60)", answer_limit=60.0)
 
     def interrupt(event) -> None:
         if isinstance(event, RunStarted):
-            _until(lambda: len(processes() - before) >= 2)
+            _until(lambda: len(processes()) >= 2)
             raise Interrupted(signal.SIGINT)
 
     options = Options()
     answers, stopped = run_session(plan([loaded], options, tmp_path / "out"), options, WARM_PROCESS, interrupt)
     assert stopped is not None
     assert [answer.result.error.kind for answer in answers] == ["interrupted"]
-    assert processes() <= before
+    assert not processes()
