@@ -34,7 +34,8 @@ class Feed:
         """`sensors` are the kinds of readings by sensor, in the order of the robot; `mounts` where they sit on it."""
         self._waiting: Messages = []
         self._numbers: dict[str, int] = {}
-        self._heard: Collection[str] = ()
+        self._heard: frozenset[str] = frozenset()
+        self._listened: set[str] = set()
         self._latched: list[tuple[Topic, bytes]] = []
         self._time = SimTime(tick_rate)
         self._sensors = SensorTopics(self, self._time, Thinning(tick_rate), mounts, sensors)
@@ -64,6 +65,12 @@ class Feed:
     def want(self, offer: Offer, names: Collection[str]) -> None:
         """From now on these are collected, the latched ones first."""
         self._numbers, self._heard = offer.numbers, frozenset(names)
+        self._listened = {
+            sensor
+            for sensor, topic in self.named
+            if self._heard.intersection((topic.name, topic.name + EXACT))
+            or (topic.type == topics.ODOMETRY_TYPE and topics.TF.name in self._heard)
+        }
         for topic, data in self._latched:
             self.publish(topic, 0, data)
 
@@ -71,6 +78,8 @@ class Feed:
         """The readings of a beat."""
         now = self._time.nanoseconds(tick)
         for reading in readings:
+            if reading.sensor not in self._listened:
+                continue
             self._sensors.write(now, (reading,))
             for name, data in self._exactly(reading):
                 self._put(name, data)

@@ -59,6 +59,7 @@ class ExternalStack:
         self._told, self._canceling = False, False
         self._correction: Pose2 | None = None
         self._odometry: Odometry | None = None
+        self._wheels = next((name for name, says in ordered.sensors.items() if says == Odometry.__name__), "")
 
     def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:
         """Start the process, say hello, and tell it its goals."""
@@ -116,7 +117,9 @@ class ExternalStack:
     def decide(self, tick: int, readings: Readings) -> Decision:
         """Take the readings of this beat and say what to drive."""
         self._feed.take(tick, readings)
-        self._odometry = next((r for r in reversed(readings) if isinstance(r, Odometry)), self._odometry)
+        self._odometry = next(
+            (r for r in readings if isinstance(r, Odometry) and r.sensor == self._wheels), self._odometry
+        )
         due = tick % self._ordered.control_period == 0
         if not (due or self._told or (self._welcome.every_beat and self._feed.waiting)):
             return self._held
@@ -169,10 +172,10 @@ class ExternalStack:
         if due and self._goals.overdue(tick):
             self._send(wire.CANCEL, {"tick": tick, "all": self._ordered.stop_on_failure, "reason": "timeout"})
         events = self._goals.take()
-        if answer.plan is not None:
-            self._plan = answer.plan if len(answer.plan.points) else None
         if any(event.kind in _GOAL_ENDS for event in events):
             self._plan = None
+        if answer.plan is not None:
+            self._plan = answer.plan if len(answer.plan.points) else None
         command = answer.command if answer.command is not None else self._held.command
         self._held = Decision(command)
         followed = answer.plan if answer.plan is not None and len(answer.plan.points) else None

@@ -105,3 +105,38 @@ def test_an_empty_plan_says_that_none_is_followed(play) -> None:
         (done,) = run.trace.of_kind(EventKind.EVENT_ENDED)
         assert [effect["happened"] for effect in done.data["effects"]] == [on_plan]
         assert len(run.trace.plans) == 1
+
+
+def test_a_stack_that_is_told_the_truth_corrects_the_odometry_of_its_wheels(play, tmp_path: Path) -> None:
+    """The true pose comes as an odometry, too, but is none of the frame `odom`."""
+    from mcap.reader import make_reader
+
+    from simscen.record.unpack import transforms
+
+    text = 'peer = Peer("mine", topics=["/sensor_ground_truth/odom"])\nfor step in peer:\n' + (
+        "    x, y, yaw = step.get('/sensor_ground_truth/odom').pose\n"
+        "    step.publish('/amcl_pose', messages.pose_with_covariance(step.stamp, (x, y, yaw), [0.1] * 9))\n"
+        "    step.drive(0.4, 0.5)\n"
+    )
+    play(text, time_limit="1", stack="{external: mine, ground_truth: true}")
+    with (tmp_path / "run.mcap").open("rb") as stream:
+        links = [link for _, _, m in make_reader(stream).iter_messages(["/tf"]) for link in transforms(m.data)]
+    corrections = [link.pose for link in links if link.child == "odom"]
+    assert corrections[-1][:2] == pytest.approx((1, 1), abs=0.05)  # where the wheels began to count
+
+
+def test_a_plan_that_comes_with_the_end_of_a_goal_is_for_the_next(play) -> None:
+    events = "[{when: {time: 0.5}, do: {spawn: {name: box, box: [0.1, 0.1, 0.1], on_plan: 0.5}}, required: false}]"
+    text = HELLO + (
+        "for step in peer:\n"
+        "    peer.goals.accept()\n"
+        "    if step.tick == 12:\n"
+        "        peer.goals.failed(208, go_on=True)\n"
+        "        peer.goals.accept()\n"
+        "        step.publish('/plan', messages.path(step.stamp, [(1, 1, 0), (4, 1, 0)]))\n"
+        "    step.drive(0.0, 0.0)\n"
+    )
+    goals = "[{name: a, pose: {x: 2, y: 1}}, {name: b, pose: {x: 4, y: 1}}]"
+    run = play(text, events=events, goals=goals, on_goal_failure="continue", time_limit="1")
+    (done,) = run.trace.of_kind(EventKind.EVENT_ENDED)
+    assert [effect["happened"] for effect in done.data["effects"]] == [True]
