@@ -4,7 +4,7 @@ import math
 import os
 import time
 from importlib.metadata import version
-from typing import Any, Dict, List, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
 
 import rclpy
 
@@ -90,9 +90,12 @@ class Adapter:
         return about
 
     def get_ready(self) -> None:
-        """Before the first step: wait until the graph is what a run needs, unless it warms up with the first steps."""
-        if not self._options.warm_up:
-            self._wait_for_graph()
+        """Before the first step: wait until the graph is what a run needs, or at least there if it is to warm up."""
+        if self._options.warm_up:
+            self._wait_until(self._readiness.nobody)
+        else:
+            self._wait_until(self._readiness.missing)
+            self._begin()
 
     def start(self, goals: Sequence[Goal], go_on: bool) -> None:
         """The goals of the run; `go_on` with the others when one fails."""
@@ -119,7 +122,9 @@ class Adapter:
         messages = self._with_initial_pose(messages)
         warming_up = now < self._options.warm_up * cdr.NANOSECONDS
         if not warming_up and not self._ready:
-            self._wait_for_graph()
+            # Who came late has not heard the time yet.
+            self._wait_until(self._readiness.missing, lambda: self._graph.publish(CLOCK, cdr.time(now)))
+            self._begin()
         synchronised: Any = self._lockstep if self._options.sync == "lockstep" and not warming_up else self._paced
         if not warming_up and self._goals.current is None:
             self._send(now)
@@ -133,14 +138,15 @@ class Adapter:
             self._settle(now)
         return said
 
-    def _wait_for_graph(self) -> None:
+    def _wait_until(self, lacks: Callable[[], List[str]], meanwhile: Callable[[], Any] = lambda: None) -> None:
         missing: List[str] = []
         since, there = time.monotonic(), self._graph.nodes()
 
         def complete() -> bool:
             """Nothing is missing, and no node has come or gone for a while."""
             nonlocal since, there
-            missing[:] = self._readiness.missing()
+            meanwhile()
+            missing[:] = lacks()
             if missing or there != self._graph.nodes():
                 since, there = time.monotonic(), self._graph.nodes()
             return time.monotonic() - since >= self._options.settle
@@ -148,6 +154,9 @@ class Adapter:
         if not self._graph.until(complete, self._options.ready, time.monotonic):
             told = "; ".join(missing) or "nodes come and go"
             raise Failure(f"the graph is not ready after {self._options.ready:g} s: {told}")
+
+    def _begin(self) -> None:
+        """The graph is what a run needs: hear what it says from now on."""
         self._ready = True
         self._graph.hear(COMMAND, self._readiness.command_type())
         for topic, type_ in HEARD.items():

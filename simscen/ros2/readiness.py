@@ -30,11 +30,15 @@ class Readiness:
         self._options = options
         self._nav2 = LiveNav2(graph, rest, given, options)
 
+    def nobody(self) -> List[str]:
+        """What is missing as long as there is no node at all."""
+        return [] if self._graph.nodes() else ["there is no other node in this ROS domain"]
+
     def missing(self) -> List[str]:
         """What is missing now, one sentence each."""
         self._rest.look_round()
-        if not self._graph.nodes():
-            return ["there is no other node in this ROS domain"]
+        if self.nobody():
+            return self.nobody()
         found = self._commands() + self._doors.missing()
         for topic in self._given:
             found += self._heard(topic) + self._also_published(topic)
