@@ -13,7 +13,7 @@ class InstalledBehavior(Watched):
 
     def __init__(self, spec: BehaviorSpec, setting: Setting) -> None:
         super().__init__("behavior", spec, setting, Behavior)
-        self.name: str = self.inner.name
+        self.name: str = spec.type or self.inner.name
 
     def start(self, pose: Pose2) -> None:
         """Begin from this pose."""

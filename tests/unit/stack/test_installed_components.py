@@ -140,7 +140,7 @@ class Nod(BehaviorSpec):
 
 
 class Nodding:
-    name = "nod"
+    name = "whatever it calls itself"
 
     def __init__(self, spec, setting):
         self.spec = spec
