@@ -24,7 +24,7 @@ from simscen.run.process.laststack import tail
 
 AT_ONCE = 1 << 20
 TAIL_BYTES = 16_384
-TIME_TO_DIE = 1.0
+TIME_TO_DIE = 2.0
 """Seconds in which the process of a socket that was hung up is expected to have ended."""
 TIME_TO_BURY = 5.0
 LONGEST_MESSAGE = 2000

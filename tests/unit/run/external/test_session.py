@@ -38,10 +38,9 @@ KINDS = {
 
 @pytest.fixture
 def session(load, tmp_path: Path):
-    def run(out: str, programs: dict[str, str], listen=lambda event: None, limit: float = 1.0):
-        scenarios = [
-            load(text, name, answer_limit=20.0 if name == "fine" else limit) for name, text in programs.items()
-        ]
+    def run(out: str, programs: dict[str, str], listen=lambda event: None):
+        limits = {name: 1.0 if KINDS.get(name) == "stack-timeout" else 30.0 for name in programs}
+        scenarios = [load(text, name, answer_limit=limits[name]) for name, text in programs.items()]
         options = Options(workers=2, wall_limit=60.0)
         answers, _ = run_session(plan(scenarios, options, tmp_path / out), options, WARM_PROCESS, listen)
         return {answer.key.scenario: answer for answer in answers}
