@@ -116,3 +116,30 @@ def test_a_node_that_hangs_is_named_and_ended(ros, run) -> None:
     assert ended.code == 3
     assert "/navigator has not answered for 2 s: it hangs, or was killed" in ended.said
     assert alive(tag) == []
+
+
+CHANGES = """\
+simscen: 1
+world: room.world.yaml
+robot: {pose: start}
+goals: [{name: far, pose: door, timeout: 60 s}, {name: last, pose: desk, timeout: 60 s}]
+events:
+  - when: {time: 2 s}
+    do: {new_goal: {name: near, pose: {x: 1.4, y: 2.2, yaw: 60 deg}}}
+  - when: {time: 9 s}
+    do: {cancel_goal: {}}
+pass: [{goals_reached: {goals: [near]}}, {result: {status: CANCELED}}, {collisions: {max: 0}}]
+"""
+
+
+@pytest.mark.parametrize("action", ["", "navigate_to_pose", "navigate_through_poses"])
+def test_goals_are_preempted_and_canceled(with_interfaces, run, tmp_path: Path, action: str) -> None:
+    (tmp_path / "changes.scenario.yaml").write_text(CHANGES)
+    launch = with_interfaces.node("navigator", **({"action": action} if action else {}))
+    words = ["--goals", action or "goal_pose", "--launch", launch]
+    ended = run(*words, scenario="changes.scenario.yaml")
+    assert ended.code == 0, ended.said
+    kinds = [event.kind.value for event in read_run(ended.logs[0]).trace.events]
+    goals = [kind for kind in kinds if kind.startswith(("goal.", "navigation."))]
+    again = ["goal.accepted", "goal.canceled"]
+    assert goals == [*again, "goal.accepted", "goal.reached", *again, "navigation.ended"]
