@@ -23,7 +23,6 @@ from simscen.run.goals import goals_of, pose_of, sent_goals
 from simscen.run.masks import load_masks
 from simscen.run.robotsize import inscribed_radius
 from simscen.run.worldsource import load_map, load_robot, load_world
-from simscen.sim.hull import thin
 from simscen.sim.robot_body import RobotBody
 from simscen.worlds.build import build
 from simscen.worlds.shortest import shortest_legs
@@ -67,7 +66,6 @@ def prepare(loaded: LoadedScenario, world_of: BuildWorld = build_world) -> Prepa
     robot, body = load_robot(loaded)
     built = world_of(loaded, lidar_height(robot))
     world = built.world
-    thin(world.bodies)
     start = pose_of(spec.robot.pose, world)
     goals = goals_of(spec, world)
     case = Case(

@@ -5,7 +5,7 @@ from scipy.spatial import ConvexHull
 
 from simscen.core.geometry import Pose3
 from simscen.core.shapes import Body, Cylinder, Mesh, Solid
-from simscen.sim.hull import MANY_CORNERS, STANDS_OUT, directions, few_corners
+from simscen.sim.hull import MANY_CORNERS, STANDS_OUT, few_corners
 
 
 def mesh(made):
@@ -27,8 +27,9 @@ def test_what_is_left_out_stands_out_by_less_than_a_millimetre(shape):
     full = ROUND[shape].vertices
     kept = few_corners(ROUND[shape])
     assert len(kept) < len(ConvexHull(full).vertices) / 2
+    assert few_corners(ROUND[shape]) is kept
     planes = ConvexHull(kept).equations
-    assert max((planes[:, :3] @ point + planes[:, 3]).max() for point in full) <= STANDS_OUT
+    assert max((planes[:, :3] @ point + planes[:, 3]).max() for point in full) <= STANDS_OUT + 1e-9
     rows = {tuple(row) for row in full.tolist()}
     assert all(tuple(row) in rows for row in kept.tolist())
 
@@ -43,14 +44,6 @@ def test_a_hull_of_few_corners_is_kept_whole():
 def test_what_is_flat_is_kept_whole():
     flat = Mesh(BALL.vertices * [1, 1, 0], BALL.faces)
     assert few_corners(flat) is flat.vertices
-
-
-def test_directions_are_spread_evenly():
-    unit = directions(1000)
-    assert np.linalg.norm(unit, axis=1) == pytest.approx(1.0)
-    nearest = np.sort(unit @ unit.T, axis=1)[:, -2]
-    assert np.arccos(nearest).min() > 0.08
-    assert np.abs(unit.mean(axis=0)).max() < 2e-3
 
 
 def test_a_thing_of_80_000_faces_can_be_pushed_and_filmed(simulate):
