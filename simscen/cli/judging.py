@@ -1,6 +1,7 @@
 """Judges one log after the other, each by its own criteria or all by those of a file."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from simscen.cli.logs import BROKEN_OFF, WHOLE
 from simscen.core.case import Case
 from simscen.core.errors import InvalidInput
 from simscen.core.evidence import Coverage, Evidence
+from simscen.core.maskcells import MaskCells
 from simscen.core.problems import Problem
 from simscen.core.result import RunFailure, RunKey, unfinished
 from simscen.core.sessionevents import Artifacts, RunFinished
@@ -37,6 +39,7 @@ class Judging:
         self.foreign = 0
         self._wanted, self._scenario, self._world_path = wanted, scenario, world_path
         self._case: Case | None = None
+        self._named: Mapping[str, MaskCells] | None = None
         self._criteria: LoadedCriteria | None = None
         if scenario is not None:
             home = root if root is not None else default_root([scenario])
@@ -66,6 +69,7 @@ class Judging:
             return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=str(log))
         # What had to happen stands in the scenario of the log, at lines that the file of criteria does not have.
         case = replace(case, disturbances=tuple(replace(one, line=0) for one in case.disturbances))
+        case = replace(case, masks={**case.masks, **self._masks()})
         return self._finished(log, key, read.trace, case, Coverage())
 
     def _foreign(self, log: Path) -> RunFinished:
@@ -81,17 +85,24 @@ class Judging:
             del missing[Evidence.FOOTPRINT]
         return self._finished(log, RunKey(log.stem, 0), read.trace, case, Coverage(missing, read.coverage.partial))
 
+    def _masks(self) -> Mapping[str, MaskCells]:
+        """The filter masks that the file of criteria names; read once."""
+        assert self._criteria is not None
+        if self._named is None:
+            from simscen.run.foreigncase import masks_of
+
+            with _told_from_here(self._criteria):
+                self._named = masks_of(self._criteria) if self._criteria.masks else {}
+        return self._named
+
     def _foreign_case(self) -> Case:
         """What the file of criteria says about the robot's surroundings; read once."""
         assert self._criteria is not None
         if self._case is None:
             from simscen.run.foreigncase import case_of
 
-            home = self._criteria.library.fence.root
-            try:
+            with _told_from_here(self._criteria):
                 self._case = case_of(self._criteria, self._world_path)
-            except InvalidInput as error:
-                raise UnusableScenario(from_here(error.problems, home)) from error
         return self._case
 
     def _finished(self, log: Path, key: RunKey, trace: Trace, case: Case, coverage: Coverage) -> RunFinished:
@@ -108,6 +119,15 @@ def _may_be_own(log: Path) -> bool:
 
 class UnusableScenario(InvalidInput):
     """The file of criteria is wrong, whatever the log."""
+
+
+@contextmanager
+def _told_from_here(criteria: LoadedCriteria) -> Iterator[None]:
+    """What is wrong with the file of criteria, as UnusableScenario."""
+    try:
+        yield
+    except InvalidInput as error:
+        raise UnusableScenario(from_here(error.problems, criteria.library.fence.root)) from error
 
 
 def runs_without_log(folders: Sequence[Path]) -> list[tuple[str, RunFinished]]:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from simscen.core.disturbance import Disturbance
 from simscen.core.geometry import Pose2
+from simscen.core.maskcells import MaskCells
 from simscen.core.navigation import Goal
 from simscen.core.passage import Passage
 from simscen.core.world import Polygon
@@ -24,6 +25,7 @@ class Case:
     cut off, and is at least that.
     `passages` are what these ways lead through, goal by goal, each in the direction of its way.
     `disturbances` are what has to happen: the scenario's events, then its faults.
+    `masks` are the filter masks that criteria name, by their files as written.
     """
 
     start: Pose2
@@ -37,6 +39,7 @@ class Case:
     disturbances: tuple[Disturbance, ...] = ()
     sent: tuple[Goal, ...] = ()
     passages: tuple[Passage, ...] = ()
+    masks: Mapping[str, MaskCells] = field(default_factory=dict)
 
     @property
     def every_goal(self) -> tuple[Goal, ...]:

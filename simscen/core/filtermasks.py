@@ -31,10 +31,24 @@ class SpeedLimits:
     base: float
     multiplier: float
 
+    @property
+    def limiting(self) -> bool:
+        """Whether any cell limits anything."""
+        return any(self.of(int(value), 1.0) is not None for value in np.unique(self.grid.cells))
+
     def at(self, pose: Pose2, full_speed: float) -> float | None:
         """The limit in m/s where the robot is, `full_speed` being the controller's; None for no limit."""
         value = int(self.grid.values_at(np.array([[pose.x, pose.y]]))[0])
         return self.of(value, full_speed)
+
+    def along(self, points: Array, full_speed: float) -> Array:
+        """The limits (n,) in m/s at points (n, 2); inf for none."""
+        values = self.grid.values_at(points)
+        limits = np.full(len(points), np.inf)
+        for value in np.unique(values).tolist():
+            limit = self.of(value, full_speed)
+            limits[values == value] = np.inf if limit is None else limit
+        return limits
 
     def of(self, value: int, full_speed: float) -> float | None:
         """The limit in m/s that a cell's value means; None for no limit.

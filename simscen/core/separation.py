@@ -26,8 +26,41 @@ def separation(poses: Array, moving: Sequence[Corner], fixed: Sequence[Corner]) 
         middle = other.mean(axis=0)
         reach = np.hypot(*piece.T).max() + np.hypot(*(other - middle).T).max()
         near = np.flatnonzero(np.hypot(*(poses[:, :2] - middle).T) - reach < found)
-        found[near] = np.minimum(found[near], _convex_separation(_carried(poses[near], piece), other))
+        still = np.broadcast_to(other, (len(near), *other.shape))
+        found[near] = np.minimum(found[near], _convex_separation(_carried(poses[near], piece), still))
     return found
+
+
+AT_ONCE = 500_000
+"""Pairs of a pose and a box that are looked at together, which bounds the memory."""
+
+
+def separation_of_boxes(poses: Array, moving: Sequence[Corner], boxes: Array) -> Array:
+    """As `separation`, from the nearest of many rectangles (m, 4): least x and y, greatest x and y; inf for none.
+
+    Of overlapping ones the deepest counts. A box is compared only where it can be the nearest: its distance from where
+    the robot stands differs from that of the hull by no more than the hull reaches.
+    """
+    pieces = [_array(piece) for piece in (convex_pieces(moving) if len(moving) > 2 else [moving])]
+    reach = max(float(np.hypot(*piece.T).max()) for piece in pieces)
+    found = np.full(len(poses), np.inf)
+    step = max(1, AT_ONCE // max(1, len(boxes)))
+    for begin in range(0, len(poses) if len(boxes) else 0, step):
+        here = poses[begin : begin + step]
+        gap = _gaps(here[:, :2], boxes)
+        pose, box = np.nonzero(gap <= gap.min(axis=1, keepdims=True) + 2 * reach)
+        corners = boxes[box][:, [[0, 1], [2, 1], [2, 3], [0, 3]]]
+        for piece in pieces:
+            np.minimum.at(found, begin + pose, _convex_separation(_carried(here[pose], piece), corners))
+    return found
+
+
+def _gaps(points: Array, boxes: Array) -> Array:
+    """Distance (n, m) of points (n, 2) to filled boxes (m, 4)."""
+    beside = np.maximum(boxes[:, :2] - points[:, np.newaxis], points[:, np.newaxis] - boxes[:, 2:])
+    outside = np.maximum(beside, 0.0)
+    gaps: Array = np.hypot(outside[..., 0], outside[..., 1])
+    return gaps
 
 
 def _array(corners: Sequence[Corner]) -> Array:
@@ -42,13 +75,12 @@ def _carried(poses: Array, corners: Array) -> Array:
     return placed
 
 
-def _convex_separation(moving: Array, fixed: Array) -> Array:
-    """Of convex anticlockwise polygons (n, h, 2) and (r, 2).
+def _convex_separation(moving: Array, still: Array) -> Array:
+    """Of convex anticlockwise polygons (n, h, 2) and (n, r, 2).
 
     Two convex polygons overlap unless an edge of one has the whole other outside; the least overlap along the edges'
     normals is the shortest way out (the edges of their Minkowski difference have no other directions).
     """
-    still = np.broadcast_to(fixed, (len(moving), *fixed.shape))
     along = np.maximum(_outside(still, moving), _outside(moving, still))
     apart = np.minimum(_nearest(moving, still), _nearest(still, moving))
     signed: Array = np.where(along > 0, apart, along)

@@ -6,72 +6,107 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
+from pydantic import model_validator
 
 from simscen.core.events import EventKind
 from simscen.core.polygons import flaw
-from simscen.core.separation import separation
+from simscen.core.separation import separation, separation_of_boxes
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import BrokenTrace, at_least, undecided
 from simscen.criteria.signals import Flags, truth
 from simscen.spec.base import Spec
 from simscen.spec.quantities import NonNegativeLength
-from simscen.spec.references import RegionName
+from simscen.spec.references import MaskFile, RegionName
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from simscen.core.case import Case
+    from simscen.core.geometry import Array
     from simscen.core.samples import Samples
     from simscen.core.trace import Trace
-    from simscen.core.world import Polygon
+
+    Away = Callable[[Array], Array]
 
 FINE = 0.005
 """Metres to which the nearest moment between two samples is searched."""
+POINT = ((0.0, 0.0),)
+"""The hull of a robot without a footprint; its inscribed radius is around it."""
 
 
 class Keepout(Spec, Criterion):
-    """The robot stayed out of a region, with its whole hull.
+    """The robot stayed out of a region, or out of what a keepout mask forbids, with its whole hull.
 
-    What is measured: the smallest distance between the robot's footprint and the region over the whole run, where
-        between two samples of the truth the robot moves straight; negative by how far it would have to be moved to be
-        out again (out of the deepest convex piece, where one of the two is not convex).
+    What is measured: the smallest distance between the robot's footprint and the region, or the occupied cells of the
+        mask, over the whole run, where between two samples of the truth the robot moves straight; negative by how far
+        it would have to be moved to be out again (out of the deepest convex piece, where one of the two is not convex;
+        out of the deepest of the rectangles that equal cells of a mask make).
     When it fails: it is below `distance`.
     Why this: a keepout filter in a costmap is advice to a planner; recoveries and controllers leave the plan.
     Source: Nav2's keepout filter tutorial.
 
+    Inconclusive when no cell of the mask is occupied: then nothing was tested.
+
     Example: `keepout: {region: wet floor, distance: 10 cm}`
     """
 
-    region: RegionName
+    region: RegionName | None = None
     """By name."""
+    mask: MaskFile | None = None
+    """Instead of a region: map yaml of a filter mask, relative to this file; lighter cells than occupied ones are free.
+
+    The stack is told of it only if `stack.keepout_mask` names it, too."""
     distance: NonNegativeLength = 0.0
     """How far to stay away from it."""
 
+    @model_validator(mode="after")
+    def _one_place(self) -> Keepout:
+        if (self.region is None) == (self.mask is None):
+            raise ValueError("expected either region or mask")
+        return self
+
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """The nearest moment."""
-        what, limit = f"keepout {self.region}", f"≥ {self.distance:.2f} m"
-        if self.region not in case.regions:
-            return [undecided(what, f"the world has no region `{self.region}`", limit)]
+        what, limit = f"keepout {self.region or self.mask}", f"≥ {self.distance:.2f} m"
+        away = self._away(case)
+        if isinstance(away, str):
+            return [undecided(what, away, limit)]
         poses = truth(trace)
         if not len(poses):
             return [undecided(what, "the robot's way was not recorded", limit)]
+        distance, tick = _nearest(trace, poses, case, away)
+        return [at_least(what, distance, self.distance, "m", at=(trace, tick))]
+
+    def _away(self, case: Case) -> Away | str:
+        """How far the hull is away at poses, or why nobody can say."""
+        hull = case.footprint or POINT
+        if self.region is None:
+            mask = case.masks.get(self.mask or "")
+            if mask is None:
+                return f"the log has no mask `{self.mask}`"
+            boxes = mask.forbidden
+            if not len(boxes):
+                return f"no cell of `{self.mask}` is occupied"
+            return lambda poses: separation_of_boxes(mask.seen_from(poses), hull, boxes)
+        if self.region not in case.regions:
+            return f"the world has no region `{self.region}`"
         region = case.regions[self.region]
         wrong = flaw(region)
         if wrong:
             raise BrokenTrace(f"region `{self.region}` {wrong}, so nothing is inside or outside of it")
-        distance, tick = _nearest(trace, poses, case, region)
-        return [at_least(what, distance, self.distance, "m", at=(trace, tick))]
+        return lambda poses: separation(poses, hull, region)
 
 
-def _nearest(trace: Trace, poses: Samples, case: Case, region: Polygon) -> tuple[float, int]:
+def _nearest(trace: Trace, poses: Samples, case: Case, away: Away) -> tuple[float, int]:
     """The smallest signed distance on the way, and its tick; being set down elsewhere is no way.
 
     While the robot moves by m (its furthest point does), a distance changes by no more than m: stretches that cannot
     lead nearer than the nearest known moment by FINE are left out, the others halved.
     """
-    hull = case.footprint or ((0.0, 0.0),)
-    reach = max(math.hypot(x, y) for x, y in hull)
+    reach = max(math.hypot(x, y) for x, y in case.footprint or POINT)
     yaw = np.unwrap(poses.values[:, 2])
-    states = np.column_stack((poses.values[:, :2], yaw, separation(poses.values, hull, region), poses.ticks))
+    states = np.column_stack((poses.values[:, :2], yaw, away(poses.values), poses.ticks))
     best = states[np.argmin(states[:, 3])]
     driven = ~_carried(trace, poses)
     begin, end = states[:-1][driven], states[1:][driven]
@@ -80,7 +115,7 @@ def _nearest(trace: Trace, poses: Samples, case: Case, region: Polygon) -> tuple
         hopeful = (begin[:, 3] + end[:, 3] - moved) / 2 < best[3] - FINE
         begin, end = begin[hopeful], end[hopeful]
         middle = (begin + end) / 2
-        middle[:, 3] = separation(middle[:, :3], hull, region)
+        middle[:, 3] = away(middle[:, :3])
         best = min((best, *middle), key=lambda state: float(state[3]))
         begin, end = np.vstack((begin, middle)), np.vstack((middle, end))
     return float(best[3]) - (0.0 if case.footprint else case.inscribed_radius), int(best[4])

@@ -13,11 +13,14 @@ from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import at_most, undecided
 from simscen.criteria.signal_values import inside as within
 from simscen.spec.base import Spec
-from simscen.spec.quantities import PositiveAngularSpeed, PositiveSpeed
+from simscen.spec.quantities import Duration, NonNegativeSpeed, PositiveAngularSpeed, PositiveSpeed
 from simscen.spec.references import RegionName
+from simscen.spec.speedmask import SpeedMask
 
 if TYPE_CHECKING:
     from simscen.core.case import Case
+    from simscen.core.geometry import Array
+    from simscen.core.samples import Samples, Ticks
     from simscen.core.trace import Trace
 
 
@@ -25,12 +28,15 @@ class Speed(Spec, Criterion):
     """The robot never went too fast.
 
     What is measured: the largest true speed over ground, and the largest true turn rate, over the whole run, or while
-        the robot's centre was in a region.
-    When it fails: one is above its bound.
+        the robot's centre was in a region. With a mask of speed limits, also the true speed against the limit of the
+        cell that the robot's centre truly was in, where it was furthest above it.
+    When it fails: one is above its bound; the speed is more than `tolerance` above a limit of the mask, for which the
+        highest limit within `grace` before and after counts.
     Why this: limits in a controller's parameters are wishes; slopes, slip and overshoot decide.
     Source: ScenarioRunner's MaxVelocityTest.
 
-    Inconclusive when the robot never was in the region: then nothing was tested.
+    Inconclusive when the robot never was in the region, or where the mask limits it for longer than twice the grace:
+    then nothing was tested.
 
     Example: `speed: {max: 0.5 m/s}`
     """
@@ -41,31 +47,86 @@ class Speed(Spec, Criterion):
     """rad/s, either way."""
     in_: RegionName | None = Field(default=None, alias="in")
     """Only while the robot's centre is in this region, by name."""
+    mask: SpeedMask | None = None
+    """A filter mask of speed limits. The stack is told of it only if `stack.speed_mask` names it, too."""
+    full_speed: PositiveSpeed | None = None
+    """What the percents of a mask are of; the criterion does not ask the stack how fast it thinks it may go."""
+    tolerance: NonNegativeSpeed = 0.05
+    """How far above a limit of the mask the robot may be."""
+    grace: Duration = 1.0
+    """How long the robot may take to slow down for a lower limit, and how early it may believe to have left it."""
 
     @model_validator(mode="after")
     def _some_bound(self) -> Speed:
-        if self.max is None and self.max_turn_rate is None:
-            raise ValueError("expected max or max_turn_rate")
+        if self.max is None and self.max_turn_rate is None and self.mask is None:
+            raise ValueError("expected max, max_turn_rate or mask")
+        return self
+
+    @model_validator(mode="after")
+    def _of_what(self) -> Speed:
+        percent = self.mask is not None and self.mask.type == "percent"
+        if percent and self.full_speed is None:
+            raise ValueError("expected full_speed, which the percents of the mask are of (or `type: absolute`)")
+        if not percent and self.full_speed is not None:
+            raise ValueError("full_speed is for a mask of percents")
         return self
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """One finding for each bound."""
         wanted = [("speed", self.max, "m/s"), ("turn_rate", self.max_turn_rate, "rad/s")]
-        return [self._fastest(trace, case, name, limit, unit) for name, limit, unit in wanted if limit is not None]
+        found = [self._fastest(trace, case, name, limit, unit) for name, limit, unit in wanted if limit is not None]
+        return found if self.mask is None else [*found, self._by_mask(trace, case, self.mask)]
 
     def _fastest(self, trace: Trace, case: Case, name: str, limit: float, unit: str) -> Finding:
         what, told = name.replace("_", " "), f"≤ {limit:.2f} {unit}"
         signal = signals.speed(trace) if name == "speed" else signals.turn_rate(trace)
         if not len(signal):
             return undecided(what, "no velocity was recorded", told)
-        inside = np.ones(len(signal), dtype=bool)
-        if self.in_ is not None:
-            if self.in_ not in case.regions:
-                return undecided(what, f"the world has no region `{self.in_}`", told)
-            where = signals.truth(trace).at(signal.ticks)[:, :2]
-            inside = within(where, np.array(case.regions[self.in_], dtype=np.float64))
+        inside = self._inside(trace, case, signal)
+        if inside is None:
+            return undecided(what, f"the world has no region `{self.in_}`", told)
         if not inside.any():
             return undecided(what, f"the robot never was in `{self.in_}`", told)
         k = int(np.flatnonzero(inside)[np.argmax(signal.values[inside, 0])])
         context = "" if self.in_ is None else f"in {self.in_}"
         return at_most(what, float(signal.values[k, 0]), limit, unit, at=(trace, int(signal.ticks[k])), context=context)
+
+    def _by_mask(self, trace: Trace, case: Case, mask: SpeedMask) -> Finding:
+        told, signal = f"≤ what {mask.file} allows", signals.speed(trace)
+        if not len(signal):
+            return undecided("speed", "no velocity was recorded", told)
+        if mask.file not in case.masks:
+            return undecided("speed", f"the log has no mask `{mask.file}`", told)
+        inside = self._inside(trace, case, signal)
+        if inside is None:
+            return undecided("speed", f"the world has no region `{self.in_}`", told)
+        limits = mask.over(case.masks[mask.file].grid)
+        here = limits.along(signals.truth(trace).at(signal.ticks)[:, :2], self.full_speed or 0.0)
+        highest = _highest_around(here, signal.ticks, round(self.grace * trace.tick_rate))
+        limited = inside & np.isfinite(highest)
+        if not limited.any():
+            because = f"the robot never was where the mask limits it for longer than {2 * self.grace:g} s"
+            return undecided("speed", because, told)
+        above = np.where(limited, signal.values[:, 0] - highest, -np.inf)
+        k = int(np.argmax(above))
+        value, limit = float(signal.values[k, 0]), float(highest[k]) + self.tolerance
+        context = f"by {mask.file} (tolerance {self.tolerance:g} m/s)"
+        return at_most("speed", value, limit, "m/s", at=(trace, int(signal.ticks[k])), context=context)
+
+    def _inside(self, trace: Trace, case: Case, signal: Samples) -> signals.Flags | None:
+        """When the robot's centre was in the region, everywhere being one, too; None for one that does not exist."""
+        if self.in_ is None:
+            return np.ones(len(signal), dtype=bool)
+        if self.in_ not in case.regions:
+            return None
+        where = signals.truth(trace).at(signal.ticks)[:, :2]
+        return within(where, np.array(case.regions[self.in_], dtype=np.float64))
+
+
+def _highest_around(values: Array, ticks: Ticks, reach: int) -> Array:
+    """Of each sample, the greatest value no more than `reach` ticks away."""
+    first = np.searchsorted(ticks, ticks - reach, side="left")
+    behind = np.searchsorted(ticks, ticks + reach, side="right")
+    padded = np.append(values, -np.inf)
+    highest: Array = np.maximum.reduceat(padded, np.column_stack((first, behind)).ravel())[::2]
+    return highest

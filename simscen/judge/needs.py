@@ -59,7 +59,7 @@ def needs(entry: AnyCriterion) -> frozenset[Evidence]:
     if own is not None:
         return frozenset(own)
     wanted = _NEEDS.get(entry.kind, frozenset(Evidence))
-    if getattr(entry.chosen, "in_", None) is not None:
+    if any(getattr(entry.chosen, key, None) is not None for key in ("in_", "mask")):
         wanted |= _PLACE
     if getattr(entry.chosen, "error_code", None) is not None:
         wanted |= {Evidence.ERROR_CODES}

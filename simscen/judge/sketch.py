@@ -9,6 +9,7 @@ from simscen.core.case import CLEARANCE_RANGE, Case
 from simscen.core.disturbance import Disturbance
 from simscen.core.events import Event, EventKind
 from simscen.core.geometry import Array, Pose2, wrap_array
+from simscen.core.maskcells import MaskCells
 from simscen.core.navigation import Goal, Path
 from simscen.core.passage import Passage
 from simscen.core.samples import Samples, Ticks
@@ -109,7 +110,8 @@ def _lifted(points: Sequence[Sequence[float]]) -> Array:
 
 def sketch_case(words: Mapping[str, Any]) -> Case:
     """A case: start [x, y, yaw] · goals [{name, pose: [x, y, yaw], xy_tolerance, …}] · sent ·
-    shortest {goal: metres} · passages [[goal, [x, y], [x, y], name, name]] · disturbances [{name, kind, …}] · …"""
+    shortest {goal: metres} · passages [[goal, [x, y], [x, y], name, name]] · disturbances [{name, kind, …}] ·
+    masks {file: {resolution, origin: [x, y, yaw], blocks: [[column, row, width, height, value]]}} · …"""
     goals, sent = (
         tuple(Goal(**{**goal, "pose": _pose(goal["pose"])}) for goal in words.get(key, [])) for key in ("goals", "sent")
     )
@@ -127,8 +129,14 @@ def sketch_case(words: Mapping[str, Any]) -> Case:
             Passage(goal, ((ax, ay), (bx, by)), (one, other))
             for goal, (ax, ay), (bx, by), one, other in words.get("passages", [])
         ),
+        masks={name: MaskCells(**_mask(mask)) for name, mask in words.get("masks", {}).items()},
         disturbances=tuple(Disturbance(**ordered) for ordered in words.get("disturbances", [])),
     )
+
+
+def _mask(words: Mapping[str, Any]) -> dict[str, Any]:
+    blocks = tuple(tuple(block) for block in words["blocks"])
+    return {**words, "blocks": blocks, "origin": _pose(words.get("origin", [0, 0]))}
 
 
 def _pose(words: Sequence[float]) -> Pose2:

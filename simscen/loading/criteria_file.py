@@ -1,6 +1,6 @@
 """Read what must hold from a scenario, or from a file that says nothing else."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -8,7 +8,8 @@ from simscen.core.errors import InvalidInput
 from simscen.core.problems import Problem
 from simscen.loading.assets import Assets
 from simscen.loading.document import Library
-from simscen.loading.loaded import LoadedRobot, LoadedWorld
+from simscen.loading.loaded import JudgedMask, LoadedRobot, LoadedWorld
+from simscen.loading.masks import judged_masks
 from simscen.loading.paths import Fence
 from simscen.loading.tree import Fields, Leaf, at, value_place
 from simscen.loading.validation import check
@@ -18,13 +19,17 @@ from simscen.model.world import WorldSpec
 
 @dataclass(frozen=True)
 class LoadedCriteria:
-    """Criteria with where they are written: `lines` in `file`, 0 for one that comes from a file it extends."""
+    """Criteria with where they are written: `lines` in `file`, 0 for one that comes from a file it extends.
+
+    `masks` are what they judge by, by their files as written.
+    """
 
     file: Path
     spec: CriteriaSpec
     lines: tuple[int, ...]
     tree: Fields = field(repr=False)
     library: Library = field(repr=False)
+    masks: Mapping[str, JudgedMask] = field(default_factory=dict)
 
     def surroundings(self) -> tuple[LoadedWorld | None, LoadedRobot | None]:
         """The world and the robot that the file names, if any. Raises InvalidInput."""
@@ -57,6 +62,10 @@ def load_criteria(path: Path, root: Path, world_path: Sequence[Path] = ()) -> Lo
     spec = check(CriteriaSpec, tree)
     if isinstance(spec, list):
         raise InvalidInput(library.with_source(spec))
+    assets = Assets(library)
+    masks = judged_masks(spec, tree, assets)
+    if assets.problems:
+        raise InvalidInput(library.with_source(sorted(assets.problems)))
     shown = library.fence.shown(file)
     places = [value_place(tree, ("pass", index)) for index in range(len(spec.pass_))]
-    return LoadedCriteria(file, spec, tuple(p.line if p.path == shown else 0 for p in places), tree, library)
+    return LoadedCriteria(file, spec, tuple(p.line if p.path == shown else 0 for p in places), tree, library, masks)

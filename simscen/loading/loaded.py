@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from simscen.core.externalcommand import ExternalCommand
 from simscen.core.problems import Problem
@@ -24,6 +24,13 @@ class LoadedMap:
     spec: RosMapSpec
     image: Path
     notes: tuple[Problem, ...] = ()
+
+
+class JudgedMask(NamedTuple):
+    """A filter mask that a criterion judges by: where its file is named first, and the map in it."""
+
+    keys: tuple[Key, ...]
+    map: LoadedMap
 
 
 @dataclass(frozen=True)
@@ -64,7 +71,8 @@ class LoadedScenario:
 
     `id` is its path without suffix relative to the root; `file` is absolute, `path` is `file` relative to the root as
     problems show it. `text` is the file as it was read. `map` is the map the robot gets: a ROS map, "none" for mapless
-    driving, or None = what the world gives; the masks are those of its stack. `sources` holds the texts of all files
+    driving, or None = what the world gives; `keepout_mask` and `speed_mask` are those of its stack, `judged_masks` what
+    criteria judge by, by their files as written. `sources` holds the texts of all files
     read, by shown path, and `files` their absolute paths. `read` are the files that the world and the robot were made
     of besides, once they were built.
     `notes` are warnings. With `lenient`, what of an SDF world cannot be used is left out and noted.
@@ -90,6 +98,7 @@ class LoadedScenario:
     lenient: bool = False
     keepout_mask: LoadedMap | None = None
     speed_mask: LoadedMap | None = None
+    judged_masks: Mapping[str, JudgedMask] = field(default_factory=dict)
     choice: StackChoice | None = None
     several_stacks: bool = False
     runs: ExternalCommand | None = None

@@ -11,6 +11,7 @@ from simscen.loading.assets import Assets
 from simscen.loading.consistency import inconsistencies
 from simscen.loading.document import Library
 from simscen.loading.loaded import LoadedMap, LoadedScenario, LoadedWorld
+from simscen.loading.masks import judged_masks
 from simscen.loading.paths import Fence
 from simscen.loading.stackchoice import StackChoice, with_stack
 from simscen.loading.tree import Fields, Key, Leaf, Node, at, child, value_place
@@ -75,6 +76,7 @@ def _with_assets(spec: ScenarioSpec, tree: Fields, library: Library, file: Path)
     keepout_mask = _mask(spec.stack.keepout_mask, tree, ("stack", "keepout_mask"), assets)
     limits = spec.stack.speed_mask
     speed_mask = _mask(limits.file if limits else None, tree, ("stack", "speed_mask", "file"), assets)
+    judged = judged_masks(spec, tree, assets)
     robot = assets.robot(spec.robot.model, value_place(tree, ("robot", "model")))
     if world is None or robot is None or assets.problems:
         return library.with_source(sorted(assets.problems))
@@ -93,9 +95,16 @@ def _with_assets(spec: ScenarioSpec, tree: Fields, library: Library, file: Path)
         tree=tree,
         sources=dict(library.texts),
         files=dict(library.files),
-        notes=_notes(world.map, robot_map if robot_map != "none" else None, keepout_mask, speed_mask),
+        notes=_notes(
+            world.map,
+            robot_map if robot_map != "none" else None,
+            keepout_mask,
+            speed_mask,
+            *(mask.map for mask in judged.values()),
+        ),
         keepout_mask=keepout_mask,
         speed_mask=speed_mask,
+        judged_masks=judged,
     )
     problems = sorted(inconsistencies(loaded))
     if any(problem.severity == "error" for problem in problems):

@@ -1,12 +1,13 @@
 """What the engine and the criteria read of any stack, whoever wrote it."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field
 
 from simscen.spec.base import Spec, by_default
 from simscen.spec.quantities import Frequency, PositiveAngle, PositiveLength, PositiveSpeed
-from simscen.spec.references import RegionName
+from simscen.spec.references import MaskFile, RegionName
+from simscen.spec.speedmask import SpeedMask
 
 
 class GoalTolerances(Spec):
@@ -23,26 +24,6 @@ class SpeedZone(Spec):
     """A region of the world, by name."""
     speed_limit: PositiveSpeed
     """While the robot believes itself inside."""
-
-
-MaskFile = Annotated[str, Field(min_length=1, max_length=4096)]
-
-
-class SpeedMask(Spec):
-    """A filter mask of speed limits (nav2_costmap_2d's SpeedFilter and its CostmapFilterInfo).
-
-    What a cell of the mask says is `base + multiplier · value`, its value being 0 … 100 as map_server reads the mask
-    (`mode: scale` keeps the greys). Cells of value 0 and unknown ones limit nothing, nor does a limit of 0 or less.
-    """
-
-    file: MaskFile
-    """Map yaml of the mask, relative to this file; its resolution and origin may differ from the map's."""
-    type: Literal["percent", "absolute"] = "percent"
-    """Percent of the controller's full speed (CostmapFilterInfo type 1), or m/s (type 2)."""
-    base: Annotated[float, Field(ge=-1000, le=1000)] = 0.0
-    """CostmapFilterInfo's base: percent or m/s."""
-    multiplier: Annotated[float, Field(ge=-1000, le=1000)] = 1.0
-    """CostmapFilterInfo's multiplier: percent or m/s for each unit of a cell's value."""
 
 
 class StackBase(Spec):

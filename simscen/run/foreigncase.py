@@ -6,6 +6,7 @@ from pathlib import Path
 from simscen.core.case import Case
 from simscen.core.errors import InvalidInput
 from simscen.core.geometry import Pose2
+from simscen.core.maskcells import MaskCells
 from simscen.core.problems import Problem
 from simscen.core.world import World
 from simscen.loading.criteria_file import LoadedCriteria
@@ -13,6 +14,7 @@ from simscen.loading.messages import suggestion
 from simscen.loading.tree import value_place
 from simscen.model.world import WorldSpec
 from simscen.run.goals import goals_of
+from simscen.run.masks import load_judged_masks
 from simscen.run.robotsize import inscribed_radius
 from simscen.run.worldsource import robot_of, world_of
 from simscen.worlds.own import build_own
@@ -33,7 +35,17 @@ def case_of(criteria: LoadedCriteria, world_path: Sequence[Path] = ()) -> Case:
         footprint=() if body is None else body.footprint,
         inscribed_radius=0.0 if body is None else inscribed_radius(body.radius, body.footprint),
         time_limit=criteria.spec.time_limit,
+        masks=masks_of(criteria),
     )
+
+
+def masks_of(criteria: LoadedCriteria) -> dict[str, MaskCells]:
+    """The filter masks that the file's criteria judge by. Raises InvalidInput."""
+
+    def sourced(problem: Problem) -> Problem:
+        return criteria.library.with_source([problem])[0]
+
+    return load_judged_masks(criteria.masks, criteria.tree, sourced)
 
 
 def _unknown_places(criteria: LoadedCriteria, world: World) -> Iterator[Problem]:

@@ -1,35 +1,60 @@
-"""The filter masks of a scenario's stack, read."""
+"""The filter masks of a scenario, read: those of its stack, and those that its criteria judge by."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from simscen.core.errors import InvalidInput
-from simscen.core.filtermasks import FilterMasks, SpeedLimits
+from simscen.core.filtermasks import FilterMasks
 from simscen.core.grid import OccupancyGrid
-from simscen.loading.loaded import LoadedMap, LoadedScenario
-from simscen.loading.tree import Key
+from simscen.core.maskcells import MaskCells, cells_of
+from simscen.core.problems import Problem
+from simscen.loading.loaded import JudgedMask, LoadedMap, LoadedScenario
+from simscen.loading.tree import Fields, Key, value_place
 from simscen.run.worldsource import load_map
 
 KEEPOUT: tuple[Key, ...] = ("stack", "keepout_mask")
 SPEED: tuple[Key, ...] = ("stack", "speed_mask", "file")
 
+MOST_BLOCKS = 100_000
+"""Rectangles of equal cells that a mask may fall into; the log of each run carries them."""
+
+Sourced = Callable[[Problem], Problem]
+"""Gives a problem the text of its line."""
+
 
 def load_masks(loaded: LoadedScenario) -> FilterMasks:
     """The masks that the stack gets. Raises InvalidInput, at the line that names it, for one that cannot be read."""
-    keepout = _grid(loaded, KEEPOUT, loaded.keepout_mask)
-    grid, spec = _grid(loaded, SPEED, loaded.speed_mask), loaded.spec.stack.speed_mask
+    keepout = _of_stack(loaded, KEEPOUT, loaded.keepout_mask)
+    grid, spec = _of_stack(loaded, SPEED, loaded.speed_mask), loaded.spec.stack.speed_mask
     if grid is None or spec is None:
         return FilterMasks(keepout)
-    return FilterMasks(keepout, SpeedLimits(grid, spec.type == "percent", spec.base, spec.multiplier))
+    return FilterMasks(keepout, spec.over(grid))
 
 
-def _grid(loaded: LoadedScenario, keys: tuple[Key, ...], source: LoadedMap | None) -> OccupancyGrid | None:
-    if source is None:
-        return None
+def load_judged_masks(masks: Mapping[str, JudgedMask], tree: Fields, sourced: Sourced) -> dict[str, MaskCells]:
+    """The masks that criteria judge by. Raises InvalidInput, at the line that names it, for one that is unusable."""
+    return {name: _judged(mask, tree, sourced) for name, mask in masks.items()}
+
+
+def _judged(mask: JudgedMask, tree: Fields, sourced: Sourced) -> MaskCells:
+    cells = cells_of(_grid(mask.map, mask.keys, tree, sourced))
+    if len(cells.blocks) > MOST_BLOCKS:
+        message = f"mask image {mask.map.image.name} falls into {len(cells.blocks)} rectangles of equal cells"
+        hint = f"criteria judge by masks of {MOST_BLOCKS} at most; is it a photograph, or a map with noise?"
+        raise InvalidInput([sourced(Problem(*value_place(tree, mask.keys), "SC320", message, hint))])
+    return cells
+
+
+def _of_stack(loaded: LoadedScenario, keys: tuple[Key, ...], source: LoadedMap | None) -> OccupancyGrid | None:
+    return None if source is None else _grid(source, keys, loaded.tree, loaded.sourced)
+
+
+def _grid(source: LoadedMap, keys: tuple[Key, ...], tree: Fields, sourced: Sourced) -> OccupancyGrid:
     try:
         return load_map(source)
     except InvalidInput as error:
-        place, image = loaded.place_of(*keys), source.image.name
+        place, image = value_place(tree, keys), source.image.name
         told = [replace(problem, path=place.path, line=place.line, col=place.col) for problem in error.problems]
         raise InvalidInput(
-            [loaded.sourced(replace(problem, message=f"mask image {image}: {problem.message}")) for problem in told]
+            [sourced(replace(problem, message=f"mask image {image}: {problem.message}")) for problem in told]
         ) from error

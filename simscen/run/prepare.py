@@ -20,7 +20,7 @@ from simscen.model.robot import RobotSpec
 from simscen.model.scenario import ScenarioSpec, estimate_of
 from simscen.model.stack import Amcl, OdometryOnly, StackSpec
 from simscen.run.goals import goals_of, pose_of, sent_goals
-from simscen.run.masks import load_masks
+from simscen.run.masks import load_judged_masks, load_masks
 from simscen.run.robotsize import inscribed_radius
 from simscen.run.worldsource import load_map, load_robot, load_world
 from simscen.sim.robot_body import RobotBody
@@ -78,6 +78,7 @@ def prepare(loaded: LoadedScenario, world_of: BuildWorld = build_world) -> Prepa
         time_limit=spec.time_limit,
         clearance_range=_clearance_range(spec),
         disturbances=disturbances_of(loaded),
+        masks=load_judged_masks(loaded.judged_masks, loaded.tree, loaded.sourced),
     )
     return Prepared(
         loaded=loaded,

@@ -3,15 +3,18 @@
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
+from pydantic import Field
+
 from simscen.spec.places import Name
 
-Target = Literal["place", "region", "object", "movable", "door", "goal", "event", "happening"]
+Target = Literal["place", "region", "object", "movable", "door", "goal", "event", "happening", "mask"]
 
 
 @dataclass(frozen=True)
 class Refers:
     """Marks a text as the name of something.
 
+    A `mask` is the file of a filter mask; where a criterion names one, it is among the masks of its Case.
     An `object` is anything that can be touched, a `movable` one that has a pose of its own; a `happening` is an event
     or a fault of the scenario.
     """
@@ -26,3 +29,4 @@ DoorName = Annotated[Name, Refers("door")]
 GoalName = Annotated[Name, Refers("goal")]
 EventName = Annotated[Name, Refers("event")]
 HappeningName = Annotated[Name, Refers("happening")]
+MaskFile = Annotated[str, Field(min_length=1, max_length=4096), Refers("mask")]

@@ -1,11 +1,14 @@
 """Nav2's filter masks: what a keepout mask forbids is driven around, what a speed mask limits is driven slowly."""
 
+import json
 import math
+import sys
 
 import numpy as np
 import pytest
 
 import simscen
+from simscen.cli.main import main
 from simscen.core.errors import InvalidInput
 from simscen.loading.scenario import load_scenario
 from simscen.run.precheck.feasibility import check
@@ -175,3 +178,153 @@ def test_without_a_map_a_keepout_mask_holds_all_the_same(tmp_path):
     more = "  - keepout: {region: middle}\nmap: none\n"
     run = simscen.simulate(scenario(tmp_path, "  keepout_mask: strip.yaml\n  localizer: {type: ground_truth}\n", more))
     assert run.passed, run.result.verdicts
+
+
+STRIP = "  - keepout: {mask: strip.yaml}\n"
+CALM = "  - speed: {mask: {file: slow.yaml, type: absolute, multiplier: 0.01}}\n"
+KNOWING = "  localizer: {type: ground_truth}\n"
+CRITERION = SCENARIO.count("\n") + 1
+"""The line of the first criterion that `more` adds."""
+
+
+def strip(folder, *, turned=False):
+    if turned:
+        mask(folder, "strip", np.zeros((20, 40), dtype=np.uint8), origin=(6.0, 0.0, math.pi / 2))
+    else:
+        grey = white()
+        grey[:40, 40:60] = 0
+        mask(folder, "strip", grey)
+
+
+def slow(folder):
+    """30 cm/s between x 4 and 6."""
+    grey = np.zeros_like(white())
+    grey[:, 40:60] = 30
+    mask(folder, "slow", grey, mode="raw")
+
+
+def findings(run, kind):
+    """Status, value and margin of what a criterion found."""
+    return [(f.status.value, f.value, f.margin) for v in run.result.verdicts if v.criterion == kind for f in v.findings]
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_robot_that_is_told_of_a_mask_keeps_out_of_it_and_another_drives_through(turned, tmp_path):
+    strip(tmp_path, turned=turned)
+    told_of = simscen.simulate(scenario(tmp_path, "  keepout_mask: strip.yaml\n", STRIP))
+    assert told_of.passed, told_of.result.verdicts
+    (region,) = findings(simscen.simulate(scenario(tmp_path, KNOWING, "  - keepout: {region: middle}\n")), "keepout")
+    unaware = simscen.simulate(scenario(tmp_path, KNOWING, STRIP))
+    assert not unaware.passed
+    ((status, value, _),) = findings(unaware, "keepout")
+    assert status == region[0] == "fail"
+    assert value < -0.2
+
+
+def test_a_robot_that_is_told_of_a_speed_mask_keeps_its_limits_and_another_is_found_too_fast(tmp_path):
+    slow(tmp_path)
+    how = "{file: slow.yaml, type: absolute, multiplier: 0.01}"
+    assert simscen.simulate(scenario(tmp_path, f"  speed_mask: {how}\n", CALM)).passed
+    unaware = simscen.simulate(scenario(tmp_path, KNOWING, CALM))
+    ((status, value, margin),) = findings(unaware, "speed")
+    assert status == "fail"
+    assert margin == pytest.approx(0.35 - value)
+
+
+@pytest.fixture
+def judge(monkeypatch, capsys, tmp_path):
+    """What `simscen judge --json` says in the folder: exit code, and its document or what is wrong."""
+
+    def called(*arguments):
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.setattr(sys, "argv", ["simscen", "judge", *arguments, "--json"])
+        with pytest.raises(SystemExit) as end:
+            main()
+        said = capsys.readouterr()
+        return end.value.code, json.loads(said.out) if said.out else said.err
+
+    return called
+
+
+def test_a_log_is_judged_by_its_masks_when_their_files_are_gone(judge, tmp_path):
+    strip(tmp_path, turned=True)
+    slow(tmp_path)
+    run = simscen.simulate(scenario(tmp_path, KNOWING, STRIP + CALM), log=tmp_path / "run.mcap")
+    for file in [*tmp_path.glob("*.yaml"), *tmp_path.glob("*.pgm")]:
+        file.unlink()
+    code, document = judge("run.mcap")
+    assert code == 1
+    again = {verdict["criterion"]: verdict["findings"] for verdict in document["verdicts"]}
+    for kind in ("keepout", "speed"):
+        assert [(f["status"], f["value"], f["margin"]) for f in again[kind]] == findings(run, kind)
+
+
+def test_a_log_is_judged_by_the_masks_of_another_file(judge, tmp_path):
+    simscen.simulate(scenario(tmp_path, KNOWING), log=tmp_path / "run.mcap")
+    strip(tmp_path)
+    limits = tmp_path / "limits.yaml"
+    limits.write_text(f"simscen: 1\npass:\n{STRIP}")
+    code, document = judge("run.mcap", "--scenario", "limits.yaml")
+    assert (code, document["verdicts"][0]["status"]) == (1, "fail")
+    (tmp_path / "strip.pgm").write_bytes(b"P5\n90000 90000\n255\n")
+    code, text = judge("run.mcap", "--scenario", "limits.yaml")
+    assert code == 2
+    assert "limits.yaml:3:21: error[SC320] mask image strip.pgm" in text
+    (tmp_path / "strip.yaml").unlink()
+    code, text = judge("run.mcap", "--scenario", "limits.yaml")
+    assert code == 2
+    assert "limits.yaml:3:21: error[SC023]" in text
+
+
+def test_a_mask_of_a_criterion_that_is_missing_or_unreadable_is_refused_at_its_line(tmp_path):
+    file = scenario(tmp_path, KNOWING, "  - keepout: {mask: strap.yaml}\n")
+    strip(tmp_path)
+    ((path, line, code, severity, text),) = told(file)
+    assert (path, line, code, severity) == ("masks.scenario.yaml", CRITERION, "SC023", "error")
+    assert "strip.yaml" in text
+    (tmp_path / "strip.pgm").write_bytes(b"P5\n90000 90000\n255\n")
+    ((path, line, code, severity, text),) = told(scenario(tmp_path, KNOWING, STRIP))
+    assert (path, line, code, severity) == ("masks.scenario.yaml", CRITERION, "SC320", "error")
+    assert "strip.pgm" in text
+
+
+def test_criteria_that_no_mask_can_make_fail_are_warned_of(tmp_path):
+    mask(tmp_path, "strip", white())
+    mask(tmp_path, "slow", white())
+    assert [
+        (line, code, severity) for _, line, code, severity, _ in told(scenario(tmp_path, KNOWING, STRIP + CALM))
+    ] == [
+        (CRITERION, "SC055", "warning"),
+        (CRITERION + 1, "SC055", "warning"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("columns", "words"), [(slice(0, 14), "the robot starts in"), (slice(70, 100), "while goal `goal-1`")]
+)
+def test_a_mask_that_forbids_start_or_goal_can_never_be_kept_out_of(columns, words, tmp_path):
+    grey = white()
+    grey[:, columns] = 0
+    mask(tmp_path, "strip", grey)
+    ((_, line, code, severity, text),) = told(scenario(tmp_path, KNOWING, STRIP))
+    assert (line, code, severity) == (CRITERION, "SC051", "error")
+    assert words in text
+
+
+def test_a_mask_lies_beside_the_file_that_names_it(tmp_path):
+    (tmp_path / "common").mkdir()
+    strip(tmp_path / "common")
+    (tmp_path / "common/base.yaml").write_text(f"simscen: 1\npass:\n{STRIP}")
+    file = scenario(tmp_path, KNOWING)
+    file.write_text("extends: common/base.yaml\n" + file.read_text().replace(SCENARIO[SCENARIO.index("pass:") :], ""))
+    assert told(file) == []
+    ((status, _, _),) = findings(simscen.simulate(file), "keepout")
+    assert status == "fail"
+
+
+def test_a_mask_of_noise_is_too_much_for_a_log(tmp_path):
+    grey = np.random.default_rng(1).integers(0, 2, (800, 800)).astype(np.uint8) * 255
+    mask(tmp_path, "strip", grey)
+    ((_, line, code, _, text),) = told(scenario(tmp_path, KNOWING, STRIP))
+    assert (line, code) == (CRITERION, "SC320")
+    assert "rectangles" in text

@@ -12,6 +12,7 @@ from simscen.core.world import World
 from simscen.loading.consistency import inconsistencies
 from simscen.loading.loaded import LoadedScenario, LoadedWorld
 from simscen.run.masks import load_masks
+from simscen.run.precheck.judgedmasks import judged_by_masks
 from simscen.run.precheck.masked import masked
 from simscen.run.precheck.misplaced import misplaced
 from simscen.run.precheck.pointless import places_of_triggers, pointless
@@ -51,6 +52,7 @@ def _impossible(scene: Scene, cache: WorldCache, pictures: Path | None) -> list[
     closed = list(unreachable(scene, ways, {keys for keys, _ in wrong}))
     problems = [*(problem for _, problem in wrong), *(problem for problem, _ in closed)]
     problems += [] if any(keys == ("robot", "pose") for keys, _ in wrong) else pointless(scene, ways)
+    problems += judged_by_masks(scene)
     problems += masked(scene, load_masks(scene.loaded))
     problems += [] if _has_errors(problems) else untimely(scene, ways)
     if problems and pictures is not None:

@@ -32,7 +32,7 @@ def masked(scene: Scene, masks: FilterMasks) -> Iterator[Problem]:
         for index, region in enumerate(scene.loaded.spec.stack.keepout)
     ]
     if masks.keepout is not None:
-        zones.append((KEEPOUT, "in a cell that the keepout mask forbids", _of_mask(masks.keepout)))
+        zones.append((KEEPOUT, "in a cell that the keepout mask forbids", holds_around(masks.keepout)))
     for keys, where, forbids in zones:
         yield from _forbidden(scene, keys, where, forbids)
     yield from _without_effect(scene, masks)
@@ -53,7 +53,9 @@ def _of_region(corners: Polygon) -> Forbids:
     return lambda pose, within: deep_inside(pose, corners) > within
 
 
-def _of_mask(mask: OccupancyGrid) -> Forbids:
+def holds_around(mask: OccupancyGrid) -> Forbids:
+    """What of the plane a keepout mask forbids."""
+
     def forbids(pose: Pose2, within: float) -> bool:
         steps = np.linspace(-within, within, 2 * int(np.ceil(within / min(mask.resolution, CELL))) + 1)
         around = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
@@ -71,7 +73,7 @@ def _without_effect(scene: Scene, masks: FilterMasks) -> Iterator[Problem]:
             message = f"{shades} cells of the keepout mask are neither free nor occupied: they forbid nothing"
             yield _warning(scene, KEEPOUT, "SC311", message)
     speed = masks.speed
-    if speed is not None and all(speed.of(int(value), 1.0) is None for value in np.unique(speed.grid.cells)):
+    if speed is not None and not speed.limiting:
         yield _warning(scene, SPEED, "SC055", "no cell of the speed mask limits anything with this base and multiplier")
 
 

@@ -95,7 +95,7 @@ def _from_point(point: Pose2, reach: float) -> Distance:
 def _kept_out(scene: Scene) -> Iterator[Problem]:
     """Regions to keep out of that hold the start or a goal."""
     for index, entry in enumerate(scene.loaded.spec.pass_):
-        if not isinstance(entry.chosen, Keepout):
+        if not isinstance(entry.chosen, Keepout) or entry.chosen.region is None:
             continue
         region, keys = entry.chosen.region, ("pass", index, "keepout", "region")
         corners = scene.world.regions[region]

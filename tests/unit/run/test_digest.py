@@ -15,6 +15,8 @@ extends: base.yaml
 world: hall.sdf
 robot: {model: cart.robot.yaml, pose: {x: 1, y: 1}}
 goals: [{pose: {x: 2, y: 1}}]
+pass: [{keepout: {mask: judged.yaml}}, {speed: {mask: {file: calm.yaml, type: absolute, multiplier: 0.01}}}]
+stack: {keepout_mask: closed.yaml, speed_mask: {file: slow.yaml}}
 """
 BASE = "simscen: 1\npass: [{goals_reached: {}}]\n"
 DEFAULTS = "time_limit: 30 s\n"
@@ -75,6 +77,7 @@ SIZE = """\
 <robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:property name="height" value="0.2"/></robot>
 """
 MAP = "image: hall.pgm\nresolution: 0.5\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n"
+MASKS = ("judged", "calm", "closed", "slow")
 FILES = {
     "p/a.scenario.yaml": SCENARIO + "map: hall.yaml\n",
     "p/base.yaml": BASE,
@@ -87,6 +90,8 @@ FILES = {
     "p/mast.stl": TRIANGLES,
     "p/hall.yaml": MAP,
     "p/hall.pgm": "P2 20 20 255\n" + "254 " * 400,
+    **{f"p/{name}.yaml": MAP.replace("hall", name) for name in MASKS},
+    **{f"p/{name}.pgm": "P2 20 20 255\n" + "0 " * 20 + "254 " * 380 for name in MASKS},
     "models/shelf/model.config": MODEL_CONFIG,
     "models/shelf/model.sdf": SHELF,
 }
@@ -132,6 +137,7 @@ def of(project: Path) -> Digest:
         ("p/mast.stl", "1 0 0\nvertex", "2 0 0\nvertex"),
         ("p/hall.yaml", "0.65", "0.66"),
         ("p/hall.pgm", "254 254 254", "254 0 254"),
+        *((f"p/{name}.pgm", "254 254 254", "254 0 254") for name in MASKS),
     ],
 )
 def test_any_file_that_a_run_reads_changes_the_digest(project: Path, of: Digest, file: str, old: str, new: str) -> None:

@@ -1,0 +1,149 @@
+"""Criteria that judge by filter masks against shapely and a cell at a time: random masks, random drives."""
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+import shapely.affinity
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from simscen.core.geometry import Pose2
+from simscen.core.grid import OccupancyGrid
+from simscen.core.maskcells import cells_of
+from simscen.core.verdict import Status
+from simscen.criteria.criterion import AnyCriterion
+from simscen.judge.judge import judge
+from simscen.judge.sketch import sketch, sketch_case
+
+SEEDS = st.integers(0, 2**32 - 1)
+LONG = [[-0.4, -0.1], [0.3, -0.2], [0.5, 0.0], [0.3, 0.2], [-0.4, 0.1]]
+NOTCHED = [[-0.4, -0.3], [0.4, -0.3], [0.4, 0.3], [0.0, 0.0], [-0.4, 0.3]]
+
+
+def mask_of(chance, values, share):
+    cells = np.where(chance.random((9, 7)) < share, chance.choice(values, (9, 7)), 0).astype(np.int8)
+    origin = Pose2(*chance.uniform(-1, 1, 2), chance.uniform(-math.pi, math.pi))
+    return OccupancyGrid(cells, float(chance.uniform(0.1, 0.5)), origin)
+
+
+def judged(criterion, grid, truth, footprint=(), seconds=10.0):
+    mask = cells_of(grid)
+    case = sketch_case({
+        "footprint": footprint,
+        "inscribed_radius": 0.2,
+        "masks": {"a.yaml": {"resolution": mask.resolution, "origin": list(mask.origin), "blocks": mask.blocks}},
+    })  # fmt: skip
+    trace = sketch({"seconds": seconds, "truth": truth})
+    (verdict,) = judge([AnyCriterion.model_validate(criterion)], trace, case)
+    return verdict.findings, trace
+
+
+def area_of(grid):
+    """All occupied cells, one by one."""
+    boxes = []
+    for row, column in np.argwhere(grid.cells == 100):
+        corners = np.array([[column, row], [column + 1, row], [column + 1, row + 1], [column, row + 1]], dtype=float)
+        boxes.append(shapely.Polygon(grid.origin.apply(corners * grid.resolution)))
+    return shapely.MultiPolygon(boxes)
+
+
+def placed(outline, x, y, yaw):
+    turned = shapely.affinity.rotate(shapely.Polygon(outline), yaw, origin=(0, 0), use_radians=True)
+    return shapely.affinity.translate(turned, x, y)
+
+
+@given(SEEDS, st.sampled_from([LONG, NOTCHED]))
+@settings(deadline=None)
+def test_the_distance_to_a_keepout_mask_is_that_of_shapely_to_each_of_its_cells(seed, hull):
+    chance = np.random.default_rng(seed)
+    grid = mask_of(chance, [40, 100, 100], share=0.3)
+    x, y, yaw = *chance.uniform(-3, 3, 2), chance.uniform(-3, 3)
+    (finding,), _ = judged({"keepout": {"mask": "a.yaml"}}, grid, [[0, x, y, yaw]], hull, seconds=0.1)
+    area, here = area_of(grid), placed(hull, x, y, yaw)
+    if not len(area.geoms):
+        assert finding.status is Status.INCONCLUSIVE
+    elif (gap := here.distance(area)) > 1e-9:
+        assert finding.status is Status.PASS
+        assert finding.value == pytest.approx(gap, abs=1e-9)
+    elif here.intersection(area).area > 1e-9:
+        assert finding.status is Status.FAIL
+        out = here.bounds[2] - here.bounds[0] + here.bounds[3] - here.bounds[1] + 7 * grid.resolution
+        assert -out < finding.value < 0
+
+
+@given(SEEDS)
+@settings(deadline=None, max_examples=30)
+def test_a_drive_is_as_far_from_a_keepout_mask_as_its_nearest_pose(seed):
+    chance = np.random.default_rng(seed)
+    grid = mask_of(chance, [100], share=0.1)
+    way = [[t, *chance.uniform(-3, 3, 2), chance.uniform(-3, 3)] for t in (0, 2, 4)]
+    (finding,), trace = judged({"keepout": {"mask": "a.yaml"}}, grid, way, LONG, seconds=4)
+    area = area_of(grid)
+    if not len(area.geoms):
+        return
+    gaps = [placed(LONG, *pose).distance(area) for pose in trace.truth.values]
+    step = 0.06 * (1 + np.abs(np.diff(np.unwrap(trace.truth.values[:, 2]))).max())
+    if min(gaps) > 1e-9:
+        assert finding.value <= min(gaps) + 1e-9
+        assert finding.value >= min(gaps) - step - np.hypot(*np.diff(trace.truth.values[:, :2], axis=0).T).max()
+    else:
+        assert finding.value <= 1e-9
+
+
+def test_a_round_robot_without_a_footprint_is_judged_by_its_radius():
+    grid = OccupancyGrid(np.full((10, 10), 100, dtype=np.int8), 0.1, Pose2(2.0, -0.5))
+    (finding,), _ = judged({"keepout": {"mask": "a.yaml"}}, grid, [[0, 0, 0], [10, 1, 0]])
+    assert finding.value == pytest.approx(0.8)
+
+
+@given(SEEDS, st.sampled_from([0.0, 0.2, 0.5]))
+@settings(deadline=None, max_examples=50)
+def test_the_speed_is_judged_by_the_cell_that_the_robot_truly_is_in(seed, grace):
+    chance = np.random.default_rng(seed)
+    grid = mask_of(chance, [20, 60], share=0.6)
+    way = [[t, *chance.uniform(-1.5, 1.5, 2)] for t in range(0, 5)]
+    how = {"file": "a.yaml", "base": 100.0, "multiplier": -1.0}
+    criterion = {"speed": {"mask": how, "full_speed": 1.0, "tolerance": 0.0, "grace": grace}}
+    (finding,), trace = judged(criterion, grid, way, seconds=4)
+    ticks, speed = trace.velocity.ticks, np.hypot(*trace.velocity.values[:, :2].T)
+    values = grid.values_at(trace.truth.at(ticks)[:, :2])
+    limits = [1.0 - value / 100 if value > 0 else math.inf for value in values]
+    margins = [
+        max(limits[j] for j in range(len(ticks)) if abs(int(ticks[j] - tick)) <= round(grace * trace.tick_rate))
+        - speed[k]
+        for k, tick in enumerate(ticks)
+    ]
+    limited = [margin for margin in margins if math.isfinite(margin)]
+    if limited:
+        assert finding.margin == pytest.approx(min(limited))
+    else:
+        assert finding.status is Status.INCONCLUSIVE
+
+
+def test_a_mask_that_the_log_does_not_have_is_no_pass():
+    trace = sketch({"seconds": 1, "truth": [[0, 0, 0]]})
+    for criterion in (
+        {"keepout": {"mask": "b.yaml"}},
+        {"speed": {"mask": {"file": "b.yaml", "type": "absolute"}}},
+    ):
+        (verdict,) = judge([AnyCriterion.model_validate(criterion)], trace, sketch_case({}))
+        assert [(f.status, f.measured) for f in verdict.findings] == [
+            (Status.INCONCLUSIVE, "the log has no mask `b.yaml`")
+        ]
+
+
+@pytest.mark.parametrize(
+    ("criterion", "words"),
+    [
+        ({"keepout": {}}, "expected either region or mask"),
+        ({"keepout": {"region": "wet", "mask": "a.yaml"}}, "expected either region or mask"),
+        ({"speed": {"mask": {"file": "a.yaml"}}}, "expected full_speed"),
+        ({"speed": {"mask": {"file": "a.yaml", "type": "absolute"}, "full_speed": 1.0}}, "full_speed is for a mask"),
+        ({"speed": {"max": 1.0, "full_speed": 1.0}}, "full_speed is for a mask"),
+    ],
+)
+def test_what_contradicts_itself_is_refused(criterion, words):
+    with pytest.raises(ValueError, match=words):
+        AnyCriterion.model_validate(criterion)
