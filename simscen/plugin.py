@@ -66,7 +66,7 @@ if TYPE_CHECKING:
         Ratio,
         Speed,
     )
-    from simscen.spec.references import GoalName, MovableName, ObjectName, RegionName
+    from simscen.spec.references import GoalName, MaskFile, MovableName, ObjectName, RegionName
     from simscen.stack.footprint import Footprint, distances
     from simscen.stack.protocols import (
         Behavior,
@@ -125,6 +125,7 @@ __all__ = [
     "Length",
     "Localizer",
     "LocalizerSpec",
+    "MaskFile",
     "Measure",
     "Mount",
     "MovableName",
@@ -226,6 +227,7 @@ _WHERE = {
     ),
     "simscen.spec.references": (
         "GoalName",
+        "MaskFile",
         "MovableName",
         "ObjectName",
         "RegionName",

@@ -48,7 +48,9 @@ class Speed(Spec, Criterion):
     in_: RegionName | None = Field(default=None, alias="in")
     """Only while the robot's centre is in this region, by name."""
     mask: SpeedMask | None = None
-    """A filter mask of speed limits. The stack is told of it only if `stack.speed_mask` names it, too."""
+    """A filter mask of speed limits: file, type, base and multiplier, as `stack.speed_mask` has them.
+
+    The stack is told of it only if it is written there, too."""
     full_speed: PositiveSpeed | None = None
     """What the percents of a mask are of; the criterion does not ask the stack how fast it thinks it may go."""
     tolerance: NonNegativeSpeed = 0.05

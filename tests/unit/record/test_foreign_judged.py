@@ -23,7 +23,7 @@ from rosbags.rosbag2 import StoragePlugin
 
 from simscen.cli.main import main
 from simscen.core.case import Case
-from simscen.core.evidence import Coverage
+from simscen.core.evidence import Coverage, Evidence
 from simscen.core.geometry import Pose2
 from simscen.core.navigation import Goal
 from simscen.core.verdict import Status
@@ -117,6 +117,23 @@ def test_a_log_is_judged_by_a_file_of_criteria(simscen, limits, tmp_path: Path) 
     assert strict.code == 1
     assert "speed: 0.50 m/s > 0.40 m/s, at t = " in strict.out
     assert "limits.yaml:2" in strict.out
+
+
+def test_a_log_is_judged_by_the_filter_masks_of_a_file_of_criteria(simscen, limits, tmp_path: Path) -> None:
+    write_mcap(tmp_path / "drive.mcap", drive())
+    (tmp_path / "slow.pgm").write_bytes(b"P5\n20 2\n255\n" + b"\x1e" * 40)
+    said = "image: slow.pgm\nmode: raw\nresolution: 1\norigin: [-5, -1, 0]\n"
+    (tmp_path / "slow.yaml").write_text(f"{said}negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n")
+    file = limits("speed: {mask: {file: slow.yaml, type: absolute, multiplier: 0.01}}")
+    ended = simscen("drive.mcap", "--scenario", file, "--truth", "/mocap")
+    assert ended.code == 1
+    assert "speed: 0.50 m/s > 0.35 m/s by slow.yaml (tolerance 0.05 m/s), at t = " in ended.out
+
+
+def test_limits_of_places_need_a_truth_that_lies_on_the_map() -> None:
+    mask = {"file": "slow.yaml", "type": "absolute"}
+    for where in ({"max": 1.0, "in": "aisle"}, {"mask": mask}):
+        assert Evidence.ALIGNMENT in needs(AnyCriterion.model_validate({"speed": where}))
 
 
 def test_without_a_truth_what_asks_for_it_is_inconclusive_and_says_so(simscen, limits, tmp_path: Path) -> None:
