@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from simscen.core.convex import convex_pieces
 from simscen.core.geometry import Array
 from simscen.core.polygons import Corner
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
 
 
 def separation(poses: Array, moving: Sequence[Corner], fixed: Sequence[Corner]) -> Array:
@@ -31,36 +35,39 @@ def separation(poses: Array, moving: Sequence[Corner], fixed: Sequence[Corner]) 
     return found
 
 
-AT_ONCE = 500_000
-"""Pairs of a pose and a box that are looked at together, which bounds the memory."""
+AT_ONCE = 64
+"""Poses whose surroundings are looked at together: few enough to be near each other on a drive."""
 
 
 def separation_of_boxes(poses: Array, moving: Sequence[Corner], boxes: Array) -> Array:
     """As `separation`, from the nearest of many rectangles (m, 4): least x and y, greatest x and y; inf for none.
 
     Of overlapping ones the deepest counts. A box is compared only where it can be the nearest: its distance from where
-    the robot stands differs from that of the hull by no more than the hull reaches.
+    the robot stands differs from that of the hull by no more than the hull reaches. The same holds of several poses and
+    the middle of them.
     """
     pieces = [_array(piece) for piece in (convex_pieces(moving) if len(moving) > 2 else [moving])]
     reach = max(float(np.hypot(*piece.T).max()) for piece in pieces)
     found = np.full(len(poses), np.inf)
-    step = max(1, AT_ONCE // max(1, len(boxes)))
-    for begin in range(0, len(poses) if len(boxes) else 0, step):
-        here = poses[begin : begin + step]
-        gap = _gaps(here[:, :2], boxes)
-        pose, box = np.nonzero(gap <= gap.min(axis=1, keepdims=True) + 2 * reach)
-        corners = boxes[box][:, [[0, 1], [2, 1], [2, 3], [0, 3]]]
+    for begin in range(0, len(poses) if len(boxes) else 0, AT_ONCE):
+        here = poses[begin : begin + AT_ONCE]
+        middle = here[:, :2].mean(axis=0)
+        spread = float(np.hypot(*(here[:, :2] - middle).T).max())
+        around = boxes[_near(middle[np.newaxis], boxes, spread + reach)[0]]
+        pose, box = np.nonzero(_near(here[:, :2], around, reach))
+        corners = around[box][:, [[0, 1], [2, 1], [2, 3], [0, 3]]]
         for piece in pieces:
             np.minimum.at(found, begin + pose, _convex_separation(_carried(here[pose], piece), corners))
     return found
 
 
-def _gaps(points: Array, boxes: Array) -> Array:
-    """Distance (n, m) of points (n, 2) to filled boxes (m, 4)."""
+def _near(points: Array, boxes: Array, reach: float) -> npt.NDArray[np.bool_]:
+    """Which of the boxes (m, 4) can be the nearest of anything that is no more than `reach` from points (n, 2)."""
     beside = np.maximum(boxes[:, :2] - points[:, np.newaxis], points[:, np.newaxis] - boxes[:, 2:])
     outside = np.maximum(beside, 0.0)
-    gaps: Array = np.hypot(outside[..., 0], outside[..., 1])
-    return gaps
+    gaps = np.hypot(outside[..., 0], outside[..., 1])
+    nearest: npt.NDArray[np.bool_] = gaps <= gaps.min(axis=1, keepdims=True) + 2 * reach + 1e-9
+    return nearest
 
 
 def _array(corners: Sequence[Corner]) -> Array:
