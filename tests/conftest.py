@@ -18,6 +18,21 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+LONG = ("tests/scenarios/test_shipped.py", "tests/ros/", "tests/conformance/")
+"""What takes longest begins first, so that no worker is left alone with it in the end."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Long ones first; otherwise in their order."""
+    root = Path(__file__).parents[1]
+
+    def rank(item: pytest.Item) -> int:
+        path = item.path.relative_to(root).as_posix()
+        return next((k for k, start in enumerate(LONG) if path.startswith(start)), len(LONG))
+
+    items.sort(key=rank)
+
+
 def lay(site: Path, name: str, version: str, points: Mapping[str, Mapping[str, str]], **modules: str) -> Path:
     """Write modules and the package's dist-info into a folder: `points` are entry points by kind, then by name."""
     site.mkdir(parents=True, exist_ok=True)
