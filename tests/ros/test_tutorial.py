@@ -14,7 +14,9 @@ FILES = dict(re.findall(r"^```(?:python|yaml)\n# (\S+)\n(.*?)^```", PAGE, re.MUL
 COMMANDS = re.findall(r"^\$ (simscen .*)$", PAGE, re.MULTILINE)
 
 
-@pytest.mark.parametrize("command", COMMANDS, ids=["once", "twice"])
+@pytest.mark.parametrize(
+    "command", [pytest.param(COMMANDS[0], marks=pytest.mark.long), *COMMANDS[1:]], ids=["once", "twice"]
+)
 def test_a_command_of_the_tutorial_does_what_it_says(ros, tmp_path: Path, command: str) -> None:
     for name, text in FILES.items():
         (tmp_path / name).write_text(text)
