@@ -7,8 +7,9 @@ import contextlib
 from functools import cache
 from typing import Annotated, Any, ClassVar, get_args
 
-from pydantic import BaseModel, Field, ModelWrapValidatorHandler, model_validator
+from pydantic import BaseModel, Field, ModelWrapValidatorHandler, ValidationError, model_validator
 from pydantic.fields import FieldInfo
+from pydantic_core import InitErrorDetails
 
 from simscen.spec.base import Spec
 from simscen.spec.ondemand import OnDemand
@@ -54,7 +55,17 @@ class Choice(Spec):
             wider = widened(cls)
             if not wider.known_keys().isdisjoint(value.keys() - cls.known_keys()):
                 return wider.model_validate(value, by_alias=True, by_name=False)
+        if isinstance(value, dict) and (named := cls._python_names().intersection(value)):
+            # Inside of a wrapped model older pydantics forget that names of fields are no keys.
+            errors = [InitErrorDetails(type="extra_forbidden", loc=(key,), input=value[key]) for key in sorted(named)]
+            raise ValidationError.from_exception_data(cls.__name__, errors)
         return handler(value)
+
+    @classmethod
+    @cache
+    def _python_names(cls) -> frozenset[str]:
+        """Names of fields that are written otherwise, e.g. `for_`."""
+        return frozenset(name for name, field in cls.model_fields.items() if field.alias not in (None, name))
 
     @model_validator(mode="after")
     def _exactly_one(self) -> "Choice":

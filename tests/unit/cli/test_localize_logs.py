@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+
+pytest.importorskip("rosbags", reason="the rosbags package is not installed")
 from rosbags.rosbag2 import StoragePlugin
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "record"))
