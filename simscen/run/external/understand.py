@@ -38,6 +38,9 @@ Said = dict[str, list[bytes]]
 """The messages of an answer by topic, in order."""
 T = TypeVar("T")
 
+ABOUT_A_UNIT = 1.01
+"""No number of a unit quaternion is larger, however it was rounded."""
+
 
 @dataclass(frozen=True, eq=False)
 class Answer:
@@ -158,6 +161,8 @@ def _particles(data: bytes) -> Array:
     if count > MOST_PARTICLES:
         raise NotAllowed(f"{count} particles")
     poses = np.array([reader.take("8d") for _ in range(count)], dtype=np.float64).reshape(-1, 8)
+    if not (np.abs(poses[:, 3:7]) <= ABOUT_A_UNIT).all():
+        raise NotAllowed(f"a particle on {topics.PARTICLES.name} whose orientation is no unit quaternion")
     return np.column_stack((on_the_ground(poses[:, :7]), poses[:, 7]))
 
 
