@@ -14,8 +14,11 @@ from simscen.record.replay import read_run
 
 ROOT = Path(__file__).parents[2]
 NODES = Path(__file__).with_name("nodes")
-SCENARIOS = ["navigation/goal", "navigation/patrol", "obstacles/pallet_on_plan"]
-REPEATS = 20
+SCENARIOS = [
+    "navigation/goal",
+    pytest.param("navigation/patrol", marks=pytest.mark.long),
+    "obstacles/pallet_on_plan",
+]
 
 
 def digest(log: Path) -> str:
@@ -63,17 +66,18 @@ def test_goals_go_to_an_action_of_nav2(with_interfaces, run, tmp_path: Path, act
     assert told == ["goal.accepted", "goal.reached"] * 2
 
 
-def test_twenty_runs_in_lockstep_are_equal_bit_for_bit_two_at_a_time(ros, run) -> None:
+@pytest.mark.parametrize("repeats", [4, pytest.param(20, marks=pytest.mark.long)])
+def test_runs_in_lockstep_are_equal_bit_for_bit_two_at_a_time(ros, run, repeats: int) -> None:
     """Two at a time: neither do they hear each other."""
     with ThreadPoolExecutor(2) as pool:
         words = ["--settle", "0.2", "--launch", ros.node("navigator")]
-        calls = [pool.submit(run, *words, scenario="short.scenario.yaml") for _ in range(REPEATS)]
+        calls = [pool.submit(run, *words, scenario="short.scenario.yaml") for _ in range(repeats)]
         ended = [call.result() for call in calls]
-    assert [one.code for one in ended] == [0] * REPEATS, ended[0].said
+    assert [one.code for one in ended] == [0] * repeats, ended[0].said
     assert len({digest(one.logs[0]) for one in ended}) == 1
     told = [one.about for one in ended]
     assert all(one["sync"] == "lockstep" and one["late_commands"] == 0 for one in told)
-    assert told == [told[0]] * REPEATS
+    assert told == [told[0]] * repeats
 
 
 def test_paced_runs_say_so(ros, run) -> None:
@@ -132,7 +136,9 @@ pass: [{goals_reached: {goals: [near]}}, {result: {status: CANCELED}}, {collisio
 """
 
 
-@pytest.mark.parametrize("action", ["", "navigate_to_pose", "navigate_through_poses"])
+@pytest.mark.parametrize(
+    "action", ["", "navigate_to_pose", pytest.param("navigate_through_poses", marks=pytest.mark.long)]
+)
 def test_goals_are_preempted_and_canceled(with_interfaces, run, tmp_path: Path, action: str) -> None:
     (tmp_path / "changes.scenario.yaml").write_text(CHANGES)
     launch = with_interfaces.node("navigator", **({"action": action} if action else {}))
