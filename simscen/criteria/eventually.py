@@ -1,22 +1,11 @@
 """`eventually`: something comes true."""
 
-from __future__ import annotations
+from typing import ClassVar, Literal
 
-from typing import TYPE_CHECKING
-
-from simscen.core.verdict import Finding
-from simscen.criteria import condition_words as words
-from simscen.criteria import horizon
-from simscen.criteria.condition import Condition, Windowed
-from simscen.criteria.formula import in_time, judged
-from simscen.criteria.temporal import Temporal, finding
-
-if TYPE_CHECKING:
-    from simscen.core.case import Case
-    from simscen.core.trace import Trace
+from simscen.criteria.stretched import Stretched
 
 
-class Eventually(Windowed, Temporal):
+class Eventually(Stretched):
     """A condition held at some moment of the run, or of a stretch of it.
 
     What is measured: how far each signal is from its bound at each sample of the truth; the margin is that of the
@@ -30,24 +19,4 @@ class Eventually(Windowed, Temporal):
     Example: `eventually: {signal: goal_distance, op: "<=", value: 0.25 m, within: 60 s}`
     """
 
-    def compared(self) -> list[Condition]:
-        """Every comparison in it."""
-        return list(self.comparisons())
-
-    @property
-    def horizon(self) -> float:
-        """The first moment of its stretch."""
-        return horizon.in_time("eventually", self, self)
-
-    def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """The moment at which it held best, or came nearest to it."""
-        told = words.in_time("eventually", self, self)
-        return [
-            finding(
-                trace,
-                case,
-                told,
-                self.compared(),
-                lambda scene: in_time(judged(self, scene), scene.window(self), scene, "eventually"),
-            )
-        ]
+    operator: ClassVar[Literal["always", "eventually"]] = "eventually"
