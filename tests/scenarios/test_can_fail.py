@@ -1,6 +1,6 @@
 """Each shipped scenario can fail: break the stack, take its disturbance away or tighten its bound, and it does.
 
-A change is a list of (path into the YAML, new value); the scenario must then fail by the criterion that is named.
+How is in can_fail/, a file for each theme: under the criterion that must then fail, new values by path into the YAML.
 """
 
 import copy
@@ -17,50 +17,11 @@ from simscen.run.prepare import prepare
 from simscen.run.simulate import simulate
 
 ROOT = Path(__file__).parents[2]
-NO_LOCALIZER = ("stack.localizer", {"type": "odometry"})
-DRIFTING_ODOMETRY = ("faults", [{"sensor": "odom", "bias": {"turn_per_metre": 0.05}}])
-ONE_RECOVERY = ("stack.recovery", {"number_of_retries": 1})
-
-SHUT = {"close": {"name": "door meeting room"}}
-CRATE_IN_THE_OTHER_WAY = {"spawn": {"name": "crate", "box": [0.5, 1.4, 1.0], "pose": {"x": 12.0, "y": 1.95}}}
-
+FOLDER = Path(__file__).with_name("can_fail")
 CHANGES = {
-    "navigation/goal": [("clearance", [("pass.2.clearance.min", 1.0)])],
-    "navigation/patrol": [
-        ("localization_error", [NO_LOCALIZER, DRIFTING_ODOMETRY]),
-        ("goals_reached", [("goals.0.timeout", 2.0)]),
-    ],
-    "navigation/path_length": [("path_length", [("pass.1.path_length.max_ratio", 1.0)])],
-    "navigation/zones": [("keepout", [("stack.keepout", [])])],
-    "navigation/time_bound": [("time_to_goal", [("pass.1.time_to_goal.max", 5.0)])],
-    "navigation/outdated_map": [("goals_reached", [("stack.costmap", {"obstacle_max_range": 0.05})])],
-    "navigation/ros_map_world": [("localization_error", [NO_LOCALIZER, DRIFTING_ODOMETRY])],
-    "navigation/goal_occupied": [("result", [("goals.0.pose", {"x": 3.0, "y": 5.0})])],
-    "navigation/goal_outside_map": [("result", [("goals.0.pose", {"x": 3.0, "y": 5.0})])],
-    "recovery/corridor_blocked_then_opened": [
-        ("goals_reached", [ONE_RECOVERY]),
-        ("recoveries", [("events", [])]),
-    ],
-    "recovery/blocked_for_good": [("result", [("events", [])])],
-    "obstacles/pallet_on_plan": [("replans", [("events", [])])],
-    "obstacles/cart_crossing": [("replans", [("events", [])])],
-    "obstacles/door_closes": [("goals_reached", [("events.0.do", [SHUT, CRATE_IN_THE_OTHER_WAY])])],
-    "faults/lidar_off": [
-        ("stopped_within", [("stack.collision_monitor", {"enabled": False})]),
-        ("goals_reached", [("faults.0.for", 85.0)]),
-    ],
-    "faults/lidar_noise": [("localization_error", [("pass.1.localization_error.max", 0.01)])],
-    "faults/wheel_slip": [("localization_error", [NO_LOCALIZER])],
-    "robots/car_three_point_turn": [("goals_reached", [("stack.planner", {"state_space": "dubins"})])],
-    "robots/jackal_skids": [("localization_error", [NO_LOCALIZER])],
-    "robots/omni_patrol": [
-        ("localization_error", [NO_LOCALIZER, DRIFTING_ODOMETRY]),
-    ],
-    "robots/mecanum_errand": [
-        ("localization_error", [NO_LOCALIZER, DRIFTING_ODOMETRY]),
-    ],
-    "robots/amr_aisle": [("time_to_goal", [("stack.controller.desired_linear_vel", 0.3)])],
-    "localization/wrong_initial_estimate": [("localization_error", [NO_LOCALIZER])],
+    f"{file.stem}/{name}": [next(iter(way.items())) for way in ways]
+    for file in sorted(FOLDER.glob("*.yaml"))
+    for name, ways in yaml.safe_load(file.read_text()).items()
 }
 CASES = [(scenario, *change) for scenario, changes in CHANGES.items() for change in changes]
 
@@ -92,7 +53,7 @@ Loader.yaml_implicit_resolvers = {
 def changed(scenario: str, changes) -> dict:
     text = (ROOT / "scenarios" / f"{scenario}.scenario.yaml").read_text()
     spec = copy.deepcopy(yaml.load(text, Loader))
-    for path, value in changes:
+    for path, value in changes.items():
         *keys, last = [int(key) if key.isdigit() else key for key in path.split(".")]
         place = spec
         for key in keys:
