@@ -14,7 +14,7 @@ LOWEST_TESTS := tests/diagnostics tests/cases $(addprefix tests/unit/,cli loadin
 
 ROS := .venv-ros
 
-.PHONY: help setup run test test-lowest test-ros served check lint types layers schemas docs mutation bench campaign fuzz build clean
+.PHONY: help setup run test test-lowest test-ros served library check lint types layers schemas docs mutation bench campaign fuzz build clean
 
 help:  ## Print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -56,6 +56,9 @@ test-lowest:  ## Test with the oldest packages that pyproject.toml allows, in .v
 
 served: setup  ## Compare each shipped scenario with its stack behind the stack protocol to the same in the engine
 	@SIMSCEN_SERVED=all $(BIN)/python -m pytest tests/scenarios/test_served.py
+
+library: setup  ## Run each shipped scenario with twenty seeds, and write what came of it into the docs (minutes)
+	@$(BIN)/python tests/scenarios/twenty_seeds.py
 
 check: lint types layers schemas  ## Lint, types, layers, drift of schemas and docs
 
