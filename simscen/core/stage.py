@@ -45,6 +45,18 @@ class Situation(Protocol):
         ...
 
     @property
+    def clearance(self) -> float | None:
+        """Metres from the robot's hull to the nearest obstacle by the newest sample of the truth, None before that.
+
+        What is further than was searched for is said to be that far.
+        """
+        ...
+
+    def scanned(self, sensor: str | None) -> int | None:
+        """The tick at which the stack last received a scan of this lidar, or of any; None before the first."""
+        ...
+
+    @property
     def travelled(self) -> float:
         """Metres driven so far; being set down elsewhere is no drive."""
         ...

@@ -14,9 +14,11 @@ from simscen.loading.references import references
 from simscen.loading.sense.hardlyfails import hardly_fails
 from simscen.loading.sense.neverhappens import never_happens
 from simscen.loading.sense.neverholds import never_holds
+from simscen.loading.sense.specwalk import below
 from simscen.loading.sense.worldsense import senseless
 from simscen.loading.tree import Fields, Key, key_place, real_keys, value_place
 from simscen.model.robot import RobotSpec
+from simscen.triggers.scan_age import ScanAge
 from simscen.triggers.trigger import Trigger
 
 COMMAND = "cmd_vel"
@@ -28,6 +30,7 @@ def inconsistencies(loaded: LoadedScenario, world: World | None = None) -> list[
     `world` is what its world file has become. Where names are unknown, no more is asked.
     """
     unknown = [*_unknown_names(loaded, world), *_unfit_faults(loaded), *_twice_named(loaded), *_uneven_rates(loaded)]
+    unknown += _unknown_lidars(loaded)
     unknown += [loaded.sourced(problem) for problem in senseless(loaded.world)]
     if any(problem.severity == "error" for problem in unknown):
         return unknown
@@ -66,6 +69,18 @@ def _unfit_faults(loaded: LoadedScenario) -> Iterator[Problem]:
             what = sensors[entry.sensor].kind if entry.sensor in sensors else "velocity command"
             message = f"fault `{entry.kind}` makes no sense on {_article(what)} (`{entry.sensor}`)"
             yield loaded.problem_at(loaded.key_place_of("faults", index, entry.kind), "SC032", message, hint)
+
+
+def _unknown_lidars(loaded: LoadedScenario) -> Iterator[Problem]:
+    """Triggers that look at the scans of a lidar which the robot does not have."""
+    if loaded.robot.spec is None:
+        return
+    lidars = [name for name, sensor in loaded.robot.spec.sensors.items() if sensor.says == "Scan"]
+    for keys, part in below(loaded.spec):
+        if isinstance(part, ScanAge) and part.sensor is not None and part.sensor not in lidars:
+            message = f"robot `{loaded.robot.name}` has no lidar called {quoted(part.sensor)}"
+            hint = suggestion(part.sensor, lidars) or "it has none at all"
+            yield loaded.problem((*keys, "sensor"), "SC031", message, hint)
 
 
 def _short_faults(loaded: LoadedScenario) -> Iterator[Problem]:

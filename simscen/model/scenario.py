@@ -28,6 +28,7 @@ from simscen.spec.references import Refers
 if TYPE_CHECKING:
     from simscen.criteria.measure import AnyMeasure
     from simscen.model.disturbance import EventEntry, FaultEntry
+    from simscen.triggers.trigger import Trigger
 else:
     AnyMeasure = Annotated[Spec, OnDemand("simscen.criteria.measure", "AnyMeasure")]
     EventEntry = Annotated[Spec, OnDemand("simscen.model.disturbance", "EventEntry")]
@@ -148,6 +149,12 @@ class ScenarioSpec(Spec):
     """All of these must hold."""
     metrics: Annotated[list[AnyMeasure], Field(max_length=100), AfterValidator(_once)] = []
     """What is measured besides what every run reports; each is a type that an installed package adds."""
+
+    @property
+    def triggers(self) -> "list[Trigger]":
+        """What events and faults wait for, in their order."""
+        waiting = [entry.when for entry in (*self.events, *self.faults)]
+        return [trigger for trigger in waiting if trigger is not None]
 
 
 def estimate_of(entry: RobotEntry, truth: Pose2) -> Estimate:

@@ -8,6 +8,7 @@ from simscen.core.events import Event, EventKind, Value
 from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
 from simscen.core.navigation import Goal, Path
+from simscen.core.sensing import Readings, Scan
 from simscen.core.shapes import Body, Box, Capsule, Cone, Cylinder, Extrusion, MotionPath, Shape, Sphere
 from simscen.core.time import Clock
 from simscen.core.trace import Decision, Truth
@@ -27,6 +28,8 @@ class LiveStage:
         self._goals = {goal.name: goal for goal in goals}
         self._look()
         self._belief: Belief | None = None
+        self._clearance: float | None = None
+        self._scanned: dict[str, int] = {}
         self._travelled = 0.0
         self._history: tuple[Event, ...] = ()
         self._fresh: list[Event] = []
@@ -43,12 +46,13 @@ class LiveStage:
 
     def _look(self, truth: Truth | None = None) -> None:
         if truth is not None:
-            self._pose, self._twist = truth.pose.plane, truth.twist
+            self._pose, self._twist, self._clearance = truth.pose.plane, truth.twist, truth.clearance
         else:
             self._pose, self._twist = self._simulation.base_pose().plane, self._simulation.base_twist()
 
-    def heard(self, decision: Decision) -> None:
-        """What the stack decided and published."""
+    def heard(self, decision: Decision, readings: Readings = ()) -> None:
+        """What the stack was told, and what it decided and published."""
+        self._scanned |= {reading.sensor: self.tick for reading in readings if isinstance(reading, Scan)}
         self._belief = decision.belief or self._belief
         self._history += decision.events
 
@@ -59,6 +63,15 @@ class LiveStage:
         return fresh
 
     # what triggers see
+
+    @property
+    def clearance(self) -> float | None:
+        """Metres from the robot's hull to the nearest obstacle by the newest sample of the truth."""
+        return self._clearance
+
+    def scanned(self, sensor: str | None) -> int | None:
+        """The tick at which the stack last received a scan of this lidar, or of any."""
+        return max(self._scanned.values(), default=None) if sensor is None else self._scanned.get(sensor)
 
     @property
     def tick(self) -> int:

@@ -55,7 +55,7 @@ def run_lockstep(rig: Rig, logs: Sequence[Log]) -> Event:
 
         readings = rig.faults.disturb(rig.senses.read(tick))
         decision = rig.stack.decide(tick, readings)
-        rig.stage.heard(decision)
+        rig.stage.heard(decision, readings)
         rig.ending.heard(decision)
 
         moment = Moment(tick, truth, readings, decision, rig.stage.take_events())

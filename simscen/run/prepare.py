@@ -24,6 +24,7 @@ from simscen.run.masks import load_judged_masks, load_masks
 from simscen.run.robotsize import inscribed_radius
 from simscen.run.worldsource import load_map, load_robot, load_world
 from simscen.sim.robot_body import RobotBody
+from simscen.triggers.clearance_below import ClearanceBelow
 from simscen.worlds.build import build
 from simscen.worlds.shortest import shortest_legs
 
@@ -105,8 +106,10 @@ def with_ways(case: Case, built: BuiltWorld) -> Case:
 
 
 def _clearance_range(spec: ScenarioSpec) -> float:
-    """As far as any criterion needs it."""
+    """As far as any criterion or trigger needs it."""
     asked = [entry.chosen.clearance_range for entry in spec.pass_ if isinstance(entry.chosen, Criterion)]
+    near = (test.clearance_below for trigger in spec.triggers for test in trigger.parts())
+    asked += [condition.root for condition in near if isinstance(condition, ClearanceBelow)]
     return max([CLEARANCE_RANGE, *asked])
 
 

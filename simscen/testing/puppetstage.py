@@ -21,6 +21,8 @@ class PuppetStage:
     clock: Clock = field(default_factory=Clock)
     robot: Pose2 = Pose2(0.0, 0.0, 0.0)
     twist: Twist = STOP
+    clearance: float | None = None
+    scans: dict[str, int] = field(default_factory=dict)
     travelled: float = 0.0
     belief: Belief | None = None
     events: tuple[Event, ...] = ()
@@ -29,6 +31,10 @@ class PuppetStage:
     regions: dict[str, Polygon] = field(default_factory=dict)
     objects: dict[str, Pose2 | None] = field(default_factory=dict)
     done: list[Any] = field(default_factory=list)
+
+    def scanned(self, sensor: str | None) -> int | None:
+        """The tick of the newest scan of this lidar, or of any."""
+        return max(self.scans.values(), default=None) if sensor is None else self.scans.get(sensor)
 
     def region(self, name: str) -> Polygon:
         """A named region of the world."""

@@ -8,7 +8,7 @@ from simscen.core.events import EventKind
 from simscen.core.stage import Situation
 from simscen.spec.base import Spec
 from simscen.spec.bytype import BehaviorName
-from simscen.spec.references import EventName, ObjectName
+from simscen.spec.references import HappeningName, ObjectName
 from simscen.triggers.base import Condition
 
 Count = Annotated[int, Field(ge=1, le=10_000)]
@@ -19,19 +19,21 @@ def _seen(now: Situation, kind: EventKind, name: str | None) -> int:
 
 
 class EventStatus(Spec, Condition):
-    """True once another event of this scenario has started or ended.
+    """True once another event, or a fault, of this scenario has started or ended.
+
+    For one trouble that brings the next: the lidar falls silent, and a second later somebody steps in the way.
 
     Example: `when: {event: {name: pallet falls, status: started}}`
     """
 
-    name: EventName
-    """The `name` of the event."""
+    name: HappeningName
+    """The `name` of the event or fault; a fault without one is called `<sensor>.<fault>`, e.g. `lidar.off`."""
     status: Literal["started", "ended"] = "started"
     """What it must have done."""
 
     def holds(self, now: Situation) -> bool:
         """It has."""
-        return _seen(now, EventKind(f"event.{self.status}"), self.name) > 0
+        return any(_seen(now, EventKind(f"{what}.{self.status}"), self.name) > 0 for what in ("event", "fault"))
 
 
 class Replan(Spec, Condition):

@@ -1,5 +1,6 @@
 """The list of triggers: a new one is one file and one line here."""
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import numpy as np
@@ -8,7 +9,7 @@ from pydantic import Field
 from simscen.core.errors import BROKEN, RunError
 from simscen.spec.choice import Choice
 from simscen.spec.ondemand import OnDemand
-from simscen.spec.quantities import Duration, Probability
+from simscen.spec.quantities import Duration, PositiveDuration, Probability
 from simscen.triggers.base import Condition
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ class Test(Choice):
     """One condition, or several combined."""
 
     group: ClassVar[str] = "trigger"
+    modifiers: ClassVar[frozenset[str]] = frozenset({"for_"})
 
     time: Annotated[Condition | None, OnDemand("simscen.triggers.time", "Time")] = None
     robot_within: Annotated[Condition | None, OnDemand("simscen.triggers.robot_within", "RobotWithin")] = None
@@ -27,7 +29,17 @@ class Test(Choice):
     speed_below: Annotated[Condition | None, OnDemand("simscen.triggers.motion", "SpeedBelow")] = None
     speed_above: Annotated[Condition | None, OnDemand("simscen.triggers.motion", "SpeedAbove")] = None
     distance_remaining: Annotated[Condition | None, OnDemand("simscen.triggers.motion", "DistanceRemaining")] = None
+    believed_distance_remaining: Annotated[
+        Condition | None, OnDemand("simscen.triggers.believed_distance", "BelievedDistanceRemaining")
+    ] = None
+    turning_below: Annotated[Condition | None, OnDemand("simscen.triggers.turning", "TurningBelow")] = None
+    turning_above: Annotated[Condition | None, OnDemand("simscen.triggers.turning", "TurningAbove")] = None
+    clearance_below: Annotated[Condition | None, OnDemand("simscen.triggers.clearance_below", "ClearanceBelow")] = None
+    scan_age: Annotated[Condition | None, OnDemand("simscen.triggers.scan_age", "ScanAge")] = None
     localization_error: Annotated[Condition | None, OnDemand("simscen.triggers.motion", "LocalizationError")] = None
+    localization_lost: Annotated[
+        Condition | None, OnDemand("simscen.triggers.localization_lost", "LocalizationLost")
+    ] = None
     goal: Annotated[Condition | None, OnDemand("simscen.triggers.goal", "GoalStatus")] = None
     replan: Annotated[Condition | None, OnDemand("simscen.triggers.happened", "Replan")] = None
     recovery: Annotated[Condition | None, OnDemand("simscen.triggers.happened", "RecoveryStatus")] = None
@@ -39,9 +51,22 @@ class Test(Choice):
     """True while at least one of these is."""
     not_: "Test | None" = Field(default=None, alias="not")
     """True while this is not."""
+    for_: PositiveDuration | None = Field(default=None, alias="for")
+    """Count it as true only once it has been true for this long without a break; default: at once."""
+
+    @property
+    def inner(self) -> "list[Test]":
+        """The conditions that this one combines; none where it is a single one."""
+        return self.all or self.any or ([self.not_] if self.not_ is not None else [])
+
+    def parts(self) -> "Iterator[Test]":
+        """This condition, then all that are in it."""
+        yield self
+        for test in self.inner:
+            yield from test.parts()
 
     def holds(self, now: "Situation") -> bool:
-        """Whether the condition is true at this beat."""
+        """Whether the condition is true at this beat; how long it has been (`for`) is not its to know."""
         if self.all is not None:
             return all_hold(self.all, now)
         if self.any is not None:
@@ -69,7 +94,7 @@ def any_holds(tests: list[Test], now: "Situation") -> bool:
 class Trigger(Test):
     """A condition, and how it makes an event start."""
 
-    modifiers: ClassVar[frozenset[str]] = frozenset({"edge", "delay", "times", "probability"})
+    modifiers: ClassVar[frozenset[str]] = frozenset({"for_", "edge", "delay", "times", "probability"})
 
     edge: Literal["rising", "falling"] = "rising"
     """Start when the condition becomes true (rising) or stops being true (falling)."""

@@ -48,7 +48,7 @@ def never_happens(loaded: LoadedScenario) -> Iterator[Problem]:
 
 @dataclass(frozen=True)
 class _Run:
-    """What a run can come to, when the events of these names may happen."""
+    """What a run can come to, when the events and faults of these names may happen."""
 
     loaded: LoadedScenario
     alive: frozenset[str]
@@ -59,8 +59,12 @@ class _Run:
 
     @property
     def possible(self) -> frozenset[str]:
-        """The events that may happen once those that are alive may; more and more of them, up to a fixed point."""
-        return frozenset(name for entry, name in self.events if self.never(entry.when, ()) is None)
+        """The events and faults that may happen once those that are alive may; ever more, up to a fixed point."""
+        orders = [
+            *((entry.when, name) for entry, name in self.events),
+            *((fault.when, fault.label) for fault in self.loaded.spec.faults),
+        ]
+        return frozenset(name for when, name in orders if when is None or self.never(when, ()) is None)
 
     def never(self, trigger: Trigger, keys: Keys) -> Why | None:
         """Why a trigger never fires."""
@@ -71,11 +75,14 @@ class _Run:
             return (*keys, "edge"), "its condition never stops being true"
         earliest = trigger.delay + _earliest(trigger)
         if trigger.edge == "rising" and earliest >= limit:
-            key = "delay" if trigger.delay else trigger.kind
+            key = "delay" if trigger.delay else "for" if trigger.for_ else trigger.kind
             return (*keys, key), f"{earliest:g} s is not before the run's time limit of {limit:g} s"
         return self._why(trigger, keys)
 
     def _why(self, test: Test, keys: Keys) -> Why | None:
+        limit = self.loaded.spec.time_limit
+        if test.for_ is not None and test.for_ >= limit:
+            return (*keys, "for"), f"{test.for_:g} s is not less than the run's time limit of {limit:g} s"
         if test.all is not None:
             whys = self._whys(test.all, (*keys, "all"))
             return next((why for why in whys if why), None)
@@ -123,13 +130,22 @@ class _Run:
             return None
         return f"the robot's top speed is {top:g} m/s"
 
+    def _turning_above(self, rate: Any) -> str | None:
+        spec = self.loaded.robot.spec
+        if spec is None or rate.root <= FASTER * spec.limits.angular or self._may_be_rammed or self.does("push"):
+            return None
+        return f"the robot turns at most at {spec.limits.angular:g} rad/s"
+
     def _distance_remaining(self, _: Any) -> str | None:
         return None if self.sent(None) else "the robot has no goal"
 
     def _localization_error(self, error: Any) -> str | None:
         stack = self.loaded.spec.stack
         told = isinstance(stack, StackSpec) and stack.told_truth
-        return "the localizer is told the truth" if told and error.root >= LOST else None
+        return "the localizer is told the truth" if told and getattr(error, "root", error) >= LOST else None
+
+    def _localization_lost(self, lost: Any) -> str | None:
+        return self._localization_error(lost.tolerance) if lost.std is None else None
 
     def _goal(self, goal: Any) -> str | None:
         sent, whose = self.sent(goal.name), "" if goal.name is None else f" called `{goal.name}`"
@@ -149,7 +165,12 @@ class _Run:
         return no_recovery(self.loaded, recovery.name) if self.sent(None) else "the robot has no goal to fail at"
 
     def _event(self, event: Any) -> str | None:
-        return None if event.name in self.alive else f"it waits for event `{event.name}`, which never does"
+        if event.name not in self.alive:
+            return f"it waits for `{event.name}`, which never does"
+        lasting = [fault for fault in self.loaded.spec.faults if fault.label == event.name and fault.for_ is None]
+        if event.status == "ended" and lasting and event.name not in [name for _, name in self.events]:
+            return f"it waits for the end of fault `{event.name}`, which has no `for` and lasts to the end of the run"
+        return None
 
     @property
     def _top_speed(self) -> float | None:
@@ -168,7 +189,10 @@ _CHECKS = {
     "travelled": _Run._travelled,
     "speed_above": _Run._speed_above,
     "distance_remaining": _Run._distance_remaining,
+    "believed_distance_remaining": _Run._distance_remaining,
+    "turning_above": _Run._turning_above,
     "localization_error": _Run._localization_error,
+    "localization_lost": _Run._localization_lost,
     "goal": _Run._goal,
     "replan": _Run._replan,
     "recovery": _Run._recovery,
@@ -202,7 +226,11 @@ def _latched(test: Test) -> bool:
 
 
 def _earliest(test: Test) -> float:
-    """Seconds before which a condition is not true for sure."""
+    """Seconds before which a condition does not count as true for sure."""
+    return (test.for_ or 0.0) + _first_true(test)
+
+
+def _first_true(test: Test) -> float:
     if test.all is not None:
         return max(map(_earliest, test.all))
     if test.any is not None:

@@ -4,8 +4,11 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
+from simscen.core.geometry import Pose2
+from simscen.core.motion import Twist
 from simscen.core.time import Clock
-from simscen.run.firing import Firing
+from simscen.run.firing import Firing, Watch
+from simscen.testing.puppetstage import PuppetStage
 from simscen.triggers.trigger import Trigger
 
 
@@ -56,3 +59,73 @@ def test_the_same_seed_gives_the_same_chance():
     trigger = {"travelled": 1.0, "times": 50, "probability": 0.5}
     assert firings(trigger, edges, seed=3) == firings(trigger, edges, seed=3)
     assert firings(trigger, edges, seed=3) != firings(trigger, edges, seed=4)
+
+
+LASTING = {"travelled": 1.0, "for": "300 ms"}  # 72 ticks: three beats of a test
+
+
+def test_a_condition_that_lasts_counts_once_it_has_been_true_for_so_long():
+    assert firings(LASTING, [0, 1, 1, 1, 1, 1]) == [0, 0, 0, 0, 1, 0]
+
+
+def test_a_break_makes_it_begin_anew():
+    assert firings(LASTING, [0, 1, 1, 1, 0, 1, 1, 1, 1]) == [0, 0, 0, 0, 0, 0, 0, 0, 1]
+
+
+def test_what_holds_from_the_start_lasts_from_the_start():
+    assert firings(LASTING, [1, 1, 1, 1, 1]) == [0, 0, 0, 1, 0]
+
+
+def test_what_lasted_falls_when_it_stops_and_what_did_not_never_does():
+    falling = {**LASTING, "edge": "falling"}
+    assert firings(falling, [0, 1, 1, 1, 1, 1, 0, 0]) == [0, 0, 0, 0, 0, 0, 1, 0]
+    assert firings(falling, [0, 1, 1, 1, 0, 0, 0, 0]) == [0] * 8
+
+
+def test_delays_come_after_what_lasts():
+    assert firings({**LASTING, "delay": "100 ms"}, [0, 1, 1, 1, 1, 1, 1]) == [0, 0, 0, 0, 0, 1, 0]
+
+
+FAST, HALL = {"speed_above": 0.5}, {"robot_in": {"region": "hall"}}
+COMBINED = {
+    "in one of all": ({"all": [{**FAST, "for": "200 ms"}, HALL]}, lambda fast, hall: lasts(fast, 2) & hall),
+    "around all": ({"all": [FAST, HALL], "for": "200 ms"}, lambda fast, hall: lasts(fast & hall, 2)),
+    "in any": ({"any": [{**FAST, "for": "500 ms"}, {**HALL, "for": "300 ms"}]},
+               lambda fast, hall: lasts(fast, 5) | lasts(hall, 3)),
+    "in not": ({"not": {**FAST, "for": "200 ms"}, "for": "300 ms"}, lambda fast, hall: lasts(~lasts(fast, 2), 3)),
+}  # fmt: skip
+
+
+def lasts(values, beats):
+    """Brute force: true where the last so many steps back, and the one they began at, all are."""
+    return np.array([k >= beats and values[k - beats : k + 1].all() for k in range(len(values))])
+
+
+@pytest.mark.parametrize("where", COMBINED)
+def test_a_condition_may_last_anywhere_inside_of_others(where):
+    words, truth = COMBINED[where]
+    chance = np.random.default_rng(5)
+    fast, hall = (np.repeat(chance.random(60) < 0.6, chance.integers(1, 9, 60)) for _ in range(2))
+    length = min(len(fast), len(hall))
+    fast, hall = fast[:length], hall[:length]
+    watch = Watch(Trigger.model_validate(words))
+    square = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
+    said = [
+        watch.holds(
+            PuppetStage(
+                tick=24 * k,
+                twist=Twist(1.0 if fast[k] else 0.0),
+                robot=Pose2(0.5 if hall[k] else 9.0, 0.5),
+                regions={"hall": square},
+            )
+        )
+        for k in range(length)
+    ]
+    assert said == truth(fast, hall).tolist()
+    assert 0 < sum(said) < length
+
+
+def test_several_due_at_once_fire_at_once_and_none_is_lost():
+    edges = [0, 1, 0, 1, 0, 0, 0]
+    assert firings({"travelled": 1.0, "times": 2, "delay": "400 ms"}, edges) == [0, 0, 0, 0, 0, 1, 0]
+    assert firings({"travelled": 1.0, "times": 2, "delay": "400 ms"}, [*edges, 0]) == [0, 0, 0, 0, 0, 1, 0, 1]

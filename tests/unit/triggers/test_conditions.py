@@ -31,6 +31,11 @@ class Now:
     events: tuple[Event, ...] = ()
     objects: dict = field(default_factory=dict)
     clock: Clock = CLOCK
+    clearance: float | None = None
+    scans: dict = field(default_factory=dict)
+
+    def scanned(self, sensor):
+        return max(self.scans.values(), default=None) if sensor is None else self.scans.get(sensor)
 
     def region(self, name):
         return {"hall": HALL}[name]
@@ -86,6 +91,65 @@ def test_an_error_of_localization_is_more_than_the_bound(off, expected):
 
 def test_without_a_belief_nothing_is_in_error():
     assert not holds({"localization_error": 0})
+
+
+@pytest.mark.parametrize(("x", "expected"), [(0.99, False), (1.0, True), (5.01, False)])
+def test_what_the_robot_thinks_remains_is_measured_from_where_it_believes_to_be(x, expected):
+    goal, belief = Goal("desk", Pose2(3.0, 2.0)), Belief(Pose2(x, 2.0), np.eye(3))
+    words = {"believed_distance_remaining": 2}
+    assert holds(words, robot=Pose2(-50.0, 2.0), goal=goal, belief=belief) is expected
+    assert not holds(words, robot=Pose2(3.0, 2.0), goal=goal)
+    assert not holds(words, belief=belief)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize(("rate", "below", "above"), [(0.49, True, False), (0.5, False, False), (0.51, False, True)])
+def test_a_turn_has_a_rate_and_no_side(rate, below, above, side):
+    twist = Twist(3.0, 0.0, side * rate)
+    assert holds({"turning_below": "0.5 rad/s"}, twist=twist) is below
+    assert holds({"turning_above": "0.5 rad/s"}, twist=twist) is above
+
+
+@pytest.mark.parametrize(
+    ("clearance", "expected"), [(None, False), (0.31, False), (0.3, False), (0.29, True), (-1, True)]
+)
+def test_what_is_near_is_nearer_than_the_bound(clearance, expected):
+    assert holds({"clearance_below": "30 cm"}, clearance=clearance) is expected
+
+
+@pytest.mark.parametrize(("tick", "expected"), [(219, False), (220, False), (221, True)])
+def test_a_scan_is_as_old_as_the_time_since_the_stack_received_it(tick, expected):
+    scans = {"lidar": 100, "rear": 90}
+    assert holds({"scan_age": {"above": "0.5 s"}}, tick=tick, scans=scans) is expected
+    assert holds({"scan_age": {"above": "0.5 s", "sensor": "lidar"}}, tick=tick, scans=scans) is expected
+    assert holds({"scan_age": {"above": "0.5 s", "sensor": "rear"}}, tick=tick - 10, scans=scans) is expected
+
+
+@pytest.mark.parametrize(("tick", "expected"), [(120, False), (121, True)])
+def test_before_the_first_scan_its_age_counts_from_the_start(tick, expected):
+    assert holds({"scan_age": {"above": "0.5 s"}}, tick=tick) is expected
+    assert holds({"scan_age": {"above": "0.5 s", "sensor": "rear"}}, tick=tick, scans={"lidar": tick}) is expected
+
+
+@pytest.mark.parametrize(
+    ("off", "turn", "expected"), [(0.5, 0.5, False), (0.51, 0.0, True), (0.0, 0.53, True), (0.0, 2 * np.pi, False)]
+)
+def test_a_robot_is_lost_when_its_position_or_its_heading_is_off(off, turn, expected):
+    belief = Belief(Pose2(1.0, 1.0 + off, 3.0 + turn), np.eye(3) * 100)
+    assert holds({"localization_lost": {}}, robot=Pose2(1.0, 1.0, 3.0), belief=belief) is expected
+
+
+@pytest.mark.parametrize(("bound", "expected"), [(0.49, True), (0.51, False)])
+def test_a_robot_that_is_unsure_is_lost_as_far_as_it_is_least_sure(bound, expected):
+    turned = np.array([[np.cos(0.7), -np.sin(0.7)], [np.sin(0.7), np.cos(0.7)]])
+    covariance = np.eye(3)
+    covariance[:2, :2] = turned @ np.diag([0.5**2, 0.1**2]) @ turned.T
+    belief = Belief(Pose2(1.0, 1.0), covariance)
+    assert holds({"localization_lost": {"std": bound}}, robot=Pose2(1.0, 1.0), belief=belief) is expected
+
+
+def test_without_a_belief_nothing_is_lost():
+    assert not holds({"localization_lost": {"std": 0.001}})
 
 
 @pytest.mark.parametrize(("x", "expected"), [(1.0, True), (2.0, True), (2.001, False)])
@@ -156,6 +220,14 @@ def test_an_end_is_no_start():
     ended = (Event(1, EventKind.EVENT_ENDED, "a"),)
     assert not holds({"event": {"name": "a"}}, events=ended)
     assert holds({"event": {"name": "a", "status": "ended"}}, events=ended)
+
+
+def test_a_fault_that_has_started_or_ended_counts_as_an_event_does():
+    began, over = Event(1, EventKind.FAULT_STARTED, "lidar.off"), Event(2, EventKind.FAULT_ENDED, "lidar.off")
+    assert holds({"event": {"name": "lidar.off"}}, events=(began,))
+    assert not holds({"event": {"name": "lidar.off", "status": "ended"}}, events=(began,))
+    assert holds({"event": {"name": "lidar.off", "status": "ended"}}, events=(began, over))
+    assert not holds({"event": {"name": "odom.bias"}}, events=(began, over))
 
 
 def test_a_replan_is_a_plan_that_is_not_for_a_new_goal():
