@@ -153,7 +153,7 @@ class ScenarioSpec(Spec):
     @property
     def triggers(self) -> "list[Trigger]":
         """What events and faults wait for, in their order."""
-        waiting = [entry.when for entry in (*self.events, *self.faults)]
+        waiting = [*(event.when for event in self.events), *(fault.when for fault in self.faults)]
         return [trigger for trigger in waiting if trigger is not None]
 
 
