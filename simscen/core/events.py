@@ -28,7 +28,7 @@ class EventKind(str, Enum):
     EVENT_ENDED = "event.ended"  # the scenario's event; entry, effects (happened, what: of each action)
     OBJECT_SPAWNED = "object.spawned"  # object; its pose, shape, and parts (outlines in its own frame)
     OBJECT_REMOVED = "object.removed"  # object
-    OBJECT_MOVED = "object.moved"  # object; waypoints
+    OBJECT_MOVED = "object.moved"  # object; waypoints (x, y, yaw), times, repeat, ease, start, phase
     ROBOT_PLACED = "robot.placed"  # x, y, yaw
     ROBOT_PUSHED = "robot.pushed"  # impulse (N s)
     RUN_ENDED = "run.ended"  # why: navigation ended, time limit

@@ -107,15 +107,34 @@ class Body:
 
 @dataclass(frozen=True)
 class MotionPath:
-    """A path through planar waypoints: after `start` seconds at `times[k]` it is at `poses[k]`, linear between.
+    """A path through planar poses: at `times[k]` (s, on its own clock) something that follows it is at `poses[k]`.
 
-    `mode`: "once" stays at the end, "loop" starts over, "back_and_forth" turns around.
+    Its clock stands at `phase` until `start` seconds after it was set off, and runs from then on. `mode`: "once" stays
+    at the end, "loop" starts over, "back_and_forth" turns around. `ease` is how it goes from one pose to the next:
+
+    - "linear": evenly.
+    - "smooth": from rest to rest, by 3 u² - 2 u³ of the way after the share u of the time; 1.5 times as fast as
+      evenly where it is fastest.
+    - "spline": along a cubic Hermite curve, whose velocity at pose k is that of Catmull and Rom for uneven times,
+      (p[k+1] - p[k-1]) / (t[k+1] - t[k-1]); at rest at both ends, but across the seam of a loop. Headings, too.
+
+    Headings turn the shorter way from each pose to the next.
     """
 
     times: tuple[float, ...]
     poses: tuple[Pose2, ...]
     mode: str = "once"
     start: float = 0.0
+    ease: str = "linear"
+    phase: float = 0.0
+
+    def elapsed(self, seconds: float) -> float:
+        """What its clock shows `seconds` after it was set off, turning around and starting over not counted."""
+        return self.phase + max(0.0, seconds - self.start)
+
+    def over(self, seconds: float) -> bool:
+        """Whether nothing moves along it any more, `seconds` after it was set off."""
+        return self.mode == "once" and self.elapsed(seconds) >= self.times[-1]
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,10 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from simscen.spec.base import Spec
+from simscen.spec.motions import Motion
 from simscen.spec.objects import Shaped
 from simscen.spec.places import Name, PlaceName, Point, PoseSpec, Ring
-from simscen.spec.quantities import Duration, Mass, PositiveLength, PositiveSpeed
+from simscen.spec.quantities import Duration, Mass, PositiveLength
 
 
 class Wall(Spec):
@@ -36,15 +37,9 @@ class Obstacle(Shaped):
     """Where it stands."""
 
 
-class Travel(Spec):
-    """Motion along straight lines through waypoints."""
+class Travel(Motion):
+    """Motion through waypoints at a speed, or along timed keyframes."""
 
-    through: Annotated[list[Point], Field(min_length=1, max_length=1000)]
-    """Waypoints [x, y]."""
-    speed: PositiveSpeed
-    """Along the lines."""
-    repeat: Literal["once", "loop", "back_and_forth"] = "once"
-    """At the last waypoint: stay, start over, or turn around."""
     start: Duration = 0.0
     """When it begins."""
 
@@ -55,7 +50,7 @@ class Movable(Obstacle):
     mass: Mass = 0.0
     """In kg; 0 = the robot cannot push it."""
     move: Travel | None = None
-    """How it moves by itself."""
+    """How it moves by itself, whatever its pose where keyframes begin elsewhere."""
 
 
 class Door(Spec):

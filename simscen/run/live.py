@@ -143,7 +143,7 @@ class LiveStage:
     def move(self, name: str, path: MotionPath) -> None:
         """Let a body follow a path that begins now."""
         self._simulation.move(name, path)
-        self.note(Event(0, EventKind.OBJECT_MOVED, name, {"waypoints": [[p.x, p.y] for p in path.poses]}))
+        self.note(Event(0, EventKind.OBJECT_MOVED, name, described_path(path)))
 
     def place_robot(self, pose: Pose2) -> None:
         """Set the robot down somewhere else."""
@@ -169,6 +169,13 @@ class LiveStage:
         stamped = event if event.tick else replace(event, tick=self.tick)
         self._fresh.append(stamped)
         self._history += (stamped,)
+
+
+def described_path(path: MotionPath) -> dict[str, Value]:
+    """All that tells where something on the path is when; see core.shapes.MotionPath."""
+    poses: list[Value] = [[pose.x, pose.y, pose.yaw] for pose in path.poses]
+    clock: dict[str, Value] = {"start": path.start, "phase": path.phase}
+    return {"waypoints": poses, "times": list(path.times), "repeat": path.mode, "ease": path.ease, **clock}
 
 
 def described(body: Body) -> dict[str, Value]:

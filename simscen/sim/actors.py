@@ -8,12 +8,12 @@ import numpy as np
 import pybullet
 
 from simscen.core.geometry import Pose3, wrap
+from simscen.core.motion_path import pose_at, top_speed
 from simscen.core.shapes import Body, Mesh, MotionPath
 from simscen.sim import engine
 from simscen.sim.enclosure import winds_around
 from simscen.sim.inertia import GRAVITY, of_solids
 from simscen.sim.lost import lost
-from simscen.sim.motion_path import pose_at, top_speed
 from simscen.sim.outline import reach
 
 FRICTION = 0.6

@@ -6,16 +6,21 @@ solid becomes prisms over its cut at one height, as tall as it is: what a level 
 
 import math
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
+from pydantic import ValidationError
 
-from simscen.core.geometry import Array, wrap
+from simscen.core.geometry import wrap
+from simscen.core.motion_path import pose_at
 from simscen.core.shapes import Body, MotionPath, Solid
 from simscen.core.world import World
 from simscen.model.world import Movable, Obstacle, Travel, WorldSpec
 from simscen.worlds.forms import DIGITS, Form, forms_of
 
 LONGEST_NAME = 120
+ALIGNED = 1e-6
+"""Radians within which a way goes straight on."""
 
 
 @dataclass
@@ -65,28 +70,47 @@ def _add_body(body: Body, height: float, done: Conversion) -> None:
 
 
 def _travel(body: Body, form: Form, changes: list[str]) -> Travel | None:
-    """The scripted motion, where it is along straight lines at one speed, beginning where the body stands."""
+    """The scripted motion: through waypoints where it is straight at one speed, else along keyframes."""
     assert body.path is not None
-    path = body.path
-    points = np.array([(pose.x, pose.y) for pose in path.poses])
-    ways = np.diff(points, axis=0)
-    lengths, times = np.hypot(*ways.T), np.diff(path.times)
-    speed = float(lengths.sum() / times.sum()) if len(lengths) else 0.0
-    steady = bool((lengths > 0).all()) and np.allclose(lengths, speed * times)
-    begins = math.dist(points[0], form.pose[:2]) < 10**-DIGITS if len(points) else False
-    ahead = form.radius is not None or _faces_ahead(path, ways)
-    closed = path.mode != "loop" or bool(np.allclose(points[0], points[-1]))
-    if not (speed and steady and begins and ahead and closed and path.mode in ("once", "loop", "back_and_forth")):
-        changes.append(f"{body.name}: it moves, but not along straight lines at one speed; it stands still")
+    path, start, turned = body.path, form.pose, form.radius is not None
+    if through := _straight(path):
+        speed = sum(a.distance(b) for a, b in pairwise(path.poses)) / path.times[-1]
+        way = {"through": through, "speed": speed, "repeat": path.mode, "start": path.start}
+        if _same(Travel.model_validate(way).path(start, path.start), path, turned):
+            return Travel.model_validate(way)
+    here = pose_at(path, 0.0)
+    if start.distance(here) > 10**-DIGITS or not (turned or abs(wrap(start.yaw - here.yaw)) < 10**-DIGITS):
+        changes.append(f"{body.name}: it moves, and its shape is beside its own origin; it stands still")
         return None
-    through = points[1:-1] if path.mode == "loop" else points[1:]
-    fields = {"through": through.round(DIGITS).tolist(), "speed": speed, "repeat": path.mode, "start": path.start}
-    return Travel.model_validate(fields)
+    frames = [[time, *np.round(pose, DIGITS).tolist()] for time, pose in zip(path.times, path.poses, strict=True)]
+    timed = {"keyframes": frames, "repeat": path.mode, "ease": path.ease, "phase": path.phase, "start": path.start}
+    try:
+        return Travel.model_validate(timed)
+    except ValidationError as error:
+        changes.append(f"{body.name}: it moves as no keyframes say ({error.errors()[0]['msg']}); it stands still")
+        return None
 
 
-def _faces_ahead(path: MotionPath, ways: Array) -> bool:
-    headings = np.arctan2(ways[:, 1], ways[:, 0]).tolist()
-    return all(abs(wrap(pose.yaw - heading)) < 1e-3 for pose, heading in zip(path.poses, headings, strict=False))
+def _straight(path: MotionPath) -> list[list[float]]:
+    """The corners after the first of a path that is even; those of a loop without the way back."""
+    points = [(round(pose.x, DIGITS), round(pose.y, DIGITS)) for pose in path.poses]
+    turns = [b for a, b, c in zip(points, points[1:], points[2:], strict=False) if not _in_line(a, b, c)]
+    corners = [*turns, *(points[-1:] if path.mode != "loop" else [])]
+    return [list(corner) for corner in corners] if path.ease == "linear" and path.times[-1] > 0 else []
+
+
+def _in_line(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> bool:
+    (ux, uy), (vx, vy) = (b[0] - a[0], b[1] - a[1]), (c[0] - b[0], c[1] - b[1])
+    return ux * vx + uy * vy >= 0 and abs(ux * vy - uy * vx) <= ALIGNED * math.hypot(ux, uy) * math.hypot(vx, vy)
+
+
+def _same(written: MotionPath, path: MotionPath, turned: bool) -> bool:
+    """Whether two paths are one, at every stop of either; headings do not matter of what is round."""
+    times = sorted({*written.times, *path.times})
+    apart = [(pose_at(written, t + path.start), pose_at(path, t + path.start)) for t in times]
+    return math.isclose(written.times[-1], path.times[-1], rel_tol=1e-6) and all(
+        a.distance(b) < 10**-DIGITS and (turned or abs(wrap(a.yaw - b.yaw)) < 10**-DIGITS) for a, b in apart
+    )
 
 
 def _name(name: str) -> str:

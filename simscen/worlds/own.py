@@ -4,10 +4,10 @@ import math
 from collections.abc import Iterable
 from dataclasses import replace
 
-from simscen.actions.move import route
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.grid import OccupancyGrid
-from simscen.core.shapes import Body, Box, MotionPath, Solid
+from simscen.core.motion_path import pose_at
+from simscen.core.shapes import Body, Box, Solid
 from simscen.core.world import World
 from simscen.model.world import Door, Movable, Obstacle, Wall, WorldSpec
 from simscen.worlds.extents import rectangle
@@ -74,11 +74,11 @@ def _standing(obstacle: Obstacle) -> Solid:
 
 
 def _movable(thing: Movable) -> Body:
-    path: MotionPath | None = None
+    pose, path = thing.pose.pose, None
     if thing.move is not None:
-        path = route(thing.pose.pose, thing.move.through, thing.move.speed, thing.move.repeat)
-        path = replace(path, start=thing.move.start)
-    return Body(thing.name, (thing.solid(thing.name),), Pose3.planar(thing.pose.pose), thing.mass, path)
+        path = thing.move.path(pose, thing.move.start)
+        pose = pose if thing.move.keyframes is None else pose_at(path, 0.0)
+    return Body(thing.name, (thing.solid(thing.name),), Pose3.planar(pose), thing.mass, path)
 
 
 def _door(door: Door) -> Body:

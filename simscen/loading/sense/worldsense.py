@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import pairwise
 
 from simscen.core.problems import Problem
 from simscen.loading.loaded import LoadedWorld
@@ -50,9 +49,9 @@ def _no_extent(spec: WorldSpec, tree: Fields) -> Iterator[Problem]:
     for index, thing in enumerate(spec.objects):
         if thing.move is None:
             continue
-        way = [[thing.pose.x, thing.pose.y], *thing.move.through]
-        if all(a == b for a, b in pairwise(way)):
-            problem = _at(tree, ("objects", index, "move", "through"), "SC313", "it moves nowhere")
+        if len(set(thing.move.path(thing.pose.pose).poses)) == 1:
+            key = "through" if thing.move.keyframes is None else "keyframes"
+            problem = _at(tree, ("objects", index, "move", key), "SC313", "it moves nowhere")
             yield replace(problem, severity="warning")
 
 

@@ -8,11 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import Polygon, union_all
 
-from simscen.actions.move import route
 from simscen.core.geometry import Pose2, Pose3
+from simscen.core.motion_path import pose_at
 from simscen.core.shapes import Body, Box, Capsule, Cone, Cylinder, Extrusion, Mesh, MotionPath, Solid, Sphere
 from simscen.core.world import World
 from simscen.model.world import WorldSpec
+from simscen.spec.motions import route
 from simscen.worlds.convert import convert
 from simscen.worlds.meshing import fuse, triangulate
 from simscen.worlds.own import build_own
@@ -123,15 +124,26 @@ def test_bodies_keep_mass_and_motion():
 def test_motion_and_shape_that_cannot_be_said_are_told():
     disc = (Solid(Cylinder(0.3, 1.0), Pose3(z=0.5)),)
     poses = (Pose2(0, 0), Pose2(1, 0), Pose2(2, 0))
-    hasty = Body("hasty", disc, Pose3(), 0.0, MotionPath((0.0, 1.0, 9.0), poses))
+    off = (Solid(Cylinder(0.3, 1.0), Pose3(x=1.0, z=0.5)),)
+    hasty = Body("beside", off, Pose3(), 0.0, MotionPath((0.0, 1.0, 9.0), poses))
     table = Body("table", (*disc, Solid(Box((1, 1, 0.1)), Pose3(z=1.0))), Pose3(x=5.0), 3.0)
     world, changes = converted(bodies=(hasty, table))
     assert changes == [
-        "hasty: it moves, but not along straight lines at one speed; it stands still",
+        "beside: it moves, and its shape is beside its own origin; it stands still",
         "table: it could be pushed and has 2 shapes, an object has one; it stands still",
     ]
     assert world.bodies[0].path is None
     assert [solid.name for solid in world.solids] == ["table", "table"]
+
+
+@pytest.mark.parametrize("mode", ["once", "back_and_forth"])
+def test_a_motion_at_changing_speed_is_said_in_keyframes(mode):
+    disc = (Solid(Cylinder(0.3, 1.0), Pose3(z=0.5)),)
+    poses = (Pose2(0, 0), Pose2(1, 0), Pose2(2, 0.5, 1.0))
+    path = MotionPath((0.0, 1.0, 9.0), poses, mode, ease="spline", phase=0.5)
+    world, changes = converted(bodies=(Body("hasty", disc, Pose3.planar(pose_at(path, 0.0)), 0.0, path),))
+    assert changes == []
+    assert world.bodies[0].path == path
 
 
 def test_what_the_file_adds_itself_comes_after():

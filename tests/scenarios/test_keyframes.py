@@ -1,0 +1,82 @@
+"""A cylinder on looped keyframes is where they say at every tick, in the simulation and in the log."""
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicHermiteSpline
+
+from simscen.core.events import EventKind
+from simscen.loading.scenario import load_scenario
+from simscen.record.replay import read_log
+from simscen.run.prepare import prepare
+from simscen.run.simulate import simulate
+
+RATE = 240
+FRAMES = [(0.0, 3.0, 1.0, 0.0), (0.5, 4.0, 1.0, 1.5), (0.7, 4.0, 2.0, 3.0), (1.1, 3.0, 2.0, -2.0), (1.3, 3.0, 1.0, 0.0)]
+BEGINS, PHASE = 0.5, 0.6
+SCENARIO = f"""\
+simscen: 1
+world:
+  simscen: 1
+  walls: [{{name: outer wall, points: [[0, 0], [8, 0], [8, 4], [0, 4], [0, 0]]}}]
+  objects:
+    - {{name: straight, cylinder: [0.2, 1.0], pose: {{x: 3, y: 1}},
+       move: {{keyframes: {[[t, x + 2, y + 1, yaw] for t, x, y, yaw in FRAMES]}, repeat: loop}}}}
+robot: {{pose: {{x: 1, y: 1}}}}
+stack: {{localizer: {{type: ground_truth}}}}
+goals: [{{pose: {{x: 1, y: 3}}}}]
+physics: {{truth_rate: {RATE}}}
+events:
+  - {{when: {{time: 0 s}}, do: {{spawn: {{name: round, cylinder: [0.2, 1.0], pose: {{x: 7, y: 3}}}}}}}}
+  - when: {{time: {BEGINS} s}}
+    do: {{move: {{name: round, keyframes: {[list(frame) for frame in FRAMES]}, repeat: loop, ease: spline,
+                phase: {PHASE} s}}}}
+time_limit: 5 s
+pass: [{{collisions: {{max: 0}}}}]
+"""
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("keyframes")
+    file, log = folder / "own.scenario.yaml", folder / "log.mcap"
+    file.write_text(SCENARIO)
+    return simulate(prepare(load_scenario(file, folder)), log=log), log
+
+
+def by_hand(ticks, begins, phase, shift, spline):
+    """Where the cylinder has to be, by scipy's spline or numpy's lines."""
+    times, values = np.array(FRAMES)[:, 0], np.array(FRAMES)[:, 1:] + [*shift, 0.0]
+    values[:, 2] = np.unwrap(values[:, 2])
+    local = np.fmod(ticks / RATE - begins + phase, times[-1])
+    if not spline:
+        return np.column_stack([np.interp(local, times, column) for column in values.T])
+    slopes = np.empty_like(values)
+    slopes[1:-1] = (values[2:] - values[:-2]) / (times[2:] - times[:-2])[:, None]
+    slopes[[0, -1]] = (values[1] - values[0] + values[-1] - values[-2]) / (times[1] - times[0] + times[-1] - times[-2])
+    return CubicHermiteSpline(times, values, slopes)(local)
+
+
+@pytest.mark.parametrize("read", ["trace", "log"])
+@pytest.mark.parametrize(
+    ("name", "begins", "phase", "shift"), [("round", BEGINS, PHASE, (0, 0)), ("straight", 0.0, 0.0, (2, 1))]
+)
+def test_it_is_within_a_millimetre_of_its_keyframes_at_every_tick(run, read, name, begins, phase, shift):
+    done, log = run
+    trace = done.trace if read == "trace" else read_log(log).trace
+    samples = trace.objects[name]
+    moving = samples.ticks >= round(begins * RATE) + 1
+    ticks = samples.ticks[moving]
+    assert np.array_equal(ticks, np.arange(ticks[0], trace.end + 1)), "every tick is there"
+    assert len(ticks) > 3 * FRAMES[-1][0] * RATE, "several loops"
+    expected = by_hand(ticks, begins, phase, shift, name == "round")
+    off = samples.values[moving] - expected
+    assert np.abs(off[:, :2]).max() < 1e-3
+    assert np.abs((off[:, 2] + np.pi) % (2 * np.pi) - np.pi).max() < 1e-3
+
+
+def test_the_log_says_what_it_needs_to_decode_the_motion(run):
+    _, log = run
+    (moved,) = read_log(log).trace.of_kind(EventKind.OBJECT_MOVED)
+    told = moved.data
+    assert [(t, *pose) for t, pose in zip(told["times"], told["waypoints"], strict=True)] == FRAMES
+    assert (told["repeat"], told["ease"], told["phase"], told["start"]) == ("loop", "spline", PHASE, 0.0)

@@ -1,0 +1,95 @@
+"""`through` and `keyframes` become the paths that they say."""
+
+import itertools
+import math
+
+import pytest
+from pydantic import ValidationError
+
+from simscen.core.geometry import Pose2, wrap
+from simscen.core.motion_path import pose_at, top_speed
+from simscen.spec.motions import Motion
+
+HERE = Pose2(0.0, 0.0, 1.0)
+
+
+def path(here=HERE, **said):
+    return Motion.model_validate(said).path(here)
+
+
+def test_waypoints_are_passed_at_the_speed():
+    way = path(through=[[4, 0], [4, 2]], speed=2.0)
+    assert way.times[-1] == 3.0
+    assert [pose_at(way, t)[:2] for t in (1.0, 2.0, 2.5)] == [(2.0, 0.0), (4.0, 0.0), (4.0, 1.0)]
+
+
+@pytest.mark.parametrize("repeat", ["once", "loop", "back_and_forth"])
+def test_what_drives_through_waypoints_faces_where_it_drives_but_for_a_moment_around_a_corner(repeat):
+    way = path(through=[[4, 0], [4, 4], [0, 4]], speed=1.0, repeat=repeat)
+    corners = [0.0, 4.0, 8.0, 12.0, 16.0]
+    for k in range(100 if repeat == "loop" else 120):
+        t = k / 100 * way.times[-1] + 1e-3
+        near = min(abs(t - corner) for corner in corners)
+        if t + 0.01 < way.times[-1]:
+            a, b = pose_at(way, t), pose_at(way, t + 0.005)
+            off = abs(wrap(math.atan2(b.y - a.y, b.x - a.x) - a.yaw))
+            assert off < 0.01 if near > 0.26 else off < math.pi / 4 + 0.1
+    turns = [abs(wrap(pose_at(way, (k + 1) / 240).yaw - pose_at(way, k / 240).yaw)) for k in range(3 * 16 * 240)]
+    assert max(turns) < 0.02, "it never turns at once, also where a loop begins anew"
+
+
+def test_an_eased_way_keeps_below_its_speed_stands_at_each_waypoint_and_turns_there():
+    way = path(through=[[3, 0], [3, 3]], speed=1.5, ease="smooth")
+    assert way.times == pytest.approx((0.0, 3.0, 3.5, 6.5))
+    assert top_speed(way) == pytest.approx(1.5)
+    assert pose_at(way, 3.25)[:2] == (3.0, 0.0)
+    assert pose_at(way, 2.9).yaw == 0.0
+    assert pose_at(way, 3.6).yaw == pytest.approx(math.pi / 2)
+
+
+def test_a_loop_of_waypoints_leads_back_to_where_it_began():
+    way = path(through=[[4, 0], [4, 3]], speed=1.0, repeat="loop")
+    assert way.times[-1] == 12.0
+    assert pose_at(way, 11.999999)[:2] == pytest.approx((0.0, 0.0), abs=1e-5)
+
+
+def test_keyframes_with_units_are_where_they_say_when_they_say():
+    way = path(keyframes=[["500 ms", "200 cm", 1, "90 deg"], [2.0, 3.0, 1.0, 0.0]])
+    assert pose_at(way, 0.0) == HERE, "it comes from where it is"
+    assert pose_at(way, 0.5) == pytest.approx(Pose2(2.0, 1.0, math.pi / 2))
+    assert pose_at(way, 9.0) == Pose2(3.0, 1.0, 0.0)
+
+
+def test_first_keyframe_at_zero_sets_it_there_at_once():
+    assert pose_at(path(keyframes=[[0, 2, 1, 0], [1, 3, 1, 0]]), 0.0) == Pose2(2.0, 1.0, 0.0)
+
+
+def test_a_full_turn_closes_a_loop():
+    way = path(
+        keyframes=[[0, 1, 1, 0], [1, 2, 1, "120 deg"], [2, 2, 2, "240 deg"], [3, 1, 1, "360 deg"]], repeat="loop"
+    )
+    assert top_speed(way, 0.5) < math.inf
+    turned = [pose_at(way, k / 50).yaw for k in range(301)]
+    assert sum(wrap(b - a) for a, b in itertools.pairwise(turned)) == pytest.approx(4 * math.pi)
+
+
+TWO = [[0, 1, 1, 0], [2, 2, 1, 0]]
+SLIPS = {
+    "expected through and speed, or keyframes": {"speed": 1.0},
+    "expected speed along waypoints": {"through": [[1, 1]]},
+    "keyframes have times, and no speed": {"keyframes": TWO, "speed": 1.0},
+    "times of keyframes must rise": {"keyframes": [[0, 1, 1, 0], [2, 2, 1, 0], [2, 2, 2, 0]]},
+    "needs keyframes": {"through": [[1, 1]], "speed": 1.0, "ease": "spline"},
+    "phase is for keyframes": {"through": [[1, 1]], "speed": 1.0, "phase": 1.0},
+    "the first of them at 0 s": {"keyframes": [[1, 1, 1, 0], [2, 2, 1, 0]], "repeat": "back_and_forth"},
+    "two keyframes or more": {"keyframes": [[0, 1, 1, 0]], "repeat": "loop"},
+    "a loop jumps": {"keyframes": TWO, "repeat": "loop"},
+    "phase 2 s is not within the 2 s": {"keyframes": TWO, "phase": 2.0},
+    "phase 4 s is not within the 4 s": {"keyframes": TWO, "phase": 4.0, "repeat": "back_and_forth"},
+}
+
+
+@pytest.mark.parametrize(("told", "said"), SLIPS.items(), ids=str)
+def test_what_is_no_motion_is_refused(told, said):
+    with pytest.raises(ValidationError, match=told):
+        Motion.model_validate(said)
