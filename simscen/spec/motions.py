@@ -148,7 +148,7 @@ def _even(legs: list[_Leg], speed: float, repeat: str) -> list[tuple[float, Pose
         if turn:
             stops.append((time + lasts - turned, leg.along(leg.length - turned * speed)))
         time += lasts
-        stops.append((time, Pose2(*leg.to, wrap(leg.begin.yaw + turn / 2))))
+        stops.append((time, leg.end._replace(yaw=wrap(leg.begin.yaw + turn / 2))))
     if repeat == "loop" and stops[-1][1].yaw != stops[0][1].yaw:
         first = stops[0]
         turned = min(TURN, legs[0].length / speed / 4)
@@ -168,5 +168,5 @@ def _eased(legs: list[_Leg], speed: float, repeat: str) -> list[tuple[float, Pos
         ahead = following or (legs[0] if repeat == "loop" else leg)
         if wrap(ahead.begin.yaw - leg.begin.yaw):
             time += 2 * TURN
-            stops.append((time, Pose2(*leg.to, ahead.begin.yaw)))
+            stops.append((time, leg.end._replace(yaw=ahead.begin.yaw)))
     return stops

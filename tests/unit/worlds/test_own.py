@@ -59,7 +59,7 @@ def test_an_object_that_moves_by_itself_keeps_to_its_speed_and_start():
     move = {"through": [[4.0, 1.0], [4.0, 3.0]], "speed": 0.5, "repeat": "back_and_forth", "start": "2 s"}
     objects = [{"name": "cart", "box": [0.5, 0.5, 0.5], "pose": {"x": 2.0, "y": 1.0}, "move": move}]
     path = build_own(spec(objects=objects), "w").bodies[0].path
-    assert path.times == (0.0, 4.0, 8.0)
+    assert path.times == (0.0, 3.75, 4.0, 4.25, 8.0)
     assert (path.mode, path.start) == ("back_and_forth", 2.0)
     assert path.poses[-1] == pytest.approx((4.0, 3.0, math.pi / 2))
 
