@@ -35,7 +35,7 @@ def within(moves: Array, every: Iterable[Limits]) -> Array:
     towards = np.concatenate([part.towards for part in parts])
     most = np.concatenate([part.most for part in parts])
     over = np.sum(moves[who] * towards, axis=1) > most
-    kept = moves.copy()
+    kept: Array = moves.copy()
     for person in np.unique(who[over]).tolist():
         mine = who == person
         kept[person] = _cut(kept[person], towards[mine], most[mine])
