@@ -12,6 +12,7 @@ from simscen.core.shapes import Body, Solid, TriangleMesh
 from simscen.core.time import Clock
 from simscen.faults.base import Wheels
 from simscen.model.anystack import ExternalStackSpec
+from simscen.run.agent import Agent
 from simscen.run.director import Director
 from simscen.run.ending import Ending
 from simscen.run.external.build import build_external
@@ -24,7 +25,9 @@ from simscen.run.senses import Senses
 from simscen.run.timetable import Timetable
 from simscen.sensors.build import build_sensors
 from simscen.sensors.sensor import Sensor
-from simscen.sim.simulation import Simulation
+from simscen.sim.alone import NAMELESS
+from simscen.sim.robot import Robot
+from simscen.sim.simulation import Placed, Simulation
 from simscen.stack.build import build_stack
 from simscen.stack.protocols import Stack, Surroundings
 from simscen.worlds.meshing import fuse, triangulate
@@ -41,19 +44,19 @@ def assemble(prepared: Prepared, seed: int, printed: Path | None = None) -> Rig:
     simulation = Simulation(
         prepared.built.mesh,
         world.bodies,
-        prepared.body,
-        prepared.start,
+        {NAMELESS: Placed(prepared.body, prepared.start)},
         triangulate,
         tick_rate=clock.rate,
         solver_iterations=spec.physics.solver_iterations,
         clearance_range=prepared.case.clearance_range,
     )
-    rays = LiveRays(RayScene(prepared.built.mesh), simulation)
-    sensors: tuple[Sensor, ...] = build_sensors(prepared.robot, clock, streams, simulation, rays)
+    robot = simulation.robots[NAMELESS]
+    rays = LiveRays(RayScene(prepared.built.mesh), robot)
+    sensors: tuple[Sensor, ...] = build_sensors(prepared.robot, clock, streams, robot, rays)
     truth_period = clock.period(spec.physics.truth_rate)
     if prepared.stack.told_truth:
         # Last, because the log takes the first odometry for the robot's own.
-        sensors = (*sensors, TruthSensor(simulation, clock.period(prepared.stack.controller_frequency)))
+        sensors = (*sensors, TruthSensor(robot, clock.period(prepared.stack.controller_frequency)))
     senses = Senses(sensors)
 
     surroundings = Surroundings(
@@ -72,30 +75,30 @@ def assemble(prepared: Prepared, seed: int, printed: Path | None = None) -> Rig:
         goes_on = spec.on_goal_failure == "continue"
         stack = build_stack(prepared.stack, surroundings, streams, clock, stop_on_failure=not goes_on)
 
-    stage = LiveStage(world, simulation, stack, clock, prepared.case.sent)
+    stage = LiveStage(world, simulation, robot, stack, clock, prepared.case.sent)
     wheels = Wheels(getattr(prepared.robot.drive, "wheel_separation", 0.0))
     faults = FaultRig(spec.faults, streams, wheels, stage.note)
     for body in world.bodies:
         stage.note(Event(0, EventKind.OBJECT_SPAWNED, body.name, described(body)))
     control_period = clock.period(prepared.stack.controller_frequency)
-    return Rig(
-        simulation=simulation,
+    agent = Agent(
+        robot=robot,
         senses=senses,
         stack=stack,
         faults=faults,
         stage=stage,
-        director=Director(spec.events, spec.faults, streams, stage, faults),
         ending=Ending(clock, spec.time_limit, spec.linger),
         timetable=Timetable((truth_period, control_period, *senses.periods)),
         truth_period=truth_period,
     )
+    return Rig(simulation, (agent,), (Director(spec.events, spec.faults, streams, stage, faults),), truth_period)
 
 
 class LiveRays:
-    """Rays against the static world and against everything that moves, where it is now."""
+    """Rays of a robot against the static world and against everything else that moves, where it is now."""
 
-    def __init__(self, scene: RayScene, simulation: Simulation) -> None:
-        self._scene, self._simulation = scene, simulation
+    def __init__(self, scene: RayScene, robot: Robot) -> None:
+        self._scene, self._robot = scene, robot
         self._meshes: dict[str, tuple[tuple[Solid, ...], TriangleMesh]] = {}
 
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
@@ -104,7 +107,7 @@ class LiveRays:
         return self._scene.cast(origins, directions, reach)
 
     def _placed(self) -> Mapping[str, tuple[TriangleMesh, Pose3]]:
-        moving, known = self._simulation.moving(), self._meshes
+        moving, known = self._robot.moving(), self._meshes
         self._meshes = {}
         for name, (body, _) in moving.items():
             before = known.get(name)
@@ -125,10 +128,10 @@ class TruthSensor:
 
     name = "ground_truth"
 
-    def __init__(self, simulation: Simulation, period: int) -> None:
-        self._simulation, self.period = simulation, period
+    def __init__(self, robot: Robot, period: int) -> None:
+        self._robot, self.period = robot, period
 
     def read(self, tick: int) -> Odometry:
         """The true pose now."""
-        truth = self._simulation.truth()
+        truth = self._robot.truth()
         return Odometry(self.name, tick, truth.pose.plane, truth.twist)

@@ -15,7 +15,8 @@ import numpy as np
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.shapes import Cylinder, Solid
 from simscen.loading.scenario import load_scenario
-from simscen.run.lockstep import Log, Rig
+from simscen.run.agent import Log
+from simscen.run.lockstep import Rig
 from simscen.run.prepare import Prepared, lidar_height, prepare
 from simscen.run.simulate import simulate
 from simscen.run.stopwatch import Stopwatch
@@ -85,13 +86,15 @@ def timed_run(prepared: Prepared, watch: Stopwatch | None = None) -> tuple[float
 
 def _watched(watch: Stopwatch, rig: Rig, own: Sequence[Log]) -> Sequence[Log]:
     """Watch the parts of the rig, and the log and the trace that are its `own` listeners."""
-    watch.watch("physics", rig.simulation, "step", "drive")
-    watch.watch("truth and contacts", rig.simulation, "truth", "collisions")
-    watch.watch("sensors", rig.senses, "read")
-    if isinstance(rig.stack, InstalledStack) and isinstance(rig.stack.inner, ReferenceStack):
-        for name, (component, *methods) in rig.stack.inner.components.items():
+    (agent,) = rig.agents
+    watch.watch("physics", rig.simulation, "step")
+    watch.watch("physics", agent.robot, "drive")
+    watch.watch("truth and contacts", agent.robot, "truth", "collisions")
+    watch.watch("sensors", agent.senses, "read")
+    if isinstance(agent.stack, InstalledStack) and isinstance(agent.stack.inner, ReferenceStack):
+        for name, (component, *methods) in agent.stack.inner.components.items():
             watch.watch(name, component, *methods)
-    watch.watch("navigator", rig.stack, "decide")
+    watch.watch("navigator", agent.stack, "decide")
     for name, listener in zip(("trace", "log"), own, strict=True):
         watch.watch(name, listener, "append")
     return ()

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 from simscen.core.trace import Moment
 from simscen.loading.scenario import load_scenario
+from simscen.run.agent import Log
 from simscen.run.bench import PATROL, SEED
 from simscen.run.external.serving import served
-from simscen.run.lockstep import Log, Rig
+from simscen.run.lockstep import Rig
 from simscen.run.prepare import Prepared, prepare
 from simscen.run.simulate import simulate
 from simscen.run.stopwatch import Stopwatch
@@ -43,7 +44,7 @@ def _each_beat(prepared: Prepared) -> tuple[int, float]:
     watch, beats = Stopwatch(), _Beats()
 
     def attach(rig: Rig, _: Sequence[Log]) -> Sequence[Log]:
-        watch.watch("stack", rig.stack, "decide")
+        watch.watch("stack", rig.agents[0].stack, "decide")
         return (beats,)
 
     simulate(prepared, SEED, attach=attach)

@@ -1,16 +1,20 @@
 """When a run is over."""
 
+from collections.abc import Iterable
+
 from simscen.core.events import Event, EventKind
 from simscen.core.time import Clock
 from simscen.core.trace import Decision
 
+TIME_LIMIT = "time limit"
+
 
 class Ending:
-    """Ends a run a while after its navigation task has ended, or at its time limit.
+    """Ends a robot's part in a run a while after its navigation task has ended, or at the time limit.
 
-    It hears of every beat. A task that was given anew in the meantime (a goal sent by an event) takes the ending back.
-    A run ends with the first sample of the truth from then on, so that all its samples are evenly spaced: what is
-    derived from them (accelerations, windows of time) means the same at its end as before.
+    It hears of every beat of the robot. A task that was given anew in the meantime (a goal sent by an event) takes the
+    ending back. A run ends with the first sample of the truth from then on, so that all its samples are evenly spaced:
+    what is derived from them (accelerations, windows of time) means the same at its end as before.
     """
 
     def __init__(self, clock: Clock, time_limit: float, linger: float) -> None:
@@ -27,9 +31,20 @@ class Ending:
                 self._over = None
 
     def reached(self, tick: int) -> Event | None:
-        """The event that ends the run at this beat, which samples the truth, or None."""
+        """The event that ends the robot's part at this beat, which samples the truth, or None."""
         if self._over is not None and tick >= self._over:
             return Event(tick, EventKind.RUN_ENDED, "navigation ended")
         if tick >= self._limit:
-            return Event(tick, EventKind.RUN_ENDED, "time limit")
+            return Event(tick, EventKind.RUN_ENDED, TIME_LIMIT)
         return None
+
+
+def end_of(tick: int, endings: Iterable[Ending]) -> Event | None:
+    """The event that ends a run at this beat, which samples the truth, or None: it ends when all its robots have."""
+    last: Event | None = None
+    for ending in endings:
+        end = ending.reached(tick)
+        if end is None:
+            return None
+        last = end if last is None or end.name == TIME_LIMIT else last
+    return last

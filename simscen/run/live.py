@@ -14,17 +14,21 @@ from simscen.core.time import Clock
 from simscen.core.trace import Decision, Truth
 from simscen.core.world import Polygon, World
 from simscen.sim.outline import parts
+from simscen.sim.robot import Robot
 from simscen.sim.simulation import Simulation
 from simscen.stack.protocols import Stack
 from simscen.worlds.shortest import Z_RANGE
 
 
 class LiveStage:
-    """Implements core.stage.Stage on the simulation and the stack, and keeps the events of the run."""
+    """Implements core.stage.Stage for one robot, on the simulation and its stack, and keeps the events of its run."""
 
-    def __init__(self, world: World, simulation: Simulation, stack: Stack, clock: Clock, goals: Iterable[Goal]) -> None:
+    def __init__(
+        self, world: World, simulation: Simulation, robot: Robot, stack: Stack, clock: Clock, goals: Iterable[Goal]
+    ) -> None:
         """`goals` are those that events may send."""
-        self._world, self._simulation, self._stack, self.clock = world, simulation, stack, clock
+        self._world, self._simulation, self._robot, self._stack = world, simulation, robot, stack
+        self.clock = clock
         self._goals = {goal.name: goal for goal in goals}
         self._look()
         self._belief: Belief | None = None
@@ -41,14 +45,14 @@ class LiveStage:
         before = self._pose
         self._look(truth)
         self._travelled += before.distance(self._pose)
-        for collision in self._simulation.collisions():
+        for collision in self._robot.collisions():
             self.note(collision)
 
     def _look(self, truth: Truth | None = None) -> None:
         if truth is not None:
             self._pose, self._twist, self._clearance = truth.pose.plane, truth.twist, truth.clearance
         else:
-            self._pose, self._twist = self._simulation.base_pose().plane, self._simulation.base_twist()
+            self._pose, self._twist = self._robot.base_pose().plane, self._robot.base_twist()
 
     def heard(self, decision: Decision, readings: Readings = ()) -> None:
         """What the stack was told, and what it decided and published."""
@@ -147,13 +151,13 @@ class LiveStage:
 
     def place_robot(self, pose: Pose2) -> None:
         """Set the robot down somewhere else."""
-        self._simulation.place_robot(pose)
+        self._robot.place(pose)
         self._look()
         self.note(Event(0, EventKind.ROBOT_PLACED, "", {"x": pose.x, "y": pose.y, "yaw": pose.yaw}))
 
     def push(self, impulse: tuple[float, float]) -> None:
         """Push the robot."""
-        self._simulation.push(impulse)
+        self._robot.push(impulse)
         self.note(Event(0, EventKind.ROBOT_PUSHED, "", {"impulse": list(impulse)}))
 
     def send_goal(self, name: str) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 from simscen.core.run import Run
 from simscen.judge.resultdata import to_json
 from simscen.loading.resolved import resolved_text
-from simscen.run.lockstep import Log
+from simscen.run.agent import Log
 from simscen.run.prepare import Prepared
 from simscen.run.simulate import simulate
 

@@ -19,10 +19,11 @@ from simscen.loading.scenario import load_scenario
 from simscen.record.header import CHOSEN, VARIATION, LogHeader
 from simscen.record.recorder import Recorder
 from simscen.record.tracebuilder import TraceBuilder
+from simscen.run.agent import Log
 from simscen.run.assemble import assemble
 from simscen.run.blame import blamed
 from simscen.run.external.stack import ExternalStack
-from simscen.run.lockstep import Log, Rig, run_lockstep
+from simscen.run.lockstep import Rig, run_lockstep
 from simscen.run.prepare import Prepared, prepare
 from simscen.run.sensornames import sensor_frames, sensor_kinds
 from simscen.sim.urdf.describe import describe
@@ -66,12 +67,14 @@ def _simulated(
         recorder = log and closing.enter_context(Recorder(log, clock, log_header(prepared, seed)))
         rig = assemble(prepared, seed, printed)
         closing.callback(rig.simulation.close)
-        external = rig.stack if isinstance(rig.stack, ExternalStack) else None
+        (agent,) = rig.agents
+        external = agent.stack if isinstance(agent.stack, ExternalStack) else None
         if external:
             closing.callback(external.close)
-        rig.stack.start(prepared.estimate, prepared.case.goals)
+        agent.stack.start(prepared.estimate, prepared.case.goals)
         own: tuple[Log, ...] = (builder, recorder) if recorder else (builder,)
-        end = run_lockstep(rig, (*own, *(attach(rig, own) if attach else ())))
+        agent.logs = (*own, *(attach(rig, own) if attach else ()))
+        end = run_lockstep(rig)
         if external:
             external.finish(end.name)
         run = judged(prepared, seed, builder.finish(end.tick), log)

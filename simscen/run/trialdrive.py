@@ -10,8 +10,9 @@ from simscen.model.robot import Ackermann
 from simscen.run.robotmodel import robot_model
 from simscen.sensors.kinematics import kinematics_of
 from simscen.sensors.odometry import along_arc
+from simscen.sim.alone import Alone
 from simscen.sim.robot_body import RobotBody
-from simscen.sim.simulation import FIRMWARE_RATE, Simulation
+from simscen.sim.simulation import FIRMWARE_RATE
 from simscen.worlds.meshing import fuse, triangulate
 
 TICK_RATE = 240
@@ -80,7 +81,7 @@ def drive_once(body: RobotBody) -> tuple[Rest, tuple[Trial, ...]]:
 
     Raises RunError when the physics loses the robot.
     """
-    simulation = Simulation(fuse([]), [], body, Pose2(0.0, 0.0, 0.0), triangulate)
+    simulation = Alone(fuse([]), [], body, Pose2(0.0, 0.0, 0.0), triangulate)
     try:
         rest = _rest(simulation)
         return rest, tuple(_trial(simulation, body, name, legs) for name, legs in _trials(body).items())
@@ -97,14 +98,14 @@ def _trials(body: RobotBody) -> dict[str, list[_Leg]]:
     return trials | ({"sideways": [_Leg(0.0, LINE)]} if robot_model(body).holonomic else {})
 
 
-def _rest(simulation: Simulation) -> Rest:
+def _rest(simulation: Alone) -> Rest:
     begin = simulation.base_pose()
     simulation.step(RESTING)
     end = simulation.base_pose()
     return Rest(_tilt(end, Pose3()), end.z, math.hypot(end.x - begin.x, end.y - begin.y))
 
 
-def _trial(simulation: Simulation, body: RobotBody, name: str, legs: list[_Leg]) -> Trial:
+def _trial(simulation: Alone, body: RobotBody, name: str, legs: list[_Leg]) -> Trial:
     simulation.place_robot(Pose2(0.0, 0.0, 0.0))
     simulation.step(SETTLING)
     motion, level = kinematics_of(body.drive), simulation.base_pose()

@@ -55,7 +55,7 @@ class Actor:
 
 
 class Actors:
-    """All that moves but the robot, by name and in the order of names, so that the engine's order is always the same.
+    """All that moves but the robots, by name and in the order of names, so that the engine's order is always the same.
 
     Scripted bodies are kept where the engine last needed them; `begin` and `finish` around a step make them push
     what they meet, with their true velocity. Without velocity they would push only by sinking in: a cart at 1 m/s by
@@ -70,7 +70,7 @@ class Actors:
         self._posed_at: int | None = None
         self._still_since: int | None = None
         self._until_asleep = math.ceil(2 * engine.UNTIL_ASLEEP * tick_rate)
-        self._undisturbed_until = -1
+        self._undisturbed: dict[int, int] = {}
         self.pushing = False
         """Whether scripted bodies might push pushable ones."""
 
@@ -167,11 +167,11 @@ class Actors:
         What something only comes near to wakes in the engine and creeps by less than a micrometre until it is touched.
         """
         still = self._still_since is not None and tick - self._still_since > self._until_asleep
-        return still and tick <= self._undisturbed_until
+        return still and tick <= min(self._undisturbed.values())
 
-    def undisturbed(self, until: int) -> None:
-        """Nothing else can touch any of these until this tick."""
-        self._undisturbed_until = until
+    def undisturbed(self, by: int, until: int) -> None:
+        """The robot of this number cannot touch any of these until this tick."""
+        self._undisturbed[by] = until
 
     def placed(self, tick: int) -> dict[str, tuple[Body, Pose3]]:
         """Everything and where it is, by name in order."""

@@ -1,6 +1,8 @@
 """How near the robot is to anything, and how long it therefore cannot touch anything."""
 
+import itertools
 import math
+from collections.abc import Callable, Sequence
 
 import pybullet
 
@@ -38,10 +40,12 @@ class Clearance:
         robot: RobotBody,
         base: Base,
         actors: Actors,
+        others: "Callable[[], Sequence[Clearance]]",
         reach: float,
     ) -> None:
-        """`reach` is how far is searched, in metres."""
+        """`others` gives the other robots, as they are measured; `reach` is how far is searched, in metres."""
         self._client, self._rate, self._base, self._actors = client, tick_rate, base, actors
+        self._others = others
         self._limits, (self._radius, self._height) = robot.limits, reach_of(robot.solid)
         self._size = ROUNDED + math.hypot(self._radius, self._height)
         self._proximity = Proximity(static, robot, reach)
@@ -58,7 +62,7 @@ class Clearance:
         """Something was put into or taken out of the world, or set down elsewhere: measure anew."""
         self._distance = 0.0
         self._measured_at, self.no_contact_before = -1, 0
-        self._actors.undisturbed(until=-1)
+        self._actors.undisturbed(self._base.id, until=-1)
         self.enclosed_by: str | None = None
         """The solid that the robot is wholly inside of, where it touches no surface."""
         self.unsure = True
@@ -68,7 +72,7 @@ class Clearance:
         """A push will change the robot's velocity during the step from `tick` on: how it moves now says nothing."""
         self._shaken_at = tick
         self._measured_at, self.no_contact_before = -1, tick
-        self._actors.undisturbed(until=tick)
+        self._actors.undisturbed(self._base.id, until=tick)
 
     def measure(self, tick: int) -> float:
         """The clearance at `tick`, which is now, in metres; the reach where nothing is nearer."""
@@ -84,7 +88,7 @@ class Clearance:
             self._distance = -abs(self._distance)
         free = min(HORIZON, max(0.0, self._distance - TOLERANCE) / self._fastest(tick))
         self.no_contact_before = tick + (math.floor(free * self._rate) if tick != self._shaken_at else 0)
-        self._actors.undisturbed(until=self.no_contact_before)
+        self._actors.undisturbed(self._base.id, until=self.no_contact_before)
         return self._distance
 
     def _search(self, tick: int) -> float:
@@ -94,7 +98,20 @@ class Clearance:
             for link in self._base.hull_links:
                 points = pybullet.getClosestPoints(self._base.id, other, nearest, link, physicsClientId=self._client)
                 nearest = min((point[8] for point in points), default=nearest)
+        for robot in self._others():
+            nearest = min(nearest, self._to_robot(robot, pose.position, nearest))
         return nearest
+
+    def _to_robot(self, robot: "Clearance", place: Vector, within: float) -> float:
+        """Distance in metres to another robot; inf above `within`."""
+        if math.dist(place, robot._base.pose().position) > within + self._size + robot._size:
+            return math.inf
+        pairs = itertools.product(self._base.hull_links, robot._base.hull_links)
+        found = (
+            pybullet.getClosestPoints(self._base.id, robot._base.id, within, *links, physicsClientId=self._client)
+            for links in pairs
+        )
+        return min((point[8] for points in found for point in points), default=math.inf)
 
     def _place(self) -> Vector:
         """A place inside the hull, in the world."""
@@ -107,12 +124,20 @@ class Clearance:
         return self._proximity.name(around[0]) if around else self._actors.around(place, tick)
 
     def _fastest(self, tick: int) -> float:
-        """The greatest speed in m/s at which the robot and anything else can approach each other for a while."""
+        """The greatest speed in m/s at which the robot and anything else can approach each other for a while.
+
+        What another robot hits leaves with up to twice its speed.
+        """
+        others, things = [robot._own_speed() for robot in self._others()], self._actors.top_speed(tick)
+        return self._own_speed() + (2 * max(things, *others) if others else things) + 0.1
+
+    def _own_speed(self) -> float:
+        """The greatest speed in m/s that any part of the robot can have for a while."""
         limits, (linear, angular) = self._limits, self._base.velocity()
         forward = max(limits.linear, limits.reverse or 0.0, limits.lateral or 0.0, math.hypot(*linear))
         turning = max(limits.angular, math.hypot(*angular)) * self._radius
         tipping = math.hypot(*angular[:2]) * self._height
-        return 1.25 * (forward + turning + tipping) + self._actors.top_speed(tick) + 0.1
+        return 1.25 * (forward + turning + tipping)
 
     def owner(self, place: Vector) -> str:
         """The static solid that is touched at a place; remembered by the centimetre, since contacts last."""

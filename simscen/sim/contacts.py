@@ -40,12 +40,19 @@ class Touch:
 
 
 class Motion(NamedTuple):
-    """How the robot moves (base frame's origin, m/s and rad/s along the world's axes), and other bodies (m/s)."""
+    """How a robot moves: its base frame's origin, m/s and rad/s along the world's axes."""
 
     origin: Vector
     linear: Vector
     angular: Vector
+
+
+class Before(NamedTuple):
+    """How everything moved before a step: the robot, other bodies (m/s) and all robots, by the engine's numbers."""
+
+    robot: Motion
     others: Mapping[int, Vector]
+    robots: Mapping[int, Motion]
 
 
 @dataclass
@@ -73,7 +80,7 @@ class Contacts:
         """Whether anything was touched lately."""
         return bool(self._ongoing)
 
-    def note(self, tick: int, touches: list[Touch], before: Motion) -> None:
+    def note(self, tick: int, touches: list[Touch], before: Before) -> None:
         """Take what was touched at `tick`, and how everything moved just before."""
         for touch in touches:
             known = self._ongoing.get(touch.name)
@@ -115,9 +122,12 @@ def inside(name: str, place: Vector) -> Touch:
     return Touch(name, NOBODY, place, (0.0, 0.0, 1.0), 0.0, fixed=True)
 
 
-def _started(tick: int, touch: Touch, before: Motion) -> Event:
-    robot = _at(before, touch.place)
-    others = before.others.get(touch.other, (0.0, 0.0, 0.0))
+def _started(tick: int, touch: Touch, before: Before) -> Event:
+    robot = _at(before.robot, touch.place)
+    if touch.other in before.robots:
+        others = _at(before.robots[touch.other], touch.place)
+    else:
+        others = before.others.get(touch.other, (0.0, 0.0, 0.0))
     approach = -_along(robot, touch.normal)
     return Event(
         tick,

@@ -41,8 +41,11 @@ Frame = tuple[tuple[float, float, float], Pose3]
 Faces = npt.NDArray[np.int32]
 
 
-def connect(tick_rate: int, solver_iterations: int) -> int:
-    """A fresh engine without graphics; every parameter is set, so that no default decides a trajectory."""
+def connect(tick_rate: int, solver_iterations: int, one_by_one: bool = False) -> int:
+    """A fresh engine without graphics; every parameter is set, so that no default decides a trajectory.
+
+    `one_by_one`: what touches nothing in common is solved apart, so that it does not matter what else is in the world.
+    """
     client: int = pybullet.connect(pybullet.DIRECT)
     if client < 0:
         raise RuntimeError("PyBullet has no free client left")
@@ -67,7 +70,7 @@ def connect(tick_rate: int, solver_iterations: int) -> int:
         allowedCcdPenetration=0.04,
         jointFeedbackMode=0,
         constraintSolverType=pybullet.CONSTRAINT_SOLVER_LCP_SI,
-        minimumSolverIslandSize=128,
+        minimumSolverIslandSize=1 if one_by_one else 128,
         reportSolverAnalytics=0,
         enableSAT=0,
         physicsClientId=client,

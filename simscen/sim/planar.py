@@ -53,7 +53,7 @@ class PlanarBase:
                 physicsClientId=client,
             )  # fmt: skip
         for link in self.hull_links:
-            engine.touch(client, self.id, link, engine.HULL, ~(engine.HULL | engine.GROUND))
+            engine.touch(client, self.id, link, engine.HULL, ~engine.GROUND)
         self._mass = body.mass
         self._radius = body.circumscribed_radius
         self.place(pose)

@@ -133,7 +133,7 @@ def _build(client: int, body: RobotBody) -> tuple[int, tuple[int, ...], tuple[in
         physicsClientId=client,
     )
     for link in hull:
-        engine.touch(client, robot, link, engine.HULL, ~(engine.HULL | engine.WHEEL))
+        engine.touch(client, robot, link, engine.HULL, ~engine.WHEEL)
         pybullet.changeDynamics(
             robot, link, lateralFriction=0.0, restitution=0.0, linearDamping=0, angularDamping=0,
             physicsClientId=client,

@@ -16,8 +16,8 @@ from simscen.core.shapes import Box, Solid
 from simscen.core.time import Clock
 from simscen.model.robot import RobotSpec
 from simscen.sensors.build import build_sensors
+from simscen.sim.alone import Alone
 from simscen.sim.embody import robot_body
-from simscen.sim.simulation import Simulation
 from simscen.worlds.meshing import fuse, triangulate
 from simscen.worlds.rays import RayScene
 
@@ -52,7 +52,7 @@ class Rig:
     """A robot in a room with its sensors."""
 
     def __init__(self, spec, seed=1, pose=Pose2(0.5, -0.3, 0.4)):
-        self.simulation = Simulation(ROOM, [], robot_body(spec), pose, triangulate)
+        self.simulation = Alone(ROOM, [], robot_body(spec), pose, triangulate)
         self.sensors = build_sensors(spec, Clock(240), Streams(seed), self.simulation, RayScene(ROOM))
 
     def drive(self, twist, ticks):

@@ -7,8 +7,8 @@ import pytest
 
 from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
+from simscen.sim.alone import Alone
 from simscen.sim.embody import robot_body
-from simscen.sim.simulation import Simulation
 from simscen.worlds.meshing import fuse, triangulate
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -23,7 +23,7 @@ def simulate():
 
     def make(robot="turtlebot", solids=(), bodies=(), pose=Pose2(0.0, 0.0, 0.0), drive=None, **physics):
         body = robot_body(shipped(robot)) if isinstance(robot, str) else robot
-        made.append(Simulation(fuse(solids), bodies, body, pose, triangulate, **physics))
+        made.append(Alone(fuse(solids), bodies, body, pose, triangulate, **physics))
         if drive:
             made[-1].drive(Twist(*drive))
         return made[-1]

@@ -37,7 +37,7 @@ def test_spawned_bodies_are_there_and_removed_ones_are_gone(simulate):
     simulation = simulate()
     simulation.spawn(Body("crate", CRATE, Pose3(1.0, 2.0)))
     assert simulation.object_pose("crate") == Pose3(1.0, 2.0)
-    assert list(simulation.moving()) == ["crate"]
+    assert list(simulation.robot.moving()) == ["crate"]
     simulation.remove("crate")
     simulation.remove("no such thing")
     assert simulation.object_pose("crate") is None
@@ -63,8 +63,8 @@ def test_a_pushed_crate_comes_to_rest_by_friction(simulate):
     import pybullet
 
     simulation = simulate(bodies=[Body("crate", CRATE, Pose3(2.0), mass=10.0)])
-    (number,) = [k for k, name in simulation._names.items() if name == "crate"]
-    pybullet.resetBaseVelocity(number, (1.0, 0, 0), (0, 0, 0), physicsClientId=simulation._client)
+    (number,) = [k for k, name in simulation.robot._names.items() if name == "crate"]
+    pybullet.resetBaseVelocity(number, (1.0, 0, 0), (0, 0, 0), physicsClientId=simulation._scene.client)
     simulation.step(480)
     assert simulation.object_pose("crate").x - 2.0 == pytest.approx(1 / (2 * 0.6 * 9.81), rel=0.15)
 

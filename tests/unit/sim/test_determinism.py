@@ -14,7 +14,7 @@ from simscen.core.geometry import Pose2, Pose3
 from simscen.core.motion import Twist
 from simscen.core.shapes import Body, MotionPath
 from simscen.sim.embody import robot_body
-from simscen.sim.simulation import Simulation
+from simscen.sim.alone import Alone
 from simscen.worlds.meshing import fuse, triangulate
 
 solids = [box(f"box{{k}}", (k * 7 % 11) - 5, (k * 5 % 9) - 4, 0.3, 0.4) for k in range(60)]
@@ -25,7 +25,7 @@ bodies = [
 ]
 if {turned}:
     bodies.reverse()
-simulation = Simulation(fuse(solids), bodies, robot_body(shipped({robot!r})), Pose2(0.1, 0.2, 0.3), triangulate)
+simulation = Alone(fuse(solids), bodies, robot_body(shipped({robot!r})), Pose2(0.1, 0.2, 0.3), triangulate)
 for k in range(60):
     simulation.drive(Twist(0.5, 0.0, 0.4 - 0.02 * k))
     simulation.step(24)

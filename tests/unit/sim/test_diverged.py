@@ -15,8 +15,8 @@ BOX = (box("box", 0, 0, 0.5, 0.5, 0.5),)
 
 def put(simulation, name, place):
     """Let the engine have lost a thing, or the robot ("")."""
-    number = simulation._actors._actors[name].id if name else simulation._base.id
-    pybullet.resetBasePositionAndOrientation(number, place, (0, 0, 0, 1), physicsClientId=simulation._client)
+    number = simulation._scene.actors._actors[name].id if name else simulation.robot.base.id
+    pybullet.resetBasePositionAndOrientation(number, place, (0, 0, 0, 1), physicsClientId=simulation._scene.client)
 
 
 @pytest.mark.parametrize("name", ["box", ""])

@@ -174,9 +174,13 @@ def test_a_push_moves_the_robot_the_way_it_points(simulate):
 def test_a_push_in_free_flight_gives_the_robot_its_impulse(simulate):
     """Half a metre above the ground there is no friction: the change of momentum is the impulse."""
     simulation = simulate("turtlebot")
-    place, turn = pybullet.getBasePositionAndOrientation(simulation._base.id, physicsClientId=simulation._client)
+    place, turn = pybullet.getBasePositionAndOrientation(
+        simulation.robot.base.id, physicsClientId=simulation._scene.client
+    )
     up = (place[0], place[1], place[2] + 0.5)
-    pybullet.resetBasePositionAndOrientation(simulation._base.id, up, turn, physicsClientId=simulation._client)
+    pybullet.resetBasePositionAndOrientation(
+        simulation.robot.base.id, up, turn, physicsClientId=simulation._scene.client
+    )
     simulation.push((0.9, 0.0))
     simulation.step(1)
     assert simulation.base_velocity()[0][0] == pytest.approx(0.9 / 1.8, rel=0.02)
@@ -185,7 +189,9 @@ def test_a_push_in_free_flight_gives_the_robot_its_impulse(simulate):
 def test_physics_that_diverges_ends_the_run_with_the_time(simulate):
     simulation = simulate("turtlebot", [box("wall", 0.5, 0, 0.1, 2)])
     simulation.step(120)
-    pybullet.resetBaseVelocity(simulation._base.id, (math.nan, 0, 0), (0, 0, 0), physicsClientId=simulation._client)
+    pybullet.resetBaseVelocity(
+        simulation.robot.base.id, (math.nan, 0, 0), (0, 0, 0), physicsClientId=simulation._scene.client
+    )
     with pytest.raises(RunError, match=r"simulation diverged at t=0\.5"):
         for _ in range(10):
             simulation.step(6)

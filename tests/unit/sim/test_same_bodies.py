@@ -18,7 +18,7 @@ BEND = ((0.0, 0.0), (4.0, 0.0), (4.0, 1.2), (1.2, 1.2), (1.2, 4.0), (0.0, 4.0))
 
 def pressed(simulation) -> bool:
     """Whether the engine reports a contact of the robot with anything but the ground right now."""
-    return bool(touches(simulation._client, simulation._base.id, simulation._names, lambda _: "", 1.0))
+    return bool(touches(simulation._scene.client, simulation.robot.base.id, simulation.robot._names, lambda _: "", 1.0))
 
 
 def watch(simulation, ticks, every=EVERY):

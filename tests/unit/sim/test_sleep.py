@@ -22,8 +22,8 @@ def run(simulation, ticks, every=6):
 
 def engine_pose(simulation, name):
     """What the engine itself says of a body whose centre of mass is above its origin."""
-    number = simulation._actors._actors[name].id
-    return pybullet.getBasePositionAndOrientation(number, physicsClientId=simulation._client)[0]
+    number = simulation._scene.actors._actors[name].id
+    return pybullet.getBasePositionAndOrientation(number, physicsClientId=simulation._scene.client)[0]
 
 
 def test_what_rests_does_not_creep(simulate):
@@ -40,8 +40,8 @@ def test_what_rolls_slowly_rolls_on(simulate):
     run(simulation, LONG)
     simulation.spawn(Body("other", CRATE, Pose3(-5.0)))  # what is changed wakes everything
     run(simulation, 6)
-    number = simulation._actors._actors["ball"].id
-    pybullet.resetBaseVelocity(number, (0.1, 0, 0), (0, 1.0, 0), physicsClientId=simulation._client)
+    number = simulation._scene.actors._actors["ball"].id
+    pybullet.resetBaseVelocity(number, (0.1, 0, 0), (0, 1.0, 0), physicsClientId=simulation._scene.client)
     run(simulation, LONG)
     assert engine_pose(simulation, "ball")[0] == pytest.approx(2.5, abs=0.02)
 

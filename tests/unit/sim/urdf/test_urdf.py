@@ -13,8 +13,8 @@ from simscen.core.geometry import Pose2, wrap
 from simscen.core.motion import Twist
 from simscen.core.shapes import Box, Mesh
 from simscen.model.robot import RobotSpec
+from simscen.sim.alone import Alone
 from simscen.sim.embody import robot_body
-from simscen.sim.simulation import Simulation
 from simscen.worlds.meshing import fuse, triangulate
 from simscen.worlds.sdf.meshfile import UnusableMesh, read_parts
 
@@ -124,7 +124,7 @@ def test_casters_that_stand_on_the_ground_are_left_to_the_bodys_own(load):
 
 
 def test_it_drives(load):
-    simulation = Simulation(fuse([]), [], load(robot()), Pose2(0, 0, 0), triangulate)
+    simulation = Alone(fuse([]), [], load(robot()), Pose2(0, 0, 0), triangulate)
     simulation.drive(Twist(0.5, 0.0, 0.0))
     simulation.step(240)
     begin = simulation.truth().pose.x
@@ -138,7 +138,7 @@ def test_meshes_are_part_of_the_hull_as_their_convex_hull(load, tmp_path):
     body = load(robot(extra="", geometry='<mesh filename="tetra.stl" scale="0.001 0.001 0.001"/>'))
     (solid,) = (solid for solid in body.hull if solid.name == "base")
     assert solid.shape.vertices.max() == pytest.approx(0.3)
-    simulation = Simulation(fuse([]), [], body, Pose2(0, 0, 0), triangulate)
+    simulation = Alone(fuse([]), [], body, Pose2(0, 0, 0), triangulate)
     simulation.step(10)
     simulation.close()
 
@@ -288,7 +288,7 @@ def test_a_car_is_steered_by_the_wheels_below_upright_joints(load):
     body = load(robot(extra=steering), drive=drive)
     assert [(w.steered, w.driven, round(w.x, 3)) for w in body.wheels] == [
         (False, True, 0.0), (False, True, 0.0), (True, False, 0.4), (True, False, 0.4)]  # fmt: skip
-    simulation = Simulation(fuse([]), [], body, Pose2(0, 0, 0), triangulate)
+    simulation = Alone(fuse([]), [], body, Pose2(0, 0, 0), triangulate)
     simulation.drive(Twist(0.4, 0.0, 0.4))
     simulation.step(720)
     assert simulation.truth().twist == pytest.approx((0.4, 0.0, 0.4), abs=0.02)
@@ -310,7 +310,7 @@ def jackal():
              "turning_scale": 1.6}  # fmt: skip
     limits = {"linear": 2.0, "angular": 4.0, "linear_acceleration": 3.0, "angular_acceleration": 8.0}
     body = robot_body(spec(drive, "jackal.urdf", limits=limits), JACKAL / "jackal.robot.yaml", [JACKAL])
-    simulation = Simulation(fuse([]), [], body, Pose2(0, 0, 0), triangulate)
+    simulation = Alone(fuse([]), [], body, Pose2(0, 0, 0), triangulate)
     yield simulation
     simulation.close()
 

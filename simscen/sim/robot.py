@@ -1,0 +1,187 @@
+"""One robot in a simulation: how it moves, what it touches, and how near it is to anything."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.errors import RunError
+from simscen.core.events import Event
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.motion import Twist
+from simscen.core.shapes import Body, TriangleMesh
+from simscen.core.trace import Truth
+from simscen.sim.actors import Actors
+from simscen.sim.camera import picture
+from simscen.sim.clearance import Clearance
+from simscen.sim.contacts import Before, Contacts, Motion, inside, touches
+from simscen.sim.drives import build
+from simscen.sim.film import Film
+from simscen.sim.lost import lost
+from simscen.sim.robot_body import RobotBody
+from simscen.sim.vehicle import base_twist
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(eq=False)
+class Scene:
+    """What all robots of a simulation share, and the robots by name; `fixed` are the bodies that never move."""
+
+    client: int
+    rate: int
+    fixed: list[int]
+    actors: Actors
+    film: Film
+    robots: dict[str, "Robot"] = field(default_factory=dict)
+    tick: int = 0
+
+    def changed(self) -> None:
+        """Something was put into or taken out of the world, or set down elsewhere."""
+        for robot in self.robots.values():
+            robot.changed()
+
+
+class Robot:
+    """A robot: it can be driven and looked at; to the others it is a thing that moves."""
+
+    def __init__(
+        self, name: str, scene: Scene, static: TriangleMesh, body: RobotBody, pose: Pose2, period: float, reach: float
+    ) -> None:
+        """Set down at `pose`; its firmware runs every `period` seconds, clearance is searched within `reach` metres."""
+        self.name, self._scene = name, scene
+        self.base, self._drive = build(scene.client, body, pose, period)
+        self.shape = Body(name, body.solid, Pose3.planar(pose), body.mass)
+        self._contacts = Contacts(scene.rate)
+        self._clearance = Clearance(
+            scene.client, scene.rate, static, body, self.base, scene.actors, self._others, reach
+        )
+        self._names: dict[int, str | None] = {}
+
+    def _others(self) -> "list[Clearance]":
+        """How near the other robots are, as they see it."""
+        return [robot._clearance for robot in self._scene.robots.values() if robot is not self]
+
+    def drive(self, command: Twist) -> None:
+        """Command a velocity in the base frame; the base follows within its limits."""
+        self._drive.command(command)
+
+    def truth(self) -> Truth:
+        """The robot as it really is. Raises RunError when the physics has lost it or anything else."""
+        scene, pose, velocity = self._scene, self.base.pose(), self.base.velocity()
+        who = f'robot "{self.name}"' if self.name else "the robot"
+        trouble = lost(who, *pose, *velocity[0], *velocity[1]) or scene.actors.lost(scene.tick)
+        if trouble is not None:
+            raise RunError("diverged", f"simulation diverged at t={scene.tick / scene.rate:.3f} s: {trouble}")
+        clearance, objects = self._clearance.measure(scene.tick), self.objects()
+        if self._contacts.last == scene.tick:
+            clearance = min(clearance, 0.0)  # surfaces that press on each other may be a hair apart
+        return Truth(pose, base_twist(pose, velocity), clearance, objects)
+
+    def collisions(self) -> tuple[Event, ...]:
+        """collision.started and collision.ended since last asked.
+
+        `robot_caused` says whether the robot itself moved towards what it hit, rather than being hit.
+        """
+        return self._contacts.take()
+
+    def objects(self) -> Mapping[str, Pose3]:
+        """Where everything is that may move, other robots with it."""
+        poses = self._scene.actors.poses(self._scene.tick)
+        if len(self._scene.robots) == 1:
+            return poses
+        return {
+            **poses,
+            **{robot.name: robot.base.pose() for robot in self._scene.robots.values() if robot is not self},
+        }
+
+    def moving(self) -> Mapping[str, tuple[Body, Pose3]]:
+        """The same with their bodies: what a scene of rays needs."""
+        placed = self._scene.actors.placed(self._scene.tick)
+        others = (robot for robot in self._scene.robots.values() if robot is not self)
+        return {**placed, **{robot.name: (robot.shape, robot.base.pose()) for robot in others}}
+
+    def base_pose(self) -> Pose3:
+        """The robot's base frame in the world."""
+        return self.base.pose()
+
+    def base_velocity(self) -> tuple[Vector, Vector]:
+        """Linear (m/s) and angular (rad/s) velocity of the base frame along the world's axes."""
+        return self.base.velocity()
+
+    def base_twist(self) -> Twist:
+        """The robot's velocity in its own frame."""
+        return base_twist(self.base.pose(), self.base.velocity())
+
+    def encoders(self) -> tuple[float, ...]:
+        """What the drive has rolled so far; see `drives.Drive.encoders`."""
+        return self._drive.encoders()
+
+    def touching(self) -> bool:
+        """Whether the hull touches anything but the ground."""
+        return self._contacts.touching
+
+    def image(
+        self, mount: Pose3, width: int, height: int, field_of_view: float, far: float
+    ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float32]]:
+        """What a camera at `mount` in the base frame sees; see `camera.picture`."""
+        self._scene.actors.show(self._scene.tick)
+        self._scene.film.set(self.moving())
+        return picture(self._scene.client, self.base.pose().compose(mount), width, height, field_of_view, far)
+
+    def place(self, pose: Pose2) -> None:
+        """Set it down somewhere else, at rest."""
+        self.settled(pose)
+        self._scene.changed()
+
+    def push(self, impulse: tuple[float, float]) -> None:
+        """Push it during the next tick: an impulse in N s in the world frame, at its centre of mass."""
+        self.base.push(impulse, 1 / self._scene.rate)
+        for robot in self._scene.robots.values():
+            robot._clearance.shaken(self._scene.tick)
+
+    # what the simulation tells it
+
+    def settled(self, pose: Pose2) -> None:
+        """It stands at `pose`, at rest."""
+        self.base.place(pose)
+        self._drive.rest()
+
+    def advance(self) -> None:
+        """One period of the firmware's loop."""
+        self._drive.advance()
+
+    def changed(self) -> None:
+        """Something was put into or taken out of the world, or set down elsewhere."""
+        scene = self._scene
+        others = {robot.base.id: robot.name for robot in scene.robots.values() if robot is not self}
+        self._names = {**dict.fromkeys(scene.fixed), **scene.actors.ids(), **others}
+        self._clearance.forget()
+
+    @property
+    def calm_until(self) -> int:
+        """The tick until which it cannot touch anything; -1 where a contact is open, and has to end in time."""
+        return -1 if self._contacts.touching else self._clearance.no_contact_before
+
+    def look(self) -> Motion:
+        """Before a step in which something might touch something: see what is near; how it moves."""
+        tick, clearance = self._scene.tick, self._clearance
+        if clearance.unsure or (tick >= clearance.no_contact_before and not self._contacts.touching):
+            clearance.measure(tick)
+        return Motion(self.base.pose().position, *self.base.velocity())
+
+    def feel(self, before: Before) -> None:
+        """After that step: note what is touched."""
+        tick, clearance = self._scene.tick, self._clearance
+        if not self._contacts.touching and tick <= clearance.no_contact_before:
+            return
+        touched = touches(self._scene.client, self.base.id, self._names, clearance.owner, 1 / self._scene.rate)
+        around = clearance.enclosed_by
+        if around is not None and around not in {touch.name for touch in touched}:
+            touched.append(inside(around, before.robot.origin))
+        self._contacts.note(tick, touched, before)
+
+    def close(self) -> None:
+        """Give back what it has of engines of its own."""
+        self._clearance.close()
