@@ -9,7 +9,8 @@ class Disturbance:
     """An event or a fault as the scenario orders it.
 
     `when` is its trigger as written, "" for a fault from the start. `required` says that the run fails unless it
-    happens. `line` is where the entry stands in the scenario's own file; 0 = unknown.
+    happens. `line` is where the entry stands in the scenario's own file; 0 = unknown. `after` is the number, among the
+    events, of the one after which it is waited for: it is a step of a story.
     """
 
     name: str
@@ -17,10 +18,13 @@ class Disturbance:
     when: str = ""
     required: bool = True
     line: int = 0
+    after: int | None = None
 
     @property
     def trigger(self) -> str:
         """The trigger in words: "when time: 10 s"."""
+        if self.after is not None:
+            return f"then when {self.when}" if self.when else "then at once"
         return f"when {self.when}" if self.when else "from the start"
 
 

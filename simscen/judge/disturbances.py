@@ -22,7 +22,7 @@ WHAT = "disturbance did not happen"
 def happenings(trace: Trace, case: Case) -> tuple[Happening, ...]:
     """What became of each disturbance of the scenario, in its order: events, then faults."""
     return tuple(
-        _event(trace, ordered, entry) if ordered.kind == "event" else _fault(trace, ordered, entry)
+        _event(trace, case, ordered, entry) if ordered.kind == "event" else _fault(trace, ordered, entry)
         for entry, ordered in _numbered(case.disturbances)
     )
 
@@ -32,10 +32,11 @@ def missing(
 ) -> tuple[tuple[Verdict, int], ...]:
     """A verdict for each required disturbance that did not happen, and the line it is written in.
 
-    It is inconclusive where the log was cut off: it might have happened later. An id that one of the `others` has, or
+    It is inconclusive where the log was cut off: it might have happened later. Of a story the step that was waited for
+    answers for those after it. An id that one of the `others` has, or
     one before it, gets a number.
     """
-    lacking = [one for one in happened if one.missing]
+    lacking = [one for one in happened if one.missing and not _excused(one, happened)]
     seen = Counter(verdict.id for verdict in others)
     found = []
     for one in lacking:
@@ -44,6 +45,15 @@ def missing(
         unique = name if seen[name] == 1 else f"{name}#{seen[name]}"
         found.append((Verdict(DISTURBANCE, unique, "fail", (_finding(trace, one),)), one.ordered.line))
     return tuple(found)
+
+
+def _excused(one: Happening, happened: Sequence[Happening]) -> bool:
+    """Whether it never had its turn in its story, and the step that it waited for has a verdict of its own."""
+    after = one.ordered.after
+    if after is None or one.fired:
+        return False
+    before = [other for other in happened if other.ordered.kind == "event"][after]
+    return not before.fired and (before.missing or _excused(before, happened))
 
 
 def _numbered(ordered: Sequence[Disturbance]) -> Iterator[tuple[int, Disturbance]]:
@@ -66,13 +76,13 @@ def _of_entry(trace: Trace, kind: EventKind, entry: int) -> list[Event]:
     return [event for event in trace.of_kind(kind) if event.data.get("entry") == entry]
 
 
-def _event(trace: Trace, ordered: Disturbance, entry: int) -> Happening:
+def _event(trace: Trace, case: Case, ordered: Disturbance, entry: int) -> Happening:
     """Each of its actions has to have changed something at least once, and the run to have gone on after that."""
     started = _of_entry(trace, EventKind.EVENT_STARTED, entry)
     fired = tuple(event.tick for event in started)
     ended = _of_entry(trace, EventKind.EVENT_ENDED, entry)
     if not started:
-        return Happening(ordered, (), False, _never(trace))
+        return Happening(ordered, (), False, _waited(trace, case, ordered) + _never(trace))
     in_time = [event for event in ended if event.tick < trace.end]
     if not in_time:
         return Happening(ordered, fired, False, _too_late(trace), fired[0])
@@ -80,9 +90,25 @@ def _event(trace: Trace, ordered: Disturbance, entry: int) -> Happening:
     for number in range(len(told[0])):
         if not any(effects[number][0] for effects in told):
             return Happening(ordered, fired, False, told[0][number][1], in_time[0].tick)
+    if not told[0]:
+        return Happening(ordered, fired, True, "as was waited for", in_time[0].tick)
     first = next(k for k, effects in enumerate(told) if any(did for did, _ in effects))
     what = "; ".join(what for did, what in told[first] if did)
     return Happening(ordered, fired, True, what, in_time[first].tick)
+
+
+def _waited(trace: Trace, case: Case, ordered: Disturbance) -> str:
+    """Of a step of a story that never came: since when it was waited for, or which one was waited for instead."""
+    if ordered.after is None:
+        return ""
+    events = [one for one in case.disturbances if one.kind == "event"]
+    waiting = events[ordered.after]
+    begun = _of_entry(trace, EventKind.EVENT_STARTED, ordered.after)
+    if begun:
+        return f"it was waited for from t = {trace.seconds(begun[0].tick):.2f} s, when {waiting.name} had happened; "
+    while waiting.after is not None and not _of_entry(trace, EventKind.EVENT_STARTED, waiting.after):
+        waiting = events[waiting.after]
+    return f"its turn never came, as {waiting.name} was still waited for; "
 
 
 def _effects(ended: Event) -> list[tuple[bool, str]]:

@@ -115,17 +115,19 @@ def _article(noun: str) -> str:
 
 
 def _twice_named(loaded: LoadedScenario) -> Iterator[Problem]:
-    lists: dict[str, list[str | None]] = {
-        "goals": [goal.name for goal in loaded.spec.goals],
-        "events": [event.name for event in loaded.spec.events],
-        "faults": [fault.name for fault in loaded.spec.faults],
+    lists: dict[str, list[tuple[tuple[Key, ...], str | None]]] = {
+        "goal": [(("goals", k), goal.name) for k, goal in enumerate(loaded.spec.goals)],
+        "event": [(step.keys, step.entry.name) for step in loaded.spec.steps],
+        "fault": [(("faults", k), fault.name) for k, fault in enumerate(loaded.spec.faults)],
     }
-    for key, names in lists.items():
-        for index, name in enumerate(names):
-            if name is not None and name in names[:index]:
-                first = loaded.place_of(key, names.index(name), "name")
-                message = f"{key[:-1]} {quoted(name)} is there already (first at {first.line}:{first.col})"
-                yield loaded.problem((key, index, "name"), "SC033", message, "give it another name")
+    for what, named in lists.items():
+        seen: dict[str, tuple[Key, ...]] = {}
+        for keys, name in named:
+            if name is not None and name in seen:
+                first = loaded.place_of(*seen[name], "name")
+                message = f"{what} {quoted(name)} is there already (first at {first.line}:{first.col})"
+                yield loaded.problem((*keys, "name"), "SC033", message, "give it another name")
+            seen.setdefault(name or "", keys)
     yield from _goals_sent_twice(loaded)
     for index, fault in enumerate(loaded.spec.faults):
         if fault.name is not None and fault.name in event_names(loaded):
@@ -135,15 +137,12 @@ def _twice_named(loaded: LoadedScenario) -> Iterator[Problem]:
 
 def _goals_sent_twice(loaded: LoadedScenario) -> Iterator[Problem]:
     taken = own_goal_names(loaded)
-    for index, event in enumerate(loaded.spec.events):
-        for number, action in enumerate(event.actions):
-            name = getattr(action.chosen, "name", "") if action.kind == "new_goal" else ""
-            if name in taken:
-                several = (number,) if isinstance(event.do, list) else ()
-                keys = ("events", index, "do", *several, "new_goal", "name")
-                message = f"a goal is called {quoted(name)} already: criteria could not tell them apart"
-                yield loaded.problem(keys, "SC033", message, "give it another name")
-            taken += [name] if name else []
+    for keys, action in (placed for step in loaded.spec.steps for placed in step.placed()):
+        name = getattr(action.chosen, "name", "") if action.kind == "new_goal" else ""
+        if name in taken:
+            message = f"a goal is called {quoted(name)} already: criteria could not tell them apart"
+            yield loaded.problem((*keys, "new_goal", "name"), "SC033", message, "give it another name")
+        taken += [name] if name else []
 
 
 def _uneven_rates(loaded: LoadedScenario) -> Iterator[Problem]:

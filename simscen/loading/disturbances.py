@@ -6,19 +6,18 @@ import yaml
 
 from simscen.core.disturbance import Disturbance
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.names import event_names
 from simscen.loading.tree import Key, at
 
 
 def disturbances_of(loaded: LoadedScenario) -> tuple[Disturbance, ...]:
-    """Events, then faults, each in the order of the scenario."""
+    """Events, each with the steps of its story after it, then faults, in the order of the scenario."""
     return (*_events(loaded), *_faults(loaded))
 
 
 def _events(loaded: LoadedScenario) -> Iterator[Disturbance]:
-    for index, (name, entry) in enumerate(zip(event_names(loaded), loaded.spec.events, strict=True)):
-        keys = ("events", index)
-        yield Disturbance(name, "event", _written(loaded, *keys, "when"), entry.required, _line(loaded, *keys))
+    for step in loaded.spec.steps:
+        when = "" if step.when is None else _written(loaded, *step.keys, "when")
+        yield Disturbance(step.name, "event", when, step.required, _line(loaded, *step.keys), step.after)
 
 
 def _faults(loaded: LoadedScenario) -> Iterator[Disturbance]:

@@ -45,8 +45,8 @@ def own_goal_names(loaded: LoadedScenario) -> list[str]:
 
 
 def event_names(loaded: LoadedScenario) -> list[str]:
-    """Names as written, or event-1, event-2, …"""
-    return [event.name or f"event-{number}" for number, event in enumerate(loaded.spec.events, start=1)]
+    """Names as written, or event-1, event-2, …; steps of stories after their event."""
+    return [step.name for step in loaded.spec.steps]
 
 
 def _of_files(loaded: LoadedScenario) -> Names:
@@ -75,7 +75,7 @@ def _of_world(loaded: LoadedScenario, world: World) -> Names:
 
 def _made(loaded: LoadedScenario, kind: str) -> list[str]:
     """The names that actions of one kind give to what they bring."""
-    actions = [action for event in loaded.spec.events for action in event.actions]
+    actions = [action for step in loaded.spec.steps for action in step.actions]
     return [str(getattr(action.chosen, "name", "")) for action in actions if action.kind == kind]
 
 

@@ -27,7 +27,7 @@ from simscen.spec.references import Refers
 
 if TYPE_CHECKING:
     from simscen.criteria.measure import AnyMeasure
-    from simscen.model.disturbance import EventEntry, FaultEntry
+    from simscen.model.disturbance import EventEntry, FaultEntry, Step
     from simscen.triggers.trigger import Trigger
 else:
     AnyMeasure = Annotated[Spec, OnDemand("simscen.criteria.measure", "AnyMeasure")]
@@ -151,9 +151,16 @@ class ScenarioSpec(Spec):
     """What is measured besides what every run reports; each is a type that an installed package adds."""
 
     @property
+    def steps(self) -> "list[Step]":
+        """The events, each with the steps of its story after it: everything that is to happen to the world."""
+        from simscen.model.disturbance import steps_of
+
+        return steps_of(self.events)
+
+    @property
     def triggers(self) -> "list[Trigger]":
         """What events and faults wait for, in their order."""
-        waiting = [*(event.when for event in self.events), *(fault.when for fault in self.faults)]
+        waiting = [*(step.when for step in self.steps), *(fault.when for fault in self.faults)]
         return [trigger for trigger in waiting if trigger is not None]
 
 

@@ -91,7 +91,7 @@ def assemble(prepared: Prepared, seed: int, printed: Path | None = None) -> Rig:
         timetable=Timetable((truth_period, control_period, *senses.periods)),
         truth_period=truth_period,
     )
-    return Rig(simulation, (agent,), (Director(spec.events, spec.faults, streams, stage, faults),), truth_period)
+    return Rig(simulation, (agent,), (Director(spec.steps, spec.faults, streams, stage, faults),), truth_period)
 
 
 class LiveRays:

@@ -1,51 +1,63 @@
 """The director watches the triggers of a scenario and lets its events and faults happen."""
 
+from typing import cast
+
 from simscen.core.chance import Streams
 from simscen.core.events import Event, EventKind, Value
-from simscen.model.disturbance import EventEntry, FaultEntry
+from simscen.core.stage import Situation
+from simscen.model.disturbance import FaultEntry, Step
 from simscen.run.faultrig import FaultRig
 from simscen.run.firing import Firing
 from simscen.run.live import LiveStage
+from simscen.run.since import Since
 from simscen.run.streamnames import stream_names
 from simscen.triggers.time import Time
 from simscen.triggers.trigger import Trigger
 
-_AT_THE_START = Trigger(time=Time(0.0))
+_AT_ONCE = Trigger(time=Time(0.0))
 
 
 class Director:
-    """Directs one run: first events, then faults, each in the order of the scenario."""
+    """Directs one run: first events and what follows them, then faults, each in the order of the scenario."""
 
     def __init__(
-        self, events: list[EventEntry], faults: list[FaultEntry], streams: Streams, stage: LiveStage, rig: FaultRig
+        self, steps: list[Step], faults: list[FaultEntry], streams: Streams, stage: LiveStage, rig: FaultRig
     ) -> None:
         self._stage, self._rig, self._faults = stage, rig, faults
-        self._events = [
-            (entry.name or f"event-{number}", entry, Firing(entry.when, streams.generator(f"event{stream}")))
-            for number, (entry, stream) in enumerate(zip(events, stream_names(events), strict=True), start=1)
+        self._steps = [
+            (step, Firing(step.when or _AT_ONCE, streams.generator(f"event{stream}")))
+            for step, stream in zip(steps, stream_names([step.entry for step in steps]), strict=True)
         ]
+        self._views: dict[int, Situation] = {k: stage for k, step in enumerate(steps) if step.after is None}
         self._starts = [
-            Firing(entry.when or _AT_THE_START, streams.generator(f"fault-start{stream}"))
+            Firing(entry.when or _AT_ONCE, streams.generator(f"fault-start{stream}"))
             for entry, stream in zip(faults, stream_names(faults), strict=True)
         ]
         self._ends: dict[int, int | None] = {}
 
     def direct(self) -> None:
         """Let happen what is due at this beat; the stage keeps the record."""
-        for number, (name, entry, firing) in enumerate(self._events):
-            for _ in range(0 if firing.spent else firing.fires(self._stage)):
-                self._perform(number, name, entry)
+        for number, (step, firing) in enumerate(self._steps):
+            view = self._views.get(number)
+            for _ in range(0 if view is None or firing.spent else firing.fires(view)):
+                self._perform(number, step)
+                self._go_on(number)
         self._end_faults()
         for index, firing in enumerate(self._starts):
             if not firing.spent and firing.fires(self._stage) and index not in self._ends:
                 self._begin_fault(index)
 
-    def _perform(self, number: int, name: str, entry: EventEntry) -> None:
-        kinds: list[Value] = [action.kind for action in entry.actions]
-        self._stage.note(Event(0, EventKind.EVENT_STARTED, name, {"entry": number, "actions": kinds}))
-        effects = [action.perform(self._stage) for action in entry.actions]
+    def _perform(self, number: int, step: Step) -> None:
+        kinds: list[Value] = [action.kind for action in step.actions]
+        self._stage.note(Event(0, EventKind.EVENT_STARTED, step.name, {"entry": number, "actions": kinds}))
+        effects = [action.perform(self._stage) for action in step.actions]
         told: list[Value] = [{"happened": effect.happened, "what": effect.what} for effect in effects]
-        self._stage.note(Event(0, EventKind.EVENT_ENDED, name, {"entry": number, "effects": told}))
+        self._stage.note(Event(0, EventKind.EVENT_ENDED, step.name, {"entry": number, "effects": told}))
+
+    def _go_on(self, number: int) -> None:
+        """From now on the step of the story that comes after this one is waited for."""
+        if number + 1 < len(self._steps) and self._steps[number + 1][0].after == number:
+            self._views[number + 1] = cast(Situation, Since(self._stage))
 
     def _begin_fault(self, index: int) -> None:
         entry = self._faults[index]

@@ -23,18 +23,16 @@ def sent_goals(spec: ScenarioSpec) -> dict[tuple[str | int, ...], Goal]:
     """The goals that events send, by where each is written, in the order of the file."""
     checker = spec.stack.goal_checker
     found: dict[tuple[str | int, ...], Goal] = {}
-    for index, event in enumerate(spec.events):
-        for number, action in enumerate(event.actions):
-            if isinstance(sent := action.chosen, NewGoal):
-                several = (number,) if isinstance(event.do, list) else ()
-                keys = ("events", index, "do", *several, "new_goal")
-                found[keys] = Goal(
-                    name=sent.name,
-                    pose=sent.pose.pose,
-                    xy_tolerance=sent.xy_tolerance or checker.xy_goal_tolerance,
-                    yaw_tolerance=sent.yaw_tolerance or checker.yaw_goal_tolerance,
-                    timeout=sent.timeout,
-                )
+    for keys, action in (placed for step in spec.steps for placed in step.placed()):
+        if isinstance(sent := action.chosen, NewGoal):
+            where = (*keys, "new_goal")
+            found[where] = Goal(
+                name=sent.name,
+                pose=sent.pose.pose,
+                xy_tolerance=sent.xy_tolerance or checker.xy_goal_tolerance,
+                yaw_tolerance=sent.yaw_tolerance or checker.yaw_goal_tolerance,
+                timeout=sent.timeout,
+            )
     return found
 
 

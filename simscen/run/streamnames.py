@@ -8,11 +8,11 @@ from typing import Any
 from pydantic import BaseModel, RootModel
 
 from simscen.loading.sense.specwalk import below
-from simscen.model.disturbance import EventEntry, FaultEntry
+from simscen.model.disturbance import EventEntry, FaultEntry, StepEntry
 from simscen.spec.choice import Choice
 
 
-def stream_names(entries: Sequence[EventEntry | FaultEntry]) -> list[str]:
+def stream_names(entries: Sequence[EventEntry | StepEntry | FaultEntry]) -> list[str]:
     """A name for the chance of each entry that neither other entries nor the order of the list can change.
 
     An entry with a name draws from the stream of its name, whatever else is edited in it. One without draws from the

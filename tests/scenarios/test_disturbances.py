@@ -128,3 +128,34 @@ CHANCE = "events: [{{name: maybe, when: {{time: 1 s, probability: {}}}, do: {{pu
 def test_what_was_not_drawn_did_not_happen(probability, required, outcome, tmp_path):
     result, _ = run(CHANCE.format(probability, required), tmp_path)
     assert result.outcome is outcome
+
+
+STORIES = """\
+events:
+  - name: a story
+    when: {time: 1 s}
+    do: {push: {impulse: [0, 0.01]}}
+    then:
+      - {when: {time: 500 ms}}
+      - {when: {collision: {}}, do: {remove: {name: bin}}}
+      - {name: the end, when: {time: 1 s}, do: {open: {name: hatch}}}
+      - {name: may stay away, do: {close: {name: hatch}}, required: false}
+  - name: another
+    when: {time: 2 s}
+    required: false
+    then:
+      - {name: never, when: {collision: {}}}
+      - {name: nor this, do: {push: {impulse: [1, 0]}}}
+      - {name: but this should, do: {push: {impulse: [1, 0]}}, required: true}
+"""
+
+
+def test_of_a_story_that_stops_the_step_that_was_waited_for_fails_the_run(tmp_path: Path) -> None:
+    result, told = run(STORIES, tmp_path)
+    assert complaints(result) == {"a story then 2": 18, "but this should": 27}
+    since = "it was waited for from t = 1.50 s, when a story then 1 had happened; it never began"
+    assert told["a story then 1"] == "+ as was waited for"
+    assert told["a story then 2"].startswith(f"- {since}")
+    assert told["the end"].startswith("- its turn never came, as a story then 2 was still waited for; it never began")
+    assert told["but this should"].startswith("- its turn never came, as never was still waited for")
+    assert result.outcome is Outcome.FAILED

@@ -134,7 +134,7 @@ def _twice(loaded: LoadedScenario) -> Iterator[Problem]:
     spec = loaded.spec
     lists: list[tuple[Keys, list[Any]]] = [
         (("pass",), [(entry.kind, entry.chosen) for entry in spec.pass_]),
-        (("events",), [(event.when, event.do) for event in spec.events]),
+        (("events",), [(event.when, event.do, event.then) for event in spec.events]),
         (("faults",), [(f.sensor, f.kind, f.chosen, f.when, f.for_) for f in spec.faults]),
         (("tags",), list(spec.tags)),
         (("stack", "keepout"), list(spec.stack.keepout)),
@@ -183,12 +183,11 @@ def _idle_stack(loaded: LoadedScenario) -> Iterator[Problem]:
 
 def _idle_actions(loaded: LoadedScenario) -> Iterator[Problem]:
     """Pushes of nothing, and doors that are as they shall be."""
-    done = [(k, event, action) for k, event in enumerate(loaded.spec.events) for action in event.actions]
-    kinds = {(action.kind, getattr(action.chosen, "name", "")) for _, _, action in done}
-    unknown = any(action.may() for _, _, action in done)
+    done = [placed for step in loaded.spec.steps for placed in step.placed()]
+    kinds = {(action.kind, getattr(action.chosen, "name", "")) for _, action in done}
+    unknown = any(action.may() for _, action in done)
     shut = {door.name: door.closed for door in loaded.world.spec.doors} if loaded.world.spec else {}
-    for index, event, action in done:
-        keys: Keys = ("events", index, "do", *((event.actions.index(action),) if isinstance(event.do, list) else ()))
+    for keys, action in done:
         name = getattr(action.chosen, "name", "")
         if action.kind == "push" and not any(getattr(action.chosen, "impulse", ())):
             yield loaded.problem((*keys, "push", "impulse"), "SC055", "a push of 0 N s changes nothing")

@@ -7,9 +7,9 @@ from typing import Any
 
 from simscen.core.problems import Problem
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.names import event_names, own_goal_names
+from simscen.loading.names import own_goal_names
 from simscen.loading.tree import Key
-from simscen.model.disturbance import EventEntry
+from simscen.model.disturbance import Step
 from simscen.model.robot import Holonomic, RobotSpec
 from simscen.model.stack import StackSpec
 from simscen.triggers.trigger import Test, Trigger
@@ -32,7 +32,7 @@ def never_happens(loaded: LoadedScenario) -> Iterator[Problem]:
     while (alive := run.possible) != run.alive:
         run = replace(run, alive=alive)
     triggers: list[tuple[Keys, Trigger | None, str, bool]] = [
-        *((("events", k, "when"), entry.when, name, entry.required) for k, (entry, name) in enumerate(run.events)),
+        *(((*step.keys, "when"), step.when, step.name, step.required) for step in run.steps if run.has_its_turn(step)),
         *((("faults", k, "when"), e.when, e.label, e.required) for k, e in enumerate(loaded.spec.faults)),
     ]
     for keys, trigger, name, required in triggers:
@@ -44,6 +44,26 @@ def never_happens(loaded: LoadedScenario) -> Iterator[Problem]:
         elif trigger.times > 1 and trigger.edge == "rising" and _latched(trigger):
             message = f"`{name}` happens once, not {trigger.times} times: its condition stays true from then on"
             yield replace(loaded.problem((*keys, "times"), "SC052", message), severity="warning")
+    yield from _over_before(run)
+
+
+def _over_before(run: "_Run") -> Iterator[Problem]:
+    """Steps of stories that wait for what happened before they are waited for, and for stories without time."""
+    limit, needed = run.loaded.spec.time_limit, dict[int, float]()
+    for number, step in enumerate(run.steps):
+        own = 0.0 if step.when is None or step.when.edge == "falling" else step.when.delay + _earliest(step.when)
+        needed[number] = own + (0.0 if step.after is None else needed[step.after])
+        if step.after is None or not run.has_its_turn(step) or step.when is None:
+            continue
+        if needed[number] >= limit > own and needed[step.after] < limit:
+            message = f"its story takes {needed[number]:g} s at least, and the run's time limit is {limit:g} s"
+            problem = run.loaded.problem((*step.keys, "when"), "SC050", f"`{step.name}` can never happen: {message}")
+            yield problem if step.required else replace(problem, severity="warning")
+        for part in step.when.parts():
+            name = getattr(part.event, "name", None)
+            if name in run.before(step):
+                message = f"`{step.name}` waits for `{name}`, which has happened before: a step waits for what comes"
+                yield run.loaded.problem((*step.keys, "when"), "SC050", message)
 
 
 @dataclass(frozen=True)
@@ -54,14 +74,24 @@ class _Run:
     alive: frozenset[str]
 
     @cached_property
-    def events(self) -> list[tuple[EventEntry, str]]:
-        return list(zip(self.loaded.spec.events, event_names(self.loaded), strict=True))
+    def steps(self) -> list[Step]:
+        return self.loaded.spec.steps
+
+    def has_its_turn(self, step: Step) -> bool:
+        """Whether the step before it in its story may happen."""
+        return step.after is None or self.steps[step.after].name in self.alive
+
+    def before(self, step: Step) -> frozenset[str]:
+        """The names of the steps before it in its story."""
+        if step.after is None:
+            return frozenset()
+        return self.before(self.steps[step.after]) | {self.steps[step.after].name}
 
     @property
     def possible(self) -> frozenset[str]:
         """The events and faults that may happen once those that are alive may; ever more, up to a fixed point."""
         orders = [
-            *((entry.when, name) for entry, name in self.events),
+            *((step.when, step.name) for step in self.steps if self.has_its_turn(step)),
             *((fault.when, fault.label) for fault in self.loaded.spec.faults),
         ]
         return frozenset(name for when, name in orders if when is None or self.never(when, ()) is None)
@@ -101,16 +131,18 @@ class _Run:
 
     def does(self, *kinds: str) -> bool:
         """Whether an event that may happen does, or may do, any of these."""
-        return any(action.may(*kinds) for e, name in self.events if name in self.alive for action in e.actions)
+        return any(action.may(*kinds) for step in self.steps if step.name in self.alive for action in step.actions)
 
     def sent(self, goal: str | None) -> int:
         """How many goals of a name (or at all) the robot can be sent."""
         own = [name for name in own_goal_names(self.loaded) if goal in (None, name)]
         more = sum(
-            entry.when.times
-            for entry, name in self.events
-            for action in entry.actions
-            if name in self.alive and action.kind == "new_goal" and goal in (None, getattr(action.chosen, "name", ""))
+            1 if step.when is None else step.when.times
+            for step in self.steps
+            for action in step.actions
+            if step.name in self.alive
+            and action.kind == "new_goal"
+            and goal in (None, getattr(action.chosen, "name", ""))
         )
         return len(own) + more
 
@@ -168,7 +200,7 @@ class _Run:
         if event.name not in self.alive:
             return f"it waits for `{event.name}`, which never does"
         lasting = [fault for fault in self.loaded.spec.faults if fault.label == event.name and fault.for_ is None]
-        if event.status == "ended" and lasting and event.name not in [name for _, name in self.events]:
+        if event.status == "ended" and lasting and event.name not in [step.name for step in self.steps]:
             return f"it waits for the end of fault `{event.name}`, which has no `for` and lasts to the end of the run"
         return None
 

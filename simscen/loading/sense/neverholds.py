@@ -33,7 +33,7 @@ def _without_goals(loaded: LoadedScenario, kind: str, criterion: Any) -> str | N
 
 
 def _result(loaded: LoadedScenario, result: Any) -> str | None:
-    cancels = any(action.may("cancel_goal") for event in loaded.spec.events for action in event.actions)
+    cancels = any(action.may("cancel_goal") for step in loaded.spec.steps for action in step.actions)
     if result.status == "CANCELED" and not cancels:
         return "no event cancels a goal"
     if result.status == "SUCCEEDED" and result.error_code not in (None, NONE):

@@ -80,7 +80,8 @@ def _told(
 def _spawns(scene: Scene) -> Iterator[tuple[Keys, Problem]]:
     for keys, _, action in scene.actions:
         if isinstance(action, Spawn):
-            when = scene.loaded.spec.events[int(keys[1])].when
+            first = keys[2] == "do"  # a step of a story comes later, and its time counts from the one before it
+            when = scene.loaded.spec.events[int(keys[1])].when if first else None
             where = _buried(scene, action) or _on_the_robot(scene, action, when)
             if where:
                 message, hint = f"`{action.name}` would appear {where}", "put it somewhere else"
@@ -101,13 +102,13 @@ def _buried(scene: Scene, spawn: Spawn) -> str | None:
     return None
 
 
-def _on_the_robot(scene: Scene, spawn: Spawn, when: Trigger) -> str | None:
+def _on_the_robot(scene: Scene, spawn: Spawn, when: Trigger | None) -> str | None:
     """Whether a thing is put where the robot is at that moment: beside it at any time, or at its start at once."""
     if spawn.z >= scene.size.height:
         return None
     if spawn.ahead is not None:
         corners = placed(_outline(spawn), Pose2(spawn.ahead[0], spawn.ahead[1], spawn.yaw))
-    elif spawn.pose is not None and isinstance(when.time, Time) and when.time.root + when.delay == 0:
+    elif spawn.pose is not None and when and isinstance(when.time, Time) and when.time.root + when.delay == 0:
         corners = placed(_outline(spawn), scene.start.inverse().compose(spawn.pose.pose))
     else:
         return None

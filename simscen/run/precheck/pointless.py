@@ -11,7 +11,6 @@ from simscen.core.problems import Problem
 from simscen.core.world import Polygon
 from simscen.criteria.keepout import Keepout
 from simscen.criteria.localization_error import LocalizationError
-from simscen.loading.names import event_names
 from simscen.loading.sense.neverhappens import FASTER, top_speed
 from simscen.run.precheck.scene import Keys, Scene
 from simscen.run.precheck.unreachable import starts_of
@@ -54,10 +53,7 @@ def _never_there(scene: Scene, ways: Ways) -> Iterator[Problem]:
 def _waits(scene: Scene) -> Iterator[tuple[Keys, str, str, Polygon, Distance]]:
     """Where triggers wait for the robot: keys, event or fault, place in words and as corners, how far it is."""
     spec = scene.loaded.spec
-    listed: list[tuple[Keys, str, Test | None]] = [
-        (("events", k, "when"), name, event.when)
-        for k, (event, name) in enumerate(zip(spec.events, event_names(scene.loaded), strict=True))
-    ]
+    listed: list[tuple[Keys, str, Test | None]] = [((*step.keys, "when"), step.name, step.when) for step in spec.steps]
     listed += [(("faults", k, "when"), fault.label, fault.when) for k, fault in enumerate(spec.faults)]
     for keys, name, test in listed:
         for below, needed in _needed(test, keys) if test is not None else ():

@@ -12,7 +12,6 @@ from simscen.core.shapes import Body, Solid
 from simscen.core.world import Polygon, World
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.tree import Key
-from simscen.model.disturbance import EventEntry
 from simscen.run.goals import goals_of, pose_of, sent_goals
 from simscen.run.precheck.expectation import expects_failure
 from simscen.run.precheck.ground import Ground, ground_of
@@ -93,11 +92,12 @@ class Scene:
     @cached_property
     def actions(self) -> list[tuple[Keys, str, BaseModel]]:
         """Every action of every event: where it stands in the file, its kind, and what it says."""
-        return [found for k, event in enumerate(self.loaded.spec.events) for found in actions_of(k, event)]
+        placed = [found for step in self.loaded.spec.steps for found in step.placed()]
+        return [((*keys, action.kind), action.kind, action.chosen) for keys, action in placed]
 
     def does(self, *kinds: str) -> bool:
         """Whether an event of the scenario does, or may do, any of these; of none: whether one may do anything."""
-        return any(action.may(*kinds) for event in self.loaded.spec.events for action in event.actions)
+        return any(action.may(*kinds) for step in self.loaded.spec.steps for action in step.actions)
 
     def footprint_at(self, pose: Pose2, solids: Iterable[Solid]) -> str | None:
         """Which of the solids the robot's own footprint would overlap, as words that follow "is"; None for none."""
@@ -125,13 +125,6 @@ class Scene:
 
 MOVING = frozenset({"open", "close", "move", "remove"})
 """Actions after which a thing is no longer where it was."""
-
-
-def actions_of(number: int, event: EventEntry) -> Iterator[tuple[Keys, str, BaseModel]]:
-    """The actions of the event with this number."""
-    for k, action in enumerate(event.actions):
-        index: Keys = (k,) if isinstance(event.do, list) else ()
-        yield ("events", number, "do", *index, action.kind), action.kind, action.chosen
 
 
 def _placed(bodies: Iterable[Body]) -> Iterator[Solid]:

@@ -1,0 +1,85 @@
+"""A story is told in its order: each step is waited for from when the one before it has happened."""
+
+import pytest
+
+from simscen.core.events import EventKind
+from simscen.core.geometry import Pose2
+from simscen.run.since import Since
+from simscen.testing.puppetstage import PuppetStage
+from simscen.triggers.trigger import Trigger
+
+PUSH = "do: {push: {impulse: [0, 0.001]}}"
+STORY = f"""\
+events:
+  - name: story
+    when: {{time: 1 s}}
+    then:
+      - {{when: {{time: 500 ms}}, {PUSH}}}
+      - {{name: drives on, when: {{travelled: 30 cm}}}}
+      - {{when: {{speed_above: 0.1 m/s, for: 400 ms, delay: 100 ms}}, {PUSH}}}
+      - {{do: {{new_goal: {{name: back, pose: {{x: 1, y: 1}}}}}}}}
+      - {{name: sent on, when: {{goal: {{status: accepted}}}}}}
+      - {{name: home, when: {{goal: {{status: reached}}}}, {PUSH}, required: false}}
+  - {{name: meanwhile, when: {{event: {{name: drives on}}}}, {PUSH}}}
+faults: [{{sensor: lidar, dropout: {{probability: 1}}, when: {{event: {{name: story then 3}}}}, for: 1 s}}]
+"""
+
+
+@pytest.fixture(scope="module")
+def trace(play):
+    return play(STORY, goals="[{name: desk, pose: {x: 6.5, y: 1, yaw: 0}}]")
+
+
+def ticks(trace, *kinds):
+    return {event.name: event.tick for event in trace.of_kind(*(kinds or (EventKind.EVENT_STARTED,)))}
+
+
+def test_steps_happen_in_their_order_each_counted_from_the_one_before(trace):
+    at = ticks(trace)
+    assert at["story"] == 240
+    assert at["story then 1"] == 360
+    where = {name: trace.truth.at([tick])[0] for name, tick in at.items()}
+    way = where["drives on"][0] - where["story then 1"][0]
+    assert 0.3 <= way < 0.33
+    assert at["story then 3"] == at["drives on"] + 96 + 24  # it drove fast enough already: 0.4 s and the delay
+    assert at["story then 4"] == at["story then 3"]  # nothing to wait for
+
+
+def test_only_what_happens_from_then_on_counts(trace):
+    """The first goal was accepted long before; the step waits for the one that the story sends."""
+    accepted = [event.tick for event in trace.of_kind(EventKind.GOAL_ACCEPTED) if event.name == "back"]
+    at = ticks(trace)
+    assert at["story then 4"] <= accepted[0] < at["sent on"] <= accepted[0] + 12
+    (reached,) = (event.tick for event in trace.of_kind(EventKind.GOAL_REACHED) if event.name == "back")
+    assert reached < at["home"] <= reached + 12
+
+
+def test_events_and_faults_may_wait_for_a_step(trace):
+    at = ticks(trace)
+    assert at["drives on"] <= at["meanwhile"] <= at["drives on"] + 6
+    assert ticks(trace, EventKind.FAULT_STARTED)["lidar.dropout"] == at["story then 3"]
+
+
+def test_a_story_that_waits_changes_nothing_until_it_goes_on(play):
+    alone = play("")
+    story = f"events: [{{when: {{time: 2 s}}, then: [{{when: {{travelled: 9 m}}, {PUSH}}}], required: false}}]\n"
+    assert alone.truth.values.tolist() == play(story).truth.values.tolist()
+
+
+def test_in_a_step_everything_that_counts_counts_from_its_beginning():
+    now = PuppetStage(tick=1000, travelled=5.0, scans={"lidar": 990, "rear": 700})
+    step = Since(now)
+
+    def holds(words):
+        return Trigger.model_validate(words).holds(step)
+
+    assert not holds({"travelled": 1.0})
+    assert not holds({"time": 1.0})
+    assert holds({"scan_age": {"above": "1 s", "sensor": "rear"}})  # what is old stays old
+    assert holds({"scan_age": {"above": "1 s", "sensor": "none yet"}})
+    now.tick, now.travelled, now.robot = 1240, 6.0, Pose2(5.0, 5.0)
+    assert holds({"travelled": 1.0})
+    assert holds({"time": 1.0})
+    assert holds({"robot_within": {"of": [5, 5], "distance": 0}})  # where it is now
+    assert not holds({"scan_age": {"above": "1.05 s", "sensor": "lidar"}})
+    assert holds({"scan_age": {"above": "1 s", "sensor": "lidar"}})
