@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from simscen.sensors.sensor import Sensor, SensorSetting, SensorView
     from simscen.spec.base import Ranged, Spec, Value, by_default
     from simscen.spec.choice import Choice
+    from simscen.spec.orplace import PlaceOrPoint, PlaceOrPose
     from simscen.spec.places import Point, PoseSpec
     from simscen.spec.quantities import (
         Angle,
@@ -135,6 +136,8 @@ __all__ = [
     "OccupancyGrid",
     "Odometry",
     "Path",
+    "PlaceOrPoint",
+    "PlaceOrPose",
     "Planner",
     "PlannerSpec",
     "Point",
@@ -220,6 +223,10 @@ _WHERE = {
         "Probability",
         "Ratio",
         "Speed",
+    ),
+    "simscen.spec.orplace": (
+        "PlaceOrPoint",
+        "PlaceOrPose",
     ),
     "simscen.spec.places": (
         "Point",

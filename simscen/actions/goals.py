@@ -3,7 +3,8 @@
 from simscen.actions.base import Action
 from simscen.core.stage import Effect, Stage
 from simscen.spec.base import Spec
-from simscen.spec.places import Name, PoseSpec
+from simscen.spec.orplace import PlaceOrPose
+from simscen.spec.places import Name
 from simscen.spec.quantities import PositiveAngle, PositiveDuration, PositiveLength
 
 
@@ -18,8 +19,8 @@ class NewGoal(Spec, Action):
 
     name: Name
     """What the goal is called."""
-    pose: PoseSpec
-    """In the map frame."""
+    pose: PlaceOrPose
+    """In the map frame: a pose, or a place by name."""
     timeout: PositiveDuration | None = None
     """Simulated time it may take."""
     xy_tolerance: PositiveLength | None = None

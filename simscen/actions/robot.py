@@ -9,7 +9,7 @@ from simscen.actions.base import Action
 from simscen.core.geometry import wrap
 from simscen.core.stage import Effect, Stage
 from simscen.spec.base import Spec
-from simscen.spec.places import PoseSpec
+from simscen.spec.orplace import PlaceOrPose
 from simscen.spec.quantities import Impulse
 
 SAME = 1e-3
@@ -22,8 +22,8 @@ class Kidnap(Spec, Action):
     Example: `do: {kidnap: {pose: {x: 2, y: 3, yaw: 90 deg}}}`
     """
 
-    pose: PoseSpec
-    """Where it finds itself, in the world frame."""
+    pose: PlaceOrPose
+    """Where it finds itself, in the world frame: a pose, or a place by name."""
 
     def perform(self, stage: Stage) -> Effect:
         """Set it down, at rest; nothing comes of it when it stands there."""

@@ -13,7 +13,8 @@ from simscen.core.navigation import Path
 from simscen.core.shapes import Body
 from simscen.core.stage import Effect, Stage
 from simscen.spec.objects import Shaped
-from simscen.spec.places import Name, PoseSpec
+from simscen.spec.orplace import PlaceOrPose
+from simscen.spec.places import Name
 from simscen.spec.quantities import Angle, Length, Mass, NonNegativeLength
 
 
@@ -27,8 +28,8 @@ class Spawn(Shaped, Action):
 
     name: Name
     """What it is called from now on."""
-    pose: PoseSpec | None = None
-    """In the world frame."""
+    pose: PlaceOrPose | None = None
+    """In the world frame: a pose, or a place by name."""
     ahead: Annotated[list[Length], Field(min_length=2, max_length=2)] | None = None
     """In the robot's frame: [metres ahead, metres to the left]."""
     on_plan: NonNegativeLength | None = None

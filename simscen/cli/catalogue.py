@@ -22,6 +22,7 @@ from simscen.spec.bytype import ByType
 from simscen.spec.choice import Choice, added
 from simscen.spec.docs import field_docs
 from simscen.spec.ondemand import type_of
+from simscen.spec.orplace import OrPlace, PlaceAlone
 from simscen.spec.quantities import UNITS, Quantity
 from simscen.triggers.trigger import Test, Trigger
 
@@ -168,6 +169,9 @@ def kind_of(kind: Any, metadata: tuple[Any, ...] = ()) -> str:
         return kind_of(mark.own)
     if get_origin(kind) is Annotated:
         return kind_of(get_args(kind)[0], (*get_args(kind)[1:], *metadata))
+    if place := next((mark for mark in metadata if isinstance(mark, OrPlace | PlaceAlone)), None):
+        words = [f"`{word}`" for word in getattr(place, "besides", ())]
+        return " or ".join([*words, "place", kind_of(kind, tuple(mark for mark in metadata if mark is not place))])
     if get_origin(kind) in (Union, UnionType):
         return " or ".join(dict.fromkeys(kind_of(member) for member in get_args(kind) if member is not NoneType))
     if get_origin(kind) is Literal:

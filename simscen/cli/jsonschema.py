@@ -159,7 +159,7 @@ def _by_json_type(node: Schema) -> Schema:
     """A text or a mapping, one or a list: the mistake is told about the one that was written."""
     options = node.get("oneOf", [])
     plain = [option for option in options if option.get("type") in ("string", "array")]
-    if len(options) != 2 or len(plain) != 1:
+    if len(options) != 2 or not plain or options[0].get("type") == options[1].get("type"):
         return node
     other = next(option for option in options if option is not plain[0])
     rest = {key: value for key, value in node.items() if key != "oneOf"}

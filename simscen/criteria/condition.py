@@ -10,7 +10,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from simscen.criteria.signal_table import SIGNALS, Signal, SignalName
 from simscen.spec.base import Spec
 from simscen.spec.bytype import BehaviorName
-from simscen.spec.places import Point
+from simscen.spec.orplace import PlaceOrPoint
 from simscen.spec.quantities import UNITS, Duration, PositiveDuration, Quantity
 from simscen.spec.references import EventName, GoalName, HappeningName, MovableName, ObjectName, RegionName
 
@@ -35,8 +35,8 @@ class Condition(Spec):
     """How much of it weighs as much as one scale of another signal; the margin then counts in scales."""
     object: MovableName | None = None
     """What `distance_to` is measured to: a thing that can move."""
-    point: Point | None = None
-    """What `distance_to` is measured to: x and y in metres."""
+    point: PlaceOrPoint | None = None
+    """What `distance_to` is measured to: x and y in metres, or a place by name."""
     goal: GoalName | None = None
     """The goal that `distance_to` or `goal_active` is about."""
     region: RegionName | None = None

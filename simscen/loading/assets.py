@@ -12,6 +12,7 @@ from simscen.loading.document import Library
 from simscen.loading.loaded import LoadedMap, LoadedRobot, LoadedWorld
 from simscen.loading.messages import quoted, suggestion
 from simscen.loading.paths import Refusal
+from simscen.loading.placing import placed, unknown_places
 from simscen.loading.source import read_text
 from simscen.loading.tree import Fields, Leaf, Node, Place, key_place, value_place
 from simscen.loading.validation import check
@@ -59,6 +60,8 @@ class Assets:
             loaded_map = self.map_file(found) if found else None
         if spec.sdf is not None:
             sdf = self._find(spec.sdf, value_place(tree, ("sdf",)))
+        self.problems += unknown_places(spec, tree, spec.places)
+        spec = placed(spec, spec.places)
         name = spec.name or path.name.split(".")[0]
         whole = tree if isinstance(tree, Fields) else None
         return LoadedWorld(name, path, spec, loaded_map, sdf, whole) if len(self.problems) == before else None

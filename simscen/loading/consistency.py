@@ -1,7 +1,7 @@
 """What only the whole scenario can tell: do the names exist, do faults fit their sensors, do rates fit the clock?"""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from simscen.core.problems import Problem
@@ -24,13 +24,16 @@ from simscen.triggers.trigger import Trigger
 COMMAND = "cmd_vel"
 
 
-def inconsistencies(loaded: LoadedScenario, world: World | None = None) -> list[Problem]:
+def inconsistencies(
+    loaded: LoadedScenario, world: World | None = None, strangers: Iterable[Problem] = ()
+) -> list[Problem]:
     """Every contradiction within a scenario and the files it names, and what deserves a look, as warnings.
 
-    `world` is what its world file has become. Where names are unknown, no more is asked.
+    `world` is what its world file has become, `strangers` are places that are not among its own. Where names are
+    unknown, no more is asked.
     """
-    unknown = [*_unknown_names(loaded, world), *_unfit_faults(loaded), *_twice_named(loaded), *_uneven_rates(loaded)]
-    unknown += _unknown_lidars(loaded)
+    unknown = [*strangers, *_unknown_names(loaded, world), *_unfit_faults(loaded), *_twice_named(loaded)]
+    unknown += [*_uneven_rates(loaded), *_unknown_lidars(loaded)]
     unknown += [loaded.sourced(problem) for problem in senseless(loaded.world)]
     if any(problem.severity == "error" for problem in unknown):
         return unknown

@@ -11,6 +11,7 @@ from simscen.loading.document import Library
 from simscen.loading.loaded import JudgedMask, LoadedRobot, LoadedWorld
 from simscen.loading.masks import judged_masks
 from simscen.loading.paths import Fence
+from simscen.loading.placing import NO_WORLD, placed, places_of, unknown_places, unplaced
 from simscen.loading.tree import Fields, Leaf, at, value_place
 from simscen.loading.validation import check
 from simscen.model.criteria_file import CriteriaSpec
@@ -33,12 +34,8 @@ class LoadedCriteria:
 
     def surroundings(self) -> tuple[LoadedWorld | None, LoadedRobot | None]:
         """The world and the robot that the file names, if any. Raises InvalidInput."""
-        assets, world, robot = Assets(self.library), None, None
-        node = at(self.tree, ("world",))
-        if isinstance(self.spec.world, WorldSpec):
-            world = assets.own_world(self.spec.world, node, self.file)
-        elif self.spec.world is not None and isinstance(node, Leaf):
-            world = assets.world(node)
+        assets, robot = Assets(self.library), None
+        world = _world(self.spec, self.tree, self.file, assets)
         if self.spec.robot is not None:
             robot = assets.robot(self.spec.robot.model, value_place(self.tree, ("robot", "model")))
         if assets.problems:
@@ -64,8 +61,20 @@ def load_criteria(path: Path, root: Path, world_path: Sequence[Path] = ()) -> Lo
         raise InvalidInput(library.with_source(spec))
     assets = Assets(library)
     masks = judged_masks(spec, tree, assets)
+    if any(unplaced(spec)):
+        known = places_of(_world(spec, tree, file, assets))
+        assets.problems += unknown_places(spec, tree, known, NO_WORLD)
+        spec = placed(spec, known)
     if assets.problems:
         raise InvalidInput(library.with_source(sorted(assets.problems)))
     shown = library.fence.shown(file)
     places = [value_place(tree, ("pass", index)) for index in range(len(spec.pass_))]
     return LoadedCriteria(file, spec, tuple(p.line if p.path == shown else 0 for p in places), tree, library, masks)
+
+
+def _world(spec: CriteriaSpec, tree: Fields, file: Path, assets: Assets) -> LoadedWorld | None:
+    """The world that the file names, if any."""
+    node = at(tree, ("world",))
+    if isinstance(spec.world, WorldSpec):
+        return assets.own_world(spec.world, node, file)
+    return assets.world(node) if spec.world is not None and isinstance(node, Leaf) else None

@@ -107,7 +107,8 @@ def explain(kind: str, context: Mapping[str, Any], node: Node, text: str) -> Mes
     if kind == "plugin":
         return Message("SC019", str(context["problem"]), str(context["hint"]))
     if kind == "quantity":
-        return Message("SC015", str(context["problem"]), f"units: {context['units']}; a bare number is SI")
+        units = f"units: {context['units']}; a bare number is SI"
+        return Message("SC015", str(context["problem"]), _bare_number(node) or units)
     if "names" in context:
         hint = suggestion(str(context["value"]), str(context["names"]).split(", "))
         return Message("SC014", f"{shown(node)} is not one of the choices", hint)
@@ -119,11 +120,18 @@ def _type_hint(kind: str, node: Node) -> str:
         return "put it in quotes"
     if not isinstance(node, Leaf) or not isinstance(node.value, str):
         return ""
-    if kind in ("int_type", "float_type") and _NUMBER.fullmatch(node.value):
-        return "remove the leading zero" if _LEADING_ZERO.match(node.value) else "remove the quotes"
+    if kind in ("int_type", "float_type"):
+        return _bare_number(node)
     if kind == "bool_type" and node.value.lower() in ("yes", "no", "on", "off", "y", "n"):
         return f"write {'true' if node.value.lower() in ('yes', 'on', 'y') else 'false'}"
     return ""
+
+
+def _bare_number(node: Node) -> str:
+    """How to make a number of a text that is one but for its quotes or its zeros."""
+    if not isinstance(node, Leaf) or not isinstance(node.value, str) or not _NUMBER.fullmatch(node.value):
+        return ""
+    return "remove the leading zero" if _LEADING_ZERO.match(node.value) else "remove the quotes"
 
 
 def shown(node: Node) -> str:

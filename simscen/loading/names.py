@@ -38,10 +38,7 @@ def goal_names(loaded: LoadedScenario) -> list[str]:
 
 def own_goal_names(loaded: LoadedScenario) -> list[str]:
     """The goals of the scenario: as written, or after their place, or goal-1, goal-2, …"""
-    return [
-        goal.name or (goal.pose if isinstance(goal.pose, str) else f"goal-{number}")
-        for number, goal in enumerate(loaded.spec.goals, start=1)
-    ]
+    return loaded.spec.goal_names
 
 
 def event_names(loaded: LoadedScenario) -> list[str]:

@@ -6,43 +6,49 @@ from typing import Annotated, Any, NamedTuple, get_args, get_origin
 from pydantic import BaseModel, RootModel
 
 from simscen.loading.tree import Key
+from simscen.spec.orplace import OrPlace
 from simscen.spec.references import Refers
 
 
 class Reference(NamedTuple):
-    """A name at `keys` of a scenario that must name something of the kind `to`."""
+    """A name at `keys` of a scenario that must name something, as its `mark` says."""
 
     keys: tuple[Key, ...]
-    to: str
+    mark: Refers
     name: str
+
+    @property
+    def to(self) -> str:
+        """The kind of what it names."""
+        return self.mark.to
 
 
 def references(spec: BaseModel, keys: tuple[Key, ...] = ()) -> Iterator[Reference]:
     """Every reference below `spec`, in the order of its fields."""
     for name, field in type(spec).model_fields.items():
         below = keys if isinstance(spec, RootModel) else (*keys, field.alias or name)
-        marks = [mark.to for mark in field.metadata if isinstance(mark, Refers)]
-        yield from _in_value(getattr(spec, name), marks[0] if marks else _target(field.annotation), below)
+        marks = [mark for mark in field.metadata if isinstance(mark, Refers)]
+        yield from _in_value(getattr(spec, name), marks[0] if marks else _mark(field.annotation), below)
 
 
-def _in_value(value: Any, to: str | None, keys: tuple[Key, ...]) -> Iterator[Reference]:
+def _in_value(value: Any, mark: Refers | None, keys: tuple[Key, ...]) -> Iterator[Reference]:
     if isinstance(value, BaseModel):
         yield from references(value, keys)
     elif isinstance(value, list):
         for index, item in enumerate(value):
-            yield from _in_value(item, to, (*keys, index))
+            yield from _in_value(item, mark, (*keys, index))
     elif isinstance(value, dict):
         for key, item in value.items():
-            yield from _in_value(item, to, (*keys, key))
-    elif isinstance(value, str) and to is not None:
-        yield Reference(keys, to, value)
+            yield from _in_value(item, mark, (*keys, key))
+    elif isinstance(value, str) and mark is not None and not (isinstance(mark, OrPlace) and value in mark.besides):
+        yield Reference(keys, mark, value)
 
 
-def _target(kind: Any) -> str | None:
+def _mark(kind: Any) -> Refers | None:
     """What a text of this type refers to; unions and lists are searched."""
     if get_origin(kind) is Annotated:
-        marks = [mark.to for mark in get_args(kind)[1:] if isinstance(mark, Refers)]
+        marks = [mark for mark in get_args(kind)[1:] if isinstance(mark, Refers)]
         if marks:
             return marks[0]
-        return _target(get_args(kind)[0])
-    return next((found for member in get_args(kind) if (found := _target(member))), None)
+        return _mark(get_args(kind)[0])
+    return next((found for member in get_args(kind) if (found := _mark(member))), None)

@@ -6,6 +6,7 @@ from dataclasses import replace
 from simscen.core.errors import InvalidInput
 from simscen.loading.compose import compose
 from simscen.loading.loaded import LoadedScenario
+from simscen.loading.placing import placed_criteria, places_of
 from simscen.loading.plugins import absent
 from simscen.loading.tree import Fields, Node
 from simscen.loading.validation import Model, check
@@ -19,11 +20,15 @@ _JUDGED = frozenset({"simscen", "pass", "metrics"})
 
 
 def resolved_text(loaded: LoadedScenario) -> str:
-    """The file as it was written; where it `extends` others or takes `defaults.yaml`, all of them merged."""
+    """The file as it was written; where it `extends` others or takes `defaults.yaml`, all of them merged.
+
+    Where criteria name places, their poses stand there instead: it is judged by without its world.
+    """
     own, _ = compose(loaded.text, loaded.path)
-    if isinstance(own, Fields) and own.plain == loaded.tree.plain:
+    plain = placed_criteria(loaded.tree.plain, _checked(ScenarioSpec, loaded.tree), places_of(loaded.world))
+    if isinstance(own, Fields) and own.plain == plain:
         return loaded.text
-    return to_yaml(loaded.tree.plain)
+    return to_yaml(plain)
 
 
 def spec_of_text(text: str, name: str) -> ScenarioSpec:

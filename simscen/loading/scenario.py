@@ -13,6 +13,7 @@ from simscen.loading.document import Library
 from simscen.loading.loaded import LoadedMap, LoadedScenario, LoadedWorld
 from simscen.loading.masks import judged_masks
 from simscen.loading.paths import Fence
+from simscen.loading.placing import placed, places_of, unknown_places
 from simscen.loading.stackchoice import StackChoice, with_stack
 from simscen.loading.tree import Fields, Key, Leaf, Node, at, child, value_place
 from simscen.loading.validation import check
@@ -80,7 +81,8 @@ def _with_assets(spec: ScenarioSpec, tree: Fields, library: Library, file: Path)
     robot = assets.robot(spec.robot.model, value_place(tree, ("robot", "model")))
     if world is None or robot is None or assets.problems:
         return library.with_source(sorted(assets.problems))
-    fence, shown = library.fence, library.fence.shown(file)
+    fence, shown, places = library.fence, library.fence.shown(file), places_of(world)
+    strangers = library.with_source(list(unknown_places(spec, tree, places)))
     loaded = LoadedScenario(
         id=scenario_id(file, fence.root),
         path=shown,
@@ -88,7 +90,7 @@ def _with_assets(spec: ScenarioSpec, tree: Fields, library: Library, file: Path)
         root=fence.root,
         world_path=fence.world_path,
         text=library.texts[shown],
-        spec=spec,
+        spec=placed(spec, places),
         world=world,
         map=robot_map,
         robot=robot,
@@ -106,7 +108,7 @@ def _with_assets(spec: ScenarioSpec, tree: Fields, library: Library, file: Path)
         speed_mask=speed_mask,
         judged_masks=judged,
     )
-    problems = sorted(inconsistencies(loaded))
+    problems = sorted(inconsistencies(loaded, strangers=strangers))
     if any(problem.severity == "error" for problem in problems):
         return problems
     return replace(loaded, notes=(*loaded.notes, *problems))

@@ -16,6 +16,9 @@ from simscen.spec.quantities import (
     Angle,
     Frequency,
     Length,
+    NonNegativeAcceleration,
+    NonNegativeAngle,
+    NonNegativeAngularSpeed,
     NonNegativeLength,
     PositiveAcceleration,
     PositiveAngle,
@@ -24,6 +27,7 @@ from simscen.spec.quantities import (
     PositiveLength,
     PositiveMass,
     PositiveSpeed,
+    Quantity,
 )
 
 FilePath = Annotated[str, Field(min_length=1, max_length=4096)]
@@ -55,7 +59,7 @@ class SkidSteer(Spec):
     wheel_width: PositiveLength = 0.05
     left: JointNames | None = None
     right: JointNames | None = None
-    turning_scale: Annotated[float, Field(gt=0, le=10)] = 1.0
+    turning_scale: Annotated[float, Field(gt=0, le=10), Quantity("ratio")] = 1.0
     """Effective over geometric wheel separation; skidding makes it larger than 1 (Clearpath's jackal: 1.5)."""
 
 
@@ -181,10 +185,10 @@ class WheelOdometry(SensorSpec):
     rate: Frequency = 40.0
     translation_noise: NonNegativeLength = 0.01
     """Standard deviation of the distance error after one metre driven; errors grow with the square root."""
-    rotation_noise: Annotated[float, Field(ge=0, le=1)] = 0.01
-    """Standard deviation of the heading error in rad after turning one radian."""
-    drift_noise: Annotated[float, Field(ge=0, le=1)] = 0.005
-    """Standard deviation of the heading error in rad after driving one metre straight."""
+    rotation_noise: Annotated[NonNegativeAngle, Field(le=1)] = 0.01
+    """Standard deviation of the heading error after turning one radian."""
+    drift_noise: Annotated[NonNegativeAngle, Field(le=1)] = 0.005
+    """Standard deviation of the heading error after driving one metre straight."""
 
 
 class InertialUnit(SensorSpec):
@@ -194,12 +198,12 @@ class InertialUnit(SensorSpec):
     says: ClassVar[str] = "Imu"
 
     rate: Frequency = 60.0
-    gyro_noise: Annotated[float, Field(ge=0, le=10)] = 0.002
-    """Standard deviation in rad/s."""
-    gyro_bias: Annotated[float, Field(ge=0, le=1)] = 0.0005
-    """Standard deviation of the constant bias of a run, in rad/s."""
-    accelerometer_noise: Annotated[float, Field(ge=0, le=100)] = 0.02
-    """Standard deviation in m/s²."""
+    gyro_noise: Annotated[NonNegativeAngularSpeed, Field(le=10)] = 0.002
+    """Standard deviation of the turn rate."""
+    gyro_bias: Annotated[NonNegativeAngularSpeed, Field(le=1)] = 0.0005
+    """Standard deviation of the constant bias of a run."""
+    accelerometer_noise: Annotated[NonNegativeAcceleration, Field(le=100)] = 0.02
+    """Standard deviation of the acceleration."""
 
 
 class Bumper(SensorSpec):

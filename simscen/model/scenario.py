@@ -1,6 +1,7 @@
 """A scenario as a user writes it (`*.scenario.yaml`)."""
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from itertools import count
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 from pydantic import AfterValidator, Discriminator, Field, Tag
 
@@ -12,18 +13,18 @@ from simscen.model.anystack import AnyStack
 from simscen.model.world import WorldSpec
 from simscen.spec.base import Spec, by_default
 from simscen.spec.ondemand import OnDemand
+from simscen.spec.orplace import OrPlace, PlaceAlone, PlaceOrPose
 from simscen.spec.places import Name, PlaceName, PoseSpec
 from simscen.spec.quantities import (
-    Angle,
+    Duration,
     Frequency,
-    Length,
     NonNegativeAngle,
     NonNegativeLength,
     PositiveAngle,
     PositiveDuration,
     PositiveLength,
+    WholeQuantity,
 )
-from simscen.spec.references import Refers
 
 if TYPE_CHECKING:
     from simscen.criteria.measure import AnyMeasure
@@ -45,18 +46,11 @@ WorldOrFile = Annotated[
     | Annotated[WorldSpec, OnDemand("simscen.model.world", "WorldSpec"), Tag("mapping")],
     Discriminator(_text_or_mapping),
 ]
-PlaceOrPose = Annotated[
-    Annotated[PlaceName, Refers("place"), Tag("text")] | Annotated[PoseSpec, Tag("mapping")],
-    Discriminator(_text_or_mapping),
-]
 
 
-class InitialEstimate(Spec):
+class InitialEstimate(PoseSpec):
     """What the localizer is told: a pose and how sure that is."""
 
-    x: Length
-    y: Length
-    yaw: Angle = 0.0
     std: Annotated[tuple[NonNegativeLength, NonNegativeLength, NonNegativeAngle], Field(strict=False)] = (
         0.5,
         0.5,
@@ -65,10 +59,19 @@ class InitialEstimate(Spec):
     """Standard deviations of x, y (m) and yaw (rad); Nav2's default covariance."""
 
 
-EstimateOrUnknown = Annotated[
-    Annotated[Literal["unknown"], Tag("text")] | Annotated[InitialEstimate, Tag("mapping")],
-    Discriminator(_text_or_mapping),
-]
+class EstimateOrPlace(OrPlace):
+    """Marks an estimate in place of which the name of a place may be written."""
+
+    def of(self, pose: PoseSpec) -> InitialEstimate:
+        """Its pose, as sure as an estimate is that does not say."""
+        return InitialEstimate(x=pose.x, y=pose.y, yaw=pose.yaw)
+
+
+Unknown = Literal["unknown"]
+if TYPE_CHECKING:
+    EstimateOrUnknown = InitialEstimate | Unknown
+else:
+    EstimateOrUnknown = Annotated[InitialEstimate, EstimateOrPlace(besides=get_args(Unknown))]
 
 
 class RobotEntry(Spec):
@@ -79,7 +82,8 @@ class RobotEntry(Spec):
     pose: PlaceOrPose
     """Where it truly stands: a pose or a place of the world."""
     initial_estimate: EstimateOrUnknown | None = None
-    """Default: the true pose, with Nav2's default covariance; `unknown`: anywhere on the map."""
+    """A pose, or a place of the world; default: the true pose, with Nav2's default covariance; `unknown`: anywhere on
+    the map."""
 
 
 class GoalEntry(Spec):
@@ -99,7 +103,7 @@ class GoalEntry(Spec):
 class Physics(Spec):
     """How the world is stepped."""
 
-    tick_rate: Annotated[int, Field(ge=60, le=2000)] = 240
+    tick_rate: Annotated[int, Field(ge=60, le=2000), WholeQuantity("frequency")] = 240
     """Physics steps for each simulated second."""
     solver_iterations: Annotated[int, Field(ge=1, le=1000)] = 10
     truth_rate: Frequency = 40.0
@@ -134,14 +138,14 @@ class ScenarioSpec(Spec):
     robot: RobotEntry
     stack: AnyStack = by_default()
     """The stack under test: simscen's own, or `{external: NAME}`, a process."""
-    goals: Annotated[list[GoalEntry], Field(max_length=1000)] = []
-    """In this order."""
+    goals: Annotated[list[Annotated[GoalEntry, PlaceAlone("pose")]], Field(max_length=1000)] = []
+    """In this order; places of the world alone will do: `[kitchen, office]`."""
     on_goal_failure: Literal["stop", "continue"] = "stop"
     """After a goal that failed: end, or drive to the next one (FollowWaypoints' stop_on_failure)."""
     time_limit: Annotated[PositiveDuration, Field(le=8000)] = 300.0
     """Simulated time after which the run ends, whatever happens."""
-    linger: Annotated[float, Field(ge=0, le=3600)] = 0.5
-    """Simulated seconds that the run goes on after the last goal, to see that the robot stays where it is."""
+    linger: Annotated[Duration, Field(le=3600)] = 0.5
+    """Simulated time that the run goes on after the last goal, to see that the robot stays where it is."""
     events: Annotated[list[EventEntry], Field(max_length=500)] = []
     faults: Annotated[list[FaultEntry], Field(max_length=500)] = []
     physics: Physics = by_default()
@@ -162,6 +166,20 @@ class ScenarioSpec(Spec):
         """What events and faults wait for, in their order."""
         waiting = [*(step.when for step in self.steps), *(fault.when for fault in self.faults)]
         return [trigger for trigger in waiting if trigger is not None]
+
+    @property
+    def goal_names(self) -> list[str]:
+        """What the goals are called, in order: as written, or after their place, or goal-1, goal-2, …
+
+        A place that is driven to again is `kitchen-2` then.
+        """
+        taken, names = {goal.name for goal in self.goals}, list[str]()
+        for number, goal in enumerate(self.goals, start=1):
+            default = goal.pose.place or f"goal-{number}"
+            others = (name for again in count(2) if (name := f"{default}-{again}") not in taken)
+            names.append(goal.name or (default if default not in taken else next(others)))
+            taken.add(names[-1])
+        return names
 
 
 def estimate_of(entry: RobotEntry, truth: Pose2) -> Estimate:

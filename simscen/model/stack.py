@@ -14,6 +14,8 @@ from simscen.spec.quantities import (
     Duration,
     Frequency,
     Length,
+    NonNegativeAngle,
+    NonNegativeAngularSpeed,
     NonNegativeLength,
     PositiveAcceleration,
     PositiveAngle,
@@ -23,6 +25,8 @@ from simscen.spec.quantities import (
     PositiveLength,
     PositiveSpeed,
     Probability,
+    Quantity,
+    Speed,
 )
 
 Noise = Annotated[float, Field(ge=0, le=100)]
@@ -52,12 +56,12 @@ class Amcl(Ranged, LocalizerSpec):
     """Strafing noise of the omni model."""
     min_particles: Annotated[int, Field(ge=10, le=50_000)] = 500
     max_particles: Annotated[int, Field(ge=10, le=50_000)] = 2000
-    pf_err: Annotated[float, Field(gt=0, lt=1)] = 0.05
+    pf_err: Annotated[float, Field(gt=0, lt=1), Quantity("ratio")] = 0.05
     """KLD: greatest distance between the true and the sampled distribution."""
     pf_z: Annotated[float, Field(gt=0, lt=1)] = 0.99
     """KLD: upper quantile of the standard normal distribution, used as it is, as Nav2 does."""
     update_min_d: NonNegativeLength = 0.25
-    update_min_a: Annotated[float, Field(ge=0, le=6.3)] = 0.2
+    update_min_a: Annotated[NonNegativeAngle, Field(le=6.3)] = 0.2
     resample_interval: Annotated[int, Field(ge=1, le=100)] = 1
     max_beams: Annotated[int, Field(ge=2, le=4096)] = 60
     laser_model_type: Literal["likelihood_field", "likelihood_field_prob", "beam"] = "likelihood_field"
@@ -85,12 +89,12 @@ class Ekf(LocalizerSpec):
 
     component: ClassVar[str] = "simscen.stack.localizers.build:ekf"
     type: Literal["ekf"]
-    translation_noise: Noise = 0.02
-    """Standard deviation in m after one metre."""
-    rotation_noise: Noise = 0.02
-    """Standard deviation in rad after one rad or one metre."""
-    gyro_noise: Noise = 0.005
-    """Standard deviation of the turn rate in rad/s."""
+    translation_noise: Annotated[NonNegativeLength, Field(le=100)] = 0.02
+    """Standard deviation of the position after one metre."""
+    rotation_noise: NonNegativeAngle = 0.02
+    """Standard deviation of the heading after one rad or one metre."""
+    gyro_noise: NonNegativeAngularSpeed = 0.005
+    """Standard deviation of the turn rate."""
 
 
 class GroundTruth(LocalizerSpec):
@@ -188,7 +192,7 @@ class RegulatedPurePursuit(Ranged, ControllerSpec):
     regulated_linear_scaling_min_speed: PositiveSpeed = 0.25
     use_cost_regulated_linear_velocity_scaling: bool = True
     cost_scaling_dist: PositiveLength = 0.6
-    cost_scaling_gain: Annotated[float, Field(gt=0, le=1)] = 1.0
+    cost_scaling_gain: Annotated[float, Field(gt=0, le=1), Quantity("ratio")] = 1.0
     max_angular_accel: PositiveAngularAcceleration = 3.2
     allow_reversing: bool = False
 
@@ -199,7 +203,7 @@ class DynamicWindow(ControllerSpec):
     component: ClassVar[str] = "simscen.stack.controllers.dwb:DynamicWindowController"
     type: Literal["dwb"]
     max_vel_x: PositiveSpeed | None = None
-    min_vel_x: Annotated[float, Field(ge=-10, le=0)] = 0.0
+    min_vel_x: Annotated[Speed, Field(ge=-10, le=0)] = 0.0
     max_vel_theta: PositiveAngularSpeed = 1.0
     vx_samples: Annotated[int, Field(ge=2, le=200)] = 20
     vy_samples: Annotated[int, Field(ge=1, le=200)] = 5
@@ -223,7 +227,7 @@ class Mppi(ControllerSpec):
     model_dt: PositiveDuration = 0.05
     batch_size: Annotated[int, Field(ge=50, le=10_000)] = 1000
     vx_max: PositiveSpeed | None = None
-    vx_min: Annotated[float, Field(ge=-10, le=0)] = -0.35
+    vx_min: Annotated[Speed, Field(ge=-10, le=0)] = -0.35
     wz_max: PositiveAngularSpeed = 1.9
     vx_std: PositiveSpeed = 0.2
     wz_std: PositiveAngularSpeed = 0.4

@@ -7,7 +7,8 @@ from pydantic import Field, model_validator
 from simscen.spec.base import Spec
 from simscen.spec.motions import Motion
 from simscen.spec.objects import Shaped
-from simscen.spec.places import Name, PlaceName, Point, PoseSpec, Ring
+from simscen.spec.orplace import PlaceOrPoint, PlaceOrPose
+from simscen.spec.places import Name, PlaceName, PoseSpec, Ring
 from simscen.spec.quantities import Duration, Mass, PositiveLength
 
 
@@ -16,8 +17,8 @@ class Wall(Spec):
 
     name: Name = "wall"
     """What a collision with it is reported as; default: wall_1, wall_2, …"""
-    points: Annotated[list[Point], Field(min_length=2, max_length=10_000)]
-    """Corners [x, y] of its centre line; repeat the first one at the end to close it."""
+    points: Annotated[list[PlaceOrPoint], Field(min_length=2, max_length=10_000)]
+    """Corners, [x, y] or places by name, of its centre line; repeat the first one at the end to close it."""
     thickness: PositiveLength = 0.1
     """Across the centre line."""
     height: PositiveLength = 1.0
@@ -33,8 +34,8 @@ class Obstacle(Shaped):
 
     name: Name
     """What a collision with it is reported as."""
-    pose: PoseSpec
-    """Where it stands."""
+    pose: PlaceOrPose
+    """Where it stands: a pose, or a place by name."""
 
 
 class Travel(Motion):
@@ -58,8 +59,8 @@ class Door(Spec):
 
     name: Name
     """What `open` and `close` call it."""
-    points: Annotated[list[Point], Field(min_length=2, max_length=2)]
-    """The two door posts; the hinge is at the first."""
+    points: Annotated[list[PlaceOrPoint], Field(min_length=2, max_length=2)]
+    """The two door posts, [x, y] or places by name; the hinge is at the first."""
     closed: bool = False
     """Whether it is closed at the start."""
     thickness: PositiveLength = 0.05

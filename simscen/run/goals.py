@@ -1,22 +1,14 @@
-"""Where a scenario starts and what it is sent to, as its world places them."""
+"""What a scenario's robot is sent to."""
 
 from simscen.actions.goals import NewGoal
-from simscen.core.geometry import Pose2
 from simscen.core.navigation import Goal
-from simscen.core.world import World
 from simscen.model.scenario import GoalEntry, ScenarioSpec
 from simscen.model.stackbase import StackBase
-from simscen.spec.places import PoseSpec
 
 
-def pose_of(place: str | PoseSpec, world: World) -> Pose2:
-    """A pose as written, or that of a place of the world."""
-    return world.places[place] if isinstance(place, str) else place.pose
-
-
-def goals_of(spec: ScenarioSpec, world: World) -> tuple[Goal, ...]:
+def goals_of(spec: ScenarioSpec) -> tuple[Goal, ...]:
     """The goals in order, named, with their tolerances."""
-    return tuple(_goal(number, entry, spec.stack, world) for number, entry in enumerate(spec.goals, start=1))
+    return tuple(_goal(name, entry, spec.stack) for name, entry in zip(spec.goal_names, spec.goals, strict=True))
 
 
 def sent_goals(spec: ScenarioSpec) -> dict[tuple[str | int, ...], Goal]:
@@ -36,11 +28,10 @@ def sent_goals(spec: ScenarioSpec) -> dict[tuple[str | int, ...], Goal]:
     return found
 
 
-def _goal(number: int, entry: GoalEntry, stack: StackBase, world: World) -> Goal:
-    place = entry.pose if isinstance(entry.pose, str) else f"goal-{number}"
+def _goal(name: str, entry: GoalEntry, stack: StackBase) -> Goal:
     return Goal(
-        name=entry.name or place,
-        pose=pose_of(entry.pose, world),
+        name=name,
+        pose=entry.pose.pose,
         xy_tolerance=entry.xy_tolerance or stack.goal_checker.xy_goal_tolerance,
         yaw_tolerance=entry.yaw_tolerance or stack.goal_checker.yaw_goal_tolerance,
         timeout=entry.timeout,

@@ -19,7 +19,7 @@ from simscen.model.anystack import AnyStack
 from simscen.model.robot import RobotSpec
 from simscen.model.scenario import ScenarioSpec, estimate_of
 from simscen.model.stack import Amcl, OdometryOnly, StackSpec
-from simscen.run.goals import goals_of, pose_of, sent_goals
+from simscen.run.goals import goals_of, sent_goals
 from simscen.run.masks import load_judged_masks, load_masks
 from simscen.run.robotsize import inscribed_radius
 from simscen.run.worldsource import load_map, load_robot, load_world
@@ -67,8 +67,8 @@ def prepare(loaded: LoadedScenario, world_of: BuildWorld = build_world) -> Prepa
     robot, body = load_robot(loaded)
     built = world_of(loaded, lidar_height(robot))
     world = built.world
-    start = pose_of(spec.robot.pose, world)
-    goals = goals_of(spec, world)
+    start = spec.robot.pose.pose
+    goals = goals_of(spec)
     case = Case(
         start=start,
         goals=goals,

@@ -11,7 +11,7 @@ from pydantic import AfterValidator, Field, model_validator
 from simscen.core.geometry import Pose2, wrap
 from simscen.core.shapes import MotionPath
 from simscen.spec.base import Spec
-from simscen.spec.places import Point
+from simscen.spec.orplace import PlaceOrPoint
 from simscen.spec.quantities import Angle, Duration, Length, PositiveSpeed
 
 TURN = 0.25
@@ -34,8 +34,9 @@ def _rising(keyframes: list[tuple[float, float, float, float]]) -> list[tuple[fl
 class Motion(Spec):
     """A scripted motion."""
 
-    through: Annotated[list[Point], Field(min_length=1, max_length=1000)] | None = None
-    """Waypoints [x, y] in the world frame, after where it is: it drives along straight lines and faces where it drives.
+    through: Annotated[list[PlaceOrPoint], Field(min_length=1, max_length=1000)] | None = None
+    """Waypoints, [x, y] in the world frame or places by name, after where it is: it drives along straight lines and
+    faces where it drives.
     """
     speed: PositiveSpeed | None = None
     """Along the lines through waypoints; its greatest one where it is eased."""

@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from pydantic import AfterValidator, Field, StringConstraints
+from pydantic import AfterValidator, Field, PrivateAttr, StringConstraints
 
 from simscen.core.geometry import Pose2
 from simscen.core.polygons import flaw
@@ -35,6 +35,18 @@ class PoseSpec(Spec):
     x: Length
     y: Length
     yaw: Angle = 0.0
+    _place: str = PrivateAttr(default="")
+
+    @property
+    def place(self) -> str:
+        """The place of the world whose pose it is; "" where the pose itself is written."""
+        return self._place
+
+    def at(self, place: str) -> "PoseSpec":
+        """The same pose, as that of a place."""
+        named = self.model_copy()
+        named._place = place
+        return named
 
     @property
     def pose(self) -> Pose2:

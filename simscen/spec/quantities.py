@@ -48,7 +48,7 @@ class Quantity:
         units = "|".join(unit.replace("^", r"\^") for unit in UNITS[self.dimension])  # a pattern for JavaScript, too
         pattern = rf"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*({units})\s*$"
         # Bounds apply to numbers only and the pattern to text only, so both fit into one schema.
-        return {**number, "type": ["number", "string"], "pattern": pattern, "description": self.described}
+        return {**number, "type": [number["type"], "string"], "pattern": pattern, "description": self.described}
 
     @property
     def example(self) -> str:
@@ -84,6 +84,15 @@ class Quantity:
         )
 
 
+class WholeQuantity(Quantity):
+    """Marks an integer as a physical quantity: so many whole units of SI."""
+
+    def parse(self, value: Any) -> Any:
+        """Turn "240 Hz" into 240; what is no whole number stays a float, which pydantic refuses."""
+        number = super().parse(value)
+        return int(number) if isinstance(value, str) and number.is_integer() else number
+
+
 Length = Annotated[float, Field(ge=-1e4, le=1e4), Quantity("length")]
 PositiveLength = Annotated[float, Field(gt=0, le=1e4), Quantity("length")]
 NonNegativeLength = Annotated[float, Field(ge=0, le=1e4), Quantity("length")]
@@ -96,7 +105,9 @@ Speed = Annotated[float, Field(ge=-100, le=100), Quantity("speed")]
 NonNegativeSpeed = Annotated[float, Field(ge=0, le=100), Quantity("speed")]
 PositiveSpeed = Annotated[float, Field(gt=0, le=100), Quantity("speed")]
 AngularSpeed = Annotated[float, Field(ge=-100, le=100), Quantity("angular speed")]
+NonNegativeAngularSpeed = Annotated[float, Field(ge=0, le=100), Quantity("angular speed")]
 PositiveAngularSpeed = Annotated[float, Field(gt=0, le=100), Quantity("angular speed")]
+NonNegativeAcceleration = Annotated[float, Field(ge=0, le=1000), Quantity("acceleration")]
 PositiveAcceleration = Annotated[float, Field(gt=0, le=1000), Quantity("acceleration")]
 PositiveAngularAcceleration = Annotated[float, Field(gt=0, le=1000), Quantity("angular acceleration")]
 PositiveJerk = Annotated[float, Field(gt=0, le=1e6), Quantity("jerk")]

@@ -6,7 +6,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.polygons import distance_to_polygon
 from simscen.core.stage import Situation
 from simscen.spec.base import Spec
-from simscen.spec.places import Point
+from simscen.spec.orplace import PlaceOrPoint
 from simscen.spec.quantities import NonNegativeLength
 from simscen.spec.references import MovableName, RegionName
 from simscen.triggers.base import Condition
@@ -18,8 +18,8 @@ class RobotWithin(Spec, Condition):
     Example: `when: {robot_within: {of: [2, 2], distance: 1.5 m}}`
     """
 
-    of: Point | None = None
-    """A point [x, y] in the world."""
+    of: PlaceOrPoint | None = None
+    """A point [x, y] in the world, or a place of it by name."""
     object: MovableName | None = None
     """An object of the world or of the scenario's events, by name; false while it is not there."""
     region: RegionName | None = None

@@ -61,7 +61,7 @@ def _twice(spec: WorldSpec, tree: Fields) -> Iterator[Problem]:
     things += [(("objects", k), thing) for k, thing in enumerate(spec.objects)]
     seen: list[tuple[object, str]] = []
     for keys, thing in things:
-        shape = (thing.box, thing.cylinder, thing.polygon, thing.height, thing.z, thing.pose)
+        shape = (thing.box, thing.cylinder, thing.polygon, thing.height, thing.z, thing.pose.pose)
         same = next((name for other, name in seen if other == shape), None)
         if same is not None:
             problem = Problem(*key_place(tree, keys), code="SC054", message=f"{quoted(same)} is exactly there already")

@@ -12,7 +12,7 @@ from simscen.core.shapes import Body, Solid
 from simscen.core.world import Polygon, World
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.tree import Key
-from simscen.run.goals import goals_of, pose_of, sent_goals
+from simscen.run.goals import goals_of, sent_goals
 from simscen.run.precheck.expectation import expects_failure
 from simscen.run.precheck.ground import Ground, ground_of
 from simscen.run.robotsize import RobotSize
@@ -42,7 +42,7 @@ class Scene:
     @cached_property
     def start(self) -> Pose2:
         """Where the robot truly stands at first."""
-        return pose_of(self.loaded.spec.robot.pose, self.world)
+        return self.loaded.spec.robot.pose.pose
 
     @cached_property
     def ground(self) -> Ground:
@@ -85,7 +85,7 @@ class Scene:
     def targets(self) -> list[tuple[Keys, Goal]]:
         """The goals that are to be reached, also those that events send, each with where its pose stands."""
         spec = self.loaded.spec
-        own: dict[Keys, Goal] = {("goals", k): goal for k, goal in enumerate(goals_of(spec, self.world))}
+        own: dict[Keys, Goal] = {("goals", k): goal for k, goal in enumerate(goals_of(spec))}
         every = {**own, **sent_goals(spec)}
         return [((*keys, "pose"), goal) for keys, goal in every.items() if not expects_failure(spec, goal.name)]
 

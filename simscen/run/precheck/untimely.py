@@ -24,7 +24,7 @@ AIDED = ("kidnap", "push", "new_goal", "cancel_goal")
 
 def untimely(scene: Scene, ways: Ways) -> list[Problem]:
     """Timeouts, time limits and bounds of criteria that no drive can keep."""
-    goals, spec = goals_of(scene.loaded.spec, scene.world), scene.loaded.robot.spec
+    goals, spec = goals_of(scene.loaded.spec), scene.loaded.robot.spec
     failing = any(expects_failure(scene.loaded.spec, goal.name) for goal in goals)
     if not goals or spec is None or failing or scene.does(*AIDED):
         return []

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from simscen.core.errors import InvalidInput
+from simscen.loading.placing import placed
 from simscen.loading.resolved import resolved_text, spec_of_text
 from simscen.loading.scenario import load_scenario
 from simscen.loading.stackchoice import StackChoice
@@ -36,7 +37,7 @@ def test_zones_and_masks_are_the_scenarios_and_parameters_the_stack_files(chosen
 
 def test_the_log_keeps_the_scenario_as_it_ran(chosen) -> None:
     loaded = chosen(ZONES, "simscen: 1\nstack: {controller: {type: dwb}}\n")
-    assert spec_of_text(resolved_text(loaded), "log") == loaded.spec
+    assert placed(spec_of_text(resolved_text(loaded), "log"), loaded.world.spec.places) == loaded.spec
     assert loaded.text != resolved_text(loaded)
 
 

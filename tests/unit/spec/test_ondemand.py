@@ -31,7 +31,7 @@ def test_problems_are_told_at_their_places_together_with_those_around():
     with pytest.raises(ValidationError) as raised:
         Site.model_validate({"wall": {"points": [[0, 0], [1, "x"]], "colour": 1}, "number": "one"})
     assert {error["loc"] for error in raised.value.errors()} == {
-        ("wall", "points", 1, 1),
+        ("wall", "points", 1, "written out", 1),
         ("wall", "colour"),
         ("number",),
     }

@@ -1,0 +1,115 @@
+"""A number may carry its unit, and a place may stand for its pose, wherever one is meant in any file."""
+
+import math
+from collections.abc import Iterator
+from typing import Annotated, Any
+
+import pytest
+from annotated_types import MaxLen, MinLen
+from pydantic import BaseModel, TypeAdapter, ValidationError
+
+from simscen.cli.everyfield import Written, every_value
+from simscen.model.robot import InertialUnit, SkidSteer
+from simscen.model.scenario import Physics, ScenarioSpec
+from simscen.model.stack import Amcl, DynamicWindow
+from simscen.spec.orplace import OrPlace
+from simscen.spec.places import PoseSpec
+from simscen.spec.quantities import Quantity
+
+PLAIN = {
+    "SpeedMask.base": "percent or m/s, as `type` says: CostmapFilterInfo has one number for both",
+    "SpeedMask.multiplier": "percent or m/s for each unit of a cell's value, as `type` says",
+    "Amcl.alpha1": "variances of unlike things for each other (Thrun et al., table 5.6), 0.2 in every file of Nav2",
+    "Amcl.alpha2": "likewise",
+    "Amcl.alpha3": "likewise",
+    "Amcl.alpha4": "likewise",
+    "Amcl.alpha5": "likewise",
+    "Amcl.pf_z": "a quantile of the standard normal distribution",
+    "Costmap.cost_scaling_factor": "an exponent for each metre, 3.0 in every file of Nav2",
+    "Amcl.lambda_short": "an exponent for each metre, 0.1 in every file of Nav2",
+    "DynamicWindow.base_obstacle_scale": "a weight of a critic",
+    "DynamicWindow.path_align_scale": "a weight of a critic",
+    "DynamicWindow.path_dist_scale": "a weight of a critic",
+    "DynamicWindow.goal_align_scale": "a weight of a critic",
+    "DynamicWindow.goal_dist_scale": "a weight of a critic",
+    "DynamicWindow.rotate_to_goal_scale": "a weight of a critic",
+    "Mppi.temperature": "of a softmax over costs without a dimension",
+    "Mppi.gamma": "a weight of costs",
+    "Condition.value": "in the dimension of its signal, which parses its unit",
+    "Condition.scale": "likewise",
+    "Windowed.value": "likewise",
+    "Windowed.scale": "likewise",
+    "Always.value": "likewise",
+    "Always.scale": "likewise",
+    "Eventually.value": "likewise",
+    "Eventually.scale": "likewise",
+    "Whenever.value": "likewise",
+    "Whenever.scale": "likewise",
+    "Smoothness.min_sparc": "spectral arc length, which has no dimension",
+    "Smoothness.min_ldlj": "a logarithm of dimensionless jerk",
+    "RobotSpec.arguments": "whatever the xacro file makes of it",
+}
+"""Numbers that are bare for a reason."""
+
+NO_PLACES = {
+    "WorldSpec.places": "they are what the names stand for",
+    "WorldSpec.regions": "an area is drawn, corner by corner",
+    "Part.pose": "in the robot's frame",
+    "RobotSpec.footprint": "in the robot's frame",
+    "Spawn.ahead": "in the robot's frame",
+    **{f"{shape}.polygon": "in the thing's own frame" for shape in ("Obstacle", "Movable", "Part", "Spawn")},
+    **{f"{shape}.cylinder": "radius and height" for shape in ("Obstacle", "Movable", "Part", "Spawn")},
+}
+"""Poses and pairs of lengths that are no places of the world, and why."""
+
+
+def _bare_numbers() -> Iterator[Written]:
+    for value in every_value():
+        if value.kind is float and not any(isinstance(mark, Quantity) for mark in value.marks):
+            yield value
+
+
+def _poses_and_points() -> Iterator[Written]:
+    """Models of poses, and lists of two lengths."""
+    for value in every_value():
+        lengths = any(isinstance(mark, Quantity) and mark.dimension == "length" for mark in value.marks)
+        if (lengths and {MinLen(2), MaxLen(2)} <= {*value.marks}) or is_pose(value.kind):
+            yield value
+
+
+def is_pose(kind: Any) -> bool:
+    return isinstance(kind, type) and issubclass(kind, PoseSpec)
+
+
+def test_every_number_with_a_dimension_takes_a_unit() -> None:
+    assert {str(value) for value in _bare_numbers()} == set(PLAIN)
+
+
+@pytest.mark.parametrize(
+    ("model", "key", "written", "meant"),
+    [
+        (ScenarioSpec, "linger", "2 s", 2.0),
+        (Physics, "tick_rate", "0.24 kHz", 240),
+        (Amcl, "update_min_a", "12 deg", math.radians(12)),
+        (DynamicWindow, "min_vel_x", "-36 km/h", -10.0),
+        (InertialUnit, "accelerometer_noise", "2 cm/s^2", 0.02),
+        (SkidSteer, "turning_scale", "150 %", 1.5),
+    ],
+)
+def test_units_of_numbers_that_were_bare(model: type[BaseModel], key: str, written: str, meant: float) -> None:
+    taken = TypeAdapter(Annotated[(model.model_fields[key].annotation, *model.model_fields[key].metadata)])
+    assert taken.validate_python(written, strict=True) == pytest.approx(meant)
+    with pytest.raises(ValidationError):
+        taken.validate_python("2 kg", strict=True)
+
+
+def test_a_whole_number_with_a_unit_stays_whole() -> None:
+    with pytest.raises(ValidationError, match="valid integer"):
+        Physics.model_validate({"tick_rate": "240.5 Hz"})
+
+
+def test_a_place_may_stand_wherever_a_pose_or_a_point_of_the_world_is_meant() -> None:
+    found = list(_poses_and_points())
+    without = {str(value) for value in found if not any(isinstance(mark, OrPlace) for mark in value.marks)}
+    assert without == set(NO_PLACES)
+    assert len(found) > len(without)
