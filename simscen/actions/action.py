@@ -18,12 +18,15 @@ class AnyAction(Choice):
     spawn: Annotated[Action | None, OnDemand("simscen.actions.spawn", "Spawn")] = None
     remove: Annotated[Action | None, OnDemand("simscen.actions.remove", "Remove")] = None
     move: Annotated[Action | None, OnDemand("simscen.actions.move", "Move")] = None
+    teleport: Annotated[Action | None, OnDemand("simscen.actions.teleport", "Teleport")] = None
+    stop: Annotated[Action | None, OnDemand("simscen.actions.stop", "Stop")] = None
     open: Annotated[Action | None, OnDemand("simscen.actions.doors", "OpenDoor")] = None
     close: Annotated[Action | None, OnDemand("simscen.actions.doors", "CloseDoor")] = None
     kidnap: Annotated[Action | None, OnDemand("simscen.actions.robot", "Kidnap")] = None
-    push: Annotated[Action | None, OnDemand("simscen.actions.robot", "Push")] = None
+    push: Annotated[Action | None, OnDemand("simscen.actions.push", "Push")] = None
     new_goal: Annotated[Action | None, OnDemand("simscen.actions.goals", "NewGoal")] = None
     cancel_goal: Annotated[Action | None, OnDemand("simscen.actions.goals", "CancelGoal")] = None
+    mark: Annotated[Action | None, OnDemand("simscen.actions.mark", "Mark")] = None
 
     def may(self, *kinds: str) -> bool:
         """Whether it does one of these; an action of an installed package may do anything."""

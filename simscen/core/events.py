@@ -29,8 +29,11 @@ class EventKind(str, Enum):
     OBJECT_SPAWNED = "object.spawned"  # object; its pose, shape, and parts (outlines in its own frame)
     OBJECT_REMOVED = "object.removed"  # object
     OBJECT_MOVED = "object.moved"  # object; waypoints (x, y, yaw), times, repeat, ease, start, phase
+    OBJECT_PLACED = "object.placed"  # object; x, y, yaw: set down there, and moved by no script any more
+    OBJECT_PUSHED = "object.pushed"  # object; impulse (N s), seconds it is spread over
     ROBOT_PLACED = "robot.placed"  # x, y, yaw
-    ROBOT_PUSHED = "robot.pushed"  # impulse (N s)
+    ROBOT_PUSHED = "robot.pushed"  # impulse (N s); seconds it is spread over, where it is no blow
+    MARK = "mark"  # the mark; note
     RUN_ENDED = "run.ended"  # why: navigation ended, time limit
 
     def __str__(self) -> str:

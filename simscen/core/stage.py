@@ -105,16 +105,31 @@ class Stage(Situation, Protocol):
         """The poses of a door's panel when closed and when open."""
         ...
 
+    def motion(self, name: str) -> tuple[MotionPath, float] | None:
+        """The path that moves an object now, and the seconds since it was set off; None when no script moves it."""
+        ...
+
+    def mass(self, name: str) -> float:
+        """The mass in kg of an object that can be pushed; 0 of one that only a script moves, or that is not there."""
+        ...
+
     def move(self, name: str, path: MotionPath) -> None:
         """Let a body follow a path that begins now."""
+        ...
+
+    def place(self, name: str, pose: Pose2) -> None:
+        """Set an object down somewhere else, at rest; no script moves it any more."""
         ...
 
     def place_robot(self, pose: Pose2) -> None:
         """Set the robot down somewhere else, at rest; the stack is not told."""
         ...
 
-    def push(self, impulse: tuple[float, float]) -> None:
-        """Push the robot: an impulse in N s in the world frame, at its centre."""
+    def push(self, impulse: tuple[float, float], name: str | None = None, seconds: float = 0.0) -> None:
+        """Push the robot, or an object with a mass: an impulse in N s in the world frame, at its centre.
+
+        It is spread evenly over so many `seconds`; over one tick of the physics for 0.
+        """
         ...
 
     def send_goal(self, name: str) -> None:

@@ -55,18 +55,28 @@ class Movable(Obstacle):
 
 
 class Door(Spec):
-    """A door: a panel in a doorway that a scenario can open and close."""
+    """A door: a panel in a doorway that a scenario can open and close. It swings about its hinge, or slides."""
 
     name: Name
     """What `open` and `close` call it."""
     points: Annotated[list[PlaceOrPoint], Field(min_length=2, max_length=2)]
-    """The two door posts, [x, y] or places by name; the hinge is at the first."""
+    """The two door posts, [x, y] or places by name; the hinge is at the first, and a door that slides goes past the first."""
+    motion: Literal["swing", "slide"] = "swing"
+    """`swing`: by 90° anticlockwise about the hinge. `slide`: along its own line, as into a pocket of the wall."""
+    travel: PositiveLength | None = None
+    """How far it slides; default: as far as it is wide."""
     closed: bool = False
     """Whether it is closed at the start."""
     thickness: PositiveLength = 0.05
     """Of the panel."""
     height: PositiveLength = 1.0
     """Of the panel."""
+
+    @model_validator(mode="after")
+    def _travel_slides(self) -> "Door":
+        if self.travel is not None and self.motion == "swing":
+            raise ValueError("travel is for a door that slides: `motion: slide`")
+        return self
 
 
 class WorldSpec(Spec):

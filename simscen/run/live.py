@@ -149,16 +149,36 @@ class LiveStage:
         self._simulation.move(name, path)
         self.note(Event(0, EventKind.OBJECT_MOVED, name, described_path(path)))
 
+    def motion(self, name: str) -> tuple[MotionPath, float] | None:
+        """The path that moves an object now, and the seconds since it was set off."""
+        return self._simulation.motion(name)
+
+    def mass(self, name: str) -> float:
+        """In kg, of an object that can be pushed."""
+        return self._simulation.mass(name)
+
+    def place(self, name: str, pose: Pose2) -> None:
+        """Set an object down somewhere else."""
+        self._simulation.place(name, pose)
+        self.note(Event(0, EventKind.OBJECT_PLACED, name, {"x": pose.x, "y": pose.y, "yaw": pose.yaw}))
+
     def place_robot(self, pose: Pose2) -> None:
         """Set the robot down somewhere else."""
         self._robot.place(pose)
         self._look()
         self.note(Event(0, EventKind.ROBOT_PLACED, "", {"x": pose.x, "y": pose.y, "yaw": pose.yaw}))
 
-    def push(self, impulse: tuple[float, float]) -> None:
-        """Push the robot."""
-        self._robot.push(impulse)
-        self.note(Event(0, EventKind.ROBOT_PUSHED, "", {"impulse": list(impulse)}))
+    def push(self, impulse: tuple[float, float], name: str | None = None, seconds: float = 0.0) -> None:
+        """Push the robot, or an object."""
+        if name is not None:
+            self._simulation.push_object(name, impulse, seconds)
+        elif seconds:
+            self._robot.press(impulse, seconds)
+        else:
+            self._robot.push(impulse)
+        about: dict[str, Value] = {"impulse": list(impulse), **({"seconds": seconds} if seconds else {})}
+        kind = EventKind.ROBOT_PUSHED if name is None else EventKind.OBJECT_PUSHED
+        self.note(Event(0, kind, name or "", about))
 
     def send_goal(self, name: str) -> None:
         """Preempt with a new goal."""

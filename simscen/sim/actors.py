@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pybullet
 
-from simscen.core.geometry import Pose3, wrap
+from simscen.core.geometry import Pose2, Pose3, wrap
 from simscen.core.motion_path import pose_at, top_speed
 from simscen.core.shapes import Body, Mesh, MotionPath
 from simscen.sim import engine
@@ -106,6 +106,39 @@ class Actors:
         """Let a body follow a path from `tick` on; from then on nothing can push it."""
         actor = self._actors[name]
         self.add(replace(actor.body, pose=self.poses(tick)[name], mass=0.0, path=path), tick)
+
+    def place(self, name: str, pose: Pose2, tick: int) -> None:
+        """Set a body down somewhere else, upright and at rest; no path moves it any more."""
+        body = self._actors[name].body
+        self.add(replace(body, pose=Pose3.planar(pose, body.pose.z), path=None), tick)
+
+    def motion(self, name: str, tick: int) -> tuple[MotionPath, float] | None:
+        """The path that moves a body now, and the seconds since it was set off."""
+        actor = self._actors.get(name)
+        if actor is None or actor.path is None:
+            return None
+        since = (tick - actor.since) / self._rate
+        return None if actor.path.over(since) else (actor.path, since)
+
+    def mass(self, name: str) -> float:
+        """In kg, of what can be pushed; 0 of anything else."""
+        actor = self._actors.get(name)
+        return actor.body.mass if actor is not None and actor.pushable else 0.0
+
+    def wake(self, name: str) -> None:
+        """See to it that a body can be pushed one tick from now: Bullet forgets forces on what it has to wake."""
+        if self.mass(name):
+            engine.wake(self._client, self._actors[name].id, may_sleep=not self._travelling)
+
+    def push(self, name: str, impulse: tuple[float, float]) -> None:
+        """Push a body's centre of mass during the next tick, in N s; what cannot be pushed, or is gone, is not."""
+        if not self.mass(name):
+            return
+        number = self._actors[name].id
+        centre = pybullet.getBasePositionAndOrientation(number, physicsClientId=self._client)[0]
+        force = (impulse[0] * self._rate, impulse[1] * self._rate, 0.0)
+        pybullet.applyExternalForce(number, -1, force, centre, pybullet.WORLD_FRAME, physicsClientId=self._client)
+        self._still_since = None
 
     def _sort(self) -> None:
         self._posed_at = self._still_since = None

@@ -1,6 +1,6 @@
 """One robot in a simulation: how it moves, what it touches, and how near it is to anything."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -25,6 +25,16 @@ from simscen.sim.vehicle import base_twist
 Vector = tuple[float, float, float]
 
 
+@dataclass(frozen=True)
+class Press:
+    """A force on something in the ticks from `since` to before `until`: an `impulse` in N s for each of them."""
+
+    push: Callable[[tuple[float, float]], None]
+    impulse: tuple[float, float]
+    since: int
+    until: int
+
+
 @dataclass(eq=False)
 class Scene:
     """What all robots of a simulation share, and the robots by name; `fixed` are the bodies that never move."""
@@ -36,6 +46,29 @@ class Scene:
     film: Film
     robots: dict[str, "Robot"] = field(default_factory=dict)
     tick: int = 0
+    presses: list[Press] = field(default_factory=list)
+
+    def press(self) -> bool:
+        """Let the forces that last press on during the next step; whether there are any."""
+        self.presses = [press for press in self.presses if press.until > self.tick]
+        for press in self.presses:
+            if press.since <= self.tick:
+                press.push(press.impulse)
+        if self.presses:
+            self.shaken()
+        return bool(self.presses)
+
+    def add_press(
+        self, push: Callable[[tuple[float, float]], None], impulse: tuple[float, float], seconds: float, since: int
+    ) -> None:
+        """Spread an impulse in N s evenly over the ticks from `since` on, over one at least."""
+        ticks = max(1, round(seconds * self.rate))
+        self.presses.append(Press(push, (impulse[0] / ticks, impulse[1] / ticks), since, since + ticks))
+
+    def shaken(self) -> None:
+        """Something is pushed during the next step."""
+        for robot in self.robots.values():
+            robot.shaken()
 
     def changed(self) -> None:
         """Something was put into or taken out of the world, or set down elsewhere."""
@@ -135,11 +168,14 @@ class Robot:
         self.settled(pose)
         self._scene.changed()
 
+    def press(self, impulse: tuple[float, float], seconds: float) -> None:
+        """Push it evenly from now on for so long: an impulse in N s in the world frame, at its centre of mass."""
+        self._scene.add_press(self.push, impulse, seconds, self._scene.tick)
+
     def push(self, impulse: tuple[float, float]) -> None:
         """Push it during the next tick: an impulse in N s in the world frame, at its centre of mass."""
         self.base.push(impulse, 1 / self._scene.rate)
-        for robot in self._scene.robots.values():
-            robot._clearance.shaken(self._scene.tick)
+        self._scene.shaken()
 
     # what the simulation tells it
 
@@ -147,6 +183,10 @@ class Robot:
         """It stands at `pose`, at rest."""
         self.base.place(pose)
         self._drive.rest()
+
+    def shaken(self) -> None:
+        """Something is pushed during the next step."""
+        self._clearance.shaken(self._scene.tick)
 
     def advance(self) -> None:
         """One period of the firmware's loop."""

@@ -1,6 +1,7 @@
 """The world in motion: robots, what stands, what moves. Time is whole ticks."""
 
 from collections.abc import Iterable, Mapping
+from functools import partial
 from typing import NamedTuple
 
 import pybullet
@@ -81,6 +82,8 @@ class Simulation:
             if scene.tick % self._firmware == 0:
                 for robot in self.robots.values():
                     robot.advance()
+            if scene.presses and scene.press():
+                calm = -1
             if scene.tick < calm:
                 pybullet.stepSimulation(scene.client)
                 scene.tick += 1
@@ -118,6 +121,28 @@ class Simulation:
         """Let a body follow a path that begins now. Raises KeyError for an unknown name."""
         self._scene.actors.move(name, path, self.tick)
         self._scene.changed()
+
+    def place(self, name: str, pose: Pose2) -> None:
+        """Set a body down somewhere else, at rest; no path moves it any more. Raises KeyError for an unknown name."""
+        self._scene.actors.place(name, pose, self.tick)
+        self._scene.changed()
+
+    def motion(self, name: str) -> tuple[MotionPath, float] | None:
+        """The path that moves a body now, and the seconds since it was set off; None when none does."""
+        return self._scene.actors.motion(name, self.tick)
+
+    def mass(self, name: str) -> float:
+        """In kg, of a body that can be pushed; 0 of anything else."""
+        return self._scene.actors.mass(name)
+
+    def push_object(self, name: str, impulse: tuple[float, float], seconds: float = 0.0) -> None:
+        """Push a body evenly for so long, or for one tick, from the next tick on: N s in the world frame, at its centre.
+
+        What cannot be pushed, or is gone, is not.
+        """
+        actors = self._scene.actors
+        actors.wake(name)
+        self._scene.add_press(partial(actors.push, name), impulse, seconds, self.tick + 1)
 
     def object_pose(self, name: str) -> Pose3 | None:
         """Where a body is now, or a robot; None when it is not there."""

@@ -29,6 +29,7 @@ UNITS: dict[str, dict[str, float]] = {
     "jerk": {"m/s^3": 1.0},
     "mass": {"kg": 1.0, "g": 0.001, "t": 1000.0},
     "frequency": {"Hz": 1.0, "kHz": 1000.0},
+    "force": {"N": 1.0, "kN": 1000.0},
     "impulse": {"N s": 1.0, "Ns": 1.0},
     "ratio": {"%": 0.01},
 }
@@ -114,6 +115,7 @@ PositiveJerk = Annotated[float, Field(gt=0, le=1e6), Quantity("jerk")]
 Mass = Annotated[float, Field(ge=0, le=1e5), Quantity("mass")]
 PositiveMass = Annotated[float, Field(gt=0, le=1e5), Quantity("mass")]
 Frequency = Annotated[float, Field(gt=0, le=1000), Quantity("frequency")]
+Force = Annotated[float, Field(ge=-1e5, le=1e5), Quantity("force")]
 Impulse = Annotated[float, Field(ge=-1e5, le=1e5), Quantity("impulse")]
 Ratio = Annotated[float, Field(ge=0), Quantity("ratio")]
 Probability = Annotated[float, Field(ge=0, le=1), Quantity("ratio")]

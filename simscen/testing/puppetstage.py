@@ -30,6 +30,7 @@ class PuppetStage:
     goal: Goal | None = None
     regions: dict[str, Polygon] = field(default_factory=dict)
     objects: dict[str, Pose2 | None] = field(default_factory=dict)
+    motions: dict[str, tuple[MotionPath, float]] = field(default_factory=dict)
     done: list[Any] = field(default_factory=list)
 
     def scanned(self, sensor: str | None) -> int | None:
@@ -43,6 +44,14 @@ class PuppetStage:
     def object(self, name: str) -> Pose2 | None:
         """Where a named object is now."""
         return self.objects.get(name, Pose2(0.5, 0.5, 0.0))
+
+    def motion(self, name: str) -> tuple[MotionPath, float] | None:
+        """The path that moves an object."""
+        return self.motions.get(name)
+
+    def mass(self, name: str) -> float:
+        """Everything weighs a kilogram."""
+        return 1.0
 
     def door(self, name: str) -> tuple[Pose2, Pose2]:
         """A door that slides by a metre."""
@@ -60,13 +69,17 @@ class PuppetStage:
         """Write it down."""
         self.done.append(("move", name, path))
 
+    def place(self, name: str, pose: Pose2) -> None:
+        """Write it down."""
+        self.done.append(("place", name, pose))
+
     def place_robot(self, pose: Pose2) -> None:
         """Write it down."""
         self.done.append(("place_robot", pose))
 
-    def push(self, impulse: tuple[float, float]) -> None:
+    def push(self, impulse: tuple[float, float], name: str | None = None, seconds: float = 0.0) -> None:
         """Write it down."""
-        self.done.append(("push", impulse))
+        self.done.append(("push", impulse, name, seconds))
 
     def send_goal(self, name: str) -> None:
         """Write it down."""

@@ -46,7 +46,7 @@ def build_own(
         bodies=bodies,
         places=places,
         regions={**base.regions, **regions},
-        doors={door.name: _swing(door) for door in spec.doors},
+        doors={door.name: _ways(door) for door in spec.doors},
         bounds=_bounds(solids, bodies, places.values(), grid),
         grid=grid or base.grid,
         notes=(*base.notes, *notes),
@@ -59,9 +59,13 @@ def door_poses(hinge: tuple[float, float], post: tuple[float, float]) -> tuple[P
     return Pose2(*hinge, yaw), Pose2(*hinge, yaw).compose(Pose2(0.0, 0.0, math.pi / 2))
 
 
-def _swing(door: Door) -> tuple[Pose2, Pose2]:
+def _ways(door: Door) -> tuple[Pose2, Pose2]:
+    """Where its panel is when closed and when open."""
     (hx, hy), (px, py) = door.points
-    return door_poses((hx, hy), (px, py))
+    closed, opened = door_poses((hx, hy), (px, py))
+    if door.motion == "swing":
+        return closed, opened
+    return closed, closed.compose(Pose2(-(door.travel or math.hypot(px - hx, py - hy)), 0.0))
 
 
 def _corners(wall: Wall) -> list[tuple[float, float]]:
@@ -83,7 +87,7 @@ def _movable(thing: Movable) -> Body:
 
 def _door(door: Door) -> Body:
     (hinge_x, hinge_y), (post_x, post_y) = door.points
-    closed, opened = door_poses((hinge_x, hinge_y), (post_x, post_y))
+    closed, opened = _ways(door)
     width = math.hypot(post_x - hinge_x, post_y - hinge_y)
     panel = Solid(Box((width, door.thickness, door.height)), Pose3(x=width / 2, z=door.height / 2), door.name)
     return Body(door.name, (panel,), Pose3.planar(closed if door.closed else opened))

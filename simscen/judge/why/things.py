@@ -51,7 +51,7 @@ def things(trace: Trace, tick: int) -> list[Thing]:
                 doing = ""
             case EventKind.OBJECT_SPAWNED:
                 spawned[event.name], last[event.name] = event, (doing, event)
-            case EventKind.OBJECT_MOVED:
+            case EventKind.OBJECT_MOVED | EventKind.OBJECT_PLACED:
                 last[event.name] = (doing, event)
             case EventKind.OBJECT_REMOVED:
                 spawned.pop(event.name, None)
@@ -75,7 +75,7 @@ def _thing(trace: Trace, tick: int, spawned: Event, by: str, last: Event) -> Thi
     pose, parts = pose_at(trace, spawned, tick), spawned.data["parts"]
     assert isinstance(parts, list)
     outlines = tuple(pose.apply(np.array(part, dtype=np.float64)) for part in parts)
-    return Thing(spawned.name, outlines, by, last.tick, last.kind == EventKind.OBJECT_MOVED)
+    return Thing(spawned.name, outlines, by, last.tick, last.kind != EventKind.OBJECT_SPAWNED)
 
 
 def _distance(points: Array, corners: Array) -> Array:
