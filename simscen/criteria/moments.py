@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from simscen.core.case import Case
     from simscen.core.trace import Trace
 
-_STARTS = (EventKind.FAULT_STARTED, EventKind.EVENT_STARTED)
+_STARTS = (EventKind.FAULT_STARTED, EventKind.EVENT_STARTED, EventKind.MARK)
 _GOAL_ENDS = (EventKind.GOAL_REACHED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED)
 _ENDS = (EventKind.FAULT_ENDED, EventKind.EVENT_ENDED)
 
@@ -29,7 +29,7 @@ class Span:
 
 
 def spans(trace: Trace, label: str) -> list[Span]:
-    """Each time the fault or event `label` happened. What never ended, or takes no time, goes on to the run's end.
+    """Each time the fault, event or mark `label` happened. What never ended, or takes no time, goes on to the end.
 
     Several entries of a scenario may share a label; the end of one is not that of another.
     """

@@ -132,6 +132,12 @@ def _twice_named(loaded: LoadedScenario) -> Iterator[Problem]:
                 yield loaded.problem((*keys, "name"), "SC033", message, "give it another name")
             seen.setdefault(name or "", keys)
     yield from _goals_sent_twice(loaded)
+    happening = [*event_names(loaded), *(fault.label for fault in loaded.spec.faults)]
+    for keys, action in (placed for step in loaded.spec.steps for placed in step.placed()):
+        name = getattr(action.chosen, "name", "") if action.kind == "mark" else ""
+        if name in happening:
+            message = f"an event or a fault is called {quoted(name)}, too: criteria could not tell them apart"
+            yield loaded.problem((*keys, "mark", "name"), "SC033", message, "give one of them another name")
     for index, fault in enumerate(loaded.spec.faults):
         if fault.name is not None and fault.name in event_names(loaded):
             message = f"an event is called {quoted(fault.name)}, too: criteria could not tell them apart"

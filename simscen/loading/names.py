@@ -13,8 +13,8 @@ ARTICLES = {
     "object": "object of the world or of an event",
     "movable": "movable object of the world or of an event",
     "goal": "goal",
-    "event": "event",
-    "happening": "event or fault",
+    "event": "event or mark",
+    "happening": "event, fault or mark",
 }
 
 Names = Mapping[str, list[str] | None]
@@ -26,8 +26,8 @@ def known_names(loaded: LoadedScenario, world: World | None = None) -> Names:
     return {
         **(_of_files(loaded) if world is None else _of_world(loaded, world)),
         "goal": goal_names(loaded),
-        "event": event_names(loaded),
-        "happening": event_names(loaded) + [fault.label for fault in loaded.spec.faults],
+        "event": _distinct(event_names(loaded), mark_names(loaded)),
+        "happening": _distinct(event_names(loaded), [fault.label for fault in loaded.spec.faults], mark_names(loaded)),
     }
 
 
@@ -44,6 +44,11 @@ def own_goal_names(loaded: LoadedScenario) -> list[str]:
 def event_names(loaded: LoadedScenario) -> list[str]:
     """Names as written, or event-1, event-2, …; steps of stories after their event."""
     return [step.name for step in loaded.spec.steps]
+
+
+def mark_names(loaded: LoadedScenario) -> list[str]:
+    """The marks that events set, in order."""
+    return _distinct(_made(loaded, "mark"))
 
 
 def _of_files(loaded: LoadedScenario) -> Names:

@@ -136,7 +136,7 @@ class Simulation:
         return self._scene.actors.mass(name)
 
     def push_object(self, name: str, impulse: tuple[float, float], seconds: float = 0.0) -> None:
-        """Push a body evenly for so long, or for one tick, from the next tick on: N s in the world frame, at its centre.
+        """Push a body evenly for so long, or for one tick, from the next tick on: N s in the world frame.
 
         What cannot be pushed, or is gone, is not.
         """

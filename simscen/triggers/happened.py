@@ -19,7 +19,7 @@ def _seen(now: Situation, kind: EventKind, name: str | None) -> int:
 
 
 class EventStatus(Spec, Condition):
-    """True once another event, or a fault, of this scenario has started or ended.
+    """True once another event, or a fault, of this scenario has started or ended, or a mark has been set.
 
     For one trouble that brings the next: the lidar falls silent, and a second later somebody steps in the way.
 
@@ -27,13 +27,14 @@ class EventStatus(Spec, Condition):
     """
 
     name: HappeningName
-    """The `name` of the event or fault; a fault without one is called `<sensor>.<fault>`, e.g. `lidar.off`."""
+    """The `name` of the event, fault or mark; a fault without one is called `<sensor>.<fault>`, e.g. `lidar.off`."""
     status: Literal["started", "ended"] = "started"
     """What it must have done."""
 
     def holds(self, now: Situation) -> bool:
         """It has."""
-        return any(_seen(now, EventKind(f"{what}.{self.status}"), self.name) > 0 for what in ("event", "fault"))
+        kinds = [EventKind(f"{what}.{self.status}") for what in ("event", "fault")]
+        return any(_seen(now, kind, self.name) > 0 for kind in (*kinds, EventKind.MARK))
 
 
 class Replan(Spec, Condition):

@@ -181,6 +181,20 @@ def _idle_stack(loaded: LoadedScenario) -> Iterator[Problem]:
             yield loaded.problem(("stack", "controller", key), "SC055", message)
 
 
+def _idle_push(loaded: LoadedScenario, keys: Keys, push: Any) -> Iterator[Problem]:
+    """A push of nothing, or on what has no mass."""
+    key = "impulse" if push.force is None else "force"
+    if not any(push.impulse or push.force):
+        yield loaded.problem((*keys, "push", key), "SC055", "a push of zero changes nothing")
+    things = loaded.world.spec.objects if loaded.world.spec else []
+    spawned = [action.chosen for step in loaded.spec.steps for action in step.actions if action.kind == "spawn"]
+    named: list[Any] = [thing for thing in (*things, *spawned) if getattr(thing, "name", "") == push.name]
+    doors = [door.name for door in loaded.world.spec.doors] if loaded.world.spec else []
+    if push.name in doors or (named and not any(thing.mass for thing in named)):
+        message, hint = f"`{push.name}` has no mass: no push moves it", "give it a `mass`, or `move` it"
+        yield loaded.problem((*keys, "push", "name"), "SC055", message, hint)
+
+
 def _idle_actions(loaded: LoadedScenario) -> Iterator[Problem]:
     """Pushes of nothing, and doors that are as they shall be."""
     done = [placed for step in loaded.spec.steps for placed in step.placed()]
@@ -189,10 +203,11 @@ def _idle_actions(loaded: LoadedScenario) -> Iterator[Problem]:
     shut = {door.name: door.closed for door in loaded.world.spec.doors} if loaded.world.spec else {}
     for keys, action in done:
         name = getattr(action.chosen, "name", "")
-        if action.kind == "push" and not any(getattr(action.chosen, "impulse", ())):
-            yield loaded.problem((*keys, "push", "impulse"), "SC055", "a push of 0 N s changes nothing")
+        if action.kind == "push":
+            yield from _idle_push(loaded, keys, action.chosen)
         for kind, undone, so in (("open", "close", False), ("close", "open", True)):
-            if action.kind == kind and shut.get(name) is so and (undone, name) not in kinds and not unknown:
+            wide = getattr(action.chosen, "to", 1) == 1
+            if action.kind == kind and wide and shut.get(name) is so and (undone, name) not in kinds and not unknown:
                 state = "shut" if so else "open"
                 message = f"door `{name}` is {state} from the start, and nothing {undone}s it"
                 yield loaded.problem((*keys, kind, "name"), "SC055", message)

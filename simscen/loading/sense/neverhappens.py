@@ -94,7 +94,11 @@ class _Run:
             *((step.when, step.name) for step in self.steps if self.has_its_turn(step)),
             *((fault.when, fault.label) for fault in self.loaded.spec.faults),
         ]
-        return frozenset(name for when, name in orders if when is None or self.never(when, ()) is None)
+        happening = {name for when, name in orders if when is None or self.never(when, ()) is None}
+        actions = [action for step in self.steps if step.name in happening for action in step.actions]
+        return frozenset(
+            happening | {getattr(action.chosen, "name", "") for action in actions if action.kind == "mark"}
+        )
 
     def never(self, trigger: Trigger, keys: Keys) -> Why | None:
         """Why a trigger never fires."""

@@ -45,6 +45,7 @@ def _map(scene: Scene) -> Image.Image:
     marks.draw_truth(canvas, scene)
     marks.draw_belief(canvas, scene)
     marks.draw_robot(canvas, scene)
+    marks.draw_marks(canvas, scene)
     marks.draw_collisions(canvas, scene)
     marks.draw_violations(canvas, scene)
     _scale_bar(canvas)

@@ -17,6 +17,7 @@ from simscen.report.picture.scene import Scene
 _STAR = [(r * math.cos(a), r * math.sin(a)) for k in range(16) for r, a in [((16, 7)[k % 2], k * math.pi / 8)]]
 _CROSS = [(1.6, 0), (5.4, 3.8), (3.8, 5.4), (0, 1.6), (-3.8, 5.4), (-5.4, 3.8), (-1.6, 0)]
 _CROSS += [(-5.4, -3.8), (-3.8, -5.4), (0, -1.6), (3.8, -5.4), (5.4, -3.8)]
+_FLAG = [(0, 0), (0, -18), (12, -13), (1.5, -9), (1.5, 0)]
 _DOT = 0.15 * np.column_stack((np.cos(np.arange(24) * np.pi / 12), np.sin(np.arange(24) * np.pi / 12)))
 _GHOSTS = 6
 _BANDS = 48
@@ -115,6 +116,15 @@ def draw_robot(canvas: Canvas, scene: Scene) -> None:
         canvas.polygon(pose.apply(nose), palette.PAGE if strength > 100 else colour)
     u, v = canvas.pixel(first.x, first.y)
     canvas.note(Note(u, v + 20, "start", 12, palette.START, "mm", halo=palette.FREE))
+
+
+def draw_marks(canvas: Canvas, scene: Scene) -> None:
+    """A flag with its name where the robot was when an event set a mark."""
+    for event in scene.trace.of_kind(EventKind.MARK):
+        x, y = scene.trace.place(event.tick)
+        canvas.sign(x, y, _FLAG, palette.AMBER)
+        u, v = canvas.pixel(x, y)
+        canvas.note(Note(u + 14, v - 13, shown(event.name), 12, palette.AMBER, halo=palette.FREE))
 
 
 def draw_collisions(canvas: Canvas, scene: Scene) -> None:

@@ -123,7 +123,7 @@ class Scene:
         return "radius" if self.size.radius is not None else "inscribed radius"
 
 
-MOVING = frozenset({"open", "close", "move", "remove"})
+MOVING = frozenset({"open", "close", "move", "remove", "teleport", "push"})
 """Actions after which a thing is no longer where it was."""
 
 

@@ -1,0 +1,109 @@
+"""Teleport, stop, push, doors and marks in a run: where things are afterwards, by the log."""
+
+import math
+
+import numpy as np
+import pytest
+
+from simscen.core.events import EventKind
+from simscen.loading.scenario import load_scenario
+from simscen.record.replay import read_log
+from simscen.run.prepare import prepare
+from simscen.run.simulate import simulate
+
+SCENARIO = """\
+simscen: 1
+world:
+  simscen: 1
+  walls: [{name: outer wall, points: [[0, 0], [8, 0], [8, 4], [0, 4], [0, 0]]}]
+  objects:
+    - {name: bin, box: [0.2, 0.2, 0.3], pose: {x: 5.5, y: 0.5}, mass: 4 kg}
+    - {name: crate, box: [0.2, 0.2, 0.3], pose: {x: 5.5, y: 1.5}}
+    - {name: cart, box: [0.4, 0.4, 0.3], pose: {x: 3, y: 3.5}, move: {through: [[7, 3.5]], speed: 1 m/s}}
+  doors:
+    - {name: hatch, points: [[7, 1], [7, 2]], closed: true}
+    - {name: slider, points: [[3, 2.5], [4, 2.5]], closed: true, motion: slide, travel: 80 cm}
+robot: {pose: {x: 1, y: 1}}
+stack: {localizer: {type: ground_truth}}
+goals: [{pose: {x: 2.5, y: 1}, timeout: 60 s}]
+time_limit: 6 s
+linger: 6
+events:
+  - {name: away, when: {time: 1 s}, do: {teleport: {name: crate, pose: {x: 6.5, y: 3, yaw: 45 deg}}}}
+  - {name: pushed, when: {time: 1 s}, do: {push: {name: bin, force: [0, 60], for: 0.5 s}}}
+  - {name: gone, when: {time: 1 s}, do: {push: {name: crate, impulse: [0, 5]}}, required: false}
+  - {name: waits, when: {time: 1 s}, do: {stop: {name: cart, for: 1 s}}}
+  - {name: stands, when: {time: 3 s}, do: {stop: {name: cart}}}
+  - {name: stood, when: {time: 3.5 s}, do: {stop: {name: cart}}, required: false}
+  - name: hatch opens
+    when: {time: 1 s}
+    do: {open: {name: hatch, duration: 2 s}}
+    then:
+      - {when: {time: 0.5 s}, do: {close: {name: hatch, duration: 2 s}}}
+  - {name: slides, when: {time: 1 s}, do: [{open: {name: slider, to: 50 %}}, {mark: {name: now}}]}
+  - {name: after the mark, when: {event: {name: now}, delay: 0.5 s}, do: {mark: {name: later}}}
+pass:
+  - stopped_within: {time: 4 s, after: later}
+"""
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("events")
+    file, log = folder / "own.scenario.yaml", folder / "log.mcap"
+    file.write_text(SCENARIO)
+    return simulate(prepare(load_scenario(file, folder)), log=log), read_log(log).trace
+
+
+def at(trace, name, seconds):
+    samples = trace.objects[name]
+    return samples.values[np.searchsorted(samples.ticks, round(seconds * trace.tick_rate))]
+
+
+def test_everything_happened_but_what_could_not(run):
+    done, _ = run
+    happened = {one.ordered.name: one for one in done.result.disturbances}
+    assert {name for name, one in happened.items() if not one.happened} == {"gone", "stood"}
+    assert happened["gone"].effect == "crate has no mass, or a script moves it: no push does"
+    assert happened["stood"].effect == "cart was not moving"
+    assert happened["hatch opens then 1"].effect == "hatch swings shut"
+
+
+def test_a_teleported_object_is_there_from_that_moment_on(run):
+    _, trace = run
+    assert at(trace, "crate", 1.0)[:2] == pytest.approx((6.5, 3.0)) or at(trace, "crate", 1.0)[0] == 5.5
+    assert at(trace, "crate", 1.05) == pytest.approx((6.5, 3.0, math.pi / 4), abs=1e-6)
+    (placed,) = [event for event in trace.of_kind(EventKind.OBJECT_PLACED) if event.name == "crate"]
+    assert (placed.data["x"], placed.data["y"]) == (6.5, 3.0)
+
+
+def test_a_cart_that_waits_goes_on_where_it_was_and_one_that_is_stopped_stays(run):
+    _, trace = run
+    for seconds, x in ((0.5, 3.5), (1.5, 4.0), (2.5, 4.5), (3.5, 5.0), (5.0, 5.0)):
+        assert at(trace, "cart", seconds)[0] == pytest.approx(x, abs=0.01)
+
+
+def test_a_pushed_bin_slides(run):
+    _, trace = run
+    assert at(trace, "bin", 1.5)[1] > 0.6
+    (pushed,) = trace.of_kind(EventKind.OBJECT_PUSHED)
+    assert pushed.data == {"impulse": [0.0, 30.0], "seconds": 0.5}
+
+
+def test_doors_reverse_and_slide(run):
+    _, trace = run
+    shut = math.pi / 2
+    assert at(trace, "hatch", 1.5)[2] == pytest.approx(shut + math.pi / 8, abs=0.02)
+    assert at(trace, "hatch", 1.75)[2] == pytest.approx(shut + math.pi / 16, abs=0.02)
+    assert at(trace, "hatch", 2.1)[2] == pytest.approx(shut, abs=1e-3)
+    assert at(trace, "slider", 1.7)[:2] == pytest.approx((3.0 - 0.3733, 2.5), abs=0.01)
+    assert at(trace, "slider", 2.0)[:2] == pytest.approx((2.6, 2.5), abs=1e-6)
+
+
+def test_marks_are_in_the_log_and_are_waited_for_and_judged_after(run):
+    done, trace = run
+    marks = {event.name: trace.seconds(event.tick) for event in trace.of_kind(EventKind.MARK)}
+    assert marks == pytest.approx({"now": 1.0, "later": 1.5}, abs=0.05)
+    assert [verdict.status.value for verdict in done.result.verdicts if verdict.criterion == "stopped_within"] == [
+        "pass"
+    ]

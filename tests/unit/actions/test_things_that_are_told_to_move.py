@@ -1,0 +1,137 @@
+"""Doors that reverse, slide and stand ajar; things that stop; pushes: what each asks of the stage, to the number."""
+
+import math
+
+import pytest
+from pydantic import ValidationError
+
+from simscen.actions.action import AnyAction
+from simscen.core.events import Event, EventKind
+from simscen.core.geometry import Pose2
+from simscen.core.motion_path import pose_at
+from simscen.core.shapes import MotionPath
+from simscen.testing.puppetstage import PuppetStage
+
+WIDE_OPEN = Pose2(0.0, 0.0, math.pi / 2)
+
+
+class Swinging(PuppetStage):
+    def door(self, name):
+        return Pose2(0.0, 0.0, 0.0), WIDE_OPEN
+
+
+def perform(stage, **action):
+    return AnyAction.model_validate(action).perform(stage)
+
+
+def moved(stage):
+    ((_, _, path),) = stage.done
+    return path
+
+
+def test_a_door_swings_by_itself_for_its_whole_duration():
+    stage = Swinging(objects={"gate": Pose2(0.0, 0.0, 0.0)})
+    assert perform(stage, open={"name": "gate", "duration": 2.0}).happened
+    assert moved(stage).times[-1] == 2.0
+    assert pose_at(moved(stage), 0.5).yaw == pytest.approx(math.pi / 8)
+    assert moved(stage).poses[-1] == WIDE_OPEN
+
+
+def test_a_door_that_is_reversed_on_its_way_takes_its_share_at_the_same_speed():
+    stage = Swinging(objects={"gate": Pose2(0.0, 0.0, math.pi / 6)})
+    assert perform(stage, close={"name": "gate", "duration": 1.5}).what == "gate swings shut"
+    assert moved(stage).times[-1] == pytest.approx(0.5)
+
+
+def test_a_door_that_slides_moves_straight():
+    stage = PuppetStage(objects={"gate": Pose2(0.25, 0.0, 0.0)})
+    assert perform(stage, open={"name": "gate", "duration": 2.0}).what == "gate slides open"
+    assert moved(stage) == MotionPath((0.0, 1.5), (Pose2(0.25, 0.0, 0.0), Pose2(1.0, 0.0, 0.0)))
+
+
+def test_a_door_ajar_is_open_by_a_share_of_its_travel():
+    stage = Swinging(objects={"gate": Pose2(0.0, 0.0, 0.0)})
+    assert perform(stage, open={"name": "gate", "to": "30 %", "duration": 1.0}).what == "gate swings 30% open"
+    assert moved(stage).poses[-1].yaw == pytest.approx(0.3 * math.pi / 2)
+    assert moved(stage).times[-1] == pytest.approx(0.3)
+
+
+def test_nothing_comes_of_opening_what_is_open_or_on_its_way():
+    assert not perform(Swinging(objects={"gate": WIDE_OPEN}), open={"name": "gate"}).happened
+    opening = MotionPath((0.0, 1.0), (Pose2(0.0, 0.0, 0.0), WIDE_OPEN))
+    stage = Swinging(objects={"gate": Pose2(0.0, 0.0, 0.5)}, motions={"gate": (opening, 0.4)})
+    effect = perform(stage, open={"name": "gate"})
+    assert (effect.happened, effect.what) == (False, "gate swings open already")
+    assert perform(stage, close={"name": "gate"}).happened
+
+
+def test_what_stops_for_a_while_goes_on_where_it_was():
+    path = MotionPath((0.0, 4.0), (Pose2(0, 0), Pose2(4, 0)), "back_and_forth", phase=1.0)
+    stage = PuppetStage(motions={"cart": (path, 1.5)})
+    assert perform(stage, stop={"name": "cart", "for": "3 s"}).what == "stopped cart for 3 s"
+    again = moved(stage)
+    assert [pose_at(again, t).x for t in (0.0, 3.0, 4.0, 6.0)] == pytest.approx([2.5, 2.5, 3.5, 2.5])
+
+
+def test_what_waits_for_its_start_waits_the_longer():
+    path = MotionPath((0.0, 4.0), (Pose2(0, 0), Pose2(4, 0)), start=2.0)
+    stage = PuppetStage(motions={"cart": (path, 1.5)})
+    perform(stage, stop={"name": "cart", "for": 3.0})
+    assert pose_at(moved(stage), 4.5) == Pose2(1.0, 0.0, 0.0)
+
+
+def test_what_stops_for_good_is_set_down_where_it_is():
+    path = MotionPath((0.0, 4.0), (Pose2(0, 0), Pose2(4, 0)))
+    stage = PuppetStage(motions={"cart": (path, 1.5)}, objects={"cart": Pose2(1.5, 0.0, 0.0)})
+    assert perform(stage, stop={"name": "cart"}).happened
+    assert stage.done == [("place", "cart", Pose2(1.5, 0.0, 0.0))]
+    assert not perform(PuppetStage(), stop={"name": "cart"}).happened
+    assert not perform(PuppetStage(objects={"cart": None}), stop={"name": "cart"}).happened
+
+
+def test_a_force_is_the_impulse_that_it_adds_up_to_over_its_time():
+    stage = PuppetStage()
+    assert (
+        perform(stage, push={"force": ["0.01 kN", 0], "for": "1.5 s"}).what == "pushed the robot with 10.0 N for 1.5 s"
+    )
+    assert perform(stage, push={"impulse": [0, 5], "name": "bin"}).what == "pushed bin with 5.0 N s"
+    assert stage.done == [("push", (15.0, 0.0), None, 1.5), ("push", (0.0, 5.0), "bin", 0.0)]
+
+
+class Heavy(PuppetStage):
+    def mass(self, name):
+        return 0.0
+
+
+def test_nothing_comes_of_a_push_on_nothing_or_on_what_cannot_be_pushed():
+    assert not perform(PuppetStage(objects={"bin": None}), push={"impulse": [0, 5], "name": "bin"}).happened
+    assert not perform(Heavy(), push={"impulse": [0, 5], "name": "bin"}).happened
+    assert not perform(PuppetStage(), push={"impulse": [0, 0]}).happened
+
+
+@pytest.mark.parametrize(
+    ("told", "said"),
+    {
+        "expected either impulse or force": {},
+        "a force needs `for`": {"force": [0, 1]},
+        "an impulse lasts no time": {"impulse": [0, 1], "for": 1.0},
+    }.items(),
+)
+def test_what_is_no_push_is_refused(told, said):
+    with pytest.raises(ValidationError, match=told):
+        AnyAction.model_validate({"push": said})
+
+
+def test_teleport_sets_an_object_down_and_says_how_far():
+    stage = PuppetStage(objects={"bin": Pose2(1.0, 1.0, 0.0)})
+    effect = perform(stage, teleport={"name": "bin", "pose": {"x": 4, "y": 5}})
+    assert effect.what == "set bin down 5.00 m away, at (4.00, 5.00)"
+    assert stage.done == [("place", "bin", Pose2(4.0, 5.0, 0.0))]
+    assert not perform(stage, teleport={"name": "bin", "pose": {"x": 1, "y": 1}}).happened
+    assert not perform(PuppetStage(objects={"bin": None}), teleport={"name": "bin", "pose": {"x": 1, "y": 1}}).happened
+
+
+def test_a_mark_is_written_down():
+    stage = PuppetStage()
+    perform(stage, mark={"name": "in the aisle", "note": "sees the rack"})
+    assert stage.done == [("note", Event(0, EventKind.MARK, "in the aisle", {"note": "sees the rack"}))]
