@@ -60,7 +60,7 @@ class Door(Spec):
     name: Name
     """What `open` and `close` call it."""
     points: Annotated[list[PlaceOrPoint], Field(min_length=2, max_length=2)]
-    """The two door posts, [x, y] or places by name; the hinge is at the first, past which a door slides that does so."""
+    """The two door posts, [x, y] or places by name; the hinge is at the first, past which a sliding door goes."""
     motion: Literal["swing", "slide"] = "swing"
     """`swing`: by 90° anticlockwise about the hinge. `slide`: along its own line, as into a pocket of the wall."""
     travel: PositiveLength | None = None
