@@ -13,30 +13,33 @@ class OdometryDistortion(Disturbance):
     """Falsifies each increment of odometry and adds the increments up again.
 
     The reported pose starts at the sensor's own, so that nothing jumps when the fault begins. When the fault is over
-    the error made so far stays, as it does on a real robot; only new increments are true again.
+    the error made so far stays, as it does on a real robot; only new increments are true again. Of several sensors
+    each has its own sum.
     """
 
     def __init__(self) -> None:
-        self._sensed: Pose2 | None = None
-        self._reported: Pose2 | None = None
+        self._sums: dict[str, tuple[Odometry, Pose2]] = {}
         self._over = False
 
     @abstractmethod
     def increment(self, step: Twist) -> Twist:
         """What is reported for a true increment (m, m, rad) or velocity (m/s, m/s, rad/s)."""
 
+    def reported(self, step: Twist, twist: Twist, ticks: int) -> tuple[Twist, Twist]:
+        """What is reported for an increment over some ticks, and for the velocity at its end."""
+        return self.increment(step), self.increment(twist)
+
     def reading(self, reading: Reading) -> Reading | None:
         """The odometry with falsified increments."""
         if not isinstance(reading, Odometry):
             return reading
-        if self._sensed is None or self._reported is None:
-            self._sensed = self._reported = reading.pose
-        step = Twist(*self._sensed.between(reading.pose))
-        self._reported = self._reported.compose(Pose2(*(step if self._over else self.increment(step))))
-        self._sensed = reading.pose
-        return replace(
-            reading, pose=self._reported, twist=reading.twist if self._over else self.increment(reading.twist)
-        )
+        before, pose = self._sums.get(reading.sensor, (reading, reading.pose))
+        step, twist = Twist(*before.pose.between(reading.pose)), reading.twist
+        if not self._over:
+            step, twist = self.reported(step, twist, reading.tick - before.tick)
+        pose = pose.compose(Pose2(*step))
+        self._sums[reading.sensor] = reading, pose
+        return replace(reading, pose=pose, twist=twist)
 
     def end(self) -> Disturbance | None:
         """The error stays."""

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 
 from simscen.core.sensing import Reading, Scan
-from simscen.faults.base import Disturbance, Fault, Wheels
+from simscen.faults.base import Disturbance, Fault, FaultSetting
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Probability
 
@@ -20,10 +21,11 @@ class BeamDropout(Spec, Fault):
     """
 
     affects: ClassVar[frozenset[str]] = frozenset({"Scan"})
+    idle: ClassVar[Mapping[str, object]] = {"probability": 0.0}
     probability: Probability
     """The chance that a beam gives no answer."""
 
-    def begin(self, chance: np.random.Generator, wheels: Wheels) -> Disturbance:
+    def begin(self, chance: np.random.Generator, setting: FaultSetting) -> Disturbance:
         """Draw once for each beam."""
         return _Holes(chance, self.probability)
 

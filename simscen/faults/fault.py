@@ -18,6 +18,25 @@ class AnyFault(Choice):
     noise: Annotated[Fault | None, OnDemand("simscen.faults.noise", "Noise")] = None
     bias: Annotated[Fault | None, OnDemand("simscen.faults.bias", "Bias")] = None
     slip: Annotated[Fault | None, OnDemand("simscen.faults.slip", "Slip")] = None
+    glass: Annotated[Fault | None, OnDemand("simscen.faults.glass", "Glass")] = None
+    ghost: Annotated[Fault | None, OnDemand("simscen.faults.ghost", "Ghost")] = None
+    rain: Annotated[Fault | None, OnDemand("simscen.faults.rain", "Rain")] = None
+    dust: Annotated[Fault | None, OnDemand("simscen.faults.dust", "Dust")] = None
+    sector: Annotated[Fault | None, OnDemand("simscen.faults.sector", "Sector")] = None
+    range_limit: Annotated[Fault | None, OnDemand("simscen.faults.range_limit", "RangeLimit")] = None
+    scale: Annotated[Fault | None, OnDemand("simscen.faults.scale", "Scale")] = None
+    drift: Annotated[Fault | None, OnDemand("simscen.faults.drift", "Drift")] = None
+    stuck: Annotated[Fault | None, OnDemand("simscen.faults.stuck", "Stuck")] = None
+    garbage: Annotated[Fault | None, OnDemand("simscen.faults.garbage", "Garbage")] = None
+    delay: Annotated[Fault | None, OnDemand("simscen.faults.delay", "Delay")] = None
+    slow: Annotated[Fault | None, OnDemand("simscen.faults.slow", "Slow")] = None
+    intermittent: Annotated[Fault | None, OnDemand("simscen.faults.intermittent", "Intermittent")] = None
+    extrinsic: Annotated[Fault | None, OnDemand("simscen.faults.extrinsic", "Extrinsic")] = None
+    gain: Annotated[Fault | None, OnDemand("simscen.faults.gain", "Gain")] = None
+    saturation: Annotated[Fault | None, OnDemand("simscen.faults.saturation", "Saturation")] = None
+    jump: Annotated[Fault | None, OnDemand("simscen.faults.jump", "Jump")] = None
+    shift: Annotated[Fault | None, OnDemand("simscen.faults.shift", "Shift")] = None
+    outdated: Annotated[Fault | None, OnDemand("simscen.faults.outdated", "Outdated")] = None
 
     @property
     def fault(self) -> Fault:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -9,7 +10,7 @@ from pydantic import Field
 
 from simscen.core.motion import Twist
 from simscen.faults._odometry import OdometryDistortion
-from simscen.faults.base import Disturbance, Fault, Wheels
+from simscen.faults.base import Disturbance, Fault, FaultSetting
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Quantity
 
@@ -20,23 +21,27 @@ class Slip(Spec, Fault):
     """Wheels slip: of each metre a wheel rolls, its slip ratio is lost; odometry counts it all the same.
 
     The slip ratio is that of vehicle dynamics when driving, s = 1 - v / (ω r) (Wong, Theory of Ground Vehicles,
-    ch. 2). Left and right may differ; then the robot also turns without noticing.
+    ch. 2). Left and right may differ; then the robot also turns without noticing. On `wheels` all odometry that counts
+    how they turn is wrong; on a sensor only that one is.
 
     Example: `{sensor: odom, slip: {left: 30 %, right: 10 %}, when: {time: 5 s}, for: 4 s}`
     """
 
-    affects: ClassVar[frozenset[str]] = frozenset({"Odometry"})
+    affects: ClassVar[frozenset[str]] = frozenset({"Odometry", "Wheels"})
+    idle: ClassVar[Mapping[str, object]] = {"left": 0.0, "right": 0.0}
     left: SlipRatio = 0.0
     """Slip ratio of the wheels on the left."""
     right: SlipRatio = 0.0
     """Slip ratio of the wheels on the right."""
 
-    def begin(self, chance: np.random.Generator, wheels: Wheels) -> Disturbance:
+    def begin(self, chance: np.random.Generator, setting: FaultSetting) -> Disturbance:
         """The ground gets less than the wheels turn."""
-        return _Slipping(self, wheels.separation)
+        return _Slipping(self, setting.separation)
 
 
 class _Slipping(OdometryDistortion):
+    drives = True
+
     def __init__(self, slip: Slip, separation: float) -> None:
         super().__init__()
         self._left, self._right, self._separation = 1 - slip.left, 1 - slip.right, separation
@@ -45,7 +50,7 @@ class _Slipping(OdometryDistortion):
         """What the wheels turned for a true increment."""
         return self._scaled(step, 1 / self._left, 1 / self._right)
 
-    def command(self, command: Twist) -> Twist:
+    def command(self, command: Twist) -> Twist | None:
         """What the ground gets of a commanded velocity."""
         return command if self._over else self._scaled(command, self._left, self._right)
 

@@ -15,6 +15,7 @@ from simscen.loading.sense.hardlyfails import hardly_fails
 from simscen.loading.sense.neverhappens import never_happens
 from simscen.loading.sense.neverholds import never_holds
 from simscen.loading.sense.specwalk import below
+from simscen.loading.sense.unfitfaults import unfit_faults
 from simscen.loading.sense.worldsense import senseless
 from simscen.loading.tree import Fields, Key, key_place, real_keys, value_place
 from simscen.model.robot import RobotSpec
@@ -32,7 +33,7 @@ def inconsistencies(
     `world` is what its world file has become, `strangers` are places that are not among its own. Where names are
     unknown, no more is asked.
     """
-    unknown = [*strangers, *_unknown_names(loaded, world), *_unfit_faults(loaded), *_twice_named(loaded)]
+    unknown = [*strangers, *_unknown_names(loaded, world), *unfit_faults(loaded), *_twice_named(loaded)]
     unknown += [*_uneven_rates(loaded), *_unknown_lidars(loaded)]
     unknown += [loaded.sourced(problem) for problem in senseless(loaded.world)]
     if any(problem.severity == "error" for problem in unknown):
@@ -54,24 +55,6 @@ def _unknown_names(loaded: LoadedScenario, world: World | None) -> Iterator[Prob
         what = ARTICLES[reference.to]
         hint = suggestion(reference.name, dict.fromkeys(names)) or "there is none at all"
         yield loaded.problem(reference.keys, "SC030", f"no {what} is called {quoted(reference.name)}", hint)
-
-
-def _unfit_faults(loaded: LoadedScenario) -> Iterator[Problem]:
-    if loaded.robot.spec is None:
-        return
-    sensors = loaded.robot.spec.sensors
-    says = {COMMAND: "Command", **{name: sensor.says for name, sensor in sensors.items()}}
-    for index, entry in enumerate(loaded.spec.faults):
-        kind = says.get(entry.sensor)
-        if kind is None:
-            message = f"robot `{loaded.robot.name}` has no sensor called {quoted(entry.sensor)}"
-            yield loaded.problem(("faults", index, "sensor"), "SC031", message, suggestion(entry.sensor, says))
-        elif kind not in entry.fault.affects:
-            fitting = [name for name, said in says.items() if said in entry.fault.affects]
-            hint = f"it can happen to: {', '.join(fitting)}" if fitting else "this robot has nothing it can happen to"
-            what = sensors[entry.sensor].kind if entry.sensor in sensors else "velocity command"
-            message = f"fault `{entry.kind}` makes no sense on {_article(what)} (`{entry.sensor}`)"
-            yield loaded.problem_at(loaded.key_place_of("faults", index, entry.kind), "SC032", message, hint)
 
 
 def _unknown_lidars(loaded: LoadedScenario) -> Iterator[Problem]:
@@ -111,10 +94,6 @@ def _begin(when: Trigger | None) -> float | None:
     if when is None:
         return 0.0
     return float(when.chosen.root) + when.delay if when.time is not None else None  # type: ignore[attr-defined]
-
-
-def _article(noun: str) -> str:
-    return f"an {noun}" if noun[0] in "aeiou" else f"a {noun}"
 
 
 def _twice_named(loaded: LoadedScenario) -> Iterator[Problem]:

@@ -24,6 +24,7 @@ from simscen.spec.quantities import (
     PositiveAngle,
     PositiveAngularAcceleration,
     PositiveAngularSpeed,
+    PositiveDuration,
     PositiveLength,
     PositiveMass,
     PositiveSpeed,
@@ -126,6 +127,9 @@ class Limits(Spec):
     linear_deceleration: PositiveAcceleration | None = None
     """Default: as acceleration."""
     angular_acceleration: PositiveAngularAcceleration
+    command_timeout: PositiveDuration = 0.5
+    """The base stops when no command came for so long; ros2_control's `cmd_vel_timeout` and its default. Commands stay
+    away only where a fault on `cmd_vel` keeps them back."""
 
 
 class Mount(Spec):

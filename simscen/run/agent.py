@@ -60,4 +60,4 @@ class Agent:
 
     def drive(self, moment: Moment) -> None:
         """Let the wheels have the command, as far as the faults let them."""
-        self.robot.drive(self.faults.command(moment.decision.command))
+        self.robot.drive(self.faults.command(moment.tick, moment.decision.command))

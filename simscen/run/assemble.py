@@ -4,25 +4,28 @@ import math
 from collections.abc import Mapping
 from pathlib import Path
 
+from simscen.core.belief import Belief
 from simscen.core.chance import Streams
 from simscen.core.events import Event, EventKind
 from simscen.core.geometry import Array, Pose3
 from simscen.core.sensing import Odometry
 from simscen.core.shapes import Body, Solid, TriangleMesh
 from simscen.core.time import Clock
-from simscen.faults.base import Wheels
 from simscen.model.anystack import ExternalStackSpec
 from simscen.run.agent import Agent
+from simscen.run.commandlink import CommandLink
 from simscen.run.director import Director
 from simscen.run.ending import Ending
 from simscen.run.external.build import build_external
 from simscen.run.faultrig import FaultRig
+from simscen.run.faultsettings import FaultSettings
 from simscen.run.live import LiveStage, described
 from simscen.run.lockstep import Rig
 from simscen.run.prepare import Prepared
 from simscen.run.robotmodel import robot_model
 from simscen.run.senses import Senses
 from simscen.run.timetable import Timetable
+from simscen.run.toldlocalizer import ToldLocalizer
 from simscen.sensors.build import build_sensors
 from simscen.sensors.sensor import Sensor
 from simscen.sim.alone import NAMELESS
@@ -73,14 +76,33 @@ def assemble(prepared: Prepared, seed: int, printed: Path | None = None) -> Rig:
         stack = build_external(prepared, prepared.stack, surroundings, seed, printed)
     else:
         goes_on = spec.on_goal_failure == "continue"
-        stack = build_stack(prepared.stack, surroundings, streams, clock, stop_on_failure=not goes_on)
+
+        def told(belief: Belief) -> Belief:
+            return faults.belief(simulation.tick, belief)
+
+        stack = build_stack(
+            prepared.stack,
+            surroundings,
+            streams,
+            clock,
+            stop_on_failure=not goes_on,
+            heard=lambda localizer: ToldLocalizer(localizer, told),
+        )
 
     stage = LiveStage(world, simulation, robot, stack, clock, prepared.case.sent)
-    wheels = Wheels(getattr(prepared.robot.drive, "wheel_separation", 0.0))
-    faults = FaultRig(spec.faults, streams, wheels, stage.note)
+    control_period = clock.period(prepared.stack.controller_frequency)
+    settings = FaultSettings(
+        prepared.robot,
+        clock,
+        lambda: simulation.tick,
+        robot,
+        prepared.built.mesh,
+        lambda mesh, names: LiveRays(RayScene(mesh), robot, names),
+    )
+    link = CommandLink(control_period, clock.ticks(prepared.robot.limits.command_timeout))
+    faults = FaultRig(spec.faults, streams, settings, link, stage.note, prepared.mapped)
     for body in world.bodies:
         stage.note(Event(0, EventKind.OBJECT_SPAWNED, body.name, described(body)))
-    control_period = clock.period(prepared.stack.controller_frequency)
     agent = Agent(
         robot=robot,
         senses=senses,
@@ -97,8 +119,9 @@ def assemble(prepared: Prepared, seed: int, printed: Path | None = None) -> Rig:
 class LiveRays:
     """Rays of a robot against the static world and against everything else that moves, where it is now."""
 
-    def __init__(self, scene: RayScene, robot: Robot) -> None:
-        self._scene, self._robot = scene, robot
+    def __init__(self, scene: RayScene, robot: Robot, without: frozenset[str] = frozenset()) -> None:
+        """Of what moves, the rays go through what is called as in `without`."""
+        self._scene, self._robot, self._without = scene, robot, without
         self._meshes: dict[str, tuple[tuple[Solid, ...], TriangleMesh]] = {}
 
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
@@ -107,7 +130,8 @@ class LiveRays:
         return self._scene.cast(origins, directions, reach)
 
     def _placed(self) -> Mapping[str, tuple[TriangleMesh, Pose3]]:
-        moving, known = self._robot.moving(), self._meshes
+        moving = {name: moved for name, moved in self._robot.moving().items() if name not in self._without}
+        known = self._meshes
         self._meshes = {}
         for name, (body, _) in moving.items():
             before = known.get(name)

@@ -1,21 +1,29 @@
-"""The faults of a scenario, between the sensors and the stack, and between the stack and the wheels."""
+"""The faults of a robot, between its sensors and the stack, in the stack, and between the stack and the wheels.
+
+What several faults do to one instance adds up in the order of the scenario: each gets what the one before it made. What
+a fault kept back (a delay) arrives where that fault stands: those after it see it when it arrives.
+"""
 
 import math
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, fields
 from typing import NoReturn
 
 import numpy as np
 
+from simscen.core.belief import Belief
 from simscen.core.chance import Streams
 from simscen.core.errors import BROKEN, RunError
 from simscen.core.events import Event, EventKind
 from simscen.core.motion import Twist
-from simscen.core.sensing import Reading, Readings
-from simscen.faults.base import Disturbance, Wheels
+from simscen.core.readings import BELIEF, COMMAND, WHEELS
+from simscen.core.sensing import Odometry, Reading, Readings
+from simscen.faults.base import Disturbance, FaultSetting
 from simscen.model.disturbance import FaultEntry
+from simscen.run.commandlink import CommandLink
 from simscen.run.streamnames import stream_names
+from simscen.stack.localizers.ground_truth import TRUTH
 
 ROUNDING = 1e-9
 """What a fault that changes nothing may still change in a number, by adding increments up."""
@@ -25,85 +33,158 @@ ROUNDING = 1e-9
 class _Active:
     """A fault at work; `touched` counts the messages and commands that it changed or kept back."""
 
+    index: int
     sensor: str
+    kind: str
     disturbance: Disturbance
     touched: int = 0
     over: bool = False
 
+    def hears(self, reading: Reading) -> bool:
+        """Whether it affects such a reading: that of its sensor; of wheels, all that count how they turn."""
+        if self.kind == WHEELS:
+            return isinstance(reading, Odometry) and reading.sensor != TRUTH
+        return reading.sensor == self.sensor
+
 
 class FaultRig:
-    """Disturbs readings and commands with the faults that are under way, in the order of the scenario."""
+    """Disturbs readings, commands, beliefs and the map with the faults that are under way, in the scenario's order."""
 
     def __init__(
-        self, faults: list[FaultEntry], streams: Streams, wheels: Wheels, note: Callable[[Event], None]
+        self,
+        faults: list[FaultEntry],
+        streams: Streams,
+        setting: Callable[[FaultEntry], FaultSetting],
+        link: CommandLink,
+        note: Callable[[Event], None],
+        mapped: Collection[int] = (),
     ) -> None:
-        """`note` takes a fault.took_effect when a fault changes its first message or command."""
-        self._faults, self._streams, self._wheels, self._note = faults, streams, wheels, note
+        """`note` takes a fault.took_effect when a fault changes its first message or command.
+
+        `mapped` are the numbers of those faults that have changed the map before the run.
+        """
+        self._mapped = set(mapped)
+        self._faults, self._streams, self._setting, self._link, self._note = faults, streams, setting, link, note
         self._names = stream_names(faults)
         self._begun: Counter[int] = Counter()
         # By number of the fault and count of its activations: what one activation leaves behind, the next builds on.
         self._active: dict[tuple[int, int], _Active] = {}
+        self._linked = False
+        self._believed: tuple[int, Belief, Belief] | None = None
 
     def begin(self, index: int) -> None:
         """Start the scenario's fault number `index`; each time its chance is a stream of its own."""
         entry = self._faults[index]
         self._begun[index] += 1
         chance = self._streams.generator(f"fault{self._names[index]}#{self._begun[index]}")
-        disturbance: object = entry.fault.begin(chance, self._wheels)
+        setting = self._setting(entry)
+        disturbance: object = entry.fault.begin(chance, setting)
         if not isinstance(disturbance, Disturbance):
             self._broke(index, f"begins as {disturbance!r}, which is no Disturbance")
-        self._active[index, self._begun[index]] = _Active(entry.sensor, disturbance)
+        self._active[index, self._begun[index]] = _Active(index, entry.sensor, setting.kind, disturbance)
+        self._linked = self._linked or setting.kind == COMMAND
 
     def end(self, index: int) -> int:
         """End it; what it leaves behind stays at work. Returns how many messages and commands it has touched."""
         key = index, self._begun[index]
         active = self._active.pop(key)
         if rest := active.disturbance.end():
-            self._active[key] = _Active(active.sensor, rest, over=True)
+            self._active[key] = _Active(index, active.sensor, active.kind, rest, over=True)
         return active.touched
 
     def disturb(self, readings: Readings) -> Readings:
         """The readings as the stack gets them."""
-        if not self._active or not readings:
-            return readings
-        disturbed = (self._reading(reading) for reading in readings)
-        return tuple(reading for reading in disturbed if reading is not None)
+        for active in self._at_work():
+            if active.index in self._mapped:
+                self._mapped.remove(active.index)
+                self._count(active)
+            late = self._late(active)
+            heard = (self._reading(active, one) if active.hears(one) else one for one in readings)
+            readings = (*late, *(one for one in heard if one is not None))
+        return readings
 
-    def command(self, command: Twist) -> Twist:
-        """The command as the wheels get it."""
-        for (index, _), active in self._at_work():
-            disturbed = active.disturbance.command(command)
-            if not isinstance(disturbed, Twist) or not all(map(math.isfinite, disturbed)):
-                self._broke(index, f"makes {disturbed!r} of a command")
-            if not np.allclose(disturbed, command, rtol=0.0, atol=ROUNDING):
-                self._count(index, active)
-            command = disturbed
+    def command(self, tick: int, command: Twist) -> Twist:
+        """The command as the wheels get it: what cmd_vel lets through, then what else befalls the wheels."""
+        sends = self._link.sends(tick, command)
+        if self._linked:
+            self._transmit(tick, command if sends else None)
+            command = self._link.driven(tick)
+        elif sends:
+            self._link.hear(tick, command)
+        for active in self._at_work():
+            if active.kind == WHEELS or active.disturbance.drives:
+                command = self._commanded(active, command) or command
         return command
 
-    def _at_work(self) -> list[tuple[tuple[int, int], _Active]]:
-        return sorted(self._active.items(), key=lambda item: item[0])
+    def belief(self, tick: int, belief: Belief) -> Belief:
+        """What the navigator is told instead of a belief of the localizer."""
+        if not any(active.kind == BELIEF for active in self._active.values()):
+            return belief
+        if self._believed is None or self._believed[:2] != (tick, belief):
+            told = belief
+            for active in self._at_work():
+                if active.kind == BELIEF:
+                    told = self._told(active, told)
+            self._believed = tick, belief, told
+        return self._believed[2]
 
-    def _reading(self, reading: Reading) -> Reading | None:
-        current: Reading | None = reading
-        for (index, _), active in self._at_work():
-            if current is not None and active.sensor == reading.sensor:
-                disturbed = active.disturbance.reading(_kept(current))
-                if disturbed is not None and _signed(disturbed) != _signed(current):
-                    self._broke(index, f"makes {type(disturbed).__name__} of the {type(current).__name__} of a sensor")
-                if disturbed is None or not _equal(disturbed, current):
-                    self._count(index, active)
-                current = disturbed
-        return current
+    def _at_work(self) -> list[_Active]:
+        return [active for _, active in sorted(self._active.items(), key=lambda item: item[0])]
+
+    def _late(self, active: _Active) -> Sequence[Reading]:
+        late = active.disturbance.arriving()
+        if strange := [one for one in late if getattr(one, "sensor", None) != active.sensor]:
+            self._broke(active.index, f"lets {strange[0]!r} arrive, which is no reading of `{active.sensor}`")
+        return late
+
+    def _reading(self, active: _Active, reading: Reading) -> Reading | None:
+        disturbed = active.disturbance.reading(_kept(reading))
+        if disturbed is not None and _signed(disturbed) != _signed(reading):
+            what = f"makes {type(disturbed).__name__} of the {type(reading).__name__} of a sensor"
+            self._broke(active.index, what)
+        if disturbed is None or not _equal(disturbed, reading):
+            self._count(active)
+        return disturbed
+
+    def _transmit(self, tick: int, command: Twist | None) -> None:
+        """Hand what is sent, and what was kept back, from fault to fault, and the rest to the base."""
+        for active in self._at_work():
+            if active.kind == COMMAND:
+                late = active.disturbance.arriving_command()
+                fresh = None if command is None else self._commanded(active, command)
+                command = late if fresh is None else fresh
+        if command is not None:
+            self._link.hear(tick, command)
+
+    def _commanded(self, active: _Active, command: Twist) -> Twist | None:
+        disturbed = active.disturbance.command(command)
+        if disturbed is None and active.kind == COMMAND:
+            self._count(active)
+            return None
+        if not isinstance(disturbed, Twist) or not all(map(math.isfinite, disturbed)):
+            self._broke(active.index, f"makes {disturbed!r} of a command")
+        if not np.allclose(disturbed, command, rtol=0.0, atol=ROUNDING):
+            self._count(active)
+        return disturbed
+
+    def _told(self, active: _Active, belief: Belief) -> Belief:
+        told: object = active.disturbance.belief(belief)
+        if not isinstance(told, Belief) or not all(map(math.isfinite, (*told.pose, *told.map_from_odom))):
+            self._broke(active.index, f"makes {told!r} of a belief")
+        if not np.allclose((*told.pose, *told.map_from_odom), (*belief.pose, *belief.map_from_odom), 0.0, ROUNDING):
+            self._count(active)
+        return told
 
     def _broke(self, index: int, what: str) -> NoReturn:
         entry = self._faults[index]
         raise RunError(BROKEN, f"fault `{entry.label}` {what}{entry.added_by}")
 
-    def _count(self, index: int, active: _Active) -> None:
+    def _count(self, active: _Active) -> None:
         if active.over:
             return
         if not active.touched:
-            self._note(Event(0, EventKind.FAULT_TOOK_EFFECT, self._faults[index].label, {"entry": index}))
+            entry = self._faults[active.index]
+            self._note(Event(0, EventKind.FAULT_TOOK_EFFECT, entry.label, {"entry": active.index}))
         active.touched += 1
 
 
@@ -124,4 +205,6 @@ def _equal(one: Reading, other: Reading) -> bool:
     if one is other:
         return True
     said = [(getattr(one, field.name), getattr(other, field.name)) for field in fields(one) if field.name != "sensor"]
-    return all(np.allclose(a, b, rtol=0.0, atol=ROUNDING, equal_nan=True) for a, b in said)
+    return all(
+        np.shape(a) == np.shape(b) and np.allclose(a, b, rtol=0.0, atol=ROUNDING, equal_nan=True) for a, b in said
+    )

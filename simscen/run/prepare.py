@@ -45,6 +45,8 @@ class Prepared:
     start: Pose2
     estimate: Estimate
     case: Case
+    mapped: tuple[int, ...] = ()
+    """The numbers of the faults that have changed the map."""
 
     @property
     def spec(self) -> ScenarioSpec:

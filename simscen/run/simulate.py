@@ -23,6 +23,7 @@ from simscen.run.agent import Log
 from simscen.run.assemble import assemble
 from simscen.run.blame import blamed
 from simscen.run.external.stack import ExternalStack
+from simscen.run.faultymap import with_faulty_map
 from simscen.run.lockstep import Rig, run_lockstep
 from simscen.run.prepare import Prepared, prepare
 from simscen.run.sensornames import sensor_frames, sensor_kinds
@@ -61,6 +62,7 @@ def simulate(
 def _simulated(
     prepared: Prepared, seed: int, log: Path | None, attach: Attach | None, printed: Path | None = None
 ) -> Run:
+    prepared = with_faulty_map(prepared, seed)
     clock = Clock(prepared.spec.physics.tick_rate)
     builder = TraceBuilder(clock)
     with ExitStack() as closing:

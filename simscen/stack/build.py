@@ -1,6 +1,7 @@
 """From a specification to a stack."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 from simscen.core.chance import Streams
@@ -18,7 +19,7 @@ from simscen.stack.installed.stack import InstalledStack
 from simscen.stack.navigator import Navigator
 from simscen.stack.plan_keeper import PlanKeeper
 from simscen.stack.progress_checker import ProgressChecker
-from simscen.stack.protocols import Behavior, Surroundings
+from simscen.stack.protocols import Behavior, Localizer, Surroundings
 from simscen.stack.recovery import RoundRobin
 from simscen.stack.reference import ReferenceStack
 from simscen.stack.setting import Setting
@@ -33,10 +34,16 @@ def build_stack(
     clock: Clock,
     *,
     stop_on_failure: bool = True,
+    heard: Callable[[Localizer], Localizer] = lambda localizer: localizer,
 ) -> InstalledStack:
-    """The stack of a specification, ready to `start`. Raises ValueError when a rate does not divide the clock."""
+    """The stack of a specification, ready to `start`. Raises ValueError when a rate does not divide the clock.
+
+    `heard` makes of its localizer the one that the rest of a reference stack asks.
+    """
     period = clock.seconds(clock.period(spec.controller_frequency))
-    setting = Setting(surroundings, "stack", streams, control_period=period, stop_on_failure=stop_on_failure)
+    setting = Setting(
+        surroundings, "stack", streams, control_period=period, stop_on_failure=stop_on_failure, heard=heard
+    )
     return InstalledStack(spec, setting)
 
 
@@ -82,7 +89,7 @@ def reference_stack(spec: model.StackSpec, setting: Setting) -> ReferenceStack:
     )
     return ReferenceStack(
         surroundings,
-        InstalledLocalizer(spec.localizer, shared.named("localizer")),
+        setting.heard(InstalledLocalizer(spec.localizer, shared.named("localizer"))),
         costmap,
         controller,
         navigator,

@@ -11,7 +11,7 @@ from simscen.core.chance import Streams
 from simscen.core.grid import OccupancyGrid
 from simscen.core.time import Clock
 from simscen.stack.footprint import Footprint
-from simscen.stack.protocols import RobotModel, Surroundings
+from simscen.stack.protocols import Localizer, RobotModel, Surroundings
 
 ANYWHERE = Estimate(None)
 
@@ -30,6 +30,7 @@ class Setting:
     estimate:         where the robot is said to be when it is switched on; `reset` or `start` says it again
     stop_on_failure:  whether a goal that fails ends the task (for a whole stack)
     clear_costmap:    forgets live obstacles that are not seen any more (for a behaviour)
+    heard:            what stands between the localizer and all who ask it; here, nothing (for the reference stack)
     """
 
     surroundings: Surroundings
@@ -40,6 +41,7 @@ class Setting:
     estimate: Estimate = ANYWHERE
     stop_on_failure: bool = True
     clear_costmap: Callable[[], None] = lambda: None
+    heard: Callable[[Localizer], Localizer] = lambda localizer: localizer
 
     def named(self, name: str) -> "Setting":
         """The same for another component, which has a random stream of its own."""

@@ -729,7 +729,7 @@ class AffectsNothing(OnScans):
     affects: ClassVar[frozenset[str]] = frozenset()
 
 
-@word("it answers with a reading", "of a Scan")
+@word("it answers with the same kind", "of a Scan")
 class AnswersForAnother(OnScans):
     def changed(self, reading):
         return replace(reading, sensor="other")

@@ -148,18 +148,9 @@ def _twice(loaded: LoadedScenario) -> Iterator[Problem]:
                 yield loaded.problem((*keys, index), "SC054", message)
 
 
-NO_EFFECT: dict[str, dict[str, float]] = {
-    "slip": {"left": 0.0, "right": 0.0},
-    "bias": {"linear_scale": 1.0, "angular_scale": 1.0, "turn_per_metre": 0.0},
-    "dropout": {"probability": 0.0},
-    "beam_dropout": {"probability": 0.0},
-}
-"""Fault → the values with which it changes nothing."""
-
-
 def _idle_faults(loaded: LoadedScenario) -> Iterator[Problem]:
     for index, entry in enumerate(loaded.spec.faults):
-        idle = NO_EFFECT.get(entry.kind)
+        idle = entry.fault.idle
         if idle and all(getattr(entry.chosen, key) == value for key, value in idle.items()):
             place = loaded.key_place_of("faults", index, entry.kind)
             yield loaded.problem_at(place, "SC055", f"fault `{entry.label}` changes nothing with these values")

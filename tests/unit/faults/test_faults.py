@@ -6,12 +6,13 @@ import pytest
 from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
 from simscen.core.sensing import Odometry, Scan
-from simscen.faults.base import Wheels
+from simscen.faults.base import FaultSetting
 from simscen.faults.fault import AnyFault
 
 
 def begun(fault: dict, separation=0.3, seed=1):
-    return AnyFault.model_validate(fault).fault.begin(np.random.default_rng(seed), Wheels(separation))
+    kind = "Scan" if {"noise"} & set(fault) else "Odometry"
+    return AnyFault.model_validate(fault).fault.begin(np.random.default_rng(seed), FaultSetting(separation, kind=kind))
 
 
 def scan(ranges) -> Scan:

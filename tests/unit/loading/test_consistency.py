@@ -81,8 +81,8 @@ def test_objects_of_imported_worlds_are_not_second_guessed(write: Write, scenari
 def test_a_fault_must_fit_its_sensor(told: Told) -> None:
     problems = told("faults:\n  - {sensor: front, slip: {left: 10 %}}\n  - {sensor: rear, off: {}}\n")
     assert [(p.code, p.line, p.col) for p in problems] == [("SC032", 7, 21), ("SC031", 8, 14)]
-    assert problems[0].hint == "it can happen to: odom"
-    assert problems[1].hint == "expected one of: cmd_vel, front, odom"
+    assert problems[0].hint == "it can happen to: odom, wheels"
+    assert problems[1].hint == "expected one of: front, odom, cmd_vel, wheels, localizer, map"
 
 
 def test_rates_must_divide_the_ticks_where_they_are_written(write: Write, told: Told) -> None:

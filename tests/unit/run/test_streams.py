@@ -9,8 +9,9 @@ from simscen.core.chance import Streams
 from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
 from simscen.core.sensing import Odometry, Scan
-from simscen.faults.base import Wheels
+from simscen.faults.base import FaultSetting
 from simscen.model.disturbance import EventEntry, FaultEntry
+from simscen.run.commandlink import CommandLink
 from simscen.run.faultrig import FaultRig
 from simscen.run.streamnames import stream_names
 
@@ -75,7 +76,8 @@ def test_adding_an_event_changes_nothing_before_it_takes_effect(play, plain, eve
 
 def rig(*faults):
     entries = [FaultEntry.model_validate(fault, by_alias=True, by_name=False) for fault in faults]
-    return FaultRig(entries, Streams(7), Wheels(0.3), lambda event: None)
+    kinds = {"lidar": FaultSetting(0.3, kind="Scan"), "odom": FaultSetting(0.3, kind="Odometry")}
+    return FaultRig(entries, Streams(7), lambda entry: kinds[entry.sensor], CommandLink(12, 120), lambda event: None)
 
 
 def scan(tick=0):

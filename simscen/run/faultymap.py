@@ -1,0 +1,42 @@
+"""Faults of the map, which the stack gets once: they change it before anything starts."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from simscen.core.chance import Streams
+from simscen.core.errors import BROKEN, RunError
+from simscen.core.grid import OccupancyGrid
+from simscen.core.readings import INSTANCES, MAP
+from simscen.core.time import Clock
+from simscen.faults.base import FaultSetting
+from simscen.model.disturbance import FaultEntry
+from simscen.run.prepare import Prepared
+from simscen.run.streamnames import stream_names
+
+
+def with_faulty_map(prepared: Prepared, seed: int) -> Prepared:
+    """The same with the map that the stack gets in a run with this seed, and which faults have changed it."""
+    faults, grid = prepared.spec.faults, prepared.map
+    mapped: list[int] = []
+    for index, (entry, name) in enumerate(zip(faults, stream_names(faults), strict=True)):
+        if grid is not None and INSTANCES.get(entry.sensor) == MAP and entry.sensor not in prepared.robot.sensors:
+            disturbed = _disturbed(grid, entry, Streams(seed).generator(f"fault{name}#1"), prepared)
+            mapped += [] if _same(grid, disturbed) else [index]
+            grid = disturbed
+    return replace(prepared, map=grid, mapped=tuple(mapped)) if mapped else prepared
+
+
+def _disturbed(
+    grid: OccupancyGrid, entry: FaultEntry, chance: np.random.Generator, prepared: Prepared
+) -> OccupancyGrid:
+    clock = Clock(prepared.spec.physics.tick_rate)
+    disturbed: object = entry.fault.begin(chance, FaultSetting(clock=clock, kind=MAP)).map(grid)
+    if not isinstance(disturbed, OccupancyGrid):
+        raise RunError(BROKEN, f"fault `{entry.label}` makes {type(disturbed).__name__} of a map{entry.added_by}")
+    return disturbed
+
+
+def _same(one: OccupancyGrid, other: OccupancyGrid) -> bool:
+    frames = (one.resolution, one.origin) == (other.resolution, other.origin)
+    return frames and np.array_equal(one.cells, other.cells)
