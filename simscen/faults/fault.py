@@ -19,6 +19,7 @@ class AnyFault(Choice):
     bias: Annotated[Fault | None, OnDemand("simscen.faults.bias", "Bias")] = None
     slip: Annotated[Fault | None, OnDemand("simscen.faults.slip", "Slip")] = None
     glass: Annotated[Fault | None, OnDemand("simscen.faults.glass", "Glass")] = None
+    extrinsic: Annotated[Fault | None, OnDemand("simscen.faults.extrinsic", "Extrinsic")] = None
     ghost: Annotated[Fault | None, OnDemand("simscen.faults.ghost", "Ghost")] = None
     rain: Annotated[Fault | None, OnDemand("simscen.faults.rain", "Rain")] = None
     dust: Annotated[Fault | None, OnDemand("simscen.faults.dust", "Dust")] = None
@@ -31,7 +32,6 @@ class AnyFault(Choice):
     delay: Annotated[Fault | None, OnDemand("simscen.faults.delay", "Delay")] = None
     slow: Annotated[Fault | None, OnDemand("simscen.faults.slow", "Slow")] = None
     intermittent: Annotated[Fault | None, OnDemand("simscen.faults.intermittent", "Intermittent")] = None
-    extrinsic: Annotated[Fault | None, OnDemand("simscen.faults.extrinsic", "Extrinsic")] = None
     gain: Annotated[Fault | None, OnDemand("simscen.faults.gain", "Gain")] = None
     saturation: Annotated[Fault | None, OnDemand("simscen.faults.saturation", "Saturation")] = None
     jump: Annotated[Fault | None, OnDemand("simscen.faults.jump", "Jump")] = None

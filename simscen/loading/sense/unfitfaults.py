@@ -44,7 +44,7 @@ def unfit_faults(loaded: LoadedScenario) -> Iterator[Problem]:
             )
         else:
             yield from _unreached(loaded, index, entry, instance.kind)
-    yield from _seen_too_late(loaded)
+    yield from _seen_too_late(loaded, known)
 
 
 def instances(loaded: LoadedScenario, robot: RobotSpec) -> Mapping[str, Instance]:
@@ -79,12 +79,13 @@ def _unreached(loaded: LoadedScenario, index: int, entry: FaultEntry, kind: str)
             yield loaded.problem_at(loaded.key_place_of("faults", index, key), "SC032", message)
 
 
-def _seen_too_late(loaded: LoadedScenario) -> Iterator[Problem]:
+def _seen_too_late(loaded: LoadedScenario, known: Mapping[str, Instance]) -> Iterator[Problem]:
     """Faults that measure once more, behind one of the same sensor that keeps its scans back."""
     faults = loaded.spec.faults
     for index, entry in enumerate(faults):
         before = [one.label for one in faults[:index] if one.sensor == entry.sensor and one.kind in ("delay", "stuck")]
-        if entry.kind in SEES and before:
+        sees = entry.kind in SEES and entry.sensor in known and known[entry.sensor].kind in ("Scan", "Image")
+        if sees and before:
             message = f"`{entry.label}` would come too late: `{before[0]}` keeps back what it should change"
             place = loaded.key_place_of("faults", index, entry.kind)
             yield loaded.problem_at(place, "SC032", message, f"write it before `{before[0]}`: faults go in their order")

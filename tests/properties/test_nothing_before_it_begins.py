@@ -1,0 +1,227 @@
+"""Until a fault or an event begins, a run is bit for bit the run without it; with one that never begins, to its end.
+
+All words of the registries are tried: a new one without an example here, or in its docstring, fails.
+"""
+
+import random
+import re
+from dataclasses import fields, is_dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from simscen.actions.action import AnyAction
+from simscen.core.events import EventKind
+from simscen.core.readings import INSTANCES, MAP
+from simscen.core.trace import Moment
+from simscen.faults.fault import AnyFault
+from simscen.loading.scenario import load_scenario
+from simscen.loading.sense.unfitfaults import instances, unfit_faults
+from simscen.run.prepare import prepare
+from simscen.run.simulate import simulate
+from simscen.spec.choice import Choice
+from simscen.spec.ondemand import type_of
+
+ROBOT = """\
+simscen: 1
+name: observer
+mass: 2 kg
+radius: 0.2 m
+body: [{cylinder: [0.2, 0.1], z: 0.03}]
+drive: {type: differential, wheel_radius: 0.033, wheel_separation: 0.287, wheel_width: 0.018}
+limits: {linear: 0.5, angular: 2.0, linear_acceleration: 1.0, angular_acceleration: 3.2}
+sensors:
+  lidar: {lidar: {rate: 10 Hz, beams: 90, max_range: 8, mount: {z: 0.18}}}
+  odom: {odometry: {rate: 40 Hz}}
+  imu: {imu: {rate: 40 Hz}}
+  bumper: {bumper: {rate: 40 Hz}}
+  camera: {camera: {rate: 5 Hz, width: 8, height: 8}}
+"""
+SCENARIO = """\
+simscen: 1
+world:
+  simscen: 1
+  walls: [{name: east wall, points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]
+  objects:
+    - {name: cart, box: [0.3, 0.3, 0.5], pose: {x: 4, y: 3.2}}
+    - {name: pallet, box: [0.3, 0.3, 0.3], pose: {x: 5.2, y: 3.4}}
+  doors: [{name: door meeting room, points: [[0.4, 3.95], [0.9, 3.95]], closed: %s}]
+robot: {model: observer.robot.yaml, pose: {x: 1, y: 1, yaw: 0.4}}
+goals: [{name: end, pose: {x: 5, y: 1}}]
+time_limit: %s
+faults:%s
+events:%s
+pass: [{collisions: {max: 5}}]
+"""
+NEVER = "when: {time: 1 s, probability: 0}, required: false"
+LONG = 2.5
+"""Seconds of the run without any disturbance, which all others are compared with."""
+
+VALUES = {
+    ("noise", "Odometry"): "{linear: 5 cm, angular: 5 deg}",
+    ("noise", "Imu"): "{gyro: 0.1 rad/s, accelerometer: 0.5}",
+    ("noise", "Image"): "{std: 5 cm, colour: 20}",
+    ("noise", "Belief"): "{linear: 5 cm, angular: 2 deg}",
+    ("bias", "Scan"): "{range: 5 cm}",
+    ("bias", "Imu"): "{gyro: 0.05 rad/s}",
+    ("bias", "Image"): "{range: 5 cm, brightness: 30}",
+    ("drift", "Scan"): "{range: 5 cm/s}",
+    ("drift", "Image"): "{range: 5 cm/s}",
+    ("drift", "Odometry"): "{linear: 2 cm/s}",
+    ("drift", "Belief"): "{linear: 5 cm/s}",
+    ("extrinsic", "Imu"): "{pitch: 3 deg}",
+    ("gain", "Command"): "{linear: 80 %}",
+    ("saturation", "Command"): "{linear: 0.2 m/s, angular_acceleration: 0.5}",
+}
+"""What stands under a fault where its docstring's example is for another kind of instance."""
+ACTIONS: dict[str, str] = {}
+"""What stands under `do` where the docstring's example is about another world."""
+
+
+def example(choice: type[Choice], key: str) -> str:
+    text = re.search(r"Example: `(.+)`", type_of(choice.model_fields[choice.choices()[key]]).__doc__ or "")
+    assert text, f"`{key}` has no example"
+    return text[1]
+
+
+def fault_example(word: str, kind: str) -> str:
+    if (word, kind) in VALUES:
+        return VALUES[word, kind]
+    _, _, rest = example(AnyFault, word).partition(f"{word}: ")
+    depth = [rest[: k + 1].count("{") - rest[: k + 1].count("}") for k in range(len(rest))]
+    return rest[: depth.index(0) + 1]
+
+
+def kinds_of(word: str) -> list[str]:
+    affects = type_of(AnyFault.model_fields[AnyFault.choices()[word]]).affects
+    return sorted(affects - {MAP})  # what befalls the map befalls the whole run
+
+
+NAMES = {kind: name for name, kind in INSTANCES.items()}
+NAMES |= {"Scan": "lidar", "Odometry": "odom", "Imu": "imu", "Bump": "bumper", "Image": "camera"}
+FAULTS = [
+    (f"{word} on {NAMES[kind]}", f"{{sensor: {NAMES[kind]}, {word}: {fault_example(word, kind)}, WHEN}}")
+    for word in AnyFault.choices()
+    for kind in kinds_of(word)
+]
+EVENTS = [
+    (word, f"{{name: {word}, WHEN, {ACTIONS.get(word) or example(AnyAction, word)}}}") for word in AnyAction.choices()
+]
+
+
+@pytest.fixture(scope="module")
+def play(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("nothing")
+    (folder / "observer.robot.yaml").write_text(ROBOT)
+    file = folder / "own.scenario.yaml"
+
+    def play(faults: list[str], events: list[str], seconds: float, shut: bool = True) -> list[Moment]:
+        lists = ["".join(f"\n  - {entry}" for entry in entries) or " []" for entries in (faults, events)]
+        file.write_text(SCENARIO % (str(shut).lower(), f"{seconds:.3f} s", *lists))
+        loaded = load_scenario(file, Path(folder))
+        assert [problem.message for problem in unfit_faults(loaded)] == []
+        heard = Heard()
+        simulate(prepare(loaded), 3, attach=lambda rig, logs: [heard])
+        return heard.moments
+
+    return play
+
+
+class Heard:
+    """A log that keeps the moments."""
+
+    def __init__(self) -> None:
+        self.moments: list[Moment] = []
+
+    def append(self, moment: Moment) -> None:
+        self.moments.append(moment)
+
+
+@pytest.fixture(scope="module")
+def quiet(play):
+    """The runs with nothing in them, by whether the door is shut at first."""
+    return {shut: play([], [], LONG, shut) for shut in (True, False)}
+
+
+def same(one: Any, other: Any) -> bool:
+    """Whether two things are the same to the last bit."""
+    if type(one) is not type(other):
+        return False
+    if isinstance(one, np.ndarray):
+        return one.dtype == other.dtype and one.shape == other.shape and one.tobytes() == other.tobytes()
+    if is_dataclass(one):
+        return all(same(getattr(one, field.name), getattr(other, field.name)) for field in fields(one))
+    if isinstance(one, list | tuple):
+        return len(one) == len(other) and all(map(same, one, other))
+    if isinstance(one, dict):
+        return list(one) == list(other) and all(same(one[key], other[key]) for key in one)
+    return repr(one) == repr(other)
+
+
+def begun(moments: list[Moment], kind: EventKind) -> int:
+    """The tick at which the disturbance began."""
+    return next(event.tick for moment in moments for event in moment.events if event.kind is kind)
+
+
+def drawn(name: str) -> float:
+    """A time of its own for each word: the same in each run of the tests."""
+    return round(random.Random(name).uniform(0.6, 1.4), 3)
+
+
+def at(seconds: float) -> str:
+    return f"when: {{time: {seconds} s}}"
+
+
+def assert_the_same_until(moments: list[Moment], other: list[Moment], tick: int) -> None:
+    before = [moment for moment in other if moment.tick < tick]
+    assert before
+    for moment, known in zip(moments, before, strict=False):
+        assert same(moment, known), f"tick {moment.tick}"
+
+
+@pytest.mark.parametrize(("name", "fault"), FAULTS, ids=[name for name, _ in FAULTS])
+def test_until_a_fault_begins_the_run_is_the_one_without_it(play, quiet, name: str, fault: str) -> None:
+    start = drawn(name)
+    moments = play([fault.replace("WHEN", at(start))], [], start + 0.3)
+    assert_the_same_until(moments, quiet[True], begun(moments, EventKind.FAULT_STARTED))
+
+
+@pytest.mark.parametrize(("name", "event"), EVENTS, ids=[name for name, _ in EVENTS])
+def test_until_an_event_begins_the_run_is_the_one_without_it(play, quiet, name: str, event: str) -> None:
+    start, shut = drawn(name), name != "close"
+    moments = play([], [event.replace("WHEN", at(start))], start + 0.1, shut)
+    assert_the_same_until(moments, quiet[shut], begun(moments, EventKind.EVENT_STARTED))
+
+
+def test_with_everything_that_never_begins_the_run_is_the_one_without_it_to_its_end(play, quiet) -> None:
+    moments = play(
+        [fault.replace("WHEN", NEVER) for _, fault in FAULTS],
+        [event.replace("WHEN", NEVER) for _, event in EVENTS],
+        LONG,
+    )
+    assert len(moments) == len(quiet[True])
+    for moment, known in zip(moments, quiet[True], strict=True):
+        assert same(moment, known), f"tick {moment.tick}"
+
+
+def test_what_is_over_leaves_no_trace_of_its_own(play) -> None:
+    """A delay at a time at which no message is due changes no bit of the rest."""
+    fault = "{sensor: lidar, delay: {latency: 50 ms}, when: {time: 1.01 s}, for: 0.02 s, required: false}"
+    plain, late = play([], [], 2.0), play([fault], [], 2.0)
+    told = [
+        replace(moment, events=tuple(e for e in moment.events if not e.kind.startswith("fault."))) for moment in late
+    ]
+    assert all(map(same, told, plain))
+
+
+def test_every_fault_is_tried_on_each_instance_that_it_affects(play, tmp_path: Path) -> None:
+    (tmp_path / "observer.robot.yaml").write_text(ROBOT)
+    file = tmp_path / "own.scenario.yaml"
+    file.write_text(SCENARIO % ("true", "1 s", " []", " []"))
+    loaded = load_scenario(file, tmp_path)
+    assert loaded.robot.spec is not None
+    known = {instance.kind for instance in instances(loaded, loaded.robot.spec).values()}
+    affected = {kind for word in AnyFault.choices() for kind in kinds_of(word)}
+    assert affected == known - {MAP}
