@@ -16,6 +16,8 @@ class AnyAction(Choice):
     group: ClassVar[str] = "action"
 
     spawn: Annotated[Action | None, OnDemand("simscen.actions.spawn", "Spawn")] = None
+    pedestrian: Annotated[Action | None, OnDemand("simscen.actions.pedestrian", "Pedestrian")] = None
+    crowd: Annotated[Action | None, OnDemand("simscen.actions.pedestrian", "Crowd")] = None
     remove: Annotated[Action | None, OnDemand("simscen.actions.remove", "Remove")] = None
     move: Annotated[Action | None, OnDemand("simscen.actions.move", "Move")] = None
     teleport: Annotated[Action | None, OnDemand("simscen.actions.teleport", "Teleport")] = None

@@ -6,7 +6,9 @@ from simscen.actions.base import Action
 from simscen.core.errors import BROKEN, RunError
 from simscen.core.stage import Effect, Stage
 
-_DOING = frozenset({"spawn", "remove", "move", "place", "place_robot", "push", "send_goal", "cancel_goal", "note"})
+_DOING = frozenset(
+    {"spawn", "walk", "remove", "move", "place", "place_robot", "push", "send_goal", "cancel_goal", "note"}
+)
 """What changes a run; everything else of a stage only tells how it stands."""
 
 

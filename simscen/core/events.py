@@ -26,11 +26,14 @@ class EventKind(str, Enum):
     FAULT_ENDED = "fault.ended"  # label; entry, touched (how many messages and commands it changed)
     EVENT_STARTED = "event.started"  # the scenario's event; entry (number of the event, from 0), actions
     EVENT_ENDED = "event.ended"  # the scenario's event; entry, effects (happened, what: of each action)
-    OBJECT_SPAWNED = "object.spawned"  # object; its pose, shape, and parts (outlines in its own frame)
+    OBJECT_SPAWNED = "object.spawned"  # object; its pose, shape, parts (outlines in its own frame), person
     OBJECT_REMOVED = "object.removed"  # object
     OBJECT_MOVED = "object.moved"  # object; waypoints (x, y, yaw), times, repeat, ease, start, phase
     OBJECT_PLACED = "object.placed"  # object; x, y, yaw: set down there, and moved by no script any more
     OBJECT_PUSHED = "object.pushed"  # object; impulse (N s), seconds it is spread over
+    PEDESTRIAN_REACHED = "pedestrian.reached"  # pedestrian; goal (its number, from 1)
+    PEDESTRIAN_REACTED = "pedestrian.reacted"  # pedestrian; behavior, robot ("" where there is but one)
+    PEDESTRIAN_CALMED = "pedestrian.calmed"  # pedestrian; behavior, robot: the reaction is over
     ROBOT_PLACED = "robot.placed"  # x, y, yaw
     ROBOT_PUSHED = "robot.pushed"  # impulse (N s); seconds it is spread over, where it is no blow
     MARK = "mark"  # the mark; note

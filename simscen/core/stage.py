@@ -1,7 +1,9 @@
 """What triggers may look at and what actions may touch while a scenario runs."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from simscen.core.belief import Belief
 from simscen.core.events import Event
@@ -10,7 +12,11 @@ from simscen.core.motion import Twist
 from simscen.core.navigation import Goal, Path
 from simscen.core.shapes import Body, MotionPath
 from simscen.core.time import Clock
+from simscen.core.walker import Walker
 from simscen.core.world import Polygon
+
+if TYPE_CHECKING:
+    import numpy as np
 
 
 @dataclass(frozen=True)
@@ -95,6 +101,18 @@ class Stage(Situation, Protocol):
 
     def spawn(self, body: Body) -> None:
         """Put a new body into the world: physics, rays and picture see it from the next tick on."""
+        ...
+
+    def walk(self, walker: Walker) -> None:
+        """Let somebody come who walks by themselves from the next tick on."""
+        ...
+
+    def room(self, place: tuple[float, float], radius: float, walls_only: bool = False) -> bool:
+        """Whether a person of a radius in metres can stand there: no wall is in the way, no thing, person or robot."""
+        ...
+
+    def chance(self, name: str) -> np.random.Generator:
+        """The random stream of this name, anew each time it is asked for."""
         ...
 
     def remove(self, name: str) -> None:

@@ -20,9 +20,9 @@ BODY_HEIGHT = 1.7
 class Walker:
     """Somebody called `name` who starts at rest at `pose` and walks to `goals` (x, y) in turn, in metres.
 
-    `speed` in m/s is the one they like best, `radius` that of their body in metres. Those of one `group` keep
-    together. `blind_to` is what they take no notice of. `reacts_within` metres and `reacts_for` seconds say when a
-    behavior other than regular and impassive begins and how long it lasts.
+    `speed` in m/s is the one they like best, `radius` and `height` those of their body in metres. Those of one `group`
+    keep together. `blind_to` is what they take no notice of. `reacts_within` metres and `reacts_for` seconds say when
+    a behavior other than regular and impassive begins and how long it lasts.
     """
 
     name: str
@@ -31,6 +31,7 @@ class Walker:
     repeat: Repeat = "once"
     speed: float = 1.3
     radius: float = 0.25
+    height: float = BODY_HEIGHT
     behavior: Behavior = "regular"
     group: str | None = None
     blind_to: frozenset[Unseen] = frozenset()

@@ -14,6 +14,7 @@ from simscen.loading.references import references
 from simscen.loading.sense.hardlyfails import hardly_fails
 from simscen.loading.sense.neverhappens import never_happens
 from simscen.loading.sense.neverholds import never_holds
+from simscen.loading.sense.people import namesakes
 from simscen.loading.sense.specwalk import below
 from simscen.loading.sense.unfitfaults import unfit_faults
 from simscen.loading.sense.worldsense import senseless
@@ -34,7 +35,7 @@ def inconsistencies(
     unknown, no more is asked.
     """
     unknown = [*strangers, *_unknown_names(loaded, world), *unfit_faults(loaded), *_twice_named(loaded)]
-    unknown += [*_uneven_rates(loaded), *_unknown_lidars(loaded)]
+    unknown += [*_uneven_rates(loaded), *_unknown_lidars(loaded), *namesakes(loaded, world)]
     unknown += [loaded.sourced(problem) for problem in senseless(loaded.world)]
     if any(problem.severity == "error" for problem in unknown):
         return unknown

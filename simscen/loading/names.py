@@ -54,7 +54,7 @@ def mark_names(loaded: LoadedScenario) -> list[str]:
 def _of_files(loaded: LoadedScenario) -> Names:
     world = loaded.world.spec
     imported = world is None or loaded.world.map is not None or loaded.world.sdf is not None
-    spawned = _made(loaded, "spawn")
+    spawned = brought(loaded)
     return {
         "place": list(world.places) if world else [],
         "region": list(world.regions) if world else [],
@@ -65,7 +65,7 @@ def _of_files(loaded: LoadedScenario) -> Names:
 
 
 def _of_world(loaded: LoadedScenario, world: World) -> Names:
-    moving, spawned = [body.name for body in world.bodies], _made(loaded, "spawn")
+    moving, spawned = [body.name for body in world.bodies], brought(loaded)
     return {
         "place": list(world.places),
         "region": list(world.regions),
@@ -73,6 +73,24 @@ def _of_world(loaded: LoadedScenario, world: World) -> Names:
         "object": _distinct(moving, [solid.name for solid in world.solids], spawned),
         "movable": _distinct(moving, spawned),
     }
+
+
+def standing(loaded: LoadedScenario, world: World | None = None) -> list[str]:
+    """What the world holds under a name, as far as that is known."""
+    if world is not None:
+        return [*(body.name for body in world.bodies), *(solid.name for solid in world.solids)]
+    return _standing(loaded.world.spec) if loaded.world.spec is not None else []
+
+
+def brought(loaded: LoadedScenario) -> list[str]:
+    """What events put into the world: things, and people, also those of crowds."""
+    people = [
+        action.chosen.names
+        for step in loaded.spec.steps
+        for action in step.actions
+        if action.kind == "crowd" and hasattr(action.chosen, "names")
+    ]
+    return _made(loaded, "spawn") + _made(loaded, "pedestrian") + [name for crowd in people for name in crowd]
 
 
 def _made(loaded: LoadedScenario, kind: str) -> list[str]:

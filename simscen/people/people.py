@@ -29,11 +29,11 @@ OWN_WIDTH = 0.25
 
 Point = tuple[float, float]
 Flags = npt.NDArray[np.bool_]
-FindWay = Callable[[Point, Point], list[Point]]
-"""Gives the corners of a way around walls from one place to another, the last of them there."""
+FindWay = Callable[[Point, Point, float], list[Point]]
+"""Gives the corners of a way around walls for a body of a radius in m, from one place to another, which is the last."""
 
 
-def straight(_start: Point, goal: Point) -> list[Point]:
+def straight(_start: Point, goal: Point, _radius: float) -> list[Point]:
     """The way of who looks at no map."""
     return [goal]
 
@@ -69,6 +69,10 @@ class People:
     def poses(self) -> dict[str, Pose2]:
         """Where everybody is."""
         return {name: person.pose for name, person in self._people.items()}
+
+    def radius(self, name: str) -> float:
+        """That of somebody's body, in metres."""
+        return self._people[name].who.radius
 
     def top_speed(self, name: str) -> float:
         """The fastest that somebody ever walks, in m/s."""
@@ -121,7 +125,7 @@ class People:
         if not stale and person.way and (self._steps + number) % PATIENCE == 0:
             stale = not self._walls.visible(np.array([person.place]), np.array([person.way[0]]))[0]
         if stale:
-            person.way, person.planned_for = self._find_way(person.place, goal), goal
+            person.way, person.planned_for = self._find_way(person.place, goal, person.who.radius), goal
 
     def _pushes(
         self,

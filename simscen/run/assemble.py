@@ -26,6 +26,7 @@ from simscen.run.robotmodel import robot_model
 from simscen.run.senses import Senses
 from simscen.run.timetable import Timetable
 from simscen.run.toldlocalizer import ToldLocalizer
+from simscen.run.walking import Walking
 from simscen.sensors.build import build_sensors
 from simscen.sensors.sensor import Sensor
 from simscen.sim.alone import NAMELESS
@@ -89,7 +90,8 @@ def assemble(prepared: Prepared, seed: int, printed: Path | None = None) -> Rig:
             heard=lambda localizer: ToldLocalizer(localizer, told),
         )
 
-    stage = LiveStage(world, simulation, robot, stack, clock, prepared.case.sent)
+    walking = Walking(prepared.built, simulation, clock)
+    stage = LiveStage(world, simulation, robot, stack, clock, prepared.case.sent, walking, streams)
     control_period = clock.period(prepared.stack.controller_frequency)
     settings = FaultSettings(
         prepared.robot,

@@ -3,7 +3,10 @@
 from collections.abc import Iterable
 from dataclasses import replace
 
+import numpy as np
+
 from simscen.core.belief import Belief
+from simscen.core.chance import Streams
 from simscen.core.events import Event, EventKind, Value
 from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
@@ -12,7 +15,9 @@ from simscen.core.sensing import Readings, Scan
 from simscen.core.shapes import Body, Box, Capsule, Cone, Cylinder, Extrusion, MotionPath, Shape, Sphere
 from simscen.core.time import Clock
 from simscen.core.trace import Decision, Truth
+from simscen.core.walker import Walker
 from simscen.core.world import Polygon, World
+from simscen.run.walking import Walking
 from simscen.sim.outline import parts
 from simscen.sim.robot import Robot
 from simscen.sim.simulation import Simulation
@@ -24,11 +29,21 @@ class LiveStage:
     """Implements core.stage.Stage for one robot, on the simulation and its stack, and keeps the events of its run."""
 
     def __init__(
-        self, world: World, simulation: Simulation, robot: Robot, stack: Stack, clock: Clock, goals: Iterable[Goal]
+        self,
+        world: World,
+        simulation: Simulation,
+        robot: Robot,
+        stack: Stack,
+        clock: Clock,
+        goals: Iterable[Goal],
+        walking: Walking,
+        streams: Streams,
     ) -> None:
         """`goals` are those that events may send."""
         self._world, self._simulation, self._robot, self._stack = world, simulation, robot, stack
         self.clock = clock
+        self._walking, self._streams = walking, streams
+        walking.tell.append(self.note)
         self._goals = {goal.name: goal for goal in goals}
         self._look()
         self._belief: Belief | None = None
@@ -137,8 +152,24 @@ class LiveStage:
 
     def remove(self, name: str) -> None:
         """Take a body out of the world."""
+        self._walking.go(name)
         self._simulation.remove(name)
         self.note(Event(0, EventKind.OBJECT_REMOVED, name))
+
+    def walk(self, walker: Walker) -> None:
+        """Let somebody come; one of the same name is replaced."""
+        if self._simulation.object_pose(walker.name):
+            self.remove(walker.name)
+        about = {**described(self._walking.come(walker)), "person": True, "behavior": walker.behavior}
+        self.note(Event(0, EventKind.OBJECT_SPAWNED, walker.name, about))
+
+    def room(self, place: tuple[float, float], radius: float, walls_only: bool = False) -> bool:
+        """Whether a person of a radius in metres can stand there."""
+        return self._walking.room(place, radius, walls_only)
+
+    def chance(self, name: str) -> np.random.Generator:
+        """The random stream of this name, anew each time it is asked for."""
+        return self._streams.generator(name)
 
     def door(self, name: str) -> tuple[Pose2, Pose2]:
         """The poses of a door's panel when closed and when open."""
@@ -146,6 +177,7 @@ class LiveStage:
 
     def move(self, name: str, path: MotionPath) -> None:
         """Let a body follow a path that begins now."""
+        self._walking.go(name)
         self._simulation.move(name, path)
         self.note(Event(0, EventKind.OBJECT_MOVED, name, described_path(path)))
 
@@ -159,6 +191,7 @@ class LiveStage:
 
     def place(self, name: str, pose: Pose2) -> None:
         """Set an object down somewhere else."""
+        self._walking.go(name)
         self._simulation.place(name, pose)
         self.note(Event(0, EventKind.OBJECT_PLACED, name, {"x": pose.x, "y": pose.y, "yaw": pose.yaw}))
 

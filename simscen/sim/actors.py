@@ -140,6 +140,14 @@ class Actors:
         pybullet.applyExternalForce(number, -1, force, centre, pybullet.WORLD_FRAME, physicsClientId=self._client)
         self._still_since = None
 
+    def follow(self, name: str, path: MotionPath, speed: float, tick: int) -> None:
+        """Let an upright round body that follows a path follow another from `tick` on, nowhere faster than `speed`.
+
+        Where it is now does not change, nor does how fast it may come along: no clearance has to be measured anew.
+        """
+        actor = self._actors[name]
+        actor.path, actor.since, actor.speed = path, tick, speed
+
     def _sort(self) -> None:
         self._posed_at = self._still_since = None
         self._actors = dict(sorted(self._actors.items()))

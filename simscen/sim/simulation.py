@@ -1,6 +1,7 @@
 """The world in motion: robots, what stands, what moves. Time is whole ticks."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
@@ -56,6 +57,7 @@ class Simulation:
         fixed = engine.static_mesh(client, static)
         film, actors = Film(client, static, triangulate), Actors(client, tick_rate, triangulate)
         self._scene = Scene(client, tick_rate, fixed, actors, film)
+        self._attends: tuple[int, Callable[[], None]] | None = None
         self._firmware = max(1, round(tick_rate / FIRMWARE_RATE))
         self.robots: dict[str, Robot] = self._scene.robots
         for name, (body, pose) in sorted(robots.items()):
@@ -79,6 +81,8 @@ class Simulation:
         scene, until = self._scene, self._scene.tick + ticks
         calm = self._calm_until()
         while scene.tick < until:
+            if self._attends is not None and scene.tick % self._attends[0] == 0:
+                self._attends[1]()
             if scene.tick % self._firmware == 0:
                 for robot in self.robots.values():
                     robot.advance()
@@ -143,6 +147,25 @@ class Simulation:
         actors = self._scene.actors
         actors.wake(name)
         self._scene.add_press(partial(actors.push, name), impulse, seconds, self.tick + 1)
+
+    def attend(self, period: int, act: Callable[[], None]) -> None:
+        """Have something done before each step from a tick that is a multiple of `period`."""
+        self._attends = period, act
+
+    def come(self, body: Body, speed: float) -> None:
+        """Let a round body come that `follow` will move, never faster than `speed` in m/s."""
+        path = MotionPath((0.0,), (body.pose.plane,))
+        self._scene.actors.add(replace(body, path=path), self.tick)
+        self._scene.actors.follow(body.name, path, speed, self.tick)
+        self._scene.changed()
+
+    def follow(self, name: str, path: MotionPath, speed: float) -> None:
+        """Let what came so follow a path that begins where it is now."""
+        self._scene.actors.follow(name, path, speed, self.tick)
+
+    def things(self) -> dict[str, tuple[Body, Pose3]]:
+        """Everything that may move but robots, and where it is, by name in order."""
+        return self._scene.actors.placed(self.tick)
 
     def object_pose(self, name: str) -> Pose3 | None:
         """Where a body is now, or a robot; None when it is not there."""

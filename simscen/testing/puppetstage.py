@@ -3,13 +3,17 @@
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from simscen.core.belief import Belief
+from simscen.core.chance import Streams
 from simscen.core.events import Event
 from simscen.core.geometry import Pose2
 from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import Goal, Path
 from simscen.core.shapes import Body, MotionPath
 from simscen.core.time import Clock
+from simscen.core.walker import Walker
 from simscen.core.world import Polygon
 
 
@@ -60,6 +64,18 @@ class PuppetStage:
     def spawn(self, body: Body) -> None:
         """Write it down."""
         self.done.append(("spawn", body))
+
+    def walk(self, walker: Walker) -> None:
+        """Write it down."""
+        self.done.append(("walk", walker))
+
+    def room(self, place: tuple[float, float], radius: float, walls_only: bool = False) -> bool:
+        """Everywhere."""
+        return True
+
+    def chance(self, name: str) -> np.random.Generator:
+        """The stream of seed 1."""
+        return Streams(1).generator(name)
 
     def remove(self, name: str) -> None:
         """Write it down."""

@@ -145,12 +145,19 @@ class ShortestWays:
         return row, column
 
 
+def ways_in(
+    built: BuiltWorld, stops: Sequence[Pose2], radius: float, z_range: tuple[float, float] = Z_RANGE
+) -> ShortestWays:
+    """The shortest ways of a disc in a built world, wherever the stops are."""
+    return ShortestWays(built.mesh, _around(built, stops), radius, z_range)
+
+
 def shortest_legs(
     built: BuiltWorld, start: Pose2, goals: Sequence[Goal], radius: float, z_range: tuple[float, float] = Z_RANGE
 ) -> list[Leg]:
     """The shortest way of a disc from each goal's predecessor (the start for the first) to that goal."""
     stops = [start, *(goal.pose for goal in goals)]
-    ways = ShortestWays(built.mesh, _around(built, stops), radius, z_range)
+    ways = ways_in(built, stops, radius, z_range)
     return [ways.leg(a, b, goal.name) for (a, b), goal in zip(pairwise(stops), goals, strict=True)]
 
 

@@ -216,8 +216,10 @@ class _Run:
     @property
     def _may_be_rammed(self) -> bool:
         world = self.loaded.world
-        own = world.spec is not None and world.sdf is None
-        return not own or self.does("move", "close", "open") or any(thing.move for thing in world.spec.objects)  # type: ignore[union-attr]
+        if world.spec is None or world.sdf is not None:
+            return True
+        moving = self.does("move", "close", "open", "pedestrian", "crowd")
+        return moving or any(thing.move for thing in world.spec.objects)
 
 
 _CHECKS = {

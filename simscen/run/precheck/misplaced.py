@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
 
+from simscen.actions.pedestrian import Pedestrian
 from simscen.actions.robot import Kidnap
 from simscen.actions.spawn import Spawn
 from simscen.core.geometry import Pose2, Pose3
@@ -13,7 +14,7 @@ from simscen.core.problems import Problem
 from simscen.core.shapes import Solid
 from simscen.core.world import Polygon
 from simscen.run.precheck.expectation import expects_bad_start
-from simscen.run.precheck.scene import CIRCLE_EDGE, Keys, Scene
+from simscen.run.precheck.scene import CIRCLE_EDGE, SILL, Keys, Scene
 from simscen.triggers.time import Time
 from simscen.triggers.trigger import Trigger
 from simscen.worlds.contain import first_blocking
@@ -27,7 +28,7 @@ WITHIN = (-0.9, 0.0, 0.9)
 
 def misplaced(scene: Scene) -> list[tuple[Keys, Problem]]:
     """Problems and whose they are: the start, goals that are to be reached, kidnappings, spawns."""
-    checks = (_start(scene), _goals(scene), _kidnaps(scene), _spawns(scene))
+    checks = (_start(scene), _goals(scene), _kidnaps(scene), _spawns(scene), _people(scene))
     return [found for check in checks for found in check]
 
 
@@ -86,6 +87,25 @@ def _spawns(scene: Scene) -> Iterator[tuple[Keys, Problem]]:
             if where:
                 message, hint = f"`{action.name}` would appear {where}", "put it somewhere else"
                 yield keys, scene.loaded.problem((*keys, "name"), "SC304", message, hint)
+
+
+def _people(scene: Scene) -> Iterator[tuple[Keys, Problem]]:
+    """People who would stand, or want to go, where a wall or an obstacle leaves no room for them."""
+    solids = (*scene.world.solids, *scene.staying)
+    for keys, _, action in scene.actions:
+        if not isinstance(action, Pedestrian):
+            continue
+        stops: list[tuple[Keys, str, tuple[float, float]]]
+        stops = [
+            ((*keys, "goals", k), f"goal {k + 1} of `{action.name}`", (x, y)) for k, (x, y) in enumerate(action.goals)
+        ]
+        stops.insert(0, ((*keys, "pose"), f"where `{action.name}` comes", (action.pose.x, action.pose.y)))
+        for at, what, place in stops:
+            if solid := first_blocking(solids, place, action.radius, (SILL, action.height)):
+                message = (
+                    f'{what} ({place[0]:g}, {place[1]:g}) is nearer to obstacle "{solid}" than {action.radius:g} m'
+                )
+                yield at, scene.loaded.problem(at, "SC304", message, "put it where a person has room")
 
 
 def _buried(scene: Scene, spawn: Spawn) -> str | None:

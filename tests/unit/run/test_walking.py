@@ -1,0 +1,113 @@
+"""People in a run: their bodies, what is logged of them, and that one more of them changes nobody else."""
+
+import numpy as np
+
+from simscen.core.events import EventKind
+
+STANDING = {
+    "stack": "{localizer: {type: ground_truth}}",
+    "goals": "[]",
+    "time_limit": "6",
+    "pass": "[{collisions: {}}]",
+}
+ANNA = "{pedestrian: {name: anna, pose: {x: 3, y: 3}, goals: [[7, 3], [3, 3]], repeat: loop}}"
+
+
+def events(*lines: str) -> str:
+    return "events:\n" + "".join(f"  - {line}\n" for line in lines)
+
+
+def told(trace, *kinds: EventKind) -> list[tuple[str, str]]:
+    return [(event.kind.value, event.name) for event in trace.of_kind(*kinds)]
+
+
+def test_a_pedestrian_is_a_thing_that_moves_and_is_called_a_person(play):
+    trace = play(events(f"{{when: {{time: 0}}, do: {ANNA}}}"), **STANDING)
+    spawned = trace.of_kind(EventKind.OBJECT_SPAWNED)[-1]
+    assert spawned.data["person"] and spawned.data["behavior"] == "regular" and spawned.data["size"] == [0.25, 1.7]
+    assert told(trace, EventKind.PEDESTRIAN_REACHED)[0] == ("pedestrian.reached", "anna")
+    way = trace.objects["anna"].values
+    assert way[:, 0].max() > 6.7 and np.ptp(way[:, 1]) < 0.01
+
+
+def test_people_walk_round_what_stands_and_what_lies_in_their_way(play):
+    """A crate of the world, and one that an event put there."""
+    crate = "{spawn: {name: box, box: [0.4, 0.4, 1], pose: {x: 6, y: 3.2}}}"
+    anna = "{pedestrian: {name: anna, pose: {x: 3.5, y: 5.5}, goals: [[7, 4.5], [6, 2]], speed: 1.4 m/s}}"
+    trace = play(events(f"{{when: {{time: 0}}, do: [{crate}, {anna}]}}"), **{**STANDING, "time_limit": "9"})
+    way = trace.objects["anna"].values[:, :2]
+    assert len(trace.of_kind(EventKind.PEDESTRIAN_REACHED)) == 2
+    for (x, y), half in (((5.0, 4.5), 0.5), ((6.0, 3.2), 0.2)):
+        gap = np.hypot(*np.maximum(np.abs(way - (x, y)) - half, 0.0).T)
+        assert gap.min() >= 0.25 - 1e-6
+
+
+def test_who_reacts_to_the_robot_says_so(play):
+    anna = "{pedestrian: {name: anna, pose: {x: 5, y: 1, yaw: 180 deg}, behavior: surprised, reacts_for: 2 s}}"
+    trace = play(events(f"{{when: {{time: 0}}, do: {anna}}}"), **{**STANDING, "robot": "{pose: {x: 2, y: 1}}"})
+    reacted = trace.of_kind(EventKind.PEDESTRIAN_REACTED, EventKind.PEDESTRIAN_CALMED)
+    assert [event.kind for event in reacted] == [EventKind.PEDESTRIAN_REACTED, EventKind.PEDESTRIAN_CALMED]
+    assert reacted[1].tick - reacted[0].tick == 480
+    assert dict(reacted[0].data) == {"behavior": "surprised", "robot": ""}
+
+
+def test_others_can_move_or_remove_a_pedestrian(play):
+    lines = events(
+        f"{{when: {{time: 0}}, do: {ANNA}}}",
+        "{when: {time: 1}, do: {move: {name: anna, through: [[3.5, 1.5]], speed: 1}}}",
+        "{when: {time: 5}, do: {remove: {name: anna}}}",
+    )
+    trace = play(lines, **STANDING)
+    anna = trace.objects["anna"]
+    assert np.allclose(anna.values[anna.ticks >= 4 * 240, :2][0], (3.5, 1.5))
+    assert told(trace, EventKind.OBJECT_REMOVED) == [("object.removed", "anna")]
+    assert anna.ticks.max() <= 5 * 240
+
+
+def test_nobody_comes_where_there_is_no_room(play):
+    lines = events(
+        f"{{when: {{time: 0}}, do: {ANNA}}}",
+        "{when: {time: 0}, do: {pedestrian: {name: bert, pose: {x: 3.3, y: 3}}}}",
+        "{when: {time: 0}, do: {pedestrian: {name: cleo, pose: {x: 1.1, y: 1}}}}",
+        "{when: {time: 0}, do: {crowd: {name: guest, count: 40, start: corner}}}",
+    )
+    trace = play(lines, **STANDING)
+    effects = [event.data["effects"][0]["happened"] for event in trace.of_kind(EventKind.EVENT_ENDED)]
+    assert effects == [True, False, False, False]
+
+
+def test_one_more_pedestrian_changes_neither_speed_nor_way_of_others_far_away(play):
+    far = "{pedestrian: {name: aaron, pose: {x: 0.4, y: 5.6}}}"
+    anna = "{pedestrian: {name: anna, pose: {x: 7.5, y: 1}, goals: [[7.5, 5]]}}"
+    crowd = "{crowd: {name: guest, count: COUNT, start: corner, goals: [corner], repeat: loop}}"
+    alone = play(events(f"{{when: {{time: 0}}, do: {anna}}}"), **STANDING)
+    both = play(events(f"{{when: {{time: 0}}, do: [{far}, {anna}]}}"), **STANDING)
+    assert (alone.objects["anna"].values == both.objects["anna"].values).all()
+    robot = {**STANDING, "robot": "{pose: {x: 7, y: 5}}"}
+    two, three = (
+        play(events(f"{{when: {{time: 0}}, do: {crowd.replace('COUNT', count)}}}"), **robot) for count in ("2", "3")
+    )
+    for name in ("guest-1", "guest-2"):
+        first = two.objects[name].values[0, :2], three.objects[name].values[0, :2]
+        assert np.allclose(*first, atol=0.02), "they come at the same place; then they may meet"
+
+
+def test_seeds_draw_other_speeds_and_a_speed_that_is_written_is_kept(play):
+    def fastest(anna: str, seed: int) -> float:
+        trace = play(events(f"{{when: {{time: 0}}, do: {anna}}}"), seed, **STANDING)
+        way = trace.objects["anna"]
+        return float((np.hypot(*np.diff(way.values[:, :2], axis=0).T) / np.diff(way.ticks)).max() * 240)
+
+    assert fastest(ANNA, 1) == fastest(ANNA, 1) != fastest(ANNA, 2)
+    slow = ANNA.replace("repeat", "speed: 0.5 m/s, repeat")
+    assert abs(fastest(slow, 1) - 0.5) < 0.01 and abs(fastest(slow, 2) - 0.5) < 0.01
+
+
+def test_who_sees_the_robot_does_not_touch_it_and_who_is_blind_walks_into_it(play):
+    def touched(more: str) -> list[tuple[str, str]]:
+        anna = f"{{pedestrian: {{name: anna, pose: {{x: 4, y: 1}}, goals: [[0.5, 1]]{more}}}}}"
+        trace = play(events(f"{{when: {{time: 0}}, do: {anna}}}"), **{**STANDING, "robot": "{pose: {x: 2, y: 1}}"})
+        return told(trace, EventKind.COLLISION_STARTED)
+
+    assert touched("") == touched(", behavior: impassive") == []
+    assert touched(", blind_to: [robots]")[0] == ("collision.started", "anna")
