@@ -14,7 +14,7 @@ from pydantic_core import PydanticUndefined
 from simscen.actions.action import AnyAction
 from simscen.criteria.criterion import AnyCriterion
 from simscen.faults.fault import AnyFault
-from simscen.model import anystack, robot, scenario, stack, stackfile, userconfig, world
+from simscen.model import anystack, robot, scenario, stack, stackfile, userconfig, variations, world
 from simscen.model.disturbance import EventEntry, FaultEntry
 from simscen.model.rosmap import RosMapSpec
 from simscen.spec import bytype, registry
@@ -110,6 +110,8 @@ _SCENARIO: dict[str, type[BaseModel]] = {
     "goals": scenario.GoalEntry,
     "events": EventEntry,
     "physics": scenario.Physics,
+    "variations": variations.VariationBlock,
+    "sampled": variations.Sampled,
 }
 _STACK: dict[str, type[BaseModel]] = {
     "stack": stack.StackSpec,

@@ -10,7 +10,7 @@ from simscen.core.errors import InvalidInput
 from simscen.loading.discovery import default_root, discover
 from simscen.loading.keywords import select
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.scenario import try_scenario
+from simscen.loading.scenario import try_variations
 from simscen.model.anystack import ExternalStackSpec
 
 
@@ -23,18 +23,18 @@ def command(
 ) -> None:
     """List the scenarios that a selection means.
 
-    One line each: id, name, tags and the external stack that it names. Exit code 0; 2 if a scenario is invalid; 5 if
-    nothing is selected.
+    One line each, also for each variation: id, name, tags and the external stack that it names. Exit code 0; 2 if a
+    scenario is invalid; 5 if nothing is selected.
     """
     home = root if root is not None else default_root(paths)
-    tried = [try_scenario(file, home, world_path or ()) for file in discover(paths, home)]
+    tried = [try_variations(file, home, world_path or ()) for file in discover(paths, home)]
     if problems := [problem for found in tried if isinstance(found, list) for problem in found]:
         raise InvalidInput(problems)
-    chosen = select([found for found in tried if isinstance(found, LoadedScenario)], keyword, tag or ())
-    width = max(len(scenario.id) for scenario in chosen)
+    chosen = select([one for found in tried if isinstance(found, tuple) for one in found], keyword, tag or ())
+    width = max(len(scenario.title) for scenario in chosen)
     for scenario in chosen:
         about = f"{scenario.spec.name or ''} {_tags(scenario)} {_stack(scenario)}"
-        print_text(f"{harmless(scenario.id):{width}}  {harmless(about)}".rstrip())
+        print_text(f"{harmless(scenario.title):{width}}  {harmless(about)}".rstrip())
 
 
 def _stack(scenario: LoadedScenario) -> str:

@@ -59,5 +59,5 @@ def _by_stack(answers: Sequence[RunFinished]) -> dict[str, list[RunResult]]:
     found: dict[str, list[RunResult]] = {}
     for answer in answers:
         if not answer.key.repeats:
-            found.setdefault(answer.key.variation, []).append(answer.result)
+            found.setdefault(answer.key.stack_name, []).append(answer.result)
     return found

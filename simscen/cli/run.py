@@ -43,7 +43,9 @@ def command(
     repeat: Annotated[
         int, typer.Option(min=1, max=100_000, help="Run each scenario with this many seeds in a row.")
     ] = 1,
-    keyword: Annotated[str, typer.Option("-k", help='Only ids that match, e.g. "faults and not slip".')] = "",
+    keyword: Annotated[
+        str, typer.Option("-k", help='Only ids and variations that match, e.g. "faults and not slip".')
+    ] = "",
     tag: Annotated[list[str] | None, typer.Option(help="Only scenarios with this tag; repeatable.")] = None,
     fail_fast: Annotated[
         bool, typer.Option("--fail-fast", "-x", help="Stop after the first run that does not pass.")
@@ -77,6 +79,9 @@ def command(
             help=STACK_HELP + "Repeatable: each scenario runs with each, and the first is compared with the others.",
         ),
     ] = None,
+    variation: Annotated[
+        list[str] | None, typer.Option(help="Only the variation of exactly this name; repeatable.")
+    ] = None,
     root: Annotated[Path | None, typer.Option(help="Files inside scenarios stay in this folder.")] = None,
     world_path: Annotated[list[Path] | None, typer.Option(help="Folder with worlds and models; repeatable.")] = None,
     lenient: Annotated[
@@ -94,7 +99,7 @@ def command(
     """
     if check_determinism and (earlier := [path for path in paths if (path / NAME).is_file()]):
         paths, check_determinism, check_against = [p for p in paths if p not in earlier], False, earlier[0]
-    wanted = Selection(keyword, tag or [], shard_of(shard))
+    wanted = Selection(keyword, tag or [], shard_of(shard), variation or [])
     scenarios, warnings = load_all(paths, root, world_path or [], lenient, wanted, stack or [])
     if warnings:
         print_text(as_text(warnings), sys.stderr)

@@ -13,9 +13,11 @@ from simscen.core.problems import Problem
 from simscen.loading.discovery import default_root, discover
 from simscen.loading.keywords import select
 from simscen.loading.loaded import LoadedScenario
+from simscen.loading.messages import quoted, suggestion
 from simscen.loading.robotfile import load_robot_file
-from simscen.loading.scenario import try_scenario
+from simscen.loading.scenario import try_variations
 from simscen.loading.stackchoice import StackChoice
+from simscen.loading.variations.telling import Found, told
 from simscen.loading.worldfile import load_world_file
 from simscen.run.precheck.feasibility import check, notes_of
 from simscen.run.precheck.worldchecks import misnamed
@@ -26,11 +28,15 @@ from simscen.run.worldsource import world_of
 
 @dataclass(frozen=True)
 class Selection:
-    """Which scenarios a command is about: `keyword` and `tags` as for pytest, `shard` as (i, n) from (1, n)."""
+    """Which scenarios a command is about: `keyword` and `tags` as for pytest, `shard` as (i, n) from (1, n).
+
+    `variations` are names of those that are meant, of all scenarios; () = whatever they are called.
+    """
 
     keyword: str = ""
     tags: Sequence[str] = ()
     shard: tuple[int, int] = (1, 1)
+    variations: Sequence[str] = ()
 
 
 def load_all(
@@ -41,7 +47,7 @@ def load_all(
     wanted: Selection,
     stacks: Sequence[str] = (),
 ) -> tuple[list[LoadedScenario], list[Problem]]:
-    """The selected scenarios, all of them valid, each with every one of `stacks`, and warnings about them, each once.
+    """The selected scenarios, all of them valid, each variation with every one of `stacks`, and warnings about them.
 
     Raises InvalidInput with every problem of every file, selected or not, and NothingSelected.
     """
@@ -52,17 +58,26 @@ def load_all(
     problems: dict[Problem, None] = {}
     warnings: dict[str, list[Problem]] = {}
     for file, choice in product(discover(paths, home), choices):
-        scenario, found = checks.scenario(file, choice)
-        if scenario is not None:
-            loaded.setdefault(scenario.id, []).append(replace(scenario, several_stacks=len(choices) > 1))
+        variations, found = checks.scenario(file, choice)
+        for scenario in variations:
+            loaded.setdefault(scenario.title, []).append(replace(scenario, several_stacks=len(choices) > 1))
             warnings.setdefault(scenario.id, []).extend(found)
         problems.update(dict.fromkeys(found))
     if any(problem.severity == "error" for problem in problems):
         raise InvalidInput(from_here(problems, home))
-    firsts = [variants[0] for variants in loaded.values()]
-    chosen = [one.id for one in _shard(select(firsts, wanted.keyword, wanted.tags), *wanted.shard)]
-    told = dict.fromkeys(warning for name in chosen for warning in warnings[name])
-    return [variant for name in chosen for variant in loaded[name]], from_here(told, home)
+    firsts = varied([stacked[0] for stacked in loaded.values()], wanted.variations)
+    chosen = _shard(select(firsts, wanted.keyword, wanted.tags), *wanted.shard)
+    told = dict.fromkeys(warning for one in chosen for warning in warnings[one.id])
+    return [stacked for one in chosen for stacked in loaded[one.title]], from_here(told, home)
+
+
+def varied(scenarios: list[LoadedScenario], names: Sequence[str]) -> list[LoadedScenario]:
+    """Those that are variations of one of these names; all where none is named. Raises NothingSelected."""
+    known = dict.fromkeys(one.variation for one in scenarios if one.variation)
+    if missing := [name for name in names if name not in known]:
+        told = suggestion(missing[0], known) or "no scenario has variations"
+        raise NothingSelected(f"no variation is called {quoted(missing[0], 120)}; {told}")
+    return [one for one in scenarios if not names or one.variation in names]
 
 
 def shard_of(text: str) -> tuple[int, int]:
@@ -103,11 +118,19 @@ class Checks:
         """The stacks to look at each scenario with; None = its own."""
         return self.stacks.chosen or (None,)
 
-    def scenario(self, file: Path, choice: StackChoice | None = None) -> tuple[LoadedScenario | None, list[Problem]]:
-        """The scenario, unless it is unusable, and its problems: a usable one has none that are errors."""
-        loaded = try_scenario(file, self.root, self.world_path, choice)
+    def scenario(self, file: Path, choice: StackChoice | None = None) -> tuple[Sequence[LoadedScenario], list[Problem]]:
+        """The variations of a scenario, none where one is unusable, and its problems: usable ones have no errors."""
+        loaded = try_variations(file, self.root, self.world_path, choice)
         if isinstance(loaded, list):
-            return None, loaded
+            return (), loaded
+        tried = [self._variation(one) for one in loaded]
+        problems = told(
+            [Found(one.variation, one.set_by, found) for one, (_, found) in zip(loaded, tried, strict=True)]
+        )
+        usable = [one for one, _ in tried if one is not None]
+        return (usable if len(usable) == len(tried) else ()), problems
+
+    def _variation(self, loaded: LoadedScenario) -> tuple[LoadedScenario | None, list[Problem]]:
         loaded, nobody = self.stacks.with_command(replace(loaded, lenient=self.lenient))
         if nobody is not None and self.runs:
             return None, [*loaded.notes, nobody]

@@ -85,11 +85,17 @@ def commands_of(scenarios: Iterable[LoadedScenario]) -> dict[str, dict[str, obje
     }
 
 
-def load_with(stack: str | None, file: Path, root: Path | None, world_path: Sequence[Path]) -> LoadedScenario:
-    """A scenario, with the stack that a `--stack` means or its own, ready to be prepared. Raises InvalidInput."""
+def load_with(
+    stack: str | None, file: Path, root: Path | None, world_path: Sequence[Path], variation: str = ""
+) -> LoadedScenario:
+    """A scenario or one of its variations, with the stack that a `--stack` means or its own, ready to be prepared.
+
+    Raises InvalidInput, and UsageError where it has no such variation or none is named.
+    """
     home = root or default_root([file])
     stacks = stacks_of([] if stack is None else [stack], home, world_path)
-    loaded, problem = stacks.with_command(load_scenario(file, home, world_path, next(iter(stacks.chosen), None)))
+    chosen = next(iter(stacks.chosen), None)
+    loaded, problem = stacks.with_command(load_scenario(file, home, world_path, chosen, variation))
     if problem is not None:
         raise InvalidInput([problem])
     return loaded
@@ -116,7 +122,7 @@ def _choice(text: str, root: Path, world_path: Sequence[Path], stacks: Stacks) -
     if not _NAME.fullmatch(name):
         hint = "a name has letters, digits, `_`, `.` and `-`"
         raise UsageError(f"cannot read --stack {harmless(text)}: expected NAME=VALUE; {hint}")
-    if RunKey("", 1, name.casefold()).repeats:
+    if RunKey("", 1, stack_name=name.casefold()).repeats:
         raise UsageError(f"--stack {harmless(text)}: no stack may be called {quoted(name)}; it names second runs")
     value = value if equals else name
     if value == REFERENCE or (_NAME.fullmatch(value) and find("stack", value)):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from simscen.core.errors import InvalidInput, UsageError
 from simscen.core.result import Outcome
-from simscen.core.sessionevents import RunFinished, SessionStarted
+from simscen.core.sessionevents import RunFinished, SessionStarted, started
 from simscen.core.version import __version__
 from simscen.report.journal import Journal
 from simscen.report.journaldata import Planned
@@ -31,9 +31,8 @@ class Work:
 
     def started(self, folder: Path) -> SessionStarted:
         """The first event of the session."""
-        ids = {job.scenario.id for job in self.jobs} | {answer.key.scenario for answer in self.kept}
-        total = len(self.jobs) + len(self.kept)
-        return SessionStarted(__version__, total, len(ids), self.workers, str(folder), tuple(sorted(ids)), self.stacks)
+        keys = [*(job.key for job in self.jobs), *(answer.key for answer in self.kept)]
+        return started(__version__, keys, self.workers, folder, self.stacks)
 
 
 def begin(journal: Journal, jobs: Sequence[Job], workers: int) -> Work:
@@ -86,6 +85,6 @@ def _twin(jobs: Sequence[Job], number: int) -> int:
     return number
 
 
-def _asked(job: Job) -> tuple[str, str]:
-    """Scenario and stack."""
-    return job.scenario.id, job.scenario.variation
+def _asked(job: Job) -> tuple[str, str, str]:
+    """Scenario, variation and stack."""
+    return job.scenario.id, job.scenario.variation, job.scenario.stack_name

@@ -4,6 +4,7 @@ import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from functools import total_ordering
 
 from simscen.core.disturbance import Happening
 from simscen.core.verdict import Verdict
@@ -19,38 +20,61 @@ class Outcome(str, Enum):
 
 AGAIN = "again"
 """What the second of two runs is called that must be equal; no stack may be called so."""
+_APART = "@"
+"""Stands between a variation and a stack in a folder's name; neither of their names may hold it."""
 
 
-@dataclass(frozen=True, order=True)
+@total_ordering
+@dataclass(frozen=True)
 class RunKey:
-    """Names one run: the scenario's id, the seed, and a label of the variation where there are several.
+    """Names one run: the scenario's id, the seed, the scenario's variation, and the stack where there are several.
 
-    The variation is the name of the stack where there are several, with `.again` for the second of two equal runs.
+    `variation` is "" where the scenario has none. `stack_name` has `.again` behind it for the second of two runs that
+    must be equal. Keys are in the order of scenario, variation, seed and stack.
     """
 
     scenario: str
     seed: int
     variation: str = ""
+    stack_name: str = ""
+
+    def __lt__(self, other: "RunKey") -> bool:
+        return self._order < other._order
+
+    @property
+    def _order(self) -> tuple[str, str, int, str]:
+        return self.scenario, self.variation, self.seed, self.stack_name
+
+    @property
+    def test(self) -> str:
+        """What is run, as -k sees it: the scenario's id, with its variation as pytest writes parameters."""
+        return title(self.scenario, self.variation)
 
     @property
     def folder(self) -> str:
-        """The run's folder inside its scenario's, e.g. "seed-7" or "seed-7-slow"."""
-        return "-".join(part for part in (f"seed-{self.seed}", self.variation) if part)
+        """The run's folder inside its scenario's, e.g. "seed-7", "seed-7-slow" or "seed-7-speed=0.5@slow"."""
+        label = _APART.join(part for part in (self.variation, self.stack_name) if part)
+        return "-".join(part for part in (f"seed-{self.seed}", label) if part)
 
     @property
     def twin(self) -> "RunKey":
         """The second of two runs that must be equal."""
-        return replace(self, variation=".".join(part for part in (self.variation, AGAIN) if part))
+        return replace(self, stack_name=".".join(part for part in (self.stack_name, AGAIN) if part))
 
     @property
     def first(self) -> "RunKey":
         """The first of two runs that must be equal; itself where it is no second one."""
-        return replace(self, variation=self.variation[: -len(AGAIN)].removesuffix(".")) if self.repeats else self
+        return replace(self, stack_name=self.stack_name[: -len(AGAIN)].removesuffix(".")) if self.repeats else self
 
     @property
     def repeats(self) -> bool:
         """Whether it is a second run, there only to be compared with the first."""
-        return self.variation == AGAIN or self.variation.endswith(f".{AGAIN}")
+        return self.stack_name == AGAIN or self.stack_name.endswith(f".{AGAIN}")
+
+
+def title(scenario: str, variation: str) -> str:
+    """What a scenario, or a variation of it, is called: "navigation/speeds[speed=0.5]"."""
+    return f"{scenario}[{variation}]" if variation else scenario
 
 
 @dataclass(frozen=True)
@@ -100,8 +124,9 @@ class RunResult:
     @property
     def again(self) -> str:
         """The command that repeats the run, from the scenario's root."""
+        varied = ["--variation", self.key.variation] if self.key.variation else []
         chosen = ["--stack", self.stack] if self.stack else []
-        return shlex.join(["simscen", "run", self.path, "--seed", str(self.key.seed), *chosen])
+        return shlex.join(["simscen", "run", self.path, "--seed", str(self.key.seed), *varied, *chosen])
 
 
 def unfinished(key: RunKey, path: str, failure: RunFailure, stack: str = "") -> RunResult:

@@ -1,7 +1,8 @@
 """What happens while scenarios run: the events that reporters listen to. The runner does not know who listens."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from simscen.core.comparison import Comparison
 from simscen.core.result import Outcome, RunKey, RunResult
@@ -21,7 +22,8 @@ class Artifacts:
 class SessionStarted:
     """The first event: `total` runs of `scenarios` files will be spread over `workers` processes.
 
-    `ids` are the scenarios' ids, `stacks` the NAME=VALUE of those that take the place of the scenarios' own.
+    `ids` are the scenarios' ids, each of its variations for itself where it has some; `stacks` are the NAME=VALUE of
+    those that take the place of the scenarios' own.
     """
 
     version: str
@@ -31,6 +33,15 @@ class SessionStarted:
     folder: str = ""
     ids: tuple[str, ...] = ()
     stacks: tuple[str, ...] = ()
+
+
+def started(
+    version: str, runs: Sequence[RunKey], workers: int, folder: Path, stacks: tuple[str, ...]
+) -> SessionStarted:
+    """The first event of a session of these runs."""
+    ids = tuple(sorted({key.test for key in runs}))
+    scenarios = len({key.scenario for key in runs})
+    return SessionStarted(version, len(runs), scenarios, workers, str(folder), ids, stacks)
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ def as_data(result: RunResult) -> dict[str, Any]:
         "scenario": result.key.scenario,
         "seed": result.key.seed,
         "variation": result.key.variation,
+        "stack_name": result.key.stack_name,
         "path": result.path,
         "stack": result.stack,
         "outcome": result.outcome.value,
@@ -60,7 +61,7 @@ def from_data(data: dict[str, Any]) -> RunResult:
     if data["format"] != FORMAT:
         raise ValueError(f"a result of format {data['format']}; this version reads {FORMAT}")
     return RunResult(
-        key=RunKey(data["scenario"], data["seed"], data["variation"]),
+        key=read_key(data),
         path=data["path"],
         outcome=Outcome(data["outcome"]),
         verdicts=tuple(read_verdict(verdict) for verdict in data["verdicts"]),
@@ -75,6 +76,12 @@ def from_data(data: dict[str, Any]) -> RunResult:
         error=None if data["error"] is None else RunFailure(**data["error"]),
         stack=data.get("stack", ""),  # older ones knew no other than the scenario's own
     )
+
+
+def read_key(data: dict[str, Any]) -> RunKey:
+    """The key of the run that plain data describes; what simscen 0.1 called its variation was the stack."""
+    variation, stack_name = (data["variation"], data["stack_name"]) if "stack_name" in data else ("", data["variation"])
+    return RunKey(data["scenario"], data["seed"], variation, stack_name)
 
 
 def _happening_data(one: Happening, tick_rate: int) -> dict[str, Any]:

@@ -8,9 +8,10 @@ from simscen.loading.assets import GAZEBO, URDF, Assets, is_ros_map
 from simscen.loading.discovery import ROBOT, STACK, WORLD
 from simscen.loading.document import Library
 from simscen.loading.paths import Fence
-from simscen.loading.scenario import try_scenario
+from simscen.loading.scenario import try_variations
 from simscen.loading.sense.worldsense import senseless
 from simscen.loading.tree import Fields
+from simscen.loading.variations.telling import Found, told
 
 _ONLY_ROBOTS = frozenset({"drive", "sensors", "limits", "body", "urdf"})
 _ONLY_WORLDS = frozenset({"walls", "obstacles", "objects", "doors", "places", "regions", "map_height", "sdf"})
@@ -23,8 +24,10 @@ def problems_of(kind: str, file: Path, root: Path, world_path: Sequence[Path] = 
     Some are warnings.
     """
     if kind == "scenario":
-        loaded = try_scenario(file, root, world_path)
-        return loaded if isinstance(loaded, list) else list(loaded.notes)
+        loaded = try_variations(file, root, world_path)
+        if isinstance(loaded, list):
+            return loaded
+        return told([Found(one.variation, one.set_by, one.notes) for one in loaded])
     library = Library(Fence.around(root, world_path))
     if isinstance(path := library.fence.entered(file), Problem):
         return [path]

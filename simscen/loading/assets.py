@@ -1,6 +1,8 @@
 """The files a scenario names: worlds, maps, robots."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -21,6 +23,7 @@ from simscen.model.rosmap import RosMapSpec
 from simscen.model.world import WorldSpec
 
 Model = TypeVar("Model", bound=BaseModel)
+Loaded = TypeVar("Loaded", LoadedMap, LoadedRobot, LoadedWorld)
 
 GAZEBO = (".sdf", ".world", ".sdf.xacro", ".world.xacro")
 URDF = (".urdf", ".xacro")
@@ -37,7 +40,7 @@ class Assets:
     def world(self, written: Leaf) -> LoadedWorld | None:
         """The world in the file that a scenario names."""
         path = self._find(str(written.value), written.place)
-        return None if path is None else self.world_file(path)
+        return None if path is None else self._once(self.world_file, path)
 
     def world_file(self, path: Path) -> LoadedWorld | None:
         """The world in a file: SDF by suffix, a ROS map by its keys, else our own language."""
@@ -69,7 +72,7 @@ class Assets:
     def map(self, written: Leaf) -> LoadedMap | None:
         """The ROS map in the file that a scenario names."""
         path = self._find(str(written.value), written.place)
-        return None if path is None else self.map_file(path)
+        return None if path is None else self._once(self.map_file, path)
 
     def map_file(self, path: Path) -> LoadedMap | None:
         """The ROS map in a file."""
@@ -79,10 +82,10 @@ class Assets:
         """A robot that ships with simscen, by its bare name, or that of a file."""
         if "/" in written or written.endswith((*URDF, ".yaml", ".yml")):
             path = self._find(written, place)
-            return None if path is None else self.robot_file(path)
+            return None if path is None else self._once(self.robot_file, path)
         shipped = shipped_robots()
         if written in shipped:
-            return self.robot_file(shipped[written], bundled=True)
+            return self._once(partial(self.robot_file, bundled=True), shipped[written])
         hint = f"{suggestion(written, shipped)} (or the path of a *.robot.yaml or .urdf file)"
         self._add(place, "SC023", f"no robot called {quoted(written)} ships with simscen", hint)
         return None
@@ -108,6 +111,18 @@ class Assets:
         body = tree if isinstance(tree, Fields) else None
         found = {package: folder for package, folder in packages.items() if folder is not None}
         return LoadedRobot(name, path, spec, urdf, bundled, body, found)
+
+    def _once(self, load: Callable[[Path], Loaded | None], path: Path) -> Loaded | None:
+        """What is in a file without a flaw is read once for all variations of a scenario."""
+        name = getattr(load, "func", load).__name__, path
+        if name in self.library.loaded:
+            known: Loaded = self.library.loaded[name]
+            return known
+        before = len(self.problems)
+        found = load(path)
+        if found is not None and len(self.problems) == before:
+            self.library.loaded[name] = found
+        return found
 
     def _ros_map(self, tree: Node | None, path: Path) -> LoadedMap | None:
         spec = self._model(RosMapSpec, tree)

@@ -4,6 +4,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from simscen.core.problems import Problem
 from simscen.loading.compose import compose
@@ -20,12 +21,13 @@ MOST_FILES = 32
 class Library:
     """Reads the files of one scenario and keeps their texts, so that problems can show their lines.
 
-    `texts` and `files` are by the name that problems use.
+    `texts` and `files` are by the name that problems use; `loaded` is what was made of files, for whoever asks again.
     """
 
     fence: Fence
     texts: dict[str, str] = field(default_factory=dict)
     files: dict[str, Path] = field(default_factory=dict)
+    loaded: dict[tuple[str, Path], Any] = field(default_factory=dict)
 
     def read(self, path: Path, defaults: bool = False) -> tuple[Node | None, list[Problem]]:
         """The tree of `path` with what it extends, and with `defaults`, the `defaults.yaml` beside it, merged in."""

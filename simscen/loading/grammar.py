@@ -72,7 +72,9 @@ def _options(kind: Any) -> list[Any]:
     if get_origin(bare) in (Union, UnionType):
         return [option for member in get_args(bare) if member is not NoneType for option in _options(member)]
     if _is_model(bare) and issubclass(bare, RootModel):
-        return _options(bare.model_fields["root"].annotation) if _is_model(_inner(bare)) else [kind]
+        inner = _inner(bare)
+        holds_models = _is_model(inner) or get_origin(inner) in (Union, UnionType)
+        return _options(bare.model_fields["root"].annotation) if holds_models else [kind]
     return [kind]
 
 

@@ -15,11 +15,11 @@ Matcher = Callable[[str], bool]
 
 
 class Selectable(Protocol):
-    """What has an id and tags: a loaded scenario."""
+    """What has a title and tags: a loaded scenario."""
 
     @property
-    def id(self) -> str:
-        """Path without suffix, relative to the root."""
+    def title(self) -> str:
+        """Its id, the path without suffix, with the name of its variation: `aisle[speed=0.5]`."""
         ...
 
     @property
@@ -32,14 +32,14 @@ Item = TypeVar("Item", bound=Selectable)
 
 
 def select(scenarios: Iterable[Item], keyword: str = "", tags: Sequence[str] = ()) -> list[Item]:
-    """Those whose id matches `keyword` and that have at least one of `tags`, in order.
+    """Those whose title matches `keyword` and that have at least one of `tags`, in order.
 
-    `keyword` is an expression like pytest's -k: parts of ids, case ignored, with `and`, `or`, `not` and brackets.
+    `keyword` is an expression like pytest's -k: parts of titles, case ignored, with `and`, `or`, `not` and brackets.
     Raises UsageError for a broken expression, NothingSelected where nothing is left.
     """
     everything = list(scenarios)
     matches = keyword_matcher(keyword) if keyword.strip() else lambda _: True
-    chosen = [s for s in everything if matches(s.id) and (not tags or not set(tags).isdisjoint(s.spec.tags))]
+    chosen = [s for s in everything if matches(s.title) and (not tags or not set(tags).isdisjoint(s.spec.tags))]
     if not chosen:
         raise NothingSelected(_nothing(everything, keyword, tags))
     return chosen

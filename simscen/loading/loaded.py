@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple
 
 from simscen.core.externalcommand import ExternalCommand
 from simscen.core.problems import Problem
-from simscen.core.result import RunKey
+from simscen.core.result import RunKey, title
 from simscen.loading.stackchoice import StackChoice
 from simscen.loading.tree import Fields, Key, Place, key_place, value_place
 from simscen.model.robot import RobotSpec
@@ -78,6 +78,8 @@ class LoadedScenario:
     `notes` are warnings. With `lenient`, what of an SDF world cannot be used is left out and noted.
     `choice` is the stack that was chosen in place of its own; it is part of the runs' keys where the session has
     `several_stacks`. `runs` is what an external stack runs, as far as anybody has said so.
+    `variation` is the name of the variation that it is, "" for a file without: `spec` and `tree` hold its values, and
+    `set_by` the path by which each of them came there, by its place.
     """
 
     id: str
@@ -102,9 +104,16 @@ class LoadedScenario:
     choice: StackChoice | None = None
     several_stacks: bool = False
     runs: ExternalCommand | None = None
+    variation: str = ""
+    set_by: Mapping[Place, str] = field(default_factory=dict, repr=False)
 
     @property
-    def variation(self) -> str:
+    def title(self) -> str:
+        """What it is called: its id, with its variation."""
+        return title(self.id, self.variation)
+
+    @property
+    def stack_name(self) -> str:
         """What tells its runs from those of the same scenario with other stacks."""
         return self.choice.name if self.choice is not None and self.several_stacks else ""
 
@@ -115,7 +124,7 @@ class LoadedScenario:
 
     def key(self, seed: int) -> RunKey:
         """The key of its run with this seed."""
-        return RunKey(self.id, seed, self.variation)
+        return RunKey(self.id, seed, self.variation, self.stack_name)
 
     def place_of(self, *keys: Key) -> Place:
         """Where the value at `keys` stands in its file, e.g. `place_of("goals", 0, "pose")`."""

@@ -1,6 +1,7 @@
 """Find the names in a specification that refer to something else."""
 
 from collections.abc import Iterator
+from functools import cache
 from typing import Annotated, Any, NamedTuple, get_args, get_origin
 
 from pydantic import BaseModel, RootModel
@@ -25,10 +26,18 @@ class Reference(NamedTuple):
 
 def references(spec: BaseModel, keys: tuple[Key, ...] = ()) -> Iterator[Reference]:
     """Every reference below `spec`, in the order of its fields."""
-    for name, field in type(spec).model_fields.items():
-        below = keys if isinstance(spec, RootModel) else (*keys, field.alias or name)
+    for name, key, mark in _fields_of(type(spec)):
+        yield from _in_value(getattr(spec, name), mark, keys if isinstance(spec, RootModel) else (*keys, key))
+
+
+@cache
+def _fields_of(model: type[BaseModel]) -> list[tuple[str, str, Refers | None]]:
+    """Each field with its key, and what a text in it refers to."""
+    found = []
+    for name, field in model.model_fields.items():
         marks = [mark for mark in field.metadata if isinstance(mark, Refers)]
-        yield from _in_value(getattr(spec, name), marks[0] if marks else _mark(field.annotation), below)
+        found.append((name, field.alias or name, marks[0] if marks else _mark(field.annotation)))
+    return found
 
 
 def _in_value(value: Any, mark: Refers | None, keys: tuple[Key, ...]) -> Iterator[Reference]:

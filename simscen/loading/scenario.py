@@ -1,22 +1,25 @@
 """Load a scenario with everything it names, or say all that is wrong with it."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
-from simscen.core.errors import InvalidInput
+from simscen.core.errors import InvalidInput, UsageError
 from simscen.core.problems import Problem
 from simscen.loading.assets import Assets
 from simscen.loading.consistency import inconsistencies
 from simscen.loading.document import Library
 from simscen.loading.loaded import LoadedMap, LoadedScenario, LoadedWorld
 from simscen.loading.masks import judged_masks
+from simscen.loading.messages import quoted, suggestion
 from simscen.loading.paths import Fence
 from simscen.loading.placing import placed, places_of, unknown_places
 from simscen.loading.stackchoice import StackChoice, with_stack
 from simscen.loading.tree import Fields, Key, Leaf, Node, at, child, value_place
 from simscen.loading.validation import check
+from simscen.loading.variations.expand import Variation, variations_of
+from simscen.loading.variations.telling import Found, told
 from simscen.model.scenario import ScenarioSpec
 from simscen.model.world import WorldSpec
 
@@ -24,23 +27,45 @@ SUFFIXES = (".scenario.yaml", ".scenario.yml", ".yaml", ".yml")
 
 
 def load_scenario(
-    path: Path, root: Path, world_path: Sequence[Path] = (), choice: StackChoice | None = None
+    path: Path,
+    root: Path,
+    world_path: Sequence[Path] = (),
+    choice: StackChoice | None = None,
+    variation: str = "",
 ) -> LoadedScenario:
     """The scenario in the file `path`; paths in it stay inside `root` and the folders of `world_path`.
 
-    The chosen stack takes the place of its own. Raises InvalidInput with every problem of the scenario and of the files
-    it names.
+    The chosen stack takes the place of its own; of a scenario with variations it is the one of that name. Raises
+    InvalidInput with every problem of the scenario and of the files it names, UsageError where there is no such
+    variation, or none is named.
     """
-    loaded = try_scenario(path, root, world_path, choice)
+    loaded = try_variations(path, root, world_path, choice)
     if isinstance(loaded, list):
         raise InvalidInput(loaded)
-    return loaded
+    if (found := next((one for one in loaded if one.variation == variation), None)) is not None:
+        return found
+    names = [one.variation for one in loaded if one.variation]
+    if not names:
+        raise UsageError(f"{path} has no variations, so none is called {quoted(variation)}")
+    told = f"has no variation {quoted(variation)}" if variation else f"has {len(names)} variations: say which one"
+    raise UsageError(f"{path} {told}; {suggestion(variation, names)}")
 
 
 def try_scenario(
     path: Path, root: Path, world_path: Sequence[Path] = (), choice: StackChoice | None = None
 ) -> LoadedScenario | list[Problem]:
-    """As load_scenario, but returns the problems."""
+    """The scenario in a file, the first of its variations where it has some; or all that is wrong with the file."""
+    loaded = try_variations(path, root, world_path, choice)
+    return loaded if isinstance(loaded, list) else loaded[0]
+
+
+def try_variations(
+    path: Path, root: Path, world_path: Sequence[Path] = (), choice: StackChoice | None = None
+) -> tuple[LoadedScenario, ...] | list[Problem]:
+    """All variations of the scenario in a file, in order, or all that is wrong with any of them.
+
+    A file without variations is its only one, without a name.
+    """
     fence = Fence.around(root, world_path)
     library = Library(fence)
     file = fence.entered(path)
@@ -50,16 +75,43 @@ def try_scenario(
         message, hint = f"its id would end in {name!r}, which is no folder", "give the file a name before its suffix"
         return [Problem(fence.shown(file), 0, 0, "SC041", message, hint)]
     tree, problems = library.read(file, defaults=True)
-    if choice is not None and isinstance(tree, Fields):
-        tree = with_stack(tree, choice)
+    if choice is not None:
         library.add(choice.texts, choice.files)
-    if not problems and tree is not None:
-        spec = check(ScenarioSpec, tree)
-        if not isinstance(spec, list) and isinstance(tree, Fields):
-            loaded = _with_assets(spec, tree, library, file)
-            return loaded if isinstance(loaded, list) else replace(loaded, choice=choice)
-        problems = [*(spec if isinstance(spec, list) else ()), *_problems_of_world(tree, library)]
-    return library.with_source(sorted(problems))
+    if problems or not isinstance(tree, Fields):
+        wrong = check(ScenarioSpec, tree) if tree is not None and not problems else []
+        return library.with_source(sorted([*problems, *(wrong if isinstance(wrong, list) else ())]))
+    variations = variations_of(tree)
+    if not isinstance(variations[0], Variation):
+        return library.with_source(sorted(variations))
+    tried = [(one, _with_choice(one, library, file, choice)) for one in variations]
+    if any(isinstance(found, list) for _, found in tried):
+        return told([Found(one.name, one.set_by, found if isinstance(found, list) else ()) for one, found in tried])
+    return tuple(found for _, found in tried if isinstance(found, LoadedScenario))
+
+
+def _with_choice(
+    one: Variation, library: Library, file: Path, choice: StackChoice | None
+) -> LoadedScenario | list[Problem]:
+    """One variation with the chosen stack in place of its own, or all that is wrong with it."""
+    tree = one.tree if choice is None else with_stack(one.tree, choice)
+    if choice is not None and (lost := list(_without_effect(one, tree, choice))):
+        return library.with_source(lost)
+    spec = check(ScenarioSpec, tree)
+    if isinstance(spec, list):
+        return library.with_source(sorted([*spec, *_problems_of_world(tree, library)]))
+    loaded = _with_assets(spec, tree, library, file)
+    if isinstance(loaded, list):
+        return loaded
+    return replace(loaded, choice=choice, variation=one.name, set_by=one.set_by)
+
+
+def _without_effect(one: Variation, tree: Fields, choice: StackChoice) -> Iterator[Problem]:
+    """Values for a stack that another takes the place of: the run would be called by what it is not run with."""
+    for change in one.changes:
+        if at(tree, change.target.keys) is not change.value:
+            message = f"{quoted(change.target.path)} changes nothing with --stack {choice.written}"
+            hint = "choose variations without it with -k or --variation, or another stack"
+            yield Problem(*change.target.place, "SC055", message, hint)
 
 
 def _problems_of_world(tree: Node, library: Library) -> list[Problem]:

@@ -29,11 +29,13 @@ from simscen.spec.quantities import (
 if TYPE_CHECKING:
     from simscen.criteria.measure import AnyMeasure
     from simscen.model.disturbance import EventEntry, FaultEntry, Step
+    from simscen.model.variations import Variations
     from simscen.triggers.trigger import Trigger
 else:
     AnyMeasure = Annotated[Spec, OnDemand("simscen.criteria.measure", "AnyMeasure")]
     EventEntry = Annotated[Spec, OnDemand("simscen.model.disturbance", "EventEntry")]
     FaultEntry = Annotated[Spec, OnDemand("simscen.model.disturbance", "FaultEntry")]
+    Variations = Annotated[Spec, OnDemand("simscen.model.variations", "Variations")]
 
 
 def _text_or_mapping(value: Any) -> str:
@@ -153,6 +155,8 @@ class ScenarioSpec(Spec):
     """All of these must hold."""
     metrics: Annotated[list[AnyMeasure], Field(max_length=100), AfterValidator(_once)] = []
     """What is measured besides what every run reports; each is a type that an installed package adds."""
+    variations: Variations | None = None
+    """Values by their paths, each combination a run of its own; default: the file as it is."""
 
     @property
     def steps(self) -> "list[Step]":

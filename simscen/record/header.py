@@ -18,8 +18,9 @@ FORMAT = "1"
 STACK = "simscen.stack"
 """The metadata record that says what an external stack was: known to its end, so it stands at the end of the log."""
 _FACT = "fact."
-CHOSEN, VARIATION = "stack", "variation"
-"""Facts: NAME=VALUE of the stack that took the place of the scenario's own, and what tells the run from others."""
+CHOSEN, STACK_NAME, VARIATION = "stack", "variation", "varied"
+"""Facts: NAME=VALUE of the stack that took the place of the scenario's own, what the run is called by it where there
+are several, and the scenario's variation."""
 OWN_FILES = CASE, SCENARIO, RESULT = "case.json", "scenario.yaml", "result.json"
 _MEDIA_TYPES = {
     ".json": "application/json",
@@ -56,7 +57,7 @@ class LogHeader:
     @property
     def key(self) -> RunKey:
         """The key of the run."""
-        return RunKey(self.name, self.seed, self.facts.get(VARIATION, ""))
+        return RunKey(self.name, self.seed, self.facts.get(VARIATION, ""), self.facts.get(STACK_NAME, ""))
 
 
 def case_to_json(case: Case) -> str:

@@ -35,9 +35,9 @@ def complaints(run: RunFinished) -> list[Complaint]:
 
 
 def label(key: RunKey, every_seed: bool = True, prefix: str = "") -> str:
-    """What a run is called in a list: the scenario's id without `prefix`, and the seed where there are several."""
-    extra = ", ".join(part for part in (f"seed {key.seed}" if every_seed else "", key.variation) if part)
-    name = key.scenario.removeprefix(prefix)
+    """What a run is called in a list: its id without `prefix`, its variation, the seed where there are several."""
+    extra = ", ".join(part for part in (f"seed {key.seed}" if every_seed else "", key.stack_name) if part)
+    name = key.test.removeprefix(prefix)
     return one_line(f"{name} ({extra})" if extra else name)
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from simscen.core.result import RunKey
 from simscen.core.sessionevents import Artifacts, RunFinished
-from simscen.judge.resultdata import as_data, from_data
+from simscen.judge.resultdata import as_data, from_data, read_key
 from simscen.report.results import relative
 
 NAME = "events.jsonl"
@@ -38,8 +38,7 @@ def planned_data(run: Planned) -> dict[str, Any]:
 
 def read_planned(data: dict[str, Any]) -> Planned:
     """The run that `planned_data` described. Raises KeyError or TypeError when it is none."""
-    key = RunKey(data["scenario"], data["seed"], data["variation"])
-    return Planned(key, data["path"], data["digest"], data["again"], data["file"], data.get("stack", ""))
+    return Planned(read_key(data), data["path"], data["digest"], data["again"], data["file"], data.get("stack", ""))
 
 
 def run_data(run: RunFinished, folder: Path) -> dict[str, Any]:

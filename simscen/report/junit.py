@@ -69,6 +69,7 @@ def _properties(case: Element, run: RunFinished) -> None:
     properties = SubElement(case, "properties")
     values = {
         "seed": str(run.key.seed),
+        "variation": run.key.variation,
         "simulated_seconds": f"{run.result.simulated:.3f}",
         "stack": run.result.stack,
         "ended": run.result.ended,
@@ -125,8 +126,8 @@ def _classname(run: RunFinished) -> str:
 
 
 def _case_name(run: RunFinished) -> str:
-    variation = f", {run.key.variation}" if run.key.variation else ""
-    return one_line(f"{run.key.scenario.rpartition('/')[2]} [seed {run.key.seed}{variation}]")
+    parts = [run.key.variation, f"seed {run.key.seed}", run.key.stack_name]
+    return one_line(f"{run.key.scenario.rpartition('/')[2]} [{', '.join(part for part in parts if part)}]")
 
 
 def _unique(name: str, used: set[str]) -> str:

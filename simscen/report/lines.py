@@ -39,7 +39,7 @@ class Naming:
     def of(cls, session: SessionStarted, columns: int | None = None) -> "Naming":
         """Seeds are told where a scenario runs more than once with a stack, stacks where there are several."""
         stacks = [text.partition("=")[0] for text in session.stacks] if len(session.stacks) > 1 else []
-        every_seed = session.total != session.scenarios * max(1, len(stacks))
+        every_seed = session.total != (len(session.ids) or session.scenarios) * max(1, len(stacks))
         prefix = _common_folder(session.ids)
         longest = max((len(one) for one in session.ids), default=0) - len(prefix)
         extra = [*(["seed 1234"] if every_seed else []), *([max(stacks, key=len)] if stacks else [])]

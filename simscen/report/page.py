@@ -61,13 +61,13 @@ def to_html(runs: Sequence[RunFinished], title: str = "simscen", comparison: Com
 
 
 def _run(run: RunFinished, picture: str) -> str:
-    label = ", ".join(part for part in (f"seed {run.key.seed}", run.key.variation) if part)
+    label = ", ".join(part for part in (f"seed {run.key.seed}", run.key.stack_name) if part)
     nearest = f"tightest: {tightest(run.result.verdicts)}" if run.outcome is Outcome.PASSED else ""
     opened = "" if run.outcome is Outcome.PASSED else " open"
     return (
         f"<details{opened}><summary>"
         f'<span class="pill {run.outcome.value}">{run.outcome.value}</span>'
-        f'<span class="name">{_text(run.key.scenario)}</span><span class="quiet">{_text(label)}</span>'
+        f'<span class="name">{_text(run.key.test)}</span><span class="quiet">{_text(label)}</span>'
         f'<span class="quiet">{run.result.simulated:.1f} s</span><span class="quiet">{_text(nearest)}</span></summary>'
         f'<div class="in">{_why(run)}{_verdicts(run)}{_disturbances(run)}{picture}'
         f"{_metrics(run)}{_again(run)}</div></details>"

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from simscen.core.errors import InvalidInput
 from simscen.core.problems import Problem
 from simscen.core.result import RunFailure, RunKey, unfinished
-from simscen.core.sessionevents import RunFinished, SessionStarted
+from simscen.core.sessionevents import RunFinished, SessionStarted, started
 from simscen.report.checkout import from_here
 from simscen.report.journaldata import FORMAT, NAME, Planned, read_planned, read_run
 
@@ -38,8 +38,7 @@ class Past:
 
     def started(self, folder: Path) -> SessionStarted:
         """The event that the session began with."""
-        ids = tuple(sorted({run.key.scenario for run in self.planned}))
-        return SessionStarted(self.version, len(self.planned), len(ids), self.workers, str(folder), ids, self.stacks)
+        return started(self.version, [run.key for run in self.planned], self.workers, folder, self.stacks)
 
     @property
     def stacks(self) -> tuple[str, ...]:

@@ -36,8 +36,8 @@ def agreed(run: RunFinished, earlier: Path) -> RunFinished:
 def _folder(run: RunFinished, earlier: Path) -> Path:
     """Where the earlier session has it: a stack that is alone here may have been one of several there."""
     stack = run.result.stack.partition("=")[0]
-    labelled = run_folder(earlier, replace(run.key.first, variation=stack))
-    return labelled if not run.key.first.variation and labelled.is_dir() else run_folder(earlier, run.key.first)
+    labelled = run_folder(earlier, replace(run.key.first, stack_name=stack))
+    return labelled if not run.key.first.stack_name and labelled.is_dir() else run_folder(earlier, run.key.first)
 
 
 def _disagreement(here: Path, there: Path) -> str | None:

@@ -37,6 +37,7 @@ def _circumstances(loaded: LoadedScenario) -> dict[str, object]:
         "arithmetic": arithmetic(),
         "lenient": loaded.lenient,
         "plugins": fingerprints(plugins_of(loaded)),
+        **({"scenario": loaded.tree.plain} if loaded.variation else {}),
         **({} if loaded.choice is None else {"stack": loaded.tree.plain.get("stack")}),
         **({} if loaded.runs is None else {"runs": loaded.runs.digest}),
     }

@@ -8,18 +8,23 @@ from simscen.core.world import BuiltWorld
 from simscen.loading.loaded import LoadedScenario
 from simscen.run.prepare import Prepared, build_world, prepare
 
+MOST = 100
+"""Scenarios that are kept; their runs follow each other, and a file may have a thousand variations."""
+
 
 class PreparedCache:
     """Prepares scenarios; lives in the warm process, whose forks inherit what is here."""
 
     def __init__(self) -> None:
         self._worlds: dict[str, BuiltWorld] = {}
-        self._scenarios: dict[tuple[str, str], Prepared] = {}
+        self._scenarios: dict[tuple[str, str, str], Prepared] = {}
 
     def prepared(self, loaded: LoadedScenario) -> Prepared:
         """The prepared scenario; the first one in a world builds it. Raises InvalidInput."""
-        name = loaded.id, loaded.variation
+        name = loaded.id, loaded.variation, loaded.stack_name
         if name not in self._scenarios:
+            if len(self._scenarios) == MOST:
+                del self._scenarios[next(iter(self._scenarios))]
             self._scenarios[name] = prepare(loaded, self._world)
         return self._scenarios[name]
 

@@ -12,6 +12,8 @@ from simscen.loading.stackchoice import StackChoice
 def repeat_command(scenario: LoadedScenario, seed: int) -> str:
     """The command that repeats a run, called from the working folder. Options are named only where they matter."""
     words = ["simscen", "run", shown(scenario.file), "--seed", str(seed)]
+    if scenario.variation:
+        words += ["--variation", scenario.variation]
     if scenario.root != default_root([scenario.file]):
         words += ["--root", shown(scenario.root)]
     for folder in scenario.world_path:

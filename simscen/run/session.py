@@ -41,15 +41,15 @@ def seeds_of(scenario: LoadedScenario, options: Options) -> range:
     """The seeds that a scenario is run with. Raises UsageError when they lead beyond the largest there is."""
     first = options.seed if options.seed is not None else scenario.spec.seed
     if first + options.repeat - 1 > LARGEST_SEED:
-        told = f"{options.repeat} runs of {scenario.id} from seed {first} on"
+        told = f"{options.repeat} runs of {scenario.title} from seed {first} on"
         raise UsageError(f"{told} would need seeds beyond the largest, {LARGEST_SEED}")
     return range(first, first + options.repeat)
 
 
 def plan(scenarios: Sequence[LoadedScenario], options: Options, out: Path) -> list[Job]:
-    """All runs of a session in the order they are started: scenario by scenario, seed by seed, stack by stack."""
+    """All runs of a session in the order they are started: variation by variation, seed by seed, stack by stack."""
     jobs: list[Job] = []
-    for _, group in groupby(scenarios, key=lambda scenario: scenario.id):
+    for _, group in groupby(scenarios, key=lambda scenario: scenario.title):
         variants = list(group)
         for seed in seeds_of(variants[0], options):
             for scenario in variants:

@@ -16,7 +16,7 @@ from simscen.loading.discovery import default_root
 from simscen.loading.plugins import fact_of, origin, plugins_of
 from simscen.loading.resolved import resolved_text
 from simscen.loading.scenario import load_scenario
-from simscen.record.header import CHOSEN, VARIATION, LogHeader
+from simscen.record.header import CHOSEN, STACK_NAME, VARIATION, LogHeader
 from simscen.record.recorder import Recorder
 from simscen.record.tracebuilder import TraceBuilder
 from simscen.run.agent import Log
@@ -115,11 +115,12 @@ def log_header(prepared: Prepared, seed: int) -> LogHeader:
         robot_description=describe(prepared.body),
         frames=sensor_frames(prepared.robot),
         sensors=sensor_kinds(prepared),
-        facts={**_stack_facts(prepared), **{fact_of(entry): origin(entry) for entry in plugins_of(prepared.loaded)}},
+        facts={**_key_facts(prepared), **{fact_of(entry): origin(entry) for entry in plugins_of(prepared.loaded)}},
     )
 
 
-def _stack_facts(prepared: Prepared) -> dict[str, str]:
-    """The stack that was chosen in place of the scenario's own, as it was given, and what the run is called by it."""
-    told = {CHOSEN: prepared.loaded.stack, VARIATION: prepared.loaded.variation}
+def _key_facts(prepared: Prepared) -> dict[str, str]:
+    """The stack that was chosen in place of the scenario's own, as it was given, and what the run is called."""
+    loaded = prepared.loaded
+    told = {CHOSEN: loaded.stack, STACK_NAME: loaded.stack_name, VARIATION: loaded.variation}
     return {name: value for name, value in told.items() if value}

@@ -79,8 +79,8 @@ def read_scenario(mutated: Path) -> list[Problem]:
     """What `validate` says; what it accepts must be fit to be run."""
     folder = mutated.parent
     file = mutated if mutated.name.endswith(".scenario.yaml") else folder / "a.scenario.yaml"
-    loaded, problems = Checks(folder).scenario(file)
-    if loaded is not None:
+    variations, problems = Checks(folder).scenario(file)
+    for loaded in variations:
         prepare(loaded)
     return problems
 

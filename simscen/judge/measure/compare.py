@@ -35,14 +35,14 @@ def compare(results: Iterable[RunResult], stacks: Sequence[str]) -> Comparison |
     baseline, *others = given
     return Comparison(
         given,
-        {scenario: _row(scenario, given, runs) for scenario in sorted({key.scenario for key in runs})},
+        {test: _row(test, given, runs) for test in sorted({key.test for key in runs})},
         tuple(_against(runs, baseline, other) for other in others),
     )
 
 
-def _row(scenario: str, stacks: Iterable[str], runs: Mapping[RunKey, RunResult]) -> dict[str, Outcomes]:
-    own = [run for key, run in runs.items() if key.scenario == scenario]
-    return {name: _outcomes(run for run in own if run.key.variation == name) for name in stacks}
+def _row(test: str, stacks: Iterable[str], runs: Mapping[RunKey, RunResult]) -> dict[str, Outcomes]:
+    own = [run for key, run in runs.items() if key.test == test]
+    return {name: _outcomes(run for run in own if run.key.stack_name == name) for name in stacks}
 
 
 def _outcomes(runs: Iterable[RunResult]) -> Outcomes:
@@ -52,7 +52,7 @@ def _outcomes(runs: Iterable[RunResult]) -> Outcomes:
 
 def _against(runs: Mapping[RunKey, RunResult], baseline: str, other: str) -> Against:
     first, second = (
-        {(key.scenario, key.seed): run for key, run in sorted(runs.items()) if key.variation == name}
+        {(key.test, key.seed): run for key, run in sorted(runs.items()) if key.stack_name == name}
         for name in (baseline, other)
     )
     pairs = [(first[case], second[case]) for case in first if case in second]
@@ -90,7 +90,7 @@ def _flip(pair: Pair) -> Flip | None:
     if one.outcome is two.outcome:
         return None
     good, bad = (one, two) if one.outcome is Outcome.PASSED else (two, one)
-    return Flip(one.key.scenario, one.key.seed, good.key.variation, bad.key.variation, _why(bad))
+    return Flip(one.key.test, one.key.seed, good.key.stack_name, bad.key.stack_name, _why(bad))
 
 
 def _why(run: RunResult) -> str:

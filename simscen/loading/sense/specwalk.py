@@ -1,6 +1,7 @@
 """Go through all of a specification, with where each part of it stands in the file."""
 
 from collections.abc import Iterator
+from functools import cache
 from typing import Annotated, Any, get_args, get_origin
 
 from pydantic import BaseModel, RootModel
@@ -30,11 +31,19 @@ def below(spec: Any, keys: Keys = ()) -> Iterator[tuple[Keys, BaseModel]]:
 def quantities(spec: BaseModel, dimension: str) -> Iterator[tuple[Keys, float]]:
     """The numbers of one dimension in a specification."""
     for keys, part in below(spec):
-        for name, field in type(part).model_fields.items():
-            value = getattr(part, name)
-            marked = any(_has(mark, dimension) for mark in field.metadata) or _measures(field.annotation, dimension)
-            if marked and isinstance(value, int | float):
-                yield (*keys, field.alias or name), value
+        for name, key in _measured(type(part), dimension):
+            if isinstance(value := getattr(part, name), int | float):
+                yield (*keys, key), value
+
+
+@cache
+def _measured(model: type[BaseModel], dimension: str) -> list[tuple[str, str]]:
+    """The fields that hold quantities of the dimension, with their keys."""
+    return [
+        (name, field.alias or name)
+        for name, field in model.model_fields.items()
+        if any(_has(mark, dimension) for mark in field.metadata) or _measures(field.annotation, dimension)
+    ]
 
 
 def _measures(kind: Any, dimension: str) -> bool:

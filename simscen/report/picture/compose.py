@@ -91,6 +91,7 @@ def _header(image: Image.Image, scene: Scene) -> None:
 def _facts(scene: Scene) -> str:
     result = scene.result
     length = result.metrics.get("path_length")
-    facts = [f"seed {result.key.seed}", result.key.variation, f"{result.simulated:.1f} s simulated"]
+    key = result.key
+    facts = [f"seed {key.seed}", key.variation, key.stack_name, f"{result.simulated:.1f} s simulated"]
     facts += [f"{length:.1f} m driven" if length is not None else "", f"ended: {shown(result.ended)}"]
     return "   ·   ".join(fact for fact in facts if fact)

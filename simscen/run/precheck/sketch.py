@@ -18,7 +18,7 @@ def draw(scene: Scene, gaps: Sequence[tuple[float, float]], folder: Path) -> Pat
     height = (low + high) / 2
     poses = [scene.start, *(goal.pose for _, goal in scene.targets)]
     image = picture(build(scene.world, height), height, [placed(scene.outline, pose) for pose in poses], gaps)
-    file = folder / f"{scene.loaded.id}.png"
+    file = folder / f"{scene.loaded.title}.png"
     try:
         require_plain(file)
         file.parent.mkdir(parents=True, exist_ok=True)

@@ -90,7 +90,7 @@ def test_the_command_line_wins_over_the_configuration(project: Path) -> None:
     assert loaded("mine")[0].runs.argv == ("sh", "-c", "true")
     assert loaded("mine", "mine=./nav 'a b'")[0].runs.argv == ("./nav", "a b")
     both = loaded("mine", "mine", "x=other", "ref=reference")
-    assert [(one.variation, one.runs and one.runs.argv) for one in both] == [
+    assert [(one.stack_name, one.runs and one.runs.argv) for one in both] == [
         ("mine", ("sh", "-c", "true")),
         ("x", ("./nav", "--other")),
         ("ref", None),

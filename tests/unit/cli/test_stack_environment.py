@@ -130,7 +130,7 @@ def test_a_program_that_cannot_go_on_is_an_error_with_what_it_printed(run, simsc
     ended = simscen("run", "mine.scenario.yaml", *stacks, "--stack", "ref=reference", "--out", "out")
     assert ended.code == 3
     listed = json.loads((tmp_path / "out/results.json").read_text())["runs"]
-    errors = {run["variation"]: run["error"] for run in listed}
+    errors = {run["stack_name"]: run["error"] for run in listed}
     assert errors.pop("ref") is None
     for name, (_, told) in programs.items():
         assert errors[name]["kind"] == "stack-crashed"

@@ -66,7 +66,7 @@ def test_each_scenario_runs_with_each_stack_and_seed_in_a_folder_and_case_of_its
     cases = [case.get("name") for case in ElementTree.parse(project / "out/junit.xml").iter("testcase")]
     assert sorted(cases) == sorted(f"{n} [seed {s}, {k}]" for n in "ab" for s in (1, 2) for k in ("ref", "dwb"))
     listed = json.loads((project / "out/results.json").read_text())["runs"]
-    assert {(run["variation"], run["stack"]) for run in listed} == {
+    assert {(run["stack_name"], run["stack"]) for run in listed} == {
         ("ref", "ref=reference"),
         ("dwb", "dwb=dwb.stack.yaml"),
     }
@@ -103,7 +103,7 @@ def test_a_single_stack_needs_no_label_and_the_reference_is_what_runs_without(si
 def test_the_command_that_repeats_a_run_repeats_it_with_its_stack(simscen, project: Path) -> None:
     simscen("run", "a.scenario.yaml", *BOTH, "--seed", "7", "--out", "out")
     listed = json.loads((project / "out/results.json").read_text())["runs"]
-    again = next(run["again"] for run in listed if run["variation"] == "dwb")
+    again = next(run["again"] for run in listed if run["stack_name"] == "dwb")
     assert again == "simscen run a.scenario.yaml --seed 7 --stack dwb=dwb.stack.yaml"
     assert simscen(*shlex.split(again)[1:], "--out", "again").code == 0
     text = (project / "again/runs/a/seed-7/scenario.yaml").read_text()
@@ -120,7 +120,7 @@ def test_a_run_that_is_repeated_agrees_with_the_one_of_several_stacks(simscen, p
 def test_a_log_says_which_stack_it_is_of_so_that_it_is_judged_as_that(simscen, project: Path) -> None:
     assert simscen("run", "a.scenario.yaml", *BOTH, "--out", "out").code == 0
     judged = json.loads(simscen("judge", "out", "--json").out)
-    assert sorted(run["variation"] for run in judged["runs"]) == ["dwb", "ref"]
+    assert sorted(run["stack_name"] for run in judged["runs"]) == ["dwb", "ref"]
     facts = read_log(project / "out/runs/a/seed-1-dwb/run.mcap").about.facts
     assert facts["stack"] == "dwb=dwb.stack.yaml"
 

@@ -20,7 +20,7 @@ def run(stack: str, seed: int = 1, scenario: str = "a", outcome: Outcome = Outco
     verdicts = (Verdict("clearance", "clearance", "fail", (found,)),) if outcome is Outcome.FAILED else ()
     error = RunFailure("stack-crashed", "it is gone") if outcome is Outcome.ERROR else None
     return RunResult(
-        RunKey(scenario, seed, stack),
+        RunKey(scenario, seed, stack_name=stack),
         f"{scenario}.scenario.yaml",
         outcome,
         verdicts,

@@ -9,7 +9,7 @@ from simscen.model.scenario import ScenarioSpec
 
 @dataclass(frozen=True)
 class _Scenario:
-    id: str
+    title: str
     spec: ScenarioSpec
 
 
@@ -22,7 +22,7 @@ ALL = [_scenario("faults/lidar_off", "fault", "lidar"), _scenario("faults/slip",
 
 
 def _ids(keyword: str = "", *tags: str) -> list[str]:
-    return [scenario.id for scenario in select(ALL, keyword, tags)]
+    return [scenario.title for scenario in select(ALL, keyword, tags)]
 
 
 @pytest.mark.parametrize(
@@ -34,7 +34,7 @@ def _ids(keyword: str = "", *tags: str) -> list[str]:
     ],
 )  # fmt: skip
 def test_keywords_read_as_in_pytest(keyword: str, expected: str) -> None:
-    assert _ids(keyword) == [ALL["abc".index(letter)].id for letter in expected]
+    assert _ids(keyword) == [ALL["abc".index(letter)].title for letter in expected]
 
 
 def test_any_of_the_tags_selects() -> None:

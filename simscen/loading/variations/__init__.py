@@ -1,0 +1,1 @@
+"""From `variations:` to scenarios: paths, values, names."""

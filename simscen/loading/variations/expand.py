@@ -1,0 +1,241 @@
+"""A scenario with `variations:` becomes as many scenarios, each a tree of its own with the values put in."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations, product
+
+from simscen.core.problems import Problem
+from simscen.loading.messages import quoted
+from simscen.loading.tree import Entry, Fields, Items, Leaf, Node, Place, at, child
+from simscen.loading.validation import check
+from simscen.loading.variations.naming import HINT, derived, flaw_of, keys_of, unique
+from simscen.loading.variations.paths import NoPath, Target, put, target_of
+from simscen.loading.variations.sampling import Pick, draws_of
+from simscen.model.variations import MOST, Sampled, VariationBlock, VariedSpec
+
+VARIATIONS = "variations"
+_SAID_OF_IT = frozenset({"description", "tags", "expected", "skip"})
+"""What a variation may say that is no value it is run with: its name need not tell."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """A value for a path; `number` is its place in its list, from 1 on."""
+
+    target: Target
+    value: Node
+    number: int
+
+
+@dataclass(frozen=True)
+class Option:
+    """Changes that go together, with the name that was given to them."""
+
+    changes: tuple[Change, ...]
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Variation:
+    """A scenario with the values of `changes` put in; a file without variations is its only one, without a name."""
+
+    name: str
+    tree: Fields = field(repr=False)
+    changes: tuple[Change, ...] = ()
+
+    @property
+    def set_by(self) -> Mapping[Place, str]:
+        """The path that put a value there, by the place of the value and of each part of it."""
+        return {
+            place: change.target.path
+            for change in self.changes
+            for place in (*_places(change.value), change.target.place)
+        }
+
+
+def variations_of(tree: Fields) -> list[Variation] | list[Problem]:
+    """All variations of a scenario, in order, or what is wrong with how they are said."""
+    entry = tree.entries.get(VARIATIONS)
+    if entry is None:
+        return [Variation("", tree)]
+    own = Fields(tree.place, {key: value for key, value in tree.entries.items() if key != VARIATIONS})
+    said = check(VariedSpec, Fields(tree.place, {VARIATIONS: entry}))
+    if isinstance(said, list):
+        return said
+    expansion = _Expansion(own)
+    blocks = said.variations.blocks
+    nodes = entry.value.items if isinstance(entry.value, Items) else [entry.value]
+    axes = [expansion.axes(block, node) for block, node in zip(blocks, nodes, strict=True)]
+    if expansion.problems:
+        return expansion.problems
+    if (number := sum(math.prod(map(len, block)) for block in axes)) > MOST:
+        message = f"these are {number} variations; a scenario may have {MOST}"
+        return [Problem(*entry.value.place, "SC017", message, "`sampled` draws some of many")]
+    options = [list(chosen) for block in axes for chosen in product(*block)]
+    return expansion.named(options) if options else [Variation("", own)]
+
+
+@dataclass
+class _Expansion:
+    """Makes variations of `tree` and collects what is wrong."""
+
+    tree: Fields
+    problems: list[Problem] = field(default_factory=list)
+    _targets: dict[str, Target] = field(default_factory=dict)
+    _names: dict[str, Place] = field(default_factory=dict)
+
+    def axes(self, block: VariationBlock, node: Node) -> list[list[Option]]:
+        """What is combined with each other: each path of a grid, and each of the other kinds as a whole."""
+        found = [[Option((change,)) for change in changes] for changes in self._columns(child(node, "grid"), True)]
+        if block.pairs is not None:
+            found.append(self._pairs(child(node, "pairs")))
+        if block.list_ is not None:
+            found.append(self._list(child(node, "list")))
+        if block.sampled is not None:
+            found.append(self._sampled(block.sampled, at(node, ("sampled", "values"))))
+        self._require_apart(found)
+        return found
+
+    def named(self, chosen: Sequence[Sequence[Option]]) -> list[Variation] | list[Problem]:
+        """The variations, each with its name."""
+        values = [
+            {change.target.path: change.value.plain for o in options for change in o.changes} for options in chosen
+        ]
+        differ = {path for path in self._targets if any(one.get(path) != values[0].get(path) for one in values)}
+        everything = list(self._targets.values())
+        told = [target for target in everything if target.keys[0] not in _SAID_OF_IT] or everything
+        keys = keys_of([target for target in told if target.path in differ] or told)
+        names = [self._name(options, keys, number) for number, options in enumerate(chosen, start=1)]
+        given = [len(options) == 1 and bool(options[0].name) for options in chosen]
+        variations = []
+        for options, name in zip(chosen, unique(names, given), strict=True):
+            changes = tuple(change for option in options for change in option.changes)
+            tree = self.tree
+            for change in changes:
+                tree = put(tree, change.target, change.value)
+            variations.append(Variation(name, tree, changes))
+        return variations
+
+    def _name(self, options: Sequence[Option], keys: dict[str, str], number: int) -> str:
+        parts = []
+        for option in options:
+            shown = [change for change in option.changes if change.target.path in keys]
+            values = {change.target.path: change.value for change in shown}
+            numbers = {change.target.path: change.number for change in shown}
+            parts.append(option.name or (derived(keys, values, numbers, number) if values else ""))
+        name = ",".join(part for part in parts if part)
+        return name if name and flaw_of(name) is None else f"variation-{number}"
+
+    def _columns(self, node: Node | None, distinct: bool) -> list[list[Change]]:
+        """The changes of each path."""
+        if not isinstance(node, Fields):
+            return []
+        found = []
+        for path, entry in node.entries.items():
+            assert isinstance(entry.value, Items)
+            if distinct:
+                self._refuse_equal(entry.value)
+            if (target := self._target(path, entry)) is not None:
+                found.append([Change(target, value, n) for n, value in enumerate(entry.value.items, start=1)])
+        return found
+
+    def _pairs(self, node: Node | None) -> list[Option]:
+        assert isinstance(node, Fields)
+        lengths = {
+            path: len(entry.value.items) for path, entry in node.entries.items() if isinstance(entry.value, Items)
+        }
+        first, *others = lengths
+        for path in others:
+            if lengths[path] != lengths[first]:
+                message = f"{quoted(path)} has {lengths[path]} values, {quoted(first)} has {lengths[first]}"
+                self._add(node.entries[path].value.place, "SC016", message, "pairs are lists of the same length")
+                return []
+        return [Option(changes) for changes in zip(*self._columns(node, False), strict=True)]
+
+    def _list(self, node: Node | None) -> list[Option]:
+        assert isinstance(node, Items)
+        found = []
+        for number, item in enumerate(node.items, start=1):
+            assert isinstance(item, Fields)
+            name = self._given_name(item)
+            entries = [(path, entry) for path, entry in item.entries.items() if path != "name"]
+            if not entries:
+                self._add(item.place, "SC010", "this variation changes nothing", "give it a path and its value")
+            targets = [(self._target(path, entry), entry) for path, entry in entries]
+            changes = [Change(target, entry.value, number) for target, entry in targets if target is not None]
+            self._require_apart([[Option((change,))] for change in changes])
+            found.append(Option(tuple(changes), name))
+        return found
+
+    def _given_name(self, item: Fields) -> str:
+        entry = item.entries.get("name")
+        if entry is None:
+            return ""
+        place, value = entry.value.place, entry.value.plain
+        name = value if isinstance(value, str) else str(value) if isinstance(value, int | float) else ""
+        if (flaw := flaw_of(name)) is not None:
+            self._add(place, "SC017", flaw, HINT)
+        first = self._names.setdefault(name.casefold(), place)
+        if first != place:
+            self._add(place, "SC033", f"two variations are called {quoted(name)} (the first at line {first.line})")
+        return name
+
+    def _sampled(self, sampled: Sampled, node: Node) -> list[Option]:
+        assert isinstance(node, Fields)
+        columns = []
+        for path, entry in node.entries.items():
+            target = self._target(path, entry)
+            drawn = entry.value
+            try:
+                values = draws_of(sampled, path)
+            except ValueError as error:
+                self._add(drawn.place, "SC016", str(error))
+                continue
+            nodes = [at(drawn, ("choice", v.number)) if isinstance(v, Pick) else Leaf(drawn.place, v) for v in values]
+            if target is not None:
+                columns.append([Change(target, value, n) for n, value in enumerate(nodes, start=1)])
+        return [Option(changes) for changes in zip(*columns, strict=True)]
+
+    def _target(self, path: str, entry: Entry) -> Target | None:
+        try:
+            target = target_of(path, entry.key, self.tree)
+        except NoPath as error:
+            self._add(entry.key, "SC030", str(error), error.hint)
+            return None
+        self._targets.setdefault(path, target)
+        return target
+
+    def _refuse_equal(self, items: Items) -> None:
+        seen: list[object] = []
+        for item in items.items:
+            if item.plain in seen:
+                self._add(item.place, "SC054", "this value is there twice", "remove one of the two")
+            seen.append(item.plain)
+
+    def _require_apart(self, axes: Sequence[Sequence[Option]]) -> None:
+        """No two of what is combined may change the same value, or one what is part of the other."""
+        targets = [{change.target.path: change.target for o in axis for change in o.changes} for axis in axes]
+        for above, below in combinations(targets, 2):
+            for one, other in product(above.values(), below.values()):
+                shorter = min(len(one.keys), len(other.keys))
+                if one.keys[:shorter] == other.keys[:shorter]:
+                    same = len(one.keys) == len(other.keys)
+                    what = "change the same value" if same else "overlap: one is part of the other"
+                    self._add(other.place, "SC054", f"{quoted(one.path)} and {quoted(other.path)} {what}")
+
+    def _add(self, place: Place, code: str, message: str, hint: str = "") -> None:
+        problem = Problem(*place, code=code, message=message, hint=hint)
+        if problem not in self.problems:
+            self.problems.append(problem)
+
+
+def _places(node: Node) -> Iterator[Place]:
+    yield node.place
+    if isinstance(node, Fields):
+        for entry in node.entries.values():
+            yield entry.key
+            yield from _places(entry.value)
+    elif isinstance(node, Items):
+        for item in node.items:
+            yield from _places(item)

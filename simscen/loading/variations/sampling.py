@@ -1,0 +1,87 @@
+"""Values drawn from ranges: a function of the seed, the path and the number of the draw, and of nothing else."""
+
+import hashlib
+import math
+from typing import Any, NamedTuple
+
+from simscen.model.variations import Draw, Integer, LogUniform, Normal, OneOf, Sampled, Uniform
+from simscen.spec.amounts import Amount, together
+
+_DIGITS = 6
+
+
+class Pick(NamedTuple):
+    """The value of this number, from 0 on, of those to choose from."""
+
+    number: int
+
+
+def draws_of(sampled: Sampled, path: str) -> list[Any]:
+    """The values of one path, in the order of the variations. Raises ValueError for a range that is none."""
+    return [_value(sampled.values[path], u) for u in _chances(sampled, path)]
+
+
+def _chances(sampled: Sampled, path: str) -> list[float]:
+    """Numbers between 0 and 1, both excluded."""
+    count = sampled.count
+    chances = [_hash(sampled.seed, path, "value", number) for number in range(count)]
+    if sampled.method == "random":
+        return chances
+    order = sorted(range(count), key=lambda number: _hash(sampled.seed, path, "stratum", number))
+    return [(stratum + chance) / count for stratum, chance in zip(order, chances, strict=True)]
+
+
+def _hash(seed: int, path: str, what: str, number: int) -> float:
+    digest = hashlib.sha256(f"{seed}\0{path}\0{what}\0{number}".encode()).digest()
+    return ((int.from_bytes(digest[:8], "big") >> 12) + 0.5) / 2**52
+
+
+def _value(draw: Draw, u: float) -> Any:
+    match draw.chosen:
+        case Uniform(root=ends):
+            (low, high), unit = _ordered(ends)
+            return _with_unit(low + u * (high - low), unit)
+        case LogUniform(root=ends):
+            (low, high), unit = _ordered(ends)
+            if low <= 0:
+                raise ValueError("the ends of `log_uniform` must be greater than 0")
+            return _with_unit(low * (high / low) ** u, unit)
+        case Integer(root=(first, last)):
+            if first > last:
+                raise ValueError(f"the range ends before it begins: {first} is greater than {last}")
+            return first + math.floor(u * (last - first + 1))
+        case OneOf(root=values):
+            return Pick(math.floor(u * len(values)))
+        case Normal() as normal:
+            return _normal(normal, u)
+    raise AssertionError(draw.kind)
+
+
+def _ordered(ends: tuple[Amount, Amount]) -> tuple[tuple[float, float], str]:
+    (low, high), unit = together(ends)
+    if low > high:
+        raise ValueError(f"the range ends before it begins: {low:g} is greater than {high:g}")
+    return (low, high), unit
+
+
+def _normal(normal: Normal, u: float) -> Any:
+    from statistics import NormalDist  # slow to import, and seldom needed
+
+    ends = [end for end in (normal.min, normal.max) if end is not None]
+    (mean, std, *bounds), unit = together((normal.mean, normal.std, *ends))
+    if std <= 0:
+        raise ValueError("`std` must be greater than 0")
+    spread = NormalDist(mean, std)
+    low = bounds[0] if normal.min is not None else -math.inf
+    high = bounds[-1] if normal.max is not None else math.inf
+    if low >= high:
+        raise ValueError(f"`min` {low:g} is not less than `max` {high:g}")
+    least, most = spread.cdf(low) if ends else 0.0, spread.cdf(high) if ends else 1.0
+    if most - least < 1e-12:
+        raise ValueError("between `min` and `max` there is next to nothing of it: they are many `std` from the `mean`")
+    return _with_unit(min(max(spread.inv_cdf(least + u * (most - least)), low), high), unit)
+
+
+def _with_unit(number: float, unit: str) -> Any:
+    rounded = float(f"{number:.{_DIGITS}g}")
+    return f"{rounded!r} {unit}" if unit else rounded

@@ -1,0 +1,129 @@
+"""`variations:`: each is a run of its own, and everything tells them apart."""
+
+import json
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+import simscen as package
+from simscen.core.errors import UsageError
+
+COMMAND = [sys.executable, "-c", "import sys; from simscen.cli.start import start; sys.exit(start())"]
+SHORT = """\
+simscen: 1
+world: {simscen: 1, walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]}
+robot: {pose: {x: 1, y: 1}}
+goals: [{pose: {x: 5, y: 3}}]
+time_limit: 1 s
+pass: [{collisions: {max: 0}}]
+variations: {grid: {robot.pose.x: [1, 2, 50 cm]}}
+"""
+NAMES = ["x=1", "x=2", "x=50cm"]
+
+
+@pytest.fixture
+def project(simscen, tmp_path: Path) -> Path:
+    """A folder with a scenario of a second that has three variations."""
+    (tmp_path / "good.scenario.yaml").unlink()
+    (tmp_path / "a.scenario.yaml").write_text(SHORT)
+    return tmp_path
+
+
+def results(folder: Path) -> list[dict[str, object]]:
+    """The runs of results.json."""
+    found: list[dict[str, object]] = json.loads((folder / "results.json").read_text())["runs"]
+    return found
+
+
+def test_each_variation_runs_with_each_seed_in_a_folder_and_a_case_of_its_own(simscen, project: Path) -> None:
+    ended = simscen("run", ".", "--repeat", "2", "--out", "out")
+    assert ended.code == 0, ended.err
+    assert ended.out.startswith("simscen")
+    assert "1 scenario · 6 runs" in ended.out
+    assert "a[x=50cm] (seed 2)" in ended.out
+    folders = sorted(log.parent.name for log in project.rglob("run.mcap"))
+    assert folders == sorted(f"seed-{seed}-{name}" for seed in (1, 2) for name in NAMES)
+    assert [(run["variation"], run["seed"]) for run in results(project / "out")] == [
+        (n, s) for n in NAMES for s in (1, 2)
+    ]
+    cases = [case.get("name") for case in ElementTree.parse(project / "out/junit.xml").iter("testcase")]
+    assert sorted(map(str, cases)) == sorted(f"a [{name}, seed {seed}]" for name in NAMES for seed in (1, 2))
+    resolved = (project / "out/runs/a/seed-1-x=50cm/scenario.yaml").read_text()
+    assert "x: 50 cm" in resolved
+    assert "variations" not in resolved
+    judged = json.loads(simscen("judge", "out", "--json").out)
+    assert sorted({run["variation"] for run in judged["runs"]}) == NAMES
+    assert "a[x=2]" in (project / "out/report.html").read_text()
+
+
+def test_the_command_that_repeats_a_run_repeats_exactly_that_one(simscen, project: Path) -> None:
+    simscen("run", ".", "--seed", "7", "-k", "x=50cm", "--out", "out")
+    (run,) = results(project / "out")
+    assert run["again"] == "simscen run a.scenario.yaml --seed 7 --variation x=50cm"
+    assert simscen(*shlex.split(str(run["again"]))[1:], "--out", "again").code == 0
+    logs = [project / f"{folder}/runs/a/seed-7-x=50cm/run.mcap" for folder in ("out", "again")]
+    assert logs[0].read_bytes() == logs[1].read_bytes()
+
+
+def test_stacks_are_compared_variation_by_variation(simscen, project: Path) -> None:
+    (project / "dwb.stack.yaml").write_text("simscen: 1\nstack: {controller: {type: dwb}}\n")
+    both = ("--stack", "ref=reference", "--stack", "dwb=dwb.stack.yaml")
+    ended = simscen("run", ".", *both, "-k", "x=1 or x=2", "--check-determinism", "--out", "out")
+    assert ended.code == 0, ended.out
+    assert "dwb against ref: 2 pairs" in ended.out
+    folders = {log.parent.name for log in project.rglob("run.mcap")}
+    assert {"seed-1-x=1@ref", "seed-1-x=2@dwb", "seed-1-x=2@dwb.again"} < folders
+    document = json.loads((project / "out/results.json").read_text())
+    assert [row["scenario"] for row in document["comparison"]["scenarios"]] == ["a[x=1]", "a[x=2]"]
+
+
+def test_a_session_goes_on_with_the_variations_that_it_lacks(simscen, project: Path) -> None:
+    subprocess.run([*COMMAND, "run", ".", "--variation", "x=1", "--out", "out"], check=True, capture_output=True)
+    before = (project / "out/runs/a/seed-1-x=1/run.mcap").stat().st_mtime_ns
+    assert simscen("run", ".", "--resume", "out").code == 0
+    assert (project / "out/runs/a/seed-1-x=1/run.mcap").stat().st_mtime_ns == before
+    assert [run["variation"] for run in results(project / "out")] == NAMES
+
+
+def test_shards_and_lists_are_of_variations(simscen, project: Path) -> None:
+    assert simscen("list", ".").out.split() == [f"a[{name}]" for name in NAMES]
+    shards = [simscen("run", ".", "--shard", f"{k}/3", "--out", f"out{k}").out for k in (1, 2, 3)]
+    assert [name for text in shards for name in NAMES if f"a[{name}]" in text] == NAMES
+
+
+def test_a_variation_that_is_not_there_is_told_with_those_that_are(simscen, project: Path) -> None:
+    ended = simscen("run", ".", "--variation", "x=51cm")
+    assert ended.code == 5
+    assert "no variation is called `x=51cm`; did you mean `x=50cm`?" in ended.err
+
+
+def test_a_value_that_geometry_refuses_is_told_with_its_variation(simscen, project: Path) -> None:
+    (project / "a.scenario.yaml").write_text(SHORT.replace("50 cm", "5.95"))
+    ended = simscen("validate", ".")
+    assert ended.code == 2
+    assert "error[SC301] the robot's start (5.95, 1) is inside obstacle" in ended.out
+    assert "in the variation `x=5.95`" in ended.out
+    assert simscen("run", ".", "--variation", "x=1").code == 2
+
+
+def test_a_value_for_a_stack_that_another_takes_the_place_of_is_no_run_of_that_name(simscen, project: Path) -> None:
+    grid = "{grid: {stack.controller.desired_linear_vel: [0.1, 0.2]}}"
+    (project / "a.scenario.yaml").write_text(SHORT.replace("{grid: {robot.pose.x: [1, 2, 50 cm]}}", grid))
+    ended = simscen("run", ".", "--stack", "mine=/bin/true")
+    assert ended.code == 2
+    assert "`stack.controller.desired_linear_vel` changes nothing with --stack mine=/bin/true" in ended.err
+
+
+def test_from_python_variations_are_listed_and_run_by_name(project: Path) -> None:
+    assert package.variations("a.scenario.yaml") == NAMES
+    run = package.simulate("a.scenario.yaml", variation="x=2")
+    assert run.result.key.variation == "x=2"
+    assert run.trace.truth.values[0][0] == pytest.approx(2, abs=0.01)
+    with pytest.raises(UsageError, match="has 3 variations: say which one; expected one of: x=1, x=2, x=50cm"):
+        package.simulate("a.scenario.yaml")
+    (project / "plain.scenario.yaml").write_text(SHORT[: SHORT.index("variations")])
+    assert package.variations("plain.scenario.yaml") == [""]

@@ -1,0 +1,151 @@
+"""From `variations:` to scenarios."""
+
+from pathlib import Path
+
+import pytest
+
+from simscen.loading.compose import compose
+from simscen.loading.scenario import load_scenario, try_variations
+from simscen.loading.tree import Fields
+from simscen.loading.variations.expand import Variation, variations_of
+
+BASE = "stack: {controller: {desired_linear_vel: 0.3}}\nrobot: {pose: {x: 1, y: 1}}\ngoals: [{pose: desk}]\n"
+
+
+def expanded(variations: str, base: str = BASE) -> list[Variation]:
+    tree, problems = compose(f"{base}variations:\n{variations}", "x")
+    assert isinstance(tree, Fields)
+    assert not problems
+    found = variations_of(tree)
+    assert isinstance(found[0], Variation), found
+    return found  # type: ignore[return-value]
+
+
+def wrong(variations: str) -> list[str]:
+    tree, _ = compose(f"{BASE}variations:\n{variations}", "x")
+    assert isinstance(tree, Fields)
+    return [
+        f"{found.line}:{found.col} {found.message}" for found in variations_of(tree) if not isinstance(found, Variation)
+    ]
+
+
+def names(variations: str) -> list[str]:
+    return [one.name for one in expanded(variations)]
+
+
+def test_a_grid_is_every_combination_and_each_is_called_by_what_differs() -> None:
+    found = expanded("  grid: {robot.pose.x: [1, 2], robot.pose.y: [3, 4 m], stack.type: [reference]}")
+    assert [one.name for one in found] == ["x=1,y=3", "x=1,y=4m", "x=2,y=3", "x=2,y=4m"]
+    assert [(one.tree.plain["robot"]["pose"]["x"], one.tree.plain["robot"]["pose"]["y"]) for one in found] == [
+        (1, 3),
+        (1, "4 m"),
+        (2, 3),
+        (2, "4 m"),
+    ]
+    assert all("variations" not in one.tree.entries for one in found)
+
+
+def test_pairs_go_together() -> None:
+    assert names("  pairs: {robot.pose.x: [1, 2], robot.pose.y: [3, 4]}") == ["x=1,y=3", "x=2,y=4"]
+
+
+def test_a_list_has_names_or_gets_them() -> None:
+    listed = (
+        "  list:\n  - {name: slow, robot.pose.x: 1}\n  - {robot.pose.x: 2, robot.pose.y: 3}\n  - {name: 3, tags: [x]}"
+    )
+    assert names(listed) == ["slow", "x=2,y=3", "3"]
+
+
+def test_several_kinds_are_combined_and_several_blocks_follow_each_other() -> None:
+    assert names(
+        "  grid: {robot.pose.x: [1, 2]}\n  list: [{name: a, robot.pose.y: 1}, {name: b, robot.pose.y: 2}]"
+    ) == [
+        "x=1,a",
+        "x=1,b",
+        "x=2,a",
+        "x=2,b",
+    ]
+    assert names("- grid: {robot.pose.x: [1, 2]}\n- list: [{name: far, goals.desk.pose: sofa}]") == [
+        "x=1",
+        "x=2",
+        "far",
+    ]
+
+
+def test_no_blocks_are_no_variations() -> None:
+    (only,) = expanded("  []")
+    assert (only.name, "variations" in only.tree.entries) == ("", False)
+
+
+def test_drawn_values_are_those_of_the_tree_where_they_are_chosen() -> None:
+    found = expanded(
+        "  sampled: {count: 3, values: {robot.pose: {choice: [{x: 1, y: 1}, dock]}, robot.pose2: {integer: [1, 9]}}}"
+    )
+    assert len(found) == 3
+    assert all(one.tree.plain["robot"]["pose"] in ({"x": 1, "y": 1}, "dock") for one in found)
+
+
+@pytest.mark.parametrize(
+    ("variations", "expected"),
+    [
+        ("  grid:\n    goals[0].pose: [a, b]", ["pose=a", "pose=b"]),
+        ("  grid: {robot.pose: [{x: 1, y: 2}, dock]}", ["pose=1_2", "pose=dock"]),
+        ("  grid: {world: [a/b.world.yaml, ../c d.yaml]}", ["world=a_b.world.yaml", "world=.._cd.yaml"]),
+        ("  grid: {robot.pose.x: [1, 2], start.pose.x: [1]}\n  list: [{start.pose.y: 1}]", ["x=1", "x=2"]),
+        ("  pairs: {robot.x: [1, 2], start.x: [3, 4]}", ["robot.x=1,start.x=3", "robot.x=2,start.x=4"]),
+        ("  grid: {description: [a, A]}", ["description=a", "description=A+2"]),
+        ("  grid: {events: [[{name: x}], [{name: y}]]}", ["events=no1", "events=no2"]),
+        ("  grid: {robot.pose.yaw: [0 deg, -90 deg]}", ["yaw=0deg", "yaw=-90deg"]),
+        (f"  grid: {{description: [{'a' * 300}, {'b' * 300}]}}", ["description=no1", "description=no2"]),
+        ("  grid: {ключ: [été, b]}", ["ключ=été", "ключ=b"]),
+    ],
+)  # fmt: skip
+def test_derived_names_are_readable_unique_and_safe_as_folders(variations: str, expected: list[str]) -> None:
+    assert names(variations) == expected
+
+
+@pytest.mark.parametrize(
+    ("variations", "told"),
+    [
+        ("  {}", "nothing is chosen here"),
+        ("  grid: {robot.pose.x: [1, 1.0]}", "this value is there twice"),
+        ("  grid: {robot.pose.x: [1], robot.pose: [dock]}", "`robot.pose.x` and `robot.pose` overlap: one is part"),
+        ("  grid: {goals.0.pose: [a]}\n  pairs: {goals.desk.pose: [b]}", "and `goals.desk.pose` change the same value"),
+        ("  list: [{robot.pose.x: 1, robot.pose: dock}]", "`robot.pose.x` and `robot.pose` overlap"),
+        ("  pairs: {robot.pose.x: [1, 2], robot.pose.y: [1]}", "`robot.pose.y` has 1 values, `robot.pose.x` has 2"),
+        ("  list: [{name: a b, tags: [x]}]", "`a b` cannot be the name of a variation"),
+        ("  list: [{name: ../x, tags: [x]}]", "`../x` cannot be the name of a variation"),
+        ("  list: [{name: a, tags: [x]}, {name: A, tags: [y]}]", "two variations are called `A` (the first at line 5)"),
+        ("  list: [{name: a}]", "this variation changes nothing"),
+        ("  sampled: {count: 3, values: {seed: {uniform: [2, 1]}}}", "the range ends before it begins"),
+        ("  sampled: {count: 1001, values: {seed: {integer: [1, 2]}}}", "must be at most 1000"),
+    ],
+)  # fmt: skip
+def test_what_is_said_wrongly_is_told_where_it_is(variations: str, told: str) -> None:
+    assert any(told in found for found in wrong(variations)), wrong(variations)
+
+
+def test_a_thousand_million_combinations_are_refused_without_being_made() -> None:
+    grid = ", ".join(f"robot.k{n}: [{', '.join(map(str, range(10)))}]" for n in range(9))
+    assert wrong(f"  grid: {{{grid}}}") == ["5:3 these are 1000000000 variations; a scenario may have 1000"]
+
+
+def test_each_variation_is_a_whole_scenario_with_its_values(write, scenario: str) -> None:
+    file = write(
+        "a.scenario.yaml",
+        scenario + "variations:\n  grid: {seed: [3, 4], stack.controller.desired_linear_vel: [0.2]}\n",
+    )
+    loaded = try_variations(file, file.parent)
+    assert isinstance(loaded, tuple)
+    assert [(one.title, one.spec.seed) for one in loaded] == [("a[seed=3]", 3), ("a[seed=4]", 4)]
+    assert loaded[0].spec.stack.controller.desired_linear_vel == 0.2  # type: ignore[union-attr]
+    assert loaded[0].world is loaded[1].world
+    assert load_scenario(file, file.parent, variation="seed=4").spec.seed == 4
+
+
+def test_a_file_that_is_extended_may_hold_the_variations(write, scenario: str) -> None:
+    write("base.yaml", scenario + "variations: {grid: {seed: [3, 4]}}\n")
+    file = write("a.scenario.yaml", "extends: base.yaml\n")
+    assert [one.variation for one in try_variations(file, Path(file).parent)] == ["seed=3", "seed=4"]  # type: ignore[union-attr]
+    file = write("b.scenario.yaml", "extends: base.yaml\nvariations: []\n")
+    assert [one.variation for one in try_variations(file, Path(file).parent)] == [""]  # type: ignore[union-attr]

@@ -1,0 +1,93 @@
+"""What a path of a variation means."""
+
+import pytest
+
+from simscen.loading.compose import compose
+from simscen.loading.tree import Fields, Leaf, Place, at
+from simscen.loading.variations.paths import NoPath, put, target_of
+
+TEXT = """\
+world: {objects: [{name: old cart, box: [1, 1, 1]}]}
+robot: {pose: {x: 1, y: 2}}
+goals: [{pose: sofa}, {name: the.end, pose: {x: 1, y: 2}}]
+faults: [{sensor: lidar, noise: {std: 1}}, {sensor: lidar, off: {}}, {sensor: odom, name: drifts, bias: {x: 1}}]
+pass: [{collisions: {max: 0}}, {clearance: {min: 1}, id: near}, {stuck: 1}, {always: {}}, {always: {}}]
+"""
+HERE = Place("x", 9, 9)
+
+
+@pytest.fixture
+def tree() -> Fields:
+    found, _ = compose(TEXT, "x")
+    assert isinstance(found, Fields)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("path", "keys"),
+    [
+        ("robot.pose.x", ("robot", "pose", "x")),
+        ("robot", ("robot",)),
+        ("goals[0].pose", ("goals", 0, "pose")),
+        ("goals.0.pose", ("goals", 0, "pose")),
+        ("goals.sofa.timeout", ("goals", 0, "timeout")),
+        ("goals[sofa].timeout", ("goals", 0, "timeout")),
+        ('goals["the.end"].pose.x', ("goals", 1, "pose", "x")),
+        ("world.objects.old cart.box[2]", ("world", "objects", 0, "box", 2)),
+        ("faults.lidar.noise.std", ("faults", 0, "noise", "std")),
+        ("faults.lidar.off.x", ("faults", 1, "off", "x")),
+        ("faults.drifts.for", ("faults", 2, "for")),
+        ("pass.collisions.max", ("pass", 0, "collisions", "max")),
+        ("pass[0].collisions.max", ("pass", 0, "collisions", "max")),
+        ("pass.collisions.severity", ("pass", 0, "severity")),
+        ("pass.near.clearance.min", ("pass", 1, "clearance", "min")),
+        ("pass.stuck", ("pass", 2, "stuck")),
+        ("stack.controller.desired_linear_vel", ("stack", "controller", "desired_linear_vel")),
+    ],
+)
+def test_a_path_leads_to_the_value_that_a_user_means(tree: Fields, path: str, keys: tuple[str | int, ...]) -> None:
+    target = target_of(path, HERE, tree)
+    assert target.keys == keys
+    value = Leaf(HERE, 7)
+    assert at(put(tree, target, value), keys) is value
+
+
+def test_what_was_not_written_stands_where_the_path_does(tree: Fields) -> None:
+    changed = put(tree, target_of("stack.controller.x", HERE, tree), Leaf(HERE, 7))
+    assert changed.plain["stack"] == {"controller": {"x": 7}}
+    assert changed.entries["stack"].key == HERE
+    assert {**changed.plain, "stack": None} == {**tree.plain, "stack": None}
+
+
+@pytest.mark.parametrize(
+    ("path", "told", "hint"),
+    [
+        ("", "`` is no path", "write keys with dots"),
+        (".x", "`.x` is no path", "write keys with dots"),
+        ("a..b", "`a..b` is no path", "write keys with dots"),
+        ("a[", "`a[` is no path", "write keys with dots"),
+        ("a[]", "`a[]` is no path", "write keys with dots"),
+        ("goals[2].pose", "names nothing: `goals` has 2 items", "the first one is [0]"),
+        ("goals.sofer.pose", "no item of `goals` is called `sofer`", "did you mean `sofa`?"),
+        ("goals[0].pose.x", "`goals[0].pose` is `sofa`, without a `x`", ""),
+        ("faults.lidar", "names several: 2 items of `faults`", "faults[0], faults[1]"),
+        ("pass.always.x", "names several: 2 items of `pass`", "pass[3], pass[4]"),
+        ("events.door.when", "the scenario has no `events`", ""),
+        ("simscen", "a variation cannot change `simscen`", "one language"),
+        ("variations.grid", "a variation cannot change `variations`", "have no variations"),
+    ],
+)
+def test_a_path_that_names_nothing_is_told_with_what_is_there(tree: Fields, path: str, told: str, hint: str) -> None:
+    with pytest.raises(NoPath) as raised:
+        target_of(path, HERE, tree)
+    assert told in str(raised.value)
+    assert hint in raised.value.hint
+    assert bool(hint) == bool(raised.value.hint)
+
+
+def test_values_in_another_file_are_said_to_be_there() -> None:
+    tree, _ = compose("world: room.world.yaml\n", "x")
+    assert isinstance(tree, Fields)
+    with pytest.raises(NoPath) as raised:
+        target_of("world.objects[0].box", HERE, tree)
+    assert "values in another file cannot be varied" in raised.value.hint
