@@ -88,6 +88,8 @@ class Solid:
     shape: Shape
     pose: Pose3 = Pose3()
     name: str = ""
+    friction: float = 1.0
+    """Of its surface against the wheels' rubber, which is 1 on dry concrete."""
 
 
 @dataclass(frozen=True)
@@ -139,9 +141,13 @@ class MotionPath:
 
 @dataclass(frozen=True)
 class TriangleMesh:
-    """Many solids fused: `vertices` (n, 3), `faces` (m, 3) and, for each face, the index of its owner in `names`."""
+    """Many solids fused: `vertices` (n, 3), `faces` (m, 3) and, for each face, the index of its owner in `names`.
+
+    `frictions` are those of the solids' surfaces, by the same index; empty where all are 1.
+    """
 
     vertices: Array
     faces: npt.NDArray[np.int32]
     owners: npt.NDArray[np.int32]
     names: tuple[str, ...] = field(default=())
+    frictions: tuple[float, ...] = ()

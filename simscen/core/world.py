@@ -14,8 +14,8 @@ Polygon = tuple[tuple[float, float], ...]
 class World:
     """Everything that is there before the robot: `solids` never move, `bodies` may.
 
-    `doors` maps a door's name, which is also its body's, to that body's pose when closed and when open. `bounds` is
-    (min x, min y, max x, max y) in metres. `grid` is set when the world came with an occupancy map of its own (a ROS
+    `doors` maps a door's name, which is also its body's, to that body's pose when closed and when open. `friction` is
+    that of the floor in some of the `regions`, by name; elsewhere it is 1. `bounds` is (min x, min y, max x, max y) in metres. `grid` is set when the world came with an occupancy map of its own (a ROS
     map). `notes` are warnings of the importer, each a sentence that names file and element.
     """
 
@@ -25,6 +25,7 @@ class World:
     places: Mapping[str, Pose2] = field(default_factory=dict)
     regions: Mapping[str, Polygon] = field(default_factory=dict)
     doors: Mapping[str, tuple[Pose2, Pose2]] = field(default_factory=dict)
+    friction: Mapping[str, float] = field(default_factory=dict)
     bounds: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     grid: OccupancyGrid | None = None
     notes: tuple[str, ...] = ()

@@ -107,6 +107,7 @@ def _standing(world: WorldSpec) -> list[str]:
     return [
         *_moving(world),
         *(obstacle.name for obstacle in world.obstacles),
+        *(ramp.name for ramp in world.ramps),
         *(wall.called(number) for number, wall in enumerate(world.walls, start=1)),
     ]
 

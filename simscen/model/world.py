@@ -9,7 +9,7 @@ from simscen.spec.motions import Motion
 from simscen.spec.objects import Shaped
 from simscen.spec.orplace import PlaceOrPoint, PlaceOrPose
 from simscen.spec.places import Name, PlaceName, PoseSpec, Ring
-from simscen.spec.quantities import Duration, Mass, PositiveLength
+from simscen.spec.quantities import Duration, Friction, Mass, PositiveLength
 
 
 class Wall(Spec):
@@ -29,13 +29,37 @@ class Wall(Spec):
         return self.name if "name" in self.model_fields_set else f"wall_{number}"
 
 
-class Obstacle(Shaped):
-    """Something that stands in the world and never moves."""
+class Thing(Shaped):
+    """Something that is in the world."""
 
     name: Name
     """What a collision with it is reported as."""
     pose: PlaceOrPose
     """Where it stands: a pose, or a place by name."""
+
+
+class Obstacle(Thing):
+    """Something that stands in the world and never moves; what is low enough is driven over."""
+
+    friction: Friction = 1.0
+    """Of its surface, where wheels get onto it: a sill, a step, a platform."""
+
+
+class Ramp(Spec):
+    """A wedge that rises from the ground: how steep it is follows from its length and height."""
+
+    name: Name
+    """What a collision with it is reported as."""
+    start: PlaceOrPoint
+    """The middle [x, y] of its foot, where it begins to rise."""
+    end: PlaceOrPoint
+    """The middle [x, y] of its upper edge, where it ends upright."""
+    width: PositiveLength
+    """Across the way up."""
+    height: PositiveLength
+    """Of its upper edge, above the ground."""
+    friction: Friction = 1.0
+    """Of its surface."""
 
 
 class Travel(Motion):
@@ -45,7 +69,7 @@ class Travel(Motion):
     """When it begins."""
 
 
-class Movable(Obstacle):
+class Movable(Thing):
     """Something that can move: pushed by the robot if it has a mass, or by itself along waypoints."""
 
     mass: Mass = 0.0
@@ -97,11 +121,14 @@ class WorldSpec(Spec):
     walls: Annotated[list[Wall], Field(max_length=2000)] = []
     obstacles: Annotated[list[Obstacle], Field(max_length=2000)] = []
     objects: Annotated[list[Movable], Field(max_length=200)] = []
+    ramps: Annotated[list[Ramp], Field(max_length=200)] = []
     doors: Annotated[list[Door], Field(max_length=200)] = []
     places: dict[PlaceName, PoseSpec] = {}
     """Named poses for goals and starts."""
     regions: dict[PlaceName, Ring] = {}
     """Named areas: polygons over their corners, which may not cross themselves."""
+    friction: dict[PlaceName, Friction] = {}
+    """How slippery the floor is in which region: 1 is dry concrete, 0.3 a wet floor, 0.1 oil or ice."""
 
     @model_validator(mode="after")
     def _names_differ(self) -> "WorldSpec":

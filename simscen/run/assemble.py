@@ -48,7 +48,7 @@ def assemble(prepared: Prepared, seed: int, printed: Path | None = None) -> Rig:
     simulation = Simulation(
         prepared.built.mesh,
         world.bodies,
-        {NAMELESS: Placed(prepared.body, prepared.start)},
+        {NAMELESS: Placed(prepared.body, prepared.start, prepared.obstacles)},
         triangulate,
         tick_rate=clock.rate,
         solver_iterations=spec.physics.solver_iterations,

@@ -11,6 +11,7 @@ from simscen.core.case import CLEARANCE_RANGE, Case
 from simscen.core.filtermasks import FilterMasks
 from simscen.core.geometry import Pose2
 from simscen.core.grid import OccupancyGrid
+from simscen.core.shapes import TriangleMesh
 from simscen.core.world import BuiltWorld
 from simscen.criteria.base import Criterion
 from simscen.loading.disturbances import disturbances_of
@@ -22,10 +23,12 @@ from simscen.model.stack import Amcl, OdometryOnly, StackSpec
 from simscen.run.goals import goals_of, sent_goals
 from simscen.run.masks import load_judged_masks, load_masks
 from simscen.run.robotsize import inscribed_radius
+from simscen.run.robotways import in_the_way
 from simscen.run.worldsource import load_map, load_robot, load_world
 from simscen.sim.robot_body import RobotBody
 from simscen.triggers.clearance_below import ClearanceBelow
 from simscen.worlds.build import build
+from simscen.worlds.meshing import fuse
 from simscen.worlds.shortest import shortest_legs
 
 DEFAULT_LIDAR_HEIGHT = 0.2
@@ -45,6 +48,8 @@ class Prepared:
     start: Pose2
     estimate: Estimate
     case: Case
+    obstacles: TriangleMesh
+    """What of the built world's mesh is in the robot's way; the same where it is all of it."""
     mapped: tuple[int, ...] = ()
     """The numbers of the faults that have changed the map."""
 
@@ -69,6 +74,8 @@ def prepare(loaded: LoadedScenario, world_of: BuildWorld = build_world) -> Prepa
     robot, body = load_robot(loaded)
     built = world_of(loaded, lidar_height(robot))
     world = built.world
+    standing = in_the_way(world.solids, body)
+    obstacles = built.mesh if standing is world.solids else fuse(standing)
     start = spec.robot.pose.pose
     goals = goals_of(spec)
     case = Case(
@@ -93,13 +100,14 @@ def prepare(loaded: LoadedScenario, world_of: BuildWorld = build_world) -> Prepa
         stack=stack_of(spec),
         start=start,
         estimate=estimate_of(spec.robot, start),
-        case=with_ways(case, built),
+        case=with_ways(case, built, obstacles),
+        obstacles=obstacles,
     )
 
 
-def with_ways(case: Case, built: BuiltWorld) -> Case:
-    """The case with the shortest ways to its goals, and what they pass between."""
-    legs = shortest_legs(built, case.start, case.goals, case.inscribed_radius)
+def with_ways(case: Case, built: BuiltWorld, obstacles: TriangleMesh) -> Case:
+    """The case with the shortest ways past the obstacles to its goals, and what they pass between."""
+    legs = shortest_legs(replace(built, mesh=obstacles), case.start, case.goals, case.inscribed_radius)
     return replace(
         case,
         shortest={goal.name: leg.length for goal, leg in zip(case.goals, legs, strict=True)},

@@ -30,10 +30,11 @@ class Alone(Simulation):
         robot: RobotBody,
         pose: Pose2,
         triangulate: engine.Triangulate,
+        obstacles: TriangleMesh | None = None,
         **physics: Any,
     ) -> None:
         """See Simulation, which takes the same `physics`."""
-        super().__init__(static, bodies, {NAMELESS: Placed(robot, pose)}, triangulate, **physics)
+        super().__init__(static, bodies, {NAMELESS: Placed(robot, pose, obstacles)}, triangulate, **physics)
         self.robot = self.robots[NAMELESS]
 
     def drive(self, command: Twist) -> None:

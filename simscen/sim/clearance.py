@@ -3,6 +3,7 @@
 import itertools
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import pybullet
 
@@ -37,18 +38,25 @@ class Clearance:
         client: int,
         tick_rate: int,
         static: TriangleMesh,
+        obstacles: TriangleMesh,
         robot: RobotBody,
         base: Base,
         actors: Actors,
         others: "Callable[[], Sequence[Clearance]]",
         reach: float,
     ) -> None:
-        """`others` gives the other robots, as they are measured; `reach` is how far is searched, in metres."""
+        """`others` gives the other robots, as they are measured; `reach` is how far is searched, in metres.
+
+        `obstacles` are what of the `static` world is in the robot's way, which a ramp that it drives over is not; where
+        they are something else, its wheels and casters stand on the rest.
+        """
         self._client, self._rate, self._base, self._actors = client, tick_rate, base, actors
         self._others = others
         self._limits, (self._radius, self._height) = robot.limits, reach_of(robot.solid)
         self._size = ROUNDED + math.hypot(self._radius, self._height)
-        self._proximity = Proximity(static, robot, reach)
+        uneven = obstacles is not static
+        self._proximity = Proximity(static, replace(robot, casters=()) if uneven else robot, reach)
+        self._ways = Proximity(obstacles, robot, reach) if uneven else self._proximity
         self._reach = reach
         self._shaken_at = -1
         self._touched: dict[tuple[int, int, int], str] = {}
@@ -79,21 +87,24 @@ class Clearance:
         if self._measured_at == tick:
             return self._distance
         self._actors.show(tick)
-        self._distance = self._search(tick)
+        self._distance = gap = self._search(tick, self._ways)
+        if self._ways is not self._proximity:
+            gap = min(gap, self._search(tick, self._proximity))
         self._measured_at = tick
         if self.unsure:
             self.enclosed_by = self._enclosing(tick)
             self.unsure = self.enclosed_by is not None
         if self.enclosed_by is not None:
             self._distance = -abs(self._distance)
-        free = min(HORIZON, max(0.0, self._distance - TOLERANCE) / self._fastest(tick))
+            gap = self._distance
+        free = min(HORIZON, max(0.0, gap - TOLERANCE) / self._fastest(tick))
         self.no_contact_before = tick + (math.floor(free * self._rate) if tick != self._shaken_at else 0)
         self._actors.undisturbed(self._base.id, until=self.no_contact_before)
         return self._distance
 
-    def _search(self, tick: int) -> float:
+    def _search(self, tick: int, standing: Proximity) -> float:
         pose = self._base.pose()
-        nearest = min(self._reach, self._proximity.distance(pose))
+        nearest = min(self._reach, standing.distance(pose))
         for other in self._actors.within(pose.position, nearest + self._size, tick):
             for link in self._base.hull_links:
                 points = pybullet.getClosestPoints(self._base.id, other, nearest, link, physicsClientId=self._client)
@@ -150,3 +161,5 @@ class Clearance:
     def close(self) -> None:
         """Give the engine back."""
         self._proximity.close()
+        if self._ways is not self._proximity:
+            self._ways.close()

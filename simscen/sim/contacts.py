@@ -22,6 +22,7 @@ NOBODY = -1
 
 Vector = tuple[float, float, float]
 Owner = Callable[[Vector], str]
+Stands = Callable[[int, int, float], bool]
 
 
 @dataclass(frozen=True)
@@ -103,12 +104,21 @@ class Contacts:
         return events
 
 
-def touches(client: int, robot: int, names: Mapping[int, str | None], owner: Owner, seconds: float) -> list[Touch]:
-    """What presses on the robot now; `names` of bodies, None where the owner of the triangle is to be found."""
+def _nowhere(*_: float) -> bool:
+    return False
+
+
+def touches(
+    client: int, robot: int, names: Mapping[int, str | None], owner: Owner, seconds: float, stands: Stands = _nowhere
+) -> list[Touch]:
+    """What presses on the robot now; `names` of bodies, None where the owner of the triangle is to be found.
+
+    `stands` says of a body, a link of the robot and the z of the unit normal towards it whether that link stands on it.
+    """
     found: dict[str, Touch] = {}
     for point in pybullet.getContactPoints(robot, physicsClientId=client):
         other, place, normal, distance, force = point[2], point[6], point[7], point[8], point[9]
-        if other not in names or (force <= 0 and distance > 0):
+        if other not in names or (force <= 0 and distance > 0) or stands(other, point[3], normal[2]):
             continue
         name = names[other] or owner(place)
         known = found.get(name)

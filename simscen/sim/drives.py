@@ -9,6 +9,7 @@ from simscen.sim.ackermann import AckermannDrive
 from simscen.sim.mecanum import MecanumDrive
 from simscen.sim.planar import OmnidirectionalDrive, PlanarBase
 from simscen.sim.robot_body import RobotBody
+from simscen.sim.terrain import Terrain
 from simscen.sim.vehicle import Vehicle
 from simscen.sim.wheels import SidedDrive
 
@@ -20,6 +21,8 @@ class Base(Protocol):
 
     id: int
     hull_links: tuple[int, ...]
+    rolling: tuple[int, ...]
+    """Links that stand on uneven ground: wheels and casters; none where the robot knows no other than level ground."""
 
     def place(self, pose: Pose2) -> None:
         """Set it down at rest, its base frame on the ground."""
@@ -68,7 +71,7 @@ class Drive(Protocol):
         ...
 
 
-def build(client: int, body: RobotBody, pose: Pose2, period: float) -> tuple[Base, Drive]:
+def build(client: int, body: RobotBody, pose: Pose2, period: float, terrain: Terrain) -> tuple[Base, Drive]:
     """A robot set down at `pose`, and its drive, whose firmware runs every `period` seconds."""
     match body.drive:
         case Omnidirectional():
@@ -78,8 +81,8 @@ def build(client: int, body: RobotBody, pose: Pose2, period: float) -> tuple[Bas
             base = PlanarBase(client, body, pose)
             return base, MecanumDrive(base, body, period)
         case Ackermann():
-            vehicle = Vehicle(client, body, pose)
+            vehicle = Vehicle(client, body, pose, terrain)
             return vehicle, AckermannDrive(client, vehicle, body, period)
         case Differential() | SkidSteer():
-            vehicle = Vehicle(client, body, pose)
+            vehicle = Vehicle(client, body, pose, terrain)
             return vehicle, SidedDrive(client, vehicle, body, period)

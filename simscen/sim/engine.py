@@ -8,6 +8,7 @@ import pybullet
 
 from simscen.core.geometry import Array, Pose3
 from simscen.core.shapes import Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere, TriangleMesh
+from simscen.core.terrain import FLOOR
 from simscen.sim.hull import few_corners
 from simscen.sim.inertia import GRAVITY
 from simscen.sim.outline import extremes
@@ -16,9 +17,6 @@ FACES_AT_ONCE = 40_000
 """Bullet's shared-memory commands hold at most 131072 vertices and 524288 indices."""
 STRIP = 20.0
 """m of x that lie together in one lot of faces."""
-FLOOR = 0.005
-"""Faces that lie wholly below this height in m are left to the ground plane, on which wheels roll smoothly."""
-
 CONVEX_FACES = 400
 """A mesh of more faces is taken as concave without a look."""
 FLAT = 1e-6
@@ -29,8 +27,8 @@ AT_REST = 1e-6
 UNTIL_ASLEEP = 2.0
 """Seconds at rest after which Bullet lets a body lie until it is touched (btMultiBody's SLEEP_TIMEOUT)."""
 
-GROUND, HULL, WHEEL = 64, 32, 16
-"""Collision groups of the ground and of a robot's parts; everything else is in Bullet's own 1 and 2."""
+TERRAIN, GROUND, HULL, WHEEL = 128, 64, 32, 16
+"""Collision groups of uneven ground, of the plane and of a robot's parts; all else is in Bullet's own 1 and 2."""
 EVERYTHING = -1
 
 PRIMITIVES = (Box, Cylinder, Sphere, Capsule)

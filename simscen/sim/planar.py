@@ -20,7 +20,12 @@ SLED = 0.001
 
 
 class PlanarBase:
-    """A hull on three joints from the world: along x, along y, about z. It cannot tip, and no wheel slips."""
+    """A hull on three joints from the world: along x, along y, about z. It cannot tip, and no wheel slips.
+
+    It stays at z = 0: a ramp is a wall to it, and a sill that its hull clears nothing at all.
+    """
+
+    rolling: tuple[int, ...]
 
     def __init__(self, client: int, body: RobotBody, pose: Pose2) -> None:
         self._client = client
@@ -46,6 +51,7 @@ class PlanarBase:
         )
         self.joints = (0, 1, 2)
         self.hull_links = tuple(range(2, 2 + len(hulls)))
+        self.rolling = ()
         pybullet.changeDynamics(self.id, 2, localInertiaDiagonal=moments, physicsClientId=client)
         for link in range(2 + len(hulls)):
             pybullet.changeDynamics(

@@ -16,6 +16,7 @@ import pybullet
 
 from simscen.core.geometry import Array, Pose3
 from simscen.core.shapes import TriangleMesh
+from simscen.core.terrain import FLOOR
 from simscen.sim import engine, outline
 from simscen.sim.enclosure import winds_around
 from simscen.sim.parts import parts_of
@@ -86,7 +87,7 @@ class Proximity:
         low, high = self._parts.low[:, :2], self._parts.high[:, :2]
         outside = np.maximum(np.maximum(low - self._centre, self._centre - high), 0.0)
         far = np.hypot(outside[:, 0], outside[:, 1]) - self._radius
-        near = np.flatnonzero((far < self._reach + STRIDE) & (self._parts.high[:, 2] > engine.FLOOR))
+        near = np.flatnonzero((far < self._reach + STRIDE) & (self._parts.high[:, 2] > FLOOR))
         known = self._bounds
         self._bounds = {
             part: max(bound + self._travelled, known.get(part, -math.inf))

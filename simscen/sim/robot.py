@@ -20,6 +20,7 @@ from simscen.sim.drives import build
 from simscen.sim.film import Film
 from simscen.sim.lost import lost
 from simscen.sim.robot_body import RobotBody
+from simscen.sim.terrain import Terrain, stands
 from simscen.sim.vehicle import base_twist
 
 Vector = tuple[float, float, float]
@@ -42,6 +43,7 @@ class Scene:
     client: int
     rate: int
     fixed: list[int]
+    terrain: Terrain
     actors: Actors
     film: Film
     robots: dict[str, "Robot"] = field(default_factory=dict)
@@ -80,15 +82,26 @@ class Robot:
     """A robot: it can be driven and looked at; to the others it is a thing that moves."""
 
     def __init__(
-        self, name: str, scene: Scene, static: TriangleMesh, body: RobotBody, pose: Pose2, period: float, reach: float
+        self,
+        name: str,
+        scene: Scene,
+        static: TriangleMesh,
+        obstacles: TriangleMesh,
+        body: RobotBody,
+        pose: Pose2,
+        period: float,
+        reach: float,
     ) -> None:
-        """Set down at `pose`; its firmware runs every `period` seconds, clearance is searched within `reach` metres."""
+        """Set down at `pose`; its firmware runs every `period` seconds, clearance is searched within `reach` metres.
+
+        `obstacles` are what of the `static` world is in its way.
+        """
         self.name, self._scene = name, scene
-        self.base, self._drive = build(scene.client, body, pose, period)
+        self.base, self._drive = build(scene.client, body, pose, period, scene.terrain)
         self.shape = Body(name, body.solid, Pose3.planar(pose), body.mass)
         self._contacts = Contacts(scene.rate)
         self._clearance = Clearance(
-            scene.client, scene.rate, static, body, self.base, scene.actors, self._others, reach
+            scene.client, scene.rate, static, obstacles, body, self.base, scene.actors, self._others, reach
         )
         self._names: dict[int, str | None] = {}
 
@@ -196,7 +209,7 @@ class Robot:
         """Something was put into or taken out of the world, or set down elsewhere."""
         scene = self._scene
         others = {robot.base.id: robot.name for robot in scene.robots.values() if robot is not self}
-        self._names = {**dict.fromkeys(scene.fixed), **scene.actors.ids(), **others}
+        self._names = {**dict.fromkeys(scene.fixed), **scene.terrain.names, **scene.actors.ids(), **others}
         self._clearance.forget()
 
     @property
@@ -216,11 +229,17 @@ class Robot:
         tick, clearance = self._scene.tick, self._clearance
         if not self._contacts.touching and tick <= clearance.no_contact_before:
             return
-        touched = touches(self._scene.client, self.base.id, self._names, clearance.owner, 1 / self._scene.rate)
+        touched = touches(
+            self._scene.client, self.base.id, self._names, clearance.owner, 1 / self._scene.rate, self._stands
+        )
         around = clearance.enclosed_by
         if around is not None and around not in {touch.name for touch in touched}:
             touched.append(inside(around, before.robot.origin))
         self._contacts.note(tick, touched, before)
+
+    def _stands(self, other: int, link: int, up: float) -> bool:
+        """Whether a contact is that of a wheel or caster with the ground."""
+        return stands(self._scene.terrain.names, self.base.rolling, other, link, up)
 
     def close(self) -> None:
         """Give back what it has of engines of its own."""

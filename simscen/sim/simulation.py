@@ -16,6 +16,7 @@ from simscen.sim.contacts import Before
 from simscen.sim.film import Film
 from simscen.sim.robot import Robot, Scene
 from simscen.sim.robot_body import RobotBody
+from simscen.sim.terrain import Terrain
 
 FIRMWARE_RATE = 60
 """Hz at which a base's firmware updates its wheel speeds; Clearpath's and Robotis' run at 50 to 100 Hz."""
@@ -24,10 +25,11 @@ SETTLING = 60
 
 
 class Placed(NamedTuple):
-    """A robot and where it starts."""
+    """A robot, where it starts, and what of the static world is in its way, if that is not all of it."""
 
     body: RobotBody
     pose: Pose2
+    obstacles: TriangleMesh | None = None
 
 
 class Simulation:
@@ -54,15 +56,17 @@ class Simulation:
         """
         client = engine.connect(tick_rate, solver_iterations, one_by_one=len(robots) > 1)
         engine.ground(client)
-        fixed = engine.static_mesh(client, static)
+        terrain = Terrain(client, static, max((w.radius for r in robots.values() for w in r.body.wheels), default=0.0))
+        fixed = engine.static_mesh(client, terrain.rest)
         film, actors = Film(client, static, triangulate), Actors(client, tick_rate, triangulate)
-        self._scene = Scene(client, tick_rate, fixed, actors, film)
+        self._scene = Scene(client, tick_rate, fixed, terrain, actors, film)
         self._attends: tuple[int, Callable[[], None]] | None = None
         self._firmware = max(1, round(tick_rate / FIRMWARE_RATE))
         self.robots: dict[str, Robot] = self._scene.robots
-        for name, (body, pose) in sorted(robots.items()):
+        for name, (body, pose, obstacles) in sorted(robots.items()):
             period = self._firmware / tick_rate
-            self.robots[name] = Robot(name, self._scene, static, body, pose, period, clearance_range)
+            walls = static if obstacles is None else obstacles
+            self.robots[name] = Robot(name, self._scene, static, walls, body, pose, period, clearance_range)
         for thing in sorted(bodies, key=lambda body: body.name):
             actors.add(thing, 0)
         for _ in range(SETTLING):

@@ -35,6 +35,12 @@ solver: they then slip 4 % when accelerating with 1 m/s², instead of 0.1 %.
 """
 CASTER_GAP = 0.001
 """How far the unloaded caster hangs above the ground in m."""
+YIELDS = math.tan(math.radians(8))
+"""How far the unloaded caster hangs on uneven ground, over its distance from the axle.
+
+Wheels between two rigid casters hang in the air at the foot of a ramp. Real bases have sprung ones, or sprung wheels;
+here the loaded caster and the wheels stand on the ground, and the other catches a robot that tips by 8°.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,3 +140,19 @@ def on_casters(
     gaps = {front: CASTER_GAP, rear: CASTER_GAP} | {loaded: 0.0}
     balls = tuple(Solid(Sphere(radius), Pose3(x, 0.0, radius + gap), "caster") for x, gap in gaps.items())
     return MassProperties(chassis.mass, centre, chassis.tensor), balls
+
+
+def yielding(casters: Sequence[Solid]) -> tuple[Solid, ...]:
+    """The same casters on uneven ground, where the unloaded one gives way."""
+    return tuple(_raised(caster) if lowest(caster) > 0 else caster for caster in casters)
+
+
+def _raised(caster: Solid) -> Solid:
+    gap = YIELDS * math.hypot(caster.pose.x, caster.pose.y)
+    return replace(caster, pose=caster.pose._replace(z=caster.pose.z - lowest(caster) + gap))
+
+
+def lowest(caster: Solid) -> float:
+    """How far above the ground a caster hangs on level ground, in m."""
+    assert isinstance(caster.shape, Sphere)
+    return round(caster.pose.z - caster.shape.radius, 9)

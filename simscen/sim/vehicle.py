@@ -1,14 +1,18 @@
 """A robot in the engine: its hull as base, its wheels as links, and where its base frame is."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
 import pybullet
 
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.motion import Twist
+from simscen.core.shapes import Solid
 from simscen.sim import engine
 from simscen.sim.robot_body import RobotBody
-from simscen.sim.undercarriage import Wheel
+from simscen.sim.terrain import Terrain
+from simscen.sim.undercarriage import Wheel, lowest, yielding
 
 Vector = tuple[float, float, float]
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
@@ -23,15 +27,20 @@ class Vehicle:
 
     A wheel touches the ground as a ball of its radius: one point of contact in the wheel's middle plane, so that the
     radius and the separation in the datasheet are those of the contact, and half the time of a cylinder's contact.
-    Only the hull touches obstacles.
+    Only the hull touches obstacles. On uneven ground the casters are a link of their own, so that one that stands on a
+    ramp can be told from a hull that scrapes it.
     """
 
-    def __init__(self, client: int, body: RobotBody, pose: Pose2) -> None:
-        self._client = client
+    def __init__(self, client: int, body: RobotBody, pose: Pose2, terrain: Terrain | None = None) -> None:
+        self._client, self._terrain = client, terrain
         moments, self._base_from_centre = body.chassis.principal()
         self._centre = self._base_from_centre.position
         self._centre_from_base = self._base_from_centre.inverse()
-        self.id, self.joints, self.hull_links = _build(client, body)
+        casters = yielding(body.casters) if terrain else ()
+        self.id, self.joints, self.hull_links = _build(client, body, casters)
+        self.rolling = _rolling(body, self.joints, self.hull_links, casters)
+        standing = [(caster.pose.x, caster.pose.y) for caster in body.casters if not lowest(caster)]
+        self._feet = np.array([*((wheel.x, wheel.y) for wheel in body.wheels), *standing])
         pybullet.changeDynamics(self.id, -1, localInertiaDiagonal=moments, physicsClientId=client)
         for wheel, joint in zip(body.wheels, self.joints, strict=True):
             self._set_up(wheel, joint)
@@ -41,7 +50,7 @@ class Vehicle:
         xx, yy, zz = wheel.inertia.tensor.diagonal().tolist()  # a wheel turns about y and is round
         link = joint + 1 if wheel.steered else joint
         # The ball reaches out beyond a narrow wheel's sides: its guard in the hull stands for it there.
-        engine.touch(self._client, self.id, link, engine.WHEEL, engine.GROUND)
+        engine.touch(self._client, self.id, link, engine.WHEEL, engine.GROUND | engine.TERRAIN)
         pybullet.changeDynamics(
             self.id,
             link,
@@ -56,7 +65,8 @@ class Vehicle:
 
     def place(self, pose: Pose2) -> None:
         """Set it down at rest, its base frame on the ground."""
-        centre = Pose3.planar(pose).compose(self._base_from_centre)
+        base = self._terrain.seat(pose, self._feet) if self._terrain else Pose3.planar(pose)
+        centre = base.compose(self._base_from_centre)
         pybullet.resetBasePositionAndOrientation(
             self.id, centre.position, centre.quaternion, physicsClientId=self._client
         )
@@ -104,14 +114,28 @@ def base_twist(pose: Pose3, velocity: tuple[Vector, Vector]) -> Twist:
     return Twist(vx, vy, rotated(back, velocity[1])[2])
 
 
-def _build(client: int, body: RobotBody) -> tuple[int, tuple[int, ...], tuple[int, ...]]:
-    """The multibody; for each wheel its first joint, steering before rolling; and the links of the hull."""
+def _rolling(body: RobotBody, joints: Sequence[int], hull: Sequence[int], casters: Sequence[Solid]) -> tuple[int, ...]:
+    """The links of wheels and of casters that are a link of their own, which is the hull's last."""
+    wheels = [joint + 1 if wheel.steered else joint for wheel, joint in zip(body.wheels, joints, strict=True)]
+    return (*wheels, hull[-1]) if casters else tuple(wheels)
+
+
+def _build(client: int, body: RobotBody, casters: Sequence[Solid] = ()) -> tuple[int, tuple[int, ...], tuple[int, ...]]:
+    """The multibody; for each wheel its first joint, steering before rolling; and the links of the hull.
+
+    `casters` become the hull's last link; without any, those of the body are part of its first.
+    """
     links: list[_Link] = []
     joints: list[int] = []
     for wheel in body.wheels:
         joints.append(len(links))
         links += _links(client, wheel, len(links))
-    first, *others = engine.hull_shapes(client, body.solid)
+    shapes = (
+        [*engine.hull_shapes(client, body.hull), *engine.hull_shapes(client, casters)]
+        if casters
+        else (engine.hull_shapes(client, body.solid))
+    )
+    first, *others = shapes
     hull = (-1, *range(len(links), len(links) + len(others)))
     links += [_Link(HULL_PIECE, shape, (0.0, 0.0, 0.0), 0, pybullet.JOINT_FIXED, (0, 0, 1)) for shape in others]
     _, centre = body.chassis.principal()

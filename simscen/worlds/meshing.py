@@ -43,7 +43,7 @@ _BOX_FACES = np.array(
 def fuse(solids: Iterable[Solid]) -> TriangleMesh:
     """All solids as one triangle mesh in the frame they are placed in; face owners index `names`."""
     vertices, faces = [np.empty((0, 3))], [np.empty((0, 3), np.int32)]
-    owners, names = [np.empty(0, np.int32)], []
+    owners, names, frictions = [np.empty(0, np.int32)], [], []
     meshes: dict[Shape, Mesh] = {}
     count = 0
     for owner, solid in enumerate(solids):
@@ -54,8 +54,10 @@ def fuse(solids: Iterable[Solid]) -> TriangleMesh:
         faces.append(mesh.faces + np.int32(count))
         owners.append(np.full(len(mesh.faces), owner, dtype=np.int32))
         names.append(solid.name)
+        frictions.append(solid.friction)
         count += len(mesh.vertices)
-    return TriangleMesh(np.concatenate(vertices), np.concatenate(faces), np.concatenate(owners), tuple(names))
+    slippery = tuple(frictions) if any(friction != 1.0 for friction in frictions) else ()
+    return TriangleMesh(np.concatenate(vertices), np.concatenate(faces), np.concatenate(owners), tuple(names), slippery)
 
 
 def triangulate(shape: Shape) -> Mesh:

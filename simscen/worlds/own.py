@@ -9,7 +9,7 @@ from simscen.core.grid import OccupancyGrid
 from simscen.core.motion_path import pose_at
 from simscen.core.shapes import Body, Box, Solid
 from simscen.core.world import World
-from simscen.model.world import Door, Movable, Obstacle, Wall, WorldSpec
+from simscen.model.world import Door, Movable, Obstacle, Ramp, Wall, WorldSpec
 from simscen.worlds.extents import rectangle
 from simscen.worlds.walls import wall_solids
 
@@ -36,6 +36,7 @@ def build_own(
     for number, wall in enumerate(spec.walls, start=1):
         solids += wall_solids(_corners(wall), wall.thickness, wall.height, wall.called(number))
     solids += [_standing(obstacle) for obstacle in spec.obstacles]
+    solids += [_rising(ramp) for ramp in spec.ramps]
     bodies = (*base.bodies, *map(_movable, spec.objects), *map(_door, spec.doors))
     places = {**base.places, **{key: place.pose for key, place in spec.places.items()}}
     regions = {key: tuple((x, y) for x, y in corners) for key, corners in spec.regions.items()}
@@ -46,6 +47,7 @@ def build_own(
         bodies=bodies,
         places=places,
         regions={**base.regions, **regions},
+        friction=spec.friction,
         doors={door.name: _ways(door) for door in spec.doors},
         bounds=_bounds(solids, bodies, places.values(), grid),
         grid=grid or base.grid,
@@ -74,7 +76,14 @@ def _corners(wall: Wall) -> list[tuple[float, float]]:
 
 def _standing(obstacle: Obstacle) -> Solid:
     solid = obstacle.solid(obstacle.name)
-    return replace(solid, pose=Pose3.planar(obstacle.pose.pose, solid.pose.z))
+    return replace(solid, pose=Pose3.planar(obstacle.pose.pose, solid.pose.z), friction=obstacle.friction)
+
+
+def _rising(ramp: Ramp) -> Solid:
+    from simscen.worlds.ramps import wedge
+
+    (ax, ay), (bx, by) = ramp.start, ramp.end
+    return wedge((ax, ay), (bx, by), ramp.width, ramp.height, ramp.name, ramp.friction)
 
 
 def _movable(thing: Movable) -> Body:

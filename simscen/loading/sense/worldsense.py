@@ -16,7 +16,7 @@ def senseless(world: LoadedWorld) -> list[Problem]:
     """Problems at their places in the world's file, without the text of their lines; some are warnings."""
     if world.spec is None or world.tree is None:
         return []
-    return [problem for check in (_shared_names, _no_extent, _twice) for problem in check(world.spec, world.tree)]
+    return [problem for check in (_shared_names, _no_extent, _twice, _frictions) for problem in check(world.spec, world.tree)]
 
 
 def _shared_names(spec: WorldSpec, tree: Fields) -> Iterator[Problem]:
@@ -43,6 +43,9 @@ def _no_extent(spec: WorldSpec, tree: Fields) -> Iterator[Problem]:
     for index, wall in enumerate(spec.walls):
         if all(point == wall.points[0] for point in wall.points):
             yield _at(tree, ("walls", index, "points"), "SC313", "the wall has no length")
+    for index, ramp in enumerate(spec.ramps):
+        if ramp.start == ramp.end:
+            yield _at(tree, ("ramps", index, "end"), "SC313", "the ramp has no length: it ends where it starts")
     for index, door in enumerate(spec.doors):
         if door.points[0] == door.points[1]:
             yield _at(tree, ("doors", index, "points"), "SC313", "the door has no width")
@@ -67,6 +70,15 @@ def _twice(spec: WorldSpec, tree: Fields) -> Iterator[Problem]:
             problem = Problem(*key_place(tree, keys), code="SC054", message=f"{quoted(same)} is exactly there already")
             yield replace(problem, severity="warning")
         seen.append((shape, thing.name))
+
+
+def _frictions(spec: WorldSpec, tree: Fields) -> Iterator[Problem]:
+    """The floor is slippery in regions, which are those of the same file."""
+    for name in spec.friction:
+        if name not in spec.regions:
+            place = key_place(tree, ("friction", name))
+            yield Problem(*place, code="SC030", message=f"no region is called {quoted(name)}",
+                          hint=suggestion(name, list(spec.regions)))  # fmt: skip
 
 
 def _at(tree: Fields, keys: Keys, code: str, message: str) -> Problem:

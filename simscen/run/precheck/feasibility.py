@@ -23,6 +23,7 @@ from simscen.run.precheck.untimely import untimely
 from simscen.run.precheck.ways import Ways
 from simscen.run.precheck.worldchecks import misnamed
 from simscen.run.robotsize import robot_size_of
+from simscen.run.robotways import as_met
 from simscen.run.worldcache import WorldCache
 from simscen.run.worldsource import load_robot
 from simscen.worlds.mapsize import too_large
@@ -37,11 +38,12 @@ def check(loaded: LoadedScenario, cache: WorldCache | None = None, pictures: Pat
     cache = cache or WorldCache()
     world = cache.world(loaded)
     loaded = _with_robot(loaded)
+    met = as_met(loaded, world)
     problems = [*_once_known(loaded, world), *_too_large(loaded, world)]
-    problems += [loaded.sourced(problem) for problem in misnamed(world, loaded.world)]
+    problems += [loaded.sourced(problem) for problem in misnamed(met, loaded.world)]
     problems += _otherwise(loaded)
     if not _has_errors(problems):
-        problems += _impossible(Scene(loaded, world, robot_size_of(loaded)), cache, pictures)
+        problems += _impossible(Scene(loaded, met, robot_size_of(loaded)), cache, pictures)
     return [*problems, *notes_of(world, loaded.world, loaded.root)]
 
 

@@ -1,0 +1,57 @@
+"""What of a static world is ground to wheels: ramps, sills, steps, platforms.
+
+A world is flat unless one of its surfaces that face upwards begins so low that a wheel could get onto it; then so are
+the surfaces that lead on from there. What else stands in a world is walls: wheels never touch it, the hull does.
+"""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.geometry import Array
+from simscen.core.shapes import TriangleMesh
+
+FLOOR = 0.005
+"""Faces that lie wholly below this height in m are left to the ground plane, on which wheels roll smoothly."""
+STEEPEST = math.radians(50)
+"""What is steeper is a wall, whatever drives: rubber on dry concrete (friction 1) holds up to 45°."""
+
+Owners = frozenset[int]
+Faces = npt.NDArray[np.bool_]
+
+
+def normals(mesh: TriangleMesh) -> Array:
+    """The unit normals (n, 3) of the faces of a mesh; zero for one without area."""
+    a, b, c = mesh.vertices[mesh.faces].swapaxes(0, 1)
+    across = np.cross(b - a, c - a)
+    lengths = np.linalg.norm(across, axis=1, keepdims=True)
+    unit: Array = across / np.where(lengths > 0, lengths, 1.0)
+    return unit
+
+
+def facing_up(mesh: TriangleMesh, steepest: float = STEEPEST) -> Faces:
+    """Which faces are above FLOOR, face upwards and are no steeper than an angle in rad."""
+    top = mesh.vertices[mesh.faces, 2].max(axis=1, initial=-math.inf)
+    found: Faces = (normals(mesh)[:, 2] >= math.cos(steepest)) & (top > FLOOR)
+    return found
+
+
+def terrain(mesh: TriangleMesh, reach: float) -> Owners:
+    """The solids of a static mesh, by number, that wheels which get onto a step of `reach` m at most may roll on."""
+    faces = np.flatnonzero(facing_up(mesh))
+    corners = mesh.vertices[mesh.faces[faces]]
+    bottom = corners[:, :, 2].min(axis=1)
+    if not (bottom <= reach).any():
+        return frozenset()
+    owners, number = np.unique(mesh.owners[faces], return_inverse=True)
+    low, high = np.full((len(owners), 3), math.inf), np.full((len(owners), 3), -math.inf)
+    np.minimum.at(low, number, corners.min(axis=1))
+    np.maximum.at(high, number, corners.max(axis=1))
+    reached = low[:, 2] <= reach
+    fresh = reached
+    while fresh.any():
+        leads = ((low[:, None] <= high[fresh] + reach) & (high[:, None] + reach >= low[fresh])).all(axis=2).any(axis=1)
+        fresh = leads & ~reached
+        reached = reached | leads
+    return frozenset(owners[reached].tolist())
