@@ -49,9 +49,10 @@ def terrain(mesh: TriangleMesh, reach: float) -> Owners:
     np.minimum.at(low, number, corners.min(axis=1))
     np.maximum.at(high, number, corners.max(axis=1))
     reached = low[:, 2] <= reach
-    fresh = reached
+    fresh: Faces = reached
     while fresh.any():
-        leads = ((low[:, None] <= high[fresh] + reach) & (high[:, None] + reach >= low[fresh])).all(axis=2).any(axis=1)
+        apart = (low[:, None] > high[fresh] + reach) | (high[:, None] + reach < low[fresh])
+        leads: Faces = np.any(~np.any(apart, axis=2), axis=1)
         fresh = leads & ~reached
         reached = reached | leads
     return frozenset(owners[reached].tolist())

@@ -15,8 +15,9 @@ class World:
     """Everything that is there before the robot: `solids` never move, `bodies` may.
 
     `doors` maps a door's name, which is also its body's, to that body's pose when closed and when open. `friction` is
-    that of the floor in some of the `regions`, by name; elsewhere it is 1. `bounds` is (min x, min y, max x, max y) in metres. `grid` is set when the world came with an occupancy map of its own (a ROS
-    map). `notes` are warnings of the importer, each a sentence that names file and element.
+    that of the floor in some of the `regions`, by name; elsewhere it is 1. `bounds` is (min x, min y, max x, max y) in
+    metres. `grid` is set when the world came with an occupancy map of its own (a ROS map). `notes` are warnings of the
+    importer, each a sentence that names file and element.
     """
 
     name: str

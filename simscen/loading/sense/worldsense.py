@@ -5,9 +5,9 @@ from dataclasses import replace
 
 from simscen.core.problems import Problem
 from simscen.loading.loaded import LoadedWorld
-from simscen.loading.messages import quoted
+from simscen.loading.messages import quoted, suggestion
 from simscen.loading.tree import Fields, Key, key_place, value_place
-from simscen.model.world import WorldSpec
+from simscen.model.world import Thing, WorldSpec
 
 Keys = tuple[Key, ...]
 
@@ -16,7 +16,11 @@ def senseless(world: LoadedWorld) -> list[Problem]:
     """Problems at their places in the world's file, without the text of their lines; some are warnings."""
     if world.spec is None or world.tree is None:
         return []
-    return [problem for check in (_shared_names, _no_extent, _twice, _frictions) for problem in check(world.spec, world.tree)]
+    return [
+        problem
+        for check in (_shared_names, _no_extent, _twice, _frictions)
+        for problem in check(world.spec, world.tree)
+    ]
 
 
 def _shared_names(spec: WorldSpec, tree: Fields) -> Iterator[Problem]:
@@ -60,7 +64,7 @@ def _no_extent(spec: WorldSpec, tree: Fields) -> Iterator[Problem]:
 
 def _twice(spec: WorldSpec, tree: Fields) -> Iterator[Problem]:
     """The same shape at the same place under another name."""
-    things = [(("obstacles", k), thing) for k, thing in enumerate(spec.obstacles)]
+    things: list[tuple[Keys, Thing]] = [(("obstacles", k), thing) for k, thing in enumerate(spec.obstacles)]
     things += [(("objects", k), thing) for k, thing in enumerate(spec.objects)]
     seen: list[tuple[object, str]] = []
     for keys, thing in things:
@@ -77,8 +81,8 @@ def _frictions(spec: WorldSpec, tree: Fields) -> Iterator[Problem]:
     for name in spec.friction:
         if name not in spec.regions:
             place = key_place(tree, ("friction", name))
-            yield Problem(*place, code="SC030", message=f"no region is called {quoted(name)}",
-                          hint=suggestion(name, list(spec.regions)))  # fmt: skip
+            message, hint = f"no region is called {quoted(name)}", suggestion(name, spec.regions)
+            yield Problem(*place, code="SC030", message=message, hint=hint)
 
 
 def _at(tree: Fields, keys: Keys, code: str, message: str) -> Problem:

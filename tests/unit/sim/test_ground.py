@@ -1,0 +1,159 @@
+"""Wheels on uneven ground, against closed forms: what they climb, what they do not, and what is then true."""
+
+import math
+
+import numpy as np
+import pytest
+from playground import box, shipped
+
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.motion import Twist
+from simscen.core.shapes import Mesh, Solid
+from simscen.sim.climb import climb_of, grip_angle
+from simscen.sim.embody import robot_body
+from simscen.worlds.meshing import fuse
+from simscen.worlds.obstacles import obstacles_of
+from simscen.worlds.ramps import wedge
+
+TICKS = 240
+FOOT = 0.5
+
+
+def ramp(degrees, length=2.0, friction=1.0, width=2.0):
+    """A ramp that begins FOOT ahead, and its height."""
+    height = length * math.tan(math.radians(degrees))
+    return wedge((FOOT, 0.0), (FOOT + length, 0.0), width, height, "ramp", friction)
+
+
+@pytest.fixture
+def on_ground(simulate):
+    """Makes simulations in which a robot knows what it climbs."""
+
+    def make(robot, solids, **where):
+        body = robot_body(shipped(robot))
+        reach = max((wheel.radius for wheel in body.wheels), default=0.0)
+        return simulate(body, solids, obstacles=fuse(obstacles_of(tuple(solids), reach, *climb_of(body))), **where)
+
+    return make
+
+
+def pitch(pose):
+    return math.asin(2 * (pose.qw * pose.qy - pose.qz * pose.qx))
+
+
+def driven(simulation, seconds):
+    """Names of what was hit on the way."""
+    hit = []
+    for _ in range(round(seconds * TICKS / 24)):
+        simulation.step(24)
+        simulation.truth()
+        hit += [event.name for event in simulation.collisions()]
+    return hit
+
+
+@pytest.mark.parametrize("robot", ["turtlebot", "amr", "jackal", "car"])
+def test_a_ramp_of_5_degrees_is_climbed_and_odometry_counts_the_way_along_it(on_ground, robot):
+    simulation = on_ground(robot, [ramp(5)], drive=(0.4, 0.0, 0.0))
+    begin = simulation.encoders()[0]
+    assert driven(simulation, 4.5) == []
+    pose = simulation.truth().pose
+    up = (pose.x - FOOT) * math.tan(math.radians(5))
+    assert pose.z == pytest.approx(up, abs=2e-3)
+    assert pitch(pose) == pytest.approx(-math.radians(5), abs=2e-3)
+    radius = shipped(robot).drive.wheel_radius
+    along = FOOT + (pose.x - FOOT) / math.cos(math.radians(5))
+    assert (simulation.encoders()[0] - begin) * radius == pytest.approx(along, rel=0.01)
+    assert simulation.truth().clearance > 0.1  # a ramp that it climbs is no obstacle
+
+
+@pytest.mark.parametrize("robot", ["turtlebot", "amr"])
+def test_a_ramp_of_30_degrees_is_hit_and_not_climbed(on_ground, robot):
+    simulation = on_ground(robot, [ramp(30)], drive=(0.4, 0.0, 0.0))
+    assert "ramp" in driven(simulation, 4)
+    assert simulation.truth().pose.z < 0.02
+
+
+def test_a_robot_that_stands_on_a_ramp_stands_still_on_its_plane(on_ground):
+    simulation = on_ground("turtlebot", [ramp(5)], pose=Pose2(FOOT + 1.0, 0.2, math.pi / 2))
+    driven(simulation, 2)
+    pose = simulation.truth().pose
+    assert pose.x == pytest.approx(FOOT + 1.0, abs=2e-3)
+    assert pose.z == pytest.approx(math.tan(math.radians(5)), abs=2e-3)
+    assert pitch(pose) == pytest.approx(0.0, abs=2e-3)  # it looks along the slope, so that it rolls instead
+
+
+@pytest.mark.parametrize("robot", ["turtlebot", "amr", "jackal"])
+@pytest.mark.parametrize(("share", "over"), [(0.9, True), (1.4, False)])
+def test_a_driven_wheel_climbs_a_step_of_r_times_1_minus_1_over_the_root_of_1_plus_friction_squared(
+    on_ground, robot, share, over
+):
+    """Without a run-up, by its own friction alone; wheels behind it push, so that skid steering gets higher."""
+    body = robot_body(shipped(robot))
+    step = share * climb_of(body).step
+    if robot == "jackal" and not over:
+        return
+    simulation = on_ground(robot, [box("step", 1.0, 0, 1.0, 2, step)], pose=Pose2(0.3, 0, 0), drive=(0.05, 0, 0))
+    driven(simulation, 12)
+    assert (simulation.truth().pose.x > 0.7) == over
+
+
+def test_a_sill_of_6_mm_is_driven_over_and_is_no_collision(on_ground):
+    simulation = on_ground("turtlebot", [box("sill", FOOT, 0, 0.05, 2, 0.006)], drive=(0.4, 0, 0))
+    heights = []
+    for _ in range(30):
+        assert driven(simulation, 0.1) == []
+        heights.append(simulation.truth().pose.z)
+    assert max(heights) == pytest.approx(0.006, abs=1e-3)
+    assert simulation.truth().pose.x > 1.0
+
+
+def test_a_step_that_the_hull_cannot_pass_is_hit(on_ground):
+    simulation = on_ground("turtlebot", [box("step", 1.0, 0, 1, 2, 0.05)], drive=(0.4, 0, 0))
+    assert "step" in driven(simulation, 2)
+
+
+@pytest.mark.parametrize(("share", "climbs"), [(0.9, False), (1.15, True)])
+@pytest.mark.parametrize("robot", ["jackal", "turtlebot"])
+def test_friction_holds_a_robot_on_a_slope_whose_tangent_is_below_it(on_ground, robot, share, climbs):
+    """tan θ = μ x the share of the weight on driven wheels; a quarter less or more decides."""
+    degrees, body = 6.0, robot_body(shipped(robot))
+    low, high = 0.01, 1.0
+    for _ in range(40):
+        middle = (low + high) / 2
+        low, high = (middle, high) if grip_angle(body, middle) < math.radians(degrees) else (low, middle)
+    surface = ramp(degrees, friction=share * high)
+    simulation = on_ground(robot, [surface], pose=Pose2(FOOT + 0.8, 0, 0), drive=(0.3, 0, 0))
+    driven(simulation, 2)
+    assert (simulation.truth().pose.x > FOOT + 0.8) == climbs
+
+
+def test_a_height_field_carries_wheels_as_a_ramp_does(on_ground):
+    steps = np.linspace(0.0, 3.0, 31)
+    x, y = np.meshgrid(steps, np.linspace(-1.0, 1.0, 21))
+    z = np.clip(x - FOOT, 0.0, 1.0) * math.tan(math.radians(5))
+    number = np.arange(x.size, dtype=np.int32).reshape(x.shape)
+    sw, se, nw, ne = (number[a, b].ravel() for a, b in
+                      ((np.s_[:-1], np.s_[:-1]), (np.s_[:-1], np.s_[1:]), (np.s_[1:], np.s_[:-1]), (np.s_[1:], np.s_[1:])))  # fmt: skip
+    faces = np.concatenate((np.column_stack((sw, se, ne)), np.column_stack((sw, ne, nw))))
+    terrain = Solid(Mesh(np.column_stack((x.ravel(), y.ravel(), z.ravel())), faces), Pose3(), "terrain")
+    simulation = on_ground("turtlebot", [terrain], drive=(0.4, 0.0, 0.0))
+    assert driven(simulation, 5) == []
+    assert simulation.truth().pose.z == pytest.approx(math.tan(math.radians(5)), abs=3e-3)
+
+
+def test_a_base_that_never_leaves_the_plane_is_stopped_by_a_ramp(on_ground):
+    simulation = on_ground("omni", [ramp(10)], drive=(0.4, 0.0, 0.0))
+    assert "ramp" in driven(simulation, 4)
+    assert simulation.truth().pose.z == 0.0
+
+
+def test_walls_leave_the_ground_flat(simulate):
+    """Wheels touch nothing of a world of walls, so that its runs are what they were."""
+    from simscen.core.terrain import terrain
+
+    mesh = fuse([box("wall", 1, 0, 0.1, 4), box("crate", -1, 0, 0.5, 0.5, 0.4), box("line", 0, 1, 1, 1, 0.004)])
+    assert terrain(mesh, 0.1) == frozenset()
+    simulation = simulate(solids=[box("wall", 1, 0, 0.1, 4)], drive=(0.2, 0, 0))
+    simulation.drive(Twist(0.1, 0, 0))
+    simulation.step(24)
+    assert abs(simulation.truth().pose.z) < 1e-4

@@ -1,0 +1,59 @@
+"""What of a world is in the way of a robot that climbs ramps."""
+
+import math
+
+import pytest
+
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.shapes import Box, Solid
+from simscen.worlds.meshing import fuse
+from simscen.worlds.obstacles import obstacles_of
+from simscen.worlds.ramps import wedge
+from simscen.worlds.shortest import ShortestWays
+
+TURTLEBOT = 0.033, math.radians(7.9), 0.0097
+BOUNDS = (-1.0, -4.0, 8.0, 4.0)
+
+
+def box(name, x, y, length, width, height):
+    return Solid(Box((length, width, height)), Pose3(x, y, height / 2), name)
+
+
+def hall(degrees):
+    """Two halves of a hall, with a platform between them that a ramp leads up to on either side."""
+    high = math.tan(math.radians(degrees))
+    return (
+        wedge((2, 0), (3, 0), 1.5, high, "up"),
+        box("platform", 3.5, 0, 1.0, 7.8, high),
+        wedge((5, 0), (4, 0), 1.5, high, "down"),
+        box("north", 3.5, 4, 9.2, 0.2, 1.0),
+        box("south", 3.5, -4, 9.2, 0.2, 1.0),
+        box("west", -1, 0, 0.2, 8, 1.0),
+        box("east", 8, 0, 0.2, 8, 1.0),
+    )
+
+
+def way(degrees, robot=TURTLEBOT):
+    mesh = fuse(obstacles_of(hall(degrees), *robot))
+    return ShortestWays(mesh, BOUNDS, 0.22).length(Pose2(1, 3, 0), Pose2(6, 3, 0))
+
+
+def test_a_world_without_ground_but_the_floor_stays_the_same_object():
+    solids = (box("wall", 1, 0, 0.1, 4, 1.0),)
+    assert obstacles_of(solids, *TURTLEBOT) is solids
+
+
+def test_the_shortest_way_leads_over_a_ramp_that_the_robot_climbs_and_not_over_its_sides():
+    # Round the corners of the ramps' sides, which are higher than a step but for their first 30 cm.
+    assert 7.0 < way(5) < 8.5
+
+
+def test_no_way_leads_over_a_ramp_that_is_too_steep_or_for_a_robot_that_stays_on_the_floor():
+    assert way(30) == math.inf
+    assert way(5, (0.1, 0.0, 0.0)) == math.inf
+
+
+def test_ramp_and_platform_join_without_a_wall_between_them():
+    names = [s.name for s in obstacles_of(hall(5), *TURTLEBOT) if s.name in ("up", "down", "platform")]
+    assert names.count("platform") == 4 + 2  # ends of the platform are at the walls' faces; four beside the ramps
+    assert names.count("up") == names.count("down") == pytest.approx(18, abs=2)
