@@ -1,5 +1,6 @@
 """How velocity commands become motion, for each type of drive."""
 
+from collections.abc import Mapping
 from typing import Protocol
 
 from simscen.core.geometry import Pose2, Pose3
@@ -21,8 +22,8 @@ class Base(Protocol):
 
     id: int
     hull_links: tuple[int, ...]
-    rolling: tuple[int, ...]
-    """Links that stand on uneven ground: wheels and casters; none where the robot knows no other than level ground."""
+    rolling: Mapping[int, float]
+    """Links that stand on uneven ground, wheels and casters; see `terrain.stands`. None where it knows only z = 0."""
 
     def place(self, pose: Pose2) -> None:
         """Set it down at rest, its base frame on the ground."""

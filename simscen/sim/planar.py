@@ -1,6 +1,7 @@
 """A base that moves in any direction, idealised as a motor for each direction."""
 
 import math
+from collections.abc import Mapping
 
 import pybullet
 
@@ -25,7 +26,7 @@ class PlanarBase:
     It stays at z = 0: a ramp is a wall to it, and a sill that its hull clears nothing at all.
     """
 
-    rolling: tuple[int, ...]
+    rolling: Mapping[int, float]
 
     def __init__(self, client: int, body: RobotBody, pose: Pose2) -> None:
         self._client = client
@@ -51,7 +52,7 @@ class PlanarBase:
         )
         self.joints = (0, 1, 2)
         self.hull_links = tuple(range(2, 2 + len(hulls)))
-        self.rolling = ()
+        self.rolling = {}
         pybullet.changeDynamics(self.id, 2, localInertiaDiagonal=moments, physicsClientId=client)
         for link in range(2 + len(hulls)):
             pybullet.changeDynamics(

@@ -5,7 +5,7 @@ ones (height fields, meshes) stay triangles; on those a wheel loses some millime
 """
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 import pybullet
@@ -17,8 +17,12 @@ from simscen.sim import engine
 
 SKY = 1000.0
 """m above and below which nobody looks for ground."""
-UPHILL = 0.1
-"""z of the unit normal above which a wheel or caster stands on what it touches; below, it has hit an edge too high."""
+ON_WHEELS, ON_CASTERS = 0.6, 0.1
+"""z of the unit normal above which a wheel or caster stands on what it touches; below, it has hit an edge too high.
+
+A driven wheel gets up an edge of 0.29 of its radius by its own grip, and of 0.4 (this) with some run-up; a caster is
+pushed over anything lower than its middle.
+"""
 
 
 class Terrain:
@@ -86,9 +90,10 @@ class Terrain:
         return Pose3.planar(pose, base + lift).compose(tilt)
 
 
-def stands(terrain_bodies: Mapping[int, str | None], rolling: Iterable[int], other: int, link: int, up: float) -> bool:
+def stands(terrain: Mapping[int, str | None], rolling: Mapping[int, float], other: int, link: int, up: float) -> bool:
     """Whether a contact is that of a wheel or caster with the ground, rather than a collision.
 
-    `other` is the engine's number of what the robot's `link` touches, `up` the z of the unit normal towards the robot.
+    `rolling` are those links, and the least `up` at which they stand: the z of the unit normal towards the robot. `other`
+    is the engine's number of what the robot's `link` touches.
     """
-    return other in terrain_bodies and link in rolling and up >= UPHILL
+    return other in terrain and link in rolling and up >= rolling[link]

@@ -11,7 +11,7 @@ from simscen.core.motion import Twist
 from simscen.core.shapes import Solid
 from simscen.sim import engine
 from simscen.sim.robot_body import RobotBody
-from simscen.sim.terrain import Terrain
+from simscen.sim.terrain import ON_CASTERS, ON_WHEELS, Terrain
 from simscen.sim.undercarriage import Wheel, lowest, yielding
 
 Vector = tuple[float, float, float]
@@ -114,10 +114,10 @@ def base_twist(pose: Pose3, velocity: tuple[Vector, Vector]) -> Twist:
     return Twist(vx, vy, rotated(back, velocity[1])[2])
 
 
-def _rolling(body: RobotBody, joints: Sequence[int], hull: Sequence[int], casters: Sequence[Solid]) -> tuple[int, ...]:
-    """The links of wheels and of casters that are a link of their own, which is the hull's last."""
+def _rolling(body: RobotBody, joints: Sequence[int], hull: Sequence[int], casters: Sequence[Solid]) -> dict[int, float]:
+    """The links of wheels, and of casters that are a link of their own, which is the hull's last."""
     wheels = [joint + 1 if wheel.steered else joint for wheel, joint in zip(body.wheels, joints, strict=True)]
-    return (*wheels, hull[-1]) if casters else tuple(wheels)
+    return dict.fromkeys(wheels, ON_WHEELS) | ({hull[-1]: ON_CASTERS} if casters else {})
 
 
 def _build(client: int, body: RobotBody, casters: Sequence[Solid] = ()) -> tuple[int, tuple[int, ...], tuple[int, ...]]:

@@ -48,7 +48,7 @@ def test_a_collision_ends_when_the_robot_has_left_however_far_it_then_is(simulat
     assert not simulation.touching()
 
 
-@pytest.mark.parametrize("height", [0.008, 0.012, 0.02])
+@pytest.mark.parametrize("height", [0.02, 0.028])
 def test_a_sill_that_holds_the_robot_is_a_collision_and_leaves_no_clearance(simulate, height):
     simulation = simulate(solids=[box("sill", 0.6, 0, 0.05, 4, height)], drive=(0.3, 0.0, 0.0))
     events, samples = watch(simulation, 720)
