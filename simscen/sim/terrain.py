@@ -93,7 +93,7 @@ class Terrain:
 def stands(terrain: Mapping[int, str | None], rolling: Mapping[int, float], other: int, link: int, up: float) -> bool:
     """Whether a contact is that of a wheel or caster with the ground, rather than a collision.
 
-    `rolling` are those links, and the least `up` at which they stand: the z of the unit normal towards the robot. `other`
-    is the engine's number of what the robot's `link` touches.
+    `rolling` are those links, and the least `up` at which they stand: the z of the unit normal towards the robot.
+    `other` is the engine's number of what the robot's `link` touches.
     """
     return other in terrain and link in rolling and up >= rolling[link]

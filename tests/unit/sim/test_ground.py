@@ -132,8 +132,7 @@ def test_a_height_field_carries_wheels_as_a_ramp_does(on_ground):
     x, y = np.meshgrid(steps, np.linspace(-1.0, 1.0, 21))
     z = np.clip(x - FOOT, 0.0, 1.0) * math.tan(math.radians(5))
     number = np.arange(x.size, dtype=np.int32).reshape(x.shape)
-    sw, se, nw, ne = (number[a, b].ravel() for a, b in
-                      ((np.s_[:-1], np.s_[:-1]), (np.s_[:-1], np.s_[1:]), (np.s_[1:], np.s_[:-1]), (np.s_[1:], np.s_[1:])))  # fmt: skip
+    sw, se, nw, ne = (part.ravel() for rows in (number[:-1], number[1:]) for part in (rows[:, :-1], rows[:, 1:]))
     faces = np.concatenate((np.column_stack((sw, se, ne)), np.column_stack((sw, ne, nw))))
     terrain = Solid(Mesh(np.column_stack((x.ravel(), y.ravel(), z.ravel())), faces), Pose3(), "terrain")
     simulation = on_ground("turtlebot", [terrain], drive=(0.4, 0.0, 0.0))
