@@ -39,6 +39,7 @@ class Clearance:
         tick_rate: int,
         static: TriangleMesh,
         obstacles: TriangleMesh,
+        uneven: bool,
         robot: RobotBody,
         base: Base,
         actors: Actors,
@@ -47,15 +48,16 @@ class Clearance:
     ) -> None:
         """`others` gives the other robots, as they are measured; `reach` is how far is searched, in metres.
 
-        `obstacles` are what of the `static` world is in the robot's way, which a ramp that it drives over is not; where
-        they are something else, its wheels and casters stand on the rest.
+        `obstacles` are what of the `static` world is in the robot's way, which a ramp that it drives over is not.
+        `uneven`: there is ground besides the floor, for its wheels and casters to stand on.
         """
         self._client, self._rate, self._base, self._actors = client, tick_rate, base, actors
         self._others = others
         self._limits, (self._radius, self._height) = robot.limits, reach_of(robot.solid)
         self._size = ROUNDED + math.hypot(self._radius, self._height)
-        uneven = obstacles is not static
-        self._proximity = Proximity(static, replace(robot, casters=()) if uneven else robot, reach)
+        # Where wheels roll on solids they may also hit them.
+        touching = replace(robot, casters=(*robot.casters, *robot.tyres)) if uneven else robot
+        self._proximity = Proximity(static, touching, reach)
         self._ways = Proximity(obstacles, robot, reach) if uneven else self._proximity
         self._reach = reach
         self._shaken_at = -1

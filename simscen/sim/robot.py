@@ -100,8 +100,9 @@ class Robot:
         self.base, self._drive = build(scene.client, body, pose, period, scene.terrain)
         self.shape = Body(name, body.solid, Pose3.planar(pose), body.mass)
         self._contacts = Contacts(scene.rate)
+        uneven = bool(scene.terrain and self.base.rolling)
         self._clearance = Clearance(
-            scene.client, scene.rate, static, obstacles, body, self.base, scene.actors, self._others, reach
+            scene.client, scene.rate, static, obstacles, uneven, body, self.base, scene.actors, self._others, reach
         )
         self._names: dict[int, str | None] = {}
 

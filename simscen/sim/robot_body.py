@@ -3,7 +3,8 @@
 import math
 from dataclasses import dataclass
 
-from simscen.core.shapes import Solid
+from simscen.core.geometry import Pose3
+from simscen.core.shapes import Solid, Sphere
 from simscen.core.world import Polygon
 from simscen.model.robot import Drive, Limits, RobotSpec
 from simscen.sim.inertia import MassProperties
@@ -38,6 +39,11 @@ class RobotBody:
     def solid(self) -> tuple[Solid, ...]:
         """What can touch an obstacle, in the order in which the engine gets it."""
         return (*self.casters, *self.hull)
+
+    @property
+    def tyres(self) -> tuple[Solid, ...]:
+        """What wheels roll on the ground with: balls."""
+        return tuple(Solid(Sphere(wheel.radius), Pose3(wheel.x, wheel.y, wheel.radius)) for wheel in self.wheels)
 
     @property
     def circumscribed_radius(self) -> float:
