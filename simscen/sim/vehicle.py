@@ -1,6 +1,6 @@
 """A robot in the engine: its hull as base, its wheels as links, and where its base frame is."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -38,7 +38,7 @@ class Vehicle:
         self._centre_from_base = self._base_from_centre.inverse()
         casters = yielding(body.casters) if terrain else ()
         self.id, self.joints, self.hull_links = _build(client, body, casters)
-        self.rolling = _rolling(body, self.joints, self.hull_links, casters)
+        self.rolling: Mapping[int, float] = _rolling(body, self.joints, self.hull_links, casters)
         standing = [(caster.pose.x, caster.pose.y) for caster in body.casters if not lowest(caster)]
         self._feet = np.array([*((wheel.x, wheel.y) for wheel in body.wheels), *standing])
         pybullet.changeDynamics(self.id, -1, localInertiaDiagonal=moments, physicsClientId=client)
