@@ -28,6 +28,7 @@ class AnyAction(Choice):
     push: Annotated[Action | None, OnDemand("simscen.actions.push", "Push")] = None
     new_goal: Annotated[Action | None, OnDemand("simscen.actions.goals", "NewGoal")] = None
     cancel_goal: Annotated[Action | None, OnDemand("simscen.actions.goals", "CancelGoal")] = None
+    friction: Annotated[Action | None, OnDemand("simscen.actions.friction", "FrictionPatch")] = None
     mark: Annotated[Action | None, OnDemand("simscen.actions.mark", "Mark")] = None
 
     def may(self, *kinds: str) -> bool:

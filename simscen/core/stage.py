@@ -11,6 +11,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
 from simscen.core.navigation import Goal, Path
 from simscen.core.shapes import Body, MotionPath
+from simscen.core.surface import Patch
 from simscen.core.time import Clock
 from simscen.core.walker import Walker
 from simscen.core.world import Polygon
@@ -148,6 +149,10 @@ class Stage(Situation, Protocol):
 
         It is spread evenly over so many `seconds`; over one tick of the physics for 0.
         """
+        ...
+
+    def lay(self, name: str, patch: Patch) -> None:
+        """Make a piece of floor slippery, or dry again; a patch of the same name is replaced."""
         ...
 
     def send_goal(self, name: str) -> None:

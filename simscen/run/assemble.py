@@ -10,6 +10,7 @@ from simscen.core.events import Event, EventKind
 from simscen.core.geometry import Array, Pose3
 from simscen.core.sensing import Odometry
 from simscen.core.shapes import Body, Solid, TriangleMesh
+from simscen.core.surface import Patch
 from simscen.core.time import Clock
 from simscen.model.anystack import ExternalStackSpec
 from simscen.run.agent import Agent
@@ -54,6 +55,8 @@ def assemble(prepared: Prepared, seed: int, printed: Path | None = None) -> Rig:
         solver_iterations=spec.physics.solver_iterations,
         clearance_range=prepared.case.clearance_range,
     )
+    for region, friction in world.friction.items():
+        simulation.lay(region, Patch(world.regions[region], friction))
     robot = simulation.robots[NAMELESS]
     rays = LiveRays(RayScene(prepared.built.mesh), robot)
     sensors: tuple[Sensor, ...] = build_sensors(prepared.robot, clock, streams, robot, rays)

@@ -13,6 +13,7 @@ from simscen.core.motion import Twist
 from simscen.core.navigation import Goal, Path
 from simscen.core.sensing import Readings, Scan
 from simscen.core.shapes import Body, Box, Capsule, Cone, Cylinder, Extrusion, MotionPath, Shape, Sphere
+from simscen.core.surface import Patch
 from simscen.core.time import Clock
 from simscen.core.trace import Decision, Truth
 from simscen.core.walker import Walker
@@ -212,6 +213,10 @@ class LiveStage:
         about: dict[str, Value] = {"impulse": list(impulse), **({"seconds": seconds} if seconds else {})}
         kind = EventKind.ROBOT_PUSHED if name is None else EventKind.OBJECT_PUSHED
         self.note(Event(0, kind, name or "", about))
+
+    def lay(self, name: str, patch: Patch) -> None:
+        """Make a piece of floor slippery, or dry again."""
+        self._simulation.lay(name, patch)
 
     def send_goal(self, name: str) -> None:
         """Preempt with a new goal."""

@@ -1,6 +1,6 @@
 """How velocity commands become motion, for each type of drive."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Protocol
 
 from simscen.core.geometry import Pose2, Pose3
@@ -35,6 +35,10 @@ class Base(Protocol):
 
     def velocity(self) -> tuple[Vector, Vector]:
         """Linear velocity of the base frame's origin (m/s) and angular velocity (rad/s), along the world's axes."""
+        ...
+
+    def hold(self, friction: Callable[[float, float], float]) -> None:
+        """Hold on the floor during the next step as its `friction` at x, y in the world lets wheels hold."""
         ...
 
     def push(self, impulse: tuple[float, float], seconds: float) -> None:

@@ -1,7 +1,7 @@
 """A base that moves in any direction, idealised as a motor for each direction."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import pybullet
 
@@ -61,7 +61,7 @@ class PlanarBase:
             )  # fmt: skip
         for link in self.hull_links:
             engine.touch(client, self.id, link, engine.HULL, ~engine.GROUND)
-        self._mass = body.mass
+        self._mass, self._held = body.mass, 1.0
         self._radius = body.circumscribed_radius
         self.place(pose)
 
@@ -90,9 +90,14 @@ class PlanarBase:
         force = (impulse[0] / seconds, impulse[1] / seconds, 0.0)
         pybullet.applyExternalForce(self.id, 2, force, place, pybullet.WORLD_FRAME, physicsClientId=self._client)
 
+    def hold(self, friction: Callable[[float, float], float]) -> None:
+        """Its motors have no more force than the floor below its middle holds."""
+        x, y, _ = self.plane()
+        self._held = friction(x, y)
+
     def motors(self, velocity: Twist) -> None:
         """Run the motors: a velocity along the world's axes, with no more force than wheels have grip."""
-        grip = GRIP * self._mass * GRAVITY
+        grip = min(GRIP, self._held) * self._mass * GRAVITY
         pybullet.setJointMotorControlArray(
             self.id,
             self.joints,

@@ -18,6 +18,7 @@ from simscen.sim.clearance import Clearance
 from simscen.sim.contacts import Before, Contacts, Motion, inside, touches
 from simscen.sim.drives import build
 from simscen.sim.film import Film
+from simscen.sim.floor import Floor
 from simscen.sim.lost import lost
 from simscen.sim.robot_body import RobotBody
 from simscen.sim.terrain import Terrain, stands
@@ -49,6 +50,13 @@ class Scene:
     robots: dict[str, "Robot"] = field(default_factory=dict)
     tick: int = 0
     presses: list[Press] = field(default_factory=list)
+    floor: Floor = field(default_factory=Floor)
+
+    def hold(self) -> None:
+        """Let wheels hold during the next step as the floor does where they are."""
+        self.floor.pass_time(self.tick)
+        for robot in self.robots.values():
+            robot.base.hold(self.floor.friction)
 
     def press(self) -> bool:
         """Let the forces that last press on during the next step; whether there are any."""

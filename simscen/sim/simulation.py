@@ -10,6 +10,7 @@ import pybullet
 from simscen.core.case import CLEARANCE_RANGE
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.shapes import Body, MotionPath, TriangleMesh
+from simscen.core.surface import Patch
 from simscen.sim import engine
 from simscen.sim.actors import Actors
 from simscen.sim.contacts import Before
@@ -90,6 +91,8 @@ class Simulation:
             if scene.tick % self._firmware == 0:
                 for robot in self.robots.values():
                     robot.advance()
+            if scene.floor:
+                scene.hold()
             if scene.presses and scene.press():
                 calm = -1
             if scene.tick < calm:
@@ -114,6 +117,10 @@ class Simulation:
         for robot in self.robots.values():
             robot.feel(Before(motions[robot.base.id], others, motions))
         scene.actors.show(scene.tick)
+
+    def lay(self, name: str, patch: Patch) -> None:
+        """Make a piece of floor slippery, or dry again; a patch of the same name is replaced."""
+        self._scene.floor.lay(name, patch)
 
     def spawn(self, body: Body) -> None:
         """Put a body into the world."""

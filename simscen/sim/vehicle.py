@@ -1,6 +1,6 @@
 """A robot in the engine: its hull as base, its wheels as links, and where its base frame is."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -44,6 +44,11 @@ class Vehicle:
         pybullet.changeDynamics(self.id, -1, localInertiaDiagonal=moments, physicsClientId=client)
         for wheel, joint in zip(body.wheels, self.joints, strict=True):
             self._set_up(wheel, joint)
+        self._wheels: dict[int, Vector] = {
+            joint + 1 if wheel.steered else joint: (wheel.x, wheel.y, 0.0)
+            for wheel, joint in zip(body.wheels, self.joints, strict=True)
+        }
+        self._grip = dict.fromkeys(self._wheels, 1.0)
         self.place(pose)
 
     def _set_up(self, wheel: Wheel, joint: int) -> None:
@@ -91,6 +96,16 @@ class Vehicle:
             turn = Pose3(0, 0, 0, *turn).compose(self._centre_from_base).quaternion
         x, y, z = rotated(turn, self._centre)
         return (vx - (wy * z - wz * y), vy - (wz * x - wx * z), vz - (wx * y - wy * x)), (wx, wy, wz)
+
+    def hold(self, friction: Callable[[float, float], float]) -> None:
+        """Give each wheel the friction of the floor below it."""
+        base = self.pose()
+        for link, place in self._wheels.items():
+            x, y, _ = rotated(base.quaternion, place)
+            found = friction(base.x + x, base.y + y)
+            if found != self._grip[link]:
+                self._grip[link] = found
+                pybullet.changeDynamics(self.id, link, lateralFriction=found, physicsClientId=self._client)
 
     def push(self, impulse: tuple[float, float], seconds: float) -> None:
         """Push its centre of mass during the next step, which lasts `seconds`."""

@@ -12,6 +12,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import Goal, Path
 from simscen.core.shapes import Body, MotionPath
+from simscen.core.surface import Patch
 from simscen.core.time import Clock
 from simscen.core.walker import Walker
 from simscen.core.world import Polygon
@@ -96,6 +97,10 @@ class PuppetStage:
     def push(self, impulse: tuple[float, float], name: str | None = None, seconds: float = 0.0) -> None:
         """Write it down."""
         self.done.append(("push", impulse, name, seconds))
+
+    def lay(self, name: str, patch: Patch) -> None:
+        """Write it down."""
+        self.done.append(("lay", name, patch))
 
     def send_goal(self, name: str) -> None:
         """Write it down."""
