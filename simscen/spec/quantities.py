@@ -120,6 +120,6 @@ Frequency = Annotated[float, Field(gt=0, le=1000), Quantity("frequency")]
 Force = Annotated[float, Field(ge=-1e5, le=1e5), Quantity("force")]
 Impulse = Annotated[float, Field(ge=-1e5, le=1e5), Quantity("impulse")]
 Ratio = Annotated[float, Field(ge=0), Quantity("ratio")]
-Friction = Annotated[float, Field(ge=0, le=2)]
+Friction = Annotated[float, Field(ge=0, le=2), Quantity("ratio")]
 """Of a surface against the rubber of a wheel: 1 on dry concrete, 0.3 on a wet floor, 0.1 on oil or ice."""
 Probability = Annotated[float, Field(ge=0, le=1), Quantity("ratio")]
