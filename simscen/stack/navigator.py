@@ -109,6 +109,8 @@ class Navigator:
             return STOP
         if planning:
             self._note(tick, EventKind.PLAN_FAILED, "", **_described(failure))
+        else:
+            self._plans.not_followed()
         if not self._retried:
             self._retried = True
             self._costmap.clear()

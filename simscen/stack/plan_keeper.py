@@ -1,5 +1,6 @@
 """Makes the plan, watches over it while it is followed, and replaces it when need be: half of Nav2's tree."""
 
+import contextlib
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -8,7 +9,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.navigation import ErrorCode, Goal, Path
 from simscen.model.stack import PlannerSpec
 from simscen.stack.costmap.costmap import Costmap
-from simscen.stack.protocols import Controller, NavigationFailure, Planner
+from simscen.stack.protocols import Controller, CostmapView, NavigationFailure, Planner
 from simscen.stack.replanning import PlanInForce
 
 TIGHT_PERIOD = 0.5
@@ -19,6 +20,9 @@ BETTER_PERIOD = 2.0
 """Seconds between two looks for a shorter way after obstacles have gone."""
 RECONSIDER = 2
 """Every which step the plan is looked at: 10 Hz at the default rate, twice as often as Nav2's costmap is updated."""
+CAUTION = (0.10, 0.05)
+"""Metres of room beyond what is needed that plans keep, if they can, once the robot could not follow one: where it is
+as tight as belief, map and scan are uncertain, the same way would end the same again."""
 GONE = 8
 """Cells of live obstacles that must have gone for that; single cells come and go with the lidar's noise."""
 
@@ -47,12 +51,16 @@ class PlanKeeper:
         self.drop("goal")
         self._checked, self._adopted, self._looked, self._most = -1, now, now, 0
         self._partial, self._origin = False, (0.0, 0.0)
-        self._steps = 0
+        self._steps, self._cautious = 0, False
 
     def drop(self, reason: str) -> None:
         """Make a new plan at the next step, for this reason."""
         self.plan: PlanInForce | None = None
         self._reason = reason
+
+    def not_followed(self) -> None:
+        """The plan could not be followed: until the next goal, take a roomier way where there is one."""
+        self._cautious = True
 
     def step(self, tick: int, now: float, goal: Goal, pose: Pose2) -> None:
         """See to it that there is a plan that can be followed. Raises NavigationFailure when there is none."""
@@ -113,11 +121,17 @@ class PlanKeeper:
         self._plans += 1
         view, aim = self._costmap.view, self._costmap.aim(pose, goal.pose)
         self._partial, self._origin = aim is not goal.pose, view.origin
-        path = self.planner.plan(view, pose, aim, self._plan_seed(self._plans))
+        path = self._planned(view, pose, aim, self._plan_seed(self._plans))
         x, y, yaw = path.points[-1].tolist()
         if not self._partial and goal.pose.distance(Pose2(x, y, yaw)) > goal.xy_tolerance:
             raise NavigationFailure(ErrorCode.GOAL_OCCUPIED, "the robot does not fit within the goal's tolerance")
         return replace(path, tick=tick)
+
+    def _planned(self, view: CostmapView, pose: Pose2, aim: Pose2, seed: int) -> Path:
+        for room in CAUTION if self._cautious else ():
+            with contextlib.suppress(NavigationFailure):  # no roomier way
+                return self.planner.plan(view.with_less_room(room), pose, aim, seed)
+        return self.planner.plan(view, pose, aim, seed)
 
     def _adopt(self, tick: int, now: float, path: Path, reason: str) -> None:
         view = self._costmap.view

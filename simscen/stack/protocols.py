@@ -7,7 +7,7 @@ Promises are written as *given … then …* and tested in tests/contracts on ev
 - *Given* a failure *then* a NavigationFailure with one of Nav2's codes, never another exception.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -97,6 +97,10 @@ class Localizer(Protocol):
         ...
 
 
+LETHAL = 254
+"""nav2_costmap_2d's cost of an obstacle."""
+
+
 @dataclass(frozen=True, eq=False)
 class CostmapView:
     """A costmap at a moment, in the map frame.
@@ -113,6 +117,11 @@ class CostmapView:
     resolution: float
     origin: tuple[float, float]
     revision: int = 0
+
+    def with_less_room(self, metres: float) -> "CostmapView":
+        """The same place with every obstacle so much larger all round."""
+        costs = np.where(self.distance <= metres, np.uint8(LETHAL), self.costs)
+        return replace(self, costs=costs, distance=np.maximum(self.distance - np.float32(metres), np.float32(0)))
 
 
 class Planner(Protocol):

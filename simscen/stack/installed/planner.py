@@ -7,10 +7,9 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.navigation import Path
 from simscen.model.stack import PlannerSpec
 from simscen.stack.installed.watched import Watched
-from simscen.stack.protocols import CostmapView, Planner
+from simscen.stack.protocols import LETHAL, CostmapView, Planner
 from simscen.stack.setting import Setting
 
-LETHAL = 254
 AT_START = 0.05
 """Metres between the start that was asked for and the first point of a path, at most."""
 

@@ -138,3 +138,40 @@ def test_a_plan_that_ends_too_far_from_the_goal_means_that_the_goal_is_occupied(
     with pytest.raises(NavigationFailure) as failed:
         bench.steps(1)
     assert failed.value.code == ErrorCode.GOAL_OCCUPIED
+
+
+def test_after_a_plan_that_could_not_be_followed_plans_keep_more_room_until_the_next_goal() -> None:
+    bench = Bench()
+    straight, asked = bench.script.plan, list[float]()
+
+    def plan(costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
+        row, column = (round((at - low) / costmap.resolution) for at, low in zip((3.0, 1.0), costmap.origin, strict=True))
+        asked.append(float(bench.costmap.view.distance[row, column] - costmap.distance[row, column]))
+        return straight(costmap, start, goal, seed)
+
+    bench.script.plan = plan
+    bench.steps(2)
+    bench.keeper.not_followed()
+    bench.keeper.drop("recovery")
+    bench.steps(2)
+    bench.keeper.reset(bench.now)
+    bench.steps(2)
+    assert asked == pytest.approx([0.0, 0.1, 0.0])
+
+
+def test_where_there_is_no_roomier_way_the_tight_one_is_tried_again() -> None:
+    bench = Bench()
+    bench.steps(2)
+    bench.keeper.not_followed()
+    bench.keeper.drop("recovery")
+    straight, room = bench.script.plan, list[bool]()
+
+    def plan(costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
+        room.append(costmap.distance is bench.costmap.view.distance)
+        if not room[-1]:
+            raise NavigationFailure(ErrorCode.NO_VALID_PATH, "too tight")
+        return straight(costmap, start, goal, seed)
+
+    bench.script.plan = plan
+    assert bench.steps(2) == ["recovery"]
+    assert room == [False, False, True]
