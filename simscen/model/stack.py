@@ -64,7 +64,8 @@ class Amcl(Ranged, LocalizerSpec):
     update_min_a: Annotated[NonNegativeAngle, Field(le=6.3)] = 0.2
     resample_interval: Annotated[int, Field(ge=1, le=100)] = 1
     max_beams: Annotated[int, Field(ge=2, le=4096)] = 60
-    laser_model_type: Literal["likelihood_field", "likelihood_field_prob", "beam"] = "likelihood_field"
+    laser_model_type: Literal["likelihood_field", "likelihood_field_prob", "beam"] = "likelihood_field_prob"
+    """Nav2's default is `likelihood_field`, which forgives more and knows less."""
     z_hit: Probability = 0.5
     z_short: Probability = 0.05
     z_max: Probability = 0.05

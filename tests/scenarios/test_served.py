@@ -90,7 +90,7 @@ SHIPPED = sorted(str(path.relative_to(ROOT / "scenarios")) for path in (ROOT / "
 )
 def test_a_shipped_scenario_gives_the_same_bits_through_the_socket(name: str, tmp_path: Path) -> None:
     here, there = logs(ROOT / "scenarios" / name, ROOT, tmp_path)
-    assert len(here) > 100_000
+    assert len(here) > 20_000
     assert there == here
 
 
@@ -98,7 +98,7 @@ def test_truth_cameras_several_lidars_preempted_late_and_canceled_goals_give_the
     (tmp_path / "a.scenario.yaml").write_text(EVERYTHING)
     (tmp_path / "watcher.robot.yaml").write_text(ROBOT)
     here, there = logs(tmp_path / "a.scenario.yaml", tmp_path, tmp_path)
-    assert len(here) > 100_000
+    assert len(here) > 20_000
     assert there == here
 
 

@@ -96,7 +96,11 @@ SLIPPING = ROOM % WALKERS + (
     "goals: [{pose: {x: 5.2, y: 1.2}, timeout: 60 s}, {pose: {x: 5, y: 3}, timeout: 60 s}]\n"
     "faults: [{sensor: odom, slip: {left: 30 %, right: 15 %}, when: {travelled: 1 m}, for: 5 s}]\n"
 )
-RECOVERY = "stack: {localizer: {max_particles: 5000, recovery_alpha_slow: 0.001, recovery_alpha_fast: 0.1}}\n"
+RECOVERY = """\
+stack:
+  localizer:
+    {laser_model_type: likelihood_field, max_particles: 5000, recovery_alpha_slow: 0.001, recovery_alpha_fast: 0.1}
+"""
 
 
 @pytest.mark.parametrize("stack", ["", RECOVERY], ids=["no recovery", "recovery"])

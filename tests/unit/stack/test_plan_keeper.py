@@ -145,7 +145,9 @@ def test_after_a_plan_that_could_not_be_followed_plans_keep_more_room_until_the_
     straight, asked = bench.script.plan, list[float]()
 
     def plan(costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
-        row, column = (round((at - low) / costmap.resolution) for at, low in zip((3.0, 1.0), costmap.origin, strict=True))
+        row, column = (
+            round((at - low) / costmap.resolution) for at, low in zip((3.0, 1.0), costmap.origin, strict=True)
+        )
         asked.append(float(bench.costmap.view.distance[row, column] - costmap.distance[row, column]))
         return straight(costmap, start, goal, seed)
 

@@ -19,10 +19,13 @@ from simscen.model.stack import Amcl, Ekf
 from simscen.model.stack import Localizer as Spec
 from simscen.testing.room import USUAL, Drive, Noise, drive, errors, localizer, nees, run, scan
 
+SUM = Amcl(laser_model_type="likelihood_field")
 PROB = Amcl(laser_model_type="likelihood_field_prob")
 BEAM = Amcl(laser_model_type="beam")
-MANY = Amcl(max_particles=5000)
-RECOVERING = Amcl(max_particles=5000, recovery_alpha_slow=0.001, recovery_alpha_fast=0.1)
+MANY = Amcl(laser_model_type="likelihood_field", max_particles=5000)
+RECOVERING = Amcl(
+    laser_model_type="likelihood_field", max_particles=5000, recovery_alpha_slow=0.001, recovery_alpha_fast=0.1
+)
 RECOVERING_PROB = RECOVERING.model_copy(update={"laser_model_type": "likelihood_field_prob"})
 EXACT_EKF = Ekf(type="ekf", translation_noise=0.01, rotation_noise=0.01, gyro_noise=0.002)
 # Motion noise near that of our wheels, and hits as exact as the cells of the map: what a well-tuned filter would use.
@@ -146,7 +149,7 @@ def print_among_people(seeds: Iterable[int]) -> None:
 
 def print_costs() -> None:
     """How long one correction takes."""
-    for spec in (Amcl(), PROB, BEAM):
+    for spec in (SUM, PROB, BEAM):
         cost = " and ".join(f"{update_cost(spec, n):.2f} ms with {n}" for n in (500, 2000))
         print(f"an update, {spec.laser_model_type}, 60 beams: {cost} particles", flush=True)
 
@@ -154,7 +157,7 @@ def print_costs() -> None:
 def print_tracking(seeds: Iterable[int]) -> None:
     """How well each localizer knows where it is on the way round the room."""
     tracked: list[tuple[str, Spec, Noise, bool]] = [
-        ("amcl", Amcl(), USUAL, False),
+        ("amcl", SUM, USUAL, False),
         ("amcl, recovery", RECOVERING, USUAL, False),
         ("amcl, prob", PROB, USUAL, False),
         ("amcl, prob, recovery", RECOVERING_PROB, USUAL, False),
@@ -175,15 +178,15 @@ def print_tracking(seeds: Iterable[int]) -> None:
 def print_searches(seeds: Iterable[int]) -> None:
     """How often a robot that is lost finds itself."""
     searches: list[tuple[str, Callable[[Spec, Iterable[int]], Search], Spec]] = [
-        ("wrong start, amcl", wrong_start, Amcl()),
+        ("wrong start, amcl", wrong_start, SUM),
         ("wrong start, prob", wrong_start, PROB),
-        ("global, amcl, 2000", global_start, Amcl()),
+        ("global, amcl, 2000", global_start, SUM),
         ("global, amcl, 5000", global_start, MANY),
         ("global, prob, 5000", global_start, PROB.model_copy(update={"max_particles": 5000})),
         ("global, prob, 20000", global_start, PROB.model_copy(update={"max_particles": 20_000})),
         ("kidnapped, amcl, recovery, 5000", kidnapping, RECOVERING),
         ("kidnapped, prob, recovery, 5000", kidnapping, RECOVERING_PROB),
-        ("kidnapped, amcl, no recovery", kidnapping, Amcl()),
+        ("kidnapped, amcl, no recovery", kidnapping, SUM),
     ]
     for name, measure, spec in searches:
         result = measure(spec, seeds)

@@ -136,7 +136,7 @@ def test_resampling_happens_on_every_interval_only(updates: int, equal: bool) ->
 
 
 def test_selective_resampling_waits_until_half_of_the_particles_carry_no_weight() -> None:
-    patient = weights_after(Amcl(selective_resampling=True), 1)
+    patient = weights_after(Amcl(selective_resampling=True, laser_model_type="likelihood_field"), 1)
     assert np.ptp(patient) > 0
     assert 1 / (patient @ patient) > len(patient) / 2
     sharp = Amcl(selective_resampling=True, laser_model_type="likelihood_field_prob")

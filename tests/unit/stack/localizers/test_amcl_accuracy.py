@@ -12,7 +12,7 @@ SEEDS = range(101, 105)
 SEEDS_AMONG_PEOPLE = (5, 7)
 
 
-@pytest.mark.parametrize("spec", [Amcl(), measure.PROB, measure.BEAM], ids=lambda spec: spec.laser_model_type)
+@pytest.mark.parametrize("spec", [measure.SUM, measure.PROB, measure.BEAM], ids=lambda spec: spec.laser_model_type)
 def test_the_way_round_the_room_is_tracked_to_five_centimetres(spec: Amcl) -> None:
     seconds = 15.0 if spec is measure.BEAM else 30.0
     assert measure.tracking(spec, SEEDS[:2], seconds).rmse.max() <= 0.05
@@ -32,7 +32,8 @@ def test_a_robot_that_knows_its_start_is_not_believed_a_metre_off_where_the_best
 
 
 def test_an_estimate_half_a_metre_and_twenty_degrees_off_is_corrected() -> None:
-    assert measure.wrong_start(Amcl(), SEEDS).found.all()
+    assert measure.wrong_start(measure.SUM, SEEDS).found.all()
+    assert measure.wrong_start(measure.PROB, SEEDS).found.all()
 
 
 def test_a_robot_that_is_told_nothing_finds_itself() -> None:
@@ -68,5 +69,5 @@ def test_a_filter_tuned_to_its_sensors_is_about_as_wrong_as_it_says() -> None:
 
 def test_with_nav2s_defaults_the_covariance_is_too_large_and_never_too_small() -> None:
     """They assume wheels and a lidar that are ten times as noisy as ours."""
-    for spec in (Amcl(), measure.PROB):
+    for spec in (measure.SUM, measure.PROB):
         assert measure.tracking(spec, SEEDS, 20.0).anees.max() < 3
