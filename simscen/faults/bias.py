@@ -16,7 +16,7 @@ from simscen.faults._odometry import OdometryDistortion
 from simscen.faults._ranging import with_distances
 from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance
 from simscen.spec.base import Spec
-from simscen.spec.quantities import Acceleration, Angle, AngularSpeed, Length, Ratio
+from simscen.spec.quantities import Acceleration, Angle, AngularSpeed, Length, Quantity, Ratio
 
 
 class Bias(Spec, Fault):
@@ -51,8 +51,8 @@ class Bias(Spec, Fault):
     """Added to the turn rate about the vertical axis."""
     accelerometer: Acceleration = 0.0
     """Added to the acceleration forward."""
-    brightness: Annotated[float, Field(ge=-255, le=255)] = 0.0
-    """Added to each pixel's red, green and blue, of 255."""
+    brightness: Annotated[float, Field(ge=-1, le=1), Quantity("ratio")] = 0.0
+    """Added to each pixel's red, green and blue, of their full scale."""
 
     def senseless(self, instance: Instance) -> tuple[str, str] | None:
         """Keys that mean nothing there."""
@@ -87,5 +87,5 @@ class _Off(Disturbance):
             )
         told = with_distances(reading, lambda distances: distances + bias.range)
         if isinstance(told, Image) and bias.brightness:
-            return replace(told, rgb=np.clip(np.rint(told.rgb + bias.brightness), 0, 255).astype(np.uint8))
+            return replace(told, rgb=np.clip(np.rint(told.rgb + 255 * bias.brightness), 0, 255).astype(np.uint8))
         return told

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 import numpy as np
-from pydantic import Field
 
 from simscen.core.belief import Belief
 from simscen.core.geometry import Pose2
@@ -23,6 +22,7 @@ from simscen.spec.quantities import (
     NonNegativeAngle,
     NonNegativeAngularSpeed,
     NonNegativeLength,
+    Probability,
 )
 
 
@@ -49,8 +49,8 @@ class Noise(Spec, Fault):
     }
     std: NonNegativeLength = 0.0
     """Standard deviation of a range or depth."""
-    colour: Annotated[float, Field(ge=0, le=255)] = 0.0
-    """Standard deviation of a pixel's red, green and blue, of 255."""
+    colour: Probability = 0.0
+    """Standard deviation of a pixel's red, green and blue, of their full scale."""
     linear: NonNegativeLength = 0.0
     """Standard deviation of odometry's distance after one metre; of a belief, in x and in y."""
     angular: NonNegativeAngle = 0.0
@@ -80,7 +80,7 @@ class _Noise(Disturbance):
                 within = np.clip(noisy, reading.range_min, reading.range_max)
                 return replace(reading, ranges=np.where(np.isfinite(noisy), within, noisy))
             case Image(rgb=rgb, depth=depth):
-                colours = rgb + self._chance.normal(0.0, self._noise.colour, rgb.shape)
+                colours = rgb + self._chance.normal(0.0, 255 * self._noise.colour, rgb.shape)
                 depths = depth + self._chance.normal(0.0, self._noise.std, depth.shape)
                 seen = np.clip(np.rint(colours), 0, 255).astype(np.uint8)
                 return replace(reading, rgb=seen, depth=np.maximum(depths, 0.0).astype(np.float32))

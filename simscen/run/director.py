@@ -61,10 +61,10 @@ class Director:
 
     def _begin_fault(self, index: int) -> None:
         entry = self._faults[index]
-        self._rig.begin(index)
+        kind = self._rig.begin(index)
         lasts = None if entry.for_ is None else self._stage.clock.ticks(entry.for_)
         self._ends[index] = None if lasts is None else self._stage.tick + lasts
-        about: dict[str, Value] = {"entry": index, "sensor": entry.sensor, "fault": entry.kind}
+        about: dict[str, Value] = {"entry": index, "sensor": entry.sensor, "fault": entry.kind, "affects": kind}
         self._stage.note(Event(0, EventKind.FAULT_STARTED, entry.label, about))
 
     def _end_faults(self) -> None:

@@ -72,8 +72,11 @@ class FaultRig:
         self._linked = False
         self._believed: tuple[int, Belief, Belief] | None = None
 
-    def begin(self, index: int) -> None:
-        """Start the scenario's fault number `index`; each time its chance is a stream of its own."""
+    def begin(self, index: int) -> str:
+        """Start the scenario's fault number `index`; each time its chance is a stream of its own.
+
+        Returns the kind of what it affects.
+        """
         entry = self._faults[index]
         self._begun[index] += 1
         chance = self._streams.generator(f"fault{self._names[index]}#{self._begun[index]}")
@@ -83,6 +86,7 @@ class FaultRig:
             self._broke(index, f"begins as {disturbance!r}, which is no Disturbance")
         self._active[index, self._begun[index]] = _Active(index, entry.sensor, setting.kind, disturbance)
         self._linked = self._linked or setting.kind == COMMAND
+        return setting.kind
 
     def end(self, index: int) -> int:
         """End it; what it leaves behind stays at work. Returns how many messages and commands it has touched."""

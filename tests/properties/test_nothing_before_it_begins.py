@@ -62,11 +62,11 @@ LONG = 2.5
 VALUES = {
     ("noise", "Odometry"): "{linear: 5 cm, angular: 5 deg}",
     ("noise", "Imu"): "{gyro: 0.1 rad/s, accelerometer: 0.5}",
-    ("noise", "Image"): "{std: 5 cm, colour: 20}",
+    ("noise", "Image"): "{std: 5 cm, colour: 10 %}",
     ("noise", "Belief"): "{linear: 5 cm, angular: 2 deg}",
     ("bias", "Scan"): "{range: 5 cm}",
     ("bias", "Imu"): "{gyro: 0.05 rad/s}",
-    ("bias", "Image"): "{range: 5 cm, brightness: 30}",
+    ("bias", "Image"): "{range: 5 cm, brightness: 10 %}",
     ("drift", "Scan"): "{range: 5 cm/s}",
     ("drift", "Image"): "{range: 5 cm/s}",
     ("drift", "Odometry"): "{linear: 2 cm/s}",

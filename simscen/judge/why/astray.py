@@ -7,8 +7,10 @@ import numpy as np
 from simscen.core.events import EventKind
 from simscen.core.trace import Trace
 
-ODOMETRY = frozenset({"bias", "slip"})
+ODOMETRY = frozenset({"bias", "slip", "scale", "drift", "noise"})
 """Faults whose error stays in the odometry when they are over."""
+WHEELS, BELIEF = frozenset({"Odometry", "Wheels"}), "Belief"
+"""What such faults affect, and those that come between the localizer and the navigator."""
 LOST = 0.5
 """Metres between belief and truth from which a robot is lost: two radii of a small one."""
 
@@ -32,8 +34,8 @@ def astray(trace: Trace, tick: int, known: bool = False) -> tuple[list[str], set
             ago = trace.seconds(tick - event.tick)
             lines.append(f"event `{doing}` had set it down elsewhere {ago:.2f} s before")
             named.add(doing)
-        elif event.kind == EventKind.FAULT_TOOK_EFFECT and _fault(trace, event.name) in ODOMETRY:
-            lines.append(f"{event.name} falsified its odometry from t = {trace.seconds(event.tick):.2f} s on")
+        elif event.kind == EventKind.FAULT_TOOK_EFFECT and (what := _falsified(trace, event.name)):
+            lines.append(f"{event.name} falsified {what} from t = {trace.seconds(event.tick):.2f} s on")
             named.add(event.name)
     return lines, named
 
@@ -46,6 +48,12 @@ def _off(trace: Trace, tick: int) -> float:
     return float(np.hypot(bx - x, by - y))
 
 
-def _fault(trace: Trace, label: str) -> str:
-    kinds = [event.data.get("fault") for event in trace.of_kind(EventKind.FAULT_STARTED) if event.name == label]
-    return str(kinds[0]) if kinds else ""
+def _falsified(trace: Trace, label: str) -> str:
+    """Which of its ideas of where it is a fault falsified; "" for none."""
+    starts = [event.data for event in trace.of_kind(EventKind.FAULT_STARTED) if event.name == label]
+    if not starts:
+        return ""
+    affects = starts[0].get("affects", "Odometry")  # logs from before lidars had a bias do not say
+    if affects == BELIEF:
+        return "its belief"
+    return "its odometry" if affects in WHEELS and starts[0].get("fault") in ODOMETRY else ""

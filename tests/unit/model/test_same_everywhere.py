@@ -56,6 +56,8 @@ NO_PLACES = {
     "WorldSpec.regions": "an area is drawn, corner by corner",
     "Part.pose": "in the robot's frame",
     "RobotSpec.footprint": "in the robot's frame",
+    "Outdated.missing": "an area is drawn, corner by corner",
+    "Outdated.extra": "likewise",
     "Spawn.ahead": "in the robot's frame",
     **{f"{shape}.polygon": "in the thing's own frame" for shape in ("Obstacle", "Movable", "Part", "Spawn")},
     **{f"{shape}.cylinder": "radius and height" for shape in ("Obstacle", "Movable", "Part", "Spawn")},
