@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from simscen.criteria.bounds import at_least, at_most, counted, held, missed, undecided
     from simscen.criteria.measure import Measure
     from simscen.criteria.signals import clearance, drive, pose_error, speed, truth, turn_rate
-    from simscen.faults.base import Disturbance, Fault, Wheels
+    from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance, Sight, Wheels
     from simscen.model.robot import Mount, SensorSpec
     from simscen.model.stack import (
         BehaviorSpec,
@@ -113,6 +113,7 @@ __all__ = [
     "EventKind",
     "Evidence",
     "Fault",
+    "FaultSetting",
     "Finding",
     "Footprint",
     "Frequency",
@@ -123,6 +124,7 @@ __all__ = [
     "Image",
     "Imu",
     "InProcessStack",
+    "Instance",
     "Length",
     "Localizer",
     "LocalizerSpec",
@@ -165,6 +167,7 @@ __all__ = [
     "SensorSpec",
     "SensorView",
     "Setting",
+    "Sight",
     "Situation",
     "Spec",
     "Speed",
@@ -257,6 +260,9 @@ _WHERE = {
     "simscen.faults.base": (
         "Disturbance",
         "Fault",
+        "FaultSetting",
+        "Instance",
+        "Sight",
         "Wheels",
     ),
     "simscen.triggers.base": ("Condition",),

@@ -1,0 +1,54 @@
+"""Faults at work, with a clock that tests turn by hand."""
+
+import math
+
+import numpy as np
+
+from simscen.core.belief import Belief
+from simscen.core.geometry import Pose2
+from simscen.core.motion import STOP
+from simscen.core.sensing import Image, Imu, Odometry, Scan
+from simscen.core.time import Clock
+from simscen.faults.base import FaultSetting, Instance
+from simscen.faults.fault import AnyFault
+
+
+class Hand:
+    """What time it is, in ticks of 1/240 s."""
+
+    tick = 0
+
+    def __call__(self) -> int:
+        return self.tick
+
+
+def begun(fault: dict, kind: str, now=lambda: 0, separation=0.3, seed=1, sight=None):
+    setting = FaultSetting(separation, Clock(240), now, kind, sight)
+    return AnyFault.model_validate(fault).fault.begin(np.random.default_rng(seed), setting)
+
+
+def senseless(fault: dict, kind: str, rate=0.0, spec=None):
+    return AnyFault.model_validate(fault).fault.senseless(Instance(kind, rate, spec))
+
+
+def scan(ranges, tick=0, least=0.1, most=12.0) -> Scan:
+    values = np.asarray(ranges, dtype=float)
+    return Scan("lidar", tick, values, -math.pi, 2 * math.pi / len(values), least, most)
+
+
+def odometry(pose=Pose2(0, 0), tick=0, twist=STOP) -> Odometry:
+    return Odometry("odom", tick, pose, twist)
+
+
+def imu(tick=0, turning=(0.0, 0.0, 0.2), pushing=(0.1, 0.0, 9.81)) -> Imu:
+    return Imu("imu", tick, turning, pushing)
+
+
+def image(depth, tick=0, grey=100) -> Image:
+    depths = np.asarray(depth, dtype=np.float32)
+    return Image("camera", tick, np.full((*depths.shape, 3), grey, np.uint8), depths)
+
+
+def belief(pose: Pose2, odom: Pose2) -> Belief:
+    """A belief at `pose` in the map when odometry says `odom`."""
+    return Belief(pose, np.eye(3), pose.compose(odom.inverse()))

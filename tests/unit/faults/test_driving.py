@@ -1,0 +1,68 @@
+"""What happens to commands and wheels, against the kinematics of a differential drive."""
+
+import numpy as np
+import pytest
+from begun import Hand, begun, odometry, senseless
+
+from simscen.core.geometry import Pose2
+from simscen.core.motion import Twist
+from simscen.core.sensing import Odometry
+from simscen.model.robot import Differential, Omnidirectional
+
+WHEELED = Differential(type="differential", wheel_radius=0.1, wheel_separation=0.4)
+
+
+def rims(motion: Twist, separation: float = 0.4) -> tuple[float, float]:
+    return motion.vx - separation / 2 * motion.wz, motion.vx + separation / 2 * motion.wz
+
+
+def test_a_gain_scales_a_command_on_its_way():
+    work = begun({"gain": {"linear": "50 %", "angular": -1}}, "Command")
+    assert work.command(Twist(0.4, 0.2, 1.0)) == pytest.approx((0.2, 0.1, -1.0))
+
+
+def test_a_weaker_side_rolls_its_share_and_the_other_all():
+    work = begun({"gain": {"left": "80 %"}}, "Wheels", separation=0.4)
+    told = Twist(0.4, 0.0, 0.5)
+    left, right = rims(work.command(told))
+    assert (left, right) == pytest.approx((0.8 * rims(told)[0], rims(told)[1]))
+
+
+def test_speeds_are_cut_and_keep_their_direction():
+    work = begun({"saturation": {"linear": 0.5, "angular": 1.0}}, "Command")
+    assert work.command(Twist(0.6, 0.8, -3.0)) == pytest.approx((0.3, 0.4, -1.0))
+    assert work.command(Twist(0.1, 0.0, 0.5)) == pytest.approx((0.1, 0.0, 0.5))
+
+
+def test_a_saturated_side_rolls_no_faster_than_its_limit_either_way():
+    work = begun({"saturation": {"left": 0.2}}, "Wheels", separation=0.4)
+    for told, expected in (((0.4, 0, 0.5), (0.2, 0.5)), ((-0.4, 0, 0), (-0.2, -0.4)), ((0.1, 0, 0), (0.1, 0.1))):
+        assert rims(work.command(Twist(*told))) == pytest.approx(expected)
+
+
+def test_accelerations_are_limited_from_one_beat_to_the_next():
+    now = Hand()
+    work = begun({"saturation": {"linear_acceleration": 0.5, "angular_acceleration": 1.0}}, "Wheels", now)
+    work.command(Twist())
+    speeds = []
+    for now.tick in range(12, 361, 12):
+        speeds.append(work.command(Twist(0.6, 0.0, 2.0)))
+    assert [speed.vx for speed in speeds] == pytest.approx(np.minimum(0.6, 0.025 * np.arange(1, 31)))
+    assert [speed.wz for speed in speeds] == pytest.approx(np.minimum(2.0, 0.05 * np.arange(1, 31)))
+
+
+def test_wheels_that_slip_mislead_every_odometry_of_theirs_each_by_its_own_sum():
+    work = begun({"slip": {"left": 0.5, "right": 0.5}}, "Wheels")
+    assert work.command(Twist(0.4)) == pytest.approx((0.2, 0, 0))
+    for k in range(5):
+        first = work.reading(odometry(Pose2(0.1 * k, 0), 6 * k))
+        other = work.reading(Odometry("other", 6 * k, Pose2(5 + 0.1 * k, 0), Twist()))
+    assert first.pose.x == pytest.approx(0.8)
+    assert other.pose.x == pytest.approx(5.8)
+
+
+@pytest.mark.parametrize("word", ["gain", "saturation"])
+def test_sides_are_those_of_wheels(word):
+    assert senseless({word: {"left": 0.5}}, "Command")[0] == "left"
+    assert senseless({word: {"right": 0.5}}, "Wheels", spec=Omnidirectional(type="omnidirectional"))[0] == "right"
+    assert senseless({word: {"right": 0.5}}, "Wheels", spec=WHEELED) is None

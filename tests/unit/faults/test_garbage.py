@@ -1,0 +1,37 @@
+"""Messages that say nonsense, as they are said to."""
+
+import numpy as np
+import pytest
+from begun import begun, image, imu, odometry, scan, senseless
+
+VALUES = {"nan": np.nan, "inf": np.inf, "zero": 0.0, "negative": -1.0, "huge": 1e30}
+
+
+@pytest.mark.parametrize("what", VALUES)
+def test_every_value_of_a_message_is_what_is_said(what):
+    spec, value = {"garbage": {"value": what}}, VALUES[what]
+    np.testing.assert_array_equal(begun(spec, "Scan").reading(scan([1.0, 2.0])).ranges, [value] * 2)
+    np.testing.assert_array_equal(begun(spec, "Odometry").reading(odometry()).pose, [value] * 3)
+    np.testing.assert_array_equal(begun(spec, "Imu").reading(imu()).linear_acceleration, [value] * 3)
+    np.testing.assert_array_equal(begun(spec, "Image").reading(image([[1.0]])).depth, [[np.float32(value)]])
+
+
+def test_a_message_can_be_cut_off_or_empty():
+    assert begun({"garbage": {"value": "empty"}}, "Scan").reading(scan([1.0] * 9)).ranges.tolist() == []
+    assert begun({"garbage": {"value": "short"}}, "Scan").reading(scan([1.0] * 9)).ranges.tolist() == [1.0] * 4
+    assert begun({"garbage": {"value": "short"}}, "Image").reading(image(np.ones((6, 4)))).rgb.shape == (3, 4, 3)
+    assert senseless({"garbage": {"value": "short"}}, "Odometry")[0] == "value"
+
+
+def test_the_share_of_garbage_is_what_is_said_and_all_else_is_untouched():
+    work, good = begun({"garbage": {"probability": "30 %"}}, "Imu"), imu()
+    got = [work.reading(good) for _ in range(4000)]
+    assert sum(one is not good for one in got) / 4000 == pytest.approx(0.3, abs=0.03)
+
+
+def test_anything_is_one_of_all_that_there_is():
+    work = begun({"garbage": {}}, "Scan")
+    sizes = [len(work.reading(scan([1.0] * 8)).ranges) for _ in range(400)]
+    assert {size: sizes.count(size) / 400 for size in (0, 4, 8)} == pytest.approx(
+        {0: 1 / 7, 4: 1 / 7, 8: 5 / 7}, abs=0.06
+    )

@@ -1,0 +1,133 @@
+"""Messages that come late, seldom, not at all, or always the same."""
+
+import numpy as np
+import pytest
+from begun import Hand, begun, belief, image, imu, odometry, scan, senseless
+
+from simscen.core.geometry import Pose2
+from simscen.core.motion import Twist
+
+
+def heard(fault: dict, ticks: int, period: int = 24, until: int | None = None) -> list[tuple[int, int]]:
+    """At which tick each scan arrives, and when it was taken; from `until` on the fault is over."""
+    now = Hand()
+    work, got = begun(fault, "Scan", now), []
+    for now.tick in range(ticks):
+        if now.tick == until:
+            work = work.end()
+        got += [(now.tick, one.tick) for one in work.arriving()]
+        if now.tick % period == 0 and (one := work.reading(scan([1.0], now.tick))) is not None:
+            got.append((now.tick, one.tick))
+    return got
+
+
+def test_a_fixed_delay_puts_every_message_off_by_the_same():
+    assert heard({"delay": {"latency": "0.2 s"}}, 200) == [(48 + 24 * k, 24 * k) for k in range(7)]
+
+
+def test_a_random_delay_is_uniform_and_never_changes_the_order():
+    got = heard({"delay": {"latency": "100 ms", "jitter": "1 s"}}, 24_000)
+    assert [taken for _, taken in got] == [24 * k for k in range(len(got))]
+    arrived = np.array([at for at, _ in got])
+    assert (np.diff(arrived) >= 0).all()
+    late = (arrived - np.array([taken for _, taken in got])) / 240
+    assert late.min() >= 0.1 - 1 / 480
+    assert late.max() <= 1.1 + 1 / 480
+    # A message waits for the slowest of those before it: later than uniform on average, which would be 0.6 s.
+    assert late.mean() > 0.6
+
+
+def test_messages_that_come_seldom_are_delayed_uniformly():
+    got = heard({"delay": {"latency": "100 ms", "jitter": "1 s"}}, 480_000, period=480)
+    late = np.array([(at - taken) / 240 for at, taken in got])
+    assert np.quantile(late, [0.25, 0.5, 0.75]) == pytest.approx([0.35, 0.6, 0.85], abs=0.05)
+
+
+def test_what_is_under_way_when_a_delay_ends_still_arrives_before_all_that_comes_after():
+    got = heard({"delay": {"latency": "0.5 s"}}, 400, until=60)
+    assert got == [(120, 0), (144, 24), (168, 48), (168, 72), (168, 96), (168, 120), (168, 144), (168, 168)] + [
+        (24 * k, 24 * k) for k in range(8, 17)
+    ]
+
+
+def test_only_the_newest_of_late_commands_counts():
+    now = Hand()
+    work = begun({"delay": {"latency": "50 ms"}}, "Command", now)
+    for now.tick in range(0, 12, 3):
+        assert work.command(Twist(now.tick)) is None
+    now.tick = 21
+    assert work.arriving_command() == Twist(9)
+    assert work.arriving_command() is None
+
+
+@pytest.mark.parametrize(("rate", "every"), [("5 Hz", 48), ("2 Hz", 120)])
+def test_a_slow_sensor_has_the_rate_that_is_said(rate, every):
+    assert [at for at, _ in heard({"slow": {"rate": rate}}, 1201)] == list(range(0, 1201, every))
+
+
+def test_a_rate_that_does_not_divide_the_sensors_own_is_kept_on_average():
+    got = [at for at, _ in heard({"slow": {"rate": "3 Hz"}}, 2400)]
+    assert len(got) == 30
+    assert set(np.diff(got)) == {72, 96}
+
+
+def test_slow_is_slower_than_the_sensor():
+    assert senseless({"slow": {"rate": 10}}, "Scan", rate=10.0)[0] == "rate"
+    assert senseless({"slow": {"rate": 9}}, "Scan", rate=10.0) is None
+
+
+def test_a_loose_contact_is_away_for_its_share_of_time_in_bursts_of_its_mean_length():
+    got = np.array([at for at, _ in heard({"intermittent": {"up": "1 s", "down": "0.5 s"}}, 240_000, period=6)])
+    assert len(got) / 40_000 == pytest.approx(2 / 3, abs=0.03)
+    gaps = np.diff(got)
+    gaps = gaps[gaps > 6] / 240
+    assert gaps.mean() == pytest.approx(0.5, rel=0.15)
+    assert gaps.std() == pytest.approx(0.5, rel=0.2)
+    assert got[0] > 0
+
+
+@pytest.mark.parametrize(
+    ("kind", "first", "later"),
+    [
+        ("Scan", scan([1.0, 2.0]), scan([3.0, 4.0], 24)),
+        ("Odometry", odometry(Pose2(1, 2)), odometry(Pose2(3, 4), 24)),
+        ("Imu", imu(), imu(24, (9, 9, 9))),
+        ("Image", image([[1.0]]), image([[2.0]], 24)),
+    ],
+)
+def test_a_stuck_sensor_repeats_its_first_message_with_fresh_stamps(kind, first, later):
+    work = begun({"stuck": {}}, kind)
+    assert work.reading(first) is not None
+    told = work.reading(later)
+    assert told.tick == 24
+    name = {"Scan": "ranges", "Odometry": "pose", "Imu": "angular_velocity", "Image": "depth"}[kind]
+    np.testing.assert_array_equal(getattr(told, name), getattr(first, name))
+
+
+def test_a_stuck_command_is_kept_and_stuck_wheels_do_not_turn():
+    command, wheels = begun({"stuck": {}}, "Command"), begun({"stuck": {}}, "Wheels")
+    assert [command.command(Twist(0.1 * k)) for k in range(1, 4)] == [Twist(0.1)] * 3
+    assert [wheels.command(Twist(0.1 * k)) for k in range(1, 4)] == [Twist()] * 3
+
+
+def test_a_localizer_that_is_off_leaves_the_robot_to_its_odometry():
+    work = begun({"off": {}}, "Belief")
+    work.belief(belief(Pose2(5, 5), Pose2(1, 0)))
+    told = work.belief(belief(Pose2(7, 6), Pose2(2, 0)))
+    assert told.pose == pytest.approx((6, 5, 0))
+    assert told.map_from_odom == pytest.approx((4, 5, 0))
+
+
+def test_a_localizer_that_is_stuck_keeps_the_robot_at_one_place():
+    work, first = begun({"stuck": {}}, "Belief"), belief(Pose2(5, 5), Pose2(1, 0))
+    assert work.belief(first) is first
+    assert work.belief(belief(Pose2(7, 6), Pose2(2, 0))) is first
+
+
+def test_a_belief_jumps_in_the_robots_own_frame_and_then_moves_as_the_map_lies_now():
+    work = begun({"jump": {"x": 1, "yaw": "90 deg"}}, "Belief")
+    told = work.belief(belief(Pose2(2, 2, np.pi / 2), Pose2(0, 0)))
+    assert told.pose == pytest.approx((2, 3, -np.pi), abs=1e-9) or told.pose == pytest.approx((2, 3, np.pi))
+    after = work.belief(belief(Pose2(2, 2.5, np.pi / 2), Pose2(0.5, 0)))
+    assert (after.pose.x, after.pose.y) == pytest.approx((1.5, 3))
+    assert after.map_from_odom.compose(Pose2(0.5, 0)) == pytest.approx(after.pose)
