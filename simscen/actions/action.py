@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 from simscen.actions.base import Action
 from simscen.spec.choice import Choice
 from simscen.spec.ondemand import OnDemand
+from simscen.spec.places import RobotName
 
 if TYPE_CHECKING:
     from simscen.core.stage import Effect, Stage
@@ -14,6 +15,7 @@ class AnyAction(Choice):
     """One thing to do."""
 
     group: ClassVar[str] = "action"
+    modifiers: ClassVar[frozenset[str]] = frozenset({"robot"})
 
     spawn: Annotated[Action | None, OnDemand("simscen.actions.spawn", "Spawn")] = None
     pedestrian: Annotated[Action | None, OnDemand("simscen.actions.pedestrian", "Pedestrian")] = None
@@ -31,6 +33,9 @@ class AnyAction(Choice):
     friction: Annotated[Action | None, OnDemand("simscen.actions.friction", "FrictionPatch")] = None
     mark: Annotated[Action | None, OnDemand("simscen.actions.mark", "Mark")] = None
 
+    robot: RobotName | None = None
+    """Which of several robots it is about; default: the only one."""
+
     def may(self, *kinds: str) -> bool:
         """Whether it does one of these; an action of an installed package may do anything."""
         return self.kind in kinds or self.narrow is not None
@@ -39,6 +44,7 @@ class AnyAction(Choice):
         """Do it now, and say what came of it."""
         action = self.chosen
         assert isinstance(action, Action)
+        stage = stage if self.robot is None else stage.of(self.robot)
         if self.narrow is None:
             return action.perform(stage)
         from simscen.actions.watched import perform_watched

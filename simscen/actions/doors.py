@@ -33,6 +33,11 @@ class OpenDoor(Spec, Action):
     to: Annotated[Ratio, Field(gt=0, le=1)] = 1.0
     """How far: 100 % is wide open, 30 % ajar."""
 
+    @property
+    def of_a_robot(self) -> bool:
+        """It is about the world."""
+        return False
+
     def perform(self, stage: Stage) -> Effect:
         """Set it going; nothing comes of it when the door is open so far, or on its way there."""
         closed, opened = stage.door(self.name)
@@ -51,6 +56,11 @@ class CloseDoor(Spec, Action):
     """A door of the world."""
     duration: PositiveDuration = 1.5
     """From wide open to shut; a door that is on its way takes its share."""
+
+    @property
+    def of_a_robot(self) -> bool:
+        """It is about the world."""
+        return False
 
     def perform(self, stage: Stage) -> Effect:
         """Set it going; nothing comes of it when the door is shut, or on its way there."""

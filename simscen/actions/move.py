@@ -19,6 +19,11 @@ class Move(Motion, Action):
     name: MovableName
     """The object to move."""
 
+    @property
+    def of_a_robot(self) -> bool:
+        """It is about the world."""
+        return False
+
     def perform(self, stage: Stage) -> Effect:
         """Set it going; nothing comes of it when it is not there, or stands at its only waypoint."""
         here = stage.object(self.name)

@@ -15,6 +15,11 @@ class Remove(Spec, Action):
     name: MovableName
     """The object to remove."""
 
+    @property
+    def of_a_robot(self) -> bool:
+        """It is about the world."""
+        return False
+
     def perform(self, stage: Stage) -> Effect:
         """Remove it; nothing comes of it when it is not there."""
         if stage.object(self.name) is None:

@@ -46,6 +46,11 @@ class Spawn(Shaped, Action):
             raise ValueError("expected exactly one of: pose, ahead, on_plan")
         return self
 
+    @property
+    def of_a_robot(self) -> bool:
+        """At a pose of the world it is the same for all."""
+        return self.pose is None
+
     def perform(self, stage: Stage) -> Effect:
         """Spawn it; without a plan to put it on, it is put ahead of the robot instead."""
         planned = self.on_plan is None or _has_plan(stage)

@@ -60,7 +60,7 @@ def load_all(
     for file, choice in product(discover(paths, home), choices):
         variations, found = checks.scenario(file, choice)
         for scenario in variations:
-            loaded.setdefault(scenario.title, []).append(replace(scenario, several_stacks=len(choices) > 1))
+            loaded.setdefault(scenario.title, []).append(scenario.having(several_stacks=len(choices) > 1))
             warnings.setdefault(scenario.id, []).extend(found)
         problems.update(dict.fromkeys(found))
     if any(problem.severity == "error" for problem in problems):
@@ -131,14 +131,14 @@ class Checks:
         return (usable if len(usable) == len(tried) else ()), problems
 
     def _variation(self, loaded: LoadedScenario) -> tuple[LoadedScenario | None, list[Problem]]:
-        loaded, nobody = self.stacks.with_command(replace(loaded, lenient=self.lenient))
+        loaded, nobody = self.stacks.with_command(loaded.having(lenient=self.lenient))
         if nobody is not None and self.runs:
             return None, [*loaded.notes, nobody]
         with files_read() as read:
             problems = [*loaded.notes, *([] if self.fast else checked(loaded, self.cache, self.pictures))]
         if nobody is not None:
             problems.append(replace(nobody, severity="warning"))
-        loaded = replace(loaded, read=tuple(sorted(read)))
+        loaded = loaded.having(read=tuple(sorted(read)))
         usable = not any(problem.severity == "error" for problem in problems)
         return (loaded if usable else None), list(dict.fromkeys(problems))
 

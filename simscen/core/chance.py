@@ -12,9 +12,13 @@ LARGEST_SEED = 2**32 - 1
 
 @dataclass(frozen=True)
 class Streams:
-    """Random streams derived from (seed, name); `seed` lies in 1 … 2³²-1."""
+    """Random streams derived from (seed, name); `seed` lies in 1 … 2³²-1.
+
+    `whose` is the robot whose streams they are where there are several: no two draw the same.
+    """
 
     seed: int
+    whose: str = ""
 
     def __post_init__(self) -> None:
         if not 1 <= self.seed <= LARGEST_SEED:
@@ -29,5 +33,6 @@ class Streams:
         return self._words(name)[0] or 1
 
     def _words(self, name: str) -> list[int]:
-        digest = hashlib.sha256(f"{self.seed}/{name}".encode()).digest()
+        whose = f"{self.whose}/" if self.whose else ""
+        digest = hashlib.sha256(f"{self.seed}/{whose}{name}".encode()).digest()
         return [int.from_bytes(digest[i : i + 4], "little") for i in range(0, 32, 4)]

@@ -16,7 +16,8 @@ class Run:
     """A run: its `result` (outcome, verdicts, metrics), the `trace` it was judged from, the `case` it was judged by.
 
     `log` is the MCAP file that holds all of it; None when none was asked for. `stack` is what an external stack said of
-    itself; empty for one in the engine.
+    itself; empty for one in the engine. `robots` is what came of each of several robots by name, as if it had been the
+    only one, e.g. `run.robots["left"].trace`; `trace` and `case` are then those of the first.
     """
 
     result: RunResult
@@ -24,6 +25,7 @@ class Run:
     case: Case
     log: Path | None = None
     stack: Mapping[str, Any] = field(default_factory=dict)
+    robots: Mapping[str, "Run"] = field(default_factory=dict)
 
     @property
     def passed(self) -> bool:

@@ -88,6 +88,15 @@ class Situation(Protocol):
         """The goal the robot is driving to."""
         ...
 
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """The names of all robots, in order; none where there is one only."""
+        ...
+
+    def of(self, robot: str) -> Situation:
+        """The same run as it concerns the robot of this name."""
+        ...
+
     def region(self, name: str) -> Polygon:
         """A named region of the world."""
         ...
@@ -99,6 +108,10 @@ class Situation(Protocol):
 
 class Stage(Situation, Protocol):
     """The run as an action may change it."""
+
+    def of(self, robot: str) -> Stage:
+        """The same run as it concerns the robot of this name."""
+        ...
 
     def spawn(self, body: Body) -> None:
         """Put a new body into the world: physics, rays and picture see it from the next tick on."""

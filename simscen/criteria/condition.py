@@ -12,7 +12,7 @@ from simscen.spec.base import Spec
 from simscen.spec.bytype import BehaviorName
 from simscen.spec.orplace import PlaceOrPoint
 from simscen.spec.quantities import UNITS, Duration, PositiveDuration, Quantity
-from simscen.spec.references import EventName, GoalName, HappeningName, MovableName, ObjectName, RegionName
+from simscen.spec.references import EventName, GoalName, HappeningName, MoverName, ObjectName, RegionName
 
 Op = Literal[">=", ">", "<=", "<"]
 SHAPES = ("signal", "all", "any", "not_", "always", "eventually", "until", "whenever")
@@ -33,7 +33,7 @@ class Condition(Spec):
     """The bound, with a unit of the signal's dimension or in SI."""
     scale: float | None = None
     """How much of it weighs as much as one scale of another signal; the margin then counts in scales."""
-    object: MovableName | None = None
+    object: MoverName | None = None
     """What `distance_to` is measured to: a thing that can move."""
     point: PlaceOrPoint | None = None
     """What `distance_to` is measured to: x and y in metres, or a place by name."""

@@ -37,6 +37,7 @@ def inconsistencies(
     unknown = [*strangers, *_unknown_names(loaded, world), *unfit_faults(loaded), *_twice_named(loaded)]
     unknown += [*_uneven_rates(loaded), *_unknown_lidars(loaded), *namesakes(loaded, world)]
     unknown += [loaded.sourced(problem) for problem in senseless(loaded.world)]
+    unknown += _robots_and_things(loaded, world)
     if any(problem.severity == "error" for problem in unknown):
         return unknown
     checks = (_undecidable, _short_faults, never_happens, never_holds, hardly_fails)
@@ -45,12 +46,13 @@ def inconsistencies(
 
 def _unknown_names(loaded: LoadedScenario, world: World | None) -> Iterator[Problem]:
     known = known_names(loaded, world)
-    for reference in references(loaded.spec):
+    for reference in references(loaded.spec, concerns=loaded.concerns):
         names = known.get(reference.to)
         if names is None or reference.name in names:
             continue
-        if reference.to == "movable" and reference.name in (known["object"] or ()):
-            message = f"{quoted(reference.name)} is a fixed part of the world: it cannot move, go or be followed"
+        if reference.to in ("movable", "mover") and reference.name in (known["object"] or ()):
+            what = "one of the robots" if reference.name in loaded.other_robots else "a fixed part of the world"
+            message = f"{quoted(reference.name)} is {what}: it cannot move, go or be followed"
             yield loaded.problem(reference.keys, "SC035", message, "name an object, a door or what an event spawns")
             continue
         what = ARTICLES[reference.to]
@@ -58,12 +60,20 @@ def _unknown_names(loaded: LoadedScenario, world: World | None) -> Iterator[Prob
         yield loaded.problem(reference.keys, "SC030", f"no {what} is called {quoted(reference.name)}", hint)
 
 
+def _robots_and_things(loaded: LoadedScenario, world: World | None) -> Iterator[Problem]:
+    """Robots that are called as a thing in the world is."""
+    things = known_names(replace(loaded, other_robots=()), world)["object"] or ()
+    if loaded.robot_name in things:
+        message = f"something in the world is called {quoted(loaded.robot_name)}, too: nobody could tell them apart"
+        yield loaded.problem_at(loaded.key_place_of("robot"), "SC033", message, "give the robot another name")
+
+
 def _unknown_lidars(loaded: LoadedScenario) -> Iterator[Problem]:
     """Triggers that look at the scans of a lidar which the robot does not have."""
     if loaded.robot.spec is None:
         return
     lidars = [name for name, sensor in loaded.robot.spec.sensors.items() if sensor.says == "Scan"]
-    for keys, part in below(loaded.spec):
+    for keys, part in below(loaded.spec, concerns=loaded.concerns):
         if isinstance(part, ScanAge) and part.sensor is not None and part.sensor not in lidars:
             message = f"robot `{loaded.robot.name}` has no lidar called {quoted(part.sensor)}"
             hint = suggestion(part.sensor, lidars) or "it has none at all"

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from simscen.core.errors import InvalidInput
 from simscen.core.problems import Problem
+from simscen.loading import robots
 from simscen.loading.assets import Assets
 from simscen.loading.document import Library
 from simscen.loading.loaded import JudgedMask, LoadedRobot, LoadedWorld
@@ -54,9 +55,9 @@ def load_criteria(path: Path, root: Path, world_path: Sequence[Path] = ()) -> Lo
         raise InvalidInput([file])
     tree, problems = library.read(file, defaults=True)
     if problems or not isinstance(tree, Fields):
-        spec = [] if problems or tree is None else check(CriteriaSpec, tree)
+        spec = [] if problems or tree is None else check(CriteriaSpec, tree, robots.judging)
         raise InvalidInput(library.with_source([*problems, *(spec if isinstance(spec, list) else ())]))
-    spec = check(CriteriaSpec, tree)
+    spec = check(CriteriaSpec, tree, robots.judging)
     if isinstance(spec, list):
         raise InvalidInput(library.with_source(spec))
     assets = Assets(library)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from simscen.core.externalcommand import ExternalCommand
 from simscen.core.problems import Problem
@@ -80,6 +80,8 @@ class LoadedScenario:
     `several_stacks`. `runs` is what an external stack runs, as far as anybody has said so.
     `variation` is the name of the variation that it is, "" for a file without: `spec` and `tree` hold its values, and
     `set_by` the path by which each of them came there, by its place.
+    `robots` are its robots by name where there are several: each is the same scenario as one of this robot alone, whose
+    name is `robot_name`, with `other_robots` about. What the whole says of a robot is then that of the first.
     """
 
     id: str
@@ -106,6 +108,23 @@ class LoadedScenario:
     runs: ExternalCommand | None = None
     variation: str = ""
     set_by: Mapping[Place, str] = field(default_factory=dict, repr=False)
+    robots: Mapping[str, "LoadedScenario"] = field(default_factory=dict)
+    robot_name: str = ""
+    other_robots: tuple[str, ...] = ()
+
+    @property
+    def each(self) -> Mapping[str, "LoadedScenario"]:
+        """It as each of its robots sees it, by name; the only one has none."""
+        return self.robots or {self.robot_name: self}
+
+    def having(self, **changes: Any) -> "LoadedScenario":
+        """The same with other values of fields, as each of its robots sees it, too."""
+        robots = {name: view.having(**changes) for name, view in self.robots.items()}
+        return replace(self, **changes, robots=robots)
+
+    def concerns(self, robot: str | None) -> bool:
+        """Whether what is said of a robot (None: of the only one, or of the world) may be about this one."""
+        return robot is None or not self.robot_name or robot == self.robot_name
 
     @property
     def title(self) -> str:

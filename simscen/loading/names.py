@@ -12,6 +12,7 @@ ARTICLES = {
     "door": "door of the world",
     "object": "object of the world or of an event",
     "movable": "movable object of the world or of an event",
+    "mover": "movable object of the world or of an event",
     "goal": "goal",
     "event": "event or mark",
     "happening": "event, fault or mark",
@@ -23,8 +24,11 @@ Names = Mapping[str, list[str] | None]
 
 def known_names(loaded: LoadedScenario, world: World | None = None) -> Names:
     """What there is to refer to. What an imported world holds is known once it has become a `world`."""
+    there = _of_files(loaded) if world is None else _of_world(loaded, world)
+    movable = there["movable"]
     return {
-        **(_of_files(loaded) if world is None else _of_world(loaded, world)),
+        **there,
+        "mover": None if movable is None else [*movable, *loaded.other_robots],
         "goal": goal_names(loaded),
         "event": _distinct(event_names(loaded), mark_names(loaded)),
         "happening": _distinct(event_names(loaded), [fault.label for fault in loaded.spec.faults], mark_names(loaded)),
@@ -59,7 +63,9 @@ def _of_files(loaded: LoadedScenario) -> Names:
         "place": list(world.places) if world else [],
         "region": list(world.regions) if world else [],
         "door": [door.name for door in world.doors] if world else [],
-        "object": None if imported or world is None else _distinct(_standing(world), spawned),
+        "object": None
+        if imported or world is None
+        else _distinct(_standing(world), spawned, list(loaded.other_robots)),
         "movable": None if imported or world is None else _distinct(_moving(world), spawned),
     }
 
@@ -70,7 +76,7 @@ def _of_world(loaded: LoadedScenario, world: World) -> Names:
         "place": list(world.places),
         "region": list(world.regions),
         "door": list(world.doors),
-        "object": _distinct(moving, [solid.name for solid in world.solids], spawned),
+        "object": _distinct(moving, [solid.name for solid in world.solids], spawned, list(loaded.other_robots)),
         "movable": _distinct(moving, spawned),
     }
 
@@ -94,9 +100,10 @@ def brought(loaded: LoadedScenario) -> list[str]:
 
 
 def _made(loaded: LoadedScenario, kind: str) -> list[str]:
-    """The names that actions of one kind give to what they bring."""
+    """The names that actions of one kind give to what they bring; a goal is that of the robot it is sent to."""
     actions = [action for step in loaded.spec.steps for action in step.actions]
-    return [str(getattr(action.chosen, "name", "")) for action in actions if action.kind == kind]
+    mine = [action for action in actions if kind != "new_goal" or loaded.concerns(action.robot)]
+    return [str(getattr(action.chosen, "name", "")) for action in mine if action.kind == kind]
 
 
 def _moving(world: WorldSpec) -> list[str]:

@@ -1,6 +1,6 @@
 """Find the names in a specification that refer to something else."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
 from typing import Annotated, Any, NamedTuple, get_args, get_origin
 
@@ -24,10 +24,17 @@ class Reference(NamedTuple):
         return self.mark.to
 
 
-def references(spec: BaseModel, keys: tuple[Key, ...] = ()) -> Iterator[Reference]:
-    """Every reference below `spec`, in the order of its fields."""
+Concerns = Callable[[str | None], bool]
+
+
+def references(spec: BaseModel, keys: tuple[Key, ...] = (), concerns: Concerns | None = None) -> Iterator[Reference]:
+    """Every reference below `spec`, in the order of its fields; not in what is about a robot that does not concern."""
+    about = getattr(spec, "robot", None)
+    if concerns is not None and isinstance(about, str) and not concerns(about):
+        return
     for name, key, mark in _fields_of(type(spec)):
-        yield from _in_value(getattr(spec, name), mark, keys if isinstance(spec, RootModel) else (*keys, key))
+        below = keys if isinstance(spec, RootModel) else (*keys, key)
+        yield from _in_value(getattr(spec, name), mark, below, concerns)
 
 
 @cache
@@ -40,15 +47,15 @@ def _fields_of(model: type[BaseModel]) -> list[tuple[str, str, Refers | None]]:
     return found
 
 
-def _in_value(value: Any, mark: Refers | None, keys: tuple[Key, ...]) -> Iterator[Reference]:
+def _in_value(value: Any, mark: Refers | None, keys: tuple[Key, ...], concerns: Concerns | None) -> Iterator[Reference]:
     if isinstance(value, BaseModel):
-        yield from references(value, keys)
+        yield from references(value, keys, concerns)
     elif isinstance(value, list):
         for index, item in enumerate(value):
-            yield from _in_value(item, mark, (*keys, index))
+            yield from _in_value(item, mark, (*keys, index), concerns)
     elif isinstance(value, dict):
         for key, item in value.items():
-            yield from _in_value(item, mark, (*keys, key))
+            yield from _in_value(item, mark, (*keys, key), concerns)
     elif isinstance(value, str) and mark is not None and not (isinstance(mark, OrPlace) and value in mark.besides):
         yield Reference(keys, mark, value)
 

@@ -7,6 +7,7 @@ from typing import Literal
 
 from simscen.core.errors import InvalidInput, UsageError
 from simscen.core.problems import Problem
+from simscen.loading import robots
 from simscen.loading.assets import Assets
 from simscen.loading.consistency import inconsistencies
 from simscen.loading.document import Library
@@ -15,6 +16,7 @@ from simscen.loading.masks import judged_masks
 from simscen.loading.messages import quoted, suggestion
 from simscen.loading.paths import Fence
 from simscen.loading.placing import placed, places_of, unknown_places
+from simscen.loading.sense.whose import whose
 from simscen.loading.stackchoice import StackChoice, with_stack
 from simscen.loading.tree import Fields, Key, Leaf, Node, at, child, value_place
 from simscen.loading.validation import check
@@ -78,7 +80,7 @@ def try_variations(
     if choice is not None:
         library.add(choice.texts, choice.files)
     if problems or not isinstance(tree, Fields):
-        wrong = check(ScenarioSpec, tree) if tree is not None and not problems else []
+        wrong = check(ScenarioSpec, tree, robots.lacking) if tree is not None and not problems else []
         return library.with_source(sorted([*problems, *(wrong if isinstance(wrong, list) else ())]))
     variations = variations_of(tree)
     if not isinstance(variations[0], Variation):
@@ -96,13 +98,13 @@ def _with_choice(
     tree = one.tree if choice is None else with_stack(one.tree, choice)
     if choice is not None and (lost := list(_without_effect(one, tree, choice))):
         return library.with_source(lost)
-    spec = check(ScenarioSpec, tree)
+    spec = check(ScenarioSpec, tree, robots.lacking)
     if isinstance(spec, list):
         return library.with_source(sorted([*spec, *_problems_of_world(tree, library)]))
-    loaded = _with_assets(spec, tree, library, file)
+    loaded = _several(spec, tree, library, file, choice) if spec.robots else _one(spec, tree, library, file)
     if isinstance(loaded, list):
         return loaded
-    return replace(loaded, choice=choice, variation=one.name, set_by=one.set_by)
+    return loaded.having(choice=choice, variation=one.name, set_by=one.set_by)
 
 
 def _without_effect(one: Variation, tree: Fields, choice: StackChoice) -> Iterator[Problem]:
@@ -122,7 +124,41 @@ def _problems_of_world(tree: Node, library: Library) -> list[Problem]:
     return assets.problems
 
 
-def _with_assets(spec: ScenarioSpec, tree: Fields, library: Library, file: Path) -> LoadedScenario | list[Problem]:
+def _several(
+    spec: ScenarioSpec, tree: Fields, library: Library, file: Path, choice: StackChoice | None
+) -> LoadedScenario | list[Problem]:
+    """A scenario of several robots; what is wrong is told once, whomever of them it concerns."""
+    if problems := list(whose(spec, tree)):
+        return library.with_source(problems)
+    views: dict[str, LoadedScenario] = {}
+    problems = []
+    for name, part in robots.each_of(tree).items():
+        own = with_stack(part, choice) if choice is not None else part
+        one = check(ScenarioSpec, own)
+        others = tuple(other for other in sorted(spec.robots or ()) if other != name)
+        found = one if isinstance(one, list) else _one(one, own, library, file, name, others)
+        if isinstance(found, list):
+            problems += found
+        else:
+            views[name] = found
+    if problems:
+        return library.with_source(sorted(set(problems)))
+    first, notes = next(iter(views.values())), [note for view in views.values() for note in view.notes]
+    return replace(
+        first,
+        spec=placed(spec, places_of(first.world)),
+        tree=tree,
+        robots=views,
+        notes=tuple(dict.fromkeys(notes)),
+        robot_name="",
+        other_robots=(),
+    )
+
+
+def _one(
+    spec: ScenarioSpec, tree: Fields, library: Library, file: Path, name: str = "", others: tuple[str, ...] = ()
+) -> LoadedScenario | list[Problem]:
+    """A scenario of one robot, or as one of several sees it."""
     assets = Assets(library)
     world = _world(spec, tree, assets, file)
     robot_map = _map(spec, tree, assets)
@@ -130,7 +166,7 @@ def _with_assets(spec: ScenarioSpec, tree: Fields, library: Library, file: Path)
     limits = spec.stack.speed_mask
     speed_mask = _mask(limits.file if limits else None, tree, ("stack", "speed_mask", "file"), assets)
     judged = judged_masks(spec, tree, assets)
-    robot = assets.robot(spec.robot.model, value_place(tree, ("robot", "model")))
+    robot = assets.robot(spec.own.model, value_place(tree, ("robot", "model")))
     if world is None or robot is None or assets.problems:
         return library.with_source(sorted(assets.problems))
     fence, shown, places = library.fence, library.fence.shown(file), places_of(world)
@@ -159,6 +195,8 @@ def _with_assets(spec: ScenarioSpec, tree: Fields, library: Library, file: Path)
         keepout_mask=keepout_mask,
         speed_mask=speed_mask,
         judged_masks=judged,
+        robot_name=name,
+        other_robots=others,
     )
     problems = sorted(inconsistencies(loaded, strangers=strangers))
     if any(problem.severity == "error" for problem in problems):

@@ -1,6 +1,6 @@
 """Validate a tree against a model: the model, or every problem at the line and column to mend."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
@@ -28,20 +28,24 @@ Model = TypeVar("Model", bound=BaseModel)
 VERSION = 1
 
 
-def check(model: type[Model], tree: Node) -> Model | list[Problem]:
-    """The specification that `tree` holds, or all that is wrong with it."""
+Lacking = Callable[[Fields], list[Problem]]
+
+
+def check(model: type[Model], tree: Node, also: Lacking | None = None) -> Model | list[Problem]:
+    """The specification that `tree` holds, or all that is wrong with it; `also` looks for what no model tells."""
     if not isinstance(tree, Fields):
         return [_problem(tree.place, "SC004", f"expected a mapping at top level, got {messages.found(tree)}")]
     if problem := _other_version(tree):
         return [problem]
     empty = [_no_value(model, tree, loc) for loc in _empty(tree)]
+    more = also(tree) if also is not None else []
     try:
         spec = model.model_validate(tree.plain, by_alias=True, by_name=False)
     except ValidationError as error:
         told = error.errors(include_input=False, include_url=False)
         found = [_translate(model, tree, dict(e)) for e in told if not _follows_from_empty(tree, dict(e))]
-        return _distinct([*empty, *found])
-    return empty or spec
+        return _distinct([*empty, *more, *found])
+    return [*empty, *more] or spec
 
 
 def _other_version(tree: Fields) -> Problem | None:

@@ -12,5 +12,5 @@ class CriteriaSpec(ScenarioSpec):
     """Version of this language."""
     world: WorldOrFile | None = None  # type: ignore[assignment]
     """Whose places and regions are meant; only a log that is not simscen's own needs it."""
-    robot: RobotEntry | None = None  # type: ignore[assignment]
+    robot: RobotEntry | None = None
     """Whose footprint it is; only a log that is not simscen's own needs it."""

@@ -14,7 +14,7 @@ from simscen.model.world import WorldSpec
 from simscen.spec.base import Spec, by_default
 from simscen.spec.ondemand import OnDemand
 from simscen.spec.orplace import OrPlace, PlaceAlone, PlaceOrPose
-from simscen.spec.places import Name, PlaceName, PoseSpec
+from simscen.spec.places import Name, PlaceName, PoseSpec, RobotName
 from simscen.spec.quantities import (
     Duration,
     Frequency,
@@ -102,6 +102,32 @@ class GoalEntry(Spec):
     yaw_tolerance: PositiveAngle | None = None
 
 
+class OneOfSeveral(RobotEntry):
+    """One of several robots: where it starts, and what is its own.
+
+    What is not said here holds as the scenario says it for all: `map`, `stack` (merged with what is said here) and
+    `on_goal_failure`.
+
+    Example: `robots: {left: {pose: {x: 1, y: 1}, goals: [{pose: dock}]}, right: {pose: {x: 4, y: 1}}}`
+    """
+
+    map: FilePath | None = None
+    """The map this robot gets; `none` = no map, odometry only."""
+    stack: AnyStack | None = None
+    """What its stack has otherwise than that of all."""
+    goals: Annotated[list[GoalEntry], Field(max_length=1000)] = []
+    """In this order; a robot without goals stands where it is."""
+    on_goal_failure: Literal["stop", "continue"] | None = None
+    """After a goal that failed: end, or drive to the next one."""
+    faults: Annotated[list[FaultEntry], Field(max_length=500)] = []
+    """Of its sensors and wheels; their triggers are about this robot, where they do not say another."""
+    pass_: Annotated[list[AnyCriterion], Field(max_length=200, alias="pass")] = []
+    """What must hold for this robot, besides what must for all."""
+
+
+MOST_ROBOTS = 20
+
+
 class Physics(Spec):
     """How the world is stepped."""
 
@@ -137,7 +163,10 @@ class ScenarioSpec(Spec):
     """A `*.world.yaml`, a ROS map `.yaml`, a Gazebo `.sdf`/`.world`, or the world itself."""
     map: FilePath | None = None
     """The map the robot gets, if it is not that of the world; `none` = no map, odometry only."""
-    robot: RobotEntry
+    robot: RobotEntry | None = None
+    """The robot under test; where there are several, `robots`."""
+    robots: Annotated[dict[RobotName, OneOfSeveral], Field(min_length=2, max_length=MOST_ROBOTS)] | None = None
+    """Several robots by name, instead of `robot`: each with its own goals, faults and criteria."""
     stack: AnyStack = by_default()
     """The stack under test: simscen's own, or `{external: NAME}`, a process."""
     goals: Annotated[list[Annotated[GoalEntry, PlaceAlone("pose")]], Field(max_length=1000)] = []
@@ -151,12 +180,18 @@ class ScenarioSpec(Spec):
     events: Annotated[list[EventEntry], Field(max_length=500)] = []
     faults: Annotated[list[FaultEntry], Field(max_length=500)] = []
     physics: Physics = by_default()
-    pass_: Annotated[list[AnyCriterion], Field(min_length=1, max_length=200, alias="pass")]
-    """All of these must hold."""
+    pass_: Annotated[list[AnyCriterion], Field(max_length=200, alias="pass")] = []
+    """All of these must hold; of several robots, for each of them."""
     metrics: Annotated[list[AnyMeasure], Field(max_length=100), AfterValidator(_once)] = []
     """What is measured besides what every run reports; each is a type that an installed package adds."""
     variations: Variations | None = None
     """Values by their paths, each combination a run of its own; default: the file as it is."""
+
+    @property
+    def own(self) -> RobotEntry:
+        """The only robot."""
+        assert self.robot is not None
+        return self.robot
 
     @property
     def steps(self) -> "list[Step]":

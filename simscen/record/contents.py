@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 
 from mcap import records
 
@@ -35,6 +36,9 @@ class Contents:
         self._frames: dict[str, Pose3] = {}
         self._types: dict[int, str] = {}
         self._handlers: dict[int, Handler] = {}
+        self._whose: dict[int, str] = {}
+        self.robots: dict[str, Contents] = {}
+        """What is said of each of several robots, by name."""
 
     def take(self, record: records.McapRecord) -> None:
         """Take in one record."""
@@ -46,9 +50,10 @@ class Contents:
             case records.Metadata(name="simscen.end"):
                 self.end = int(record.metadata["tick"])
             case records.Attachment():
-                self._files[record.name] = record.data
+                self._attached(record)
             case records.Schema():
-                self._types[record.id] = record.name
+                for contents in (self, *self.robots.values()):
+                    contents._types[record.id] = record.name
             case records.Channel():
                 self._open(record)
             case _:
@@ -56,6 +61,8 @@ class Contents:
 
     def header(self) -> LogHeader:
         """How the run was ordered. Raises Foreign when the log does not say."""
+        if self.robots:
+            return self._of_several({name: contents.header() for name, contents in self.robots.items()})
         if not self._facts or header.CASE not in self._files:
             raise Foreign("it does not say which run it is of")
         return LogHeader(
@@ -70,9 +77,24 @@ class Contents:
             facts=header.extra_facts(self._facts),
         )
 
+    def _of_several(self, robots: dict[str, LogHeader]) -> LogHeader:
+        first = next(iter(robots.values()))
+        text = str(self._files.get(header.SCENARIO, b""), "utf-8")
+        files = {name: data for name, data in self._files.items() if name not in header.OWN_FILES}
+        each = {name: replace(one, scenario=text) for name, one in robots.items()}
+        return replace(first, scenario=text, files=files, robots=each)
+
     def trace(self) -> Trace:
-        """What happened, until the end of the run or else the last message."""
+        """What happened, until the end of the run or else the last message; of several robots to the first."""
+        if self.robots:
+            return self.traces()[next(iter(self.robots))]
         return self._rows.trace(self._time.rate, self._last if self.end is None else self.end)
+
+    def traces(self) -> dict[str, Trace]:
+        """What happened to each of several robots, by name."""
+        for contents in self.robots.values():
+            contents.end, contents._last = self.end, max(self._last, contents._last)
+        return {name: contents.trace() for name, contents in self.robots.items()}
 
     def result(self) -> str:
         """The result of the run; "" when there is none."""
@@ -83,16 +105,34 @@ class Contents:
             raise Foreign(f"its format is {facts.get('format')}, this simscen reads {header.FORMAT}")
         self._facts = facts
         self._time = SimTime(int(facts["tick_rate"]))
+        for name in json.loads(facts.get(header.ROBOTS, "[]")):
+            contents = self.robots[name] = Contents()
+            contents._begin({**header.facts_of(facts, name), header.ROBOTS: "[]"})
+
+    def _attached(self, file: records.Attachment) -> None:
+        robot, _, name = file.name.partition("/")
+        if robot in self.robots and name == header.CASE:
+            self.robots[robot]._files[name] = file.data
+        else:
+            self._files[file.name] = file.data
 
     def _message(self, message: records.Message) -> None:
         if not self._facts:
             raise Foreign("it has no metadata record `simscen`")
         self._last = self._time.tick(message.log_time)
+        if message.channel_id in self._whose:
+            self.robots[self._whose[message.channel_id]]._message(message)
+            return
         handler = self._handlers.get(message.channel_id)
         if handler is not None:
             handler(self._last, message.data)
 
     def _open(self, channel: records.Channel) -> None:
+        robot, _, rest = channel.topic[1:].partition("/")
+        if robot in self.robots:
+            self._whose[channel.id] = robot
+            self.robots[robot]._open(replace(channel, topic=f"/{rest}"))
+            return
         kind = self._types.get(channel.schema_id, "")
         by_topic: dict[tuple[str, str], Handler] = {
             topics.TRUTH[:2]: self._truth,

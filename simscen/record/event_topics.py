@@ -6,13 +6,13 @@ from simscen.core.geometry import Pose2, Pose3
 from simscen.record import event_text, frames, pack_rare, topics
 from simscen.record.pack import PoseStampedPacker
 from simscen.record.simtime import SimTime
-from simscen.record.topics import Publisher
+from simscen.record.topics import Out
 
 
 class EventTopics:
     """Writes events, for machines and for people; a goal that is accepted also as a pose."""
 
-    def __init__(self, out: Publisher, time: SimTime, case: Case) -> None:
+    def __init__(self, out: Out, time: SimTime, case: Case) -> None:
         self._out, self._time = out, time
         self._goals = {goal.name: goal.pose for goal in case.every_goal}
         self._goal = PoseStampedPacker(frames.MAP)

@@ -21,6 +21,8 @@ _FACT = "fact."
 CHOSEN, STACK_NAME, VARIATION = "stack", "variation", "varied"
 """Facts: NAME=VALUE of the stack that took the place of the scenario's own, what the run is called by it where there
 are several, and the scenario's variation."""
+ROBOTS, RESOLUTION, ORIGIN = "robots", "map.resolution", "map.origin"
+"""In the metadata record: the names of several robots, and where the map of a robot is."""
 OWN_FILES = CASE, SCENARIO, RESULT = "case.json", "scenario.yaml", "result.json"
 _MEDIA_TYPES = {
     ".json": "application/json",
@@ -39,6 +41,7 @@ class LogHeader:
     `name` is the scenario's id, `scenario` its resolved YAML text. `map` is what the robot was given. `frames` are
     where sensors sit on the robot's base; a lidar that is not among them is placed by its first scan. `sensors` are
     the kinds of their readings by name, in the order in which they get their topics; a log that is read does not know.
+    `robots` are the headers of each of several robots by name; what stands here of a robot is then that of the first.
     `robot_description` is URDF. `files` travel along under their names, `facts` as metadata; neither may hold a wall
     clock, a host or a process number, or equal runs would differ.
     """
@@ -53,6 +56,7 @@ class LogHeader:
     sensors: Mapping[str, str] = field(default_factory=dict)
     files: Mapping[str, bytes] = field(default_factory=dict)
     facts: Mapping[str, str] = field(default_factory=dict)
+    robots: Mapping[str, "LogHeader"] = field(default_factory=dict)
 
     @property
     def key(self) -> RunKey:
@@ -81,10 +85,23 @@ def media_type(name: str) -> str:
 def facts(about: LogHeader, clock: Clock) -> dict[str, str]:
     """The metadata record "simscen". Numbers are written so that they are read back exactly."""
     known = {"format": FORMAT, "scenario": about.name, "seed": str(about.seed), "tick_rate": str(clock.rate)}
-    if about.map is not None:
-        x, y, yaw = about.map.origin
-        known |= {"map.resolution": repr(float(about.map.resolution)), "map.origin": json.dumps([x, y, yaw])}
+    known |= {ROBOTS: json.dumps(list(about.robots))} if about.robots else _map_facts(about)
+    for name, one in about.robots.items():
+        known |= {f"{name}.{fact}": value for fact, value in _map_facts(one).items()}
     return known | {f"{_FACT}{name}": value for name, value in about.facts.items()}
+
+
+def _map_facts(about: LogHeader) -> dict[str, str]:
+    if about.map is None:
+        return {}
+    x, y, yaw = about.map.origin
+    return {RESOLUTION: repr(float(about.map.resolution)), ORIGIN: json.dumps([x, y, yaw])}
+
+
+def facts_of(facts: Mapping[str, str], robot: str) -> dict[str, str]:
+    """What the metadata record says of one of several robots, as it would of the only one."""
+    own = {fact: facts[f"{robot}.{fact}"] for fact in (RESOLUTION, ORIGIN) if f"{robot}.{fact}" in facts}
+    return {**facts, **own}
 
 
 def extra_facts(facts: Mapping[str, str]) -> dict[str, str]:
@@ -94,7 +111,8 @@ def extra_facts(facts: Mapping[str, str]) -> dict[str, str]:
 
 def attachments(about: LogHeader) -> dict[str, bytes]:
     """The files in the log, by name."""
-    own = {CASE: case_to_json(about.case).encode()}
+    several = {f"{name}/{CASE}": case_to_json(one.case).encode() for name, one in about.robots.items()}
+    own = several or {CASE: case_to_json(about.case).encode()}
     if about.scenario:
         own[SCENARIO] = about.scenario.encode()
     taken = sorted(set(about.files) & set(OWN_FILES))

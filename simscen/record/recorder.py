@@ -6,24 +6,20 @@ from pathlib import Path
 from types import TracebackType
 
 from simscen.core.errors import RunError
-from simscen.core.geometry import Pose3
 from simscen.core.time import Clock
 from simscen.core.trace import Moment
-from simscen.record import frames, header, pack_many, pack_rare, topics
-from simscen.record.event_topics import EventTopics
+from simscen.record import header
 from simscen.record.header import LogHeader
 from simscen.record.logfile import LogFile
-from simscen.record.sensor_topics import SensorTopics
+from simscen.record.robot_topics import RobotTopics
 from simscen.record.simtime import SimTime
-from simscen.record.stack_topics import StackTopics
-from simscen.record.thinning import Thinning
-from simscen.record.topics import Publisher
-from simscen.record.truth_topics import TruthTopics
+from simscen.record.topics import Namespaced, Publisher
 from simscen.record.writer import McapWriter, Sink
 
 
 class Recorder:
-    """Eats moments in the order of their ticks. Equal moments give equal bytes; nothing in it is a wall clock.
+    """Eats moments in the order of their ticks, those of several robots apart. Equal moments give equal bytes; nothing
+    in it is a wall clock.
 
     Given a path it writes beside it under a partial name until `close`; leaving the context without `close` leaves the
     partial file, with the index that readers ask for unless the disk is full. Given a sink it writes there. Raises
@@ -35,26 +31,20 @@ class Recorder:
         sink = self._file if self._file is not None else target
         assert not isinstance(sink, str | Path)
         self._writer = McapWriter(sink, profile="ros2", library="simscen")
-        self._time = SimTime(clock.rate)
-        out, thinning = Publisher(self._writer), Thinning(clock.rate)
-        _write_header(self._writer, out, clock, about)
-        self._truth = TruthTopics(out, self._time, thinning)
-        self._sensors = SensorTopics(out, self._time, thinning, about.frames, about.sensors)
-        self._stack = StackTopics(out, self._time, thinning)
-        self._events = EventTopics(out, self._time, about.case)
+        out, time = Publisher(self._writer), SimTime(clock.rate)
+        self._writer.note("simscen", header.facts(about, clock))
+        for name, data in header.attachments(about).items():
+            self._writer.attach(name, header.media_type(name), data)
+        each = about.robots or {"": about}
+        self.robots = {
+            name: RobotTopics(Namespaced(out, name) if about.robots else out, time, one) for name, one in each.items()
+        }
+        """What takes the moments of each robot, by name; the only one has none."""
 
     def append(self, moment: Moment) -> None:
-        """Write one beat; every message of it carries the beat's simulated time."""
-        tick, decision = moment.tick, moment.decision
-        now = self._time.nanoseconds(tick)
-        if moment.truth is not None:
-            self._truth.write(now, tick, moment.truth)
-        if decision.belief is not None:
-            self._sensors.correct(Pose3.planar(decision.belief.map_from_odom))
-        self._sensors.write(now, moment.readings)
-        self._stack.write(now, tick, decision)
-        for event in (*moment.events, *decision.events):
-            self._events.write(now, event)
+        """Write one beat of the only robot."""
+        (robot,) = self.robots.values()
+        robot.append(moment)
 
     def close(self, end_tick: int, result: str = "", stack: Mapping[str, str] | None = None) -> None:
         """Write the end of the run, its result (JSON) and what an external stack was, then give the file its name."""
@@ -79,13 +69,3 @@ class Recorder:
                 with suppress(RunError):  # why the run broke off is worth more than that its log did, too
                     self._writer.finish()
             self._file.abandon()
-
-
-def _write_header(writer: McapWriter, out: Publisher, clock: Clock, about: LogHeader) -> None:
-    writer.note("simscen", header.facts(about, clock))
-    for name, data in header.attachments(about).items():
-        writer.attach(name, header.media_type(name), data)
-    if about.map is not None:
-        out.publish(topics.MAP, 0, pack_many.occupancy_grid(frames.MAP, (0, 0), about.map))
-    if about.robot_description:
-        out.publish(topics.ROBOT_DESCRIPTION, 0, pack_rare.string(about.robot_description))

@@ -1,7 +1,8 @@
 """Reads a log back into the Trace of its run, so that it can be judged without a simulator."""
 
 import struct
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO
 
@@ -35,13 +36,15 @@ DAMAGE = (
 class Log:
     """A log that was read: how the run was ordered, what happened, and its result (JSON; "" while there is none).
 
-    `complete` is False for the log of a run that broke off; its trace then ends with the last message.
+    `complete` is False for the log of a run that broke off; its trace then ends with the last message. `robots` has
+    what the log says of each of several robots, by name; `about` and `trace` are then those of the first.
     """
 
     about: LogHeader
     trace: Trace
     result: str
     complete: bool
+    robots: Mapping[str, "Log"] = field(default_factory=dict)
 
 
 def read_run(path: Path) -> Log:
@@ -69,7 +72,8 @@ def read_log(path: "str | Path", partial: bool | None = None) -> Log:
         if not whole and not forgiving:
             hint = "to read what there is, name it *.partial.mcap"
             raise invalid(path, "SC803", "the log ends too early: its run broke off", hint)
-        return Log(about, contents.trace(), contents.result(), whole)
+        robots = {name: Log(about.robots[name], trace, "", whole) for name, trace in contents.traces().items()}
+        return Log(about, contents.trace(), contents.result(), whole, robots)
     except OSError as error:
         raise invalid(path, "SC800", f"cannot read the log: {error.strerror}") from error
     except Foreign as error:

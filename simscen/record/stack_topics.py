@@ -8,7 +8,7 @@ from simscen.record.pack import PoseWithCovariancePacker, TwistPacker
 from simscen.record.pack_many import ParticleCloudPacker, PathPacker
 from simscen.record.simtime import SimTime
 from simscen.record.thinning import Thinning, Throttle
-from simscen.record.topics import Publisher
+from simscen.record.topics import Out
 
 PARTICLE_RATE = 2  # a cloud of 2000 is 128 kB, as much as all other topics say in a second
 LOCAL_PLAN_RATE = 5  # only for the eye
@@ -17,7 +17,7 @@ LOCAL_PLAN_RATE = 5  # only for the eye
 class StackTopics:
     """Writes decisions."""
 
-    def __init__(self, out: Publisher, time: SimTime, thinning: Thinning) -> None:
+    def __init__(self, out: Out, time: SimTime, thinning: Thinning) -> None:
         self._out, self._time, self._thinning = out, time, thinning
         self._belief = PoseWithCovariancePacker(frames.MAP)
         self._particles = ParticleCloudPacker(frames.MAP)

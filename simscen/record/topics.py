@@ -78,6 +78,13 @@ class Publisher:
         self._writer = writer
         self._types: Mapping[str, MessageType] = load()
         self._channels: dict[str, int] = {}
+        self._told: dict[str, int] = {}
+
+    def once(self, topic: Topic, time: int, data: bytes) -> None:
+        """Write a message at `time` nanoseconds, if there is none of that time on its topic."""
+        if self._told.get(topic.name) != time:
+            self._told[topic.name] = time
+            self.publish(topic, time, data)
 
     def publish(self, topic: Topic, time: int, data: bytes) -> None:
         """Write a message at `time` nanoseconds."""
@@ -90,3 +97,20 @@ class Publisher:
         kind = self._types[topic.type]
         metadata = {"offered_qos_profiles": qos(topic.latched), "topic_type_hash": kind.hash}
         return self._writer.channel(topic.name, kind, metadata)
+
+
+class Namespaced:
+    """Takes the messages of one of several robots: its topics are in its namespace, as in Nav2's bringup of several.
+
+    There is one clock for all.
+    """
+
+    def __init__(self, out: Publisher, robot: str) -> None:
+        self._out, self._robot = out, robot
+
+    def publish(self, topic: Topic, time: int, data: bytes) -> None:
+        """Take a message at `time` nanoseconds."""
+        if topic == CLOCK:
+            self._out.once(topic, time, data)
+        else:
+            self._out.publish(topic._replace(name=f"/{self._robot}{topic.name}"), time, data)

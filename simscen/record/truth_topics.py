@@ -6,13 +6,13 @@ from simscen.record.pack import ClockPacker, Float64Packer, OdometryPacker
 from simscen.record.pack_many import TransformsPacker
 from simscen.record.simtime import SimTime
 from simscen.record.thinning import Thinning
-from simscen.record.topics import Publisher
+from simscen.record.topics import Out
 
 
 class TruthTopics:
     """Writes truth samples, and the clock with them."""
 
-    def __init__(self, out: Publisher, time: SimTime, thinning: Thinning) -> None:
+    def __init__(self, out: Out, time: SimTime, thinning: Thinning) -> None:
         self._out, self._time, self._thinning = out, time, thinning
         self._clock = ClockPacker()
         self._odometry = OdometryPacker(frames.MAP, frames.TRUTH)

@@ -1,7 +1,7 @@
 """The composition root: the only place that builds engines, sensors and stacks."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from simscen.core.belief import Belief
@@ -30,7 +30,6 @@ from simscen.run.toldlocalizer import ToldLocalizer
 from simscen.run.walking import Walking
 from simscen.sensors.build import build_sensors
 from simscen.sensors.sensor import Sensor
-from simscen.sim.alone import NAMELESS
 from simscen.sim.robot import Robot
 from simscen.sim.simulation import Placed, Simulation
 from simscen.stack.build import build_stack
@@ -40,7 +39,7 @@ from simscen.worlds.rays import RayScene
 
 
 def assemble(prepared: Prepared, seed: int, printed: Path | None = None) -> Rig:
-    """Build the rig of one run of a prepared scenario with this seed; its stack has not been started.
+    """Build the rig of one run of a prepared scenario with this seed; its stacks have not been started.
 
     `printed` is the file for what an external stack prints.
     """
@@ -49,7 +48,7 @@ def assemble(prepared: Prepared, seed: int, printed: Path | None = None) -> Rig:
     simulation = Simulation(
         prepared.built.mesh,
         world.bodies,
-        {NAMELESS: Placed(prepared.body, prepared.start, prepared.obstacles)},
+        {name: Placed(part.body, part.start, part.obstacles) for name, part in prepared.each.items()},
         triangulate,
         tick_rate=clock.rate,
         solver_iterations=spec.physics.solver_iterations,
@@ -57,45 +56,68 @@ def assemble(prepared: Prepared, seed: int, printed: Path | None = None) -> Rig:
     )
     for region, friction in world.friction.items():
         simulation.lay(region, Patch(world.regions[region], friction))
-    robot = simulation.robots[NAMELESS]
-    rays = LiveRays(RayScene(prepared.built.mesh), robot)
+    scene, stages = RayScene(prepared.built.mesh), dict[str, LiveStage]()
+    walking = Walking(prepared.built, simulation, clock)
+    agents = {
+        name: _agent(name, part, simulation, scene, seed, walking, stages, printed)
+        for name, part in prepared.each.items()
+    }
+    for name, stage in stages.items():
+        for body in (*world.bodies, *(robot.shape for robot in simulation.robots[name].others)):
+            stage.note(Event(0, EventKind.OBJECT_SPAWNED, body.name, described(body)))
+    return Rig(
+        simulation,
+        tuple(agents.values()),
+        tuple(_directors(prepared, streams, agents)),
+        clock.period(spec.physics.truth_rate),
+    )
+
+
+def _directors(prepared: Prepared, streams: Streams, agents: Mapping[str, Agent]) -> Iterator[Director]:
+    """Who lets things happen: to the world, then to each robot; for a single robot that is one.
+
+    What is about no robot is the same for all, so that any of them may stand for it.
+    """
+    spec = prepared.spec
+    first, *_ = agents.values()
+    if not prepared.robots:
+        yield Director(spec.steps, spec.faults, streams, first.stage, first.faults)
+        return
+    yield Director(spec.steps, [], streams, first.stage, first.faults)
+    for name, agent in agents.items():
+        own = Streams(streams.seed, name)
+        yield Director([], prepared.robots[name].spec.faults, own, agent.stage, agent.faults)
+
+
+def _agent(
+    name: str,
+    prepared: Prepared,
+    simulation: Simulation,
+    scene: RayScene,
+    seed: int,
+    walking: Walking,
+    stages: dict[str, LiveStage],
+    printed: Path | None,
+) -> Agent:
+    """One robot with its senses and its stack; its stage is added to those of the others."""
+    spec, robot = prepared.spec, simulation.robots[name]
+    clock, streams = Clock(spec.physics.tick_rate), Streams(seed, name)
+    rays = LiveRays(RayScene(scene), robot)
     sensors: tuple[Sensor, ...] = build_sensors(prepared.robot, clock, streams, robot, rays)
     truth_period = clock.period(spec.physics.truth_rate)
+    control_period = clock.period(prepared.stack.controller_frequency)
     if prepared.stack.told_truth:
         # Last, because the log takes the first odometry for the robot's own.
-        sensors = (*sensors, TruthSensor(robot, clock.period(prepared.stack.controller_frequency)))
+        sensors = (*sensors, TruthSensor(robot, control_period))
     senses = Senses(sensors)
 
-    surroundings = Surroundings(
-        robot=robot_model(prepared.body),
-        map=prepared.map,
-        tick_rate=clock.rate,
-        keepout=tuple(world.regions[name] for name in prepared.stack.keepout),
-        speed_zones=tuple((world.regions[zone.region], zone.speed_limit) for zone in prepared.stack.speed_zones),
-        masks=prepared.masks,
-        lidars=tuple(name for name, sensor in prepared.robot.sensors.items() if sensor.localizes),
+    def told(belief: Belief) -> Belief:
+        return faults.belief(simulation.tick, belief)
+
+    stack = _stack(prepared, clock, streams, seed, printed, told)
+    stage = LiveStage(
+        prepared.built.world, simulation, robot, stack, clock, prepared.case.sent, walking, Streams(seed), stages
     )
-    stack: Stack
-    if isinstance(prepared.stack, ExternalStackSpec):
-        stack = build_external(prepared, prepared.stack, surroundings, seed, printed)
-    else:
-        goes_on = spec.on_goal_failure == "continue"
-
-        def told(belief: Belief) -> Belief:
-            return faults.belief(simulation.tick, belief)
-
-        stack = build_stack(
-            prepared.stack,
-            surroundings,
-            streams,
-            clock,
-            stop_on_failure=not goes_on,
-            heard=lambda localizer: ToldLocalizer(localizer, told),
-        )
-
-    walking = Walking(prepared.built, simulation, clock)
-    stage = LiveStage(world, simulation, robot, stack, clock, prepared.case.sent, walking, streams)
-    control_period = clock.period(prepared.stack.controller_frequency)
     settings = FaultSettings(
         prepared.robot,
         clock,
@@ -106,9 +128,7 @@ def assemble(prepared: Prepared, seed: int, printed: Path | None = None) -> Rig:
     )
     link = CommandLink(control_period, clock.ticks(prepared.robot.limits.command_timeout))
     faults = FaultRig(spec.faults, streams, settings, link, stage.note, prepared.mapped)
-    for body in world.bodies:
-        stage.note(Event(0, EventKind.OBJECT_SPAWNED, body.name, described(body)))
-    agent = Agent(
+    return Agent(
         robot=robot,
         senses=senses,
         stack=stack,
@@ -118,7 +138,37 @@ def assemble(prepared: Prepared, seed: int, printed: Path | None = None) -> Rig:
         timetable=Timetable((truth_period, control_period, *senses.periods)),
         truth_period=truth_period,
     )
-    return Rig(simulation, (agent,), (Director(spec.steps, spec.faults, streams, stage, faults),), truth_period)
+
+
+def _stack(
+    prepared: Prepared,
+    clock: Clock,
+    streams: Streams,
+    seed: int,
+    printed: Path | None,
+    told: Callable[[Belief], Belief],
+) -> Stack:
+    """The stack of a robot; it is `told` what becomes of what its localizer says."""
+    world = prepared.built.world
+    surroundings = Surroundings(
+        robot=robot_model(prepared.body),
+        map=prepared.map,
+        tick_rate=clock.rate,
+        keepout=tuple(world.regions[name] for name in prepared.stack.keepout),
+        speed_zones=tuple((world.regions[zone.region], zone.speed_limit) for zone in prepared.stack.speed_zones),
+        masks=prepared.masks,
+        lidars=tuple(name for name, sensor in prepared.robot.sensors.items() if sensor.localizes),
+    )
+    if isinstance(prepared.stack, ExternalStackSpec):
+        return build_external(prepared, prepared.stack, surroundings, seed, printed)
+    return build_stack(
+        prepared.stack,
+        surroundings,
+        streams,
+        clock,
+        stop_on_failure=prepared.spec.on_goal_failure != "continue",
+        heard=lambda localizer: ToldLocalizer(localizer, told),
+    )
 
 
 class LiveRays:

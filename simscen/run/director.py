@@ -49,10 +49,10 @@ class Director:
 
     def _perform(self, number: int, step: Step) -> None:
         kinds: list[Value] = [action.kind for action in step.actions]
-        self._stage.note(Event(0, EventKind.EVENT_STARTED, step.name, {"entry": number, "actions": kinds}))
+        self._stage.tell(Event(0, EventKind.EVENT_STARTED, step.name, {"entry": number, "actions": kinds}))
         effects = [action.perform(self._stage) for action in step.actions]
         told: list[Value] = [{"happened": effect.happened, "what": effect.what} for effect in effects]
-        self._stage.note(Event(0, EventKind.EVENT_ENDED, step.name, {"entry": number, "effects": told}))
+        self._stage.tell(Event(0, EventKind.EVENT_ENDED, step.name, {"entry": number, "effects": told}))
 
     def _go_on(self, number: int) -> None:
         """From now on the step of the story that comes after this one is waited for."""

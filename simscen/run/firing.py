@@ -63,6 +63,7 @@ class Watch:
         """Whether it is true at this beat; each part is asked, as it has to see all of them."""
         if not self._parts:
             return self._test.holds(now)
+        now = self._test.seen(now)
         answers = [part.holds(now) for part in self._parts]
         if self._test.not_ is not None:
             return not answers[0]

@@ -1,5 +1,7 @@
 """What a scenario's robot is sent to."""
 
+from collections.abc import Callable
+
 from simscen.actions.goals import NewGoal
 from simscen.core.navigation import Goal
 from simscen.model.scenario import GoalEntry, ScenarioSpec
@@ -11,12 +13,12 @@ def goals_of(spec: ScenarioSpec) -> tuple[Goal, ...]:
     return tuple(_goal(name, entry, spec.stack) for name, entry in zip(spec.goal_names, spec.goals, strict=True))
 
 
-def sent_goals(spec: ScenarioSpec) -> dict[tuple[str | int, ...], Goal]:
-    """The goals that events send, by where each is written, in the order of the file."""
+def sent_goals(spec: ScenarioSpec, concerns: Callable[[str | None], bool]) -> dict[tuple[str | int, ...], Goal]:
+    """The goals that events send to the robot that `concerns`, by where each is written, in the order of the file."""
     checker = spec.stack.goal_checker
     found: dict[tuple[str | int, ...], Goal] = {}
     for keys, action in (placed for step in spec.steps for placed in step.placed()):
-        if isinstance(sent := action.chosen, NewGoal):
+        if isinstance(sent := action.chosen, NewGoal) and concerns(action.robot):
             where = (*keys, "new_goal")
             found[where] = Goal(
                 name=sent.name,

@@ -27,7 +27,10 @@ from simscen.worlds.shortest import Z_RANGE
 
 
 class LiveStage:
-    """Implements core.stage.Stage for one robot, on the simulation and its stack, and keeps the events of its run."""
+    """Implements core.stage.Stage for one robot, on the simulation and its stack, and keeps the events of its run.
+
+    What happens to the world happens to all robots, and is in the events of each.
+    """
 
     def __init__(
         self,
@@ -39,12 +42,15 @@ class LiveStage:
         goals: Iterable[Goal],
         walking: Walking,
         streams: Streams,
+        fellows: "dict[str, LiveStage]",
     ) -> None:
-        """`goals` are those that events may send."""
+        """`goals` are those that events may send; to `fellows`, the stages of all robots, this one is added."""
         self._world, self._simulation, self._robot, self._stack = world, simulation, robot, stack
         self.clock = clock
         self._walking, self._streams = walking, streams
         walking.tell.append(self.note)
+        self._fellows = fellows
+        fellows[robot.name] = self
         self._goals = {goal.name: goal for goal in goals}
         self._look()
         self._belief: Belief | None = None
@@ -99,6 +105,15 @@ class LiveStage:
         return self._simulation.tick
 
     @property
+    def robots(self) -> tuple[str, ...]:
+        """The names of all robots; none where there is one only."""
+        return tuple(self._fellows) if len(self._fellows) > 1 else ()
+
+    def of(self, robot: str) -> "LiveStage":
+        """The stage of another robot."""
+        return self._fellows[robot]
+
+    @property
     def robot(self) -> Pose2:
         """The true pose of the robot."""
         return self._pose
@@ -149,20 +164,20 @@ class LiveStage:
         if self._simulation.object_pose(body.name):
             self.remove(body.name)
         self._simulation.spawn(body)
-        self.note(Event(0, EventKind.OBJECT_SPAWNED, body.name, described(body)))
+        self.tell(Event(0, EventKind.OBJECT_SPAWNED, body.name, described(body)))
 
     def remove(self, name: str) -> None:
         """Take a body out of the world."""
         self._walking.go(name)
         self._simulation.remove(name)
-        self.note(Event(0, EventKind.OBJECT_REMOVED, name))
+        self.tell(Event(0, EventKind.OBJECT_REMOVED, name))
 
     def walk(self, walker: Walker) -> None:
         """Let somebody come; one of the same name is replaced."""
         if self._simulation.object_pose(walker.name):
             self.remove(walker.name)
         about = {**described(self._walking.come(walker)), "person": True, "behavior": walker.behavior}
-        self.note(Event(0, EventKind.OBJECT_SPAWNED, walker.name, about))
+        self.tell(Event(0, EventKind.OBJECT_SPAWNED, walker.name, about))
 
     def room(self, place: tuple[float, float], radius: float, walls_only: bool = False) -> bool:
         """Whether a person of a radius in metres can stand there."""
@@ -180,7 +195,7 @@ class LiveStage:
         """Let a body follow a path that begins now."""
         self._walking.go(name)
         self._simulation.move(name, path)
-        self.note(Event(0, EventKind.OBJECT_MOVED, name, described_path(path)))
+        self.tell(Event(0, EventKind.OBJECT_MOVED, name, described_path(path)))
 
     def motion(self, name: str) -> tuple[MotionPath, float] | None:
         """The path that moves an object now, and the seconds since it was set off."""
@@ -194,7 +209,7 @@ class LiveStage:
         """Set an object down somewhere else."""
         self._walking.go(name)
         self._simulation.place(name, pose)
-        self.note(Event(0, EventKind.OBJECT_PLACED, name, {"x": pose.x, "y": pose.y, "yaw": pose.yaw}))
+        self.tell(Event(0, EventKind.OBJECT_PLACED, name, {"x": pose.x, "y": pose.y, "yaw": pose.yaw}))
 
     def place_robot(self, pose: Pose2) -> None:
         """Set the robot down somewhere else."""
@@ -212,7 +227,7 @@ class LiveStage:
             self._robot.push(impulse)
         about: dict[str, Value] = {"impulse": list(impulse), **({"seconds": seconds} if seconds else {})}
         kind = EventKind.ROBOT_PUSHED if name is None else EventKind.OBJECT_PUSHED
-        self.note(Event(0, kind, name or "", about))
+        (self.note if name is None else self.tell)(Event(0, kind, name or "", about))
 
     def lay(self, name: str, patch: Patch) -> None:
         """Make a piece of floor slippery, or dry again."""
@@ -226,8 +241,13 @@ class LiveStage:
         """Cancel what the robot is doing."""
         self._stack.cancel(self.tick)
 
+    def tell(self, event: Event) -> None:
+        """Write an event to the logs of all robots: it happened to the world."""
+        for stage in self._fellows.values():
+            stage.note(event)
+
     def note(self, event: Event) -> None:
-        """Write an event to the log; one without a tick happened now."""
+        """Write an event to the log of this robot; one without a tick happened now."""
         stamped = event if event.tick else replace(event, tick=self.tick)
         self._fresh.append(stamped)
         self._history += (stamped,)

@@ -3,8 +3,8 @@
 Plain data and numpy arrays only, so that it can be made once in the warm process and survive the fork.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 
 from simscen.core.belief import Estimate
 from simscen.core.case import CLEARANCE_RANGE, Case
@@ -25,6 +25,7 @@ from simscen.run.masks import load_judged_masks, load_masks
 from simscen.run.robotsize import inscribed_radius
 from simscen.run.robotways import in_the_way
 from simscen.run.worldsource import load_map, load_robot, load_world
+from simscen.sim.alone import NAMELESS
 from simscen.sim.robot_body import RobotBody
 from simscen.triggers.clearance_below import ClearanceBelow
 from simscen.worlds.build import build
@@ -36,7 +37,11 @@ DEFAULT_LIDAR_HEIGHT = 0.2
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """Everything of a scenario but chance."""
+    """Everything of a scenario but chance.
+
+    Where there are several robots, `robots` has it as each of them needs it, by name; what stands here of a robot is
+    then that of the first.
+    """
 
     loaded: LoadedScenario
     built: BuiltWorld
@@ -52,6 +57,12 @@ class Prepared:
     """What of the built world's mesh is in the robot's way; the same where it is all of it."""
     mapped: tuple[int, ...] = ()
     """The numbers of the faults that have changed the map."""
+    robots: Mapping[str, "Prepared"] = field(default_factory=dict)
+
+    @property
+    def each(self) -> Mapping[str, "Prepared"]:
+        """It as each of its robots needs it, by name in order; the only one has none."""
+        return self.robots or {NAMELESS: self}
 
     @property
     def spec(self) -> ScenarioSpec:
@@ -70,18 +81,37 @@ def build_world(loaded: LoadedScenario, height: float) -> BuiltWorld:
 
 def prepare(loaded: LoadedScenario, world_of: BuildWorld = build_world) -> Prepared:
     """Build what the runs of this scenario share. Raises InvalidInput for files that cannot be used."""
+    if not loaded.robots:
+        return _prepared(loaded, world_of)
+    parts: dict[str, Prepared] = {}
+    heights: dict[float, BuiltWorld] = {}
+
+    def known(view: LoadedScenario, height: float) -> BuiltWorld:
+        if height not in heights:
+            heights[height] = world_of(view, height)
+        return heights[height]
+
+    for name, view in loaded.robots.items():
+        parts[name] = _prepared(view, known)
+    reach = max(part.case.clearance_range for part in parts.values())
+    parts = {name: replace(part, case=replace(part.case, clearance_range=reach)) for name, part in parts.items()}
+    return replace(next(iter(parts.values())), loaded=loaded, robots=parts)
+
+
+def _prepared(loaded: LoadedScenario, world_of: BuildWorld) -> Prepared:
+    """For its only robot, or one of several."""
     spec = loaded.spec
     robot, body = load_robot(loaded)
     built = world_of(loaded, lidar_height(robot))
     world = built.world
     standing = in_the_way(world.solids, body)
     obstacles = built.mesh if standing is world.solids else fuse(standing)
-    start = spec.robot.pose.pose
+    start = spec.own.pose.pose
     goals = goals_of(spec)
     case = Case(
         start=start,
         goals=goals,
-        sent=tuple(sent_goals(spec).values()),
+        sent=tuple(sent_goals(spec, loaded.concerns).values()),
         regions=world.regions,
         footprint=body.footprint,
         inscribed_radius=inscribed_radius(body.radius, body.footprint),
@@ -99,7 +129,7 @@ def prepare(loaded: LoadedScenario, world_of: BuildWorld = build_world) -> Prepa
         body=body,
         stack=stack_of(spec),
         start=start,
-        estimate=estimate_of(spec.robot, start),
+        estimate=estimate_of(spec.own, start),
         case=with_ways(case, built, obstacles),
         obstacles=obstacles,
     )

@@ -1,7 +1,7 @@
 """The one way from a description to a result: assemble, step in lockstep, record, judge."""
 
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +12,7 @@ from simscen.core.time import Clock
 from simscen.core.trace import Trace
 from simscen.judge.result import result_of
 from simscen.judge.resultdata import to_json
+from simscen.judge.several import together
 from simscen.loading.discovery import default_root
 from simscen.loading.plugins import fact_of, origin, plugins_of
 from simscen.loading.resolved import resolved_text
@@ -27,10 +28,11 @@ from simscen.run.faultymap import with_faulty_map
 from simscen.run.lockstep import Rig, run_lockstep
 from simscen.run.prepare import Prepared, prepare
 from simscen.run.sensornames import sensor_frames, sensor_kinds
+from simscen.sim.alone import NAMELESS
 from simscen.sim.urdf.describe import describe
 
 Attach = Callable[[Rig, Sequence[Log]], Sequence[Log]]
-"""Is shown the rig and its own logs before the first beat; what it returns listens to every moment, too."""
+"""Is shown the rig and the logs of its first robot before the first beat; what it returns listens to that, too."""
 
 
 def simulate(
@@ -64,22 +66,24 @@ def _simulated(
 ) -> Run:
     prepared = with_faulty_map(prepared, seed)
     clock = Clock(prepared.spec.physics.tick_rate)
-    builder = TraceBuilder(clock)
+    builders = {name: TraceBuilder(clock) for name in prepared.each}
     with ExitStack() as closing:
         recorder = log and closing.enter_context(Recorder(log, clock, log_header(prepared, seed)))
         rig = assemble(prepared, seed, printed)
         closing.callback(rig.simulation.close)
-        (agent,) = rig.agents
-        external = agent.stack if isinstance(agent.stack, ExternalStack) else None
-        if external:
-            closing.callback(external.close)
-        agent.stack.start(prepared.estimate, prepared.case.goals)
-        own: tuple[Log, ...] = (builder, recorder) if recorder else (builder,)
-        agent.logs = (*own, *(attach(rig, own) if attach else ()))
+        externals = [agent.stack for agent in rig.agents if isinstance(agent.stack, ExternalStack)]
+        for stack in externals:
+            closing.callback(stack.close)
+        for agent, (name, part) in zip(rig.agents, prepared.each.items(), strict=True):
+            agent.stack.start(part.estimate, part.case.goals)
+            agent.logs = (builders[name], recorder.robots[name]) if recorder else (builders[name],)
+        first = rig.agents[0]
+        first.logs = (*first.logs, *(attach(rig, first.logs) if attach else ()))
         end = run_lockstep(rig)
+        external = externals[0] if externals else None
         if external:
             external.finish(end.name)
-        run = judged(prepared, seed, builder.finish(end.tick), log)
+        run = judged(prepared, seed, {name: builder.finish(end.tick) for name, builder in builders.items()}, log)
         if recorder:
             recorder.close(end.tick, to_json(run.result), external.facts if external else None)
     return replace(run, stack=external.described) if external else run
@@ -92,8 +96,17 @@ def simulate_file(
     return simulate(prepare(load_scenario(file, root or default_root([file]), world_path)), seed, log=log)
 
 
-def judged(prepared: Prepared, seed: int, trace: Trace, log: Path | None = None) -> Run:
-    """The run that a trace shows."""
+def judged(prepared: Prepared, seed: int, traces: Mapping[str, Trace], log: Path | None = None) -> Run:
+    """The run that the traces of its robots show."""
+    if not prepared.robots:
+        return _judged(prepared, seed, traces[NAMELESS], log)
+    runs = {name: _judged(part, seed, traces[name], log) for name, part in prepared.robots.items()}
+    result = together({name: run.result for name, run in runs.items()}, traces)
+    return replace(next(iter(runs.values())), result=result, robots=runs)
+
+
+def _judged(prepared: Prepared, seed: int, trace: Trace, log: Path | None) -> Run:
+    """What came of one robot."""
     loaded = prepared.loaded
     places = [loaded.place_of("pass", index) for index in range(len(prepared.spec.pass_))]
     # One that the scenario extends or takes from defaults.yaml has its line in another file than reports name.
@@ -106,6 +119,11 @@ def judged(prepared: Prepared, seed: int, trace: Trace, log: Path | None = None)
 
 def log_header(prepared: Prepared, seed: int) -> LogHeader:
     """What the log says about the run."""
+    header, parts = _log_header(prepared, seed), prepared.robots.items()
+    return replace(header, robots={name: _log_header(part, seed) for name, part in parts}) if parts else header
+
+
+def _log_header(prepared: Prepared, seed: int) -> LogHeader:
     return LogHeader(
         name=prepared.loaded.id,
         seed=seed,

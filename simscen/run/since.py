@@ -9,9 +9,15 @@ from simscen.core.stage import Situation
 class Since:
     """A core.stage.Situation that begins now: time, way and events count from here, all else is as it is."""
 
-    def __init__(self, now: Situation) -> None:
-        self._now = now
+    def __init__(self, now: Situation, others: "dict[str, Since] | None" = None) -> None:
+        self._now, self._others = now, {} if others is None else others
+        if others is None:
+            self._others |= {name: Since(now.of(name), self._others) for name in now.robots}
         self._start, self._way, self._past = now.tick, now.travelled, len(now.events)
+
+    def of(self, robot: str) -> "Since":
+        """The same for another robot."""
+        return self._others[robot]
 
     @property
     def tick(self) -> int:

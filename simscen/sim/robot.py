@@ -110,13 +110,18 @@ class Robot:
         self._contacts = Contacts(scene.rate)
         uneven = bool(scene.terrain and self.base.rolling)
         self._clearance = Clearance(
-            scene.client, scene.rate, static, obstacles, uneven, body, self.base, scene.actors, self._others, reach
+            scene.client, scene.rate, static, obstacles, uneven, body, self.base, scene.actors, self._clearances, reach
         )
         self._names: dict[int, str | None] = {}
 
-    def _others(self) -> "list[Clearance]":
-        """How near the other robots are, as they see it."""
-        return [robot._clearance for robot in self._scene.robots.values() if robot is not self]
+    @property
+    def others(self) -> "list[Robot]":
+        """The other robots, by name."""
+        return [robot for robot in self._scene.robots.values() if robot is not self]
+
+    def _clearances(self) -> list[Clearance]:
+        """How near the other robots are to things, as they see it."""
+        return [robot._clearance for robot in self.others]
 
     def drive(self, command: Twist) -> None:
         """Command a velocity in the base frame; the base follows within its limits."""
@@ -154,8 +159,7 @@ class Robot:
     def moving(self) -> Mapping[str, tuple[Body, Pose3]]:
         """The same with their bodies: what a scene of rays needs."""
         placed = self._scene.actors.placed(self._scene.tick)
-        others = (robot for robot in self._scene.robots.values() if robot is not self)
-        return {**placed, **{robot.name: (robot.shape, robot.base.pose()) for robot in others}}
+        return {**placed, **{robot.name: (robot.shape, robot.base.pose()) for robot in self.others}}
 
     def base_pose(self) -> Pose3:
         """The robot's base frame in the world."""
@@ -217,7 +221,7 @@ class Robot:
     def changed(self) -> None:
         """Something was put into or taken out of the world, or set down elsewhere."""
         scene = self._scene
-        others = {robot.base.id: robot.name for robot in scene.robots.values() if robot is not self}
+        others = {robot.base.id: robot.name for robot in self.others}
         self._names = {**dict.fromkeys(scene.fixed), **scene.terrain.names, **scene.actors.ids(), **others}
         self._clearance.forget()
 

@@ -7,7 +7,7 @@ from pydantic import Field
 
 from simscen.spec.places import Name
 
-Target = Literal["place", "region", "object", "movable", "door", "goal", "event", "happening", "mask"]
+Target = Literal["place", "region", "object", "movable", "mover", "door", "goal", "event", "happening", "mask"]
 
 
 @dataclass(frozen=True)
@@ -15,7 +15,8 @@ class Refers:
     """Marks a text as the name of something.
 
     A `mask` is the file of a filter mask; where a criterion names one, it is among the masks of its Case.
-    An `object` is anything that can be touched, a `movable` one that has a pose of its own; a `happening` is an event
+    An `object` is anything that can be touched, a `movable` one that has a pose of its own, and a `mover` one of
+    these or another robot; a `happening` is an event
     or a fault of the scenario.
     """
 
@@ -25,6 +26,7 @@ class Refers:
 RegionName = Annotated[Name, Refers("region")]
 ObjectName = Annotated[Name, Refers("object")]
 MovableName = Annotated[Name, Refers("movable")]
+MoverName = Annotated[Name, Refers("mover")]
 DoorName = Annotated[Name, Refers("door")]
 GoalName = Annotated[Name, Refers("goal")]
 EventName = Annotated[Name, Refers("event")]

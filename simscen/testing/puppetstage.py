@@ -42,6 +42,15 @@ class PuppetStage:
         """The tick of the newest scan of this lidar, or of any."""
         return max(self.scans.values(), default=None) if sensor is None else self.scans.get(sensor)
 
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """There is one only."""
+        return ()
+
+    def of(self, robot: str) -> "PuppetStage":
+        """All robots are the same."""
+        return self
+
     def region(self, name: str) -> Polygon:
         """A named region of the world."""
         return self.regions.get(name, ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)))

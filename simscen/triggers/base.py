@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 if TYPE_CHECKING:
     from simscen.core.stage import Situation
@@ -14,6 +14,9 @@ class Condition(ABC):
 
     *Given* the same situation *then* the same answer: a condition keeps no state and draws no chance.
     """
+
+    of_a_robot: ClassVar[bool] = True
+    """Whether it depends on which of several robots it is about."""
 
     @abstractmethod
     def holds(self, now: Situation) -> bool:

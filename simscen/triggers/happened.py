@@ -1,6 +1,6 @@
 """`event`, `replan`, `recovery`, `collision`: something was logged often enough."""
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -25,6 +25,8 @@ class EventStatus(Spec, Condition):
 
     Example: `when: {event: {name: pallet falls, status: started}}`
     """
+
+    of_a_robot: ClassVar[bool] = False
 
     name: HappeningName
     """The `name` of the event, fault or mark; a fault without one is called `<sensor>.<fault>`, e.g. `lidar.off`."""

@@ -8,7 +8,7 @@ from simscen.core.stage import Situation
 from simscen.spec.base import Spec
 from simscen.spec.orplace import PlaceOrPoint
 from simscen.spec.quantities import NonNegativeLength
-from simscen.spec.references import MovableName, RegionName
+from simscen.spec.references import MoverName, RegionName
 from simscen.triggers.base import Condition
 
 
@@ -20,8 +20,8 @@ class RobotWithin(Spec, Condition):
 
     of: PlaceOrPoint | None = None
     """A point [x, y] in the world, or a place of it by name."""
-    object: MovableName | None = None
-    """An object of the world or of the scenario's events, by name; false while it is not there."""
+    object: MoverName | None = None
+    """An object of the world or of the scenario's events, or another robot, by name; false while it is not there."""
     region: RegionName | None = None
     """A region of the world, by name."""
     distance: NonNegativeLength

@@ -1,5 +1,7 @@
 """`time`: the clock has reached a moment."""
 
+from typing import ClassVar
+
 from simscen.core.stage import Situation
 from simscen.spec.base import Value
 from simscen.spec.quantities import Duration
@@ -11,6 +13,8 @@ class Time(Value[Duration], Condition):
 
     Example: `when: {time: 10 s}`
     """
+
+    of_a_robot: ClassVar[bool] = False
 
     def holds(self, now: Situation) -> bool:
         """The clock, which counts whole ticks, has reached the tick nearest to the time."""

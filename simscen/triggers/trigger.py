@@ -9,6 +9,7 @@ from pydantic import Field
 from simscen.core.errors import BROKEN, RunError
 from simscen.spec.choice import Choice
 from simscen.spec.ondemand import OnDemand
+from simscen.spec.places import RobotName
 from simscen.spec.quantities import Duration, PositiveDuration, Probability
 from simscen.triggers.base import Condition
 
@@ -20,7 +21,7 @@ class Test(Choice):
     """One condition, or several combined."""
 
     group: ClassVar[str] = "trigger"
-    modifiers: ClassVar[frozenset[str]] = frozenset({"for_"})
+    modifiers: ClassVar[frozenset[str]] = frozenset({"for_", "robot"})
 
     time: Annotated[Condition | None, OnDemand("simscen.triggers.time", "Time")] = None
     robot_within: Annotated[Condition | None, OnDemand("simscen.triggers.robot_within", "RobotWithin")] = None
@@ -53,6 +54,8 @@ class Test(Choice):
     """True while this is not."""
     for_: PositiveDuration | None = Field(default=None, alias="for")
     """Count it as true only once it has been true for this long without a break; default: at once."""
+    robot: RobotName | None = None
+    """Which of several robots it is about; default: the only one."""
 
     @property
     def inner(self) -> "list[Test]":
@@ -65,8 +68,13 @@ class Test(Choice):
         for test in self.inner:
             yield from test.parts()
 
+    def seen(self, now: "Situation") -> "Situation":
+        """The situation of the robot that it is about."""
+        return now if self.robot is None else now.of(self.robot)
+
     def holds(self, now: "Situation") -> bool:
         """Whether the condition is true at this beat; how long it has been (`for`) is not its to know."""
+        now = self.seen(now)
         if self.all is not None:
             return all_hold(self.all, now)
         if self.any is not None:
@@ -94,7 +102,7 @@ def any_holds(tests: list[Test], now: "Situation") -> bool:
 class Trigger(Test):
     """A condition, and how it makes an event start."""
 
-    modifiers: ClassVar[frozenset[str]] = frozenset({"for_", "edge", "delay", "times", "probability"})
+    modifiers: ClassVar[frozenset[str]] = frozenset({"for_", "robot", "edge", "delay", "times", "probability"})
 
     edge: Literal["rising", "falling"] = "rising"
     """Start when the condition becomes true (rising) or stops being true (falling)."""

@@ -31,9 +31,10 @@ class RayScene:
     in the process that uses it: Embree's threads do not survive a fork.
     """
 
-    def __init__(self, static: TriangleMesh) -> None:
-        self._device = EmbreeDevice()
-        self._static = _Part(self._device, static)
+    def __init__(self, static: "TriangleMesh | RayScene") -> None:
+        """Of a world; or of that of another scene, which is then built once for both."""
+        self._device: EmbreeDevice = static._device if isinstance(static, RayScene) else EmbreeDevice()
+        self._static: _Part = static._static if isinstance(static, RayScene) else _Part(self._device, static)
         self._parts: dict[int, _Part] = {}
         self._movers: dict[str, _Mover] = {}
         self._solid: list[_Mover] = []

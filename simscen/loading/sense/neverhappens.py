@@ -114,6 +114,8 @@ class _Run:
         return self._why(trigger, keys)
 
     def _why(self, test: Test, keys: Keys) -> Why | None:
+        if not self.loaded.concerns(test.robot):
+            return None
         limit = self.loaded.spec.time_limit
         if test.for_ is not None and test.for_ >= limit:
             return (*keys, "for"), f"{test.for_:g} s is not less than the run's time limit of {limit:g} s"
@@ -146,6 +148,7 @@ class _Run:
             for action in step.actions
             if step.name in self.alive
             and action.kind == "new_goal"
+            and self.loaded.concerns(action.robot)
             and goal in (None, getattr(action.chosen, "name", ""))
         )
         return len(own) + more

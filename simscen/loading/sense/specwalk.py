@@ -1,6 +1,6 @@
 """Go through all of a specification, with where each part of it stands in the file."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
 from typing import Annotated, Any, get_args, get_origin
 
@@ -12,20 +12,28 @@ from simscen.spec.quantities import Quantity
 Keys = tuple[Key, ...]
 
 
-def below(spec: Any, keys: Keys = ()) -> Iterator[tuple[Keys, BaseModel]]:
-    """Every mapping of a specification, itself included, in the order of its fields."""
+def below(
+    spec: Any, keys: Keys = (), concerns: Callable[[str], bool] | None = None
+) -> Iterator[tuple[Keys, BaseModel]]:
+    """Every mapping of a specification, itself included, in the order of its fields.
+
+    What says `robot:` and is about one that does not concern is passed over.
+    """
+    about = getattr(spec, "robot", None)
+    if concerns is not None and isinstance(about, str) and not concerns(about):
+        return
     if isinstance(spec, RootModel):
-        yield from below(spec.root, keys)
+        yield from below(spec.root, keys, concerns)
     elif isinstance(spec, BaseModel):
         yield keys, spec
         for name, field in type(spec).model_fields.items():
-            yield from below(getattr(spec, name), (*keys, field.alias or name))
+            yield from below(getattr(spec, name), (*keys, field.alias or name), concerns)
     elif isinstance(spec, list | tuple):
         for index, item in enumerate(spec):
-            yield from below(item, (*keys, index))
+            yield from below(item, (*keys, index), concerns)
     elif isinstance(spec, dict):
         for key, item in spec.items():
-            yield from below(item, (*keys, key))
+            yield from below(item, (*keys, key), concerns)
 
 
 def quantities(spec: BaseModel, dimension: str) -> Iterator[tuple[Keys, float]]:

@@ -12,6 +12,7 @@ from simscen.core.world import World
 from simscen.loading.consistency import inconsistencies
 from simscen.loading.loaded import LoadedScenario, LoadedWorld
 from simscen.run.masks import load_masks
+from simscen.run.precheck.apart import apart
 from simscen.run.precheck.judgedmasks import judged_by_masks
 from simscen.run.precheck.masked import masked
 from simscen.run.precheck.misplaced import misplaced
@@ -36,6 +37,18 @@ def check(loaded: LoadedScenario, cache: WorldCache | None = None, pictures: Pat
     InvalidInput for unusable files, and UsageError for a picture that cannot be written.
     """
     cache = cache or WorldCache()
+    if not loaded.robots:
+        return _checked(loaded, cache, pictures)
+    found = [problem for view in loaded.robots.values() for problem in _checked(view, cache, pictures)]
+    problems = list(dict.fromkeys(found))  # what is wrong with all of them is told once
+    if not _has_errors(problems):
+        world, views = cache.world(loaded), [_with_robot(view) for view in loaded.robots.values()]
+        problems += apart([Scene(view, world, robot_size_of(view)) for view in views])
+    return problems
+
+
+def _checked(loaded: LoadedScenario, cache: WorldCache, pictures: Path | None) -> list[Problem]:
+    """Of a scenario of one robot, or as one of several sees it."""
     world = cache.world(loaded)
     loaded = _with_robot(loaded)
     met = as_met(loaded, world)

@@ -56,7 +56,7 @@ def _waits(scene: Scene) -> Iterator[tuple[Keys, str, str, Polygon, Distance]]:
     listed: list[tuple[Keys, str, Test | None]] = [((*step.keys, "when"), step.name, step.when) for step in spec.steps]
     listed += [(("faults", k, "when"), fault.label, fault.when) for k, fault in enumerate(spec.faults)]
     for keys, name, test in listed:
-        for below, needed in _needed(test, keys) if test is not None else ():
+        for below, needed in _needed(scene, test, keys) if test is not None else ():
             match needed.chosen if needed.kind in ("robot_in", "robot_within") else None:
                 case RobotIn(region=region):
                     corners = scene.world.regions[region]
@@ -71,11 +71,13 @@ def _waits(scene: Scene) -> Iterator[tuple[Keys, str, str, Polygon, Distance]]:
                     pass
 
 
-def _needed(test: Test, keys: Keys) -> Iterator[tuple[Keys, Test]]:
-    """The conditions that must all become true for a test to."""
+def _needed(scene: Scene, test: Test, keys: Keys) -> Iterator[tuple[Keys, Test]]:
+    """The conditions on the robot that must all become true for a test to."""
+    if not scene.loaded.concerns(test.robot):
+        return
     if test.all is not None:
         for k, part in enumerate(test.all):
-            yield from _needed(part, (*keys, "all", k))
+            yield from _needed(scene, part, (*keys, "all", k))
     elif test.any is None and test.not_ is None:
         yield (*keys, test.kind), test
 

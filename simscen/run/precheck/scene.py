@@ -42,7 +42,7 @@ class Scene:
     @cached_property
     def start(self) -> Pose2:
         """Where the robot truly stands at first."""
-        return self.loaded.spec.robot.pose.pose
+        return self.loaded.spec.own.pose.pose
 
     @cached_property
     def ground(self) -> Ground:
@@ -86,14 +86,15 @@ class Scene:
         """The goals that are to be reached, also those that events send, each with where its pose stands."""
         spec = self.loaded.spec
         own: dict[Keys, Goal] = {("goals", k): goal for k, goal in enumerate(goals_of(spec))}
-        every = {**own, **sent_goals(spec)}
+        every = {**own, **sent_goals(spec, self.loaded.concerns)}
         return [((*keys, "pose"), goal) for keys, goal in every.items() if not expects_failure(spec, goal.name)]
 
     @cached_property
     def actions(self) -> list[tuple[Keys, str, BaseModel]]:
         """Every action of every event: where it stands in the file, its kind, and what it says."""
         placed = [found for step in self.loaded.spec.steps for found in step.placed()]
-        return [((*keys, action.kind), action.kind, action.chosen) for keys, action in placed]
+        mine = [(keys, action) for keys, action in placed if self.loaded.concerns(action.robot)]
+        return [((*keys, action.kind), action.kind, action.chosen) for keys, action in mine]
 
     def does(self, *kinds: str) -> bool:
         """Whether an event of the scenario does, or may do, any of these; of none: whether one may do anything."""

@@ -1,0 +1,87 @@
+"""The result of a run of several robots, from what came of each."""
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TypeVar
+
+from simscen.core.disturbance import Happening
+from simscen.core.result import Outcome, RunFailure, RunResult
+from simscen.core.trace import Trace
+from simscen.core.verdict import Verdict
+from simscen.judge.wording import DISTURBANCE
+
+T = TypeVar("T")
+SUCCESS = "success"
+OF_ALL = ("object.", "event.", "run.")
+"""Kinds of events that happen to the world, and are in the log of each robot."""
+
+
+def together(results: Mapping[str, RunResult], traces: Mapping[str, Trace]) -> RunResult:
+    """One result: all passes where each does; verdicts, metrics and faults are called `robot/name`.
+
+    What happens to the world has no robot and is told once. The metric `success` is there for the run as well.
+    """
+    first = next(iter(results.values()))
+    shared = {one.ordered.name for one in first.disturbances if one.ordered.kind == "event"}
+    told = [(verdict, line) for verdict, line in _lined(first) if _of_the_world(verdict, shared)]
+    for name, result in results.items():
+        own = ((verdict, line) for verdict, line in _lined(result) if not _of_the_world(verdict, shared))
+        told += [(replace(verdict, id=f"{name}/{verdict.id}"), line) for verdict, line in own]
+    errors = [(name, result.error) for name, result in results.items() if result.error is not None]
+    successes = [result.metrics.get(SUCCESS) for result in results.values()]
+    success = None if None in successes else min(value for value in successes if value is not None)
+    return replace(
+        first,
+        outcome=_worst(results),
+        verdicts=tuple(verdict for verdict, _ in told),
+        lines=tuple(line for _, line in told) if first.lines else (),
+        metrics={SUCCESS: success, **_named({name: result.metrics for name, result in results.items()})},
+        undefined=_named({name: result.undefined for name, result in results.items()}),
+        events=_events(traces),
+        disturbances=(*_happenings(first, "event"), *_faults(results)),
+        error=_failure(errors[0][0], errors[0][1]) if errors else None,
+    )
+
+
+def _lined(result: RunResult) -> list[tuple[Verdict, int]]:
+    return list(zip(result.verdicts, result.lines or (0,) * len(result.verdicts), strict=True))
+
+
+def _of_the_world(verdict: Verdict, events: set[str]) -> bool:
+    """Whether it says that an event of the scenario did not happen."""
+    return verdict.criterion == DISTURBANCE and not events.isdisjoint((verdict.id, verdict.id.rpartition("#")[0]))
+
+
+def _worst(results: Mapping[str, RunResult]) -> Outcome:
+    outcomes = [result.outcome for result in results.values()]
+    return next((worst for worst in (Outcome.ERROR, Outcome.FAILED) if worst in outcomes), Outcome.PASSED)
+
+
+def _named(parts: Mapping[str, Mapping[str, T]]) -> dict[str, T]:
+    return {f"{name}/{key}": value for name, part in parts.items() for key, value in part.items()}
+
+
+def _events(traces: Mapping[str, Trace]) -> dict[str, int]:
+    """How often what happened, each thing once."""
+    first = next(iter(traces.values()))
+    counts = Counter(str(event.kind) for event in first.events if str(event.kind).startswith(OF_ALL))
+    for trace in traces.values():
+        counts.update(str(event.kind) for event in trace.events if not str(event.kind).startswith(OF_ALL))
+    return dict(sorted(counts.items()))
+
+
+def _happenings(result: RunResult, kind: str) -> list[Happening]:
+    return [one for one in result.disturbances if one.ordered.kind == kind]
+
+
+def _faults(results: Mapping[str, RunResult]) -> list[Happening]:
+    return [
+        replace(one, ordered=replace(one.ordered, name=f"{name}/{one.ordered.name}"))
+        for name, result in results.items()
+        for one in _happenings(result, "fault")
+    ]
+
+
+def _failure(name: str, error: RunFailure | None) -> RunFailure | None:
+    return error and replace(error, message=f"{name}: {error.message}")

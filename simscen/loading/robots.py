@@ -1,0 +1,83 @@
+"""A scenario of several robots, as each of them sees it: a scenario of one robot."""
+
+from collections.abc import Iterator
+
+from simscen.core.problems import Problem
+from simscen.loading.document import merge
+from simscen.loading.tree import Entry, Fields, Items, Node, child
+from simscen.model.scenario import RobotEntry
+
+ROBOT, ROBOTS, PASS = "robot", "robots", "pass"
+OF_ONE = ("goals", "faults")
+"""What a scenario of one robot says at top level, and one of several says of each."""
+
+
+def each_of(tree: Fields) -> dict[str, Fields]:
+    """The scenario as each of its robots sees it, by name in order; empty where it has one robot.
+
+    Each part is where it is written, so that problems are told there.
+    """
+    robots = child(tree, ROBOTS)
+    entries = robots.entries if isinstance(robots, Fields) else {}
+    return {name: _of_one(tree, entries[name]) for name in sorted(entries)}
+
+
+def _of_one(tree: Fields, entry: Entry) -> Fields:
+    said, place = entry.value, entry.value.place
+    assert isinstance(said, Fields)
+    robot = {key: value for key, value in said.entries.items() if key in RobotEntry.model_fields}
+    own = {key: value for key, value in said.entries.items() if key not in robot and key != PASS}
+    whole = merge(Fields(tree.place, own), _without(tree, ROBOTS))
+    criteria = Items(tree.place, (*_items(child(tree, PASS)), *_items(child(said, PASS))))
+    return Fields(
+        tree.place,
+        {**whole.entries, ROBOT: Entry(entry.key, Fields(place, robot)), PASS: Entry(entry.key, criteria)},
+    )
+
+
+def _items(node: Node | None) -> tuple[Node, ...]:
+    return node.items if isinstance(node, Items) else ()
+
+
+def _without(tree: Fields, *keys: str) -> Fields:
+    return Fields(tree.place, {key: entry for key, entry in tree.entries.items() if key not in keys})
+
+
+def lacking(tree: Fields) -> list[Problem]:
+    """What a scenario lacks or says twice: one robot or several, and what must hold."""
+    return [*(_of_several(tree) if ROBOTS in tree.entries else _of_the_only(tree))]
+
+
+def judging(tree: Fields) -> list[Problem]:
+    """What a file lacks that need say no more than what must hold."""
+    return [*(_of_several(tree) if ROBOTS in tree.entries else _nothing_holds(tree))]
+
+
+def _of_the_only(tree: Fields) -> Iterator[Problem]:
+    if ROBOT not in tree.entries:
+        yield Problem(*tree.place, "SC010", f"missing key `{ROBOT}`")
+    yield from _nothing_holds(tree)
+
+
+def _nothing_holds(tree: Fields) -> Iterator[Problem]:
+    criteria = child(tree, PASS)
+    if criteria is None and ROBOTS not in tree.entries:
+        yield Problem(*tree.place, "SC010", f"missing key `{PASS}`")
+    if isinstance(criteria, Items) and not criteria.items:
+        yield Problem(*criteria.place, "SC017", "expected 1 or more values, got 0")
+
+
+def _of_several(tree: Fields) -> Iterator[Problem]:
+    if ROBOT in tree.entries:
+        hint = "one robot is `robot`, several are each under a name in `robots`"
+        yield Problem(*tree.entries[ROBOT].key, "SC016", "`robot` and `robots` exclude each other", hint)
+    for key in OF_ONE:
+        if key in tree.entries:
+            what = f"`{key}` are those of one robot, and here are several"
+            yield Problem(*tree.entries[key].key, "SC016", what, f"write them under the robot's name in `{ROBOTS}`")
+    yield from _nothing_holds(tree)
+    robots = child(tree, ROBOTS)
+    for name, entry in robots.entries.items() if isinstance(robots, Fields) else ():
+        if isinstance(entry.value, Fields) and not _items(child(tree, PASS)) and not _items(child(entry.value, PASS)):
+            hint = "say what must hold for it, or at top level for each robot"
+            yield Problem(*entry.key, "SC010", f"missing key `{PASS}` in `{ROBOTS}.{name}`", hint)
