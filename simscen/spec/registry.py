@@ -64,9 +64,9 @@ GROUPS: dict[str, Group] = {
     "trigger": Group(
         "simscen.triggers.base:Condition",
         "simscen.triggers.trigger:Test",
-        ("edge", "delay", "times", "probability", "all", "any", "not"),
+        ("for", "robot", "edge", "delay", "times", "probability", "all", "any", "not"),
     ),
-    "action": Group("simscen.actions.base:Action", "simscen.actions.action:AnyAction"),
+    "action": Group("simscen.actions.base:Action", "simscen.actions.action:AnyAction", ("robot",)),
     "sensor": Group("simscen.model.robot:SensorSpec", "simscen.model.robot:Sensor"),
     "metric": Group("simscen.criteria.measure:Measure", "simscen.judge.measure.table:ADDRESSES", ("metrics",)),
 }
