@@ -12,6 +12,7 @@ from simscen.core.events import Event, EventKind
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import BrokenTrace, NotRecorded, at_most, counted, undecided
+from simscen.criteria.persons import persons
 from simscen.criteria.signals import speed, turn_rate
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Impulse
@@ -49,6 +50,8 @@ class Collisions(Spec, Criterion):
     """No contact may be harder than this, in N s."""
     object: ObjectName | None = Field(default=None, alias="with")
     """Only contacts with this object, by name."""
+    people: bool = False
+    """Only contacts with people: pedestrians, and those of crowds."""
     caused_by_robot: bool = False
     """Only contacts at which the robot itself was moving: not when something ran into it while it stood."""
 
@@ -57,6 +60,9 @@ class Collisions(Spec, Criterion):
         if not len(trace.truth) and not trace.of_kind(EventKind.COLLISION_STARTED):
             return [undecided("collisions", "neither the robot's way nor what it touched was recorded")]
         hits = [event for event in trace.of_kind(EventKind.COLLISION_STARTED) if self.object in (None, event.name)]
+        if self.people:
+            everybody = persons(trace)
+            hits = [event for event in hits if event.name in everybody]
         if self.caused_by_robot:
             hits = [event for event in hits if _moving(trace, event, case)]
         limit = 0 if self.max is None and self.max_impulse is None else self.max

@@ -31,6 +31,7 @@ class AnyCriterion(Choice):
     )
     collisions: Annotated[Criterion | None, OnDemand("simscen.criteria.collisions", "Collisions")] = None
     clearance: Annotated[Criterion | None, OnDemand("simscen.criteria.clearance", "Clearance")] = None
+    personal_space: Annotated[Criterion | None, OnDemand("simscen.criteria.personal_space", "PersonalSpace")] = None
     keepout: Annotated[Criterion | None, OnDemand("simscen.criteria.keepout", "Keepout")] = None
     time_to_goal: Annotated[Criterion | None, OnDemand("simscen.criteria.time_to_goal", "TimeToGoal")] = None
     path_length: Annotated[Criterion | None, OnDemand("simscen.criteria.path_length", "PathLength")] = None

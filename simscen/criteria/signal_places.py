@@ -38,13 +38,17 @@ def distance_to(asked: Asked) -> Array:
 
 def _to_object(trace: Trace, name: str, poses: Array) -> Array:
     """Infinite while the thing is not there."""
-    if name in trace.objects:
-        where = finite(trace.objects[name], f"the pose of {name}", trace).at(trace.truth.ticks)
-    else:
-        where = _standing(trace, name)
+    where = whereabouts(trace, name)
     distance = np.hypot(poses[:, 0] - where[:, 0], poses[:, 1] - where[:, 1])
-    there: Array = np.where(_there(trace, name), distance, np.inf)
-    return there
+    apart: Array = np.where(there(trace, name), distance, np.inf)
+    return apart
+
+
+def whereabouts(trace: Trace, name: str) -> Array:
+    """Where a thing is at each truth sample, or where it always is, (n, 2 or 3) or (1, 2)."""
+    if name in trace.objects:
+        return finite(trace.objects[name], f"the pose of {name}", trace).at(trace.truth.ticks)
+    return _standing(trace, name)
 
 
 def _standing(trace: Trace, name: str) -> Array:
@@ -56,18 +60,18 @@ def _standing(trace: Trace, name: str) -> Array:
     raise Unavailable(f"`{name}` never was there, or does not move")
 
 
-def _there(trace: Trace, name: str) -> Array:
+def there(trace: Trace, name: str) -> Array:
     """Whether a thing is in the world at each truth sample; what was never put there was there from the start."""
     clock = trace.truth.ticks
     changes = [
         event for event in trace.of_kind(EventKind.OBJECT_SPAWNED, EventKind.OBJECT_REMOVED) if event.name == name
     ]
-    there = np.ones(len(clock), dtype=bool)
+    present = np.ones(len(clock), dtype=bool)
     if changes and changes[0].kind == EventKind.OBJECT_SPAWNED:
-        there[:] = False
+        present[:] = False
     for event in changes:
-        there[np.searchsorted(clock, event.tick, side="left") :] = event.kind == EventKind.OBJECT_SPAWNED
-    return there
+        present[np.searchsorted(clock, event.tick, side="left") :] = event.kind == EventKind.OBJECT_SPAWNED
+    return present
 
 
 def distance_remaining(asked: Asked) -> Array:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 
 from simscen.core.evidence import Evidence
 from simscen.core.geometry import Array
+from simscen.criteria import persons
 from simscen.criteria import signal_places as places
 from simscen.criteria import signal_values as values
 from simscen.criteria.signals import STALE_AFTER
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 SignalName = Literal[
     "clearance", "speed", "forward_speed", "turn_rate", "yaw_rate", "acceleration", "angular_acceleration", "jerk",
     "travelled", "time", "goal_distance", "goal_heading_error", "distance_remaining", "plan_deviation", "distance_to",
+    "person_distance",
     "localization_error", "localization_yaw_error", "position_std", "yaw_std", "nees", "belief_age", "scan_age",
     "command_speed", "command_turn_rate", "collision_count", "replan_count", "recovery_count",
     "localized", "in_region", "in_collision", "goal_active", "recovery_active", "fault_active", "event_active",
@@ -106,6 +108,11 @@ SIGNALS: dict[SignalName, Signal] = {
         "object is not there.",
         "length", places.distance_to, about=("object", "point", "goal"),
     ),
+    "person_distance": Signal(
+        "True gap between the robot's footprint and the body of the nearest pedestrian; infinite while nobody is "
+        "there.",
+        "length", persons.person_distance,
+    ),
     "localization_error": Signal(
         "Distance between believed and true position when the newest belief came; against the truth of now once that "
         "is over 1 s old. Not aligned.",
@@ -167,6 +174,7 @@ _EVIDENCE: dict[SignalName, frozenset[Evidence]] = {
     "plan_deviation": frozenset({Evidence.ALIGNMENT, Evidence.PLANS}),
     **dict.fromkeys(("distance_to", "in_region"), frozenset({Evidence.ALIGNMENT})),
     **dict.fromkeys(("localization_error", "localization_yaw_error"), frozenset({Evidence.ALIGNMENT, _BELIEF})),
+    "person_distance": frozenset({Evidence.ALIGNMENT, Evidence.OBJECTS, Evidence.FOOTPRINT}),
     "nees": frozenset({Evidence.ALIGNMENT, _BELIEF, Evidence.COVARIANCE}),
     **dict.fromkeys(("position_std", "yaw_std", "localized"), frozenset({_BELIEF, Evidence.COVARIANCE})),
     "belief_age": frozenset({_BELIEF}),

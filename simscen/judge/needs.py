@@ -14,6 +14,7 @@ _NEEDS: dict[str, frozenset[Evidence]] = {
     "no_false_success": _PLACE | {_GOALS},
     "collisions": frozenset({Evidence.CONTACTS}),
     "clearance": frozenset({Evidence.CLEARANCE}),
+    "personal_space": _PLACE | {Evidence.OBJECTS, Evidence.FOOTPRINT, Evidence.VELOCITY},
     "keepout": _PLACE | {Evidence.FOOTPRINT},
     "time_to_goal": frozenset({_GOALS}),
     "path_length": frozenset({_TRUTH}),
@@ -35,6 +36,7 @@ _APE = (*(f"ape_{kind}_{one}" for kind in ("trans", "rot") for one in _SUMS), "a
 _RPE = tuple(f"rpe_{kind}_{one}" for kind in ("trans", "rot") for one in _SUMS)
 _SHAPE = ("path_length", "path_length_ratio", "heading_change", "aol", "norm_curvature", "max_curvature")
 _SPEEDS = ("max_speed", "time_not_moving", "mean_jerk", "max_jerk", "sparc", "ldlj")
+_SPACES = ("min_person_distance", "intrusion_intimate", "intrusion_personal", "intrusion_social")
 _METRICS: dict[str, frozenset[Evidence]] = {
     **dict.fromkeys(("success", "spl", "barn_score"), _PLACE | {_GOALS, Evidence.CONTACTS}),
     "soft_spl": _PLACE | {_GOALS},
@@ -46,6 +48,7 @@ _METRICS: dict[str, frozenset[Evidence]] = {
     **dict.fromkeys(_RPE, frozenset({_TRUTH, _BELIEF})),
     **dict.fromkeys(("min_clearance", "mean_clearance"), frozenset({Evidence.CLEARANCE})),
     **dict.fromkeys(("collisions", "contact_time"), frozenset({Evidence.CONTACTS})),
+    **dict.fromkeys(_SPACES, _PLACE | {Evidence.OBJECTS, Evidence.FOOTPRINT}),
     "shortest_length": frozenset(),
     "time_to_goal": frozenset({_GOALS}),
     "replans": frozenset({Evidence.PLANNING}),

@@ -45,6 +45,7 @@ class Test(Choice):
     replan: Annotated[Condition | None, OnDemand("simscen.triggers.happened", "Replan")] = None
     recovery: Annotated[Condition | None, OnDemand("simscen.triggers.happened", "RecoveryStatus")] = None
     collision: Annotated[Condition | None, OnDemand("simscen.triggers.happened", "Collided")] = None
+    pedestrian: Annotated[Condition | None, OnDemand("simscen.triggers.pedestrian", "PedestrianStatus")] = None
     event: Annotated[Condition | None, OnDemand("simscen.triggers.happened", "EventStatus")] = None
     all: Annotated[list["Test"], Field(min_length=1, max_length=50)] | None = None
     """True while all of these are."""

@@ -19,6 +19,7 @@ from simscen.criteria.signal_table import read
 from simscen.criteria.signal_values import Unavailable
 from simscen.criteria.signals import check_finite, drive, speed, truth, turn_rate
 from simscen.criteria.smooth import STILL, ldlj, sparc
+from simscen.judge.measure.people import person_metrics
 from simscen.judge.measure.pose import pose_metrics
 from simscen.judge.measure.table import METRICS
 from simscen.judge.measure.way import Values, way_metrics
@@ -46,6 +47,7 @@ def measure(trace: Trace, case: Case) -> Measures:
         **way_metrics(trace),
         **_motion(trace, case),
         **_clearance(trace),
+        **person_metrics(trace, case),
         **_contacts(trace),
         "replans": float(sum(plan.data.get("reason", "goal") != "goal" for plan in trace.of_kind(EventKind.PLAN_MADE))),
         "recoveries": float(len(trace.of_kind(EventKind.RECOVERY_STARTED))),

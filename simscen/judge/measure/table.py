@@ -57,6 +57,13 @@ METRICS: dict[str, Metric] = {
                    "Balasubramanian et al. 2015"),
     "min_clearance": Metric("m", "Least true distance of the hull to anything; 2 m where nothing is nearer."),
     "mean_clearance": Metric("m", "Its mean, more than 2 m counting as 2 m.", "bench-mr"),
+    "min_person_distance": Metric("m", "Least true gap between the robot's footprint and a pedestrian's body.",
+                                  "HuNavSim"),
+    "intrusion_intimate": Metric(
+        "", "Share of the time with the gap to the nearest pedestrian below 0.45 m.", "Hall 1966, HuNavSim"
+    ),
+    "intrusion_personal": Metric("", "The same from 0.45 m to below 1.2 m.", "Hall 1966, HuNavSim"),
+    "intrusion_social": Metric("", "The same from 1.2 m to below 3.6 m.", "Hall 1966, HuNavSim"),
     "collisions": Metric("", "Contacts that began.", "Arena"),
     "contact_time": Metric("s", "While there was at least one contact."),
     "replans": Metric("", "Plans made for another reason than a new goal."),

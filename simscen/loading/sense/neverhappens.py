@@ -18,7 +18,7 @@ Keys = tuple[Key, ...]
 Why = tuple[Keys, str]
 """Where what keeps a trigger from firing stands, and in words that follow "never happens: "."""
 
-LATCHED = frozenset({"time", "travelled", "goal", "replan", "recovery", "collision", "event"})
+LATCHED = frozenset({"time", "travelled", "goal", "replan", "recovery", "collision", "pedestrian", "event"})
 """Conditions that stay true once they are."""
 FASTER = 1.1
 """Times its top speed that a robot is at most, by overshoot."""
@@ -203,6 +203,9 @@ class _Run:
     def _recovery(self, recovery: Any) -> str | None:
         return no_recovery(self.loaded, recovery.name) if self.sent(None) else "the robot has no goal to fail at"
 
+    def _pedestrian(self, pedestrian: Any) -> str | None:
+        return None if self.does("pedestrian", "crowd") else "no event lets a pedestrian come"
+
     def _event(self, event: Any) -> str | None:
         if event.name not in self.alive:
             return f"it waits for `{event.name}`, which never does"
@@ -237,6 +240,7 @@ _CHECKS = {
     "goal": _Run._goal,
     "replan": _Run._replan,
     "recovery": _Run._recovery,
+    "pedestrian": _Run._pedestrian,
     "event": _Run._event,
 }
 

@@ -45,7 +45,12 @@ def test_a_signal_has_one_finite_value_for_each_truth_sample_within_its_range(na
         "truth": [[0, 0, 0], [4, 2, 1, 1]],
         "plans": [[1, [[0, 0], [2, 1]]]],
         "objects": {"cart": [[0, 3, 3]]},
-        "events": [[0.5, "goal.accepted", "shelf"], [1, "fault.started", "off"], [1, "event.started", "off"]],
+        "events": [
+            [0.5, "goal.accepted", "shelf"],
+            [1, "fault.started", "off"],
+            [1, "event.started", "off"],
+            [0, "object.spawned", "cart", {"person": True, "size": [0.25, 1.7]}],
+        ],
     }
     case = {"goals": [{"name": "shelf", "pose": [2, 1, 0]}], "regions": {"dock": [[0, 0], [1, 0], [1, 1]]}}
     of = {"object": "cart", "region": "dock", "fault": "off", "event": "off"}

@@ -32,6 +32,7 @@ TRUTH, ALIGNMENT, GOALS, BELIEF = Evidence.TRUTH, Evidence.ALIGNMENT, Evidence.N
         ({"localization_consistency": {"every": 5}}, {TRUTH, ALIGNMENT, BELIEF, Evidence.COVARIANCE}),
         ({"relocalized_within": {"time": 9}}, {TRUTH, ALIGNMENT, BELIEF}),
         ({"relocalized_within": {"time": 9, "after": "gust"}}, {TRUTH, ALIGNMENT, BELIEF, Evidence.DISTURBANCES}),
+        ({"personal_space": {}}, {TRUTH, ALIGNMENT, Evidence.OBJECTS, Evidence.FOOTPRINT, Evidence.VELOCITY}),
         ({"replans": {"max": 2}}, {Evidence.PLANNING}),
         ({"recoveries": {"max": 2}}, {Evidence.RECOVERIES}),
     ],
@@ -40,12 +41,27 @@ def test_a_criterion_needs_this_and_no_more(words, wanted):
     assert needs(AnyCriterion.model_validate(words)) == wanted
 
 
+NEAR_PEOPLE = {"min_person_distance", "intrusion_intimate", "intrusion_personal", "intrusion_social"}
+
+
 @pytest.mark.parametrize(
     ("lacking", "left_out"),
     [
         (GOALS, {"success", "spl", "barn_score", "soft_spl", "path_irregularity", "time_to_goal"}),
         (Evidence.CONTACTS, {"success", "spl", "barn_score", "collisions", "contact_time"}),
-        (ALIGNMENT, {"success", "spl", "barn_score", "soft_spl", "nees", *(name for name in METRICS if "ape" in name)}),
+        (
+            ALIGNMENT,
+            {
+                "success",
+                "spl",
+                "barn_score",
+                "soft_spl",
+                "nees",
+                *NEAR_PEOPLE,
+                *(name for name in METRICS if "ape" in name),
+            },
+        ),
+        (Evidence.OBJECTS, NEAR_PEOPLE),
         (BELIEF, {"nees", *(name for name in METRICS if "pe_" in name)}),
         (Evidence.COVARIANCE, {"nees"}),
         (Evidence.CLEARANCE, {"min_clearance", "mean_clearance"}),

@@ -1,0 +1,59 @@
+"""`personal_space`: how near the robot came to people."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from simscen.core.verdict import Finding
+from simscen.criteria.base import Criterion
+from simscen.criteria.bounds import at_least, undecided
+from simscen.criteria.persons import INTIMATE, person_gap
+from simscen.criteria.signal_values import Unavailable
+from simscen.criteria.signals import speed
+from simscen.spec.base import Spec
+from simscen.spec.quantities import NonNegativeLength
+
+if TYPE_CHECKING:
+    from simscen.core.case import Case
+    from simscen.core.trace import Trace
+
+DRIVING = 0.1
+"""m/s; a slower robot stands, and people come up to it as they like."""
+
+
+class PersonalSpace(Spec, Criterion):
+    """The robot kept its distance from people.
+
+    What is measured: the smallest true gap between the robot's footprint and the body of a pedestrian, over the whole
+        run.
+    When it fails: it is below `min`.
+    Why this: people feel a robot that passes close by as a threat long before it touches them; 0.45 m is where Hall's
+        intimate space begins.
+    Source: Hall 1966; the space intrusions of HuNavSim and of Francis et al. 2023, by the gap between surfaces.
+
+    Inconclusive when nobody was ever there: then nothing was tested.
+
+    Example: `personal_space: {min: 0.3 m, while_driving: true}`
+    """
+
+    min: NonNegativeLength = INTIMATE
+    """Of the gap."""
+    while_driving: bool = False
+    """Only moments at which the robot drives, faster than 0.1 m/s: people come up to one that stands as they like."""
+
+    def judge(self, trace: Trace, case: Case) -> list[Finding]:
+        """The nearest moment."""
+        limit = f"≥ {self.min:.2f} m"
+        try:
+            gaps = person_gap(trace, case)
+        except Unavailable as why:
+            return [undecided("distance to people", str(why), limit)]
+        if self.while_driving:
+            gaps = np.where(speed(trace).at(trace.truth.ticks)[:, 0] > DRIVING, gaps, np.inf)
+        nearest = int(np.argmin(gaps))
+        if np.isinf(gaps[nearest]):
+            return [undecided("distance to people", "nobody was there while the robot drove", limit)]
+        at = (trace, int(trace.truth.ticks[nearest]))
+        return [at_least("distance to people", float(gaps[nearest]), self.min, "m", at=at)]

@@ -1,0 +1,33 @@
+"""How near people a robot was, in closed form."""
+
+import pytest
+
+from simscen.judge.measure.people import person_metrics
+from simscen.judge.sketch import sketch, sketch_case
+
+ANNA = [0, "object.spawned", "anna", {"person": True, "size": [0.25, 1.7]}]
+
+
+def test_a_robot_that_drives_up_to_somebody_is_in_each_zone_for_the_time_that_its_way_takes():
+    """At 1 m/s from a gap of 4.55 m to one of 0.05 m, then it stands: 0.95 s social are 2.4 m, and so on."""
+    trace = sketch({"seconds": 10, "truth": [[0, 0, 0], [4.5, 4.5, 0], [10, 4.5, 0]], "objects": {"anna": [[0, 5, 0]]},
+                    "events": [ANNA]})  # fmt: skip
+    found = person_metrics(trace, sketch_case({"inscribed_radius": 0.2}))
+    assert found["min_person_distance"] == pytest.approx(0.05, abs=1e-6)
+    assert found["intrusion_social"] == pytest.approx(0.24, abs=0.004)
+    assert found["intrusion_personal"] == pytest.approx(0.075, abs=0.004)
+    assert found["intrusion_intimate"] == pytest.approx(0.59, abs=0.004)
+
+
+def test_of_several_people_the_nearest_counts_and_only_while_they_are_there():
+    bert = [5, "object.spawned", "bert", {"person": True, "size": [0.25, 1.7]}]
+    trace = sketch({"seconds": 10, "truth": [[0, 0, 0]], "objects": {"anna": [[0, 2, 0]], "bert": [[0, 1, 0]]},
+                    "events": [ANNA, bert]})  # fmt: skip
+    found = person_metrics(trace, sketch_case({"footprint": [[0.2, 0.2], [-0.2, 0.2], [-0.2, -0.2], [0.2, -0.2]]}))
+    assert found["min_person_distance"] == pytest.approx(0.55)
+    assert (found["intrusion_social"], found["intrusion_personal"]) == pytest.approx((0.5, 0.5), abs=0.003)
+
+
+def test_without_people_there_is_no_number():
+    found = person_metrics(sketch({"seconds": 1, "truth": [[0, 0, 0]]}), sketch_case({}))
+    assert set(found.values()) == {"there were no people"}
