@@ -15,15 +15,18 @@ from simscen.actions.action import AnyAction
 from simscen.criteria.criterion import AnyCriterion
 from simscen.faults.fault import AnyFault
 from simscen.model import anystack, robot, scenario, stack, stackfile, userconfig, variations, world
-from simscen.model.disturbance import EventEntry, FaultEntry
+from simscen.model.disturbance import EventEntry, FaultEntry, StepEntry
 from simscen.model.rosmap import RosMapSpec
+from simscen.model.stackbase import SpeedZone
 from simscen.spec import bytype, registry
 from simscen.spec.bytype import ByType
 from simscen.spec.choice import Choice, added
 from simscen.spec.docs import field_docs
 from simscen.spec.ondemand import type_of
 from simscen.spec.orplace import OrPlace, PlaceAlone
+from simscen.spec.places import PoseSpec
 from simscen.spec.quantities import UNITS, Quantity
+from simscen.spec.speedmask import SpeedMask
 from simscen.triggers.trigger import Test, Trigger
 
 _EXAMPLE = re.compile(r"^Example: `(.+)`$", re.MULTILINE)
@@ -109,6 +112,8 @@ _SCENARIO: dict[str, type[BaseModel]] = {
     "initial_estimate": scenario.InitialEstimate,
     "goals": scenario.GoalEntry,
     "events": EventEntry,
+    "then": StepEntry,
+    "pose": PoseSpec,
     "physics": scenario.Physics,
     "variations": variations.VariationBlock,
     "sampled": variations.Sampled,
@@ -116,6 +121,8 @@ _SCENARIO: dict[str, type[BaseModel]] = {
 _STACK: dict[str, type[BaseModel]] = {
     "stack": stack.StackSpec,
     "external": anystack.ExternalStackSpec,
+    "speed_zones": SpeedZone,
+    "speed_mask": SpeedMask,
     "costmap": stack.Costmap,
     "planner": stack.OmplPlanner,
     "goal_checker": stack.SimpleGoalChecker,

@@ -101,9 +101,18 @@ class _WithInstalled(_Generator):
 
 
 def _exactly_one(model: type[Choice], keys: list[str]) -> Schema:
-    if not model.modifiers:
-        return {"minProperties": 1, "maxProperties": 1}
-    return {"oneOf": [{"required": [key]} for key in keys]}
+    """One of `keys`, and only one; where there is none, a misspelt one is told about by what does not know it.
+
+    With `maxProperties` yaml-language-server would offer nothing: it counts the key that is being typed.
+    """
+    given: list[Schema] = [{"type": "object", "required": [key]} for key in keys]
+    beside = [field.alias or name for name, field in model.model_fields.items() if name in model.modifiers]
+    missing = {"type": "string", "errorMessage": f"expected one of: {', '.join(keys)}"}
+    return {
+        "oneOf": [*given, {"not": {"anyOf": given}}],
+        "if": {"type": "object", "propertyNames": {"enum": beside}},
+        "then": missing,
+    }
 
 
 def _mended(node: Any, definitions: Schema) -> Any:
@@ -163,7 +172,9 @@ def _by_json_type(node: Schema) -> Schema:
         return node
     other = next(option for option in options if option is not plain[0])
     rest = {key: value for key, value in node.items() if key != "oneOf"}
-    return {**rest, "if": {"type": plain[0]["type"]}, "then": plain[0], "else": other}
+    words = plain[0].get("enum", plain[0].get("examples", []))
+    offered = {"examples": words} if words else {}  # where nothing is written yet, an editor looks at neither branch
+    return {**rest, **offered, "if": {"type": plain[0]["type"]}, "then": plain[0], "else": other}
 
 
 def _without_null(node: Schema) -> Schema:

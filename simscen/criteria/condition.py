@@ -11,7 +11,7 @@ from simscen.criteria.signal_table import SIGNALS, Signal, SignalName
 from simscen.spec.base import Spec
 from simscen.spec.bytype import BehaviorName
 from simscen.spec.orplace import PlaceOrPoint
-from simscen.spec.quantities import UNITS, Duration, PositiveDuration, Quantity
+from simscen.spec.quantities import UNITS, AnyQuantity, Duration, PositiveDuration, Quantity
 from simscen.spec.references import EventName, GoalName, HappeningName, MoverName, ObjectName, RegionName
 
 Op = Literal[">=", ">", "<=", "<"]
@@ -29,9 +29,9 @@ class Condition(Spec):
     """A named signal; `simscen explain signals` lists them."""
     op: Op | None = None
     """How it compares with `value`; left out for a signal that is yes or no."""
-    value: float | None = None
+    value: Annotated[float, AnyQuantity()] | None = None
     """The bound, with a unit of the signal's dimension or in SI."""
-    scale: float | None = None
+    scale: Annotated[float, AnyQuantity()] | None = None
     """How much of it weighs as much as one scale of another signal; the margin then counts in scales."""
     object: MoverName | None = None
     """What `distance_to` is measured to: a thing that can move."""

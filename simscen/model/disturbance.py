@@ -56,6 +56,7 @@ class EventEntry(Spec):
     name: Name | None = None
     """What reports and other triggers call it; default: event-1, event-2, …"""
     when: Trigger
+    """What it waits for."""
     do: Actions | None = None
     """One action, or several in order; may be left out before `then`."""
     then: Annotated[list[StepEntry], Field(max_length=50)] = []

@@ -40,26 +40,36 @@ class Differential(Spec):
     """Two driven wheels and casters."""
 
     type: Literal["differential"]
+    """Which drive it is."""
     wheel_radius: PositiveLength
+    """Of a driven wheel."""
     wheel_separation: PositiveLength
     """Between the middles of the two wheels."""
     wheel_width: PositiveLength = 0.03
+    """Of a wheel, along its axle."""
     left: JointNames | None = None
     """Wheel joints of the URDF; default: found by position."""
     right: JointNames | None = None
+    """Wheel joints of the URDF on the right; default: found by position."""
 
 
 class SkidSteer(Spec):
     """Fixed wheels on both sides that skid in turns."""
 
     type: Literal["skid_steer"]
+    """Which drive it is."""
     wheel_radius: PositiveLength
+    """Of a driven wheel."""
     wheel_separation: PositiveLength
+    """Between the middles of the wheels on the left and on the right."""
     wheel_base: PositiveLength = 0.3
     """Between the front and the rear axle."""
     wheel_width: PositiveLength = 0.05
+    """Of a wheel, along its axle."""
     left: JointNames | None = None
+    """Wheel joints of the URDF on the left; default: found by position."""
     right: JointNames | None = None
+    """Wheel joints of the URDF on the right; default: found by position."""
     turning_scale: Annotated[float, Field(gt=0, le=10), Quantity("ratio")] = 1.0
     """Effective over geometric wheel separation; skidding makes it larger than 1 (Clearpath's jackal: 1.5)."""
 
@@ -68,38 +78,51 @@ class Ackermann(Spec):
     """A car: rear wheels drive, front wheels steer."""
 
     type: Literal["ackermann"]
+    """Which drive it is."""
     wheel_radius: PositiveLength
+    """Of a driven wheel."""
     wheel_separation: PositiveLength
+    """Between the middles of the wheels on the left and on the right."""
     wheel_base: PositiveLength
+    """Between the front and the rear axle."""
     wheel_width: PositiveLength = 0.04
+    """Of a wheel, along its axle."""
     max_steering: PositiveAngle
     """Of the virtual middle wheel."""
     left: JointNames | None = None
+    """Wheel joints of the URDF on the left; default: found by position."""
     right: JointNames | None = None
+    """Wheel joints of the URDF on the right; default: found by position."""
     steering: JointNames | None = None
+    """Steering joints of the URDF; default: found by position."""
 
 
 class Omnidirectional(Spec):
     """Moves in any direction (omni wheels, idealised as a planar drive); its odometry sees every motion."""
 
     type: Literal["omnidirectional"]
+    """Which drive it is."""
 
 
 class Mecanum(Spec):
     """Four mecanum wheels: moves in any direction, with odometry from the wheels' encoders."""
 
     type: Literal["mecanum"]
+    """Which drive it is."""
     wheel_radius: PositiveLength
+    """Of a driven wheel."""
     wheel_separation: PositiveLength
     """Between the middles of the wheels on the left and on the right (track width)."""
     wheel_base: PositiveLength
     """Between the front and the rear axle."""
     wheel_width: PositiveLength = 0.05
+    """Of a wheel, along its axle."""
     roller_angle: Annotated[Angle, Field(ge=0.1, le=1.4)] = 0.7853981633974483
     """Between a roller's axis and the wheel's axle."""
     left: JointNames | None = None
     """Wheel joints of the URDF; default: found by position."""
     right: JointNames | None = None
+    """Wheel joints of the URDF on the right; default: found by position."""
 
     @property
     def wheels(self) -> MecanumWheels:
@@ -123,10 +146,13 @@ class Limits(Spec):
     lateral: PositiveSpeed | None = None
     """Sideways speed of an omnidirectional or mecanum base; default: as forward."""
     angular: PositiveAngularSpeed
+    """Turn rate, either way."""
     linear_acceleration: PositiveAcceleration
+    """When it speeds up."""
     linear_deceleration: PositiveAcceleration | None = None
     """Default: as acceleration."""
     angular_acceleration: PositiveAngularAcceleration
+    """Of its turn rate, up and down."""
     command_timeout: PositiveDuration = 0.5
     """The base stops when no command came for so long; ros2_control's `cmd_vel_timeout` and its default. Commands stay
     away only where a fault on `cmd_vel` keeps them back."""
@@ -136,9 +162,13 @@ class Mount(Spec):
     """Where a sensor sits in the robot's base frame (on the ground under the middle of the axle)."""
 
     x: Length = 0.0
+    """Ahead of the base frame's origin."""
     y: Length = 0.0
+    """To the left of it."""
     z: NonNegativeLength = 0.2
+    """Above the ground."""
     yaw: Angle = 0.0
+    """Where it looks, anticlockwise from straight ahead."""
 
 
 class SensorSpec(Component):
@@ -150,6 +180,7 @@ class SensorSpec(Component):
     """Whether a localizer matches its scans with the map; all scans show a costmap what is around."""
 
     rate: Frequency = 10.0
+    """How often it says something."""
 
     @classmethod
     def broken_promise(cls) -> str:
@@ -168,16 +199,21 @@ class Lidar(Ranged, SensorSpec):
     localizes: ClassVar[bool] = True
 
     rate: Frequency = 10.0
+    """How often it says something."""
     beams: Annotated[int, Field(ge=1, le=4096)] = 360
+    """How many beams a scan has, spread evenly over its field of view."""
     field_of_view: PositiveAngle = 6.283185307179586
     """Centred on straight ahead."""
     min_range: NonNegativeLength = 0.12
+    """What is nearer gives no answer."""
     max_range: PositiveLength = 12.0
+    """What is further gives no answer."""
     noise: NonNegativeLength = 0.01
     """Standard deviation of a range."""
     resolution: PositiveLength = 0.001
     """Ranges are whole multiples of this."""
     mount: Mount = by_default()
+    """Where it sits on the robot."""
 
 
 class WheelOdometry(SensorSpec):
@@ -187,6 +223,7 @@ class WheelOdometry(SensorSpec):
     says: ClassVar[str] = "Odometry"
 
     rate: Frequency = 40.0
+    """How often it says something."""
     translation_noise: NonNegativeLength = 0.01
     """Standard deviation of the distance error after one metre driven; errors grow with the square root."""
     rotation_noise: Annotated[NonNegativeAngle, Field(le=1)] = 0.01
@@ -202,6 +239,7 @@ class InertialUnit(SensorSpec):
     says: ClassVar[str] = "Imu"
 
     rate: Frequency = 60.0
+    """How often it says something."""
     gyro_noise: Annotated[NonNegativeAngularSpeed, Field(le=10)] = 0.002
     """Standard deviation of the turn rate."""
     gyro_bias: Annotated[NonNegativeAngularSpeed, Field(le=1)] = 0.0005
@@ -217,6 +255,7 @@ class Bumper(SensorSpec):
     says: ClassVar[str] = "Bump"
 
     rate: Frequency = 40.0
+    """How often it says something."""
 
 
 class Camera(SensorSpec):
@@ -226,12 +265,17 @@ class Camera(SensorSpec):
     says: ClassVar[str] = "Image"
 
     rate: Frequency = 5.0
+    """How often it says something."""
     width: Annotated[int, Field(ge=8, le=640)] = 64
+    """Of its image, in pixels."""
     height: Annotated[int, Field(ge=8, le=480)] = 48
+    """Of its image, in pixels."""
     field_of_view: PositiveAngle = 1.2
     """Horizontal."""
     max_range: PositiveLength = 10.0
+    """What is further has no depth."""
     mount: Mount = by_default()
+    """Where it sits on the robot."""
 
 
 class Sensor(Choice):
@@ -262,6 +306,7 @@ class Part(Shaped):
     """A piece of the robot's body; `pose` in the base frame."""
 
     pose: PoseSpec = PoseSpec(x=0.0, y=0.0)
+    """Where it is in the robot's base frame."""
 
 
 class RobotSpec(Spec):
@@ -270,7 +315,9 @@ class RobotSpec(Spec):
     simscen: Literal[1]
     """Version of this language."""
     name: Name
+    """What reports call it."""
     description: Annotated[str, Field(max_length=10_000)] = ""
+    """For people."""
     urdf: FilePath | None = None
     """A URDF (or xacro) file, relative to this one, instead of `body`."""
     packages: Annotated[dict[Name, FilePath], Field(max_length=100)] = {}
@@ -286,7 +333,9 @@ class RobotSpec(Spec):
     footprint: Ring | None = None
     """Corners of the footprint in the base frame, for any other; default: from the shapes."""
     drive: Drive
+    """What its wheels are, and how they drive it."""
     limits: Limits
+    """What its base can do."""
     sensors: dict[Name, Sensor]
     """By instance name: what faults refer to."""
 

@@ -100,6 +100,7 @@ class GoalEntry(Spec):
     xy_tolerance: PositiveLength | None = None
     """Default: the stack's goal checker."""
     yaw_tolerance: PositiveAngle | None = None
+    """Default: the stack's goal checker."""
 
 
 class OneOfSeveral(RobotEntry):
@@ -134,6 +135,7 @@ class Physics(Spec):
     tick_rate: Annotated[int, Field(ge=60, le=2000), WholeQuantity("frequency")] = 240
     """Physics steps for each simulated second."""
     solver_iterations: Annotated[int, Field(ge=1, le=1000)] = 10
+    """Iterations of the contact solver for each physics step."""
     truth_rate: Frequency = 40.0
     """How often the truth is recorded and judged."""
 
@@ -178,8 +180,11 @@ class ScenarioSpec(Spec):
     linger: Annotated[Duration, Field(le=3600)] = 0.5
     """Simulated time that the run goes on after the last goal, to see that the robot stays where it is."""
     events: Annotated[list[EventEntry], Field(max_length=500)] = []
+    """What happens in the world, and when."""
     faults: Annotated[list[FaultEntry], Field(max_length=500)] = []
+    """What goes wrong with sensors, wheels and commands, and when."""
     physics: Physics = by_default()
+    """How the world is stepped."""
     pass_: Annotated[list[AnyCriterion], Field(max_length=200, alias="pass")] = []
     """All of these must hold; of several robots, for each of them."""
     metrics: Annotated[list[AnyMeasure], Field(max_length=100), AfterValidator(_once)] = []

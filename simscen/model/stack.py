@@ -55,34 +55,55 @@ class Amcl(Ranged, LocalizerSpec):
     alpha5: Noise = 0.2
     """Strafing noise of the omni model."""
     min_particles: Annotated[int, Field(ge=10, le=50_000)] = 500
+    """The fewest that KLD sampling may leave."""
     max_particles: Annotated[int, Field(ge=10, le=50_000)] = 2000
+    """The most, and as many as it begins with."""
     pf_err: Annotated[float, Field(gt=0, lt=1), Quantity("ratio")] = 0.05
     """KLD: greatest distance between the true and the sampled distribution."""
     pf_z: Annotated[float, Field(gt=0, lt=1)] = 0.99
     """KLD: upper quantile of the standard normal distribution, used as it is, as Nav2 does."""
     update_min_d: NonNegativeLength = 0.25
+    """How far the robot must have moved until it looks at another scan."""
     update_min_a: Annotated[NonNegativeAngle, Field(le=6.3)] = 0.2
+    """How far it must have turned until it looks at another scan."""
     resample_interval: Annotated[int, Field(ge=1, le=100)] = 1
+    """Scans looked at for each resampling."""
     max_beams: Annotated[int, Field(ge=2, le=4096)] = 60
+    """How many beams of a scan are compared with the map."""
     laser_model_type: Literal["likelihood_field", "likelihood_field_prob", "beam"] = "likelihood_field_prob"
     """Nav2's default is `likelihood_field`, which forgives more and knows less."""
     z_hit: Probability = 0.5
+    """Weight of beams that end at an obstacle of the map."""
     z_short: Probability = 0.05
+    """Weight of beams that end before it; the `beam` model only."""
     z_max: Probability = 0.05
+    """Weight of beams without an answer; the `beam` model only."""
     z_rand: Probability = 0.5
+    """Weight of beams that end anywhere."""
     sigma_hit: PositiveLength = 0.2
+    """Standard deviation of the ends of beams that hit an obstacle of the map."""
     lambda_short: Annotated[float, Field(gt=0, le=100)] = 0.1
+    """How fast short beams get rarer with their length, for each metre; the `beam` model only."""
     laser_likelihood_max_dist: PositiveLength = 2.0
+    """Ends further from any obstacle than this count as that far."""
     laser_min_range: Length = -1.0
     """-1 = the lidar's own."""
     laser_max_range: Length = 100.0
+    """Ranges are cut here, and at the lidar's own greatest one."""
     recovery_alpha_slow: Probability = 0.0
+    """Decay of the slow average of weights, by which random particles are added; 0 = never."""
     recovery_alpha_fast: Probability = 0.0
+    """Decay of the fast average of weights, by which random particles are added; 0 = never."""
     selective_resampling: bool = False
+    """Resample only when the effective number of particles is below half of them."""
     do_beamskip: bool = False
+    """Leave out beams that fit hardly any particle; `likelihood_field_prob` only."""
     beam_skip_distance: PositiveLength = 0.5
+    """A beam fits a particle when it ends this near to an obstacle of the map."""
     beam_skip_threshold: Probability = 0.3
+    """Beams that fit a smaller share of the particles are left out."""
     beam_skip_error_threshold: Probability = 0.9
+    """Where so great a share of the beams would be left out, none is: then it is the pose that is wrong."""
 
 
 class Ekf(LocalizerSpec):
@@ -128,13 +149,21 @@ class Costmap(Ranged):
     resolution: PositiveLength = 0.05
     """Edge of the largest cell: those of a coarser map are split, those of a finer one stay as they are."""
     inflation_radius: NonNegativeLength = 0.70
+    """How far around obstacles cells cost something."""
     cost_scaling_factor: Annotated[float, Field(gt=0, le=100)] = 3.0
+    """How fast cost falls with the distance to an obstacle, for each metre."""
     update_frequency: Frequency = 5.0
+    """How often what the lidars see is taken in."""
     obstacle_max_range: PositiveLength = 2.5
+    """What is seen further off is not marked."""
     obstacle_min_range: NonNegativeLength = 0.0
+    """What is seen nearer is not marked."""
     raytrace_max_range: PositiveLength = 3.0
+    """Beams clear cells up to this distance."""
     raytrace_min_range: NonNegativeLength = 0.0
+    """Beams clear cells from this distance on."""
     track_unknown_space: bool = True
+    """Taken from files of Nav2; means nothing here."""
     rolling_size: PositiveLength = 24.0
     """Edge of the rolling window when driving without a map."""
 
@@ -147,6 +176,7 @@ class PlannerSpec(Typed):
     replanning: Literal["on_invalid", "rate"] = "on_invalid"
     """Replan when the plan is blocked or clearly worse than a new one, or at a rate."""
     replanning_rate: Frequency = 1.0
+    """How often, with `replanning: rate`."""
 
 
 class OmplPlanner(PlannerSpec):
@@ -155,9 +185,11 @@ class OmplPlanner(PlannerSpec):
     component: ClassVar[str] = "simscen.stack.planners.build:ompl_planner"
     type: Literal["rrt_connect", "rrt_star", "informed_rrt_star", "bit_star", "aorrtc", "kpiece"] = "rrt_connect"
     allow_unknown: bool = True
+    """Taken from files of Nav2; means nothing here."""
     max_iterations: Iterations = 20_000
     """Iterations before NO_VALID_PATH; never seconds."""
     simplify: bool = True
+    """Whether plans are shortened and smoothed."""
     state_space: Literal["auto", "holonomic", "se2", "dubins", "reeds_shepp"] = "auto"
     """auto: Reeds-Shepp for an Ackermann drive, se2 for a long footprint, else holonomic."""
 
@@ -177,25 +209,45 @@ class RegulatedPurePursuit(Ranged, ControllerSpec):
     desired_linear_vel: PositiveSpeed | None = None
     """Default: 0.5 m/s, or what the robot can do if that is less."""
     lookahead_dist: PositiveLength = 0.6
+    """To the point of the plan that is followed, where its distance is not scaled by speed."""
     min_lookahead_dist: PositiveLength = 0.3
+    """The least, where it is scaled by speed."""
     max_lookahead_dist: PositiveLength = 0.9
+    """The greatest, where it is scaled by speed."""
     lookahead_time: PositiveDuration = 1.5
+    """The lookahead distance is the way driven in this time."""
     use_velocity_scaled_lookahead_dist: bool = True
+    """Whether the lookahead distance is scaled by speed."""
     rotate_to_heading_angular_vel: PositiveAngularSpeed = 1.8
+    """Turn rate when it turns in place."""
     rotate_to_heading_min_angle: PositiveAngle = 0.785
+    """It turns in place when the plan leads off by more than this."""
     use_rotate_to_heading: bool = True
+    """Whether it turns in place at all."""
     min_approach_linear_velocity: PositiveSpeed = 0.05
+    """The least speed on the last stretch to the goal."""
     approach_velocity_scaling_dist: PositiveLength = 0.6
+    """How far from the plan's end it begins to slow down."""
     use_collision_detection: bool = True
+    """Whether it stops when what it commands would lead into an obstacle."""
     max_allowed_time_to_collision_up_to_carrot: PositiveDuration = 1.0
+    """How far ahead it looks for collisions, no further than the point that it follows."""
     use_regulated_linear_velocity_scaling: bool = True
+    """Whether it slows down in narrow curves."""
     regulated_linear_scaling_min_radius: PositiveLength = 0.9
+    """Narrower curves are driven slower."""
     regulated_linear_scaling_min_speed: PositiveSpeed = 0.25
+    """The least speed that curves and costs slow it down to."""
     use_cost_regulated_linear_velocity_scaling: bool = True
+    """Whether it slows down near obstacles."""
     cost_scaling_dist: PositiveLength = 0.6
+    """How near an obstacle must be to slow it down."""
     cost_scaling_gain: Annotated[float, Field(gt=0, le=1), Quantity("ratio")] = 1.0
+    """How much: speed times this share of the distance over `cost_scaling_dist`."""
     max_angular_accel: PositiveAngularAcceleration = 3.2
+    """Of its turn rate, when it turns in place."""
     allow_reversing: bool = False
+    """Taken from files of Nav2; means nothing here."""
 
 
 class DynamicWindow(ControllerSpec):
@@ -204,19 +256,33 @@ class DynamicWindow(ControllerSpec):
     component: ClassVar[str] = "simscen.stack.controllers.dwb:DynamicWindowController"
     type: Literal["dwb"]
     max_vel_x: PositiveSpeed | None = None
+    """Greatest speed forward; default: 0.5 m/s, or what the robot can do if that is less."""
     min_vel_x: Annotated[Speed, Field(ge=-10, le=0)] = 0.0
+    """Greatest speed backward, negative."""
     max_vel_theta: PositiveAngularSpeed = 1.0
+    """Greatest turn rate."""
     vx_samples: Annotated[int, Field(ge=2, le=200)] = 20
+    """Speeds forward that are tried."""
     vy_samples: Annotated[int, Field(ge=1, le=200)] = 5
+    """Taken from files of Nav2; means nothing here."""
     vtheta_samples: Annotated[int, Field(ge=2, le=200)] = 20
+    """Turn rates that are tried."""
     sim_time: PositiveDuration = 1.7
+    """How far ahead each is followed."""
     base_obstacle_scale: Noise = 0.02
+    """Weight of the costs that it comes through."""
     path_align_scale: Noise = 32.0
+    """Weight of how far its front is from the plan."""
     path_dist_scale: Noise = 32.0
+    """Weight of how far it is from the plan."""
     goal_align_scale: Noise = 24.0
+    """Weight of how far its front is from the plan's end."""
     goal_dist_scale: Noise = 24.0
+    """Weight of how far it is from the plan's end."""
     rotate_to_goal_scale: Noise = 32.0
+    """Taken from files of Nav2; means nothing here."""
     forward_point_distance: NonNegativeLength = 0.1
+    """How far ahead of its middle its front is."""
 
 
 class Mppi(ControllerSpec):
@@ -225,15 +291,25 @@ class Mppi(ControllerSpec):
     component: ClassVar[str] = "simscen.stack.controllers.mppi:MppiController"
     type: Literal["mppi"]
     time_steps: Annotated[int, Field(ge=5, le=200)] = 56
+    """Steps that each sample looks ahead."""
     model_dt: PositiveDuration = 0.05
+    """How long a step is."""
     batch_size: Annotated[int, Field(ge=50, le=10_000)] = 1000
+    """Samples drawn for each command."""
     vx_max: PositiveSpeed | None = None
+    """Greatest speed forward; default: 0.5 m/s, or what the robot can do if that is less."""
     vx_min: Annotated[Speed, Field(ge=-10, le=0)] = -0.35
+    """Greatest speed backward, negative."""
     wz_max: PositiveAngularSpeed = 1.9
+    """Greatest turn rate."""
     vx_std: PositiveSpeed = 0.2
+    """Standard deviation of the sampled speeds."""
     wz_std: PositiveAngularSpeed = 0.4
+    """Standard deviation of the sampled turn rates."""
     temperature: Annotated[float, Field(gt=0, le=100)] = 0.3
+    """How evenly samples are weighted: the lower, the more the best one counts."""
     gamma: Annotated[float, Field(ge=0, le=10)] = 0.015
+    """Weight of staying near the last command, against the costs of a sample."""
 
 
 _Controllers = Annotated[
@@ -255,6 +331,7 @@ class SimpleGoalChecker(GoalCheckerSpec):
     component: ClassVar[str] = "simscen.stack.goal_checker:SimpleGoalChecker"
     type: Literal["simple"] = "simple"
     stateful: bool = True
+    """Once the position was reached only the heading counts."""
 
 
 GoalChecker = Annotated[GoalCheckerSpec, ByType("goal_checker", SimpleGoalChecker)]
@@ -264,8 +341,11 @@ class ProgressChecker(Spec):
     """nav2_controller::SimpleProgressChecker, or PoseProgressChecker when an angle is given."""
 
     required_movement_radius: PositiveLength = 0.5
+    """How far it must move within the time allowed."""
     required_movement_angle: Angle | None = None
+    """Or how far it must turn, where that counts as progress."""
     movement_time_allowance: PositiveDuration = 10.0
+    """In how long; then driving fails with FAILED_TO_MAKE_PROGRESS."""
 
 
 class BehaviorSpec(Typed):
@@ -282,8 +362,11 @@ class Spin(BehaviorSpec):
     turns_in_place: ClassVar[bool] = True
     type: Literal["spin"] = "spin"
     spin_dist: Angle = 1.57
+    """How far it turns."""
     max_rotational_vel: PositiveAngularSpeed = 1.0
+    """Greatest turn rate of a spin."""
     simulate_ahead_time: PositiveDuration = 2.0
+    """How far ahead it looks for collisions."""
 
 
 class Wait(BehaviorSpec):
@@ -292,6 +375,7 @@ class Wait(BehaviorSpec):
     component: ClassVar[str] = "simscen.stack.behaviors.motions:Wait"
     type: Literal["wait"] = "wait"
     wait_duration: Duration = 5.0
+    """How long it waits."""
 
 
 class BackUp(BehaviorSpec):
@@ -300,8 +384,11 @@ class BackUp(BehaviorSpec):
     component: ClassVar[str] = "simscen.stack.behaviors.motions:BackUp"
     type: Literal["backup"] = "backup"
     backup_dist: NonNegativeLength = 0.30
+    """How far it backs up."""
     backup_speed: PositiveSpeed = 0.15
+    """How fast it backs up."""
     simulate_ahead_time: PositiveDuration = 2.0
+    """How far ahead it looks for collisions."""
 
 
 class ClearCostmap(BehaviorSpec):
@@ -329,18 +416,26 @@ class Recovery(Spec):
     """Behaviours of Nav2's default tree, taken in turn when planning or control fails."""
 
     number_of_retries: Annotated[int, Field(ge=0, le=100)] = 6
+    """How often a goal is tried again before it fails."""
     behaviors: Annotated[list[Behavior], Field(max_length=20)] = [
         "clear_costmap",
         "spin",
         "wait",
         "backup",
     ]
+    """What is done in turn, by name or with parameters of its own."""
     spin_dist: Angle = 1.57
+    """How far it turns."""
     wait_duration: Duration = 5.0
+    """How long it waits."""
     backup_dist: NonNegativeLength = 0.30
+    """How far it backs up."""
     backup_speed: PositiveSpeed = 0.15
+    """How fast it backs up."""
     simulate_ahead_time: PositiveDuration = 2.0
+    """How far ahead it looks for collisions."""
     max_rotational_vel: PositiveAngularSpeed = 1.0
+    """Greatest turn rate of a spin."""
 
     @property
     def names(self) -> list[str]:
@@ -370,15 +465,18 @@ class VelocitySmoother(Spec):
     """nav2_velocity_smoother: limits accelerations of what is sent to the base."""
 
     enabled: bool = True
+    """Whether it is there at all."""
     max_accel: PositiveAcceleration | None = None
     """Default: the robot's own limit."""
     max_angular_accel: PositiveAngularAcceleration | None = None
+    """Default: the robot's own limit."""
 
 
 class CollisionMonitor(Spec):
     """nav2_collision_monitor: the last word before the base."""
 
     enabled: bool = True
+    """Whether it is there at all."""
     source_timeout: PositiveDuration = 0.3
     """A lidar that is silent this long stops the robot (Nav2's default is 1 s)."""
     time_before_collision: PositiveDuration = 0.5
@@ -397,14 +495,22 @@ class StackSpec(InProcessStack):
     component: ClassVar[str] = "simscen.stack.build:reference_stack"
     type: Literal["reference"] = "reference"
     localizer: Localizer = by_default()
+    """What knows where the robot is."""
     costmap: Costmap = by_default()
+    """What the robot knows of the ground around it."""
     planner: Planner = by_default()
+    """What finds a way."""
     controller: Controller = by_default()
+    """What follows a path."""
     goal_checker: GoalChecker = by_default()
     progress_checker: ProgressChecker = by_default()
+    """What says that the robot does not get on."""
     recovery: Recovery = by_default()
+    """What is done when planning or control has failed."""
     velocity_smoother: VelocitySmoother = by_default()
+    """What limits the accelerations of commands."""
     collision_monitor: CollisionMonitor = by_default()
+    """What stops the robot, whatever it is told."""
 
     @property
     def told_truth(self) -> bool:

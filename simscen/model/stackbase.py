@@ -14,7 +14,9 @@ class GoalTolerances(Spec):
     """How near is near enough for goals that do not say: the stack is told, and criteria judge by it."""
 
     xy_goal_tolerance: PositiveLength = 0.25
+    """How far from the goal the robot may be."""
     yaw_goal_tolerance: PositiveAngle = 0.25
+    """How far from the goal's heading its own may be."""
 
 
 class SpeedZone(Spec):

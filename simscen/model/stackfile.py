@@ -24,3 +24,4 @@ class StackFileSpec(Spec):
     description: Annotated[str, Field(max_length=10_000)] = ""
     """What is special about it."""
     stack: AnyStack
+    """The stack's parameters, as in a scenario."""

@@ -119,10 +119,14 @@ class WorldSpec(Spec):
     sdf: Annotated[str, Field(min_length=1, max_length=4096)] | None = None
     """A Gazebo world to add things to."""
     walls: Annotated[list[Wall], Field(max_length=2000)] = []
+    """Walls along polylines."""
     obstacles: Annotated[list[Obstacle], Field(max_length=2000)] = []
+    """What stands and never moves."""
     objects: Annotated[list[Movable], Field(max_length=200)] = []
+    """What can move, be pushed, or be moved by a scenario."""
     ramps: Annotated[list[Ramp], Field(max_length=200)] = []
     doors: Annotated[list[Door], Field(max_length=200)] = []
+    """What a scenario can open and close."""
     places: dict[PlaceName, PoseSpec] = {}
     """Named poses for goals and starts."""
     regions: dict[PlaceName, Ring] = {}

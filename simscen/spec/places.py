@@ -35,8 +35,11 @@ class PoseSpec(Spec):
     """A position in metres and a heading in radians, in the map frame."""
 
     x: Length
+    """Metres along the x axis."""
     y: Length
+    """Metres along the y axis."""
     yaw: Angle = 0.0
+    """The heading, anticlockwise from the x axis."""
     _place: str = PrivateAttr(default="")
 
     @property

@@ -49,7 +49,9 @@ class Quantity:
         units = "|".join(unit.replace("^", r"\^") for unit in UNITS[self.dimension])  # a pattern for JavaScript, too
         pattern = rf"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*({units})\s*$"
         # Bounds apply to numbers only and the pattern to text only, so both fit into one schema.
-        return {**number, "type": [number["type"], "string"], "pattern": pattern, "description": self.described}
+        told = f"expected {self._a_dimension}, e.g. {self.example}; units: {', '.join(UNITS[self.dimension])}"
+        both = {**number, "type": [number["type"], "string"], "pattern": pattern, "description": self.described}
+        return {**both, "patternErrorMessage": told}
 
     @property
     def example(self) -> str:
@@ -83,6 +85,18 @@ class Quantity:
         raise PydanticCustomError(
             "quantity", "{problem}; units: {units}", {"problem": problem, "units": ", ".join(units)}
         )
+
+
+@dataclass(frozen=True)
+class AnyQuantity:
+    """Marks a float as a quantity whose dimension something beside it says, and whose unit is parsed there."""
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        units = "|".join(re.escape(unit) for unit in dict.fromkeys(unit for units in UNITS.values() for unit in units))
+        units = units.replace("\\ ", " ").replace("\\%", "%")  # JavaScript knows no escapes but those it needs
+        told = "expected a number, with a unit such as in 1.5 m or in SI"
+        text = {"pattern": rf"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*({units})\s*$", "patternErrorMessage": told}
+        return {**handler(schema), "type": ["number", "string"], **text}
 
 
 class WholeQuantity(Quantity):

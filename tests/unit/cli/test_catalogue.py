@@ -81,3 +81,8 @@ def test_defaults_are_told_and_what_is_required_has_none() -> None:
 def test_modifiers_are_listed_apart_from_the_choices() -> None:
     assert [field.key for field in fields_of(trigger.Trigger)] == ["edge", "delay", "times", "probability"]
     assert {topic.name for topic in TOPICS if topic.group == "trigger"} == {*trigger.Test.choices(), "when"}
+
+
+def test_every_key_of_the_language_says_what_it_means() -> None:
+    silent = [f"{topic.name}.{field.key}" for topic in topics() for field in topic.fields if not field.text]
+    assert silent == []

@@ -14,7 +14,7 @@ from simscen.model.scenario import Physics, ScenarioSpec
 from simscen.model.stack import Amcl, DynamicWindow
 from simscen.spec.orplace import OrPlace
 from simscen.spec.places import PoseSpec
-from simscen.spec.quantities import Quantity
+from simscen.spec.quantities import AnyQuantity, Quantity
 
 PLAIN = {
     "SpeedMask.base": "percent or m/s, as `type` says: CostmapFilterInfo has one number for both",
@@ -35,16 +35,6 @@ PLAIN = {
     "DynamicWindow.rotate_to_goal_scale": "a weight of a critic",
     "Mppi.temperature": "of a softmax over costs without a dimension",
     "Mppi.gamma": "a weight of costs",
-    "Condition.value": "in the dimension of its signal, which parses its unit",
-    "Condition.scale": "likewise",
-    "Windowed.value": "likewise",
-    "Windowed.scale": "likewise",
-    "Always.value": "likewise",
-    "Always.scale": "likewise",
-    "Eventually.value": "likewise",
-    "Eventually.scale": "likewise",
-    "Whenever.value": "likewise",
-    "Whenever.scale": "likewise",
     "Smoothness.min_sparc": "spectral arc length, which has no dimension",
     "Smoothness.min_ldlj": "a logarithm of dimensionless jerk",
     "RobotSpec.arguments": "whatever the xacro file makes of it",
@@ -67,7 +57,7 @@ NO_PLACES = {
 
 def _bare_numbers() -> Iterator[Written]:
     for value in every_value():
-        if value.kind is float and not any(isinstance(mark, Quantity) for mark in value.marks):
+        if value.kind is float and not any(isinstance(mark, Quantity | AnyQuantity) for mark in value.marks):
             yield value
 
 
