@@ -125,6 +125,7 @@ class WorldSpec(Spec):
     objects: Annotated[list[Movable], Field(max_length=200)] = []
     """What can move, be pushed, or be moved by a scenario."""
     ramps: Annotated[list[Ramp], Field(max_length=200)] = []
+    """What wheels climb: slopes, sills and steps."""
     doors: Annotated[list[Door], Field(max_length=200)] = []
     """What a scenario can open and close."""
     places: dict[PlaceName, PoseSpec] = {}

@@ -11,7 +11,8 @@ import pytest
 from languageserver import Diagnostic, LanguageServer
 
 from simscen.actions.action import AnyAction
-from simscen.cli.catalogue import Topic, topics
+from simscen.cli.catalogue import Topic, fields_of, topics
+from simscen.cli.jsonschema import MODELS
 from simscen.core.version import PACKAGE
 from simscen.criteria.criterion import AnyCriterion
 from simscen.faults.fault import AnyFault
@@ -134,6 +135,8 @@ PLACES = {
     "scenario.initial_estimate": Place("scenario", "robot:\n  pose: dock\n  initial_estimate:\n    "),
     "scenario.goals": Place("scenario", "goals:\n  -\n    "),
     "scenario.events": Place("scenario", "events:\n  -\n    "),
+    "scenario.variations": Place("scenario", "variations:\n  "),
+    "scenario.sampled": Place("scenario", "variations:\n  sampled:\n    "),
     "scenario.then": Place("scenario", "events:\n  - when: {time: 1}\n    then:\n      -\n        "),
     "scenario.pose": Place("scenario", "robot:\n  pose:\n    "),
     "scenario.physics": Place("scenario", "physics:\n  "),
@@ -178,8 +181,22 @@ def places() -> Iterator[tuple[Topic, Place]]:
         elif topic.group in TYPED:
             kind, before = TYPED[topic.group]
             yield topic, Place(kind, f"{before}type: {topic.name}\n{_indent(before)}")
+        elif (top := _at_the_top(topic)) is not None:
+            yield topic, top
         elif name not in NOT_TYPED_IN_OURS and topic.name not in ("when", "faults", "pass"):
             assert topic.group in ROOMS, f"{name} has no place in this test"
+
+
+def _at_the_top(topic: Topic) -> Place | None:
+    """Where it stands if it is a key of its kind of file, alone or in a list."""
+    field = (
+        next((field for field in fields_of(MODELS[topic.group]) if field.key == topic.name), None)
+        if (topic.group in MODELS)
+        else None
+    )
+    if field is None:
+        return None
+    return Place(topic.group, f"{topic.name}:\n  -\n    " if "list of" in field.kind else f"{topic.name}:\n  ")
 
 
 def _indent(before: str) -> str:
