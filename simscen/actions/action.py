@@ -31,6 +31,8 @@ class AnyAction(Choice):
     new_goal: Annotated[Action | None, OnDemand("simscen.actions.goals", "NewGoal")] = None
     cancel_goal: Annotated[Action | None, OnDemand("simscen.actions.goals", "CancelGoal")] = None
     friction: Annotated[Action | None, OnDemand("simscen.actions.friction", "FrictionPatch")] = None
+    keepout: Annotated[Action | None, OnDemand("simscen.actions.zones", "SwitchKeepout")] = None
+    speed_zone: Annotated[Action | None, OnDemand("simscen.actions.zones", "SwitchSpeedZone")] = None
     mark: Annotated[Action | None, OnDemand("simscen.actions.mark", "Mark")] = None
 
     robot: RobotName | None = None

@@ -36,6 +36,7 @@ class EventKind(str, Enum):
     PEDESTRIAN_CALMED = "pedestrian.calmed"  # pedestrian; behavior, robot: the reaction is over
     ROBOT_PLACED = "robot.placed"  # x, y, yaw
     ROBOT_PUSHED = "robot.pushed"  # impulse (N s); seconds it is spread over, where it is no blow
+    ZONE_SWITCHED = "zone.switched"  # region, or "" for a mask; filter (keepout, speed), enabled, speed_limit (m/s)
     MARK = "mark"  # the mark; note
     RUN_ENDED = "run.ended"  # why: navigation ended, time limit
 

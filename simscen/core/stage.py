@@ -15,6 +15,7 @@ from simscen.core.surface import Patch
 from simscen.core.time import Clock
 from simscen.core.walker import Walker
 from simscen.core.world import Polygon
+from simscen.core.zones import ZoneSwitch
 
 if TYPE_CHECKING:
     import numpy as np
@@ -174,6 +175,10 @@ class Stage(Situation, Protocol):
 
     def cancel_goal(self) -> None:
         """Cancel the current goal as an action client would."""
+        ...
+
+    def switch_zone(self, order: ZoneSwitch) -> str:
+        """Tell the stack that a zone of its costmap filters is on or off; why nothing came of it, or ""."""
         ...
 
     def note(self, event: Event) -> None:

@@ -246,6 +246,20 @@ class LiveStage:
         for stage in self._fellows.values():
             stage.note(event)
 
+    def switch_zone(self, order: ZoneSwitch) -> str:
+        """Tell the stack that a zone is on or off."""
+        if not isinstance(self._stack, InstalledStack) or not self._stack.can_switch_zones:
+            return "the stack cannot be told of zones that are switched"
+        if refused := self._filters.refused(order):
+            return refused
+        for region in self._filters.switch(order):
+            limit = self._filters.limit(region) if order.filter == "speed" else 0.0
+            about: dict[str, Value] = {"filter": order.filter, "enabled": order.enabled}
+            about |= {"speed_limit": limit} if limit and order.enabled else {}
+            self.note(Event(0, EventKind.ZONE_SWITCHED, region, about))
+        self._stack.set_zones(self.tick, self._filters.zones)
+        return ""
+
     def note(self, event: Event) -> None:
         """Write an event to the log of this robot; one without a tick happened now."""
         stamped = event if event.tick else replace(event, tick=self.tick)

@@ -22,6 +22,7 @@ from simscen.core.navigation import ErrorCode, Goal, Path
 from simscen.core.sensing import Imu, Odometry, Readings, Scan
 from simscen.core.trace import Decision
 from simscen.core.world import Polygon
+from simscen.core.zones import Zones
 
 
 class NavigationFailure(Exception):
@@ -198,6 +199,14 @@ class GoalChecker(Protocol):
 
     def reached(self, goal: Goal, pose: Pose2, twist: Twist) -> bool:
         """Whether the robot, believed at `pose` in the map and moving at `twist`, has reached the goal."""
+        ...
+
+
+class SwitchesZones(Protocol):
+    """What a stack can do besides, whose costmap filters can be switched while it drives."""
+
+    def set_zones(self, tick: int, zones: Zones) -> None:
+        """Told at `tick`, before its `decide`: from the next update of its costmap on, these zones hold and no others."""
         ...
 
 

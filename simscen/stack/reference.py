@@ -11,6 +11,7 @@ from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import ErrorCode, Goal, Path
 from simscen.core.sensing import Imu, Odometry, Readings, Scan
 from simscen.core.trace import Decision
+from simscen.core.zones import Zones
 from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.localizers.ground_truth import TRUTH
@@ -58,6 +59,7 @@ class ReferenceStack:
         self._odometry, self._wheels = OdometryHistory(), False
         self._scans: dict[str, Scan] = {}
         self._mapped = -costmap_period
+        self._zones: Zones | None = None
         self._free_at = 0
         self._nothing = Decision(STOP)
 
@@ -78,6 +80,10 @@ class ReferenceStack:
         self._task.cancel(tick)
         self._navigator.stop()
         self._command, self._nothing = STOP, Decision(STOP)
+
+    def set_zones(self, tick: int, zones: Zones) -> None:
+        """These zones hold from the next update of the costmap on, and no others."""
+        self._zones = zones
 
     @property
     def plan(self) -> Path | None:
@@ -150,7 +156,13 @@ class ReferenceStack:
 
     def _update_costmap(self, tick: int) -> None:
         """Feed the newest scan of each lidar, not older than the costmap's own period."""
-        if not self._scans or tick - self._mapped < self._costmap_period:
+        if tick - self._mapped < self._costmap_period:
+            return
+        if self._zones is not None:
+            self._costmap.set_zones(self._zones)
+            self._speed_filter.set_zones(self._zones)
+            self._zones = None
+        if not self._scans:
             return
         self._mapped = tick
         pose = self._localizer.belief.pose

@@ -16,6 +16,7 @@ from simscen.core.surface import Patch
 from simscen.core.time import Clock
 from simscen.core.walker import Walker
 from simscen.core.world import Polygon
+from simscen.core.zones import ZoneSwitch
 
 
 @dataclass
@@ -118,6 +119,11 @@ class PuppetStage:
     def cancel_goal(self) -> None:
         """Write it down."""
         self.done.append(("cancel_goal",))
+
+    def switch_zone(self, order: ZoneSwitch) -> str:
+        """Write it down."""
+        self.done.append(("switch_zone", order))
+        return ""
 
     def note(self, event: Event) -> None:
         """Write it down."""

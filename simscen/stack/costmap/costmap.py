@@ -1,14 +1,16 @@
 """The costmap of a robot: static map below, live obstacles above, inflated, updated where something changed."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Pose2
 from simscen.core.sensing import Scan
+from simscen.core.zones import Zones
 from simscen.model.stack import Costmap as CostmapSpec
-from simscen.stack.costmap.frame import Cells
+from simscen.stack.costmap.frame import Cells, Frame
 from simscen.stack.costmap.inflation_layer import FAR, Inflation, squared_distances
 from simscen.stack.costmap.obstacle_layer import crossed, hits
 from simscen.stack.costmap.rolling import carried_over, left_behind, window_around, within
@@ -39,6 +41,7 @@ class Costmap:
         self._inflation = Inflation(resolution, self._inscribed, spec.inflation_radius, scaling, reach)
         self._margin = math.ceil(reach / resolution)
         self._revision = 0
+        self._zoned = 0
         self._newest: dict[str, tuple[Pose2, Scan]] = {}
         self._lay(self._layer(Pose2(0.0, 0.0)))
         self._show(np.zeros(self._frame.shape, dtype=bool))
@@ -50,8 +53,8 @@ class Costmap:
 
     @property
     def obstacle_cells(self) -> int:
-        """How many cells are marked as live obstacles."""
-        return int(np.count_nonzero(self._live))
+        """How many cells are marked as live obstacles, or were forbidden since the start."""
+        return int(np.count_nonzero(self._live)) + self._zoned
 
     def update(self, base: Pose2, scan: Scan) -> None:
         """Clear what the beams pass through, then mark what they hit, seen from the robot at `base`."""
@@ -78,6 +81,17 @@ class Costmap:
         for base, scan in list(self._newest.values()):
             self.update(base, scan)
 
+    def set_zones(self, zones: Zones) -> None:
+        """Keep out of these from now on, and of no others."""
+        before = self._forbidden()
+        self._surroundings = replace(self._surroundings, keepout=zones.keepout, masks=zones.masks)
+        self._lay(self._layer_in(self._frame))
+        self._zoned += self._forbidden() - before
+        self._show(self._live)
+
+    def _forbidden(self) -> int:
+        return int(np.count_nonzero(self._static_squared == 0))
+
     def fits_static(self, pose: Pose2, tolerance: float) -> bool:
         """Whether the pose is off the walls of the map and the robot's inscribed circle fits somewhere so near it."""
         row, column = self._frame.cells(np.array([[pose.x, pose.y]]))[0].tolist()
@@ -93,10 +107,12 @@ class Costmap:
         return within(self._frame, start, goal) if self._rolling else goal
 
     def _layer(self, centre: Pose2) -> StaticLayer:
+        return self._layer_in(window_around(centre, self._spec.rolling_size, self._spec.resolution))
+
+    def _layer_in(self, window: Frame) -> StaticLayer:
+        """What never changes but by an order; in this window, where there is no map."""
         grid, keepout, mask = self._surroundings.map, self._surroundings.keepout, self._surroundings.masks.keepout
-        if grid is not None:
-            return static_layer(grid, keepout, mask)
-        return empty_layer(window_around(centre, self._spec.rolling_size, self._spec.resolution), keepout, mask)
+        return empty_layer(window, keepout, mask) if grid is None else static_layer(grid, keepout, mask)
 
     def _lay(self, layer: StaticLayer) -> None:
         self._frame, self._unknown = layer.frame, layer.unknown

@@ -5,6 +5,7 @@ from simscen.core.events import Event, EventKind
 from simscen.core.navigation import Goal, Path
 from simscen.core.sensing import Readings
 from simscen.core.trace import Decision
+from simscen.core.zones import Zones
 from simscen.model.stack import InProcessStack
 from simscen.stack.installed.localizer import checked_belief
 from simscen.stack.installed.watched import Watched
@@ -32,6 +33,15 @@ class InstalledStack(Watched):
     def cancel(self, tick: int) -> None:
         """Cancel the current goal and all after it."""
         self.ask(self.inner.cancel, tick)
+
+    @property
+    def can_switch_zones(self) -> bool:
+        """Whether it is a SwitchesZones."""
+        return callable(getattr(self.inner, "set_zones", None))
+
+    def set_zones(self, tick: int, zones: Zones) -> None:
+        """From the next update of its costmap on these zones hold, and no others."""
+        self.ask(self.inner.set_zones, tick, zones)
 
     def decide(self, tick: int, readings: Readings) -> Decision:
         """The stack's decision. Raises RunError when it is none."""
