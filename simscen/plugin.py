@@ -26,10 +26,12 @@ if TYPE_CHECKING:
     from simscen.core.polygons import distance_to_polygon
     from simscen.core.samples import Samples
     from simscen.core.sensing import Bump, Image, Imu, Odometry, Reading, Readings, Scan
+    from simscen.core.shapes import Body, MotionPath
     from simscen.core.stage import Effect, Situation, Stage
     from simscen.core.time import Clock
     from simscen.core.trace import Decision, Trace
     from simscen.core.verdict import Finding, Status
+    from simscen.core.zones import Zones, ZoneSwitch
     from simscen.criteria.base import Criterion
     from simscen.criteria.bounds import at_least, at_most, counted, held, missed, undecided
     from simscen.criteria.measure import Measure
@@ -80,6 +82,7 @@ if TYPE_CHECKING:
         RobotModel,
         Stack,
         Surroundings,
+        SwitchesZones,
     )
     from simscen.stack.setting import Setting
     from simscen.stack.tasks import Task
@@ -94,6 +97,7 @@ __all__ = [
     "Behavior",
     "BehaviorSpec",
     "Belief",
+    "Body",
     "Bump",
     "Case",
     "Choice",
@@ -130,6 +134,7 @@ __all__ = [
     "LocalizerSpec",
     "MaskFile",
     "Measure",
+    "MotionPath",
     "Mount",
     "MovableName",
     "NavigationFailure",
@@ -176,12 +181,15 @@ __all__ = [
     "Status",
     "Streams",
     "Surroundings",
+    "SwitchesZones",
     "Task",
     "TaskResult",
     "Trace",
     "Twist",
     "Value",
     "Wheels",
+    "ZoneSwitch",
+    "Zones",
     "at_least",
     "at_most",
     "by_default",
@@ -279,6 +287,7 @@ _WHERE = {
         "RobotModel",
         "Stack",
         "Surroundings",
+        "SwitchesZones",
     ),
     "simscen.stack.setting": ("Setting",),
     "simscen.stack.footprint": (
@@ -348,6 +357,10 @@ _WHERE = {
         "Readings",
         "Scan",
     ),
+    "simscen.core.shapes": (
+        "Body",
+        "MotionPath",
+    ),
     "simscen.core.stage": (
         "Effect",
         "Situation",
@@ -361,6 +374,10 @@ _WHERE = {
     "simscen.core.verdict": (
         "Finding",
         "Status",
+    ),
+    "simscen.core.zones": (
+        "ZoneSwitch",
+        "Zones",
     ),
 }
 _MODULE_OF = {name: module for module, names in _WHERE.items() for name in names}

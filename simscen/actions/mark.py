@@ -27,5 +27,5 @@ class Mark(Spec, Action):
 
     def perform(self, stage: Stage) -> Effect:
         """Write it down."""
-        stage.note(Event(0, EventKind.MARK, self.name, {"note": self.note} if self.note else {}))
+        stage.tell(Event(0, EventKind.MARK, self.name, {"note": self.note} if self.note else {}))
         return Effect(True, f"marked {self.name}")

@@ -4,12 +4,10 @@ from typing import Any, cast
 
 from simscen.actions.base import Action
 from simscen.core.errors import BROKEN, RunError
-from simscen.core.stage import Effect, Stage
+from simscen.core.stage import Effect, Situation, Stage
 
-_DOING = frozenset(
-    {"spawn", "walk", "remove", "move", "place", "place_robot", "push", "send_goal", "cancel_goal", "note"}
-)
-"""What changes a run; everything else of a stage only tells how it stands."""
+_TELLING = frozenset({*dir(Situation), "room", "chance", "door", "motion", "mass"})
+"""What of a stage only tells how it stands; everything else changes a run."""
 
 
 def perform_watched(action: Action, stage: Stage, whose: str) -> Effect:
@@ -30,5 +28,5 @@ class _Watched:
         self._stage, self.done = stage, False
 
     def __getattr__(self, name: str) -> Any:
-        self.done = self.done or name in _DOING
+        self.done = self.done or name not in _TELLING
         return getattr(self._stage, name)

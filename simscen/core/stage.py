@@ -181,6 +181,10 @@ class Stage(Situation, Protocol):
         """Tell the stack that a zone of its costmap filters is on or off; why nothing came of it, or ""."""
         ...
 
+    def tell(self, event: Event) -> None:
+        """Write an event to the logs of all robots: it happened to the world."""
+        ...
+
     def note(self, event: Event) -> None:
         """Write an event to the log."""
         ...

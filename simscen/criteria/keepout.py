@@ -15,8 +15,9 @@ from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import BrokenTrace, at_least, undecided
 from simscen.criteria.signals import Flags, truth
+from simscen.criteria.switched import NEVER, spans_on, within
 from simscen.spec.base import Spec
-from simscen.spec.quantities import NonNegativeLength
+from simscen.spec.quantities import Duration, NonNegativeLength
 from simscen.spec.references import MaskFile, RegionName
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ class Keepout(Spec, Criterion):
     Why this: a keepout filter in a costmap is advice to a planner; recoveries and controllers leave the plan.
     Source: Nav2's keepout filter tutorial.
 
-    Inconclusive when no cell of the mask is occupied: then nothing was tested.
+    Inconclusive when no cell of the mask is occupied, or with `while_on` when it never was on: then nothing was tested.
 
     Example: `keepout: {region: wet floor, distance: 10 cm}`
     """
@@ -59,11 +60,17 @@ class Keepout(Spec, Criterion):
     The stack is told of it only if `stack.keepout_mask` names it, too."""
     distance: NonNegativeLength = 0.0
     """How far to stay away from it."""
+    while_on: bool = False
+    """Only while events have it switched on (`keepout` among the actions); else over the whole run."""
+    grace: Duration = 0.0
+    """How long the robot may take to leave it after it was switched on; with `while_on` only."""
 
     @model_validator(mode="after")
     def _one_place(self) -> Keepout:
         if (self.region is None) == (self.mask is None):
             raise ValueError("expected either region or mask")
+        if self.grace and not self.while_on:
+            raise ValueError("grace is for a zone that is switched on: `while_on: true`")
         return self
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
@@ -75,8 +82,15 @@ class Keepout(Spec, Criterion):
         poses = truth(trace)
         if not len(poses):
             return [undecided(what, "the robot's way was not recorded", limit)]
-        distance, tick = _nearest(trace, poses, case, away)
-        return [at_least(what, distance, self.distance, "m", at=(trace, tick))]
+        if not self.while_on:
+            distance, tick = _nearest(trace, poses, case, away)
+            return [at_least(what, distance, self.distance, "m", at=(trace, tick))]
+        ways = [within(poses, *span) for span in spans_on(trace, "keepout", self.region, self.grace)]
+        found = [_nearest(trace, way, case, away) for way in ways if len(way)]
+        if not found:
+            return [undecided(what, NEVER, limit)]
+        distance, tick = min(found)
+        return [at_least(what, distance, self.distance, "m", at=(trace, tick), context="while it was on")]
 
     def _away(self, case: Case) -> Away | str:
         """How far the hull is away at poses, or why nobody can say."""

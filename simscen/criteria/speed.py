@@ -12,6 +12,7 @@ from simscen.criteria import signals
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import at_most, undecided
 from simscen.criteria.signal_values import inside as within
+from simscen.criteria.switched import NEVER, spans_on
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Duration, NonNegativeSpeed, PositiveAngularSpeed, PositiveSpeed
 from simscen.spec.references import RegionName
@@ -47,6 +48,9 @@ class Speed(Spec, Criterion):
     """rad/s, either way."""
     in_: RegionName | None = Field(default=None, alias="in")
     """Only while the robot's centre is in this region, by name."""
+    while_on: bool = False
+    """Only while events have the limit in that region switched on (`speed_zone` among the actions), and from `grace`
+    after that; else over the whole run."""
     mask: SpeedMask | None = None
     """A filter mask of speed limits: file, type, base and multiplier, as `stack.speed_mask` has them.
 
@@ -56,12 +60,19 @@ class Speed(Spec, Criterion):
     tolerance: NonNegativeSpeed = 0.05
     """How far above a limit of the mask the robot may be."""
     grace: Duration = 1.0
-    """How long the robot may take to slow down for a lower limit, and how early it may believe to have left it."""
+    """How long the robot may take to slow down for a lower limit, or for a zone that was switched on, and how early it
+    may believe to have left it."""
 
     @model_validator(mode="after")
     def _some_bound(self) -> Speed:
         if self.max is None and self.max_turn_rate is None and self.mask is None:
             raise ValueError("expected max, max_turn_rate or mask")
+        return self
+
+    @model_validator(mode="after")
+    def _on_where(self) -> Speed:
+        if self.while_on and (self.in_ is None or self.mask is not None):
+            raise ValueError("while_on is for the zone of a region: `in`, and no mask")
         return self
 
     @model_validator(mode="after")
@@ -87,8 +98,13 @@ class Speed(Spec, Criterion):
         inside = self._inside(trace, case, signal)
         if inside is None:
             return undecided(what, f"the world has no region `{self.in_}`", told)
+        if self.while_on:
+            spans = spans_on(trace, "speed", self.in_, self.grace)
+            if not spans:
+                return undecided(what, NEVER, told)
+            inside &= np.any([(first <= signal.ticks) & (signal.ticks <= last) for first, last in spans], axis=0)
         if not inside.any():
-            return undecided(what, f"the robot never was in `{self.in_}`", told)
+            return undecided(what, f"the robot never was in `{self.in_}`{' while it was on' * self.while_on}", told)
         k = int(np.flatnonzero(inside)[np.argmax(signal.values[inside, 0])])
         context = "" if self.in_ is None else f"in {self.in_}"
         return at_most(what, float(signal.values[k, 0]), limit, unit, at=(trace, int(signal.ticks[k])), context=context)

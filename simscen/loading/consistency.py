@@ -18,6 +18,7 @@ from simscen.loading.sense.people import namesakes
 from simscen.loading.sense.specwalk import below
 from simscen.loading.sense.unfitfaults import unfit_faults
 from simscen.loading.sense.worldsense import senseless
+from simscen.loading.sense.zoneorders import vain_orders
 from simscen.loading.tree import Fields, Key, key_place, real_keys, value_place
 from simscen.model.robot import RobotSpec
 from simscen.triggers.scan_age import ScanAge
@@ -40,7 +41,7 @@ def inconsistencies(
     unknown += _robots_and_things(loaded, world)
     if any(problem.severity == "error" for problem in unknown):
         return unknown
-    checks = (_undecidable, _short_faults, never_happens, never_holds, hardly_fails)
+    checks = (_undecidable, _short_faults, never_happens, never_holds, hardly_fails, vain_orders)
     return [*unknown, *(problem for check in checks for problem in check(loaded))]
 
 

@@ -20,6 +20,7 @@ from simscen.run.ending import Ending
 from simscen.run.external.build import build_external
 from simscen.run.faultrig import FaultRig
 from simscen.run.faultsettings import FaultSettings
+from simscen.run.filters import Filters
 from simscen.run.live import LiveStage, described
 from simscen.run.lockstep import Rig
 from simscen.run.prepare import Prepared
@@ -115,9 +116,9 @@ def _agent(
         return faults.belief(simulation.tick, belief)
 
     stack = _stack(prepared, clock, streams, seed, printed, told)
-    stage = LiveStage(
-        prepared.built.world, simulation, robot, stack, clock, prepared.case.sent, walking, Streams(seed), stages
-    )
+    world, sent = prepared.built.world, prepared.case.sent
+    filters = Filters(prepared.stack, world.regions, prepared.masks)
+    stage = LiveStage(world, simulation, robot, stack, filters, clock, sent, walking, Streams(seed), stages)
     settings = FaultSettings(
         prepared.robot,
         clock,

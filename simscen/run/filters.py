@@ -27,7 +27,7 @@ class Filters:
 
     def __init__(self, stack: StackBase, regions: Mapping[str, Polygon], masks: FilterMasks) -> None:
         self._regions, self._masks = regions, masks
-        keepout = {region: (0.0, True) for region in stack.keepout}
+        keepout = dict.fromkeys(stack.keepout, (0.0, True))
         speed = {zone.region: (zone.speed_limit, True) for zone in stack.speed_zones}
         self._filters: dict[Filter, _Filter] = {
             "keepout": _Filter(keepout, masks.keepout is not None),

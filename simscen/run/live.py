@@ -18,10 +18,13 @@ from simscen.core.time import Clock
 from simscen.core.trace import Decision, Truth
 from simscen.core.walker import Walker
 from simscen.core.world import Polygon, World
+from simscen.core.zones import ZoneSwitch
+from simscen.run.filters import Filters
 from simscen.run.walking import Walking
 from simscen.sim.outline import parts
 from simscen.sim.robot import Robot
 from simscen.sim.simulation import Simulation
+from simscen.stack.installed.stack import InstalledStack
 from simscen.stack.protocols import Stack
 from simscen.worlds.shortest import Z_RANGE
 
@@ -38,15 +41,19 @@ class LiveStage:
         simulation: Simulation,
         robot: Robot,
         stack: Stack,
+        filters: Filters,
         clock: Clock,
         goals: Iterable[Goal],
         walking: Walking,
         streams: Streams,
         fellows: "dict[str, LiveStage]",
     ) -> None:
-        """`goals` are those that events may send; to `fellows`, the stages of all robots, this one is added."""
+        """`filters` are those of its stack's costmap, `goals` those that events may send.
+
+        To `fellows`, the stages of all robots, this one is added.
+        """
         self._world, self._simulation, self._robot, self._stack = world, simulation, robot, stack
-        self.clock = clock
+        self._filters, self.clock = filters, clock
         self._walking, self._streams = walking, streams
         walking.tell.append(self.note)
         self._fellows = fellows

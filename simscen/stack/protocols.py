@@ -206,7 +206,7 @@ class SwitchesZones(Protocol):
     """What a stack can do besides, whose costmap filters can be switched while it drives."""
 
     def set_zones(self, tick: int, zones: Zones) -> None:
-        """Told at `tick`, before its `decide`: from the next update of its costmap on, these zones hold and no others."""
+        """Told at `tick`, before its `decide`: these hold from the next update of its costmap on, and no others."""
         ...
 
 

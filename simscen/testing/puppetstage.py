@@ -125,6 +125,10 @@ class PuppetStage:
         self.done.append(("switch_zone", order))
         return ""
 
+    def tell(self, event: Event) -> None:
+        """Write it down."""
+        self.done.append(("tell", event))
+
     def note(self, event: Event) -> None:
         """Write it down."""
         self.done.append(("note", event))

@@ -47,6 +47,10 @@ world:
   objects:
     - {name: cart, box: [0.3, 0.3, 0.5], pose: {x: 4, y: 3.2}}
     - {name: pallet, box: [0.3, 0.3, 0.3], pose: {x: 5.2, y: 3.4}}
+  regions:
+    hall: [[0, 0], [6, 0], [6, 4], [0, 4]]
+    wet floor: [[2, 2], [3, 2], [3, 3], [2, 3]]
+    crossing: [[4, 0], [5, 0], [5, 2], [4, 2]]
   doors: [{name: door meeting room, points: [[0.4, 3.95], [0.9, 3.95]], closed: %s}]
 robot: {model: observer.robot.yaml, pose: {x: 1, y: 1, yaw: 0.4}}
 goals: [{name: end, pose: {x: 5, y: 1}}]

@@ -7,6 +7,7 @@ from scipy.ndimage import distance_transform_edt
 from simscen.core.geometry import Pose2
 from simscen.core.grid import OccupancyGrid
 from simscen.core.sensing import Scan
+from simscen.core.zones import Zones
 from simscen.model.stack import Costmap as Spec
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.protocols import Surroundings
@@ -193,3 +194,32 @@ def test_the_revision_grows_when_something_changed() -> None:
     world.discs.append((4.0, 3.0, 0.1))
     map_.update(Pose2(2.0, 3.0), scan_of(world, Pose2(2.0, 3.0)))
     assert map_.view.revision == before + 1
+
+
+ZONES = (((3.0, 2.0), (5.0, 2.0), (5.0, 4.0), (3.0, 4.0)),)
+
+
+def test_zones_that_are_switched_on_make_the_costmap_that_has_them_from_the_start_and_off_again_the_old_one() -> None:
+    world = Flatland().room(8, 6)
+    plain, zoned, switched = costmap(world), costmap(world, keepout=ZONES), costmap(world)
+    world.discs = [(2.0, 3.0, 0.2)]
+    scan = scan_of(world, Pose2(1.0, 3.0))
+    for map_ in (plain, zoned, switched):
+        map_.update(Pose2(1.0, 3.0), scan)
+    revision, cells = switched.view.revision, switched.obstacle_cells
+    switched.set_zones(Zones(keepout=ZONES))
+    assert np.array_equal(switched.view.costs, zoned.view.costs)
+    assert np.array_equal(switched.view.distance, zoned.view.distance)
+    assert switched.view.revision > revision, "who follows a plan looks at it again"
+    assert switched.obstacle_cells == cells + 40 * 40
+    switched.set_zones(Zones())
+    assert np.array_equal(switched.view.costs, plain.view.costs)
+    assert switched.obstacle_cells == cells
+
+
+def test_zones_are_switched_in_a_window_that_rolls() -> None:
+    map_ = costmap(None, Spec(rolling_size=6.0))
+    map_.set_zones(Zones(keepout=(((1.0, 0.5), (2.0, 0.5), (2.0, 1.5), (1.0, 1.5)),)))
+    assert at(map_, 1.5, 1.0)[0] == 254
+    map_.set_zones(Zones())
+    assert at(map_, 1.5, 1.0)[0] == 0

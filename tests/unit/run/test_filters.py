@@ -1,0 +1,78 @@
+"""Which zones of a stack's costmap filters are on, order by order."""
+
+import numpy as np
+import pytest
+
+from simscen.core.filtermasks import FilterMasks
+from simscen.core.geometry import Pose2
+from simscen.core.grid import OccupancyGrid
+from simscen.core.zones import ZoneSwitch
+from simscen.model.stack import StackSpec
+from simscen.run.filters import Filters
+
+WET, DRY, SLOW = (((k, 0.0), (k + 1, 0.0), (k + 1, 1.0)) for k in (0.0, 2.0, 4.0))
+REGIONS = {"wet": WET, "dry": DRY, "slow": SLOW}
+STACK = {"keepout": ["wet"], "speed_zones": [{"region": "slow", "speed_limit": 0.2}]}
+MASK = OccupancyGrid(np.zeros((2, 2), np.int8), 0.1, Pose2(0.0, 0.0))
+
+
+def filters(masks=None, **stack):
+    return Filters(StackSpec.model_validate(stack), REGIONS, masks or FilterMasks())
+
+
+def order(filters, what, enabled, region=None, limit=None):
+    told = ZoneSwitch(what, enabled, region, limit)
+    return filters.refused(told) or filters.switch(told)
+
+
+def test_zones_come_in_the_order_in_which_they_were_named():
+    some = filters(**STACK)
+    assert some.zones.keepout == (WET,)
+    assert order(some, "keepout", True, "dry") == ("dry",)
+    assert some.zones.keepout == (WET, DRY)
+    assert order(some, "keepout", False, "wet") == ("wet",)
+    assert some.zones.keepout == (DRY,)
+    assert order(some, "keepout", True, "wet") == ("wet",)
+    assert some.zones.keepout == (WET, DRY)
+
+
+def test_speed_limits_hold_as_last_said():
+    some = filters(**STACK)
+    assert some.zones.speed == ((SLOW, 0.2),)
+    order(some, "speed", True, "slow", 0.1)
+    assert some.zones.speed == ((SLOW, 0.1),)
+    order(some, "speed", False, "slow")
+    assert some.zones.speed == ()
+    order(some, "speed", True, "slow")
+    assert some.zones.speed == ((SLOW, 0.1),)
+
+
+def test_a_filter_switched_as_a_whole_takes_its_mask_along_and_gives_back_what_was_on():
+    some = filters(FilterMasks(MASK), keepout=["wet", "dry"])
+    order(some, "keepout", False, "dry")
+    assert order(some, "keepout", False) == ("wet", "")
+    assert (some.zones.keepout, some.zones.masks.keepout) == ((), None)
+    assert order(some, "keepout", True) == ("wet", "")
+    assert some.zones.keepout == (WET,)
+    assert some.zones.masks.keepout is MASK
+
+
+@pytest.mark.parametrize(
+    ("told", "what", "enabled", "region", "limit"),
+    [
+        ("`wet` was on already", "keepout", True, "wet", None),
+        ("`dry` was off already", "keepout", False, "dry", None),
+        ("`slow` was on already", "speed", True, "slow", 0.2),
+        ("`dry` is no speed zone of the stack, and has no speed limit", "speed", True, "dry", None),
+        ("the stack's keepout filter was on already", "keepout", True, None, None),
+    ],
+)
+def test_an_order_that_changes_nothing_says_why(told, what, enabled, region, limit):
+    assert order(filters(**STACK), what, enabled, region, limit) == told
+
+
+def test_a_filter_of_nothing_cannot_be_switched_and_one_that_is_off_takes_no_orders():
+    assert order(filters(), "speed", False) == "the stack's speed filter has no zone and no mask"
+    some = filters(**STACK)
+    order(some, "keepout", False)
+    assert order(some, "keepout", True, "dry") == "the stack's keepout filter is off as a whole"
