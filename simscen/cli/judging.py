@@ -12,13 +12,14 @@ from simscen.core.errors import InvalidInput
 from simscen.core.evidence import Coverage, Evidence
 from simscen.core.maskcells import MaskCells
 from simscen.core.problems import Problem
-from simscen.core.result import RunFailure, RunKey, unfinished
+from simscen.core.result import Outcome, RunFailure, RunKey, unfinished
 from simscen.core.sessionevents import Artifacts, RunFinished
 from simscen.core.trace import Trace
 from simscen.judge.result import result_of
 from simscen.loading.criteria_file import LoadedCriteria, load_criteria
 from simscen.loading.discovery import default_root
 from simscen.loading.resolved import criteria_of_text
+from simscen.model.criteria_file import expectation_of
 from simscen.record.foreign.mcapfile import is_own
 from simscen.record.foreign.read import read_foreign
 from simscen.record.foreign.wanted import Wanted
@@ -65,7 +66,8 @@ class Judging:
         key = about.key
         if self._criteria is None:
             spec = criteria_of_text(about.scenario, str(log), about.facts)
-            result = result_of(key, str(log), spec.pass_, read.trace, case, metrics=spec.metrics)
+            expected = expectation_of(spec)
+            result = result_of(key, str(log), spec.pass_, read.trace, case, metrics=spec.metrics, expected=expected)
             return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=str(log))
         # What had to happen stands in the scenario of the log, at lines that the file of criteria does not have.
         case = replace(case, disturbances=tuple(replace(one, line=0) for one in case.disturbances))
@@ -109,7 +111,9 @@ class Judging:
         """Judged by the file of criteria."""
         criteria, file = self._criteria, str(self._scenario)
         assert criteria is not None
-        result = result_of(key, file, criteria.spec.pass_, trace, case, criteria.lines, coverage, criteria.spec.metrics)
+        spec = criteria.spec
+        expected = expectation_of(spec)
+        result = result_of(key, file, spec.pass_, trace, case, criteria.lines, coverage, spec.metrics, expected)
         return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=file)
 
 
@@ -142,6 +146,8 @@ def runs_without_log(folders: Sequence[Path]) -> list[tuple[str, RunFinished]]:
 
 
 def _without_log(answer: RunFinished) -> RunFinished:
+    if answer.outcome is Outcome.SKIPPED:
+        return answer
     error = answer.result.error
     failure = RunFailure(error.kind if error else "crashed", "it left no log" + (f": {error.message}" if error else ""))
     return RunFinished(unfinished(answer.key, answer.result.path, failure), file=answer.file)

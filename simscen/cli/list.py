@@ -23,8 +23,8 @@ def command(
 ) -> None:
     """List the scenarios that a selection means.
 
-    One line each, also for each variation: id, name, tags and the external stack that it names. Exit code 0; 2 if a
-    scenario is invalid; 5 if nothing is selected.
+    One line each, also for each variation: id, name, tags, the external stack that it names, and why it is skipped or
+    expected to fail. Exit code 0; 2 if a scenario is invalid; 5 if nothing is selected.
     """
     home = root if root is not None else default_root(paths)
     tried = [try_variations(file, home, world_path or ()) for file in discover(paths, home)]
@@ -33,8 +33,15 @@ def command(
     chosen = select([one for found in tried if isinstance(found, tuple) for one in found], keyword, tag or ())
     width = max(len(scenario.title) for scenario in chosen)
     for scenario in chosen:
-        about = f"{scenario.spec.name or ''} {_tags(scenario)} {_stack(scenario)}"
+        about = f"{scenario.spec.name or ''} {_tags(scenario)} {_stack(scenario)} {_excuse(scenario)}"
         print_text(f"{harmless(scenario.title):{width}}  {harmless(about)}".rstrip())
+
+
+def _excuse(scenario: LoadedScenario) -> str:
+    spec = scenario.spec
+    if spec.skip is not None:
+        return f"(skipped: {spec.skip})"
+    return f"(expected to fail: {spec.expected.fail})" if spec.expected is not None else ""
 
 
 def _stack(scenario: LoadedScenario) -> str:

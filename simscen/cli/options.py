@@ -14,12 +14,12 @@ from typer.models import ArgumentInfo, OptionInfo
 from simscen.core.errors import Exit
 
 EXITS = {
-    Exit.PASSED: "All passed; nothing is wrong.",
-    Exit.FAILED: "A criterion failed.",
+    Exit.PASSED: "All passed, or failed as their scenarios say; nothing is wrong.",
+    Exit.FAILED: "A criterion failed, or held although it was expected to fail.",
     Exit.USAGE: "An invalid file, wrong usage or an unusable output folder. Nothing was run.",
     Exit.INCOMPLETE: "A run could not be completed (crash, timeout, out of memory), or a result could not be written.",
     Exit.INTERNAL: "A bug in simscen.",
-    Exit.NOTHING_SELECTED: "Nothing was selected.",
+    Exit.NOTHING_SELECTED: "Nothing was selected, or all of it is skipped.",
     Exit.HUNG_UP: "Interrupted by SIGHUP: the terminal has gone.",
     Exit.INTERRUPTED: "Interrupted by Ctrl-C (SIGINT).",
     Exit.TERMINATED: "Interrupted by SIGTERM.",

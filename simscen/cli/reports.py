@@ -87,12 +87,16 @@ class Reports:
             junit=str(self.junit),
             folder=str(self.folder),
             comparison=comparison,
+            expected=count[Outcome.FAILED_AS_EXPECTED],
+            skipped=count[Outcome.SKIPPED],
         )
 
 
 def verdict(answers: Sequence[RunFinished]) -> Exit:
     """The exit code of a session that was not interrupted."""
     outcomes = {answer.outcome for answer in answers}
+    if outcomes == {Outcome.SKIPPED}:
+        return Exit.NOTHING_SELECTED
     if Outcome.ERROR in outcomes:
         only_skipped = all(a.result.error is None or a.result.error.kind == "not-run" for a in answers)
         return Exit.FAILED if only_skipped and Outcome.FAILED in outcomes else Exit.INCOMPLETE

@@ -94,8 +94,9 @@ def command(
     verdicts in the output folder, beside results.json and junit.xml. Should simscen itself be killed, `simscen report`
     makes these from the journal, and --resume goes on where it stopped.
 
-    Exit code 0: all passed; 1: a criterion failed; 2: an invalid scenario or an unusable output folder (nothing was
-    run); 3: a run could not be completed; 5: nothing selected; 129, 130 and 143: interrupted.
+    Exit code 0: all passed, or failed as expected; 1: a criterion failed, or held although it was expected to fail; 2:
+    an invalid scenario or an unusable output folder (nothing was run); 3: a run could not be completed; 5: nothing
+    selected, or everything skipped; 129, 130 and 143: interrupted.
     """
     if check_determinism and (earlier := [path for path in paths if (path / NAME).is_file()]):
         paths, check_determinism, check_against = [p for p in paths if p not in earlier], False, earlier[0]
@@ -139,7 +140,10 @@ def _run(work: Work, options: Options, reports: Reports, shown: Screen) -> Exit:
     wall = time.monotonic() - begun
     listen(reports.closing(answers, wall, stopped is not None, comparison))
     written = reports.end(wall) and written and _kept(work.journal)
-    return stopped or (verdict(answers) if written else Exit.INCOMPLETE)
+    code = verdict(answers)
+    if code is Exit.NOTHING_SELECTED:
+        print_text("simscen: nothing was run: every scenario that was chosen says to skip it", sys.stderr)
+    return stopped or (code if written else Exit.INCOMPLETE)
 
 
 def _kept(journal: Journal) -> bool:

@@ -16,6 +16,13 @@ class Outcome(str, Enum):
     PASSED = "passed"
     FAILED = "failed"
     ERROR = "error"
+    FAILED_AS_EXPECTED = "failed-as-expected"
+    SKIPPED = "skipped"
+
+    @property
+    def good(self) -> bool:
+        """Whether it is as the scenario says: passed, failed as expected, or skipped."""
+        return self not in (Outcome.FAILED, Outcome.ERROR)
 
 
 AGAIN = "again"
@@ -100,6 +107,7 @@ class RunResult:
     has a verdict of its own, before those of the criteria. `ended` is why the simulation stopped, `simulated` is in
     seconds, `tick_rate` turns the findings' ticks into seconds. `error` is set exactly when the outcome is ERROR.
     `stack` is the NAME=VALUE of the --stack that it ran with, files seen from the root; "" = the scenario's own stack.
+    `reason` is the scenario's, where it is expected to fail or skipped.
     """
 
     key: RunKey
@@ -116,6 +124,7 @@ class RunResult:
     tick_rate: int = 240
     error: RunFailure | None = None
     stack: str = ""
+    reason: str = ""
 
     def __post_init__(self) -> None:
         if (self.error is not None) != (self.outcome is Outcome.ERROR):
@@ -127,6 +136,11 @@ class RunResult:
         varied = ["--variation", self.key.variation] if self.key.variation else []
         chosen = ["--stack", self.stack] if self.stack else []
         return shlex.join(["simscen", "run", self.path, "--seed", str(self.key.seed), *varied, *chosen])
+
+
+def skipped(key: RunKey, path: str, reason: str, stack: str = "") -> RunResult:
+    """The result of a run that its scenario says is not to be run."""
+    return RunResult(key, path, Outcome.SKIPPED, stack=stack, reason=reason)
 
 
 def unfinished(key: RunKey, path: str, failure: RunFailure, stack: str = "") -> RunResult:

@@ -32,6 +32,11 @@ class Run:
         """Whether everything held; a run that could not be completed never passed."""
         return self.result.outcome is Outcome.PASSED
 
+    @property
+    def as_expected(self) -> bool:
+        """Whether it passed, or failed as its scenario says it does."""
+        return self.result.outcome.good
+
     def verdict(self, name: str) -> Verdict:
         """The verdict of the criterion with this id, e.g. `run.verdict("path_length").status`. Raises KeyError."""
         found = {verdict.id: verdict for verdict in self.result.verdicts}

@@ -91,7 +91,8 @@ class RunFinished:
 class SessionFinished:
     """The last event: counts, simulated and wall seconds of the whole session, and where the reports are.
 
-    `comparison` is what several stacks on the same scenarios say about each other.
+    `expected` failed as their scenarios say, `skipped` were not run. `comparison` is what several stacks on the same
+    scenarios say about each other.
     """
 
     passed: int
@@ -103,6 +104,8 @@ class SessionFinished:
     junit: str = ""
     folder: str = ""
     comparison: Comparison | None = None
+    expected: int = 0
+    skipped: int = 0
 
 
 SessionEvent = SessionStarted | RunStarted | RunProgress | RunFinished | SessionFinished

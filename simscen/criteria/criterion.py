@@ -1,5 +1,6 @@
 """The list of criteria: a new one is one file and one line here."""
 
+from collections.abc import Sequence
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import BaseModel, model_validator
@@ -69,3 +70,14 @@ class AnyCriterion(Choice):
         from simscen.criteria.whenever import Response
 
         return Response.of(self.whenever, self.then)
+
+
+def verdict_names(criteria: Sequence[AnyCriterion]) -> list[str]:
+    """What the verdict of each criterion is called; an id that is given twice gets a number: speed, speed#2."""
+    seen: dict[str, int] = {}
+    names = []
+    for entry in criteria:
+        name = entry.id or entry.kind
+        seen[name] = seen.get(name, 0) + 1
+        names.append(name if seen[name] == 1 else f"{name}#{seen[name]}")
+    return names

@@ -11,7 +11,7 @@ from simscen.core.trace import Trace
 from simscen.core.verdict import Finding, Status, Verdict
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import NotRecorded, undecided
-from simscen.criteria.criterion import AnyCriterion
+from simscen.criteria.criterion import AnyCriterion, verdict_names
 from simscen.criteria.moments import finished
 from simscen.judge.needs import doubt, undecidable
 from simscen.judge.sound import flaw_of
@@ -20,20 +20,16 @@ from simscen.judge.sound import flaw_of
 def judge(
     criteria: Sequence[AnyCriterion], trace: Trace, case: Case, coverage: Coverage = WHOLE
 ) -> tuple[Verdict, ...]:
-    """One verdict for each criterion, in order. An id that is given twice gets a number: speed, speed#2.
+    """One verdict for each criterion, in order.
 
     An exception inside a criterion is its verdict, an error that names it; what it needs and was not recorded, or what
     the log lacks (`coverage`), leaves it inconclusive. On a log that was cut off nothing passes, for what came after
     might have failed, nor on an empty one.
     """
-    seen: dict[str, int] = {}
-    verdicts = []
-    for entry in criteria:
-        name = entry.id or entry.kind
-        seen[name] = seen.get(name, 0) + 1
-        unique = name if seen[name] == 1 else f"{name}#{seen[name]}"
-        verdicts.append(Verdict(entry.kind, unique, entry.severity, _findings(entry, trace, case, coverage)))
-    return tuple(verdicts)
+    return tuple(
+        Verdict(entry.kind, name, entry.severity, _findings(entry, trace, case, coverage))
+        for entry, name in zip(criteria, verdict_names(criteria), strict=True)
+    )
 
 
 def outcome(verdicts: Sequence[Verdict]) -> Outcome:

@@ -5,14 +5,16 @@ from collections.abc import Sequence
 
 from simscen.core.case import Case
 from simscen.core.evidence import WHOLE, Coverage
+from simscen.core.expectation import Expectation
 from simscen.core.result import Outcome, RunFailure, RunKey, RunResult
 from simscen.core.trace import Trace
 from simscen.core.verdict import Status, Verdict
 from simscen.criteria.bounds import BrokenTrace
 from simscen.criteria.criterion import AnyCriterion
 from simscen.criteria.measure import AnyMeasure
-from simscen.criteria.moments import ending
+from simscen.criteria.moments import ending, finished
 from simscen.judge.disturbances import happenings, missing
+from simscen.judge.expected import as_expected
 from simscen.judge.judge import judge, outcome
 from simscen.judge.measure.added import with_added
 from simscen.judge.measure.metrics import Measures, measure
@@ -29,8 +31,10 @@ def result_of(
     lines: tuple[int, ...] = (),
     coverage: Coverage = WHOLE,
     metrics: Sequence[AnyMeasure] = (),
+    expected: Expectation | None = None,
 ) -> RunResult:
-    """Judge a trace and sum it up; `metrics` are measured besides those of every run.
+    """Judge a trace and sum it up; `metrics` are measured besides those of every run, and it may be
+    `expected` to fail.
 
     `path` is the scenario's file, `lines` where each criterion stands in it, () for a file that does not hold them.
     What had to happen and did not is a verdict, too; it comes first, for it is the reason of what follows.
@@ -40,7 +44,9 @@ def result_of(
     lacking = missing(trace, happened, verdicts)
     lines = (*(line for _, line in lacking), *lines) if lines else ()
     verdicts = (*(verdict for verdict, _ in lacking), *verdicts)
-    came_out = outcome(verdicts)
+    came_out, on_that = as_expected(expected, verdicts, outcome(verdicts), finished(trace))
+    if expected is not None and on_that is not None:
+        verdicts, lines = (*verdicts, on_that), (*lines, expected.line) if lines else ()
     failure = _why(verdicts) if came_out is Outcome.ERROR else None
     measures = Measures({}, {})
     try:
@@ -61,6 +67,7 @@ def result_of(
         simulated=trace.seconds(trace.end),
         tick_rate=trace.tick_rate,
         error=failure,
+        reason="" if expected is None else expected.reason,
     )
 
 

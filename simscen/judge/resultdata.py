@@ -29,6 +29,7 @@ def as_data(result: RunResult) -> dict[str, Any]:
         "stack_name": result.key.stack_name,
         "path": result.path,
         "stack": result.stack,
+        "reason": result.reason,
         "outcome": result.outcome.value,
         "ended": result.ended,
         "simulated_seconds": result.simulated,
@@ -75,6 +76,7 @@ def from_data(data: dict[str, Any]) -> RunResult:
         tick_rate=data["tick_rate"],
         error=None if data["error"] is None else RunFailure(**data["error"]),
         stack=data.get("stack", ""),  # older ones knew no other than the scenario's own
+        reason=data.get("reason", ""),
     )
 
 

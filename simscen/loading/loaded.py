@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
+from simscen.core.expectation import Expectation
 from simscen.core.externalcommand import ExternalCommand
 from simscen.core.problems import Problem
 from simscen.core.result import RunKey, title
@@ -140,6 +141,15 @@ class LoadedScenario:
     def stack(self) -> str:
         """NAME=VALUE of the chosen stack, a file as seen from the root; "" = its own."""
         return "" if self.choice is None else self.choice.seen_from(self.root)
+
+    @property
+    def expectation(self) -> Expectation | None:
+        """That it is known to fail, with the line that says so, where that is in its own file."""
+        said = self.spec.expected
+        if said is None:
+            return None
+        place = self.key_place_of("expected")
+        return Expectation(said.fail, tuple(said.criteria), place.line if place.path == self.path else 0)
 
     def key(self, seed: int) -> RunKey:
         """The key of its run with this seed."""

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 from simscen.core.world import World
+from simscen.criteria.criterion import verdict_names
 from simscen.loading.loaded import LoadedScenario
 from simscen.model.world import WorldSpec
 
@@ -16,6 +17,7 @@ ARTICLES = {
     "goal": "goal",
     "event": "event or mark",
     "happening": "event, fault or mark",
+    "verdict": "criterion, event or fault",
 }
 
 Names = Mapping[str, list[str] | None]
@@ -26,12 +28,14 @@ def known_names(loaded: LoadedScenario, world: World | None = None) -> Names:
     """What there is to refer to. What an imported world holds is known once it has become a `world`."""
     there = _of_files(loaded) if world is None else _of_world(loaded, world)
     movable = there["movable"]
+    happening = _distinct(event_names(loaded), [fault.label for fault in loaded.spec.faults])
     return {
         **there,
         "mover": None if movable is None else [*movable, *loaded.other_robots],
         "goal": goal_names(loaded),
         "event": _distinct(event_names(loaded), mark_names(loaded)),
-        "happening": _distinct(event_names(loaded), [fault.label for fault in loaded.spec.faults], mark_names(loaded)),
+        "happening": _distinct(happening, mark_names(loaded)),
+        "verdict": None if loaded.other_robots else _distinct(verdict_names(loaded.spec.pass_), happening),
     }
 
 

@@ -16,7 +16,7 @@ from simscen.model.scenario import ScenarioSpec
 
 JUDGING = frozenset({"criterion", "metric"})
 """The kinds of types that a judgement needs."""
-_JUDGED = frozenset({"simscen", "pass", "metrics"})
+_JUDGED = frozenset({"simscen", "pass", "metrics", "expected"})
 
 
 def resolved_text(loaded: LoadedScenario) -> str:

@@ -2,7 +2,13 @@
 
 from typing import Literal
 
+from simscen.core.expectation import Expectation
 from simscen.model.scenario import RobotEntry, ScenarioSpec, WorldOrFile
+
+
+def expectation_of(spec: ScenarioSpec) -> Expectation | None:
+    """That a run is known to fail, wherever that is written."""
+    return None if spec.expected is None else Expectation(spec.expected.fail, tuple(spec.expected.criteria))
 
 
 class CriteriaSpec(ScenarioSpec):

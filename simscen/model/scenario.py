@@ -3,7 +3,7 @@
 from itertools import count
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
-from pydantic import AfterValidator, Discriminator, Field, Tag
+from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
 from simscen.core.belief import Estimate
 from simscen.core.chance import LARGEST_SEED
@@ -25,6 +25,7 @@ from simscen.spec.quantities import (
     PositiveLength,
     WholeQuantity,
 )
+from simscen.spec.references import Refers
 
 if TYPE_CHECKING:
     from simscen.criteria.measure import AnyMeasure
@@ -70,6 +71,7 @@ class EstimateOrPlace(OrPlace):
 
 
 Unknown = Literal["unknown"]
+
 if TYPE_CHECKING:
     EstimateOrUnknown = InitialEstimate | Unknown
 else:
@@ -127,6 +129,35 @@ class OneOfSeveral(RobotEntry):
 
 
 MOST_ROBOTS = 20
+
+
+def _in_words(reason: str) -> str:
+    if not reason.strip():
+        raise ValueError("a reason has words")
+    return reason
+
+
+Reason = Annotated[str, Field(max_length=500), AfterValidator(_in_words)]
+
+
+class ExpectedFailure(Spec):
+    """A failure that is known: the run is no failure as long as it fails, and one as soon as it does not.
+
+    Example: `expected: {fail: "the planner hugs corners, NAV-123", criteria: [clearance]}`
+    """
+
+    fail: Reason
+    """Why, for people: a ticket, and what is wrong."""
+    criteria: Annotated[list[Annotated[Name, Refers("verdict")]], Field(max_length=200)] = []
+    """Ids of the criteria, or names of the events and faults that do not happen, that must fail, and alone may;
+    default: one or more criteria, whichever."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_reason(cls, value: Any) -> Any:
+        if isinstance(value, str):
+            raise ValueError("say why it is known to fail: `{fail: REASON}`")
+        return value
 
 
 class Physics(Spec):
@@ -189,6 +220,10 @@ class ScenarioSpec(Spec):
     """All of these must hold; of several robots, for each of them."""
     metrics: Annotated[list[AnyMeasure], Field(max_length=100), AfterValidator(_once)] = []
     """What is measured besides what every run reports; each is a type that an installed package adds."""
+    expected: ExpectedFailure | None = None
+    """Say that it is known to fail, and why. A run that breaks off is an error all the same."""
+    skip: Reason | None = None
+    """Do not run it, and say why. The file must be valid all the same."""
     variations: Variations | None = None
     """Values by their paths, each combination a run of its own; default: the file as it is."""
 

@@ -65,6 +65,19 @@ def broken(run: RunFinished) -> str:
     return message if message.startswith(kind) else f"{kind}: {message}"
 
 
+def excused(run: RunFinished) -> str:
+    """Why a run that did not pass is no failure, in one line; "" for all others."""
+    match run.outcome:
+        case Outcome.SKIPPED:
+            return one_line(f"skipped: {run.result.reason}")
+        case Outcome.FAILED_AS_EXPECTED:
+            violated = [complaint.message for complaint in complaints(run) if not complaint.warning]
+            more = f" and {len(violated) - 1} more" if len(violated) > 1 else ""
+            return one_line(f"failed as expected: {run.result.reason} ({violated[0]}{more})")
+        case _:
+            return ""
+
+
 def _complaint(run: RunFinished, verdict: Verdict, line: int, finding: Finding) -> Complaint:
     detail = tuple(one_line(text) for text in finding.detail)
     return Complaint(verdict, line, one_line(sentence(verdict, finding, run.result.tick_rate)), detail)

@@ -8,7 +8,7 @@ from simscen.core.sessionevents import RunFinished, SessionEvent, SessionFinishe
 from simscen.judge.wording import tightest
 from simscen.report.checkout import in_checkout
 from simscen.report.comparedpage import as_markdown
-from simscen.report.complaints import broken, complaints, label, scenario_file
+from simscen.report.complaints import broken, complaints, excused, label, scenario_file
 from simscen.report.console import Reporter, text_reporter
 from simscen.report.text import one_line
 
@@ -51,6 +51,9 @@ class _GitHub:
 def annotations(run: RunFinished) -> list[str]:
     """The workflow commands for one run."""
     name = label(run.key)
+    if excuse := excused(run):
+        line = next((c.line for c in complaints(run) if not c.warning), 0)
+        return [_command("notice", run, line, name, excuse)]
     lines = [
         _command(
             "warning" if found.warning else "error", run, found.line, name, "\n".join((found.message, *found.detail))
@@ -64,11 +67,19 @@ def annotations(run: RunFinished) -> list[str]:
 
 def markdown(runs: list[RunFinished], session: SessionFinished) -> str:
     """A table of all runs, the ones that did not pass first."""
-    order = [Outcome.ERROR, Outcome.FAILED, Outcome.PASSED]
+    signs = {
+        Outcome.ERROR: "⚠️",
+        Outcome.FAILED: "❌",
+        Outcome.FAILED_AS_EXPECTED: "🟡",
+        Outcome.SKIPPED: "⏭️",
+        Outcome.PASSED: "✅",
+    }
+    order = list(signs)
     ordered = sorted(runs, key=lambda run: (order.index(run.outcome), run.result.path, run.key))
-    signs = {Outcome.PASSED: "✅", Outcome.FAILED: "❌", Outcome.ERROR: "⚠️"}
     errors = "error" if session.errors == 1 else "errors"
-    head = f"### simscen: {session.passed} passed, {session.failed} failed, {session.errors} {errors}"
+    more = f", {session.expected} failed as expected" if session.expected else ""
+    more += f", {session.skipped} skipped" if session.skipped else ""
+    head = f"### simscen: {session.passed} passed, {session.failed} failed, {session.errors} {errors}{more}"
     compared = [] if session.comparison is None else as_markdown(session.comparison, _cell)
     rows = [
         f"| {signs[run.outcome]} | {_cell(label(run.key))} | {run.result.simulated:.1f} s | {_cell(_why(run))} |"
@@ -80,6 +91,8 @@ def markdown(runs: list[RunFinished], session: SessionFinished) -> str:
 def _why(run: RunFinished) -> str:
     if run.outcome is Outcome.ERROR:
         return broken(run)
+    if excuse := excused(run):
+        return excuse
     told = [complaint.message for complaint in complaints(run)]
     return "; ".join(told) if told else f"tightest: {tightest(run.result.verdicts)}"
 

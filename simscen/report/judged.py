@@ -7,7 +7,7 @@ from simscen.core.result import Outcome, RunResult
 from simscen.core.sessionevents import RunFinished
 from simscen.core.verdict import Status, Verdict
 from simscen.judge.wording import tightest
-from simscen.report.complaints import broken, complaints
+from simscen.report.complaints import broken, complaints, excused
 from simscen.report.line import Line, Piece, Role
 from simscen.report.lines import SIGNS, complained
 from simscen.report.text import one_line, visible
@@ -18,7 +18,8 @@ _ROLES: dict[str, Role] = {"good": "good", "bad": "bad", "odd": "odd"}
 def in_full(run: RunFinished, name: str) -> Iterator[Line]:
     """How long it is and how it came out, then all that was violated."""
     nearest = tightest(run.result.verdicts) if run.outcome is Outcome.PASSED else ""
-    yield (*_head(run.result, name), *((Piece(f"   tightest: {one_line(nearest)}", "quiet"),) if nearest else ()))
+    beside = f"tightest: {one_line(nearest)}" if nearest else excused(run)
+    yield (*_head(run.result, name), *((Piece(f"   {beside}", "quiet"),) if beside else ()))
     yield from complained(run)
 
 
@@ -26,6 +27,8 @@ def in_a_line(run: RunFinished, name: str) -> Line:
     """How long it is, how near it came to failing, or the first reason why it did not pass."""
     if run.outcome is Outcome.ERROR:
         return (*_head(run.result, name), Piece(f"   {broken(run)}", "odd"))
+    if excuse := excused(run):
+        return (*_head(run.result, name), Piece(f"   {excuse}", "quiet"))
     told = [complaint for complaint in complaints(run) if not complaint.warning]
     more = f" (and {len(told) - 1} more)" if len(told) > 1 else ""
     nearest = one_line(tightest(run.result.verdicts))
@@ -55,6 +58,7 @@ def summary(runs: Sequence[RunFinished]) -> Line:
     """12 passed, 1 failed."""
     count = Counter(run.outcome for run in runs)
     words = [(Outcome.PASSED, "passed"), (Outcome.FAILED, "failed"), (Outcome.ERROR, "could not be judged")]
+    words += [(Outcome.FAILED_AS_EXPECTED, "failed as expected"), (Outcome.SKIPPED, "skipped")]
     told = [f"{count[outcome]} {word}" for outcome, word in words if count[outcome] or outcome is Outcome.PASSED]
     return (Piece(", ".join(told)),)
 

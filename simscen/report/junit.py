@@ -13,7 +13,7 @@ from xml.etree.ElementTree import Element, SubElement
 from simscen.core.result import Outcome
 from simscen.core.sessionevents import RunFinished
 from simscen.judge.wording import subject, told
-from simscen.report.complaints import Complaint, complaints, failure, place, scenario_file
+from simscen.report.complaints import Complaint, complaints, excused, failure, place, scenario_file
 from simscen.report.text import command, one_line, visible
 
 Family = Literal["simscen", "xunit2"]
@@ -35,7 +35,7 @@ def to_xml(runs: Sequence[RunFinished], family: Family = "simscen", name: str = 
 def _suite(root: Element, path: str, runs: list[RunFinished], family: Family) -> None:
     suite = SubElement(root, "testsuite", {"name": visible(path)})
     _count(suite, runs)
-    suite.set("skipped", "0")
+    suite.set("skipped", str(sum(bool(excused(run)) for run in runs)))
     used: set[str] = set()
     for run in runs:
         _case(suite, run, _unique(_case_name(run), used), family)
@@ -59,6 +59,10 @@ def _case(suite: Element, run: RunFinished, name: str, family: Family) -> None:
             _failure(case, run)
         case Outcome.ERROR:
             _error(case, run)
+        case Outcome.SKIPPED:
+            SubElement(case, "skipped", {"type": "simscen.skip", "message": visible(run.result.reason)})
+        case Outcome.FAILED_AS_EXPECTED:  # as pytest writes its xfail
+            SubElement(case, "skipped", {"type": "simscen.expected-failure", "message": excused(run)})
         case Outcome.PASSED:
             pass
     if output := _output(run):
@@ -73,6 +77,7 @@ def _properties(case: Element, run: RunFinished) -> None:
         "simulated_seconds": f"{run.result.simulated:.3f}",
         "stack": run.result.stack,
         "ended": run.result.ended,
+        "expected": run.result.reason if run.outcome is not Outcome.SKIPPED else "",
         "again": command(run.again),
     }
     for verdict in run.result.verdicts:

@@ -14,13 +14,19 @@ from simscen.core.sessionevents import (
 )
 from simscen.judge.wording import tightest, told
 from simscen.report.compared import compared
-from simscen.report.complaints import broken, complaints, failure, label, place
+from simscen.report.complaints import broken, complaints, excused, failure, label, place
 from simscen.report.line import Line, Piece, Role
 from simscen.report.text import command, one_line
 
 TAIL = 12
 MOST_HAPPENINGS = 8
-SIGNS = {Outcome.PASSED: ("✓", "good"), Outcome.FAILED: ("✗", "bad"), Outcome.ERROR: ("!", "odd")}
+SIGNS = {
+    Outcome.PASSED: ("✓", "good"),
+    Outcome.FAILED: ("✗", "bad"),
+    Outcome.ERROR: ("!", "odd"),
+    Outcome.FAILED_AS_EXPECTED: ("~", "odd"),
+    Outcome.SKIPPED: ("-", "odd"),
+}
 
 
 @dataclass(frozen=True)
@@ -100,7 +106,12 @@ def finished(run: RunFinished, naming: Naming) -> Iterator[Line]:
 
 
 def complained(run: RunFinished) -> Iterator[Line]:
-    """What was violated, where, and how to see it again; nothing but warnings for a run that passed."""
+    """What was violated, where, and how to see it again; nothing but warnings for a run that passed.
+
+    Of one that failed as expected only the reason is of interest, which stands beside its name.
+    """
+    if run.outcome in (Outcome.FAILED_AS_EXPECTED, Outcome.SKIPPED):
+        return
     if run.outcome is Outcome.ERROR:
         yield from _broken(run)
     for complaint in complaints(run):
@@ -115,7 +126,13 @@ def complained(run: RunFinished) -> Iterator[Line]:
 
 def closing(session: SessionFinished) -> Iterator[Line]:
     """13 passed, 1 failed · 402 s simulated in 4.1 s (98x) · simscen-out/latest/junit.xml."""
-    counts = [(session.passed, "passed", "good"), (session.failed, "failed", "bad"), (session.errors, "errors", "odd")]
+    counts = [
+        (session.passed, "passed", "good"),
+        (session.failed, "failed", "bad"),
+        (session.errors, "errors", "odd"),
+        (session.expected, "failed as expected", "odd"),
+        (session.skipped, "skipped", "odd"),
+    ]
     shown = [(number, word, role) for number, word, role in counts if number or word == "passed"]
     pieces: list[Piece] = []
     for number, word, role in shown:
@@ -135,9 +152,13 @@ def text_of(line: Line) -> str:
 
 
 def _summary(run: RunFinished) -> tuple[Piece, ...]:
+    if run.outcome is Outcome.SKIPPED:
+        return (Piece(excused(run), "quiet"),)
     if run.outcome is Outcome.ERROR and not run.result.simulated:
         return (Piece(f"{failure(run)[0]} after {run.wall:.2f} s", "quiet"),)
     times = f"{run.result.simulated:6.1f} s simulated in {run.wall:.2f} s"
+    if run.outcome is Outcome.FAILED_AS_EXPECTED:
+        return (Piece(f"{times}   {excused(run)}", "quiet"),)
     nearest = tightest(run.result.verdicts) if run.outcome is Outcome.PASSED else ""
     return (Piece(times, "quiet"), *((Piece(f"   tightest: {one_line(nearest)}", "quiet"),) if nearest else ()))
 

@@ -10,7 +10,7 @@ from simscen.core.result import Outcome
 from simscen.core.sessionevents import RunFinished
 from simscen.judge.wording import comparison, subject, tightest, when
 from simscen.report.comparedpage import as_html
-from simscen.report.complaints import broken, complaints, failure, place
+from simscen.report.complaints import broken, complaints, excused, failure, place
 from simscen.report.text import command, one_line, visible
 
 PICTURE_BYTES = 6 * 2**20
@@ -25,6 +25,7 @@ summary { display: flex; gap: 14px; align-items: baseline; padding: 9px 14px; cu
 summary .name { font-weight: 600; flex: 1; overflow-wrap: anywhere; }
 .pill { border-radius: 5px; color: #fff; padding: 1px 9px; font-size: 13px; text-transform: uppercase; }
 .passed { background: #1c8042; } .failed { background: #c81e28; } .error { background: #be7800; }
+.failed-as-expected, .skipped { background: #6f757d; }
 .in { padding: 4px 16px 14px; } table { border-collapse: collapse; width: 100%; margin: 6px 0 12px; }
 td, th { text-align: left; padding: 4px 10px 4px 0; border-top: 1px solid #eceef0; vertical-align: top; }
 h2 { font-size: 18px; } h3 { font-size: 15px; margin-bottom: 2px; } section { margin: 18px 0; }
@@ -39,11 +40,11 @@ p code { white-space: pre-wrap; }
 
 def to_html(runs: Sequence[RunFinished], title: str = "simscen", comparison: Comparison | None = None) -> str:
     """The page; what did not pass comes first and stands open. Pictures are read from the runs' artifacts."""
-    order = [Outcome.ERROR, Outcome.FAILED, Outcome.PASSED]
+    order = [Outcome.ERROR, Outcome.FAILED, Outcome.FAILED_AS_EXPECTED, Outcome.SKIPPED, Outcome.PASSED]
     ordered = sorted(runs, key=lambda run: (order.index(run.outcome), run.result.path, run.key))
     counts = ", ".join(
-        f"{number} {outcome.value}"
-        for outcome in (Outcome.PASSED, Outcome.FAILED, Outcome.ERROR)
+        f"{number} {outcome.value.replace('-', ' ')}"
+        for outcome in Outcome
         if (number := sum(run.outcome is outcome for run in runs)) or outcome is Outcome.PASSED
     )
     simulated = sum(run.result.simulated for run in ordered)
@@ -62,11 +63,11 @@ def to_html(runs: Sequence[RunFinished], title: str = "simscen", comparison: Com
 
 def _run(run: RunFinished, picture: str) -> str:
     label = ", ".join(part for part in (f"seed {run.key.seed}", run.key.stack_name) if part)
-    nearest = f"tightest: {tightest(run.result.verdicts)}" if run.outcome is Outcome.PASSED else ""
-    opened = "" if run.outcome is Outcome.PASSED else " open"
+    nearest = f"tightest: {tightest(run.result.verdicts)}" if run.outcome is Outcome.PASSED else excused(run)
+    opened = "" if run.outcome.good else " open"
     return (
         f"<details{opened}><summary>"
-        f'<span class="pill {run.outcome.value}">{run.outcome.value}</span>'
+        f'<span class="pill {run.outcome.value}">{run.outcome.value.replace("-", " ")}</span>'
         f'<span class="name">{_text(run.key.test)}</span><span class="quiet">{_text(label)}</span>'
         f'<span class="quiet">{run.result.simulated:.1f} s</span><span class="quiet">{_text(nearest)}</span></summary>'
         f'<div class="in">{_why(run)}{_verdicts(run)}{_disturbances(run)}{picture}'

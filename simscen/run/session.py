@@ -14,7 +14,7 @@ from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of_all
 from simscen.run.against import agreed
 from simscen.run.outfolder import run_folder
-from simscen.run.process.answer import answer_to, not_done
+from simscen.run.process.answer import answer_to, not_done, not_to_do
 from simscen.run.process.jobs import Job
 from simscen.run.process.supervisor import Advanced, Ended, Interrupted, Started, supervise
 from simscen.run.process.whereabouts import whereabouts
@@ -49,6 +49,8 @@ def seeds_of(scenario: LoadedScenario, options: Options) -> range:
 def plan(scenarios: Sequence[LoadedScenario], options: Options, out: Path) -> list[Job]:
     """All runs of a session in the order they are started: variation by variation, seed by seed, stack by stack."""
     jobs: list[Job] = []
+    skipped = [scenario for scenario in scenarios if scenario.spec.skip is not None]
+    scenarios = [scenario for scenario in scenarios if scenario.spec.skip is None]
     for _, group in groupby(scenarios, key=lambda scenario: scenario.title):
         variants = list(group)
         for seed in seeds_of(variants[0], options):
@@ -56,6 +58,10 @@ def plan(scenarios: Sequence[LoadedScenario], options: Options, out: Path) -> li
                 key = scenario.key(seed)
                 for each in (key, key.twin) if options.twice else (key,):
                     jobs.append(Job(len(jobs), scenario, each, run_folder(out, each), options.wall_limit))
+    # Once each, whatever the number of seeds, and behind the others: twins are told by their numbers.
+    for scenario in skipped:
+        key = scenario.key(seeds_of(scenario, options)[0])
+        jobs.append(Job(len(jobs), scenario, key, run_folder(out, key), options.wall_limit))
     return jobs
 
 
@@ -71,11 +77,16 @@ def run_session(
     stopped: Exit | None = None
 
     def go_on() -> bool:
-        return not options.fail_fast or all(answer.outcome is Outcome.PASSED for answer in answers.values())
+        return not options.fail_fast or all(answer.outcome.good for answer in answers.values())
 
+    for job in jobs:
+        if job.scenario.spec.skip is not None:
+            answers[job.number] = not_to_do(job, job.scenario.spec.skip)
+            listen(answers[job.number])
+    jobs_to_do = [job for job in jobs if job.number not in answers]
     try:
-        told = whereabouts(plugins_of_all([job.scenario for job in jobs]))
-        for happening in supervise(jobs, options.workers, (*entry, *told), go_on):
+        told = whereabouts(plugins_of_all([job.scenario for job in jobs_to_do]))
+        for happening in supervise(jobs_to_do, options.workers, (*entry, *told), go_on):
             job = happening.job
             match happening:
                 case Started():

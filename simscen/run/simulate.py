@@ -112,7 +112,14 @@ def _judged(prepared: Prepared, seed: int, trace: Trace, log: Path | None) -> Ru
     # One that the scenario extends or takes from defaults.yaml has its line in another file than reports name.
     lines = tuple(place.line if place.path == loaded.path else 0 for place in places)
     result = result_of(
-        loaded.key(seed), loaded.path, prepared.spec.pass_, trace, prepared.case, lines, metrics=prepared.spec.metrics
+        loaded.key(seed),
+        loaded.path,
+        prepared.spec.pass_,
+        trace,
+        prepared.case,
+        lines,
+        metrics=prepared.spec.metrics,
+        expected=loaded.expectation,
     )
     return Run(replace(result, stack=loaded.stack), trace, prepared.case, log)
 

@@ -7,6 +7,8 @@ from simscen.core.chance import Streams
 from simscen.core.comparison import Against, Comparison, Difference, Flip, Outcomes
 from simscen.core.paired import mean_interval, sign_test
 from simscen.core.result import Outcome, RunKey, RunResult
+from simscen.core.verdict import Status
+from simscen.judge.expected import EXPECTED
 from simscen.judge.measure.table import METRICS
 from simscen.judge.wording import sentence, violations
 
@@ -31,7 +33,7 @@ def compare(results: Iterable[RunResult], stacks: Sequence[str]) -> Comparison |
     if len(stacks) < 2:
         return None
     given = {name: value for name, _, value in (text.partition("=") for text in stacks)}
-    runs = {result.key: result for result in results if not result.key.repeats}
+    runs = {one.key: one for one in results if not one.key.repeats and one.outcome is not Outcome.SKIPPED}
     baseline, *others = given
     return Comparison(
         given,
@@ -45,8 +47,17 @@ def _row(test: str, stacks: Iterable[str], runs: Mapping[RunKey, RunResult]) -> 
     return {name: _outcomes(run for run in own if run.key.stack_name == name) for name in stacks}
 
 
+def _came_out(run: RunResult) -> Outcome:
+    """How the robot did, whatever its scenario expected."""
+    if run.outcome is Outcome.ERROR:
+        return Outcome.ERROR
+    decisive = [verdict for verdict in run.verdicts if verdict.severity == "fail" and verdict.criterion != EXPECTED]
+    held = bool(run.reason) and all(verdict.status is Status.PASS for verdict in decisive)
+    return Outcome.PASSED if held or run.outcome is Outcome.PASSED else Outcome.FAILED
+
+
 def _outcomes(runs: Iterable[RunResult]) -> Outcomes:
-    count = Counter(run.outcome for run in runs)
+    count = Counter(_came_out(run) for run in runs)
     return Outcomes(count[Outcome.PASSED], count[Outcome.FAILED], count[Outcome.ERROR])
 
 
@@ -87,9 +98,9 @@ def _arrived(run: RunResult) -> bool:
 
 def _flip(pair: Pair) -> Flip | None:
     one, two = pair
-    if one.outcome is two.outcome:
+    if _came_out(one) is _came_out(two):
         return None
-    good, bad = (one, two) if one.outcome is Outcome.PASSED else (two, one)
+    good, bad = (one, two) if _came_out(one) is Outcome.PASSED else (two, one)
     return Flip(one.key.test, one.key.seed, good.key.stack_name, bad.key.stack_name, _why(bad))
 
 

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from simscen.core.intervals import wilson
-from simscen.core.result import RunResult
+from simscen.core.result import Outcome, RunResult
 
 
 @dataclass(frozen=True)
@@ -38,8 +38,8 @@ class Suite:
 
 
 def suite(results: Iterable[RunResult]) -> Suite:
-    """Sum up the runs of a session; their order does not matter."""
-    runs = sorted(results, key=lambda run: run.key)
+    """Sum up the runs of a session, without those that were skipped; their order does not matter."""
+    runs = sorted((run for run in results if run.outcome is not Outcome.SKIPPED), key=lambda run: run.key)
     measured = [run for run in runs if run.metrics]
     successes = sum(run.metrics.get("success") == 1.0 for run in measured)
     spl, soft_spl = (_known(measured, name) for name in ("spl", "soft_spl"))

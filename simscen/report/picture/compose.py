@@ -79,7 +79,7 @@ def _scale_bar(canvas: Canvas) -> None:
 
 def _header(image: Image.Image, scene: Scene) -> None:
     result, pen = scene.result, ImageDraw.Draw(image)
-    word, colour = result.outcome.value.upper(), palette.OUTCOMES[result.outcome]
+    word, colour = result.outcome.value.replace("-", " ").upper(), palette.OUTCOMES[result.outcome]
     wide = math.ceil(font(16).getlength(word)) + 24
     pen.rounded_rectangle((16, 16, 16 + wide, 46), 6, fill=colour)
     write(pen, Note(16 + wide / 2, 31, word, 16, palette.PAGE, "mm"))

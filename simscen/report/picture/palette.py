@@ -25,7 +25,7 @@ AMBER: Colour = (190, 120, 0)
 GREEN: Colour = (28, 128, 66)
 GREY: Colour = (110, 115, 122)
 
-OUTCOMES = {Outcome.PASSED: GREEN, Outcome.FAILED: RED, Outcome.ERROR: AMBER}
+OUTCOMES = {Outcome.PASSED: GREEN, Outcome.FAILED: RED, Outcome.ERROR: AMBER, Outcome.FAILED_AS_EXPECTED: AMBER}
 STATUSES = {Status.PASS: GREEN, Status.FAIL: RED, Status.INCONCLUSIVE: AMBER, Status.ERROR: AMBER}
 
 _STOPS = np.array([(40, 60, 160), (110, 40, 170), (185, 40, 130), (225, 85, 75), (240, 150, 30)], dtype=np.float64)

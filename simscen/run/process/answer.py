@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from simscen.core.errors import InvalidInput, RunError
-from simscen.core.result import RunFailure, RunResult, unfinished
+from simscen.core.result import RunFailure, RunResult, skipped, unfinished
 from simscen.core.sessionevents import Artifacts, RunFinished
 from simscen.judge.resultdata import from_json
 from simscen.record.logfile import PARTIAL_SUFFIX
@@ -39,6 +39,12 @@ def answer_to(job: Job, end: ProcessEnd | PreparerDeath) -> RunFinished:
 def not_done(job: Job, failure: RunFailure) -> RunFinished:
     """The answer to a run that was never finished, or never begun."""
     result = unfinished(job.key, job.scenario.path, failure, job.scenario.stack)
+    return RunFinished(result, again=repeat_command(job.scenario, job.key.seed), file=shown(job.scenario.file))
+
+
+def not_to_do(job: Job, reason: str) -> RunFinished:
+    """The answer to a run that its scenario says to skip."""
+    result = skipped(job.key, job.scenario.path, reason, job.scenario.stack)
     return RunFinished(result, again=repeat_command(job.scenario, job.key.seed), file=shown(job.scenario.file))
 
 

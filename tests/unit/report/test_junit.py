@@ -20,6 +20,7 @@ JENKINS = {  # attributes that Jenkins' junit-10.xsd allows
     "testcase": {"name", "time", "classname", "group"},
     "failure": {"type", "message"},
     "error": {"type", "message"},
+    "skipped": {"type", "message"},
     "system-out": set(),
 }
 
@@ -45,6 +46,19 @@ def test_another_reader_sees_one_case_for_each_run(passed, failed, crashed):
     assert found["goal [seed 1]"].is_passed
     assert found["goal [seed 1]"].classname == "navigation.goal"
     assert found["lidar_off [seed 7]"].result[0].type == "stopped_within"
+
+
+def test_another_reader_sees_known_failures_and_what_was_not_run_as_skipped(passed, failed):
+    known = of(failed, outcome=Outcome.FAILED_AS_EXPECTED, reason="NAV-1")
+    skipped = of(passed, outcome=Outcome.SKIPPED, verdicts=(), lines=(), reason="NAV-2")
+    document = read([known, skipped])
+    assert (document.failures, document.errors) == (0, 0)
+    assert [suite.skipped for suite in document] == [1, 1]
+    messages = {case.result[0].message for case in cases(document).values()}
+    assert messages == {
+        "failed as expected: NAV-1 (stopped_within: 0.84 s > 0.50 s after lidar.off, at t = 10.84 s, (2.10, 3.41))",
+        "NAV-2",
+    }
 
 
 def test_a_failure_says_where_and_what_for_every_criterion(failed):
@@ -79,7 +93,9 @@ def test_file_line_properties_and_attachments_are_there(failed):
 
 
 def test_the_strict_family_keeps_to_what_jenkins_allows(passed, failed, crashed):
-    root = ElementTree.fromstring(to_xml([passed, failed, crashed], family="xunit2"))
+    known = of(failed, outcome=Outcome.FAILED_AS_EXPECTED, reason="NAV-1")
+    skipped = of(passed, outcome=Outcome.SKIPPED, verdicts=(), lines=(), reason="NAV-2")
+    root = ElementTree.fromstring(to_xml([passed, failed, crashed, known, skipped], family="xunit2"))
     for element in root.iter():
         assert set(element.keys()) <= JENKINS[element.tag]
         if (seconds := element.get("time")) is not None:

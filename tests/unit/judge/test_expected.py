@@ -1,0 +1,73 @@
+"""A failure that is expected hides nothing: neither another one, nor that it is gone."""
+
+import pytest
+
+from simscen.core.expectation import Expectation
+from simscen.core.result import Outcome
+from simscen.core.verdict import Finding, Status, Verdict
+from simscen.judge.expected import as_expected
+from simscen.judge.judge import outcome
+from simscen.judge.wording import DISTURBANCE
+
+PASS, FAIL, UNCLEAR, ERROR = Status.PASS, Status.FAIL, Status.INCONCLUSIVE, Status.ERROR
+
+
+def verdict(name: str, status: Status, criterion: str = "", severity: str = "fail") -> Verdict:
+    return Verdict(criterion or name, name, severity, (Finding(status, name, "1", "2"),))
+
+
+def judged(expected: Expectation | None, *verdicts: Verdict, whole: bool = True) -> tuple[Outcome, str]:
+    """The outcome, and what is told of the expectation."""
+    came_out, on_that = as_expected(expected, verdicts, outcome(verdicts), whole)
+    return came_out, "" if on_that is None else on_that.findings[0].measured
+
+
+KNOWN = Expectation("NAV-1")
+SPEED = Expectation("NAV-1", ("speed",))
+
+
+@pytest.mark.parametrize(
+    ("expected", "statuses", "came_out", "told"),
+    [
+        (KNOWN, (FAIL, PASS), Outcome.FAILED_AS_EXPECTED, "speed failed"),
+        (KNOWN, (FAIL, FAIL), Outcome.FAILED_AS_EXPECTED, "speed, clearance failed"),
+        (KNOWN, (FAIL, UNCLEAR), Outcome.FAILED_AS_EXPECTED, "speed failed"),
+        (KNOWN, (PASS, PASS), Outcome.FAILED, "everything held"),
+        (KNOWN, (PASS, UNCLEAR), Outcome.FAILED, "nothing failed, clearance undecided"),
+        (KNOWN, (FAIL, ERROR), Outcome.ERROR, ""),
+        (SPEED, (FAIL, PASS), Outcome.FAILED_AS_EXPECTED, "speed failed"),
+        (SPEED, (FAIL, FAIL), Outcome.FAILED, "speed failed"),
+        (SPEED, (FAIL, UNCLEAR), Outcome.FAILED, "speed failed"),
+        (SPEED, (PASS, FAIL), Outcome.FAILED, "speed held"),
+        (SPEED, (PASS, PASS), Outcome.FAILED, "speed held"),
+        (SPEED, (UNCLEAR, PASS), Outcome.FAILED, "nothing failed, speed undecided"),
+        (None, (FAIL, PASS), Outcome.FAILED, ""),
+        (None, (PASS, PASS), Outcome.PASSED, ""),
+    ],
+)
+def test_only_what_was_expected_to_fail_may_and_must(
+    expected: Expectation | None, statuses: tuple[Status, Status], came_out: Outcome, told: str
+) -> None:
+    verdicts = [verdict(name, status) for name, status in zip(("speed", "clearance"), statuses, strict=True)]
+    assert judged(expected, *verdicts) == (came_out, told)
+
+
+def test_all_that_is_named_must_fail() -> None:
+    both = Expectation("NAV-1", ("speed", "clearance"))
+    assert judged(both, verdict("speed", FAIL), verdict("clearance", PASS)) == (Outcome.FAILED, "clearance held")
+
+
+def test_a_disturbance_that_did_not_happen_is_expected_only_by_its_name() -> None:
+    missing = verdict("door", FAIL, DISTURBANCE)
+    assert judged(KNOWN, missing, verdict("speed", FAIL)) == (Outcome.FAILED, "speed failed")
+    assert judged(KNOWN, missing, verdict("speed", PASS)) == (Outcome.FAILED, "everything held")
+    assert judged(Expectation("NAV-1", ("door",)), missing)[0] is Outcome.FAILED_AS_EXPECTED
+
+
+def test_a_warning_is_no_failure_to_expect() -> None:
+    verdicts = verdict("speed", FAIL, severity="warn"), verdict("clearance", PASS)
+    assert judged(KNOWN, *verdicts) == (Outcome.FAILED, "everything held")
+
+
+def test_a_log_that_was_cut_off_is_never_as_expected() -> None:
+    assert judged(KNOWN, verdict("speed", FAIL), verdict("clearance", UNCLEAR), whole=False) == (Outcome.FAILED, "")
