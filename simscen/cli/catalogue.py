@@ -14,7 +14,7 @@ from pydantic_core import PydanticUndefined
 from simscen.actions.action import AnyAction
 from simscen.criteria.criterion import AnyCriterion
 from simscen.faults.fault import AnyFault
-from simscen.model import anystack, robot, scenario, stack, stackfile, userconfig, variations, world
+from simscen.model import anystack, navigation, robot, scenario, stack, stackfile, userconfig, variations, world
 from simscen.model.disturbance import EventEntry, FaultEntry, StepEntry
 from simscen.model.rosmap import RosMapSpec
 from simscen.model.stackbase import SpeedZone
@@ -111,6 +111,7 @@ _SCENARIO: dict[str, type[BaseModel]] = {
     "robot entry": scenario.RobotEntry,
     "initial_estimate": scenario.InitialEstimate,
     "goals": scenario.GoalEntry,
+    "navigation": navigation.Navigation,
     "events": EventEntry,
     "then": StepEntry,
     "pose": PoseSpec,

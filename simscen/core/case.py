@@ -21,6 +21,7 @@ class Case:
     `shortest` maps a goal's name to the length in metres of the shortest way that a disc of the robot's inscribed
     radius has from the goal before it (the start for the first) through the static world; inf when there is none.
     `sent` are the goals that events may send on the way.
+    `expected` maps the name of a goal at which the robot is to fail to how: "failed", or the name of an error code.
     `clearance_range` is how far around the hull clearance was searched, in metres: a clearance that is not below it was
     cut off, and is at least that.
     `passages` are what these ways lead through, goal by goal, each in the direction of its way.
@@ -40,6 +41,7 @@ class Case:
     sent: tuple[Goal, ...] = ()
     passages: tuple[Passage, ...] = ()
     masks: Mapping[str, MaskCells] = field(default_factory=dict)
+    expected: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def every_goal(self) -> tuple[Goal, ...]:

@@ -12,6 +12,7 @@ class EventKind(str, Enum):
 
     GOAL_ACCEPTED = "goal.accepted"  # goal; x, y, yaw
     GOAL_REACHED = "goal.reached"  # goal; index
+    GOAL_PASSED = "goal.passed"  # goal that is passed without a stop; index
     GOAL_FAILED = "goal.failed"  # goal; index, error_code, error_name, message
     GOAL_CANCELED = "goal.canceled"  # goal; index, preempted_by
     NAVIGATION_ENDED = "navigation.ended"  # result; error_code, error_name

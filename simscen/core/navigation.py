@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from enum import Enum, IntEnum
 from typing import Literal
@@ -36,11 +37,30 @@ class ErrorCode(IntEnum):
     GOAL_OCCUPIED = 206
     PLANNER_TIMEOUT = 207
     NO_VALID_PATH = 208
+    NO_VIAPOINTS_GIVEN = 309
+    FOLLOW_WAYPOINTS_UNKNOWN = 600
+    TASK_EXECUTOR_FAILED = 601
+    NO_VALID_WAYPOINTS = 602
+    STOP_ON_MISSED_WAYPOINT = 603
     SPIN_TIMEOUT = 701
     SPIN_COLLISION_AHEAD = 703
     BACKUP_COLLISION_AHEAD = 714
     NAVIGATE_UNKNOWN = 9000
     NAVIGATE_TIMEOUT = 9003
+
+
+_THROUGH_POSES = {**{code + 100: code for code in range(200, 209)}, **{code + 100: code for code in range(9000, 9004)}}
+"""ComputePathThroughPoses and NavigateThroughPoses number what the actions of one pose do, 100 higher."""
+
+
+def error_code(number: int) -> ErrorCode | int:
+    """The code of a number, by the name that one pose and several share; the number itself where it has no name."""
+    number = _THROUGH_POSES.get(number, number)
+    return ErrorCode(number) if number in {int(code) for code in ErrorCode} else number
+
+
+Mode = Literal["navigate_to_pose", "navigate_through_poses", "follow_waypoints"]
+"""Nav2's actions that take goals: one after the other, passed in one drive, or as waypoints with a task at each."""
 
 
 class TaskResult(str, Enum):
@@ -54,13 +74,40 @@ class TaskResult(str, Enum):
 
 @dataclass(frozen=True)
 class Goal:
-    """A pose to reach in the map frame, within tolerances (m, rad), in at most `timeout` simulated seconds."""
+    """A pose to reach in the map frame, within tolerances (m, rad), in at most `timeout` simulated seconds.
+
+    `via`: it is passed within its tolerance without a stop, whatever the heading, on the way to the goal after it, in
+    one plan (Nav2's NavigateThroughPoses). `wait`: simulated seconds to stay there (Nav2's WaitAtWaypoint).
+    """
 
     name: str
     pose: Pose2
     xy_tolerance: float = 0.25
     yaw_tolerance: float = 0.25
     timeout: float | None = None
+    via: bool = False
+    wait: float = 0.0
+
+
+FAILED = "failed"
+"""How a goal is to end at which the robot is to fail with whatever code."""
+
+
+def in_loop(name: str, loop: int) -> str:
+    """What a goal of that name is called when the list of goals is driven for the `loop`-th time."""
+    return name if loop == 1 else f"{name}#{loop}"
+
+
+LOOP = re.compile(r"(.+)#[0-9]+")
+"""The name of a goal in a further loop."""
+
+
+def named(name: str, asked: str | None) -> bool:
+    """Whether a goal is the one that is asked for: `shelf` is `shelf` in every loop, `shelf#2` that of the second."""
+    if asked is None or name == asked:
+        return True
+    loop = LOOP.fullmatch(name)
+    return loop is not None and loop[1] == asked
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ from pydantic import GetJsonSchemaHandler, PlainValidator
 from pydantic_core import CoreSchema, PydanticCustomError
 
 from simscen.core.events import Event
-from simscen.core.navigation import ErrorCode
+from simscen.core.navigation import ErrorCode, error_code
 
 
 def parse(value: Any) -> ErrorCode:
@@ -15,8 +15,10 @@ def parse(value: Any) -> ErrorCode:
         return value
     if isinstance(value, str) and value in ErrorCode.__members__:
         return ErrorCode[value]
-    if isinstance(value, int) and not isinstance(value, bool) and value in {int(code) for code in ErrorCode}:
-        return ErrorCode(value)
+    if isinstance(value, int) and not isinstance(value, bool):
+        code = error_code(value)
+        if isinstance(code, ErrorCode):
+            return code
     raise PydanticCustomError(
         "error_code",
         "unknown error code `{value}`; expected one of: {names}",
@@ -39,6 +41,7 @@ def code_of(event: Event) -> str:
     name, number = event.data.get("error_name"), event.data.get("error_code")
     if isinstance(name, str) and name:
         return name
-    if isinstance(number, int) and number in {int(code) for code in ErrorCode}:
-        return ErrorCode(number).name
+    code = error_code(number) if isinstance(number, int) else None
+    if isinstance(code, ErrorCode):
+        return code.name
     return ErrorCode.NONE.name if number is None else str(number)

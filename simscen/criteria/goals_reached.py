@@ -9,10 +9,12 @@ import numpy as np
 from pydantic import Field
 
 from simscen.core.geometry import wrap
+from simscen.core.navigation import FAILED, named
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
-from simscen.criteria.bounds import at_most, held, missed, undecided
-from simscen.criteria.moments import GoalStory, ending, finished, stories
+from simscen.criteria.bounds import at_least, at_most, held, missed, undecided
+from simscen.criteria.moments import GoalStory, began, ending, finished, stories
+from simscen.criteria.passing import nearest
 from simscen.criteria.signals import finite, true_pose
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveAngle, PositiveDuration, PositiveLength
@@ -25,6 +27,10 @@ if TYPE_CHECKING:
 
 class GoalsReached(Spec, Criterion):
     """Every goal was reached: the robot says so, and at that moment it truly was there.
+
+    A goal with `expect` is judged by that: one at which the robot is to fail has to fail, with the code that is asked
+    for. Poses that navigate_through_poses passes have to be come near to, at whatever heading. Where a goal has
+    `on_reached: {wait: …}`, the robot has to stay so long before it goes on.
 
     Goals that events send count from when they are sent. A goal that such a goal preempted is dropped, as in Nav2: it
     is told as preempted and need not be reached, but those that remain must be. Named in `goals`, it is inconclusive.
@@ -41,7 +47,8 @@ class GoalsReached(Spec, Criterion):
     """
 
     goals: Annotated[list[GoalName], Field(min_length=1, max_length=1000)] | None = None
-    """Only these, by name; default: all of the scenario, and all that events have sent."""
+    """Only these, by name, in every loop (`shelf#2`: in the second one); default: all of the scenario, and all that
+    events have sent."""
     tolerance: PositiveLength | None = None
     """How far the true position may be off; default: the goal's own tolerance."""
     yaw_tolerance: PositiveAngle | None = None
@@ -51,12 +58,19 @@ class GoalsReached(Spec, Criterion):
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Distance, heading and, if asked for, time of each goal; one finding for a goal that was not reached."""
-        chosen = [story for story in stories(trace, case) if self.goals is None or story.goal.name in self.goals]
+        told = stories(trace, case)
+        chosen = [story for story in told if any(named(story.goal.name, name) for name in self.goals or (None,))]
         findings = self._untold(trace, case, {story.goal.name for story in chosen})
         if not chosen and not findings:
             return [undecided("goals_reached", "the scenario has no goals", "reached")]
         for story in chosen:
-            findings += self._reached(trace, story) if story.reached is not None else [self._missing(trace, story)]
+            if story.failure and not story.preempted:
+                findings.append(_failed(trace, story))
+            elif story.reached is None:
+                findings.append(self._missing(trace, story))
+            else:
+                findings += self._passed(trace, story, told) if story.goal.via else self._reached(trace, story)
+                findings += _waited(trace, case, story, told)
         if self.goals is None and all(story.preempted for story in chosen):
             findings.append(undecided("goals_reached", "every goal was preempted", "reached"))
         return findings
@@ -66,10 +80,10 @@ class GoalsReached(Spec, Criterion):
         names = [goal.name for goal in case.every_goal]
         findings = []
         for name in dict.fromkeys(self.goals or ()):
-            if name not in names:
+            if not any(named(each, name) for each in names):
                 because, detail = f"the scenario has no goal `{name}`", [f"goals: {', '.join(names)}"]
                 findings.append(undecided(f"goal {name}", because, "reached", detail))
-            elif name not in told:
+            elif not any(named(each, name) for each in told):
                 tell = missed if finished(trace) else undecided
                 findings.append(tell(f"goal {name}", "never sent", "reached"))
         return findings
@@ -111,12 +125,44 @@ class GoalsReached(Spec, Criterion):
             findings.append(self._time(trace, story, self.within))
         return findings
 
+    def _passed(self, trace: Trace, story: GoalStory, told: list[GoalStory]) -> list[Finding]:
+        """Of a pose that is passed on the way the heading is free, and how near the robot came to it at all counts."""
+        tick, apart = nearest(trace, story, told)
+        limit, context = self.tolerance or story.goal.xy_tolerance, "from the pose where it came nearest to it"
+        findings = [at_most(f"goal {story.goal.name}", apart, limit, "m", at=(trace, tick), context=context)]
+        if self.within is not None:
+            findings.append(self._time(trace, story, self.within))
+        return findings
+
     def _time(self, trace: Trace, story: GoalStory, within: float) -> Finding:
         what = f"goal {story.goal.name} time"
         if story.accepted is None or story.reached is None:
             return undecided(what, "when it was accepted was not recorded", f"≤ {within:.2f} s")
         taken = trace.seconds(story.reached - story.accepted)
         return at_most(what, taken, within, "s", at=(trace, story.reached))
+
+
+def _failed(trace: Trace, story: GoalStory) -> Finding:
+    """Of a goal at which the robot is to fail: whether it did, and with the code that is asked for."""
+    what, expected = f"goal {story.goal.name}", _expected(story)
+    if story.end is None and not finished(trace):
+        return undecided(what, f"the log stops at t = {trace.seconds(trace.end):.2f} s, {story.fate}", expected)
+    at = (trace, trace.end if story.end is None else story.end.tick)
+    on_the_way = story.goal.via and story.reached is not None  # it may come past some poses before it fails
+    return (held if story.failed_as_expected or on_the_way else missed)(what, story.fate, expected, at)
+
+
+def _expected(story: GoalStory) -> str:
+    return FAILED if story.failure == FAILED else f"failed with {story.failure}"
+
+
+def _waited(trace: Trace, case: Case, story: GoalStory, told: list[GoalStory]) -> list[Finding]:
+    """Whether the robot stayed as long as it was to, before it went on to another goal of the list."""
+    later = next((each for each in told if began(each) > began(story) and each.goal in case.goals), None)
+    if not story.goal.wait or story.reached is None or later is None or later.accepted is None:
+        return []
+    stayed = trace.seconds(later.accepted - story.reached)
+    return [at_least(f"goal {story.goal.name} wait", stayed, story.goal.wait, "s", at=(trace, later.accepted))]
 
 
 def _not_reached(trace: Trace, story: GoalStory) -> Finding:

@@ -8,14 +8,16 @@ from itertools import zip_longest
 from typing import TYPE_CHECKING
 
 from simscen.core.events import Event, EventKind, Value
-from simscen.core.navigation import Goal
+from simscen.core.navigation import FAILED, Goal
+from simscen.criteria.codes import code_of
 
 if TYPE_CHECKING:
     from simscen.core.case import Case
     from simscen.core.trace import Trace
 
 _STARTS = (EventKind.FAULT_STARTED, EventKind.EVENT_STARTED, EventKind.MARK)
-_GOAL_ENDS = (EventKind.GOAL_REACHED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED)
+_ARRIVED = (EventKind.GOAL_REACHED, EventKind.GOAL_PASSED)
+_GOAL_ENDS = (*_ARRIVED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED)
 _ENDS = (EventKind.FAULT_ENDED, EventKind.EVENT_ENDED)
 
 
@@ -74,16 +76,32 @@ def finished(trace: Trace) -> bool:
 
 @dataclass(frozen=True)
 class GoalStory:
-    """What became of a goal, as the robot reported it: when it was accepted, and the event that ended it."""
+    """What became of a goal, as the robot reported it: when it was accepted, and the event that ended it.
+
+    `failure` is how the scenario has it fail: "failed", or the name of an error code; "" where it is to be reached.
+    """
 
     goal: Goal
     accepted: int | None
     end: Event | None
+    failure: str = ""
 
     @property
     def reached(self) -> int | None:
-        """The tick at which the robot said that it was there."""
-        return self.end.tick if self.end is not None and self.end.kind == EventKind.GOAL_REACHED else None
+        """The tick at which the robot said that it was there, or came past it."""
+        return self.end.tick if self.end is not None and self.end.kind in _ARRIVED else None
+
+    @property
+    def awaited(self) -> bool:
+        """Whether the robot is to arrive there: no other goal was sent instead, and it is not to fail."""
+        return not self.preempted and not self.failure
+
+    @property
+    def failed_as_expected(self) -> bool:
+        """Whether it failed, and in the way that the scenario asks for."""
+        if self.end is None or self.end.kind != EventKind.GOAL_FAILED:
+            return False
+        return self.failure in (FAILED, code_of(self.end))
 
     @property
     def preempted(self) -> bool:
@@ -92,7 +110,7 @@ class GoalStory:
 
     @property
     def fate(self) -> str:
-        """In words, for a goal that was not reached."""
+        """In words: what the robot said of it."""
         if self.end is None:
             return "never accepted" if self.accepted is None else "still under way"
         if self.preempted:
@@ -108,15 +126,28 @@ def stories(trace: Trace, case: Case) -> list[GoalStory]:
     comes last, and one that no event sent has no story.
     """
     told = _reports(trace)
+    before = _counted([goal.name for goal in case.goals])
     found = [
-        GoalStory(goal, *_nth(told.get(goal.name, []), [g.name for g in case.goals[:k]].count(goal.name)))
+        GoalStory(goal, *_nth(told.get(goal.name, []), before[k]), case.expected.get(goal.name, ""))
         for k, goal in enumerate(case.goals)
     ]
     for goal in case.sent:
         reports = told.get(goal.name, [])
-        sent = max(len(reports), sum(event.data.get("preempted_by") == goal.name for event in trace.events))
+        # What it preempted may be several poses of one drive.
+        preempting = {event.tick for event in trace.events if event.data.get("preempted_by") == goal.name}
+        sent = max(len(reports), len(preempting))
         found += [GoalStory(goal, *_nth(reports, k)) for k in range(sent)]
     return sorted(found, key=began)
+
+
+def _counted(names: list[str]) -> list[int]:
+    """How often each name came before."""
+    seen: dict[str, int] = {}
+    counts = []
+    for name in names:
+        counts.append(seen.get(name, 0))
+        seen[name] = counts[-1] + 1
+    return counts
 
 
 _Report = tuple[int | None, Event | None]

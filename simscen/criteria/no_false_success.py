@@ -10,6 +10,7 @@ from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import at_most, held, missed, undecided
 from simscen.criteria.moments import GoalStory, began, stories
+from simscen.criteria.passing import nearest
 from simscen.criteria.signals import true_pose
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveLength
@@ -39,19 +40,27 @@ class NoFalseSuccess(Spec, Criterion):
         """One finding for each goal reported reached, one for the end of navigation."""
         told = stories(trace, case)
         ended = trace.of_kind(EventKind.NAVIGATION_ENDED)
-        strange = [event for event in trace.of_kind(EventKind.GOAL_REACHED) if event.name not in _names(case)]
+        strange = [
+            event
+            for event in trace.of_kind(EventKind.GOAL_REACHED, EventKind.GOAL_PASSED)
+            if event.name not in _names(case)
+        ]
         if not ended and not strange and all(story.end is None for story in told):
             return [undecided("no_false_success", "the robot reported nothing that could be false")]
-        findings = [self._at_goal(trace, story) for story in told if story.reached is not None]
+        findings = [self._at_goal(trace, story, told) for story in told if story.reached is not None]
         findings += [
             undecided(f"goal {event.name}", "reported reached, but the scenario has no such goal") for event in strange
         ]
         findings += [finding for k in range(len(ended)) if (finding := _success(trace, case, ended, k)) is not None]
         return findings or [held("no_false_success", "no success was claimed", "no false success")]
 
-    def _at_goal(self, trace: Trace, story: GoalStory) -> Finding:
+    def _at_goal(self, trace: Trace, story: GoalStory, told: list[GoalStory]) -> Finding:
         assert story.reached is not None
         what, at = f"goal {story.goal.name}", (trace, story.reached)
+        if story.goal.via:
+            tick, apart = nearest(trace, story, told)
+            context = "from the pose where it came nearest to it, which it says it has passed"
+            return at_most(what, apart, self.tolerance, "m", at=(trace, tick), context=context)
         context = "from the goal when the robot said it was there"
         return at_most(
             what, true_pose(trace, story.reached).distance(story.goal.pose), self.tolerance, "m", at=at, context=context
@@ -71,7 +80,7 @@ def _success(trace: Trace, case: Case, ended: tuple[Event, ...], k: int) -> Find
     if end.name != "SUCCEEDED":
         return None
     own = [s for s in stories(trace, case) if _task(s, ended) == k or (k == 0 and s.goal in case.goals)]
-    late = [s for s in own if not s.preempted and (s.reached is None or s.reached > end.tick)]
+    late = [s for s in own if s.awaited and (s.reached is None or s.reached > end.tick)]
     if not late:
         return None
     names = ", ".join(story.goal.name for story in late)

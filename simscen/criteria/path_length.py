@@ -26,7 +26,8 @@ class PathLength(Spec, Criterion):
     """The robot drove no further than it should.
 
     What is measured: the length of the true way in the plane, in moves of at least 1 cm, over the whole run; its ratio
-        to the shortest way from the start through all goals that a disc of the robot's inscribed radius has.
+        to the shortest way from the start through all goals that a disc of the robot's inscribed radius has; goals at
+        which the robot is to fail are left out of that way.
     When it fails: it is longer than `max`, or than `max_ratio` times the shortest way.
     Why this: detours, swerving and search patterns cost battery and nerves while every goal is still reached.
     Source: HuNavSim and bench-mr for the length; SEAN's "path efficiency" is this ratio. SPL (Anderson 2018) is its
@@ -62,7 +63,7 @@ class PathLength(Spec, Criterion):
             return undecided(what, because, f"≤ {self.max_ratio:g}")
         limit = self.max_ratio * shortest
         context = f"({self.max_ratio:g} times the shortest way of {shortest:.2f} m)"
-        unreached = [story for story in stories(trace, case) if story.reached is None]
+        unreached = [story for story in stories(trace, case) if story.reached is None and not story.failure]
         if unreached and way.length <= limit:
             name = unreached[0].goal.name
             return undecided(what, f"goal {name} was not reached, so there is no whole way to compare", context)
@@ -71,7 +72,7 @@ class PathLength(Spec, Criterion):
 
 def shortest_way(trace: Trace, case: Case) -> tuple[float, str]:
     """The length in metres of the shortest way through all goals; or nan, and why there is none to compare with."""
-    names = [goal.name for goal in case.goals]
+    names = [goal.name for goal in case.goals if goal.name not in case.expected]
     twice = sorted({name for name in names if names.count(name) > 1})
     without = [name for name in names if not math.isfinite(case.shortest.get(name, math.nan))]
     length = sum(case.shortest.get(name, math.nan) for name in names)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal
 
 from simscen.core.events import Event, EventKind
+from simscen.core.navigation import named
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import held, missed, undecided
@@ -66,7 +67,7 @@ class ErrorCodeIs(Spec, Criterion):
         kinds = (
             [EventKind.NAVIGATION_ENDED]
             if self.goal is None
-            else [EventKind.GOAL_REACHED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED]
+            else [EventKind.GOAL_REACHED, EventKind.GOAL_PASSED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED]
         )
         what = "error code" if self.goal is None else f"error code of goal {self.goal}"
         end = _last(trace, *kinds, name=self.goal)
@@ -76,7 +77,7 @@ class ErrorCodeIs(Spec, Criterion):
 
 
 def _last(trace: Trace, *kinds: EventKind, name: str | None = None) -> Event | None:
-    events = [event for event in trace.of_kind(*kinds) if name in (None, event.name)]
+    events = [event for event in trace.of_kind(*kinds) if named(event.name, name)]
     return events[-1] if events else None
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from simscen.core.events import EventKind
 from simscen.core.geometry import Array, wrap_array
+from simscen.core.navigation import named
 from simscen.core.samples import Samples, Ticks
 from simscen.criteria.bounds import BrokenTrace
 from simscen.criteria.moments import spans
@@ -186,6 +187,7 @@ def goal_active(asked: Asked) -> Array:
     """From acceptance to the report that ends it."""
     ends = (
         EventKind.GOAL_REACHED,
+        EventKind.GOAL_PASSED,
         EventKind.GOAL_FAILED,
         EventKind.GOAL_CANCELED,
         EventKind.NAVIGATION_ENDED,
@@ -337,7 +339,7 @@ def _between(trace: Trace, start: EventKind, ends: tuple[EventKind, ...], name: 
     """From each event of the kind `start` (of that name, if one is given) to the next of `ends` under its name."""
     stretches: list[tuple[int, float]] = []
     for event in trace.of_kind(start):
-        if name in (None, event.name):
+        if name in (None, event.name) or (start is EventKind.GOAL_ACCEPTED and named(event.name, str(name))):
             later = (e.tick for e in trace.of_kind(*ends) if _ends(e.kind, e.name, event.name) and e.tick > event.tick)
             stretches.append((event.tick, next(later, np.inf)))
     return _stretches(trace, stretches)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from simscen.core.navigation import named
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import at_most, missed, undecided
@@ -22,7 +23,7 @@ class TimeToGoal(Spec, Criterion):
 
     What is measured: simulated time from the first goal's acceptance to the report that the last one is reached; with
         `goal`, from that goal's acceptance to the report that it is reached. Goals that events send count too; those
-        that they preempt need not be reached.
+        that they preempt, and goals that are expected to fail, need not be reached.
     When it fails: it took longer, or the goal was never reached.
     Why this: a robot that dithers arrives, too. That it truly arrived is what goals_reached asks.
     Source: the time of the BARN challenge and of Nav2's own benchmarks (nav2#3239).
@@ -39,22 +40,24 @@ class TimeToGoal(Spec, Criterion):
         """One finding; one for each goal if several share the name."""
         told = stories(trace, case)
         if self.goal is not None:
-            named = [story for story in told if story.goal.name == self.goal]
-            if not named:
-                known = self.goal in [goal.name for goal in case.every_goal]
+            own = [story for story in told if named(story.goal.name, self.goal)]
+            if not own:
+                known = any(named(goal.name, self.goal) for goal in case.every_goal)
                 because = "never sent" if known else f"the scenario has no goal `{self.goal}`"
                 return [undecided(f"goal {self.goal}", because)]
-            return [self._timed(trace, f"goal {self.goal}", story.accepted, story) for story in named]
+            return [self._timed(trace, f"goal {story.goal.name}", story.accepted, story) for story in own]
         if not told:
             return [undecided("time_to_goal", "the scenario has no goals")]
         start = next((story.accepted for story in told if story.accepted is not None), None)
-        awaited = [story for story in told if not story.preempted]
+        awaited = [story for story in told if story.awaited]
         if not awaited:
-            return [undecided("time_to_goal", "every goal was preempted")]
+            return [undecided("time_to_goal", "every goal was preempted, or is to fail")]
         unreached = [story for story in awaited if story.reached is None]
         return [self._timed(trace, "time_to_goal", start, unreached[0] if unreached else awaited[-1])]
 
     def _timed(self, trace: Trace, what: str, start: int | None, story: GoalStory) -> Finding:
+        if story.failure:
+            return undecided(what, "the robot is to fail there, not to arrive")
         if start is None:
             return self._never_begun(trace, what, story)
         if story.reached is not None:

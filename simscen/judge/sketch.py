@@ -110,7 +110,8 @@ def _lifted(points: Sequence[Sequence[float]]) -> Array:
 
 def sketch_case(words: Mapping[str, Any]) -> Case:
     """A case: start [x, y, yaw] · goals [{name, pose: [x, y, yaw], xy_tolerance, …}] · sent ·
-    shortest {goal: metres} · passages [[goal, [x, y], [x, y], name, name]] · disturbances [{name, kind, …}] ·
+    expected {goal: failed or a code} · shortest {goal: metres} · passages [[goal, [x, y], [x, y], name, name]] ·
+    disturbances [{name, kind, …}] ·
     masks {file: {resolution, origin: [x, y, yaw], blocks: [[column, row, width, height, value]]}} · …"""
     goals, sent = (
         tuple(Goal(**{**goal, "pose": _pose(goal["pose"])}) for goal in words.get(key, [])) for key in ("goals", "sent")
@@ -130,6 +131,7 @@ def sketch_case(words: Mapping[str, Any]) -> Case:
             for goal, (ax, ay), (bx, by), one, other in words.get("passages", [])
         ),
         masks={name: MaskCells(**_mask(mask)) for name, mask in words.get("masks", {}).items()},
+        expected=words.get("expected", {}),
         disturbances=tuple(Disturbance(**ordered) for ordered in words.get("disturbances", [])),
     )
 

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
+from simscen.core.navigation import LOOP
 from simscen.core.problems import Problem
 from simscen.core.time import Clock
 from simscen.core.world import World
@@ -20,7 +21,9 @@ from simscen.loading.sense.unfitfaults import unfit_faults
 from simscen.loading.sense.worldsense import senseless
 from simscen.loading.sense.zoneorders import vain_orders
 from simscen.loading.tree import Fields, Key, key_place, real_keys, value_place
+from simscen.model.navigation import failure_of
 from simscen.model.robot import RobotSpec
+from simscen.model.scenario import MOST_GOALS
 from simscen.triggers.scan_age import ScanAge
 from simscen.triggers.trigger import Trigger
 
@@ -36,7 +39,7 @@ def inconsistencies(
     unknown, no more is asked.
     """
     unknown = [*strangers, *_unknown_names(loaded, world), *unfit_faults(loaded), *_twice_named(loaded)]
-    unknown += [*_uneven_rates(loaded), *_unknown_lidars(loaded), *namesakes(loaded, world)]
+    unknown += [*_uneven_rates(loaded), *_unknown_lidars(loaded), *namesakes(loaded, world), *_unfit_goals(loaded)]
     unknown += [loaded.sourced(problem) for problem in senseless(loaded.world)]
     unknown += _robots_and_things(loaded, world)
     if any(problem.severity == "error" for problem in unknown):
@@ -129,10 +132,29 @@ def _twice_named(loaded: LoadedScenario) -> Iterator[Problem]:
         if name in happening:
             message = f"an event or a fault is called {quoted(name)}, too: criteria could not tell them apart"
             yield loaded.problem((*keys, "mark", "name"), "SC033", message, "give one of them another name")
+    for index, goal in enumerate(loaded.spec.goals):
+        if goal.name is not None and LOOP.fullmatch(goal.name):
+            message = f"{quoted(goal.name)} is what a goal is called in a further loop"
+            yield loaded.problem(("goals", index, "name"), "SC033", message, "give it a name without # and a number")
     for index, fault in enumerate(loaded.spec.faults):
         if fault.name is not None and fault.name in event_names(loaded):
             message = f"an event is called {quoted(fault.name)}, too: criteria could not tell them apart"
             yield loaded.problem(("faults", index, "name"), "SC033", message, "give one of them another name")
+
+
+def _unfit_goals(loaded: LoadedScenario) -> Iterator[Problem]:
+    """What the mode of navigation leaves no room for, and more goals than a run takes."""
+    spec = loaded.spec
+    if len(spec.goals) * spec.navigation.loops > MOST_GOALS:
+        message = f"{len(spec.goals)} goals in {spec.navigation.loops} loops are more than {MOST_GOALS}"
+        yield loaded.problem(("navigation", "loops"), "SC016", message)
+    for index, goal in enumerate(spec.goals[:-1] if spec.navigation.mode == "navigate_through_poses" else ()):
+        for key, why in (("on_reached", "does not stop"), ("expect", "has no result")):
+            if (
+                goal.on_reached.wait if key == "on_reached" else failure_of(goal.expect)
+            ) and key in goal.model_fields_set:
+                message = f"`{key}` stands at the last goal of navigate_through_poses: at the others the robot {why}"
+                yield loaded.problem(("goals", index, key), "SC016", message)
 
 
 def _goals_sent_twice(loaded: LoadedScenario) -> Iterator[Problem]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+from simscen.core.navigation import in_loop
 from simscen.core.world import World
 from simscen.criteria.criterion import verdict_names
 from simscen.loading.loaded import LoadedScenario
@@ -45,8 +46,9 @@ def goal_names(loaded: LoadedScenario) -> list[str]:
 
 
 def own_goal_names(loaded: LoadedScenario) -> list[str]:
-    """The goals of the scenario: as written, or after their place, or goal-1, goal-2, …"""
-    return loaded.spec.goal_names
+    """The goals of the scenario, in every loop: as written, or after their place, or goal-1, goal-2, …"""
+    loops = range(1, loaded.spec.navigation.loops + 1)
+    return [in_loop(name, loop) for loop in loops for name in loaded.spec.goal_names]
 
 
 def event_names(loaded: LoadedScenario) -> list[str]:

@@ -10,6 +10,7 @@ from simscen.core.chance import LARGEST_SEED
 from simscen.core.geometry import Pose2
 from simscen.criteria.criterion import AnyCriterion
 from simscen.model.anystack import AnyStack
+from simscen.model.navigation import Expectation, Navigation, OnReached
 from simscen.model.world import WorldSpec
 from simscen.spec.base import Spec, by_default
 from simscen.spec.ondemand import OnDemand
@@ -103,6 +104,15 @@ class GoalEntry(Spec):
     """Default: the stack's goal checker."""
     yaw_tolerance: PositiveAngle | None = None
     """Default: the stack's goal checker."""
+    expect: Expectation = "succeeded"
+    """What is to come of it: `succeeded`, `failed`, or the code of a failure, e.g. `{error_code: GOAL_OCCUPIED}`. A
+    failure that is expected is a pass, and a success that is not expected is none."""
+    on_reached: OnReached = by_default()
+    """What the robot does there before it goes on."""
+
+
+MOST_GOALS = 1000
+"""Goals that a robot is sent to in one run, loops counted."""
 
 
 class OneOfSeveral(RobotEntry):
@@ -118,8 +128,10 @@ class OneOfSeveral(RobotEntry):
     """The map this robot gets; `none` = no map, odometry only."""
     stack: AnyStack | None = None
     """What its stack has otherwise than that of all."""
-    goals: Annotated[list[GoalEntry], Field(max_length=1000)] = []
+    goals: Annotated[list[GoalEntry], Field(max_length=MOST_GOALS)] = []
     """In this order; a robot without goals stands where it is."""
+    navigation: Navigation | None = None
+    """Which action takes its goals, and how often."""
     on_goal_failure: Literal["stop", "continue"] | None = None
     """After a goal that failed: end, or drive to the next one."""
     faults: Annotated[list[FaultEntry], Field(max_length=500)] = []
@@ -202,8 +214,10 @@ class ScenarioSpec(Spec):
     """Several robots by name, instead of `robot`: each with its own goals, faults and criteria."""
     stack: AnyStack = by_default()
     """The stack under test: simscen's own, or `{external: NAME}`, a process."""
-    goals: Annotated[list[Annotated[GoalEntry, PlaceAlone("pose")]], Field(max_length=1000)] = []
+    goals: Annotated[list[Annotated[GoalEntry, PlaceAlone("pose")]], Field(max_length=MOST_GOALS)] = []
     """In this order; places of the world alone will do: `[kitchen, office]`."""
+    navigation: Navigation = by_default()
+    """Which action takes the goals, and how often."""
     on_goal_failure: Literal["stop", "continue"] = "stop"
     """After a goal that failed: end, or drive to the next one (FollowWaypoints' stop_on_failure)."""
     time_limit: Annotated[PositiveDuration, Field(le=8000)] = 300.0

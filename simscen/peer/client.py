@@ -88,8 +88,9 @@ class Peer:
     """A stack as simscen sees it. Iterating gives one Step after another until the run ends.
 
     `topics` are those it wants to hear, None = all that there are; `every_beat` asks for a step whenever a sensor
-    speaks, where otherwise there is one for each command and the readings since the last come with it. `about` is kept
-    in the run's log.
+    speaks, where otherwise there is one for each command and the readings since the last come with it. `modes` are the
+    ways of taking goals that it knows, by the names of Nav2's actions: who knows navigate_through_poses passes goals
+    with `via` without a stop. `about` is kept in the run's log.
     Raises wire.Malformed or Refused when the two sides do not understand each other, Gone when simscen hung up.
     """
 
@@ -100,6 +101,7 @@ class Peer:
         topics: Sequence[str] | None = (),
         *,
         every_beat: bool = False,
+        modes: Sequence[str] = ("navigate_to_pose",),
         about: dict[str, Any] | None = None,
         connection: Connection | None = None,
     ) -> None:
@@ -122,6 +124,7 @@ class Peer:
                 "version": version,
                 "topics": [topic for topic, _ in self._topics.values()] if topics is None else list(topics),
                 "step": "beat" if every_beat else "control",
+                "modes": list(modes),
                 "about": about or {},
             },
         )
@@ -138,6 +141,7 @@ class Peer:
             kind, body = self._connection.receive()
             if kind == wire.STEP:
                 header, heard = wire.from_step(body)
+                self.goals.now = header.sec + header.nanosec * 1e-9
                 step = Step(self, header, [self._message(*each) for each in heard], self._canceled)
                 self._canceled = False
                 yield step

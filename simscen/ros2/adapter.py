@@ -28,12 +28,13 @@ HEARD = {
     "/tf": "tf2_msgs/msg/TFMessage",
 }
 """What is heard of the stack besides its commands."""
+THROUGH = "navigate_through_poses"
 BASE, INITIAL_POSE = "base_link", "/initialpose"
 ZERO = (0.0,) * 6
 
 
 class Adapter:
-    """One run: made with the topics that simscen has, then asked at every step."""
+    """One run: made with the topics that simscen has, then asked at every step. `mode` is the scenario's."""
 
     def __init__(self, options: Options, topics: Sequence[Topic], goals: Goals, launched: Optional[Launched]) -> None:
         if not rclpy.ok():
@@ -46,6 +47,7 @@ class Adapter:
         self._door: Optional[Door] = None
         self._velocity: Tuple[float, ...] = ZERO
         self._ready, self._go_on = False, True
+        self.mode, self._sent = "", 0
         self._planned_for: Optional[Goal] = None
         self._unsaid: List[Message] = []
         self.left_out: List[str] = []
@@ -168,21 +170,38 @@ class Adapter:
         """Send the goals that are left; what is rejected has failed."""
         while self._door is not None and self._goals.accept() is not None:
             assert self._goals.current is not None
-            failed = self._door.send([self._goals.current, *self._goals.waiting], now, self._rest)
+            drive = self._drive()
+            self._sent = 1 if self._door.one_by_one else len(drive)
+            failed = self._door.send(drive, now, self._rest)
             if failed is None:
                 return
             self._goals.failed(failed.code, failed.message, go_on=self._go_on)
+
+    def _drive(self) -> List[Goal]:
+        """What goes into one action: all goals that are left, or up to where the scenario has the robot stop or wait.
+
+        How long a waypoint follower waits is its own parameter; so it is sent on anew after each wait.
+        """
+        assert self._goals.current is not None
+        left = [self._goals.current, *self._goals.waiting]
+        stops = (k for k, goal in enumerate(left) if goal.wait or (self.mode == THROUGH and not goal.via))
+        return left[: next(stops, len(left)) + 1]
 
     def _settle(self, now: int) -> None:
         """Tell what became of the goals."""
         assert self._door is not None
         for outcome in self._door.outcomes(self._now(now)) if self._goals.current is not None else ():
+            if self._goals.current is None:
+                return
+            self._sent -= 1
             if isinstance(outcome, Failed):
+                self._sent -= len(self._goals.ahead)
                 self._goals.failed(outcome.code, outcome.message, go_on=self._go_on)
             else:
                 self._goals.reached()
-            if not self._door.one_by_one:
-                self._goals.accept()
+            if self._sent <= 0:
+                return
+            self._goals.accept()
 
     def _now(self, now: int) -> Now:
         still = all(abs(number) < 1e-3 for number in self._velocity)

@@ -16,6 +16,8 @@ from simscen.ros2.launched import Launched
 from simscen.ros2.options import Options
 
 EVENTS = "/simscen/events"
+DEFAULT_MODE = "navigate_to_pose"
+MODES = (DEFAULT_MODE, "navigate_through_poses", "follow_waypoints")
 
 
 def main(values: Dict[str, Any]) -> int:
@@ -63,14 +65,20 @@ class Run:
             raise Failure(f"simscen ros2 speaks version {wire.PROTOCOL} of the stack protocol")
         launched = self._prepare()
         said = {one["number"]: Topic(one["topic"], one["type"]) for one in hello["says"] if _in_the_graph(one)}
-        options = self._options
+        options = self._with_action_of(hello.get("mode", DEFAULT_MODE))
         if options.warm_up:  # what is missing then must be said before simscen gives up the answer to that step
             options = options._replace(ready=min(options.ready, 0.8 * hello["answer_limit"]))
         adapter = Adapter(options, list(said.values()), self.goals, launched)
         self._ends.append(adapter.end)
         adapter.get_ready()
         about = adapter.about()
-        welcome = {"protocol": wire.PROTOCOL, "name": "simscen ros2", "version": about["rclpy"], "step": "control"}
+        welcome = {
+            "protocol": wire.PROTOCOL,
+            "name": "simscen ros2",
+            "version": about["rclpy"],
+            "step": "control",
+            "modes": [*MODES],
+        }
         topics = [topic.name for topic in said.values() if topic.name in adapter.offered]
         connection.send_json(wire.WELCOME, {**welcome, "topics": topics, "about": about})
         hears = {one["topic"]: one["number"] for one in hello["hears"]}
@@ -83,6 +91,7 @@ class Run:
             if kind == wire.STEP:
                 header, messages = wire.from_step(body)
                 now = header.sec * 10**9 + header.nanosec
+                self.goals.now = now * 1e-9
                 due = bool(header.flags & wire.COMMAND_DUE)
                 heard = adapter.step(now, [(said[number].name, data) for number, data in messages], due)
                 connection.send(wire.answer_frame(header.tick, self._numbered(heard, hears)))
@@ -92,9 +101,19 @@ class Run:
             else:
                 self._take(kind, wire.from_json(body), adapter, now)
 
+    def _with_action_of(self, mode: str) -> Options:
+        """The options with the action of the scenario's mode; Failure where `--goals` says another one."""
+        wanted = self._options.goals
+        if mode in (DEFAULT_MODE, wanted):
+            return self._options
+        if wanted != "auto":
+            raise Failure(f"the scenario sends goals by {mode}, and --goals says {wanted}")
+        return self._options._replace(goals=mode)
+
     def _take(self, kind: int, content: Dict[str, Any], adapter: Any, now: int) -> None:
         if kind == wire.GOAL:
             adapter.start([Goal.of(goal) for goal in content["goals"]], content["on_goal_failure"] == "continue")
+            adapter.mode = content.get("mode", DEFAULT_MODE)
         elif kind == wire.PREEMPT:
             adapter.preempt(now, Goal.of(content["goal"]))
         elif kind == wire.CANCEL:

@@ -168,6 +168,7 @@ def _stack(
         streams,
         clock,
         stop_on_failure=prepared.spec.on_goal_failure != "continue",
+        mode=prepared.spec.navigation.mode,
         heard=lambda localizer: ToldLocalizer(localizer, told),
     )
 

@@ -9,7 +9,7 @@ from simscen.core.maskcells import MaskCells
 from simscen.core.problems import Problem
 from simscen.loading.criteria_file import LoadedCriteria
 from simscen.model.world import WorldSpec
-from simscen.run.goals import goals_of
+from simscen.run.goals import expected_of, goals_of
 from simscen.run.masks import load_judged_masks
 from simscen.run.robotsize import inscribed_radius
 from simscen.run.worldsource import robot_of, world_of
@@ -22,9 +22,11 @@ def case_of(criteria: LoadedCriteria, world_path: Sequence[Path] = ()) -> Case:
     root = criteria.library.fence.root
     world = build_own(WorldSpec(simscen=1), "") if loaded_world is None else world_of(loaded_world, root, world_path)
     body = None if loaded_robot is None else robot_of(loaded_robot, (root, *criteria.library.fence.world_path))[1]
+    goals = goals_of(criteria.spec)
     return Case(
         start=Pose2(0.0, 0.0, 0.0),
-        goals=goals_of(criteria.spec),
+        goals=goals,
+        expected=expected_of(criteria.spec, goals),
         regions=world.regions,
         footprint=() if body is None else body.footprint,
         inscribed_radius=0.0 if body is None else inscribed_radius(body.radius, body.footprint),

@@ -1,16 +1,40 @@
 """What a scenario's robot is sent to."""
 
+import math
 from collections.abc import Callable
+from dataclasses import replace
 
 from simscen.actions.goals import NewGoal
-from simscen.core.navigation import Goal
+from simscen.core.navigation import Goal, in_loop
+from simscen.model.navigation import failure_of
 from simscen.model.scenario import GoalEntry, ScenarioSpec
 from simscen.model.stackbase import StackBase
 
 
 def goals_of(spec: ScenarioSpec) -> tuple[Goal, ...]:
-    """The goals in order, named, with their tolerances."""
-    return tuple(_goal(name, entry, spec.stack) for name, entry in zip(spec.goal_names, spec.goals, strict=True))
+    """All goals in order, named, with their tolerances; of further loops with `#2`, `#3`, … to their names."""
+    once = [_goal(name, entry, spec.stack) for name, entry in zip(spec.goal_names, spec.goals, strict=True)]
+    if spec.navigation.mode == "navigate_through_poses":
+        passed = [_passed(goal, entry, spec.navigation.radius) for goal, entry in zip(once, spec.goals, strict=True)]
+        once = [*passed[:-1], *once[-1:]]
+    return tuple(
+        replace(goal, name=in_loop(goal.name, loop)) for loop in range(1, spec.navigation.loops + 1) for goal in once
+    )
+
+
+def expected_of(spec: ScenarioSpec, goals: tuple[Goal, ...]) -> dict[str, str]:
+    """The goals at which the robot is to fail, and how; in navigate_through_poses all of a drive that is to fail."""
+    through = spec.navigation.mode == "navigate_through_poses"
+    found = {}
+    for number, goal in enumerate(goals):
+        entry = spec.goals[-1] if through else spec.goals[number % len(spec.goals)]
+        if failure := failure_of(entry.expect):
+            found[goal.name] = failure
+    return found
+
+
+def _passed(goal: Goal, entry: GoalEntry, radius: float) -> Goal:
+    return replace(goal, via=True, xy_tolerance=entry.xy_tolerance or radius, yaw_tolerance=math.pi)
 
 
 def sent_goals(spec: ScenarioSpec, concerns: Callable[[str | None], bool]) -> dict[tuple[str | int, ...], Goal]:
@@ -37,4 +61,5 @@ def _goal(name: str, entry: GoalEntry, stack: StackBase) -> Goal:
         xy_tolerance=entry.xy_tolerance or stack.goal_checker.xy_goal_tolerance,
         yaw_tolerance=entry.yaw_tolerance or stack.goal_checker.yaw_goal_tolerance,
         timeout=entry.timeout,
+        wait=entry.on_reached.wait,
     )

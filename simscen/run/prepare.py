@@ -20,7 +20,7 @@ from simscen.model.anystack import AnyStack
 from simscen.model.robot import RobotSpec
 from simscen.model.scenario import ScenarioSpec, estimate_of
 from simscen.model.stack import Amcl, OdometryOnly, StackSpec
-from simscen.run.goals import goals_of, sent_goals
+from simscen.run.goals import expected_of, goals_of, sent_goals
 from simscen.run.masks import load_judged_masks, load_masks
 from simscen.run.robotsize import inscribed_radius
 from simscen.run.robotways import in_the_way
@@ -30,7 +30,7 @@ from simscen.sim.robot_body import RobotBody
 from simscen.triggers.clearance_below import ClearanceBelow
 from simscen.worlds.build import build
 from simscen.worlds.meshing import fuse
-from simscen.worlds.shortest import shortest_legs
+from simscen.worlds.shortest import legs_between
 
 DEFAULT_LIDAR_HEIGHT = 0.2
 
@@ -111,6 +111,7 @@ def _prepared(loaded: LoadedScenario, world_of: BuildWorld) -> Prepared:
     case = Case(
         start=start,
         goals=goals,
+        expected=expected_of(spec, goals),
         sent=tuple(sent_goals(spec, loaded.concerns).values()),
         regions=world.regions,
         footprint=body.footprint,
@@ -136,8 +137,15 @@ def _prepared(loaded: LoadedScenario, world_of: BuildWorld) -> Prepared:
 
 
 def with_ways(case: Case, built: BuiltWorld, obstacles: TriangleMesh) -> Case:
-    """The case with the shortest ways past the obstacles to its goals, and what they pass between."""
-    legs = shortest_legs(replace(built, mesh=obstacles), case.start, case.goals, case.inscribed_radius)
+    """The case with the shortest ways past the obstacles to its goals, and what they pass between.
+
+    Where the robot is to fail at a goal, the way to the next one begins where the way to that one did.
+    """
+    ends, at = [], case.start
+    for goal in case.goals:
+        ends.append((at, goal))
+        at = at if goal.name in case.expected else goal.pose
+    legs = legs_between(replace(built, mesh=obstacles), ends, case.inscribed_radius)
     return replace(
         case,
         shortest={goal.name: leg.length for goal, leg in zip(case.goals, legs, strict=True)},

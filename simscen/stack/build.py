@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from simscen.core.chance import Streams
 from simscen.core.events import Event
+from simscen.core.navigation import Mode
 from simscen.core.time import Clock
 from simscen.model import stack as model
 from simscen.stack.collision_monitor import CollisionMonitor
@@ -35,6 +36,7 @@ def build_stack(
     *,
     stop_on_failure: bool = True,
     heard: Callable[[Localizer], Localizer] = lambda localizer: localizer,
+    mode: Mode = "navigate_to_pose",
 ) -> InstalledStack:
     """The stack of a specification, ready to `start`. Raises ValueError when a rate does not divide the clock.
 
@@ -42,7 +44,7 @@ def build_stack(
     """
     period = clock.seconds(clock.period(spec.controller_frequency))
     setting = Setting(
-        surroundings, "stack", streams, control_period=period, stop_on_failure=stop_on_failure, heard=heard
+        surroundings, "stack", streams, control_period=period, stop_on_failure=stop_on_failure, mode=mode, heard=heard
     )
     return InstalledStack(spec, setting)
 
@@ -93,7 +95,7 @@ def reference_stack(spec: model.StackSpec, setting: Setting) -> ReferenceStack:
         costmap,
         controller,
         navigator,
-        Task(setting.stop_on_failure, journal),
+        Task(setting.stop_on_failure, journal, clock, setting.mode),
         VelocitySmoother(spec.velocity_smoother, robot, setting.control_period),
         CollisionMonitor(spec.collision_monitor, robot, surroundings.lidars, surroundings.tick_rate),
         period,

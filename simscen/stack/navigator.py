@@ -1,4 +1,4 @@
-"""Drives to goals in order: Nav2's NavigateToPose tree (replanning and recovery) as a state machine.
+"""Drives to a goal, past poses on the way: the replanning and recovery of Nav2's trees as a state machine.
 
 Without errors one step is: check the goal, check the plan, ask the controller. When planning or control fails, first
 the costmap is cleared and the same is tried again (the per-context recovery of Nav2's tree); when it fails again, the
@@ -40,6 +40,8 @@ class Navigator:
         self._period, self._events = period, journal
         self._clock = 0.0
         self.goal: Goal | None = None
+        self.via: tuple[Goal, ...] = ()
+        """What is to be passed before the goal, in this order."""
         self._forget()
 
     @property
@@ -69,7 +71,7 @@ class Navigator:
 
     def stop(self) -> None:
         """Drop the goal."""
-        self.goal = None
+        self.goal, self.via = None, ()
         self._forget()
 
     def step(self, tick: int, pose: Pose2, twist: Twist, held: bool = False) -> tuple[Twist, bool]:
@@ -83,7 +85,7 @@ class Navigator:
         self._clock += self._period
         if self._behavior is not None:
             return self._recover(tick, pose), False
-        if self._goal_checker.reached(goal, pose, twist):
+        if not self.via and self._goal_checker.reached(goal, pose, twist):
             return STOP, True
         try:
             command = self._follow(tick, goal, pose, twist, held)
@@ -93,8 +95,9 @@ class Navigator:
         return command, False
 
     def _follow(self, tick: int, goal: Goal, pose: Pose2, twist: Twist, held: bool) -> Twist:
-        self._plans.step(tick, self._clock, goal, pose)
-        command = self._controller.command(pose, twist, self._costmap.view, goal)
+        self._plans.step(tick, self._clock, goal, pose, self.via)
+        following = (*self.via, goal)[0]  # a tour may end where it begins: only the last drive to its end ends it
+        command = self._controller.command(pose, twist, self._costmap.view, following)
         if held:
             raise NavigationFailure(ErrorCode.FAILED_TO_MAKE_PROGRESS, "the collision monitor holds the robot")
         if self._progress.stuck(pose, self._clock):
@@ -136,7 +139,9 @@ class Navigator:
     def _hopeless(self, goal: Goal, failure: NavigationFailure) -> bool:
         if failure.code == ErrorCode.GOAL_OUTSIDE_MAP:
             return True
-        return failure.code == ErrorCode.GOAL_OCCUPIED and not self._costmap.fits_static(goal.pose, goal.xy_tolerance)
+        return failure.code == ErrorCode.GOAL_OCCUPIED and not all(
+            self._costmap.fits_static(each.pose, each.xy_tolerance) for each in (*self.via, goal)
+        )
 
     def _recover(self, tick: int, pose: Pose2) -> Twist:
         behavior = self._behavior

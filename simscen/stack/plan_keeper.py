@@ -2,10 +2,11 @@
 
 import contextlib
 from collections.abc import Callable
-from dataclasses import replace
+
+import numpy as np
 
 from simscen.core.events import Event, EventKind, Value
-from simscen.core.geometry import Pose2
+from simscen.core.geometry import Array, Pose2
 from simscen.core.navigation import ErrorCode, Goal, Path
 from simscen.model.stack import PlannerSpec
 from simscen.stack.costmap.costmap import Costmap
@@ -23,6 +24,8 @@ RECONSIDER = 2
 CAUTION = (0.10, 0.05)
 """Metres of room beyond what is needed that plans keep, if they can, once the robot could not follow one: where it is
 as tight as belief, map and scan are uncertain, the same way would end the same again."""
+AT_ITS_END = 0.1
+"""Metres from the end of a plan at which something that was to be passed has been missed."""
 GONE = 8
 """Cells of live obstacles that must have gone for that; single cells come and go with the lidar's noise."""
 
@@ -44,6 +47,7 @@ class PlanKeeper:
         self._spec, self.planner, self._controller, self._costmap = spec, planner, controller, costmap
         self._plan_seed, self._radius, self._journal, self._steered = plan_seed, radius, journal, steered
         self._plans = 0
+        self._via: tuple[Goal, ...] = ()
         self.reset(0.0)
 
     def reset(self, now: float) -> None:
@@ -62,8 +66,12 @@ class PlanKeeper:
         """The plan could not be followed: until the next goal, take a roomier way where there is one."""
         self._cautious = True
 
-    def step(self, tick: int, now: float, goal: Goal, pose: Pose2) -> None:
-        """See to it that there is a plan that can be followed. Raises NavigationFailure when there is none."""
+    def step(self, tick: int, now: float, goal: Goal, pose: Pose2, via: tuple[Goal, ...] = ()) -> None:
+        """See to it that there is a plan that can be followed. Raises NavigationFailure when there is none.
+
+        One plan leads past all poses of `via` (Nav2's ComputePathThroughPoses).
+        """
+        self._via = via
         if self.plan is None:
             self._adopt(tick, now, self._compute(tick, goal, pose), self._reason)
         self._steps += 1
@@ -90,6 +98,8 @@ class PlanKeeper:
     def _must_replan(self, now: float, pose: Pose2, plan: PlanInForce) -> str:
         """Why the plan cannot be followed any more; "" if it can."""
         if self._steered and now - self._adopted >= MISSED_PERIOD and plan.missed(pose):
+            return "missed"
+        if self._via and not self._partial and plan.remaining() < AT_ITS_END:
             return "missed"
         if self._spec.replanning == "rate":
             return "rate" if now - self._looked >= 1.0 / self._spec.replanning_rate else ""
@@ -118,14 +128,25 @@ class PlanKeeper:
         return "better" if gone else ""
 
     def _compute(self, tick: int, goal: Goal, pose: Pose2) -> Path:
+        """One path through all that is to be passed; where it turns from one to the next, it heads for the next."""
+        legs, start = list[Array](), pose
+        for stop in (*self._via, goal):
+            points = self._leg(stop, start)
+            legs.append(points)
+            start = Pose2(*points[-1].tolist())
+            if self._partial:
+                break
+        return Path(np.concatenate([*(leg[:-1] for leg in legs[:-1]), legs[-1]]), tick)
+
+    def _leg(self, goal: Goal, start: Pose2) -> Array:
         self._plans += 1
-        view, aim = self._costmap.view, self._costmap.aim(pose, goal.pose)
+        view, aim = self._costmap.view, self._costmap.aim(start, goal.pose)
         self._partial, self._origin = aim is not goal.pose, view.origin
-        path = self._planned(view, pose, aim, self._plan_seed(self._plans))
+        path = self._planned(view, start, aim, self._plan_seed(self._plans))
         x, y, yaw = path.points[-1].tolist()
         if not self._partial and goal.pose.distance(Pose2(x, y, yaw)) > goal.xy_tolerance:
             raise NavigationFailure(ErrorCode.GOAL_OCCUPIED, "the robot does not fit within the goal's tolerance")
-        return replace(path, tick=tick)
+        return path.points
 
     def _planned(self, view: CostmapView, pose: Pose2, aim: Pose2, seed: int) -> Path:
         for room in CAUTION if self._cautious else ():

@@ -177,8 +177,11 @@ class ReferenceStack:
             self._smoother.reset(STOP)
             self._free_at = tick
             return STOP
-        if self._navigator.goal is not goal:
-            self._navigator.pursue(goal)
+        goal = self._passed(tick, goal)
+        last = (goal, *self._task.ahead)[-1]
+        if self._navigator.goal is not last:
+            self._navigator.pursue(last)
+        self._navigator.via = tuple(each for each in (goal, *self._task.ahead) if each is not last)
         if goal.timeout is not None and tick - self._task.since > goal.timeout * self._tick_rate:
             return self._give_up(tick, NavigationFailure(ErrorCode.NAVIGATE_TIMEOUT, f"{goal.timeout:g} s are over"))
         if self._monitor.silent(tick):
@@ -198,6 +201,18 @@ class ReferenceStack:
             self._smoother.reset(STOP)
             return STOP
         return self._guarded(wanted)
+
+    def _passed(self, tick: int, goal: Goal) -> Goal:
+        """The goal that is next to be passed or reached, once those that the robot is near to are behind it.
+
+        Nav2's RemovePassedGoals: the way on is planned through the poses that remain.
+        """
+        while goal.via and self._localizer.belief.pose.distance(goal.pose) <= goal.xy_tolerance:
+            self._task.passed(tick)
+            following = self._task.next(tick)
+            assert following is not None, "what is passed is on the way to something"
+            goal = following
+        return goal
 
     def _held(self, tick: int) -> bool:
         """Whether the monitor has allowed nothing for HELD; once told, the waiting begins anew."""

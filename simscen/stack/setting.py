@@ -9,6 +9,7 @@ import numpy as np
 from simscen.core.belief import Estimate
 from simscen.core.chance import Streams
 from simscen.core.grid import OccupancyGrid
+from simscen.core.navigation import Mode
 from simscen.core.time import Clock
 from simscen.stack.footprint import Footprint
 from simscen.stack.protocols import Localizer, RobotModel, Surroundings
@@ -29,6 +30,7 @@ class Setting:
     resolution:       metres, the edge of a cell of the costmaps that it is shown
     estimate:         where the robot is said to be when it is switched on; `reset` or `start` says it again
     stop_on_failure:  whether a goal that fails ends the task (for a whole stack)
+    mode:             Nav2's action that takes the goals; what it means stands in the goals, as `via` and `wait`
     clear_costmap:    forgets live obstacles that are not seen any more (for a behaviour)
     heard:            what stands between the localizer and all who ask it; here, nothing (for the reference stack)
     """
@@ -40,6 +42,7 @@ class Setting:
     resolution: float = 0.05
     estimate: Estimate = ANYWHERE
     stop_on_failure: bool = True
+    mode: Mode = "navigate_to_pose"
     clear_costmap: Callable[[], None] = lambda: None
     heard: Callable[[Localizer], Localizer] = lambda localizer: localizer
 

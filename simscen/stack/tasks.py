@@ -1,66 +1,120 @@
-"""The list of goals: what is accepted, reached, failed, canceled, and how the whole task ended."""
+"""The list of goals: what is accepted, reached, passed, failed, canceled, and how the whole task ended."""
 
 from simscen.core.events import Event, EventKind, Value
-from simscen.core.navigation import ErrorCode, Goal, TaskResult
+from simscen.core.navigation import ErrorCode, Goal, Mode, TaskResult
+from simscen.core.time import Clock
 
 
 class Task:
-    """Goals in order, and the events that a client of the action would see."""
+    """Goals in order, and the events that a client of the action would see.
 
-    def __init__(self, stop_on_failure: bool, journal: list[Event]) -> None:
+    Goals that are passed (`via`) and the one after them are one action: they fail, are canceled and preempted together.
+    """
+
+    def __init__(
+        self, stop_on_failure: bool, journal: list[Event], clock: Clock | None = None, mode: Mode = "navigate_to_pose"
+    ) -> None:
+        """`clock` says how many ticks the goals' `wait` takes; default: as many as the default clock's."""
         self._stop_on_failure, self._events = stop_on_failure, journal
+        self._clock, self._mode = clock or Clock(), mode
         self._waiting: list[Goal] = []
         self._accepted = 0
         self._failure: ErrorCode | int | None = None
+        self._stays: int | None = None
         self.goal: Goal | None = None
         self.since = 0
 
     def start(self, goals: tuple[Goal, ...]) -> None:
         """A new task."""
         self._waiting, self.goal, self._failure, self._accepted = list(goals), None, None, 0
+        self._stays = None
 
     def next(self, tick: int) -> Goal | None:
-        """Accept the next goal if none is being driven to; end the task when there is none left."""
-        if self.goal is None and self._waiting:
+        """Accept the next goal if none is being driven to; end the task when there is none left.
+
+        None, too, while the robot waits where it is.
+        """
+        self.rest(tick)
+        if self.goal is None and self._stays is None and self._waiting:
             self.goal, self.since = self._waiting.pop(0), tick
             pose = self.goal.pose
             self._note(tick, EventKind.GOAL_ACCEPTED, x=float(pose.x), y=float(pose.y), yaw=float(pose.yaw))
             self._accepted += 1
         return self.goal
 
+    def rest(self, tick: int) -> bool:
+        """Whether the robot is to stay where it is at this tick; the task ends with its last wait."""
+        if self._stays is None or tick < self._stays:
+            return self._stays is not None
+        self._stays = None
+        if not self._waiting:
+            self._end(tick, TaskResult.SUCCEEDED)
+        return False
+
+    @property
+    def ahead(self) -> tuple[Goal, ...]:
+        """What follows the current goal in the same drive."""
+        if self.goal is None or not self.goal.via:
+            return ()
+        last = next((k for k, goal in enumerate(self._waiting) if not goal.via), len(self._waiting) - 1)
+        return tuple(self._waiting[: last + 1])
+
     def reached(self, tick: int) -> None:
         """The goal is reached."""
+        assert self.goal is not None
         self._note(tick, EventKind.GOAL_REACHED, index=self._accepted - 1)
+        if self.goal.wait > 0:
+            self._stays, self.goal = tick + self._clock.ticks(self.goal.wait), None
+        else:
+            self._close(tick, TaskResult.SUCCEEDED)
+
+    def passed(self, tick: int) -> None:
+        """The goal, which is one to pass, is behind the robot."""
+        self._note(tick, EventKind.GOAL_PASSED, index=self._accepted - 1)
         self._close(tick, TaskResult.SUCCEEDED)
 
     def failed(self, tick: int, code: ErrorCode | int, message: str) -> None:
         """The goal has failed; so has the task when it stops on failures. A number is a code that has no name here."""
         said: dict[str, Value] = {"error_code": int(code), "error_name": _name(code), "message": message}
-        self._note(tick, EventKind.GOAL_FAILED, index=self._accepted - 1, **said)
+        self._drop(tick, EventKind.GOAL_FAILED, **said)
         self._failure = code
         if self._stop_on_failure:
+            if self._mode == "follow_waypoints":
+                self._failure = ErrorCode.STOP_ON_MISSED_WAYPOINT
             self._waiting = []
         self._close(tick, TaskResult.FAILED)
 
     def cancel(self, tick: int) -> None:
         """Drop this goal and all after it."""
-        if self.goal is None:
+        if self.goal is None and self._stays is None:
             return
-        self._note(tick, EventKind.GOAL_CANCELED, index=self._accepted - 1)
-        self._waiting = []
+        if self.goal is not None:
+            self._drop(tick, EventKind.GOAL_CANCELED)
+        self._waiting, self._stays = [], None
         self._close(tick, TaskResult.CANCELED)
 
     def preempt(self, tick: int, goal: Goal) -> None:
-        """Drop this goal for another one; those after it follow."""
+        """Drop this goal for another one; those after it follow. It ends a wait, too."""
         if self.goal is not None:
-            self._note(tick, EventKind.GOAL_CANCELED, index=self._accepted - 1, preempted_by=goal.name)
-        self.goal = None
+            self._drop(tick, EventKind.GOAL_CANCELED, preempted_by=goal.name)
+        self.goal, self._stays = None, None
         self._waiting.insert(0, goal)
+
+    def _drop(self, tick: int, kind: EventKind, **said: Value) -> None:
+        """The same becomes of the goal and of what follows it in the same drive."""
+        ahead = self.ahead
+        self._note(tick, kind, index=self._accepted - 1, **said)
+        for goal in ahead:
+            self._events.append(Event(tick, kind, goal.name, {"index": self._accepted, **said}))
+            self._accepted += 1
+        self._waiting = self._waiting[len(ahead) :]
 
     def _close(self, tick: int, result: TaskResult) -> None:
         self.goal = None
-        if self._waiting:
-            return
+        if not self._waiting:
+            self._end(tick, result)
+
+    def _end(self, tick: int, result: TaskResult) -> None:
         if self._failure is not None:
             result = TaskResult.FAILED
         code = self._failure or ErrorCode.NONE

@@ -42,6 +42,7 @@ class Test(Choice):
         Condition | None, OnDemand("simscen.triggers.localization_lost", "LocalizationLost")
     ] = None
     goal: Annotated[Condition | None, OnDemand("simscen.triggers.goal", "GoalStatus")] = None
+    waypoint: Annotated[Condition | None, OnDemand("simscen.triggers.waypoint", "Waypoint")] = None
     replan: Annotated[Condition | None, OnDemand("simscen.triggers.happened", "Replan")] = None
     recovery: Annotated[Condition | None, OnDemand("simscen.triggers.happened", "RecoveryStatus")] = None
     collision: Annotated[Condition | None, OnDemand("simscen.triggers.happened", "Collided")] = None

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -157,8 +157,23 @@ def shortest_legs(
 ) -> list[Leg]:
     """The shortest way of a disc from each goal's predecessor (the start for the first) to that goal."""
     stops = [start, *(goal.pose for goal in goals)]
-    ways = ways_in(built, stops, radius, z_range)
-    return [ways.leg(a, b, goal.name) for (a, b), goal in zip(pairwise(stops), goals, strict=True)]
+    return legs_between(built, list(zip(stops, goals, strict=False)), radius, z_range)
+
+
+def legs_between(
+    built: BuiltWorld, ends: Sequence[tuple[Pose2, Goal]], radius: float, z_range: tuple[float, float] = Z_RANGE
+) -> list[Leg]:
+    """The shortest way of a disc from each pose to its goal; the same way is looked for once."""
+    stops = [pose for start, goal in ends for pose in (start, goal.pose)]
+    ways = ways_in(built, stops, radius, z_range) if stops else None
+    found: dict[tuple[Pose2, Pose2], Leg] = {}
+    legs = []
+    for start, goal in ends:
+        assert ways is not None
+        leg = found.get((start, goal.pose))
+        found[start, goal.pose] = leg = leg or ways.leg(start, goal.pose, goal.name)
+        legs.append(replace(leg, passages=tuple(replace(each, goal=goal.name) for each in leg.passages)))
+    return legs
 
 
 def _around(built: BuiltWorld, stops: Sequence[Pose2]) -> tuple[float, float, float, float]:

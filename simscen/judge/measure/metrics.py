@@ -97,7 +97,7 @@ def _success(trace: Trace, case: Case) -> bool:
 
 
 def _time_to_goal(trace: Trace, case: Case) -> float | str:
-    ends = [story.reached for story in stories(trace, case) if not story.preempted]
+    ends = [story.reached for story in stories(trace, case) if story.awaited]
     starts = trace.of_kind(EventKind.GOAL_ACCEPTED)
     if not starts or not ends or ends[-1] is None:
         return "the last goal was not reached"

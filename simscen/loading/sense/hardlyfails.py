@@ -12,7 +12,6 @@ from pydantic import BaseModel
 
 from simscen.core.problems import Problem
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.names import own_goal_names
 from simscen.loading.sense.neverhappens import top_speed
 from simscen.loading.sense.specwalk import quantities
 from simscen.loading.tree import Fields, Key, Leaf, Node, at
@@ -106,7 +105,7 @@ def _only_warnings(loaded: LoadedScenario) -> Iterator[Problem]:
 
 def _late_timeouts(loaded: LoadedScenario) -> Iterator[Problem]:
     limit = loaded.spec.time_limit
-    for index, (goal, name) in enumerate(zip(loaded.spec.goals, own_goal_names(loaded), strict=True)):
+    for index, (goal, name) in enumerate(zip(loaded.spec.goals, loaded.spec.goal_names, strict=True)):
         if goal.timeout is not None and goal.timeout > limit:
             message = f"goal `{name}` never times out: the time limit ends the run after {limit:g} s"
             yield loaded.problem(("goals", index, "timeout"), "SC052", message)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
+from simscen.core.navigation import named
 from simscen.core.problems import Problem
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.names import own_goal_names
@@ -12,13 +13,14 @@ from simscen.loading.tree import Key
 from simscen.model.disturbance import Step
 from simscen.model.robot import Holonomic, RobotSpec
 from simscen.model.stack import StackSpec
+from simscen.triggers.goal import GoalStatus
 from simscen.triggers.trigger import Test, Trigger
 
 Keys = tuple[Key, ...]
 Why = tuple[Keys, str]
 """Where what keeps a trigger from firing stands, and in words that follow "never happens: "."""
 
-LATCHED = frozenset({"time", "travelled", "goal", "replan", "recovery", "collision", "pedestrian", "event"})
+LATCHED = frozenset({"time", "travelled", "goal", "waypoint", "replan", "recovery", "collision", "pedestrian", "event"})
 """Conditions that stay true once they are."""
 FASTER = 1.1
 """Times its top speed that a robot is at most, by overshoot."""
@@ -141,7 +143,7 @@ class _Run:
 
     def sent(self, goal: str | None) -> int:
         """How many goals of a name (or at all) the robot can be sent."""
-        own = [name for name in own_goal_names(self.loaded) if goal in (None, name)]
+        own = [name for name in own_goal_names(self.loaded) if named(name, goal)]
         more = sum(
             1 if step.when is None else step.when.times
             for step in self.steps
@@ -192,10 +194,15 @@ class _Run:
             return f"the robot is sent {sent or 'no'} goal{'' if sent == 1 else 's'}{whose}"
         if goal.status == "canceled" and not self.does("cancel_goal", "new_goal"):
             return "no event cancels a goal or sends another"
+        if goal.status == "passed" and self.loaded.spec.navigation.mode != "navigate_through_poses":
+            return "goals are passed in the mode navigate_through_poses alone"
         stops = self.loaded.spec.on_goal_failure == "stop" and not self.does("new_goal")
         if goal.status == "failed" and goal.count > 1 and stops:
             return "the run ends after the first goal that fails (`on_goal_failure: stop`)"
         return None
+
+    def _waypoint(self, waypoint: Any) -> str | None:
+        return self._goal(GoalStatus(status="reached", name=waypoint.name, count=waypoint.count))
 
     def _replan(self, _: Any) -> str | None:
         return None if self.sent(None) else "the robot has no goal to plan for"
@@ -238,6 +245,7 @@ _CHECKS = {
     "localization_error": _Run._localization_error,
     "localization_lost": _Run._localization_lost,
     "goal": _Run._goal,
+    "waypoint": _Run._waypoint,
     "replan": _Run._replan,
     "recovery": _Run._recovery,
     "pedestrian": _Run._pedestrian,

@@ -8,6 +8,7 @@ from simscen.loading.loaded import LoadedScenario
 from simscen.loading.names import goal_names
 from simscen.loading.sense.neverhappens import no_recovery
 from simscen.loading.tree import Key
+from simscen.model.navigation import failure_of
 
 Keys = tuple[Key, ...]
 ABOUT_GOALS = frozenset({"goals_reached", "time_to_goal", "no_false_success", "stuck", "result", "error_code"})
@@ -25,6 +26,7 @@ def never_holds(loaded: LoadedScenario) -> Iterator[Problem]:
         if why:
             yield loaded.problem_at(loaded.key_place_of(*keys), "SC051", f"{entry.kind} can never hold: {why}")
     yield from _contradictions(loaded)
+    yield from _never_sent(loaded)
 
 
 def _without_goals(loaded: LoadedScenario, kind: str, criterion: Any) -> str | None:
@@ -50,13 +52,30 @@ def _recoveries(loaded: LoadedScenario, recoveries: Any) -> str | None:
 _CHECKS = {"result": _result, "recoveries": _recoveries}
 
 
+def _never_sent(loaded: LoadedScenario) -> Iterator[Problem]:
+    """Goals after one at which the robot is to fail, where a failure is the end."""
+    spec = loaded.spec
+    again = spec.navigation.loops > 1
+    if spec.on_goal_failure == "continue" or any(
+        action.may("new_goal") for step in spec.steps for action in step.actions
+    ):
+        return
+    for index, goal in enumerate(spec.goals):
+        if failure_of(goal.expect) and (again or index + 1 < len(spec.goals)):
+            following = spec.goal_names[(index + 1) % len(spec.goals)]
+            message = f"goal `{following}` is never sent: the robot is to fail at the one before it, and stops there"
+            yield loaded.problem(("goals", index, "expect"), "SC051", message, "say `on_goal_failure: continue`")
+            return
+
+
 def _contradictions(loaded: LoadedScenario) -> Iterator[Problem]:
     """Results that exclude each other."""
+    failing = any(failure_of(goal.expect) for goal in loaded.spec.goals)
     wanted: dict[str, tuple[str, Keys]] = {}
     for index, entry in enumerate(loaded.spec.pass_):
         if entry.severity != "fail":
             continue
-        every_goal = entry.kind == "goals_reached" and getattr(entry.chosen, "goals", None) is None
+        every_goal = entry.kind == "goals_reached" and getattr(entry.chosen, "goals", None) is None and not failing
         status = "SUCCEEDED" if every_goal else str(getattr(entry.chosen, "status", "")) if entry.result else ""
         if not status:
             continue

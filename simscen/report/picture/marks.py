@@ -6,6 +6,7 @@ import numpy as np
 
 from simscen.core.events import EventKind
 from simscen.core.geometry import Array, Pose2
+from simscen.core.navigation import named
 from simscen.core.samples import Samples
 from simscen.core.verdict import Status
 from simscen.judge.wording import comparison, subject
@@ -91,7 +92,9 @@ def draw_goals(canvas: Canvas, scene: Scene) -> None:
     """Each goal: its tolerance as a ring, its heading, its name."""
     names: dict[tuple[float, float], list[str]] = {}
     for goal in scene.case.every_goal:
-        names.setdefault((goal.pose.x, goal.pose.y), []).append(goal.name)
+        there = names.setdefault((goal.pose.x, goal.pose.y), [])
+        if not any(named(goal.name, other) for other in there):  # the second loop comes to the same place
+            there.append(goal.name)
     for goal in scene.case.every_goal:
         x, y, yaw = goal.pose
         reach = max(goal.xy_tolerance * canvas.scale, 5.0)

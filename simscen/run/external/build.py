@@ -32,5 +32,6 @@ def build_external(
         rates={name: float(getattr(sensor.chosen, "rate", 0.0)) for name, sensor in prepared.robot.sensors.items()},
         robot_description=describe(prepared.body),
         stop_on_failure=prepared.spec.on_goal_failure == "stop",
+        mode=prepared.spec.navigation.mode,
     )
     return ExternalStack(spec.external, command, surroundings, ordered, printed)

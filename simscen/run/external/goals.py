@@ -7,7 +7,8 @@ the whole task ended is not its to say. So a log cannot contradict itself, whate
 from typing import Any
 
 from simscen.core.events import Event, EventKind, Value
-from simscen.core.navigation import ErrorCode, Goal
+from simscen.core.navigation import ErrorCode, Goal, Mode, error_code
+from simscen.core.time import Clock
 from simscen.run.external.errors import NotAllowed
 from simscen.stack.tasks import Task
 
@@ -20,9 +21,9 @@ _FREE = {kind.value for kind in EventKind if kind.value.split(".")[0] in ("plan"
 class ToldGoals:
     """The goals of a run, and how they stand by what the stack says."""
 
-    def __init__(self, stop_on_failure: bool, tick_rate: int) -> None:
+    def __init__(self, stop_on_failure: bool, tick_rate: int, mode: Mode = "navigate_to_pose") -> None:
         self._journal: list[Event] = []
-        self._task = Task(stop_on_failure, self._journal)
+        self._task = Task(stop_on_failure, self._journal, Clock(tick_rate), mode)
         self._rate = tick_rate
         self._dropped: set[str] = set()
 
@@ -53,6 +54,11 @@ class ToldGoals:
             case "goal.reached":
                 self._current(kind, name)
                 self._task.reached(tick)
+            case "goal.passed":
+                self._current(kind, name)
+                if self._task.goal is not None and not self._task.goal.via:
+                    raise NotAllowed(f"goal.passed `{name[:60]}`, which is a goal to stop at")
+                self._task.passed(tick)
             case "goal.failed":
                 self._current(kind, name)
                 self._task.failed(tick, _code(data.get("error_code")), str(data.get("message", ""))[:LONGEST_TEXT])
@@ -62,6 +68,10 @@ class ToldGoals:
                 self._journal.append(Event(tick, EventKind(kind), name[:LONGEST_TEXT], _plain(data)))
             case _:
                 raise NotAllowed(f"an event `{kind[:60]}`, which is not a stack's to tell")
+
+    def rest(self, tick: int) -> None:
+        """Time has come to this tick: a wait may be over, and with it the task."""
+        self._task.rest(tick)
 
     def overdue(self, tick: int) -> bool:
         """Whether the time of the current goal is over, and the stack does not say so itself: then it fails now."""
@@ -85,6 +95,8 @@ class ToldGoals:
     def _accept(self, tick: int, name: str) -> None:
         if self._task.goal is not None:
             raise NotAllowed(f"goal.accepted, but goal `{self._task.goal.name}` is under way")
+        if self._task.rest(tick):
+            raise NotAllowed(f"goal.accepted `{name[:60]}`, but the robot is to stay where it is for a while")
         following = self._task.following
         if following is None or name not in ("", following.name):
             waits = "none is waiting" if following is None else f"the next one is `{following.name}`"
@@ -113,7 +125,7 @@ def _code(told: Any) -> ErrorCode | int:
     if isinstance(told, str) and told in ErrorCode.__members__:
         return ErrorCode[told]
     if isinstance(told, int) and not isinstance(told, bool) and 0 <= told <= LARGEST_CODE:
-        return ErrorCode(told) if told in {int(code) for code in ErrorCode} else told
+        return error_code(told)
     raise NotAllowed(f"goal.failed with the error code {str(told)[:60]!r}")
 
 

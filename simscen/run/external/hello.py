@@ -6,7 +6,7 @@ from typing import Any
 from simscen.core.belief import Estimate
 from simscen.core.geometry import Pose3
 from simscen.core.grid import OccupancyGrid
-from simscen.core.navigation import Goal
+from simscen.core.navigation import Goal, Mode
 from simscen.core.version import __version__
 from simscen.peer import wire
 from simscen.record.topics import Topic
@@ -25,6 +25,7 @@ class Ordered:
     rates: dict[str, float]
     robot_description: str
     stop_on_failure: bool
+    mode: Mode = "navigate_to_pose"
 
 
 def hello(
@@ -40,6 +41,7 @@ def hello(
         "tick_rate": surroundings.tick_rate,
         "control_period": ordered.control_period,
         "answer_limit": answer_limit,
+        "mode": ordered.mode,
         "robot": _robot(surroundings.robot),
         "map": _grid(surroundings.map),
         "keepout": [_polygon(area) for area in surroundings.keepout],
@@ -61,13 +63,14 @@ def hello(
     }
 
 
-def task(estimate: Estimate, goals: tuple[Goal, ...], stop_on_failure: bool) -> dict[str, Any]:
+def task(estimate: Estimate, goals: tuple[Goal, ...], ordered: Ordered) -> dict[str, Any]:
     """The object of GOAL."""
     pose = estimate.pose
     return {
         "initial_estimate": {"pose": None if pose is None else list(pose), "std": list(estimate.std)},
         "goals": [goal_data(goal) for goal in goals],
-        "on_goal_failure": "stop" if stop_on_failure else "continue",
+        "on_goal_failure": "stop" if ordered.stop_on_failure else "continue",
+        "mode": ordered.mode,
     }
 
 
@@ -75,7 +78,8 @@ def goal_data(goal: Goal) -> dict[str, Any]:
     """A goal as GOAL and PREEMPT say it."""
     x, y, yaw = map(float, goal.pose)
     tolerances = {"xy_tolerance": goal.xy_tolerance, "yaw_tolerance": goal.yaw_tolerance}
-    return {"name": goal.name, "x": x, "y": y, "yaw": yaw, **tolerances, "timeout": goal.timeout}
+    drive = {"timeout": goal.timeout, "via": goal.via, "wait": goal.wait}
+    return {"name": goal.name, "x": x, "y": y, "yaw": yaw, **tolerances, **drive}
 
 
 def _robot(robot: RobotModel) -> dict[str, Any]:

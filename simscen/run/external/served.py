@@ -11,18 +11,19 @@ import json
 import sys
 from array import array
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
 from simscen.core.belief import Estimate
 from simscen.core.chance import Streams
-from simscen.core.events import EventKind
+from simscen.core.events import EventKind, Value
 from simscen.core.filtermasks import FilterMasks, SpeedLimits
 from simscen.core.geometry import Array, Pose2
 from simscen.core.grid import OccupancyGrid
 from simscen.core.motion import Twist
 from simscen.core.navigation import Goal as CoreGoal
+from simscen.core.navigation import Mode
 from simscen.core.sensing import Bump, Image, Imu, Odometry, Reading, Scan
 from simscen.core.time import Clock
 from simscen.core.trace import Decision
@@ -47,7 +48,8 @@ class ServedReference(Peer):
         self._first: dict[str, Any] = {}
         self._orders: list[tuple[int, dict[str, Any]]] = []
         self._followed = False
-        super().__init__("simscen's reference stack", every_beat=True, topics=None)
+        self._under_way: Value = 0
+        super().__init__("simscen's reference stack", every_beat=True, topics=None, modes=get_args(Mode))
         self._time = SimTime(self.hello["tick_rate"])
         self._sensors = {topic["topic"]: topic.get("sensor", "") for topic in self.hello["says"]}
 
@@ -92,6 +94,7 @@ class ServedReference(Peer):
             Streams(hello["seed"]),
             Clock(hello["tick_rate"]),
             stop_on_failure=told["on_goal_failure"] == "stop",
+            mode=told["mode"],
         )
         pose, std = estimate["pose"], estimate["std"]
         self._stack.start(
@@ -149,6 +152,10 @@ class ServedReference(Peer):
         if decision.local_plan is not None:
             step.publish(topics.LOCAL_PLAN.name + EXACT, _numbers(decision.local_plan.points))
         for event in decision.events:
+            if event.kind is EventKind.GOAL_ACCEPTED:
+                self._under_way = event.data["index"]
+            if event.data.get("index", self._under_way) != self._under_way:
+                continue  # what ends with the goal that it follows in the same drive, nobody needs to be told
             if event.kind is not EventKind.NAVIGATION_ENDED:
                 said = {"kind": event.kind.value, "name": event.name, "data": dict(event.data)}
                 step.publish(EVENTS, messages.string(json.dumps(said)))
@@ -156,7 +163,7 @@ class ServedReference(Peer):
 
 def _goal(goal: Goal) -> CoreGoal:
     pose = Pose2(goal.x, goal.y, goal.yaw)
-    return CoreGoal(goal.name, pose, goal.xy_tolerance, goal.yaw_tolerance, goal.timeout)
+    return CoreGoal(goal.name, pose, goal.xy_tolerance, goal.yaw_tolerance, goal.timeout, goal.via, goal.wait)
 
 
 def _grid(facts: dict[str, Any] | None, grid: messages.OccupancyGrid | None) -> OccupancyGrid | None:

@@ -50,7 +50,7 @@ class ExternalStack:
         self._name, self._command, self._printed = name, command, printed
         self._surroundings, self._ordered = surroundings, ordered
         self._time = SimTime(surroundings.tick_rate)
-        self._goals = ToldGoals(ordered.stop_on_failure, surroundings.tick_rate)
+        self._goals = ToldGoals(ordered.stop_on_failure, surroundings.tick_rate, ordered.mode)
         self._feed = Feed(surroundings.tick_rate, ordered.sensors, ordered.mounts)
         self._process: StackProcess | None = None
         self._welcome = Welcome()
@@ -76,9 +76,11 @@ class ExternalStack:
         try:
             frame, limit = wire.json_frame(wire.HELLO, told), self._command.start_limit
             kind, body = self._process.exchange(frame, limit, "answer to HELLO")
-            self._welcome = self._allowed("the answer to HELLO", lambda: Welcome.of(kind, body, offer))
+            self._welcome = self._allowed(
+                "the answer to HELLO", lambda: Welcome.of(kind, body, offer, self._ordered.mode)
+            )
             feed.want(offer, self._welcome.topics)
-            self._process.send(wire.json_frame(wire.GOAL, task(estimate, goals, self._ordered.stop_on_failure)))
+            self._process.send(wire.json_frame(wire.GOAL, task(estimate, goals, self._ordered)))
         except RunError:
             self.close()
             raise
@@ -169,6 +171,7 @@ class ExternalStack:
         return answer
 
     def _decided(self, tick: int, answer: Answer, due: bool) -> Decision:
+        self._goals.rest(tick)
         if due and self._goals.overdue(tick):
             self._send(wire.CANCEL, {"tick": tick, "all": self._ordered.stop_on_failure, "reason": "timeout"})
         events = self._goals.take()

@@ -4,6 +4,7 @@ import json
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from simscen.core.navigation import Mode
 from simscen.peer import wire
 from simscen.run.external.errors import NotAllowed
 from simscen.run.external.topics import Offer
@@ -23,8 +24,8 @@ class Welcome:
     about: dict[str, Any] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, kind: int, body: bytes, offer: Offer) -> "Welcome":
-        """From its first frame. Raises NotAllowed or Malformed."""
+    def of(cls, kind: int, body: bytes, offer: Offer, mode: Mode = "navigate_to_pose") -> "Welcome":
+        """From its first frame. Raises Malformed, or NotAllowed, as of a stack that does not know the `mode`."""
         if kind != wire.WELCOME:
             raise NotAllowed("its first frame is no WELCOME")
         told = wire.from_json(body)
@@ -33,6 +34,10 @@ class Welcome:
         step = told.get("step", "control")
         if step not in ("control", "beat"):
             raise NotAllowed(f"`step` is {step!r}, neither `control` nor `beat`")
+        modes = told.get("modes", ["navigate_to_pose"])
+        if not isinstance(modes, list) or mode not in modes:
+            known = ", ".join(map(str, modes))[:200] if isinstance(modes, list) else "none"
+            raise NotAllowed(f"the scenario sends goals by {mode}, which this stack does not know; it knows {known}")
         topics = told.get("topics", [])
         if not isinstance(topics, list) or not all(isinstance(topic, str) for topic in topics):
             raise NotAllowed("`topics` is no list of names")

@@ -85,7 +85,8 @@ class Scene:
     def targets(self) -> list[tuple[Keys, Goal]]:
         """The goals that are to be reached, also those that events send, each with where its pose stands."""
         spec = self.loaded.spec
-        own: dict[Keys, Goal] = {("goals", k): goal for k, goal in enumerate(goals_of(spec))}
+        first = goals_of(spec)[: len(spec.goals)]  # further loops lead to the same places
+        own: dict[Keys, Goal] = {("goals", k): goal for k, goal in enumerate(first)}
         every = {**own, **sent_goals(spec, self.loaded.concerns)}
         return [((*keys, "pose"), goal) for keys, goal in every.items() if not expects_failure(spec, goal.name)]
 

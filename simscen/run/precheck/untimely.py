@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 from simscen.core.navigation import Goal
+from simscen.core.navigation import named as is_named
 from simscen.core.problems import Problem
 from simscen.criteria.criterion import AnyCriterion
 from simscen.loading.sense.neverhappens import top_speed
@@ -44,16 +45,19 @@ def _broken(scene: Scene, goals: tuple[Goal, ...], robot: RobotSpec, whole: list
     legs = [max(0.0, SHORTER * leg - a - b) for leg, (a, b) in zip(whole, pairwise(slack), strict=True)]
     speed = FASTER * top_speed(robot)
     told = f"at the robot's top speed of {top_speed(robot):g} m/s"
-    for index, goal in enumerate(goals):
+    for index, goal in enumerate(goals[: len(spec.goals)]):
         first_or_alone = index == 0 or spec.on_goal_failure == "stop"
         if goal.timeout is not None and legs[index] / speed > goal.timeout and first_or_alone:
             what = f"goal `{goal.name}` cannot be reached within {goal.timeout:g} s"
             why = f"the way of {whole[index]:.2f} m takes {whole[index] / top_speed(robot):.1f} s {told}"
             yield loaded.problem(("goals", index, "timeout"), "SC303", f"{what}: {why}")
     drive = f"the way of {sum(whole):.2f} m through all goals takes {sum(whole) / top_speed(robot):.1f} s {told}"
-    if sum(legs) / speed > spec.time_limit and any(map(_asks_for_success, spec.pass_)):
+    waits = sum(goal.wait for goal in goals)
+    if sum(legs) / speed + waits > spec.time_limit and any(map(_asks_for_success, spec.pass_)):
         keys = ("time_limit",) if "time_limit" in spec.model_fields_set else ("goals",)
-        yield loaded.problem(keys, "SC303", f"the goals cannot be reached within {spec.time_limit:g} s: {drive}")
+        waiting = f", and {waits:g} s are waited at them" if waits else ""
+        message = f"the goals cannot be reached within {spec.time_limit:g} s: {drive}{waiting}"
+        yield loaded.problem(keys, "SC303", message)
     for index, entry in enumerate(spec.pass_):
         yield from (
             loaded.problem(("pass", index, entry.kind, key), "SC303", f"{entry.kind} can never hold: {why}")
@@ -69,7 +73,9 @@ def _never_holds(
     bound = getattr(criterion, "max", None)
     if entry.kind == "time_to_goal" and isinstance(bound, float):
         named = getattr(criterion, "goal", None)
-        least = sum(legs) if named is None else min((leg for leg, n in zip(legs, names, strict=True) if n == named))
+        least = (
+            sum(legs) if named is None else min((leg for leg, n in zip(legs, names, strict=True) if is_named(n, named)))
+        )
         if least / speed > bound:
             yield "max", drive if named is None else f"the way to `{named}` alone takes {least / speed:.1f} s at least"
     if entry.kind == "path_length":
@@ -81,7 +87,11 @@ def _never_holds(
     within = getattr(criterion, "within", None)
     if entry.kind == "goals_reached" and within is not None:
         chosen = getattr(criterion, "goals", None) or names
-        far = [k for k, name in enumerate(names) if name in chosen and legs[k] / speed > within]
+        far = [
+            k
+            for k, name in enumerate(names)
+            if any(is_named(name, each) for each in chosen) and legs[k] / speed > within
+        ]
         if far:
             yield "within", f"the way of {whole[far[0]]:.2f} m to `{names[far[0]]}` takes {legs[far[0]] / speed:.1f} s"
 

@@ -47,7 +47,7 @@ class VfhPlusStack:
         self._top = min(spec.top_speed or DEFAULT_SPEED, setting.robot.max_linear)
         self._forbidden = np.concatenate([np.empty((0, 2)), *map(inside, self._surroundings.keepout)])
         self._journal: list[Event] = []
-        self._task = Task(setting.stop_on_failure, self._journal)
+        self._task = Task(setting.stop_on_failure, self._journal, clock, setting.mode)
         self._memory = Memory(clock.ticks(spec.memory), 2.0 * spec.active_radius)
         self._restart(Estimate(None))
 

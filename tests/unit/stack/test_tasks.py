@@ -1,0 +1,145 @@
+"""The list of goals as a client of Nav2's actions sees it: passed, waited at, preempted and failed together."""
+
+import pytest
+
+from simscen.core.events import Event
+from simscen.core.geometry import Pose2
+from simscen.core.navigation import ErrorCode, Goal, error_code, in_loop, named
+from simscen.core.time import Clock
+from simscen.stack.tasks import Task
+
+A, B = Goal("a", Pose2(0, 0), via=True), Goal("b", Pose2(1, 0), via=True)
+C, D = Goal("c", Pose2(2, 0)), Goal("d", Pose2(3, 0))
+
+
+def task(*goals: Goal, stop: bool = True, mode="navigate_to_pose") -> tuple[Task, list[Event]]:
+    journal: list[Event] = []
+    begun = Task(stop, journal, Clock(100), mode)
+    begun.start(goals)
+    return begun, journal
+
+
+def told(journal: list[Event]) -> list[tuple[int, str, str]]:
+    return [(event.tick, event.kind.value, event.name) for event in journal]
+
+
+def test_poses_are_passed_on_the_way_to_one_that_is_reached():
+    drive, journal = task(A, B, C)
+    assert drive.next(1) is A
+    assert drive.ahead == (B, C)
+    drive.passed(2)
+    assert drive.next(2) is B
+    drive.passed(3)
+    assert drive.next(3) is C
+    assert drive.ahead == ()
+    drive.reached(9)
+    assert told(journal)[-3:] == [
+        (3, "goal.accepted", "c"),
+        (9, "goal.reached", "c"),
+        (9, "navigation.ended", "SUCCEEDED"),
+    ]
+    assert [event.data["index"] for event in journal[:-1]] == [0, 0, 1, 1, 2, 2]
+
+
+def test_a_drive_fails_as_a_whole_and_the_next_one_follows():
+    drive, journal = task(A, B, C, D, stop=False)
+    drive.next(1)
+    drive.passed(2)
+    drive.next(2)
+    drive.failed(5, ErrorCode.NO_VALID_PATH, "no way")
+    assert drive.next(6) is D
+    drive.reached(7)
+    assert told(journal)[3:] == [
+        (5, "goal.failed", "b"),
+        (5, "goal.failed", "c"),
+        (6, "goal.accepted", "d"),
+        (7, "goal.reached", "d"),
+        (7, "navigation.ended", "FAILED"),
+    ]
+    assert [event.data["index"] for event in journal[3:7]] == [1, 2, 3, 3]
+
+
+@pytest.mark.parametrize("how", ["preempt", "cancel"])
+def test_what_ends_a_drive_ends_all_of_it(how):
+    drive, journal = task(A, B, C, D)
+    drive.next(1)
+    drive.preempt(2, Goal("x", Pose2(5, 5))) if how == "preempt" else drive.cancel(2)
+    assert [(kind, name) for _, kind, name in told(journal)[1:4]] == [("goal.canceled", each) for each in "abc"]
+    if how == "preempt":
+        assert {event.data["preempted_by"] for event in journal[1:4]} == {"x"}
+        goal = drive.next(3)
+        assert goal is not None
+        assert goal.name == "x"
+        drive.reached(4)
+        assert drive.next(5) is D
+    else:
+        assert told(journal)[-1] == (2, "navigation.ended", "CANCELED")
+
+
+def test_the_robot_stays_as_long_as_the_goal_says_before_the_next_one_or_the_end():
+    waits = Goal("a", Pose2(0, 0), wait=0.5), Goal("b", Pose2(1, 0), wait=0.2)
+    tour, journal = task(*waits)
+    tour.next(1)
+    tour.reached(10)
+    assert tour.next(59) is None
+    assert tour.goal is None
+    assert tour.next(60) is waits[1]
+    tour.reached(70)
+    assert tour.next(89) is None
+    assert told(journal)[-1] == (70, "goal.reached", "b")
+    assert tour.next(90) is None
+    assert told(journal)[-1] == (90, "navigation.ended", "SUCCEEDED")
+    assert tour.next(91) is None
+    assert len(journal) == 5
+
+
+def test_a_wait_ends_when_the_task_is_canceled_or_another_goal_comes():
+    stays = Goal("a", Pose2(0, 0), wait=5.0)
+    canceled, journal = task(stays, D)
+    canceled.next(1)
+    canceled.reached(2)
+    canceled.cancel(3)
+    assert told(journal)[-1] == (3, "navigation.ended", "CANCELED")
+    assert canceled.next(1000) is None
+    preempted, journal = task(stays, D)
+    preempted.next(1)
+    preempted.reached(2)
+    preempted.preempt(3, C)
+    assert preempted.next(3) is C
+    preempted.reached(4)
+    assert preempted.next(4) is D
+
+
+@pytest.mark.parametrize(
+    ("mode", "stop", "code"),
+    [
+        ("follow_waypoints", True, ErrorCode.STOP_ON_MISSED_WAYPOINT),
+        ("follow_waypoints", False, ErrorCode.NO_VALID_PATH),
+        ("navigate_to_pose", True, ErrorCode.NO_VALID_PATH),
+    ],
+)
+def test_a_follower_that_stops_says_that_a_waypoint_was_missed(mode, stop, code):
+    tour, journal = task(C, stop=stop, mode=mode)
+    tour.next(1)
+    tour.failed(2, ErrorCode.NO_VALID_PATH, "no way")
+    assert journal[-2].data["error_name"] == "NO_VALID_PATH"  # of the goal itself
+    assert journal[-1].data == {"error_code": int(code), "error_name": code.name}
+
+
+def test_a_goal_has_its_name_in_every_loop():
+    assert [in_loop("shelf", loop) for loop in (1, 2, 12)] == ["shelf", "shelf#2", "shelf#12"]
+    assert named("shelf#2", "shelf")
+    assert named("shelf#2", "shelf#2")
+    assert named("shelf", None)
+    assert not named("shelf", "shelf#2")
+    assert not named("shelf#2", "shelf#3")
+    assert not named("shelf#b", "shelf")
+    assert not named("bookshelf#2", "shelf")
+
+
+def test_codes_of_several_poses_have_the_names_of_those_of_one():
+    assert error_code(306) is ErrorCode.GOAL_OCCUPIED  # nav2_msgs/action/ComputePathThroughPoses
+    assert error_code(9103) is ErrorCode.NAVIGATE_TIMEOUT  # nav2_msgs/action/NavigateThroughPoses
+    assert error_code(309) is ErrorCode.NO_VIAPOINTS_GIVEN
+    assert error_code(603) is ErrorCode.STOP_ON_MISSED_WAYPOINT
+    assert error_code(4711) == 4711
