@@ -65,6 +65,7 @@ CODES = {
     "SC403": "A `*.robot.yaml` gives its xacro file an argument that no `<xacro:arg>` declares.",
     "SC404": "A dimension of a robot's drive is not what its URDF draws: it drives otherwise than it reckons.",
     "SC405": "A URDF draws wheels or casters off the ground that the others stand on.",
+    "SC406": "A robot carries so much, so far off its wheels, that it falls over where it stands.",
     "SC800": "The log cannot be read.",
     "SC801": "The file is not a log of simscen.",
     "SC802": "The log is damaged.",

@@ -19,11 +19,14 @@ from simscen.spec.places import Name, PlaceName, PoseSpec, RobotName
 from simscen.spec.quantities import (
     Duration,
     Frequency,
+    Length,
     NonNegativeAngle,
     NonNegativeLength,
     PositiveAngle,
     PositiveDuration,
     PositiveLength,
+    PositiveMass,
+    Quantity,
     WholeQuantity,
 )
 from simscen.spec.references import Refers
@@ -79,6 +82,15 @@ else:
     EstimateOrUnknown = Annotated[InitialEstimate, EstimateOrPlace(besides=get_args(Unknown))]
 
 
+class Payload(Spec):
+    """Something on the robot that neither its stack nor its datasheet knows of: mass and where that is."""
+
+    mass: PositiveMass
+    """In kg."""
+    at: Annotated[list[Length], Field(min_length=3, max_length=3)] | None = None
+    """[x, y, z] of its centre of mass in the base frame; default: on top of the hull, above the base's origin."""
+
+
 class RobotEntry(Spec):
     """The robot, where it truly starts, and where it thinks it starts."""
 
@@ -89,6 +101,10 @@ class RobotEntry(Spec):
     initial_estimate: EstimateOrUnknown | None = None
     """A pose, or a place of the world; default: the true pose, with Nav2's default covariance; `unknown`: anywhere on
     the map."""
+    payload: Payload | None = None
+    """What it carries: motors are those of the empty robot."""
+    motor_torque: Annotated[float, Field(gt=0, le=1), Quantity("ratio")] = 1.0
+    """Share of their torque that its motors still have: worn, hot, or run from a weak battery."""
 
 
 class GoalEntry(Spec):

@@ -65,11 +65,32 @@ def read_mesh(path: Path) -> Mesh:
 
 
 def load_robot(loaded: LoadedScenario) -> tuple[RobotSpec, RobotBody]:
-    """The robot as specified (a bare URDF as far as it makes plain), and made ready for physics."""
+    """The robot as specified (a bare URDF as far as it makes plain), and made ready for physics, with what it carries.
+
+    Raises InvalidInput also for a load under which it would fall over where it stands.
+    """
     try:
-        return robot_of(loaded.robot, (loaded.root, *loaded.world_path))
+        spec, body = robot_of(loaded.robot, (loaded.root, *loaded.world_path))
+        return spec, _as_entered(loaded, body)
     except InvalidInput as error:
         raise InvalidInput([p if p.source else loaded.sourced(p) for p in error.problems]) from error
+
+
+def _as_entered(loaded: LoadedScenario, body: RobotBody) -> RobotBody:
+    entry = loaded.spec.robot
+    if entry.payload is None and entry.motor_torque == 1.0:
+        return body
+    from simscen.sim.laden import centre, laden, stands, top, weakened
+
+    body = weakened(body, entry.motor_torque)
+    if entry.payload is not None:
+        x, y, z = entry.payload.at or (0.0, 0.0, top(body))
+        body = laden(body, entry.payload.mass, (x, y, z))
+        if not stands(body):
+            x, y, _ = centre(body)
+            what = f"the robot falls over: with its payload its centre of mass is at ({x:.2f}, {y:.2f}), off its wheels"
+            raise InvalidInput([loaded.problem(("robot", "payload"), "SC406", what, "put it nearer to the middle")])
+    return body
 
 
 def robot_of(robot: LoadedRobot, roots: tuple[Path, ...]) -> tuple[RobotSpec, RobotBody]:

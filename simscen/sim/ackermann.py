@@ -10,7 +10,7 @@ from simscen.sim.inertia import GRAVITY
 from simscen.sim.ramp import Ramp
 from simscen.sim.robot_body import RobotBody
 from simscen.sim.vehicle import Vehicle
-from simscen.sim.wheels import driven, hold, mean_angle
+from simscen.sim.wheels import driven, hold, mean_angle, rolls
 
 STEERING_RATE = 3.2
 """rad/s: what the servo of an F1TENTH car does (f1tenth_gym, sv_max; O'Kelly et al. 2020)."""
@@ -40,6 +40,7 @@ class AckermannDrive:
         pybullet.setJointMotorControlArray(
             self._robot, rolling, pybullet.VELOCITY_CONTROL, forces=[0.0] * len(rolling), physicsClientId=client
         )
+        self._still_rolls = False
         self._steer()
         self._turn()
 
@@ -55,7 +56,7 @@ class AckermannDrive:
             self._steer()
             self._ramp.advance()
             self._turn()
-        elif self._ramp.advance():
+        elif self._ramp.advance() or self._still_rolls:
             self._turn()
 
     def _wanted(self) -> float:
@@ -89,7 +90,8 @@ class AckermannDrive:
 
     def _turn(self) -> None:
         speed, joints = self._ramp.velocity.vx, self._left + self._right
-        if speed == 0:
+        self._still_rolls = speed == 0 and rolls(self._client, self._robot, joints, self._drive.wheel_radius)
+        if speed == 0 and not self._still_rolls:
             hold(self._client, self._robot, joints, self._torques)
             return
         skew = math.tan(self._steering) * self._drive.wheel_separation / (2 * self._drive.wheel_base)

@@ -61,7 +61,7 @@ class PlanarBase:
             )  # fmt: skip
         for link in self.hull_links:
             engine.touch(client, self.id, link, engine.HULL, ~engine.GROUND)
-        self._mass, self._held = body.mass, 1.0
+        self._mass, self._held, self._power = body.mass, 1.0, body.power
         self._radius = body.circumscribed_radius
         self.place(pose)
 
@@ -97,7 +97,7 @@ class PlanarBase:
 
     def motors(self, velocity: Twist) -> None:
         """Run the motors: a velocity along the world's axes, with no more force than wheels have grip."""
-        grip = min(GRIP, self._held) * self._mass * GRAVITY
+        grip = min(GRIP * self._power, self._held) * self._mass * GRAVITY
         pybullet.setJointMotorControlArray(
             self.id,
             self.joints,

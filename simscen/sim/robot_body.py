@@ -17,7 +17,8 @@ class RobotBody:
     """Everything needed to build a robot, in its base frame: on the ground under the middle of its axle.
 
     `hull` and `casters` touch obstacles; `casters` also glide on the ground without friction; wheels only roll on it.
-    `chassis` is the mass of all but the wheels. `footprint` is anticlockwise; `radius` is set for a round robot.
+    `chassis` is the mass of all but the wheels; `power` is the share of their force that its motors have. `footprint`
+    is anticlockwise; `radius` is set for a round robot.
     """
 
     name: str
@@ -29,6 +30,7 @@ class RobotBody:
     radius: float | None
     drive: Drive
     limits: Limits
+    power: float = 1.0
 
     @property
     def mass(self) -> float:

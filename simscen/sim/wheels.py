@@ -10,6 +10,9 @@ from simscen.sim.ramp import Ramp
 from simscen.sim.robot_body import RobotBody
 from simscen.sim.vehicle import Vehicle
 
+ROLLING = 0.1
+"""m/s at a wheel's rim up to which it is held where it is when it should stand: more than one step of the firmware."""
+
 
 class SidedDrive:
     """Wheels on the left turn alike, and so do those on the right."""
@@ -23,6 +26,7 @@ class SidedDrive:
         scale = drive.turning_scale if isinstance(drive, SkidSteer) else 1.0
         self._half = drive.wheel_separation * scale / 2
         self._left, self._right, self._torques = driven(body, vehicle)
+        self._still_rolls = False
         self._turn()
 
     def command(self, twist: Twist) -> None:
@@ -31,7 +35,7 @@ class SidedDrive:
 
     def advance(self) -> None:
         """Set the wheels' speeds when they change."""
-        if self._ramp.advance():
+        if self._ramp.advance() or self._still_rolls:
             self._turn()
 
     def rest(self) -> None:
@@ -47,7 +51,10 @@ class SidedDrive:
 
     def _turn(self) -> None:
         vx, _, wz = self._ramp.velocity
-        if vx == 0 and wz == 0:
+        self._still_rolls = vx == wz == 0 and rolls(
+            self._client, self._vehicle.id, self._left + self._right, self._radius
+        )
+        if vx == wz == 0 and not self._still_rolls:
             hold(self._client, self._vehicle.id, self._left + self._right, self._torques)
             return
         left, right = (vx - wz * self._half) / self._radius, (vx + wz * self._half) / self._radius
@@ -66,6 +73,12 @@ def driven(body: RobotBody, vehicle: Vehicle) -> tuple[list[int], list[int], lis
     wheels = [(w, joint) for w, joint in zip(body.wheels, vehicle.joints, strict=True) if w.driven]
     left, right = [pair for pair in wheels if pair[0].left], [pair for pair in wheels if not pair[0].left]
     return [j for _, j in left], [j for _, j in right], [w.torque for w, _ in left + right]
+
+
+def rolls(client: int, robot: int, joints: Sequence[int], radius: float) -> bool:
+    """Whether a wheel is too fast to be held where it is: motors too weak for the load still brake it."""
+    speeds = (pybullet.getJointState(robot, joint, physicsClientId=client)[1] for joint in joints)
+    return any(abs(speed) * radius > ROLLING for speed in speeds)
 
 
 def hold(client: int, robot: int, joints: Sequence[int], torques: Sequence[float]) -> None:
