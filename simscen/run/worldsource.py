@@ -77,7 +77,7 @@ def load_robot(loaded: LoadedScenario) -> tuple[RobotSpec, RobotBody]:
 
 
 def _as_entered(loaded: LoadedScenario, body: RobotBody) -> RobotBody:
-    entry = loaded.spec.robot
+    entry = loaded.spec.own
     if entry.payload is None and entry.motor_torque == 1.0:
         return body
     from simscen.sim.laden import centre, laden, stands, top, weakened
