@@ -53,6 +53,7 @@ Loader.yaml_implicit_resolvers = {
 def changed(scenario: str, changes) -> dict:
     text = (ROOT / "scenarios" / f"{scenario}.scenario.yaml").read_text()
     spec = copy.deepcopy(yaml.load(text, Loader))
+    spec.pop("variations", None)  # as it is without them, it can be changed as any other
     for path, value in changes.items():
         *keys, last = [int(key) if key.isdigit() else key for key in path.split(".")]
         place = spec

@@ -60,9 +60,10 @@ def alone(tmp_path_factory):
 
 def test_one_at_a_time_from_another_folder_every_log_and_every_result_is_the_same_to_the_byte(together, alone):
     folder, _ = together
+    total = json.loads((folder / "results.json").read_text())["total"]
     for name in ("run.mcap", "result.json"):
         logs = hashes(folder, name)
-        assert len(logs) == len(list((ROOT / "scenarios").rglob("*.scenario.yaml")))
+        assert len(logs) == total >= len(list((ROOT / "scenarios").rglob("*.scenario.yaml")))
         assert hashes(alone, name) == logs
 
 
