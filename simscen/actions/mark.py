@@ -25,6 +25,11 @@ class Mark(Spec, Action):
     note: Annotated[str, Field(max_length=1000)] = ""
     """More about it, for people who read the log."""
 
+    @property
+    def of_a_robot(self) -> bool:
+        """It is about the world."""
+        return False
+
     def perform(self, stage: Stage) -> Effect:
         """Write it down."""
         stage.tell(Event(0, EventKind.MARK, self.name, {"note": self.note} if self.note else {}))

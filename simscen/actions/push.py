@@ -40,6 +40,11 @@ class Push(Spec, Action):
             raise ValueError("a force needs `for`: how long it lasts" if self.force else "an impulse lasts no time")
         return self
 
+    @property
+    def of_a_robot(self) -> bool:
+        """It is, unless it is an object that is pushed."""
+        return self.name is None
+
     def perform(self, stage: Stage) -> Effect:
         """Push; nothing comes of a push of zero, or of one on what is not there or has no mass."""
         what, lasts = self.name or "the robot", self.for_ or 0.0

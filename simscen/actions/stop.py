@@ -24,6 +24,11 @@ class Stop(Spec, Action):
     for_: PositiveDuration | None = Field(default=None, alias="for")
     """How long it stands; default: until something else moves it."""
 
+    @property
+    def of_a_robot(self) -> bool:
+        """It is about the world."""
+        return False
+
     def perform(self, stage: Stage) -> Effect:
         """Stop it; nothing comes of it when it is not there, or no script moves it now."""
         here, motion = stage.object(self.name), stage.motion(self.name)

@@ -25,6 +25,11 @@ class Teleport(Spec, Action):
     pose: PlaceOrPose
     """Where it stands from now on, in the world frame: a pose, or a place by name."""
 
+    @property
+    def of_a_robot(self) -> bool:
+        """It is about the world."""
+        return False
+
     def perform(self, stage: Stage) -> Effect:
         """Set it down; nothing comes of it when it is not there, or stands there already."""
         here, there = stage.object(self.name), self.pose.pose

@@ -20,7 +20,7 @@ def vain_orders(loaded: LoadedScenario) -> Iterator[Problem]:
         (step.name, (*keys, action.kind), action.chosen)
         for step in loaded.spec.steps
         for keys, action in step.placed()
-        if action.kind in ("keepout", "speed_zone")
+        if action.kind in ("keepout", "speed_zone") and loaded.concerns(action.robot)
     ]
     for name, keys, order in orders:
         if isinstance(loaded.spec.stack, ExternalStackSpec):
