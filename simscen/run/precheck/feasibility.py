@@ -17,6 +17,7 @@ from simscen.run.precheck.judgedmasks import judged_by_masks
 from simscen.run.precheck.masked import masked
 from simscen.run.precheck.misplaced import misplaced
 from simscen.run.precheck.pointless import places_of_triggers, pointless
+from simscen.run.precheck.routes import in_walls
 from simscen.run.precheck.scene import Scene
 from simscen.run.precheck.sketch import draw
 from simscen.run.precheck.unreachable import starts_of, unreachable
@@ -67,6 +68,7 @@ def _impossible(scene: Scene, cache: WorldCache, pictures: Path | None) -> list[
     closed = list(unreachable(scene, ways, {keys for keys, _ in wrong}))
     problems = [*(problem for _, problem in wrong), *(problem for problem, _ in closed)]
     problems += [] if any(keys == ("robot", "pose") for keys, _ in wrong) else pointless(scene, ways)
+    problems += in_walls(scene)
     problems += judged_by_masks(scene)
     problems += masked(scene, load_masks(scene.loaded))
     problems += [] if _has_errors(problems) else untimely(scene, ways)

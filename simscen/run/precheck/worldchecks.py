@@ -6,7 +6,8 @@ from simscen.core.problems import Problem
 from simscen.core.world import World
 from simscen.loading.loaded import LoadedWorld
 from simscen.loading.messages import quoted
-from simscen.loading.tree import key_place
+from simscen.loading.tree import key_place, value_place
+from simscen.run.precheck.routes import stops_of
 from simscen.worlds.contain import blocking_solid
 
 INSIDE = 1e-6
@@ -15,7 +16,7 @@ HEIGHTS = 0.02, 0.4
 
 
 def misnamed(world: World, source: LoadedWorld) -> Iterator[Problem]:
-    """Warnings about places in obstacles and regions where nothing is, without the text of their lines."""
+    """Warnings about places and ways in obstacles and regions where nothing is, without the text of their lines."""
     if source.spec is None or source.tree is None:
         return
     for name, place in source.spec.places.items():
@@ -23,6 +24,12 @@ def misnamed(world: World, source: LoadedWorld) -> Iterator[Problem]:
         if solid is not None:
             message = f'place {quoted(name)} is inside obstacle "{solid}"'
             yield Problem(*key_place(source.tree, ("places", name)), "SC314", message, severity="warning")
+    for index, thing in enumerate(source.spec.objects):
+        for keys, what, place in stops_of(thing.move) if thing.move is not None else ():
+            if solid := blocking_solid(world, place, INSIDE, HEIGHTS):
+                told = f'{what} of {quoted(thing.name)} ({place[0]:g}, {place[1]:g}) is inside obstacle "{solid}"'
+                at = value_place(source.tree, ("objects", index, "move", *keys))
+                yield Problem(*at, "SC304", told, severity="warning")
     left, low, right, high = world.bounds
     for name, corners in source.spec.regions.items():
         xs, ys = [x for x, _ in corners], [y for _, y in corners]
