@@ -25,9 +25,9 @@ def misnamed(world: World, source: LoadedWorld) -> Iterator[Problem]:
             message = f'place {quoted(name)} is inside obstacle "{solid}"'
             yield Problem(*key_place(source.tree, ("places", name)), "SC314", message, severity="warning")
     for index, thing in enumerate(source.spec.objects):
-        for keys, what, place in stops_of(thing.move) if thing.move is not None else ():
-            if solid := blocking_solid(world, place, INSIDE, HEIGHTS):
-                told = f'{what} of {quoted(thing.name)} ({place[0]:g}, {place[1]:g}) is inside obstacle "{solid}"'
+        for keys, what, (x, y) in stops_of(thing.move) if thing.move is not None else ():
+            if solid := blocking_solid(world, (x, y), INSIDE, HEIGHTS):
+                told = f'{what} of {quoted(thing.name)} ({x:g}, {y:g}) is inside obstacle "{solid}"'
                 at = value_place(source.tree, ("objects", index, "move", *keys))
                 yield Problem(*at, "SC304", told, severity="warning")
     left, low, right, high = world.bounds
