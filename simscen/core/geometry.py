@@ -85,8 +85,9 @@ class Pose3(NamedTuple):
 
     @classmethod
     def planar(cls, pose: Pose2, z: float = 0.0) -> Pose3:
-        """A pose of the plane, lifted to height `z`."""
-        return cls(pose.x, pose.y, z, 0.0, 0.0, math.sin(pose.yaw / 2), math.cos(pose.yaw / 2))
+        """A pose of the plane, lifted to height `z`; an infinite heading, as broken odometry says, is no number."""
+        half = pose.yaw / 2 if math.isfinite(pose.yaw) else math.nan
+        return cls(pose.x, pose.y, z, 0.0, 0.0, math.sin(half), math.cos(half))
 
     @property
     def position(self) -> tuple[float, float, float]:

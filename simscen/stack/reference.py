@@ -1,6 +1,5 @@
 """The reference stack: readings in; localise, map, navigate, smooth, guard; one command out."""
 
-import math
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from simscen.core.zones import Zones
 from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.localizers.ground_truth import TRUTH
+from simscen.stack.localizers.odometry_track import believable
 from simscen.stack.navigator import Navigator
 from simscen.stack.odometry_history import OdometryHistory
 from simscen.stack.protocols import Controller, Localizer, NavigationFailure, Surroundings
@@ -150,7 +150,7 @@ class ReferenceStack:
             return
         if reading.sensor != TRUTH and not self._wheels:
             self._wheels, self._odometry = True, OdometryHistory()
-        if all(map(math.isfinite, (*reading.pose, *reading.twist))):
+        if believable(reading.pose) and believable(reading.twist):
             self._twist = reading.twist
             self._odometry.add(reading.tick, reading.pose)
 

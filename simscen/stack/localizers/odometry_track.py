@@ -2,6 +2,7 @@
 
 from bisect import bisect_left
 from collections import deque
+from collections.abc import Iterable
 
 from simscen.core.geometry import Pose2
 from simscen.core.sensing import Odometry
@@ -10,9 +11,9 @@ from simscen.core.sensing import Odometry
 _LARGEST = 1e6
 
 
-def believable(pose: Pose2) -> bool:
-    """Whether these are numbers that a position can have."""
-    return all(-_LARGEST < value < _LARGEST for value in pose)
+def believable(values: Iterable[float]) -> bool:
+    """Whether these are numbers that a position, or a velocity, can have."""
+    return all(-_LARGEST < value < _LARGEST for value in values)
 
 
 class OdometryTrack:

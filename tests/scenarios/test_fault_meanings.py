@@ -1,0 +1,212 @@
+"""Faults in whole runs: what reaches the stack and the wheels, against what an independent look at the world says."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from simscen.core.events import EventKind
+from simscen.core.motion import STOP
+from simscen.core.result import Outcome
+from simscen.core.sensing import Odometry, Scan
+from simscen.core.trace import Moment
+from simscen.judge.result import result_of
+from simscen.judge.resultdata import to_json
+from simscen.loading.resolved import spec_of_text
+from simscen.loading.scenario import load_scenario
+from simscen.record.replay import read_log
+from simscen.run.prepare import prepare
+from simscen.run.simulate import simulate
+
+ROOM = """\
+simscen: 1
+world:
+  simscen: 1
+  walls: [{name: outer wall, points: [[0, 0], [8, 0], [8, 4], [0, 4], [0, 0]]}]
+  obstacles: [{name: pane, box: [0.02, 3, 1], pose: {x: 5, y: 2}}]
+  objects: [{name: crate, box: [0.4, 0.4, 0.4], pose: {x: 3, y: 3.4}}]
+robot: {pose: {x: 1, y: 1}}
+goals: [{pose: {x: 4, y: 1}}]
+"""
+
+
+class Heard:
+    def __init__(self) -> None:
+        self.moments: list[Moment] = []
+
+    def append(self, moment: Moment) -> None:
+        self.moments.append(moment)
+
+
+def play(text: str, folder: Path, head: str = ROOM, ends: str = "pass: [{collisions: {max: 5}}]\n"):
+    """The result and the moments of a run."""
+    file = folder / "own.scenario.yaml"
+    file.write_text(head + text + ends)
+    heard = Heard()
+    run = simulate(prepare(load_scenario(file, folder)), attach=lambda rig, logs: [heard])
+    return run, heard.moments
+
+
+def scans(moments: list[Moment]) -> list[tuple[int, Scan]]:
+    return [(moment.tick, one) for moment in moments for one in moment.readings if isinstance(one, Scan)]
+
+
+def to_walls(x: float, y: float, angles: np.ndarray) -> np.ndarray:
+    """How far it is to the walls of an empty room of 8 m by 4 m."""
+    with np.errstate(divide="ignore"):
+        along = np.where(np.cos(angles) > 0, (8 - x) / np.cos(angles), -x / np.cos(angles))
+        across = np.where(np.sin(angles) > 0, (4 - y) / np.sin(angles), -y / np.sin(angles))
+    return np.minimum(along, across)
+
+
+STANDING = """\
+simscen: 1
+world:
+  simscen: 1
+  walls: [{name: outer wall, thickness: 0.002, points: [[0, 0], [8, 0], [8, 4], [0, 4], [0, 0]]}]
+  obstacles: [{name: pane, box: [0.02, 3, 1], pose: {x: 5, y: 2}}]
+  objects: [{name: crate, box: [0.4, 0.4, 0.4], pose: {x: 3, y: 3.4}}]
+robot: {pose: {x: 2, y: 2, yaw: 0.3}}
+stack: {localizer: {type: ground_truth}}
+goals: []
+time_limit: 1 s
+"""
+
+
+def test_beams_through_glass_return_what_lies_behind(tmp_path):
+    _, moments = play("faults: [{sensor: lidar, glass: {of: [pane, crate]}}]\n", tmp_path, STANDING)
+    for _, scan in scans(moments):
+        off = scan.ranges - to_walls(2.0, 2.0, scan.angles() + 0.3)
+        assert np.abs(off).max() < 0.06, "0.01 m of noise, nothing of the pane and the crate"
+
+
+def test_a_share_of_the_beams_goes_through_glass_and_the_rest_sees_it(tmp_path):
+    _, moments = play("faults: [{sensor: lidar, glass: {of: [pane], probability: 70 %}}]\n", tmp_path, STANDING)
+    through = []
+    for _, scan in scans(moments):
+        bearing = scan.angles() + 0.3
+        at_pane = np.abs(np.remainder(bearing + math.pi, 2 * math.pi) - math.pi) < math.atan2(1.4, 3)
+        through += (scan.ranges[at_pane] > 2.99 / np.cos(bearing[at_pane]) + 0.2).tolist()
+    assert np.mean(through) == pytest.approx(0.7, abs=0.06)
+
+
+def test_a_lidar_that_is_turned_in_its_mount_sees_everything_turned_back(tmp_path):
+    fault = (
+        "faults: [{sensor: lidar, extrinsic: {yaw: 10 deg, x: 5 cm}}, {sensor: lidar, glass: {of: [pane, crate]}}]\n"
+    )
+    _, moments = play(
+        fault.replace("glass", "glass"), tmp_path, STANDING.replace("box: [0.02, 3, 1]", "box: [0.02, 0.02, 1]")
+    )
+    x, y = 2 + 0.05 * math.cos(0.3), 2 + 0.05 * math.sin(0.3)
+    for _, scan in scans(moments):
+        off = scan.ranges - to_walls(x, y, scan.angles() + 0.3 + math.radians(10))
+        assert np.mean(np.abs(off) < 0.06) > 0.9, "but for the crate and the post"
+
+
+def test_a_lidar_that_is_pitched_down_sees_the_floor_as_a_wall(tmp_path):
+    _, moments = play("faults: [{sensor: lidar, extrinsic: {pitch: 5 deg}}]\n", tmp_path, STANDING)
+    height = 0.18
+    for _, scan in scans(moments):
+        ahead = scan.ranges[len(scan.ranges) // 2]
+        assert ahead == pytest.approx(height / math.sin(math.radians(5)), abs=0.06)
+
+
+def test_late_scans_arrive_at_the_first_beat_that_is_due_and_carry_the_tick_of_when_they_were_taken(tmp_path):
+    _, moments = play("faults: [{sensor: lidar, delay: {latency: 0.111 s}}]\ntime_limit: 3 s\n", tmp_path)
+    beats = [moment.tick for moment in moments]
+    got = scans(moments)
+    assert [one.tick for _, one in got] == [24 * k for k in range(len(got))]
+    for tick, scan in got:
+        assert tick == min(beat for beat in beats if beat >= scan.tick + round(0.111 * 240))
+
+
+def test_a_base_whose_commands_are_lost_stops_after_its_timeout_and_goes_on_with_them(tmp_path):
+    fault = "faults: [{sensor: cmd_vel, off: {}, when: {time: 3 s}, for: 2 s}]\ntime_limit: 8 s\n"
+    run, moments = play(fault, tmp_path)
+    speeds = {moment.tick / 240: moment.truth.twist.vx for moment in moments if moment.truth}
+    assert speeds[3.0] > 0.3
+    # 0.5 s without a command, then 0.5 m/s of speed at 1.5 m/s² of deceleration.
+    assert speeds[3.4] > 0.3
+    assert max(abs(v) for t, v in speeds.items() if 4.0 <= t <= 5.0) < 0.02
+    assert max(v for t, v in speeds.items() if t > 5.2) > 0.3
+    assert any(moment.decision.command != STOP for moment in moments if 4.2 <= moment.tick / 240 <= 4.8)
+    assert run.result.disturbances[0].happened
+
+
+def test_a_late_command_makes_the_robot_do_later_what_the_stack_wants(tmp_path):
+    fault = "faults: [{sensor: cmd_vel, delay: {latency: 300 ms}}]\ntime_limit: 4 s\n"
+    _, moments = play(fault, tmp_path)
+    wanted = next(moment.tick for moment in moments if moment.decision.command.vx > 0.02)
+    moved = next(moment.tick for moment in moments if moment.truth and moment.truth.twist.vx > 0.005)
+    assert 72 <= moved - wanted <= 72 + 18
+
+
+def test_wheels_whose_left_side_is_weak_pull_to_the_left_and_odometry_knows(tmp_path):
+    fault = "faults: [{sensor: wheels, saturation: {left: 0.1 m/s}, when: {time: 2 s}, for: 0.6 s}]\ntime_limit: 4 s\n"
+    _, moments = play(fault, tmp_path)
+    turned = [moment.truth.twist.wz for moment in moments if moment.truth and 2.3 < moment.tick / 240 < 2.55]
+    assert np.mean(turned) > 0.5
+    heard = [one for moment in moments for one in moment.readings if isinstance(one, Odometry) and one.tick == 600]
+    truth = next(moment.truth for moment in moments if moment.tick == 600)
+    assert heard[0].pose.yaw == pytest.approx(truth.pose.plane.yaw, abs=0.05)
+
+
+def test_the_navigator_is_told_that_the_robot_jumped_while_the_fault_lasts(tmp_path):
+    fault = "faults: [{sensor: localizer, jump: {y: 0.5 m}, when: {time: 2 s}, for: 1 s}]\ntime_limit: 4 s\n"
+    _, moments = play(fault, tmp_path)
+    off = {}
+    for moment in moments:
+        if moment.truth and moment.decision.belief:
+            off[moment.tick / 240] = moment.decision.belief.pose.distance(moment.truth.pose.plane)
+    assert max(value for at, value in off.items() if at < 2.0) < 0.2
+    assert min(value for at, value in off.items() if 2.05 < at < 2.95) > 0.3
+    assert max(value for at, value in off.items() if at > 3.1) < 0.2
+
+
+def test_a_shifted_map_is_the_one_that_the_stack_gets_and_the_log_shows(tmp_path):
+    fault = "faults: [{sensor: map, shift: {x: 30 cm}}]\ntime_limit: 6 s\n"
+    run, moments = play(fault, tmp_path)
+    (one,) = run.result.disturbances
+    assert (one.happened, one.tick) == (True, 0)
+    last = [moment for moment in moments if moment.truth and moment.decision.belief][-1]
+    assert last.decision.belief.pose.x - last.truth.pose.x == pytest.approx(0.3, abs=0.1)
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "zero", "negative", "huge", "empty", "short", "anything"])
+def test_no_garbage_of_a_lidar_brings_the_stack_down(tmp_path, value):
+    faults = (
+        f"faults: [{{sensor: lidar, garbage: {{value: {value}}}, when: {{time: 1 s}}, for: 2 s}}]\ntime_limit: 25 s\n"
+    )
+    run, moments = play(faults, tmp_path, ends="pass: [{collisions: {max: 0}}, {goals_reached: {}}]\n")
+    assert run.result.outcome in (Outcome.PASSED, Outcome.FAILED)
+    assert [event for moment in moments for event in moment.events if event.kind is EventKind.FAULT_ENDED]
+
+
+@pytest.mark.parametrize("localizer", ["amcl", "ekf", "odometry"])
+def test_no_garbage_of_odometry_or_inertial_unit_brings_a_localizer_down(tmp_path, localizer):
+    values = ("nan", "inf", "negative", "huge")
+    entries = [
+        f"  - {{sensor: {sensor}, name: {sensor} {value}, garbage: {{value: {value}, probability: 50 %}}, "
+        f"when: {{time: {1 + k} s}}, for: 0.5 s}}\n"
+        for sensor in ("odom", "imu")
+        for k, value in enumerate(values)
+    ]
+    text = f"stack: {{localizer: {{type: {localizer}}}}}\ntime_limit: 6 s\nfaults:\n{''.join(entries)}"
+    run, _ = play(text, tmp_path)
+    assert run.result.outcome in (Outcome.PASSED, Outcome.FAILED)
+
+
+def test_a_log_full_of_garbage_is_judged_again_as_it_was(tmp_path):
+    faults = "".join(
+        f"  - {{sensor: {name}, garbage: {{}}, when: {{time: 1 s}}}}\n" for name in ("lidar", "odom", "imu")
+    )
+    file = tmp_path / "own.scenario.yaml"
+    file.write_text(
+        f"{ROOM}time_limit: 4 s\nfaults:\n{faults}pass: [{{collisions: {{max: 5}}}}, {{path_length: {{max: 9}}}}]\n"
+    )
+    run = simulate(prepare(load_scenario(file, tmp_path)), log=tmp_path / "run.mcap")
+    log = read_log(tmp_path / "run.mcap")
+    criteria = spec_of_text(log.about.scenario, file.name).pass_
+    again = result_of(run.result.key, run.result.path, criteria, log.trace, log.about.case, run.result.lines)
+    assert to_json(again) == to_json(run.result)
