@@ -82,7 +82,11 @@ def logs(file: Path, root: Path, folder: Path) -> tuple[bytes, bytes]:
     return data[0][: ends[0]], data[1][: ends[1]]
 
 
-SHIPPED = sorted(str(path.relative_to(ROOT / "scenarios")) for path in (ROOT / "scenarios").rglob("*.scenario.yaml"))
+SHIPPED = sorted(
+    str(path.relative_to(ROOT / "scenarios"))
+    for path in (ROOT / "scenarios").rglob("*.scenario.yaml")
+    if "sensor: localizer" not in path.read_text()  # that of a stack behind a socket cannot be disturbed
+)
 
 
 @pytest.mark.parametrize(
