@@ -112,6 +112,8 @@ _SCENARIO: dict[str, type[BaseModel]] = {
     "initial_estimate": scenario.InitialEstimate,
     "goals": scenario.GoalEntry,
     "navigation": navigation.Navigation,
+    "expect": navigation.ExpectedError,
+    "on_reached": navigation.OnReached,
     "events": EventEntry,
     "then": StepEntry,
     "pose": PoseSpec,

@@ -29,7 +29,10 @@ class Navigation(Spec):
 
 
 class ExpectedError(Spec):
-    """The robot is to fail at this goal with this code."""
+    """The robot is to fail at this goal with this code.
+
+    Example: `expect: {error_code: GOAL_OCCUPIED}`
+    """
 
     error_code: Code
     """One of Nav2's, by name or number."""

@@ -134,6 +134,8 @@ PLACES = {
     "scenario.robot entry": Place("scenario", "robot:\n  "),
     "scenario.initial_estimate": Place("scenario", "robot:\n  pose: dock\n  initial_estimate:\n    "),
     "scenario.goals": Place("scenario", "goals:\n  -\n    "),
+    "scenario.expect": Place("scenario", "goals:\n  - pose: dock\n    expect:\n      "),
+    "scenario.on_reached": Place("scenario", "goals:\n  - pose: dock\n    on_reached:\n      "),
     "scenario.events": Place("scenario", "events:\n  -\n    "),
     "scenario.variations": Place("scenario", "variations:\n  "),
     "scenario.sampled": Place("scenario", "variations:\n  sampled:\n    "),
