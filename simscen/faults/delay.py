@@ -66,7 +66,7 @@ class _Late(Disturbance):
     def end(self) -> Disturbance | None:
         """What is under way still arrives."""
         self._over = True
-        return self
+        return self if self._readings or self._commands else None
 
 
 class _Line(Generic[T]):
@@ -74,6 +74,9 @@ class _Line(Generic[T]):
 
     def __init__(self) -> None:
         self._waiting: deque[tuple[int, T]] = deque()
+
+    def __len__(self) -> int:
+        return len(self._waiting)
 
     def pass_on(self, message: T, due: int, now: int) -> T | None:
         """The message, if nothing is before it and it is due now; else it waits."""

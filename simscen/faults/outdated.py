@@ -22,7 +22,7 @@ Rings = Annotated[list[Ring], Field(max_length=100)]
 class Outdated(Spec, Fault):
     """The map that the stack gets shows nothing where something stands, or something where nothing is any more.
 
-    Example: `{sensor: map, outdated: {missing: [[[3, 1], [4, 1], [4, 2], [3, 2]]]}}`
+    Example: `{sensor: map, outdated: {extra: [[[3, 1], [4, 1], [4, 2], [3, 2]]]}}`
     """
 
     affects: ClassVar[frozenset[str]] = frozenset({"Map"})

@@ -119,12 +119,12 @@ def steps_of(events: Sequence[EventEntry]) -> list[Step]:
 
 
 class FaultEntry(AnyFault):
-    """Something that goes wrong with a sensor or the wheels."""
+    """Something that goes wrong with a sensor, the base, the localizer or the map."""
 
     modifiers: ClassVar[frozenset[str]] = frozenset({"sensor", "when", "for_", "name", "required"})
 
     sensor: Name
-    """The instance it affects, by its name in the robot's `sensors`."""
+    """What it affects: a sensor, by its name in the robot's `sensors`; `cmd_vel`, `wheels`, `localizer` or `map`."""
     name: Name | None = None
     """What reports and criteria call it; default: `<sensor>.<fault>`, e.g. `lidar.off`."""
     when: Trigger | None = None

@@ -210,6 +210,15 @@ def test_with_everything_that_never_begins_the_run_is_the_one_without_it_to_its_
         assert same(moment, known), f"tick {moment.tick}"
 
 
+MAPS = [word for word in AnyFault.choices() if MAP in type_of(AnyFault.model_fields[AnyFault.choices()[word]]).affects]
+
+
+@pytest.mark.parametrize("word", MAPS)
+def test_a_fault_of_the_map_is_there_from_the_first_beat_on(play, quiet, word: str) -> None:
+    moments = play([f"{{sensor: map, {word}: {fault_example(word, MAP)}}}"], [], 0.2)
+    assert begun(moments, EventKind.FAULT_STARTED) == begun(moments, EventKind.FAULT_TOOK_EFFECT) == 0
+
+
 def test_what_is_over_leaves_no_trace_of_its_own(play) -> None:
     """A delay at a time at which no message is due changes no bit of the rest."""
     fault = "{sensor: lidar, delay: {latency: 50 ms}, when: {time: 1.01 s}, for: 0.02 s, required: false}"

@@ -15,6 +15,7 @@ from simscen.judge.result import result_of
 from simscen.judge.resultdata import to_json
 from simscen.loading.resolved import spec_of_text
 from simscen.loading.scenario import load_scenario
+from simscen.record.difference import first_difference
 from simscen.record.replay import read_log
 from simscen.run.prepare import prepare
 from simscen.run.simulate import simulate
@@ -197,16 +198,21 @@ def test_no_garbage_of_odometry_or_inertial_unit_brings_a_localizer_down(tmp_pat
     assert run.result.outcome in (Outcome.PASSED, Outcome.FAILED)
 
 
-def test_a_log_full_of_garbage_is_judged_again_as_it_was(tmp_path):
-    faults = "".join(
-        f"  - {{sensor: {name}, garbage: {{}}, when: {{time: 1 s}}}}\n" for name in ("lidar", "odom", "imu")
-    )
+GARBAGE = "".join(f"  - {{sensor: {name}, garbage: {{}}, when: {{time: 1 s}}}}\n" for name in ("lidar", "odom", "imu"))
+BURSTS = "".join(
+    f"  - {{sensor: {name}, delay: {{latency: 0.3 s, jitter: 0.5 s}}, when: {{time: 1 s}}, for: 1 s}}\n"
+    for name in ("lidar", "odom", "imu", "bumper", "cmd_vel")
+)
+
+
+@pytest.mark.parametrize("faults", [GARBAGE, BURSTS], ids=["garbage", "bursts"])
+def test_a_log_of_what_no_sensor_should_say_is_judged_again_as_it_was(tmp_path, faults):
+    criteria = "pass: [{collisions: {max: 5}}, {path_length: {max: 9}}, {localization_error: {max: 3}}]\n"
     file = tmp_path / "own.scenario.yaml"
-    file.write_text(
-        f"{ROOM}time_limit: 4 s\nfaults:\n{faults}pass: [{{collisions: {{max: 5}}}}, {{path_length: {{max: 9}}}}]\n"
-    )
+    file.write_text(f"{ROOM}time_limit: 4 s\nfaults:\n{faults}{criteria}")
     run = simulate(prepare(load_scenario(file, tmp_path)), log=tmp_path / "run.mcap")
     log = read_log(tmp_path / "run.mcap")
-    criteria = spec_of_text(log.about.scenario, file.name).pass_
-    again = result_of(run.result.key, run.result.path, criteria, log.trace, log.about.case, run.result.lines)
+    written = spec_of_text(log.about.scenario, file.name).pass_
+    again = result_of(run.result.key, run.result.path, written, log.trace, log.about.case, run.result.lines)
     assert to_json(again) == to_json(run.result)
+    assert first_difference(run.trace, log.trace) is None
