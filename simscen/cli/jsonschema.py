@@ -7,6 +7,7 @@ from pydantic import BaseModel, RootModel
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
+from simscen.loading.document import MORE
 from simscen.loading.stackchoice import OF_THE_SCENARIO
 from simscen.model.robot import RobotSpec
 from simscen.model.scenario import ScenarioSpec
@@ -25,6 +26,7 @@ MODELS: dict[str, type[BaseModel]] = {
     "robot": RobotSpec,
     "stack": StackFileSpec,
     "config": UserConfigSpec,
+    "base": ScenarioSpec,
 }
 DRAFT = "http://json-schema.org/draft-07/schema#"
 """What yaml-language-server knows best; nothing newer is needed."""
@@ -36,11 +38,12 @@ def schema_of(name: str, installed: bool = False) -> Schema:
     generated = model.model_json_schema(schema_generator=_WithInstalled if installed else _Generator)
     if name == "stack":
         _leave_to_the_scenario(generated)
-    schema = _mended(
-        {**generated, "properties": {"extends": _EXTENDS, **generated["properties"]}}, generated.get("$defs", {})
-    )
+    if name == "base":
+        _leave_to_those_that_extend(generated)
+    known = {"extends": _EXTENDS, **generated["properties"], **(_added(generated) if model is ScenarioSpec else {})}
+    schema = _mended({**generated, "properties": known}, generated.get("$defs", {}))
     # Any other key may come from the file it extends or from the defaults.yaml beside it.
-    needed = ["simscen"] if model.model_fields["simscen"].is_required() else []
+    needed = ["simscen"] if model.model_fields["simscen"].is_required() and name != "base" else []
     return {"$schema": DRAFT, "title": f"simscen {name}", **schema, "required": needed}
 
 
@@ -49,6 +52,48 @@ def _leave_to_the_scenario(generated: Schema) -> None:
     for definition in generated["$defs"].values():
         for key in OF_THE_SCENARIO:
             definition.get("properties", {}).pop(key, None)
+
+
+def _added(generated: Schema) -> Schema:
+    """`pass+` and the like: what is added to the list of the file that is extended."""
+    lists = {name: told for name, told in generated["properties"].items() if told.get("type") == "array"}
+    return {
+        f"{name}{MORE}": {**told, "description": f"Added to `{name}` of the file that is extended."}
+        for name, told in lists.items()
+    }
+
+
+def _leave_to_those_that_extend(generated: Schema) -> None:
+    """What extends a base can add keys to its mappings, but nothing to what stands in its lists."""
+    definitions = generated.get("$defs", {})
+    in_lists = _reached(generated, definitions, lists=True)
+    for name in _reached(generated, definitions, lists=False) - in_lists:
+        definitions[name].pop("required", None)
+
+
+def _reached(schema: Schema, definitions: Schema, lists: bool) -> set[str]:
+    """The definitions that a schema leads to without passing a list; or with `lists`, behind one."""
+    found: set[str] = set()
+    seen: set[tuple[str, bool]] = set()
+
+    def walk(node: Any, behind: bool) -> None:
+        if isinstance(node, list):
+            for item in node:
+                walk(item, behind)
+        if not isinstance(node, dict):
+            return
+        name = str(node.get("$ref", "")).rpartition("/")[2]
+        if name and (name, behind) not in seen:
+            seen.add((name, behind))
+            if behind == lists:
+                found.add(name)
+            walk(definitions[name], behind)
+        for key, value in node.items():
+            if key != "$defs":
+                walk(value, behind or key in ("items", "prefixItems"))
+
+    walk(schema, False)
+    return found
 
 
 def as_text(schema: Schema) -> str:

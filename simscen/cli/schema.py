@@ -20,6 +20,7 @@ class Kind(str, Enum):
     ROBOT = "robot"
     STACK = "stack"
     CONFIG = "config"
+    BASE = "base"
 
 
 def command(

@@ -15,7 +15,7 @@ from simscen.cli.stacks import stacks_of
 from simscen.core.errors import Exit
 from simscen.core.problems import Problem
 from simscen.loading.anyfile import kind_of, problems_of
-from simscen.loading.discovery import ROBOT, SCENARIO, STACK, WORLD, default_root, discover
+from simscen.loading.discovery import BASE, ROBOT, SCENARIO, STACK, WORLD, default_root, discover
 
 
 class Format(str, Enum):
@@ -48,8 +48,9 @@ def command(
     """Check scenario, world, robot and stack files without running anything.
 
     Every problem of every file is listed with its line. Folders are searched for *.scenario.yaml, *.world.yaml,
-    *.robot.yaml and *.stack.yaml. Scenarios are looked at in their worlds: is the robot free at its start and goals,
-    can it get there in time, can all events happen, can all criteria hold and fail?
+    *.robot.yaml, *.stack.yaml and *.base.yaml. Of a base, which is there to be extended, and of a defaults.yaml what
+    is there is checked, and nothing is missing. Scenarios are looked at in their worlds: is the robot free at its
+    start and goals, can it get there in time, can all events happen, can all criteria hold and fail?
 
     Exit code 0: all are valid; 2: some are not; 5: there are none.
     """
@@ -57,7 +58,7 @@ def command(
     stacks = stacks_of(stack or [], home, world_path or [])
     checks = Checks(home, world_path or [], lenient, fast, picture, stacks=stacks, runs=bool(stack))
     checked = _Checked()
-    for file in discover(paths, home, SCENARIO + WORLD + ROBOT + STACK):
+    for file in discover(paths, home, SCENARIO + WORLD + ROBOT + STACK + BASE):
         kind = kind_of(file, home)
         checked.add(kind, from_here(_problems(kind, file, checks), home))
     _PRINT[format_](checked)
@@ -71,7 +72,7 @@ def _problems(kind: str, file: Path, checks: Checks) -> list[Problem]:
         found = [problem for choice in checks.choices for problem in checks.scenario(file, choice)[1]]
         return list(dict.fromkeys(found))
     found = problems_of(kind, file, checks.root, checks.world_path)
-    if kind == "stack" or any(problem.severity == "error" for problem in found):
+    if kind in ("stack", "base") or any(problem.severity == "error" for problem in found):
         return found
     built = checks.robot if kind == "robot" else checks.world
     return [*found, *built(file)]

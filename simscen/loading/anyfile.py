@@ -5,8 +5,8 @@ from pathlib import Path
 
 from simscen.core.problems import Problem
 from simscen.loading.assets import GAZEBO, URDF, Assets, is_ros_map
-from simscen.loading.discovery import ROBOT, STACK, WORLD
-from simscen.loading.document import Library
+from simscen.loading.discovery import BASE, ROBOT, STACK, WORLD
+from simscen.loading.document import DEFAULTS, Library
 from simscen.loading.paths import Fence
 from simscen.loading.scenario import try_variations
 from simscen.loading.sense.worldsense import senseless
@@ -19,7 +19,7 @@ _ONLY_SCENARIOS = frozenset({"world", "robot", "goals", "pass", "events", "fault
 
 
 def problems_of(kind: str, file: Path, root: Path, world_path: Sequence[Path] = ()) -> list[Problem]:
-    """All that is wrong with a "scenario", "world", "robot", "stack" or "map" file and the files it names.
+    """All that is wrong with a "scenario", "world", "robot", "stack", "base" or "map" file and the files it names.
 
     Some are warnings.
     """
@@ -35,6 +35,10 @@ def problems_of(kind: str, file: Path, root: Path, world_path: Sequence[Path] = 
         from simscen.loading.stackfile import stack_file  # a model of its own, which few commands need
 
         return found if isinstance(found := stack_file(path, library), list) else []
+    if kind == "base":
+        from simscen.loading.basefile import problems_of_base
+
+        return problems_of_base(path, library)
     assets = Assets(library)
     senses: list[Problem] = []
     if kind == "world":
@@ -49,7 +53,9 @@ def problems_of(kind: str, file: Path, root: Path, world_path: Sequence[Path] = 
 
 def kind_of(file: Path, root: Path) -> str:
     """By its name where that tells, else by the keys that only one kind has."""
-    for kind, suffixes in (("world", (*WORLD, *GAZEBO)), ("robot", (*ROBOT, *URDF)), ("stack", STACK)):
+    if file.name == DEFAULTS:
+        return "base"
+    for kind, suffixes in (("base", BASE), ("world", (*WORLD, *GAZEBO)), ("robot", (*ROBOT, *URDF)), ("stack", STACK)):
         if file.name.endswith(suffixes):
             return kind
     tree, _ = Library(Fence.around(root)).read(file.absolute())

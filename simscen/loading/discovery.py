@@ -15,6 +15,7 @@ SCENARIO = (".scenario.yaml", ".scenario.yml")
 WORLD = (".world.yaml", ".world.yml")
 ROBOT = (".robot.yaml", ".robot.yml")
 STACK = (".stack.yaml", ".stack.yml")
+BASE = (".base.yaml", ".base.yml")
 
 REPOSITORY = (".git", ".hg", ".jj", ".svn")
 PROJECT = ("pyproject.toml", "package.xml", "setup.py")

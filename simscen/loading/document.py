@@ -10,11 +10,13 @@ from simscen.core.problems import Problem
 from simscen.loading.compose import compose
 from simscen.loading.paths import Fence, Refusal
 from simscen.loading.source import read_text
-from simscen.loading.tree import Entry, Fields, Leaf, Node, Place
+from simscen.loading.tree import Entry, Fields, Items, Leaf, Node, Place
 
 DEFAULTS = "defaults.yaml"
 EXTENDS = "extends"
 MOST_FILES = 32
+MORE = "+"
+"""Behind the key of a list at top level: what stands there is added to that of the file that is extended."""
 
 
 @dataclass
@@ -38,7 +40,7 @@ class Library:
             below, more = self._defaults(beside)
             problems += more
             if isinstance(below, Fields):
-                tree = merge(tree, below)
+                tree = extended(tree, below)
             elif not more and below is not None:
                 problems.append(Problem(self.fence.shown(beside), 0, 0, "SC004", "expected a mapping at top level"))
         return tree, problems
@@ -75,7 +77,7 @@ class Library:
             return own, [*problems, base]
         below, more = self._with_base(base, (*chain, path))
         if isinstance(below, Fields):
-            return merge(own, below), problems + more
+            return extended(own, below), problems + more
         return own, problems + more
 
     def _defaults(self, beside: Path) -> tuple[Node | None, list[Problem]]:
@@ -104,6 +106,26 @@ class Library:
         if len(self.files) >= MOST_FILES:
             return Problem(*place, "SC024", f"more than {MOST_FILES} files extend each other")
         return base
+
+
+def extended(over: Fields, under: Fields) -> Fields:
+    """The file `over` with what `under` says besides; `pass+` and the like add to the list that is there.
+
+    Where there is none yet, the key stays: a file further below may have it.
+    """
+    entries = dict(over.entries)
+    for key, more in over.entries.items():
+        name = key.removesuffix(MORE)
+        if name == key or name in over.entries or not isinstance(more.value, Items):
+            continue
+        for known in (name, key):
+            below = under.entries.get(known)
+            if below is not None and isinstance(below.value, Items):
+                del entries[key]
+                items = (*below.value.items, *more.value.items)
+                entries[known] = Entry(more.key, Items(more.value.place, items))
+                break
+    return merge(Fields(over.place, entries), under)
 
 
 def merge(over: Fields, under: Fields) -> Fields:

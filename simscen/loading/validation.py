@@ -48,6 +48,31 @@ def check(model: type[Model], tree: Node, also: Lacking | None = None) -> Model 
     return [*empty, *more] or spec
 
 
+def check_partial(model: type[BaseModel], tree: Node) -> list[Problem]:
+    """All that is wrong with what `tree` says, whatever it leaves to the files that extend it.
+
+    These can add keys to its mappings, but nothing to what stands in its lists.
+    """
+    if not isinstance(tree, Fields):
+        return [_problem(tree.place, "SC004", f"expected a mapping at top level, got {messages.found(tree)}")]
+    if problem := _other_version(tree):
+        return [problem]
+    empty = [_no_value(model, tree, loc) for loc in _empty(tree)]
+    try:
+        model.model_validate(tree.plain, by_alias=True, by_name=False)
+    except ValidationError as error:
+        told = [dict(found) for found in error.errors(include_input=False, include_url=False)]
+        said = [found for found in told if not _may_be_added(found) and not _follows_from_empty(tree, found)]
+        return _distinct([*empty, *(_translate(model, tree, found) for found in said)])
+    return empty
+
+
+def _may_be_added(error: dict[str, Any]) -> bool:
+    """Whether only a key is missing, in a mapping that is in no list."""
+    in_a_list = any(isinstance(part, int) for part in error["loc"])
+    return error["type"] in ("missing", "union_tag_not_found") and not in_a_list
+
+
 def _other_version(tree: Fields) -> Problem | None:
     version = child(tree, "simscen")
     if not isinstance(version, Leaf) or version.value == VERSION or isinstance(version.value, bool):

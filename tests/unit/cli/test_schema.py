@@ -109,3 +109,19 @@ def test_check_jsonschema_agrees() -> None:
         command = [sys.executable, "-m", "check_jsonschema", "--schemafile", schema, str(file)]
         ended = subprocess.run(command, check=False, capture_output=True, text=True)
         assert (ended.returncode == 0) == valid, ended.stdout
+
+
+BASES = [
+    ({}, True),
+    ({"tags": ["smoke"], "pass+": [{"collisions": {"max": 0}}]}, True),
+    ({"robot": {"model": "amr"}, "extends": "b.base.yaml"}, True),
+    ({"gaols": []}, False),
+    ({"goals": [{"timeout": "3 s"}]}, False),
+    ({"robot": {"modle": "amr"}}, False),
+    ({"pass+": [{"colisions": {}}]}, False),
+]
+
+
+@pytest.mark.parametrize(("base", "fits"), BASES)
+def test_a_partial_file_fits_the_partial_schema(base: dict[str, Any], fits: bool) -> None:
+    assert jsonschema.Draft7Validator(schema_of("base")).is_valid(base) is fits

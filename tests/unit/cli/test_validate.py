@@ -125,3 +125,14 @@ def test_fast_leaves_the_geometry_out_and_nothing_else(simscen, tmp_path: Path) 
         f"{good}time_limit: 9 s\nevents: [{{when: {{time: 9 s}}, do: {{cancel_goal: {{}}}}}}]\n"
     )
     assert "can never happen" in simscen("validate", "late.scenario.yaml", "--fast").out
+
+
+def test_a_base_is_called_one_and_checked_for_what_it_says(simscen, tmp_path: Path) -> None:
+    (tmp_path / "aisle.base.yaml").write_text("robot: {model: amr}\npass: [{collisions: {max: 0}}]\n")
+    (tmp_path / "defaults.yaml").write_text("tags: [smoke]\n")
+    assert simscen("validate", "aisle.base.yaml", "defaults.yaml") == (0, "2 bases are valid\n", "")
+    assert simscen("validate", ".") == (0, "1 base and 1 scenario are valid\n", "")
+    (tmp_path / "defaults.yaml").write_text("tag: [smoke]\n")
+    ended = simscen("validate", "defaults.yaml")
+    assert ended.code == 2
+    assert "defaults.yaml:1:1: error[SC012] unknown key `tag`" in ended.out

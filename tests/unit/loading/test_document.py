@@ -1,6 +1,8 @@
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from simscen.core.problems import Problem
 from simscen.loading.document import Library
 from simscen.loading.paths import Fence
@@ -93,3 +95,23 @@ def test_mistakes_in_every_file_are_told(tmp_path: Path) -> None:
 def test_problems_get_the_text_of_their_line(tmp_path: Path) -> None:
     _, problems, library = _read(tmp_path, {"a.yaml": "x: 1\nx: 2\n"})
     assert library.with_source(problems)[0].source == "x: 2"
+
+
+@pytest.mark.parametrize(
+    ("own", "base", "defaults", "expected"),
+    [
+        ("pass+: [3]", "pass: [1]", "pass: [2]", {"pass": [1, 3]}),
+        ("pass+: [3]", "pass+: [1]", "pass: [2]", {"pass": [2, 1, 3]}),
+        ("pass+: [3]", "tags: []", "pass: [2]", {"pass": [2, 3], "tags": []}),
+        ("pass: [3]", "pass: [1]", "pass: [2]", {"pass": [3]}),
+        ("pass+: [3]", "tags: []", "tags: [2]", {"pass+": [3], "tags": []}),
+        ("pass: [3]\npass+: [4]", "pass: [1]", "tags: []", {"pass": [3], "pass+": [4], "tags": []}),
+        ("x: {y+: [3]}", "x: {y: [1]}", "tags: []", {"x": {"y+": [3], "y": [1]}, "tags": []}),
+    ],
+)  # fmt: skip
+def test_a_key_with_a_plus_adds_to_the_list_of_the_file_below(own, base, defaults, expected, tmp_path) -> None:
+    for name, text in {"own": f"extends: base.yaml\n{own}", "base": base, "defaults": defaults}.items():
+        (tmp_path / f"{name}.yaml").write_text(text)
+    tree, problems = Library(Fence.around(tmp_path)).read(tmp_path / "own.yaml", defaults=True)
+    assert problems == []
+    assert tree.plain == expected

@@ -1,0 +1,29 @@
+"""The files of the guide on `extends` are what it says they become."""
+
+import re
+import textwrap
+from pathlib import Path
+
+from simscen.loading.document import Library
+from simscen.loading.paths import Fence
+
+GUIDE = Path(__file__).parents[2] / "docs/guides/extends.md"
+
+
+def test_the_files_of_the_guide_become_one(tmp_path: Path) -> None:
+    shown = re.findall(r"^    # (\S+\.yaml)\n((?:    .*\n)+)", GUIDE.read_text(encoding="utf-8"), re.MULTILINE)
+    assert [name for name, _ in shown] == ["defaults.yaml", "aisle.base.yaml", "slow.scenario.yaml"]
+    for name, text in shown:
+        (tmp_path / name).write_text(textwrap.dedent(text))
+    tree, problems = Library(Fence.around(tmp_path)).read(tmp_path / "slow.scenario.yaml", defaults=True)
+    assert problems == []
+    assert tree is not None
+    assert tree.plain == {
+        "stack": {"controller": {"desired_linear_vel": 0.2}},
+        "goals": [{"pose": "shelf"}],
+        "world": "../worlds/warehouse.world.yaml",
+        "robot": {"model": "amr", "pose": "dock"},
+        "simscen": 1,
+        "tags": ["nightly"],
+        "pass": [{"collisions": {"max": 0}}, {"goals_reached": {}}],
+    }
