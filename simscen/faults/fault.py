@@ -34,6 +34,7 @@ class AnyFault(Choice):
     intermittent: Annotated[Fault | None, OnDemand("simscen.faults.intermittent", "Intermittent")] = None
     gain: Annotated[Fault | None, OnDemand("simscen.faults.gain", "Gain")] = None
     saturation: Annotated[Fault | None, OnDemand("simscen.faults.saturation", "Saturation")] = None
+    low_battery: Annotated[Fault | None, OnDemand("simscen.faults.low_battery", "LowBattery")] = None
     jump: Annotated[Fault | None, OnDemand("simscen.faults.jump", "Jump")] = None
     shift: Annotated[Fault | None, OnDemand("simscen.faults.shift", "Shift")] = None
     outdated: Annotated[Fault | None, OnDemand("simscen.faults.outdated", "Outdated")] = None

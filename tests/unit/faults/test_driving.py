@@ -66,3 +66,17 @@ def test_sides_are_those_of_wheels(word):
     assert senseless({word: {"left": 0.5}}, "Command")[0] == "left"
     assert senseless({word: {"right": 0.5}}, "Wheels", spec=Omnidirectional(type="omnidirectional"))[0] == "right"
     assert senseless({word: {"right": 0.5}}, "Wheels", spec=WHEELED) is None
+
+
+def test_a_battery_drains_evenly_and_the_robot_keeps_to_its_curve():
+    now = Hand()
+    work = begun({"low_battery": {"start": 0.5, "end": 0.1, "drain": "10 s"}}, "Command", now)
+    told, limits = Twist(0.6, 0.0, 0.3), {0: 0.5, 1200: 0.3, 2400: 0.1, 4800: 0.1}
+    for now.tick, most in limits.items():
+        assert work.command(told) == pytest.approx((most, 0.0, most / 2))
+    assert work.command(Twist(0.05, 0.0, 1.0)) == Twist(0.05, 0.0, 1.0)
+
+
+def test_a_battery_that_charges_itself_is_none():
+    with pytest.raises(ValueError, match="no battery charges itself"):
+        begun({"low_battery": {"start": 0.1, "end": 0.5}}, "Command")
