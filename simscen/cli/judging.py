@@ -16,6 +16,7 @@ from simscen.core.result import Outcome, RunFailure, RunKey, unfinished
 from simscen.core.sessionevents import Artifacts, RunFinished
 from simscen.core.trace import Trace
 from simscen.judge.result import result_of
+from simscen.judge.several import together
 from simscen.loading.criteria_file import LoadedCriteria, load_criteria
 from simscen.loading.discovery import default_root
 from simscen.loading.resolved import criteria_of_text
@@ -23,7 +24,7 @@ from simscen.model.criteria_file import expectation_of
 from simscen.record.foreign.mcapfile import is_own
 from simscen.record.foreign.read import read_foreign
 from simscen.record.foreign.wanted import Wanted
-from simscen.record.replay import read_run
+from simscen.record.replay import Log, read_run
 from simscen.report.journaldata import NAME
 from simscen.report.rebuild import read_journal
 from simscen.run.outfolder import run_folder
@@ -62,40 +63,56 @@ class Judging:
 
     def _own(self, log: Path) -> RunFinished:
         read = read_run(log)
+        if not read.robots:
+            return self._of_one(log, read, "")
+        runs = {name: self._of_one(log, one, name) for name, one in read.robots.items()}
+        traces = {name: one.trace for name, one in read.robots.items()}
+        result = together({name: run.result for name, run in runs.items()}, traces)
+        return replace(next(iter(runs.values())), result=result)
+
+    def _of_one(self, log: Path, read: Log, robot: str) -> RunFinished:
+        """What a log says of its only robot, or of one of several."""
         about, case = read.about, read.about.case
         key = about.key
         if self._criteria is None:
-            spec = criteria_of_text(about.scenario, str(log), about.facts)
+            spec = criteria_of_text(about.scenario, str(log), about.facts, robot)
             expected = expectation_of(spec)
             result = result_of(key, str(log), spec.pass_, read.trace, case, metrics=spec.metrics, expected=expected)
             return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=str(log))
+        with _told_from_here(self._criteria):
+            criteria = self._criteria.of(robot)
         # What had to happen stands in the scenario of the log, at lines that the file of criteria does not have.
         case = replace(case, disturbances=tuple(replace(one, line=0) for one in case.disturbances))
-        case = replace(case, masks={**case.masks, **self._masks()})
-        return self._finished(log, key, read.trace, case, Coverage())
+        case = replace(case, masks={**case.masks, **self._masks(criteria)})
+        return self._finished(log, key, read.trace, case, Coverage(), criteria)
 
     def _foreign(self, log: Path) -> RunFinished:
         self.foreign += 1
         if self._criteria is None:
             hint = "say with --scenario what must hold; a file with `pass:` is enough"
             raise InvalidInput([Problem(str(log), 0, 0, "SC801", "not a log of simscen", hint)])
+        with _told_from_here(self._criteria):
+            criteria = self._criteria.of("")
         case = self._foreign_case()
         read = read_foreign(log, replace(self._wanted, goals=tuple(goal.name for goal in case.goals)))
         self.notes += [f"{log}: {note}" for note in read.notes]
         missing = dict(read.coverage.missing)
         if case.footprint:
             del missing[Evidence.FOOTPRINT]
-        return self._finished(log, RunKey(log.stem, 0), read.trace, case, Coverage(missing, read.coverage.partial))
+        return self._finished(
+            log, RunKey(log.stem, 0), read.trace, case, Coverage(missing, read.coverage.partial), criteria
+        )
 
-    def _masks(self) -> Mapping[str, MaskCells]:
-        """The filter masks that the file of criteria names; read once."""
-        assert self._criteria is not None
-        if self._named is None:
-            from simscen.run.foreigncase import masks_of
+    def _masks(self, criteria: LoadedCriteria) -> Mapping[str, MaskCells]:
+        """The filter masks that criteria name; those of a file that is the same for all robots are read once."""
+        if criteria is self._criteria and self._named is not None:
+            return self._named
+        from simscen.run.foreigncase import masks_of
 
-            with _told_from_here(self._criteria):
-                self._named = masks_of(self._criteria) if self._criteria.masks else {}
-        return self._named
+        with _told_from_here(criteria):
+            named = masks_of(criteria) if criteria.masks else {}
+        self._named = named if criteria is self._criteria else self._named
+        return named
 
     def _foreign_case(self) -> Case:
         """What the file of criteria says about the robot's surroundings; read once."""
@@ -107,11 +124,11 @@ class Judging:
                 self._case = case_of(self._criteria, self._world_path)
         return self._case
 
-    def _finished(self, log: Path, key: RunKey, trace: Trace, case: Case, coverage: Coverage) -> RunFinished:
+    def _finished(
+        self, log: Path, key: RunKey, trace: Trace, case: Case, coverage: Coverage, criteria: LoadedCriteria
+    ) -> RunFinished:
         """Judged by the file of criteria."""
-        criteria, file = self._criteria, str(self._scenario)
-        assert criteria is not None
-        spec = criteria.spec
+        file, spec = str(self._scenario), criteria.spec
         expected = expectation_of(spec)
         result = result_of(key, file, spec.pass_, trace, case, criteria.lines, coverage, spec.metrics, expected)
         return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=file)

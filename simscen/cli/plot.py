@@ -15,6 +15,7 @@ from simscen.core.problems import Problem
 from simscen.core.result import RunResult
 from simscen.judge.result import result_of
 from simscen.judge.resultdata import from_json
+from simscen.judge.several import together
 from simscen.loading.resolved import criteria_of_text
 from simscen.record.replay import Log, read_run
 
@@ -50,18 +51,25 @@ def _log(run: Path) -> Path:
 
 
 def _draw(log: Log, file: Path, picture: Path) -> None:
-    from simscen.report.picture import Scene, write_picture
+    from simscen.report.picture import Scene, with_robots, write_picture
 
     scene = Scene(log.trace, log.about.case, log.about.map or _nothing(log), _result(log, file))
-    save(picture, lambda path: write_picture(scene, path), [file])
+    robots = {name: (one.trace, one.about.case) for name, one in log.robots.items()}
+    save(picture, lambda path: write_picture(with_robots(scene, robots), path), [file])
 
 
 def _result(log: Log, file: Path) -> RunResult:
     """What the run said of itself; for one that broke off, what its criteria say of what there is."""
     if log.result:
         return from_json(log.result)
+    results = {name: _judged(one, file, name) for name, one in (log.robots or {"": log}).items()}
+    traces = {name: one.trace for name, one in log.robots.items()}
+    return together(results, traces) if traces else results[""]
+
+
+def _judged(log: Log, file: Path, robot: str) -> RunResult:
     about = log.about
-    spec = criteria_of_text(about.scenario, str(file), about.facts)
+    spec = criteria_of_text(about.scenario, str(file), about.facts, robot)
     return result_of(about.key, about.name, spec.pass_, log.trace, about.case, metrics=spec.metrics)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import simscen.sim.simulation
 import simscen.stack.build  # noqa: F401 - engines are imported here so that the forks need not
 from simscen.core.run import Run
-from simscen.report.picture import Scene, write_picture
+from simscen.report.picture import Scene, with_robots, write_picture
 from simscen.run.perform import perform
 from simscen.run.prepare import Prepared
 from simscen.run.prepared_cache import PreparedCache
@@ -51,7 +51,8 @@ def _perform(job: Job, tell: Callable[[float], None]) -> dict[str, Any]:
 def _finish(prepared: Prepared, run: Run, folder: Path) -> None:
     world = prepared.built.world
     scene = Scene(run.trace, run.case, prepared.built.map, run.result, world.places, world.bodies)
-    write_picture(scene, folder / "map.png")
+    robots = {name: (one.trace, one.case) for name, one in run.robots.items()}
+    write_picture(with_robots(scene, robots), folder / "map.png")
 
 
 if __name__ == "__main__":

@@ -11,9 +11,10 @@ from simscen.loading.assets import Assets
 from simscen.loading.document import Library
 from simscen.loading.loaded import JudgedMask, LoadedRobot, LoadedWorld
 from simscen.loading.masks import judged_masks
+from simscen.loading.messages import quoted
 from simscen.loading.paths import Fence
 from simscen.loading.placing import NO_WORLD, placed, places_of, unknown_places, unplaced
-from simscen.loading.tree import Fields, Leaf, at, value_place
+from simscen.loading.tree import Fields, Leaf, at, key_place, value_place
 from simscen.loading.validation import check
 from simscen.model.criteria_file import CriteriaSpec
 from simscen.model.world import WorldSpec
@@ -32,6 +33,21 @@ class LoadedCriteria:
     tree: Fields = field(repr=False)
     library: Library = field(repr=False)
     masks: Mapping[str, JudgedMask] = field(default_factory=dict)
+
+    def of(self, robot: str) -> "LoadedCriteria":
+        """What must hold for one of several robots, "" for the only one of a log. Raises InvalidInput.
+
+        A file that says nothing of single robots holds for each.
+        """
+        views = robots.each_of(self.tree)
+        if robot in views:
+            return _loaded(self.file, views[robot], self.library)
+        if not views:
+            return self
+        what = f"the log has a robot {quoted(robot)}, of which nothing is said here"
+        message = what if robot else "the log is of one robot, and here are several"
+        problem = Problem(*key_place(self.tree, (robots.ROBOTS,)), code="SC030", message=message)
+        raise InvalidInput(self.library.with_source([problem]))
 
     def surroundings(self) -> tuple[LoadedWorld | None, LoadedRobot | None]:
         """The world and the robot that the file names, if any. Raises InvalidInput."""
@@ -57,7 +73,15 @@ def load_criteria(path: Path, root: Path, world_path: Sequence[Path] = ()) -> Lo
     if problems or not isinstance(tree, Fields):
         spec = [] if problems or tree is None else check(CriteriaSpec, tree, robots.judging)
         raise InvalidInput(library.with_source([*problems, *(spec if isinstance(spec, list) else ())]))
-    spec = check(CriteriaSpec, tree, robots.judging)
+    wrong = check(CriteriaSpec, tree, robots.judging)
+    if isinstance(wrong, list):
+        raise InvalidInput(library.with_source(wrong))
+    return _loaded(file, tree, library)
+
+
+def _loaded(file: Path, tree: Fields, library: Library) -> LoadedCriteria:
+    """What a sound tree says must hold; what it names that there is not is told."""
+    spec = check(CriteriaSpec, tree)
     if isinstance(spec, list):
         raise InvalidInput(library.with_source(spec))
     assets = Assets(library)

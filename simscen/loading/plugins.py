@@ -13,8 +13,8 @@ _FACT = "plugin."
 
 
 def plugins_of(loaded: LoadedScenario) -> tuple[Entry, ...]:
-    """What the scenario and its robot take from installed packages, sorted."""
-    return used_by(loaded.spec, loaded.robot.spec)
+    """What the scenario and its robots take from installed packages, sorted."""
+    return used_by(loaded.spec, *(view.robot.spec for view in loaded.each.values()))
 
 
 def plugins_of_all(scenarios: Iterable[LoadedScenario]) -> tuple[Entry, ...]:

@@ -8,6 +8,7 @@ from simscen.loading.compose import compose
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.placing import placed_criteria, places_of
 from simscen.loading.plugins import absent
+from simscen.loading.robots import each_of
 from simscen.loading.tree import Fields, Node
 from simscen.loading.validation import Model, check
 from simscen.loading.writing import to_yaml
@@ -36,8 +37,9 @@ def spec_of_text(text: str, name: str) -> ScenarioSpec:
     return _checked(ScenarioSpec, _read(text, name))
 
 
-def criteria_of_text(text: str, name: str, facts: Mapping[str, str]) -> CriteriaSpec:
-    """What a resolved text says must hold; `name` is what problems call it, `facts` are those of the log it is from.
+def criteria_of_text(text: str, name: str, facts: Mapping[str, str], robot: str = "") -> CriteriaSpec:
+    """What a resolved text says must hold; `name` is what problems call it, `facts` are those of the log it is from,
+    `robot` the one of several that is meant.
 
     Only that is looked at: what else of installed packages the run was made with need not be there to judge it. Raises
     InvalidInput, also where a criterion is not installed that judged the run then.
@@ -46,6 +48,7 @@ def criteria_of_text(text: str, name: str, facts: Mapping[str, str]) -> Criteria
         raise InvalidInput([replace(problem, path=name) for problem in missing])
     tree = _read(text, name)
     if isinstance(tree, Fields):
+        tree = each_of(tree)[robot] if robot else tree
         tree = replace(tree, entries={key: entry for key, entry in tree.entries.items() if key in _JUDGED})
     return _checked(CriteriaSpec, tree)
 

@@ -46,6 +46,11 @@ class Log:
     complete: bool
     robots: Mapping[str, "Log"] = field(default_factory=dict)
 
+    @property
+    def traces(self) -> list[Trace]:
+        """What happened to each robot."""
+        return [log.trace for log in self.robots.values()] or [self.trace]
+
 
 def read_run(path: Path) -> Log:
     """Read a log to judge or draw its run. Raises InvalidInput as `read_log` does, and where there is no truth."""

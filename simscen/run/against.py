@@ -51,7 +51,8 @@ def _disagreement(here: Path, there: Path) -> str | None:
     said, was = (_statuses(from_json(log.result)) for log in (now, then))
     changed = [name for name in {**was, **said} if said.get(name) != was.get(name)]
     told = [f"{name}: {said.get(name, 'absent')} instead of {was.get(name, 'absent')}" for name in changed]
-    return "; ".join(told) or first_disagreement(now.trace, then.trace)
+    pairs = zip(now.traces, then.traces, strict=False)
+    return "; ".join(told) or next((parts for pair in pairs if (parts := first_disagreement(*pair))), None)
 
 
 def _statuses(result: RunResult) -> dict[str, str]:

@@ -5,7 +5,7 @@ import json
 import platform
 from pathlib import Path
 
-from simscen.loading.loaded import LoadedScenario
+from simscen.loading.loaded import LoadedMap, LoadedScenario
 from simscen.loading.plugins import plugins_of
 from simscen.run.plugincode import fingerprints
 from simscen.run.versions import arithmetic, code, cpu_flags, versions
@@ -45,10 +45,11 @@ def _circumstances(loaded: LoadedScenario) -> dict[str, object]:
 
 def _named(loaded: LoadedScenario) -> list[Path]:
     """Map images, SDF and URDF files."""
-    maps = [loaded.world.map, *([] if loaded.map is None or loaded.map == "none" else [loaded.map])]
+    views = list(loaded.each.values())
+    maps = [loaded.world.map, *(view.map for view in views if view.map != "none")]
     return [
-        *(found.image for found in maps if found),
-        *(file for file in (loaded.world.sdf, loaded.robot.urdf) if file),
+        *(found.image for found in maps if isinstance(found, LoadedMap)),
+        *(file for file in (loaded.world.sdf, *(view.robot.urdf for view in views)) if file),
     ]
 
 

@@ -117,8 +117,12 @@ def compared(run: RunFinished, twin: RunFinished | None) -> RunFinished:
     from simscen.record.difference import first_difference
     from simscen.record.replay import read_log
 
-    logs = [read_log(Path(path)).trace for path in (twin.artifacts.mcap, run.artifacts.mcap)]
-    where = first_difference(*logs) or "the logs differ in something that is not part of the trace"
+    logs = [read_log(Path(path)) for path in (twin.artifacts.mcap, run.artifacts.mcap)]
+    pairs = zip(*(log.traces for log in logs), strict=False)
+    where = (
+        next((told for pair in pairs if (told := first_difference(*pair))), "")
+        or "the logs differ in something that is not part of the trace"
+    )
     failure = RunFailure("nondeterministic", f"two runs with the same seed differ: {where}")
     return replace(run, result=replace(run.result, outcome=Outcome.ERROR, error=failure))
 

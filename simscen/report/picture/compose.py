@@ -39,14 +39,16 @@ def _map(scene: Scene) -> Image.Image:
     canvas = Canvas(bounds, _scale(bounds), palette.UNKNOWN)
     ground.lay(canvas, scene.map)
     marks.draw_places(canvas, scene)
-    marks.draw_plans(canvas, scene)
-    marks.draw_goals(canvas, scene)
+    for draw_mark in (marks.draw_plans, marks.draw_goals):
+        for robot in scene.each:
+            draw_mark(canvas, robot)
     marks.draw_objects(canvas, scene)
-    marks.draw_truth(canvas, scene)
-    marks.draw_belief(canvas, scene)
-    marks.draw_robot(canvas, scene)
-    marks.draw_marks(canvas, scene)
-    marks.draw_collisions(canvas, scene)
+    for draw_mark in (marks.draw_truth, marks.draw_belief, marks.draw_robot):
+        for robot in scene.each:
+            draw_mark(canvas, robot)
+    for robot in scene.each:
+        marks.draw_marks(canvas, robot)
+        marks.draw_collisions(canvas, robot)
     marks.draw_violations(canvas, scene)
     _scale_bar(canvas)
     return canvas.finish()
@@ -54,8 +56,9 @@ def _map(scene: Scene) -> Image.Image:
 
 def _shown(scene: Scene) -> Array:
     """Points that must be on the picture. Where things are parked far away until they are needed is not."""
-    goals = np.array([(goal.pose.x, goal.pose.y) for goal in scene.case.every_goal]).reshape(-1, 2)
-    return np.vstack((goals, scene.trace.truth.values[:, :2]))
+    goals = [(goal.pose.x, goal.pose.y) for robot in scene.each for goal in robot.case.every_goal]
+    ways = [robot.trace.truth.values[:, :2] for robot in scene.each]
+    return np.vstack((np.array(goals).reshape(-1, 2), *ways))
 
 
 def _scale(bounds: Bounds) -> float:

@@ -26,7 +26,8 @@ _BANDS = 48
 
 def draw_places(canvas: Canvas, scene: Scene) -> None:
     """Named places that are no goals: a small diamond and the name."""
-    taken = {(round(goal.pose.x, 3), round(goal.pose.y, 3)) for goal in scene.case.every_goal}
+    goals = [goal.pose for robot in scene.each for goal in robot.case.every_goal]
+    taken = {(round(pose.x, 3), round(pose.y, 3)) for pose in goals}
     for name, pose in sorted(scene.places.items()):
         if (round(pose.x, 3), round(pose.y, 3)) in taken or not _visible(canvas, pose):
             continue
@@ -51,7 +52,7 @@ def draw_objects(canvas: Canvas, scene: Scene) -> None:
     """
     shapes = outlines(scene.trace, scene.bodies)
     spawned = {event.name: pose_of(event) for event in scene.trace.of_kind(EventKind.OBJECT_SPAWNED)}
-    for name in sorted(shapes):
+    for name in sorted(set(shapes) - set(scene.robots)):
         samples = scene.trace.objects.get(name)
         last = spawned.get(name)
         if samples is not None and len(samples):
@@ -104,7 +105,9 @@ def draw_goals(canvas: Canvas, scene: Scene) -> None:
         canvas.disc(x, y, 2.6, palette.GOAL)
         if told := names.pop((x, y), None):
             u, v = canvas.pixel(x, y)
-            canvas.note(Note(u, v - reach - 12, shown(", ".join(told)), 14, palette.GOAL, "mm", halo=palette.FREE))
+            canvas.note(
+                Note(u, v - reach - 12, shown(scene.called(", ".join(told))), 14, palette.GOAL, "mm", halo=palette.FREE)
+            )
 
 
 def draw_robot(canvas: Canvas, scene: Scene) -> None:
@@ -118,7 +121,7 @@ def draw_robot(canvas: Canvas, scene: Scene) -> None:
         canvas.polygon(pose.apply(hull), (*colour, strength), colour)
         canvas.polygon(pose.apply(nose), palette.PAGE if strength > 100 else colour)
     u, v = canvas.pixel(first.x, first.y)
-    canvas.note(Note(u, v + 20, "start", 12, palette.START, "mm", halo=palette.FREE))
+    canvas.note(Note(u, v + 20, shown(scene.called("start")), 12, palette.START, "mm", halo=palette.FREE))
 
 
 def draw_marks(canvas: Canvas, scene: Scene) -> None:
