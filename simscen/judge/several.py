@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TypeVar
 
 from simscen.core.disturbance import Happening
+from simscen.core.events import Event
 from simscen.core.result import Outcome, RunFailure, RunResult
 from simscen.core.trace import Trace
 from simscen.core.verdict import Verdict
@@ -13,7 +14,7 @@ from simscen.judge.wording import DISTURBANCE
 
 T = TypeVar("T")
 SUCCESS = "success"
-OF_ALL = ("object.", "event.", "run.")
+OF_ALL = ("object.", "pedestrian.", "event.", "run.")
 """Kinds of events that happen to the world, and are in the log of each robot."""
 
 
@@ -63,12 +64,16 @@ def _named(parts: Mapping[str, Mapping[str, T]]) -> dict[str, T]:
 
 
 def _events(traces: Mapping[str, Trace]) -> dict[str, int]:
-    """How often what happened, each thing once."""
+    """How often what happened, each thing once; that the robots are there is nothing that happens."""
     first = next(iter(traces.values()))
-    counts = Counter(str(event.kind) for event in first.events if str(event.kind).startswith(OF_ALL))
+    counts = Counter(str(event.kind) for event in first.events if _shared(event) and event.name not in traces)
     for trace in traces.values():
-        counts.update(str(event.kind) for event in trace.events if not str(event.kind).startswith(OF_ALL))
+        counts.update(str(event.kind) for event in trace.events if not _shared(event))
     return dict(sorted(counts.items()))
+
+
+def _shared(event: Event) -> bool:
+    return str(event.kind).startswith(OF_ALL)
 
 
 def _happenings(result: RunResult, kind: str) -> list[Happening]:

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 from simscen.loading.tree import Fields, Items, Leaf, Node
+from simscen.spec.places import NAMESPACE
 
 _KINDS = {
     "model_type": "a mapping",
@@ -112,7 +113,8 @@ def explain(kind: str, context: Mapping[str, Any], node: Node, text: str) -> Mes
     if "names" in context:
         hint = suggestion(str(context["value"]), str(context["names"]).split(", "))
         return Message("SC014", f"{shown(node)} is not one of the choices", hint)
-    return _bad_name(node) if kind == "string_pattern_mismatch" else Message("SC011", text[:1].lower() + text[1:])
+    is_name = kind == "string_pattern_mismatch"
+    return _bad_name(node, str(context["pattern"])) if is_name else Message("SC011", text[:1].lower() + text[1:])
 
 
 def _type_hint(kind: str, node: Node) -> str:
@@ -150,10 +152,12 @@ def _choices(expected: str) -> list[str]:
     return [part.strip().strip("'") for part in expected.replace(" or ", ", ").split(",")]
 
 
-def _bad_name(node: Node) -> Message:
+def _bad_name(node: Node, pattern: str) -> Message:
     value = node.value if isinstance(node, Leaf) and isinstance(node.value, str) else ""
     control = next((c for c in value if not c.isprintable()), None)
     if control is not None:
         return Message("SC017", f"control character U+{ord(control):04X} in {quoted(value)}", "remove it")
     hint = "begin with a letter or `_`, then letters, digits, spaces, `_`, `.` and `-`"
+    if pattern == NAMESPACE:
+        hint = "it is a namespace in ROS, too: begin with a letter, then letters, digits, and single `_` between them"
     return Message("SC017", f"{quoted(value)} cannot be a name here", hint)

@@ -101,6 +101,8 @@ def _with_choice(
     spec = check(ScenarioSpec, tree, robots.lacking)
     if isinstance(spec, list):
         return library.with_source(sorted([*spec, *_problems_of_world(tree, library)]))
+    if problems := list(whose(spec, tree)):
+        return library.with_source(problems)
     loaded = _several(spec, tree, library, file, choice) if spec.robots else _one(spec, tree, library, file)
     if isinstance(loaded, list):
         return loaded
@@ -128,10 +130,8 @@ def _several(
     spec: ScenarioSpec, tree: Fields, library: Library, file: Path, choice: StackChoice | None
 ) -> LoadedScenario | list[Problem]:
     """A scenario of several robots; what is wrong is told once, whomever of them it concerns."""
-    if problems := list(whose(spec, tree)):
-        return library.with_source(problems)
     views: dict[str, LoadedScenario] = {}
-    problems = []
+    problems: list[Problem] = []
     for name, part in robots.each_of(tree).items():
         own = with_stack(part, choice) if choice is not None else part
         one = check(ScenarioSpec, own)

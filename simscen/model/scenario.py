@@ -144,7 +144,7 @@ class OneOfSeveral(RobotEntry):
     """The map this robot gets; `none` = no map, odometry only."""
     stack: AnyStack | None = None
     """What its stack has otherwise than that of all."""
-    goals: Annotated[list[GoalEntry], Field(max_length=MOST_GOALS)] = []
+    goals: Annotated[list[Annotated[GoalEntry, PlaceAlone("pose")]], Field(max_length=MOST_GOALS)] = []
     """In this order; a robot without goals stands where it is."""
     navigation: Navigation | None = None
     """Which action takes its goals, and how often."""

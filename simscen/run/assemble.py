@@ -135,7 +135,7 @@ def _agent(
         stack=stack,
         faults=faults,
         stage=stage,
-        ending=Ending(clock, spec.time_limit, spec.linger),
+        ending=Ending(clock, spec.time_limit, spec.linger, idle=bool(name) and not prepared.case.goals),
         timetable=Timetable((truth_period, control_period, *senses.periods)),
         truth_period=truth_period,
     )

@@ -17,10 +17,11 @@ class Ending:
     what is derived from them (accelerations, windows of time) means the same at its end as before.
     """
 
-    def __init__(self, clock: Clock, time_limit: float, linger: float) -> None:
+    def __init__(self, clock: Clock, time_limit: float, linger: float, idle: bool = False) -> None:
+        """`idle`: the robot has no task until it is given one, so that nobody waits for it."""
         self._limit = clock.ticks(time_limit)
         self._linger = clock.ticks(linger)
-        self._over: int | None = None
+        self._over: int | None = 0 if idle else None
 
     def heard(self, decision: Decision) -> None:
         """What the stack decided at a beat; tell each of them."""

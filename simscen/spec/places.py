@@ -14,7 +14,8 @@ Name = Annotated[
     StringConstraints(min_length=1, max_length=120, pattern=r"^[^\x00-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]*$"),
 ]
 # The length stands apart from the pattern: a Unicode `\w` repeated 119 times takes 25 ms to compile, at every start.
-RobotName = Annotated[str, StringConstraints(max_length=40, pattern=r"^[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*$")]
+NAMESPACE = r"^[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*$"
+RobotName = Annotated[str, StringConstraints(max_length=40, pattern=NAMESPACE)]
 """What one of several robots is called, which is its namespace in ROS, too."""
 PlaceName = Annotated[str, StringConstraints(max_length=120, pattern=r"^[A-Za-z_][\w .-]*$")]
 Point = Annotated[list[Length], Field(min_length=2, max_length=2)]

@@ -6,6 +6,7 @@ from simscen.actions.action import AnyAction
 from simscen.actions.base import Action
 from simscen.core.problems import Problem
 from simscen.loading.messages import quoted, suggestion
+from simscen.loading.robots import ROBOTS
 from simscen.loading.sense.specwalk import Keys, below
 from simscen.loading.tree import Fields, key_place, value_place
 from simscen.model.anystack import ExternalStackSpec
@@ -15,29 +16,31 @@ from simscen.triggers.trigger import Test
 
 
 def whose(spec: ScenarioSpec, tree: Fields) -> Iterator[Problem]:
-    """What is wrong with the robots of a scenario of several, before each is looked at for itself."""
-    known = spec.robots or {}
-    for name, robot in known.items():
-        if isinstance(robot.stack if robot.stack is not None else spec.stack, ExternalStackSpec):
-            keys: Keys = ("robots", name, "stack") if robot.stack is not None else ("stack",)
-            hint = "each robot needs a stack in the engine: `reference`, or one of an installed package"
+    """What is wrong with the robots that a scenario names, before each is looked at for itself."""
+    for keys, part in below({"events": spec.events, "faults": spec.faults, ROBOTS: spec.robots or {}}):
+        if isinstance(part, Test | AnyAction) and part.robot is not None and part.robot not in (spec.robots or ()):
+            yield _stranger(spec, tree, part.robot, (*keys, "robot"))
+    if spec.robots:
+        yield from _outsiders(spec, tree)
+        yield from _nobodys(spec, tree)
+
+
+def _stranger(spec: ScenarioSpec, tree: Fields, name: str, keys: Keys) -> Problem:
+    message, hint = f"no robot is called {quoted(name)}", suggestion(name, spec.robots or ())
+    if not spec.robots:
+        message, hint = f"{message}: there is one only, which has no name", "remove `robot`"
+    return Problem(*value_place(tree, keys), "SC030", message, hint)
+
+
+def _outsiders(spec: ScenarioSpec, tree: Fields) -> Iterator[Problem]:
+    """Stacks in processes of their own, each of which would be told that its robot is the only one."""
+    for name, robot in (spec.robots or {}).items():
+        if isinstance(robot.stack or spec.stack, ExternalStackSpec):
+            keys: Keys = (ROBOTS, name, "stack") if robot.stack else ("stack",)
             message = "an external stack drives one robot, and here are several"
+            hint = "each robot needs a stack in the engine: `reference`, or one of an installed package"
             yield Problem(*key_place(tree, keys), "SC042", message, hint)
-    for keys, part in below(spec):
-        if not isinstance(part, Test | AnyAction):
-            continue
-        if part.robot is not None and part.robot not in known:
-            place, message = value_place(tree, (*keys, "robot")), f"no robot is called {quoted(part.robot)}"
-            yield Problem(*place, "SC030", message, suggestion(part.robot, known))
-    yield from _nobodys(spec, tree)
-
-
-def only(spec: ScenarioSpec, tree: Fields) -> Iterator[Problem]:
-    """Where a scenario of one robot names one."""
-    for keys, part in below(spec):
-        if isinstance(part, Test | AnyAction) and part.robot is not None:
-            message = f"no robot is called {quoted(part.robot)}: there is one only, which has no name"
-            yield Problem(*value_place(tree, (*keys, "robot")), "SC030", message, "remove `robot`")
+            return
 
 
 def _nobodys(spec: ScenarioSpec, tree: Fields) -> Iterator[Problem]:

@@ -1,0 +1,133 @@
+"""Scenarios of several robots, run: each is on its own, and one result, one log and one picture hold all of it."""
+
+import hashlib
+import json
+
+import pytest
+from mcap.reader import make_reader
+
+from simscen.core.events import EventKind
+from simscen.core.result import Outcome
+from simscen.core.verdict import Status
+from simscen.judge.result import result_of
+from simscen.judge.resultdata import from_json, to_json
+from simscen.judge.several import together
+from simscen.loading.resolved import criteria_of_text
+from simscen.loading.scenario import load_scenario
+from simscen.record.replay import read_log
+from simscen.run.prepare import prepare
+from simscen.run.simulate import simulate
+
+WORLD = """\
+simscen: 1
+time_limit: 20 s
+world:
+  simscen: 1
+  walls: [{name: wall, points: [[0, 0], [30, 0], [30, 6], [0, 6], [0, 0]]}]
+"""
+EAST = "pose: {x: 1, y: 3}, goals: [{name: east, pose: {x: 3, y: 3.4}}]"
+FAR = "pose: {x: 28, y: 3}, goals: [{name: north, pose: {x: 28, y: 4}}]"
+AGAINST = "pose: {x: 2.2, y: 3, yaw: 180 deg}, stack: {collision_monitor: {enabled: false}}"
+PASS = "pass: [{goals_reached: {}}, {collisions: {max: 0}}]\n"
+
+
+@pytest.fixture
+def run(tmp_path):
+    def run(text, name="several"):
+        file = tmp_path / f"{name}.scenario.yaml"
+        file.write_text(WORLD + text)
+        return simulate(prepare(load_scenario(file, tmp_path)), log=tmp_path / f"{name}.mcap")
+
+    return run
+
+
+def messages(log, robot, seconds):
+    """All that is written of a robot at first, but where the others are."""
+    sha = hashlib.sha256()
+    with log.open("rb") as stream:
+        for _, channel, message in make_reader(stream).iter_messages(end_time=int(seconds * 1e9)):
+            if channel.topic.startswith(f"/{robot}/") and b"object" not in message.data:
+                sha.update(f"{channel.topic} {message.log_time} ".encode() + message.data)
+    return sha.hexdigest()
+
+
+def test_who_else_is_there_changes_nothing_for_a_robot_that_never_meets_them(run):
+    two = run(f"robots: {{b: {{{FAR}}}, a: {{{EAST}}}}}\n{PASS}", "two")
+    three = run(
+        f"robots: {{a: {{{EAST}}}, b: {{{FAR}, model: jackal}}, c: {{pose: {{x: 25, y: 1}}}}}}\n"
+        "pass: [{collisions: {max: 0}}]\n",
+        "three",
+    )
+    assert two.passed
+    assert messages(two.log, "a", 5) == messages(three.log, "a", 5)
+
+
+def test_verdicts_metrics_and_faults_are_each_robots_and_events_are_the_worlds(run):
+    done = run(
+        f"robots: {{a: {{{EAST}, faults: [{{sensor: lidar, off: {{}}, for: 1 s}}], pass: [{{replans: {{max: 50}}}}]}},"
+        f" b: {{{FAR}}}}}\n"
+        "events: [{name: crate, when: {travelled: 0.5 m, robot: a}, "
+        "do: {spawn: {name: crate, box: [0.3, 0.3, 0.3], pose: {x: 20, y: 1}}}}]\n" + PASS
+    )
+    result = done.result
+    assert [verdict.id for verdict in result.verdicts] == [
+        "a/goals_reached", "a/collisions", "a/replans", "b/goals_reached", "b/collisions"
+    ]  # fmt: skip
+    assert result.outcome is Outcome.PASSED
+    assert [one.ordered.name for one in result.disturbances] == ["crate", "a/lidar.off"]
+    assert result.metrics["a/path_length"] > 1.5 > result.metrics["b/path_length"]
+    assert result.metrics["success"] == 1.0
+    assert result.events["object.spawned"] == 1
+    assert result.events["goal.reached"] == 2
+    for robot in done.robots.values():
+        assert {event.name for event in robot.trace.of_kind(EventKind.EVENT_STARTED)} == {"crate"}
+    assert not done.robots["b"].trace.of_kind(EventKind.FAULT_STARTED)
+    assert from_json(to_json(result)) == result
+
+
+def test_a_log_says_the_same_of_each_robot_as_the_run_did(run):
+    done = run(f"robots: {{a: {{{EAST}}}, b: {{{AGAINST}}}}}\n{PASS.replace('{goals_reached: {}}, ', '')}")
+    log = read_log(done.log)
+    assert list(log.robots) == ["a", "b"]
+    for name, one in log.robots.items():
+        assert one.about.case == done.robots[name].case
+        assert one.trace.truth.values.tobytes() == done.robots[name].trace.truth.values.tobytes()
+        assert one.trace.events == done.robots[name].trace.events
+    results = {
+        name: result_of(
+            one.about.key, "log", criteria_of_text(one.about.scenario, "log", one.about.facts, name).pass_,
+            one.trace, one.about.case,
+        )
+        for name, one in log.robots.items()
+    }  # fmt: skip
+    again = together(results, {name: one.trace for name, one in log.robots.items()})
+    assert [(v.id, v.findings) for v in again.verdicts] == [(v.id, v.findings) for v in done.result.verdicts]
+    assert json.loads(log.result)["verdicts"]
+
+
+def test_one_robot_that_fails_fails_the_run_and_says_which_it_was(run):
+    done = run(f"robots: {{a: {{{EAST}, pass: [{{path_length: {{max: 0.1 m}}}}]}}, b: {{{FAR}}}}}\n{PASS}")
+    assert done.result.outcome is Outcome.FAILED
+    assert [v.id for v in done.result.verdicts if v.status is Status.FAIL] == ["a/path_length"]
+    assert done.robots["b"].passed
+
+
+def test_a_run_ends_when_all_robots_have_and_one_without_a_goal_is_not_waited_for(run):
+    near = FAR.replace("y: 4", "y: 3.3")
+    done = run(
+        f"robots: {{a: {{{EAST}}}, b: {{{near}}}, c: {{pose: {{x: 20, y: 3}}}}}}\npass: [{{collisions: {{}}}}]\n"
+    )
+    ended = [robot.trace.of_kind(EventKind.NAVIGATION_ENDED) for robot in done.robots.values()]
+    assert [len(events) for events in ended] == [1, 1, 0]
+    assert done.result.ended == "navigation ended"
+    last = max(events[0].tick for events in ended if events)
+    assert {robot.trace.end for robot in done.robots.values()} == {last + 120}
+
+
+def test_an_event_that_never_happens_is_told_once(run):
+    done = run(
+        f"robots: {{a: {{{EAST}}}, b: {{{FAR}}}}}\n"
+        "events: [{name: crash, when: {robot_within: {object: b, distance: 1 m}, robot: a}, "
+        "do: {push: {impulse: [1, 0]}, robot: b}}]\n" + PASS
+    )
+    assert [v.id for v in done.result.verdicts if v.status is Status.FAIL] == ["crash"]
