@@ -67,7 +67,9 @@ class Judging:
             return self._of_one(log, read, "")
         runs = {name: self._of_one(log, one, name) for name, one in read.robots.items()}
         traces = {name: one.trace for name, one in read.robots.items()}
-        result = together({name: run.result for name, run in runs.items()}, traces)
+        said = criteria_of_text(read.about.scenario, str(log), read.about.facts)
+        expected = expectation_of(said if self._criteria is None else self._criteria.spec)
+        result = together({name: run.result for name, run in runs.items()}, traces, expected)
         return replace(next(iter(runs.values())), result=result)
 
     def _of_one(self, log: Path, read: Log, robot: str) -> RunFinished:

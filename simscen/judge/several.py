@@ -7,9 +7,12 @@ from typing import TypeVar
 
 from simscen.core.disturbance import Happening
 from simscen.core.events import Event
+from simscen.core.expectation import Expectation
 from simscen.core.result import Outcome, RunFailure, RunResult
 from simscen.core.trace import Trace
 from simscen.core.verdict import Verdict
+from simscen.criteria.moments import finished
+from simscen.judge.expected import as_expected
 from simscen.judge.wording import DISTURBANCE
 
 T = TypeVar("T")
@@ -18,10 +21,13 @@ OF_ALL = ("object.", "pedestrian.", "event.", "run.")
 """Kinds of events that happen to the world, and are in the log of each robot."""
 
 
-def together(results: Mapping[str, RunResult], traces: Mapping[str, Trace]) -> RunResult:
+def together(
+    results: Mapping[str, RunResult], traces: Mapping[str, Trace], expected: Expectation | None = None
+) -> RunResult:
     """One result: all passes where each does; verdicts, metrics and faults are called `robot/name`.
 
-    What happens to the world has no robot and is told once. The metric `success` is there for the run as well.
+    What happens to the world has no robot and is told once. The metric `success` is there for the run as well. The run
+    may be `expected` to fail.
     """
     first = next(iter(results.values()))
     shared = {one.ordered.name for one in first.disturbances if one.ordered.kind == "event"}
@@ -29,12 +35,16 @@ def together(results: Mapping[str, RunResult], traces: Mapping[str, Trace]) -> R
     for name, result in results.items():
         own = ((verdict, line) for verdict, line in _lined(result) if not _of_the_world(verdict, shared))
         told += [(replace(verdict, id=f"{name}/{verdict.id}"), line) for verdict, line in own]
+    verdicts = tuple(verdict for verdict, _ in told)
+    came_out, on_that = as_expected(expected, verdicts, _worst(results), all(map(finished, traces.values())))
+    if expected is not None and on_that is not None:
+        told.append((on_that, expected.line))
     errors = [(name, result.error) for name, result in results.items() if result.error is not None]
     successes = [result.metrics.get(SUCCESS) for result in results.values()]
     success = None if None in successes else min(value for value in successes if value is not None)
     return replace(
         first,
-        outcome=_worst(results),
+        outcome=came_out,
         verdicts=tuple(verdict for verdict, _ in told),
         lines=tuple(line for _, line in told) if first.lines else (),
         metrics={SUCCESS: success, **_named({name: result.metrics for name, result in results.items()})},
@@ -42,6 +52,7 @@ def together(results: Mapping[str, RunResult], traces: Mapping[str, Trace]) -> R
         events=_events(traces),
         disturbances=(*_happenings(first, "event"), *_faults(results)),
         error=_failure(errors[0][0], errors[0][1]) if errors else None,
+        reason="" if expected is None else expected.reason,
     )
 
 

@@ -7,7 +7,7 @@ from simscen.loading.document import merge
 from simscen.loading.tree import Entry, Fields, Items, Node, child
 from simscen.model.scenario import RobotEntry
 
-ROBOT, ROBOTS, PASS = "robot", "robots", "pass"
+ROBOT, ROBOTS, PASS, EXPECTED = "robot", "robots", "pass", "expected"
 OF_ONE = ("goals", "faults")
 """What a scenario of one robot says at top level, and one of several says of each."""
 
@@ -15,7 +15,7 @@ OF_ONE = ("goals", "faults")
 def each_of(tree: Fields) -> dict[str, Fields]:
     """The scenario as each of its robots sees it, by name in order; empty where it has one robot.
 
-    Each part is where it is written, so that problems are told there.
+    Each part is where it is written, so that problems are told there. That the run is expected to fail is said of all.
     """
     robots = child(tree, ROBOTS)
     entries = robots.entries if isinstance(robots, Fields) else {}
@@ -27,7 +27,7 @@ def _of_one(tree: Fields, entry: Entry) -> Fields:
     assert isinstance(said, Fields)
     robot = {key: value for key, value in said.entries.items() if key in RobotEntry.model_fields}
     own = {key: value for key, value in said.entries.items() if key not in robot and key != PASS}
-    whole = merge(Fields(tree.place, own), _without(tree, ROBOTS))
+    whole = merge(Fields(tree.place, own), _without(tree, ROBOTS, EXPECTED))
     criteria = Items(tree.place, (*_items(child(tree, PASS)), *_items(child(said, PASS))))
     return Fields(
         tree.place,

@@ -101,7 +101,7 @@ def judged(prepared: Prepared, seed: int, traces: Mapping[str, Trace], log: Path
     if not prepared.robots:
         return _judged(prepared, seed, traces[NAMELESS], log)
     runs = {name: _judged(part, seed, traces[name], log) for name, part in prepared.robots.items()}
-    result = together({name: run.result for name, run in runs.items()}, traces)
+    result = together({name: run.result for name, run in runs.items()}, traces, prepared.loaded.expectation)
     return replace(next(iter(runs.values())), result=result, robots=runs)
 
 
