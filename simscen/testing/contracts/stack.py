@@ -24,7 +24,7 @@ from simscen.testing.promise import Contract, demand, promise
 
 START, NEAR, FAR = Pose2(1, 2), Goal("near", Pose2(1.8, 2.0, 0.0)), Goal("far", Pose2(5, 2, 0.0))
 ASIDE = Goal("aside", Pose2(1.5, 3.2, 1.5))
-ENDINGS = {EventKind.GOAL_REACHED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED}
+ENDINGS = {EventKind.GOAL_REACHED, EventKind.GOAL_PASSED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED}
 
 
 class Heard:

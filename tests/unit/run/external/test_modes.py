@@ -1,0 +1,120 @@
+"""Goals that are passed, waited at and driven in loops, behind the protocol; and stacks that know nothing of that."""
+
+import pytest
+from stack_programs import DRIVE
+
+from simscen.core.errors import RunError
+from simscen.core.result import Outcome
+
+OLD = 'peer = Peer("mine", "2.1", topics=["/odom"])\n'
+KNOWS = OLD.replace(")\n", ', modes=["navigate_to_pose", "navigate_through_poses", "follow_waypoints"])\n')
+AT_ONCE = "for step in peer:\n    if peer.goals.accept(): peer.goals.reached()\n    step.drive(0.0, 0.0)\n"
+THREE = "[{name: a, pose: {x: 2, y: 1}}, {name: b, pose: {x: 3, y: 1}}, {name: c, pose: {x: 1, y: 1}}]"
+THROUGH = {"navigation": "{mode: navigate_through_poses, loops: 2}", "goals": THREE}
+
+
+def told(run) -> list[tuple[int, str, str]]:
+    return [
+        (event.tick, str(event.kind), event.name)
+        for event in run.trace.events
+        if event.kind.split(".")[0] in ("goal", "navigation")
+    ]
+
+
+def kinds(run) -> list[tuple[str, str]]:
+    return [(kind, name) for _, kind, name in told(run) if kind != "goal.accepted"]
+
+
+@pytest.mark.parametrize("mode", ["navigate_through_poses", "follow_waypoints"])
+def test_a_stack_that_does_not_know_the_mode_is_told_apart_from_one_that_fails(play, mode: str) -> None:
+    with pytest.raises(RunError) as error:
+        play(OLD + DRIVE, navigation=f"{{mode: {mode}}}")
+    assert error.value.kind == "stack-protocol"
+    assert f"sends goals by {mode}, which this stack does not know; it knows navigate_to_pose" in str(error.value)
+
+
+def test_a_stack_that_says_nothing_of_modes_takes_goals_one_after_the_other(play) -> None:
+    older = "import json\n" + OLD.replace("Peer(", "Older(").replace(
+        "peer =",
+        "class Older(Peer):\n"
+        "    pass\n"
+        "send = Connection.send_json\n"
+        "Connection.send_json = lambda self, kind, told: send(\n"
+        "    self, kind, {key: value for key, value in told.items() if key != 'modes'})\n"
+        "peer =",
+    )
+    assert play(older + DRIVE).result.outcome is Outcome.PASSED
+    with pytest.raises(RunError, match="does not know"):
+        play(older + DRIVE, navigation="{mode: follow_waypoints}")
+
+
+def test_what_is_reached_on_the_way_is_passed_in_each_loop(play) -> None:
+    run = play(KNOWS + AT_ONCE, **THROUGH)
+    assert kinds(run) == [
+        ("goal.passed", "a"),
+        ("goal.passed", "b"),
+        ("goal.reached", "c"),
+        ("goal.passed", "a#2"),
+        ("goal.passed", "b#2"),
+        ("goal.reached", "c#2"),
+        ("navigation.ended", "SUCCEEDED"),
+    ]
+    assert run.result.outcome is Outcome.FAILED  # it never left its place
+    wrong = {f.what for v in run.result.verdicts for f in v.findings if f.status.value == "fail"}
+    assert wrong == {"goal a", "goal b", "goal a#2", "goal b#2"}
+
+
+def test_a_drive_fails_as_a_whole_and_the_next_loop_follows(play) -> None:
+    text = (
+        "for step in peer:\n    if peer.goals.accept(): peer.goals.failed(308, go_on=True)\n    step.drive(0.0, 0.0)\n"
+    )
+    run = play(KNOWS + text, on_goal_failure="continue", **THROUGH)
+    assert kinds(run) == [
+        *(("goal.failed", name) for name in ("a", "b", "c", "a#2", "b#2", "c#2")),
+        ("navigation.ended", "FAILED"),
+    ]
+    failed = next(event for event in run.trace.events if event.kind == "goal.failed")
+    assert failed.data["error_name"] == "NO_VALID_PATH"
+
+
+def test_a_wait_is_kept_by_the_peer_and_by_the_engine(play) -> None:
+    goals = (
+        "[{name: a, pose: {x: 1, y: 1}, on_reached: {wait: 0.5}}, {name: b, pose: {x: 1, y: 1}, on_reached: {wait: 1}}]"
+    )
+    run = play(KNOWS + AT_ONCE, goals=goals, navigation="{mode: follow_waypoints}")
+    assert told(run) == [
+        (0, "goal.accepted", "a"),
+        (0, "goal.reached", "a"),
+        (120, "goal.accepted", "b"),
+        (120, "goal.reached", "b"),
+        (360, "navigation.ended", "SUCCEEDED"),
+    ]
+    assert run.result.outcome is Outcome.PASSED
+
+
+@pytest.mark.parametrize(
+    ("said", "says"),
+    [
+        ([("goal.accepted", "a"), ("goal.reached", "a"), ("goal.accepted", "b")], "is to stay where it is for a while"),
+        ([("goal.accepted", "a"), ("goal.passed", "a")], "which is a goal to stop at"),
+        ([("goal.passed", "a")], "none is under way"),
+    ],
+)
+def test_a_word_that_cannot_be_is_an_error(play, said, says: str) -> None:
+    lines = "".join(f"    peer.goals.say({kind!r}, {name!r})\n" for kind, name in said)
+    goals = "[{name: a, pose: {x: 1, y: 1}, on_reached: {wait: 0.5}}, {name: b, pose: {x: 2, y: 1}}]"
+    with pytest.raises(RunError, match=says) as error:
+        play(KNOWS + "for step in peer:\n" + lines + "    step.drive(0.0, 0.0)\n", goals=goals)
+    assert error.value.kind == "stack-protocol"
+
+
+def test_another_goal_ends_the_drive_for_all_its_poses(play) -> None:
+    events = "[{when: {time: 0.5}, do: {new_goal: {name: detour, pose: {x: 1, y: 2}}}}]"
+    accept = "for step in peer:\n    goal = peer.goals.accept()\n"
+    text = accept + "    if goal and step.seconds > 1: peer.goals.reached()\n    step.drive(0.0, 0.0)\n"
+    run = play(KNOWS + text, events=events, **THROUGH)
+    assert kinds(run)[:5] == [
+        *(("goal.canceled", name) for name in "abc"),
+        ("goal.reached", "detour"),
+        ("goal.passed", "a#2"),
+    ]
