@@ -4,6 +4,8 @@ import os
 from pathlib import Path
 
 PLUGINS = "PYDANTIC_DISABLE_PLUGINS"
+COMPLETE = "_SIMSCEN_COMPLETE"
+"""By this variable a shell says that it wants to know what may be typed next; the name is click's."""
 _AT_START = os.environ.get(PLUGINS)
 """As the caller had it: `simscen` sets it for itself before anything else."""
 

@@ -56,6 +56,8 @@ class Topic:
     rows: tuple[Field, ...] = ()
     origin: str = ""
     """The package that adds it, and its version; "" for what simscen ships."""
+    alias: str = ""
+    """What else it is called: the number of a code."""
 
     @property
     def fields(self) -> list[Field]:

@@ -6,8 +6,11 @@ from typing import Annotated
 
 import typer
 
+from simscen.cli import completing
 from simscen.cli.catalogue import OPTIONAL, Field, Topic, topics
+from simscen.cli.codetopics import code_topics
 from simscen.cli.diagnostics import print_text
+from simscen.cli.keytopics import key_topics, keys_of_topics
 from simscen.cli.metrics import metric_topics
 from simscen.cli.signals import signal_topics
 from simscen.core.errors import UsageError
@@ -16,15 +19,18 @@ from simscen.loading.messages import quoted, suggestion
 
 
 def command(
-    name: Annotated[str, typer.Argument(help="What to explain; nothing = list what there is.")] = "",
+    name: Annotated[
+        str, typer.Argument(help="What to explain; nothing = list what there is.", autocompletion=completing.topics)
+    ] = "",
     page: Annotated[
         bool, typer.Option("--page", help="Print the reference of the language, with what is installed, as Markdown.")
     ] = False,
 ) -> None:
-    """Explain a trigger, action, fault, criterion, signal, metric, component or error code.
+    """Explain a word of the language, a key, a signal, a metric, a component or a code.
 
-    For example `simscen explain stopped_within`, `simscen explain amcl`, `simscen explain SC012`. Where a name means
-    several things, all are explained; `simscen explain trigger.localization_error` picks one.
+    For example `simscen explain stopped_within`, `explain amcl`, `explain amcl.update_min_a`, `explain goals.pose`,
+    `explain GOAL_OCCUPIED` or its number 206, `explain crashed`, `explain "exit 3"`, `explain SC012`. Where a name
+    means several things, all are explained; `simscen explain trigger.localization_error` picks one.
     """
     if page:
         from simscen.cli.reference import language_page
@@ -34,22 +40,34 @@ def command(
     width = max(40, min(100, shutil.get_terminal_size().columns))
     if not name:
         print_text(_overview(width))
-    elif name.upper() in CODES:
-        print_text(f"{name.upper()}\n{_wrapped(CODES[name.upper()], width, '  ')}")
     else:
-        print_text("\n\n".join(_explained(topic, width) for topic in _called(name)))
+        print_text(explained(name, width))
+
+
+def explained(name: str, width: int = 100) -> str:
+    """All that a name means. Raises UsageError where nothing is called so."""
+    if name.upper() in CODES:
+        return f"{name.upper()}\n{_wrapped(CODES[name.upper()], width, '  ')}"
+    return "\n\n".join(_explained(topic, width) for topic in _called(name))
 
 
 def _everything() -> list[Topic]:
-    return [*topics(installed=True), *signal_topics(), *metric_topics(installed=True)]
+    return [*topics(installed=True), *signal_topics(), *metric_topics(installed=True), *code_topics()]
+
+
+def known_names(keys: bool = False) -> list[str]:
+    """What there is to explain, in order; with `keys` the paths of keys instead."""
+    everything = _everything()
+    return keys_of_topics(everything) if keys else [*dict.fromkeys(topic.name for topic in everything), *CODES]
 
 
 def _called(name: str) -> list[Topic]:
     everything = _everything()
-    found = [topic for topic in everything if name in (topic.name, f"{topic.group}.{topic.name}")]
+    lowered = name.lower()
+    found = [topic for topic in everything if lowered in (name.lower() for name in _names(topic))]
+    found = found or key_topics(name, everything)
     if not found:
-        known = [*dict.fromkeys(topic.name for topic in everything), *CODES]
-        hint = suggestion(name, known)
+        hint = suggestion(name, [*known_names(), *(known_names(keys=True) if "." in name else _bare_keys(everything))])
         raise UsageError(
             f"nothing is called {quoted(name)}; "
             + (hint if hint.startswith("did") else "`simscen explain` lists what there is")
@@ -57,12 +75,22 @@ def _called(name: str) -> list[Topic]:
     return found
 
 
+def _names(topic: Topic) -> tuple[str, ...]:
+    return (topic.name, f"{topic.group}.{topic.name}", *((topic.alias,) if topic.alias else ()))
+
+
+def _bare_keys(everything: list[Topic]) -> list[str]:
+    return [field.key for topic in everything for field in topic.fields]
+
+
 def _overview(width: int) -> str:
     groups: dict[str, list[str]] = {}
     for topic in _everything():
         groups.setdefault(topic.group, []).append(topic.name)
     lines = [f"{group}:\n{_wrapped(', '.join(names), width, '  ')}" for group, names in groups.items()]
-    return "\n".join([*lines, "", "`simscen explain NAME` tells more; error codes such as SC012 are explained, too."])
+    return "\n".join(
+        [*lines, "", "`simscen explain NAME` tells more, also of keys (`amcl.update_min_a`) and of problems (SC012)."]
+    )
 
 
 def _explained(topic: Topic, width: int) -> str:

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from simscen.cli import completing
 from simscen.cli.diagnostics import harmless, print_text
 from simscen.cli.judging import Judging, runs_without_log
 from simscen.cli.logs import logs_of
@@ -31,7 +32,11 @@ class Time(str, Enum):
 
 def command(
     logs: Annotated[
-        list[Path], typer.Argument(help="Logs (run.mcap, *.mcap, rosbag2 folders), or folders to search for them.")
+        list[Path],
+        typer.Argument(
+            help="Logs (run.mcap, *.mcap, rosbag2 folders), or folders to search for them.",
+            autocompletion=completing.logs,
+        ),
     ],
     scenario: Annotated[
         Path | None, typer.Option(help="Judge by the criteria of this file; `pass:` is all that it needs.")

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from simscen.cli import completing
 from simscen.cli.diagnostics import harmless, print_text
 from simscen.core.errors import InvalidInput
 from simscen.loading.discovery import default_root, discover
@@ -15,7 +16,9 @@ from simscen.model.anystack import ExternalStackSpec
 
 
 def command(
-    paths: Annotated[list[Path], typer.Argument(help="Scenario files, or folders to search.")],
+    paths: Annotated[
+        list[Path], typer.Argument(help="Scenario files, or folders to search.", autocompletion=completing.scenarios)
+    ],
     keyword: Annotated[str, typer.Option("-k", help="Parts of ids with and, or, not, as in pytest.")] = "",
     tag: Annotated[list[str] | None, typer.Option(help="Only scenarios with this tag; repeatable.")] = None,
     root: Annotated[Path | None, typer.Option(help="Files inside scenarios stay in this folder.")] = None,

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from simscen.cli.called import PLUGINS
+from simscen.cli.called import COMPLETE, PLUGINS
 from simscen.cli.later import import_later
 from simscen.cli.surroundings import NO_ROOM, flushed, occupy_descriptors, output_lost, require_folder
 from simscen.core.errors import Exit, InvalidInput, SimscenError
@@ -25,8 +25,9 @@ COMMANDS = {
     "localize": "Run a recorded drive through the localizer alone.",
     "log": "Mend the logs of runs that broke off.",
     "new": "Write a commented scenario to start from.",
-    "explain": "Explain a trigger, action, fault, criterion, signal, metric, component or error code.",
+    "explain": "Explain a word of the language, a key, a signal, a metric, a component or a code.",
     "schema": "Print or write the JSON Schemas that editors use.",
+    "completion": "Print the script that lets a shell complete commands, options, scenario files and names.",
     "plugins": "List the types that installed packages add to the language and to the stack.",
     "world": "Inspect, convert and export worlds.",
     "robot": "Drive a robot once and compare command, odometry and truth.",
@@ -37,7 +38,7 @@ COMMANDS = {
 """Command → what it does. `simscen.cli.<command>` has a function `command`, or an `app` with commands of its own."""
 
 
-LIGHT = frozenset({"validate", "list", "schema", "explain", "new"})
+LIGHT = frozenset({"validate", "list", "schema", "explain", "new", "completion"})
 """Commands that must answer at once. Numpy is a quarter of their start; few of them compute anything."""
 
 
@@ -81,6 +82,7 @@ app = typer.Typer(
     name="simscen",
     rich_markup_mode=None,
     add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
     no_args_is_help=True,
 )
@@ -110,6 +112,10 @@ def main() -> None:
     # and so does what it imports to look for them.
     os.environ[PLUGINS] = "__all__"
     import_later("importlib.metadata", "entry_points")
+    if COMPLETE in os.environ:
+        from typer.completion import completion_init  # type: ignore[attr-defined]
+
+        completion_init()
     sys.exit(flushed(_called()))
 
 

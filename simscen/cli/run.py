@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from simscen.cli import completing
 from simscen.cli.diagnostics import as_text, print_text
 from simscen.cli.interrupts import signals_interrupt
 from simscen.cli.reports import JunitFamily, Reports, require_writable, verdict
@@ -30,7 +31,9 @@ WARM_PROCESS = ("-m", "simscen.cli.warm_process")
 
 
 def command(
-    paths: Annotated[list[Path], typer.Argument(help="Scenario files, or folders to search.")],
+    paths: Annotated[
+        list[Path], typer.Argument(help="Scenario files, or folders to search.", autocompletion=completing.scenarios)
+    ],
     out: Annotated[
         Path | None, typer.Option(help="Output folder, new or empty; default: simscen-out/<run-id>.")
     ] = None,
@@ -76,6 +79,7 @@ def command(
         list[str] | None,
         typer.Option(
             metavar="NAME=VALUE",
+            autocompletion=completing.stacks,
             help=STACK_HELP + "Repeatable: each scenario runs with each, and the first is compared with the others.",
         ),
     ] = None,

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from simscen.cli import completing
 from simscen.cli.diagnostics import as_github, as_json, as_text, from_here, print_text
 from simscen.cli.select import Checks
 from simscen.cli.stacks import stacks_of
@@ -27,7 +28,7 @@ class Format(str, Enum):
 
 
 def command(
-    paths: Annotated[list[Path], typer.Argument(help="Files, or folders to search.")],
+    paths: Annotated[list[Path], typer.Argument(help="Files, or folders to search.", autocompletion=completing.files)],
     format_: Annotated[Format, typer.Option("--format", help="How to print problems.")] = Format.TEXT,
     stack: Annotated[
         list[str] | None,

@@ -1,5 +1,11 @@
 import pytest
 
+from simscen.cli import explain
+from simscen.cli.codetopics import NAV2
+from simscen.cli.explain import explained, known_names
+from simscen.core.errors import Exit
+from simscen.core.navigation import ErrorCode
+
 
 def test_without_a_name_everything_is_listed(simscen) -> None:
     out = simscen("explain").out
@@ -51,3 +57,47 @@ def test_signals_are_listed_with_their_units_and_each_is_explained(simscen) -> N
     assert "40\n  Hz" in out or "40 Hz" in out
     assert "Example: {signal: distance_to, object: cart" in simscen("explain", "distance_to").out
     assert "clearance (signal)" in simscen("explain", "clearance").out
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("goals.pose", "place or mapping (required)"),
+        ("goals.pose", "yaw: angle in rad"),
+        ("amcl.update_min_a", "angle in rad, 0 … 6.3 (default 0.2)"),
+        ("update_min_a", "amcl.update_min_a (key)"),
+        ("stack.localizer.alpha1", "Rotation noise from rotation."),
+        ("events.when", "What it waits for."),
+        ("sensors.lidar.mount.yaw", "anticlockwise from straight ahead"),
+        ("physics.tick_rate", "frequency in Hz"),
+        ("GOAL_OCCUPIED", "Nav2's error code 206."),
+        ("206", "GOAL_OCCUPIED (error code)"),
+        ("stack-timeout", "An external stack gave no answer"),
+        ("exit 3", "could not be completed"),
+        ("5", "Nothing was selected."),
+    ],
+)
+def test_keys_and_codes_are_explained(simscen, name: str, told: str) -> None:
+    ended = simscen("explain", name)
+    assert ended.code == 0, ended.err
+    assert told in ended.out
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [("amcl.update_min_b", "amcl.update_min_"), ("goal_ocupied", "GOAL_OCCUPIED"), ("lingr", "linger")],
+)
+def test_misspelt_keys_and_codes_are_told_what_was_meant(simscen, name: str, meant: str) -> None:
+    assert f"did you mean `{meant}" in simscen("explain", name).err
+
+
+def test_every_topic_every_key_and_every_code_is_explained(monkeypatch) -> None:
+    everything = explain._everything()
+    monkeypatch.setattr(explain, "_everything", lambda: everything)  # to collect it costs most of the time
+    for name in [*known_names(), *known_names(keys=True)]:
+        assert explained(name), name
+
+
+def test_every_code_of_nav2_and_of_the_command_line_has_a_text() -> None:
+    assert set(NAV2) == set(ErrorCode)
+    assert {f"exit {code.value}" for code in Exit} <= set(known_names())

@@ -24,3 +24,43 @@ def test_an_impossible_name_is_a_usage_error(simscen, name: str) -> None:
     ended = simscen("new", name)
     assert ended.code == 2
     assert "Traceback" not in ended.err
+
+
+def test_a_copy_of_a_shipped_scenario_has_what_it_needs_and_is_valid(simscen, tmp_path: Path) -> None:
+    ended = simscen("new", "mine", "--like", "outdated_map")
+    assert ended.code == 0
+    assert {path.relative_to(tmp_path).as_posix() for path in (tmp_path / "mine").rglob("*")} == {
+        "mine/house.world.yaml", "mine/house_last_year.yaml", "mine/house_last_year.pgm"
+    }  # fmt: skip
+    assert "map: mine/house_last_year.yaml" in (tmp_path / "mine.scenario.yaml").read_text()
+    assert simscen("validate", "mine.scenario.yaml").code == 0
+
+
+def test_a_copy_within_a_project_names_the_same_files_and_keeps_comments(simscen, tmp_path: Path) -> None:
+    (tmp_path / ".git").mkdir()
+    (tmp_path / "here.world.yaml").write_text("simscen: 1\nplaces: {dock: {x: 0, y: 0}, desk: {x: 2, y: 0}}\n")
+    text = "simscen: 1\n# why\nworld: 'here.world.yaml'  # there\nrobot: {pose: dock}\n"
+    (tmp_path / "one.scenario.yaml").write_text(f"{text}goals: [desk]\npass: [{{goals_reached: {{}}}}]\n")
+    assert simscen("new", "deep/two", "--like", "one.scenario.yaml").code == 0
+    copied = (tmp_path / "deep" / "two.scenario.yaml").read_text()
+    assert copied.startswith("simscen: 1\n# why\nworld: '../here.world.yaml'  # there\n")
+    assert simscen("validate", "deep/two.scenario.yaml").code == 0
+    assert [path.name for path in (tmp_path / "deep").iterdir()] == ["two.scenario.yaml"]
+
+
+@pytest.mark.parametrize(
+    ("like", "told"),
+    [("outdated_mop", "did you mean `navigation/outdated_map`"), ("cart_crossing", "several shipped scenarios")],
+)
+def test_a_scenario_to_copy_that_is_not_there_or_not_the_only_one_is_told(simscen, like: str, told: str) -> None:
+    ended = simscen("new", "mine", "--like", like)
+    assert (ended.code, told in ended.err) == (2, True), ended.err
+    assert not Path("mine.scenario.yaml").exists()
+
+
+def test_a_copy_overwrites_nothing(simscen, tmp_path: Path) -> None:
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "house.world.yaml").write_text("precious")
+    assert simscen("new", "mine", "--like", "navigation/goal").code == 2
+    assert (tmp_path / "mine" / "house.world.yaml").read_text() == "precious"
+    assert not (tmp_path / "mine.scenario.yaml").exists()

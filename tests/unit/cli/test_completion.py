@@ -1,0 +1,72 @@
+"""What a shell offers behind Tab."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+COMMAND = [sys.executable, "-c", "from simscen.cli.start import start; start()"]
+
+
+def offered(*words: str) -> list[str]:
+    """What bash would show behind these words, the last of which may not be complete."""
+    env = {**os.environ, "_SIMSCEN_COMPLETE": "complete_bash", "COMP_WORDS": " ".join(("simscen", *words)),
+           "COMP_CWORD": str(len(words))}  # fmt: skip
+    # The name of the program is the name of the variable, too.
+    program = COMMAND[2].replace("start()", "import sys; sys.argv[0] = 'simscen'; start()", 1)
+    done = subprocess.run([*COMMAND[:2], program], capture_output=True, text=True, env=env, check=False)
+    assert done.stderr == ""
+    return done.stdout.split()
+
+
+@pytest.mark.parametrize(
+    ("words", "among"),
+    [
+        (("exp",), ["explain"]),
+        (("validate", "go"), ["good.scenario.yaml"]),
+        (("explain", "amcl.update_min"), ["amcl.update_min_d", "amcl.update_min_a"]),
+        (("explain", "stopped"), ["stopped_within"]),
+        (("schema", "wo"), ["world"]),
+        (("new", "mine", "--like", "navigation/go"), ["navigation/goal", "navigation/goal_occupied"]),
+        (("run", "--stack", "refe"), ["reference"]),
+        (("run", "--fail"), ["--fail-fast"]),
+    ],
+    ids=" ".join,
+)
+def test_it_offers_commands_files_names_and_options(simscen, words: tuple[str, ...], among: list[str]) -> None:
+    Path("deep").mkdir()
+    assert set(among) <= set(offered(*words))
+
+
+def test_files_below_a_folder_are_offered_with_their_folder(simscen) -> None:
+    Path("deep").mkdir()
+    Path("good.scenario.yaml").rename("deep/one.scenario.yaml")
+    assert offered("list", "de") == ["deep/"]
+    assert offered("list", "deep/") == ["deep/one.scenario.yaml"]
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish", "powershell"])
+def test_the_script_for_each_shell_is_printed(simscen, shell: str) -> None:
+    ended = simscen("completion", shell)
+    assert ended.code == 0
+    assert "_SIMSCEN_COMPLETE" in ended.out
+
+
+def test_bash_takes_its_script(simscen) -> None:
+    script = simscen("completion", "bash").out
+    assert subprocess.run(["bash", "-n"], input=script, text=True, check=False).returncode == 0
+
+
+@pytest.mark.parametrize("arguments", [("-h",), ("run", "-h"), ("world", "-h"), ("world", "convert", "-h")])
+def test_help_has_a_short_name(simscen, arguments: tuple[str, ...]) -> None:
+    ended = simscen(*arguments)
+    assert (ended.code, "Usage:" in ended.out) == (0, True)
+
+
+def test_the_module_is_the_command(simscen) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "simscen", "validate", "good.scenario.yaml"], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout) == (0, "1 scenario is valid\n")
