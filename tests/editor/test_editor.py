@@ -9,9 +9,11 @@ from typing import Any, NamedTuple
 
 import pytest
 from languageserver import Diagnostic, LanguageServer
+from pydantic import BaseModel
 
 from simscen.actions.action import AnyAction
 from simscen.cli.catalogue import Topic, fields_of, topics
+from simscen.cli.everyfield import every_value
 from simscen.cli.jsonschema import MODELS
 from simscen.core.version import PACKAGE
 from simscen.criteria.criterion import AnyCriterion
@@ -48,7 +50,7 @@ ROOMS = {
 }
 
 
-CHOICES = [room.choice for room in ROOMS.values()]
+MAPPINGS = {kind for kind in {value.kind for value in every_value()} if isinstance(kind, type) and kind.__doc__}
 
 
 class Page:
@@ -276,7 +278,9 @@ def test_each_key_of_each_mapping_is_offered_and_explained_and_its_mistakes_are_
         wrong = [f"{field.key}: {WRONG_NAMES if field.kind.startswith('names') else WRONG}" for field in keys]
         text = before + f"\n{_indent(before)}".join([*wrong, f"{STRANGE}: 1"])
         pages.append((topic, keys, Page(server, kind, before), Page(server, kind, text)))
-    mappings = [summary(topic.text) for topic in topics() if topic.text] + [summary(c.__doc__ or "") for c in CHOICES]
+    mappings = [summary(topic.text) for topic in topics() if topic.text] + [
+        summary(kind.__doc__) for kind in MAPPINGS if issubclass(kind, BaseModel)
+    ]
     for topic, keys, empty, full in pages:
         assert {field.key for field in keys} - empty.offered(len(empty.lines) - 1) == set(), topic.name
         line = len(full.lines) - len(keys) - 1

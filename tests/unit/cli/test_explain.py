@@ -74,7 +74,7 @@ def test_signals_are_listed_with_their_units_and_each_is_explained(simscen) -> N
         ("206", "GOAL_OCCUPIED (error code)"),
         ("stack-timeout", "An external stack gave no answer"),
         ("exit 3", "could not be completed"),
-        ("5", "Nothing was selected."),
+        ("5", "Nothing was selected"),
     ],
 )
 def test_keys_and_codes_are_explained(simscen, name: str, told: str) -> None:
