@@ -136,7 +136,9 @@ class FaultRig:
         return [active for _, active in sorted(self._active.items(), key=lambda item: item[0])]
 
     def _late(self, active: _Active) -> Sequence[Reading]:
-        late = active.disturbance.arriving()
+        late: object = active.disturbance.arriving()
+        if not isinstance(late, list | tuple):
+            self._broke(active.index, f"lets {late!r} arrive")
         if strange := [one for one in late if getattr(one, "sensor", None) != active.sensor]:
             self._broke(active.index, f"lets {strange[0]!r} arrive, which is no reading of `{active.sensor}`")
         return late
@@ -155,6 +157,8 @@ class FaultRig:
         for active in self._at_work():
             if active.kind == COMMAND:
                 late = active.disturbance.arriving_command()
+                if late is not None:
+                    self._check(active, late)
                 fresh = None if command is None else self._commanded(active, command)
                 command = late if fresh is None else fresh
         if command is not None:
@@ -165,11 +169,15 @@ class FaultRig:
         if disturbed is None and active.kind == COMMAND:
             self._count(active)
             return None
-        if not isinstance(disturbed, Twist) or not all(map(math.isfinite, disturbed)):
-            self._broke(active.index, f"makes {disturbed!r} of a command")
+        disturbed = self._check(active, disturbed)
         if not np.allclose(disturbed, command, rtol=0.0, atol=ROUNDING):
             self._count(active)
         return disturbed
+
+    def _check(self, active: _Active, command: object) -> Twist:
+        if not isinstance(command, Twist) or not all(map(math.isfinite, command)):
+            self._broke(active.index, f"makes {command!r} of a command")
+        return command
 
     def _told(self, active: _Active, belief: Belief) -> Belief:
         told: object = active.disturbance.belief(belief)

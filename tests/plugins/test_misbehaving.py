@@ -49,7 +49,8 @@ HEADS = {
     "metric": "class Mine(Spec, Measure):\n    def measure(self, trace, case):\n        ",
     "trigger": "class Mine(Spec, Condition):\n    def holds(self, now):\n        ",
     "action": "class Mine(Spec, Action):\n    def perform(self, stage):\n        ",
-    "fault": "class Mine(Spec, Fault):\n    affects: ClassVar = frozenset({'Scan', 'Command'})\n"
+    "fault": "class Mine(Spec, Fault):\n"
+    "    affects: ClassVar = frozenset({'Scan', 'Command', 'Wheels', 'Belief', 'Map'})\n"
     "    def begin(self, chance, wheels):\n        return Broken()\n\nclass Broken(Disturbance):\n    ",
     "sensor": "class Mine(SensorSpec):\n    component: ClassVar = 'mine:Device'\n    says: ClassVar = 'Scan'\n\n"
     "class Device:\n    def __init__(self, spec, setting): self.setting = setting\n    def read(self, tick):\n        ",
@@ -72,6 +73,8 @@ def run(packages, tmp_path):
         packages("mines", "0.3", {kind: {"mine": "mine:Mine"}}, mine=f"{HEAD}\n\n{HEADS[kind]}{dedent(text)}\n")
         scenario, robot = USES[kind]
         (tmp_path / "r.robot.yaml").write_text(ROBOT % robot)
+        if sensor == "map":
+            scenario = scenario.replace(", when: {time: 0.5}", "")
         (tmp_path / "s.scenario.yaml").write_text((SCENARIO % scenario).replace("sensor: lidar", f"sensor: {sensor}"))
         return simulate_file(tmp_path / "s.scenario.yaml", None, None, tmp_path).result
 
@@ -157,6 +160,30 @@ def test_an_answer_that_is_none_ends_the_run_with_its_name(run, kind, text, erro
 def test_a_command_that_is_none_ends_the_run_with_the_faults_name(run) -> None:
     with pytest.raises(RunError, match=r"makes Twist\(vx=nan.* of a command \(fault `mine` of mines 0.3\)"):
         run("fault", "def command(self, command): return Twist(float('nan'), 0.0, 0.0)", sensor="cmd_vel")
+
+
+@pytest.mark.parametrize(
+    ("instance", "text", "why"),
+    [
+        ("wheels", "def command(self, command): return None", "makes None of a command"),
+        ("lidar", "def arriving(self): return ['late']", "lets 'late' arrive, which is no reading of `lidar`"),
+        ("lidar", "def arriving(self): return None", "lets None arrive"),
+        ("localizer", "def belief(self, belief): return 'here'", "makes 'here' of a belief"),
+        ("cmd_vel", "def arriving_command(self): return 'go'", "makes 'go' of a command"),
+    ],
+)
+def test_what_a_fault_of_any_instance_makes_is_looked_at(run, instance: str, text: str, why: str) -> None:
+    with pytest.raises(RunError, match=rf"{why}.*\(fault `mine` of mines 0.3\)"):
+        run("fault", text, sensor=instance)
+
+
+def test_a_map_that_is_none_ends_the_run_with_the_faults_name(run) -> None:
+    with pytest.raises(RunError, match=r"makes str of a map \(fault `mine` of mines 0.3\)"):
+        run(
+            "fault",
+            "def map(self, grid): return 'here be dragons'",
+            sensor="map",
+        )
 
 
 def test_a_fault_that_changes_nothing_is_told_and_does_not_pass(run) -> None:

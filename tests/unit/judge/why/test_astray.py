@@ -27,6 +27,15 @@ def test_an_odometry_fault_leads_astray_long_after_it_is_over():
     assert why("localization_error", slip(1, 1.5, 2, "lidar.off", "off"), **lost) == []
 
 
+def test_a_fault_that_came_between_localizer_and_navigator_leads_astray_and_a_lidar_that_is_off_does_not():
+    lost = {"case": {"goals": [GOAL]}, "belief": {"offset": [0, 0.8, 0]}}
+    jump = slip(1, 1.5, 2, "localizer.jump", "jump", affects="Belief")
+    assert why("localization_error", jump, **lost) == ["why: localizer.jump falsified its belief from t = 1.50 s on"]
+    assert why("localization_error", slip(1, 1.5, 2, "lidar.bias", "bias", affects="Scan"), **lost) == []
+    scaled = slip(1, 1.5, 2, "odom.scale", "scale", affects="Odometry")
+    assert why("localization_error", scaled, **lost) == ["why: odom.scale falsified its odometry from t = 1.50 s on"]
+
+
 def test_lost_is_half_a_metre_in_any_direction():
     case = {"goals": [GOAL]}
     at_one = {"seconds": 10, "truth": [[0, 0, 1]]}

@@ -33,9 +33,9 @@ def why(criterion, events, at=10, trace=STANDS, case=CASE, **changes):
     return causes(criterion, round(at * 240), built, sketch_case(case))
 
 
-def slip(begin, felt, end=None, name="odom.slip", kind="slip"):
+def slip(begin, felt, end=None, name="odom.slip", kind="slip", **about):
     told = [
-        [begin, "fault.started", name, {"entry": 0, "fault": kind}],
+        [begin, "fault.started", name, {"entry": 0, "fault": kind, **about}],
         [felt, "fault.took_effect", name, {"entry": 0}],
     ]
     return [*told, *([[end, "fault.ended", name, {"entry": 0}]] if end else [])]
