@@ -23,8 +23,8 @@ BESIDE = 0.01
 """m to both sides of an edge where the ground is looked at."""
 THICKNESS = 0.01
 """m of what stands for an edge."""
-LEVEL = 1e-3
-"""z of the unit normal of faces that count as upright."""
+UPRIGHT = 0.5
+"""z of the unit normal up to which a face is the edge of something (60°), not a slope."""
 
 
 def is_flat(solids: Iterable[Solid], reach: float) -> bool:
@@ -51,7 +51,7 @@ def obstacles_of(solids: tuple[Solid, ...], reach: float, slope: float, step: fl
 def _too_steep(mesh: TriangleMesh, ground: Owners, slope: float) -> Iterator[Solid]:
     """Each face of the ground that is too steep, as a prism down to its foot."""
     up = normals(mesh)[:, 2]
-    for face in np.flatnonzero(_of(mesh, ground) & (up > LEVEL) & (up < math.cos(slope) - 1e-9)).tolist():
+    for face in np.flatnonzero(_of(mesh, ground) & (up > UPRIGHT) & (up < math.cos(slope) - 1e-9)).tolist():
         corners = mesh.vertices[mesh.faces[face]]
         foot = corners.copy()
         foot[:, 2] = corners[:, 2].min() - THICKNESS
@@ -69,13 +69,14 @@ _PRISM = np.array(
 
 def _edges(mesh: TriangleMesh, ground: Owners, step: float) -> Iterator[Solid]:
     """Upright faces of the ground as thin walls, where the ground beside them is lower by more than a step."""
-    chosen = np.flatnonzero(_of(mesh, ground) & (np.abs(normals(mesh)[:, 2]) <= LEVEL))
+    chosen = np.flatnonzero(_of(mesh, ground) & (np.abs(normals(mesh)[:, 2]) <= UPRIGHT))
     pieces = list(_pieces(mesh, chosen))
     if not pieces:
         return
     middles = np.array([(edge.start + edge.end) / 2 for edge in pieces])
     out = np.array([edge.outward for edge in pieces])
-    heights = _heights(mesh, ground, np.concatenate((middles - BESIDE * out, middles + BESIDE * out)))
+    behind = middles - (BESIDE + np.array([[edge.depth] for edge in pieces])) * out
+    heights = _heights(mesh, ground, np.concatenate((behind, middles + BESIDE * out)))
     walls: list[tuple[_Edge, float, float]] = []
     for edge, high, low in zip(pieces, *np.round(np.split(heights, 2), 4).tolist(), strict=True):
         if high - low > step:
@@ -88,12 +89,16 @@ def _edges(mesh: TriangleMesh, ground: Owners, step: float) -> Iterator[Solid]:
 
 
 class _Edge(NamedTuple):
-    """A piece of what an upright face is in plan: its ends (2,), the unit vector outwards, and whose face it is."""
+    """A piece of what an upright face is in plan: its ends (2,), the unit vector outwards, and whose face it is.
+
+    One that leans covers `depth` metres inwards of that line.
+    """
 
     start: Array
     end: Array
     outward: Array
     owner: int
+    depth: float
 
     def runs_on_to(self, other: "_Edge") -> bool:
         """Whether the other begins where this one ends, of the same face."""
@@ -112,18 +117,18 @@ def _pieces(mesh: TriangleMesh, faces: npt.NDArray[np.int64]) -> Iterator[_Edge]
     seen = set()
     across = normals(mesh)[:, :2]
     for face in faces.tolist():
-        outward, owner = across[face], int(mesh.owners[face])
+        outward, owner = across[face] / np.linalg.norm(across[face]), int(mesh.owners[face])
         along = np.array([-outward[1], outward[0]])
         corners = mesh.vertices[mesh.faces[face], :2]
-        places = corners @ along
-        first, last = corners[int(places.argmin())], corners[int(places.argmax())]
+        places, offsets = corners @ along, corners @ outward
+        first, last = (place * along + offsets.max() * outward for place in (places.min(), places.max()))
         key = (owner, *np.round(np.concatenate((first, last, outward)), 4).tolist())
         if key in seen or not np.ptp(places):
             continue
         seen.add(key)
         shares = np.linspace(0.0, 1.0, max(1, math.ceil(float(np.ptp(places)) / PIECE)) + 1)
         ends = first + shares[:, None] * (last - first)
-        yield from (_Edge(a, b, outward, owner) for a, b in pairwise(ends))
+        yield from (_Edge(a, b, outward, owner, float(np.ptp(offsets))) for a, b in pairwise(ends))
 
 
 def _heights(mesh: TriangleMesh, ground: Owners, points: Array) -> Array:

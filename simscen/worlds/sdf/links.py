@@ -24,6 +24,10 @@ class LinkContent:
     mass: float
 
 
+RUBBER = 1.0
+"""Friction of wheels on dry concrete."""
+
+
 def read_link(link: PlacedLink, reader: ShapeReader, report: Report) -> LinkContent:
     """The content of a link; unusable collisions go to the report and are left out."""
     element = link.frame.element
@@ -50,8 +54,26 @@ def _collision(element: Element, link: PlacedLink, reader: ShapeReader, report: 
     _note_untouchable(element, report)
     pose = link.pose.compose(_in_link(element.child("pose"), link))
     name = f"{link.name}::{element.name}" if element.name else link.name
+    friction = _friction(element, report)
     for solid in reader.solids(geometry, pose):
-        yield Solid(scaled(solid.shape, link.scale), pose.compose(solid.pose), name)
+        yield Solid(scaled(solid.shape, link.scale), pose.compose(solid.pose), name, friction)
+
+
+def _friction(collision: Element, report: Report) -> float:
+    """`<mu>` of ODE's surface, where that is less than a wheel's own: ODE takes the lesser of two (so does Gazebo)."""
+    found: Element | None = collision
+    for tag in ("surface", "friction", "ode", "mu"):
+        found = found.child(tag) if found is not None else None
+    if found is None:
+        return RUBBER
+    try:
+        mu = float(found.text)
+    except ValueError:
+        mu = -1.0
+    if not mu >= 0:
+        report.note(found.place, f"no coefficient of friction: {RUBBER:g} is taken")
+        return RUBBER
+    return min(RUBBER, mu)
 
 
 def _in_link(given: Element | None, link: PlacedLink) -> Pose3:

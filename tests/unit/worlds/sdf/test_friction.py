@@ -1,0 +1,40 @@
+"""`<mu>`: how well wheels hold on what a world is made of."""
+
+import math
+
+import pytest
+
+from simscen.worlds.meshing import fuse
+from simscen.worlds.obstacles import obstacles_of
+
+
+def ramp(surface):
+    shape = "<geometry><box><size>2 1.8 0.2</size></box></geometry>"
+    collision = f"<collision name='c'><pose>0 0 -0.1 0 0 0</pose>{shape}{surface}</collision>"
+    return f"<model name='ramp'><static>1</static><pose>3 1 0 0 -0.08 0</pose><link name='l'>{collision}</link></model>"
+
+
+def mu(text):
+    return f"<surface><friction><ode><mu>{text}</mu></ode></friction></surface>"
+
+
+@pytest.mark.parametrize(("surface", "friction"), [("", 1.0), (mu(0.3), 0.3), (mu("100.0"), 1.0), (mu("inf"), 1.0)])
+def test_the_lesser_of_a_surface_and_of_rubber_holds(load, surface, friction):
+    (solid,) = load(ramp(surface)).solids
+    assert solid.friction == friction
+    assert fuse([solid]).frictions == (() if friction == 1.0 else (friction,))
+
+
+@pytest.mark.parametrize("text", ["-1", "dry", ""])
+def test_what_is_no_coefficient_is_told_and_taken_for_1(load, text):
+    world = load(ramp(mu(text)))
+    assert world.solids[0].friction == 1.0
+    assert any("no coefficient of friction" in note for note in world.notes)
+
+
+def test_a_tilted_box_is_a_ramp_to_a_robot_that_climbs_it_and_a_wall_to_one_that_does_not(load):
+    solids = load(ramp("")).solids
+    climbed = obstacles_of(solids, 0.033, math.radians(7.9), 0.0097)
+    assert climbed is not solids
+    assert all(solid.shape.size[1] == 0.01 for solid in climbed)  # only its sides are left
+    assert obstacles_of(solids, 0.033, 0.0, 0.0) is solids
