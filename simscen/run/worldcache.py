@@ -12,6 +12,7 @@ from simscen.core.shapes import Solid
 from simscen.core.world import World
 from simscen.loading.loaded import LoadedScenario, LoadedWorld
 from simscen.run.worldsource import load_world
+from simscen.worlds.plainways import PlainWays, plain_ways
 
 if TYPE_CHECKING:
     from simscen.worlds.shortest import ShortestWays
@@ -24,6 +25,7 @@ class WorldCache:
     """Remembers worlds by what their files say, and where a robot of some size gets in them."""
 
     _worlds: list[tuple[LoadedWorld, World, set[Path]]] = field(default_factory=list)
+    _plain: list[tuple[tuple[Solid, ...], float, tuple[float, float], PlainWays | None]] = field(default_factory=list)
     _ways: list[tuple[tuple[Solid, ...], Bounds, float, tuple[float, float], ShortestWays]] = field(
         default_factory=list
     )
@@ -39,6 +41,15 @@ class WorldCache:
         for file in sorted(known[2]):
             note_read(file)
         return known[1]
+
+    def plain_ways(self, solids: tuple[Solid, ...], radius: float, z_range: tuple[float, float]) -> PlainWays | None:
+        """The ways of a disc between solids in plain numbers; None where the solids are not plain."""
+        for known in self._plain:
+            if known[0] is solids and known[1:3] == (radius, z_range):
+                return known[3]
+        ways = plain_ways(solids, radius, z_range)
+        self._plain = [*self._plain[-7:], (solids, radius, z_range, ways)]
+        return ways
 
     def ways(
         self, solids: tuple[Solid, ...], bounds: Bounds, radius: float, z_range: tuple[float, float]

@@ -31,6 +31,7 @@ class PlainWays:
 
     def __init__(self, prisms: Iterable[Upright], radius: float) -> None:
         self._radius = radius
+        self._lengths: dict[tuple[Point, Point], float] = {}
         self._near: dict[Cell, list[Upright]] = {}
         reach = radius + HALF_STEP + SLACK
         for prism in prisms:
@@ -42,6 +43,11 @@ class PlainWays:
 
     def length(self, start: Point, goal: Point) -> float:
         """Metres of a way from start to goal, perhaps not the shortest; inf when none was found."""
+        if (start, goal) not in self._lengths:
+            self._lengths[start, goal] = self._length(start, goal)
+        return self._lengths[start, goal]
+
+    def _length(self, start: Point, goal: Point) -> float:
         if self._is_clear(start, goal):
             return math.dist(start, goal)
 

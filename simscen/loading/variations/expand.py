@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations, product
+from typing import TYPE_CHECKING
 
 from simscen.core.problems import Problem
 from simscen.loading.messages import quoted
@@ -11,8 +12,9 @@ from simscen.loading.tree import Entry, Fields, Items, Leaf, Node, Place, at, ch
 from simscen.loading.validation import check
 from simscen.loading.variations.naming import HINT, derived, flaw_of, keys_of, unique
 from simscen.loading.variations.paths import NoPath, Target, put, target_of
-from simscen.loading.variations.sampling import Pick, draws_of
-from simscen.model.variations import MOST, Sampled, VariationBlock, VariedSpec
+
+if TYPE_CHECKING:  # what most scenarios do not need is imported where it is
+    from simscen.model.variations import Sampled, VariationBlock
 
 VARIATIONS = "variations"
 _SAID_OF_IT = frozenset({"description", "tags", "expected", "skip"})
@@ -59,6 +61,8 @@ def variations_of(tree: Fields) -> list[Variation] | list[Problem]:
     entry = tree.entries.get(VARIATIONS)
     if entry is None:
         return [Variation("", tree)]
+    from simscen.model.variations import MOST, VariedSpec
+
     own = Fields(tree.place, {key: value for key, value in tree.entries.items() if key != VARIATIONS})
     said = check(VariedSpec, Fields(tree.place, {VARIATIONS: entry}))
     if isinstance(said, list):
@@ -85,7 +89,7 @@ class _Expansion:
     _targets: dict[str, Target] = field(default_factory=dict)
     _names: dict[str, Place] = field(default_factory=dict)
 
-    def axes(self, block: VariationBlock, node: Node) -> list[list[Option]]:
+    def axes(self, block: "VariationBlock", node: Node) -> list[list[Option]]:
         """What is combined with each other: each path of a grid, and each of the other kinds as a whole."""
         found = [[Option((change,)) for change in changes] for changes in self._columns(child(node, "grid"), True)]
         if block.pairs is not None:
@@ -181,7 +185,9 @@ class _Expansion:
             self._add(place, "SC033", f"two variations are called {quoted(name)} (the first at line {first.line})")
         return name
 
-    def _sampled(self, sampled: Sampled, node: Node) -> list[Option]:
+    def _sampled(self, sampled: "Sampled", node: Node) -> list[Option]:
+        from simscen.loading.variations.sampling import Pick, draws_of
+
         assert isinstance(node, Fields)
         columns = []
         for path, entry in node.entries.items():

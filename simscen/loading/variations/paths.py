@@ -126,6 +126,8 @@ def _item(path: str, keys: list[Key], items: Items, part: str, rest: list[str]) 
 
 
 def _names(item: Node) -> list[str]:
+    if isinstance(item, Leaf):
+        return [item.value] if isinstance(item.value, str) else []
     if not isinstance(item, Fields):
         return []
     values = [item.entries[key].value for key in _NAMES if key in item.entries]

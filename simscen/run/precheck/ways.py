@@ -66,7 +66,7 @@ class Ways:
 
     @cached_property
     def _fixed(self) -> PlainWays | None:
-        return plain_ways(self.scene.world.solids, self.scene.size.inscribed, self.z_range)
+        return self.cache.plain_ways(self.scene.world.solids, self.scene.size.inscribed, self.z_range)
 
     def _plain(self, solids: tuple[Solid, ...]) -> PlainWays | None:
         if solids is self.scene.world.solids:

@@ -1,6 +1,7 @@
 """Stacks against each other: what is paired, what is left out, and what is said of the rest."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -129,3 +130,21 @@ def test_metrics_that_packages_add_are_compared_too() -> None:
 
 def test_every_metric_that_is_compared_is_one() -> None:
     assert set(COMPARED) <= set(METRICS)
+
+
+def test_stacks_are_compared_by_what_they_did_whatever_their_scenario_expects() -> None:
+    """A stack that fails as expected is not better than one that holds what was expected to fail."""
+    known = replace(run("ref", outcome=Outcome.FAILED), outcome=Outcome.FAILED_AS_EXPECTED, reason="NAV-1")
+    broken = Finding(Status.FAIL, "expected", "everything held", "a failure: NAV-1")
+    mended = replace(
+        run("mine", outcome=Outcome.FAILED),
+        reason="NAV-1",
+        verdicts=(Verdict("expected", "expected", "fail", (broken,)),),
+    )
+    (flip,) = against(known, mended).flips
+    assert (flip.passed, flip.failed) == ("mine", "ref")
+
+
+def test_what_was_skipped_is_no_pair() -> None:
+    skipped = [replace(run(name), outcome=Outcome.SKIPPED, verdicts=(), reason="NAV-1") for name in ("ref", "mine")]
+    assert against(*skipped, run("ref", 2), run("mine", 2)).pairs == 1

@@ -9,7 +9,7 @@ from simscen.loading.variations.paths import NoPath, put, target_of
 TEXT = """\
 world: {objects: [{name: old cart, box: [1, 1, 1]}]}
 robot: {pose: {x: 1, y: 2}}
-goals: [{pose: sofa}, {name: the.end, pose: {x: 1, y: 2}}]
+goals: [{pose: sofa}, {name: the.end, pose: {x: 1, y: 2}}, desk]
 faults: [{sensor: lidar, noise: {std: 1}}, {sensor: lidar, off: {}}, {sensor: odom, name: drifts, bias: {x: 1}}]
 pass: [{collisions: {max: 0}}, {clearance: {min: 1}, id: near}, {stuck: 1}, {always: {}}, {always: {}}]
 """
@@ -31,6 +31,7 @@ def tree() -> Fields:
         ("goals[0].pose", ("goals", 0, "pose")),
         ("goals.0.pose", ("goals", 0, "pose")),
         ("goals.sofa.timeout", ("goals", 0, "timeout")),
+        ("goals.desk", ("goals", 2)),
         ("goals[sofa].timeout", ("goals", 0, "timeout")),
         ('goals["the.end"].pose.x', ("goals", 1, "pose", "x")),
         ("world.objects.old cart.box[2]", ("world", "objects", 0, "box", 2)),
@@ -67,7 +68,7 @@ def test_what_was_not_written_stands_where_the_path_does(tree: Fields) -> None:
         ("a..b", "`a..b` is no path", "write keys with dots"),
         ("a[", "`a[` is no path", "write keys with dots"),
         ("a[]", "`a[]` is no path", "write keys with dots"),
-        ("goals[2].pose", "names nothing: `goals` has 2 items", "the first one is [0]"),
+        ("goals[3].pose", "names nothing: `goals` has 3 items", "the first one is [0]"),
         ("goals.sofer.pose", "no item of `goals` is called `sofer`", "did you mean `sofa`?"),
         ("goals[0].pose.x", "`goals[0].pose` is `sofa`, without a `x`", ""),
         ("faults.lidar", "names several: 2 items of `faults`", "faults[0], faults[1]"),

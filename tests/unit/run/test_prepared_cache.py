@@ -1,0 +1,29 @@
+"""What the warm process keeps."""
+
+from pathlib import Path
+
+from simscen.loading.scenario import try_variations
+from simscen.run import prepared_cache
+from simscen.run.prepared_cache import PreparedCache
+
+TEXT = """\
+simscen: 1
+world: {simscen: 1, walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]}
+robot: {pose: {x: 1, y: 1}}
+goals: [{pose: {x: 5, y: 3}}]
+pass: [{collisions: {max: 0}}]
+variations: {grid: {robot.pose.x: [1, 2, 3]}}
+"""
+
+
+def test_variations_of_one_world_build_it_once_and_keep_only_the_last(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr(prepared_cache, "MOST", 2)
+    (tmp_path / "a.scenario.yaml").write_text(TEXT)
+    variations = try_variations(tmp_path / "a.scenario.yaml", tmp_path)
+    assert isinstance(variations, tuple)
+    cache = PreparedCache()
+    prepared = [cache.prepared(one) for one in variations]
+    assert len({id(one.built) for one in prepared}) == 1
+    assert [one.start.x for one in prepared] == [1, 2, 3]
+    assert cache.prepared(variations[2]) is prepared[2]
+    assert cache.prepared(variations[0]) is not prepared[0]
