@@ -8,8 +8,11 @@ from typing import ClassVar, Generic, TypeVar
 
 import numpy as np
 
+from simscen.core.belief import Belief
+from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
 from simscen.core.sensing import Reading
+from simscen.faults._belief import with_correction
 from simscen.faults.base import Disturbance, Fault, FaultSetting
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Duration
@@ -22,12 +25,12 @@ class Delay(Spec, Fault):
 
     A message arrives at the first beat at or after its time, stamped with when it was measured. Each takes `latency`
     and a random part of `jitter` besides, but none overtakes the one before it. What is under way when the fault ends
-    still arrives, and holds up what comes after it.
+    still arrives, and holds up what comes after it. Of the localizer the correction of the odometry comes late.
 
     Example: `{sensor: lidar, delay: {latency: 200 ms, jitter: 50 ms}}`
     """
 
-    affects: ClassVar[frozenset[str]] = frozenset({"Scan", "Odometry", "Imu", "Bump", "Image", "Command"})
+    affects: ClassVar[frozenset[str]] = frozenset({"Scan", "Odometry", "Imu", "Bump", "Image", "Command", "Belief"})
     idle: ClassVar[Mapping[str, object]] = {"latency": 0.0, "jitter": 0.0}
     latency: Duration = 0.0
     """What every message takes."""
@@ -43,6 +46,8 @@ class _Late(Disturbance):
     def __init__(self, chance: np.random.Generator, delay: Delay, setting: FaultSetting) -> None:
         self._chance, self._delay, self._setting = chance, delay, setting
         self._readings, self._commands = _Line[Reading](), _Line[Twist]()
+        self._corrections = _Line[Pose2]()
+        self._correction: Pose2 | None = None
         self._over = False
 
     def _due(self) -> int:
@@ -63,10 +68,18 @@ class _Late(Disturbance):
     def arriving_command(self) -> Twist | None:
         return next(reversed(self._commands.take(self._setting.now())), None)
 
+    def belief(self, belief: Belief) -> Belief:
+        now, newest = self._setting.now(), belief.map_from_odom
+        arrived = self._corrections.take(now)
+        if (fresh := self._corrections.pass_on(newest, self._due(), now)) is not None:
+            arrived.append(fresh)
+        self._correction = arrived[-1] if arrived else self._correction or newest
+        return with_correction(belief, self._correction)
+
     def end(self) -> Disturbance | None:
         """What is under way still arrives."""
         self._over = True
-        return self if self._readings or self._commands else None
+        return self if self._readings or self._commands or self._corrections else None
 
 
 class _Line(Generic[T]):

@@ -6,8 +6,11 @@ from typing import ClassVar
 
 import numpy as np
 
+from simscen.core.belief import Belief
+from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
 from simscen.core.sensing import Reading
+from simscen.faults._belief import with_correction
 from simscen.faults.base import Disturbance, Fault, FaultSetting
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveDuration
@@ -22,7 +25,7 @@ class Intermittent(Spec, Fault):
     Example: `{sensor: lidar, intermittent: {up: 1 s, down: 0.5 s}}`
     """
 
-    affects: ClassVar[frozenset[str]] = frozenset({"Scan", "Odometry", "Imu", "Bump", "Image", "Command"})
+    affects: ClassVar[frozenset[str]] = frozenset({"Scan", "Odometry", "Imu", "Bump", "Image", "Command", "Belief"})
     up: PositiveDuration
     """Mean time for which messages come."""
     down: PositiveDuration
@@ -37,6 +40,7 @@ class _LooseContact(Disturbance):
     def __init__(self, chance: np.random.Generator, spec: Intermittent, setting: FaultSetting) -> None:
         self._chance, self._spec, self._setting = chance, spec, setting
         self._gap = True
+        self._correction: Pose2 | None = None
         self._until = setting.clock.seconds(setting.now()) + chance.exponential(spec.down)
 
     def _away(self) -> bool:
@@ -51,3 +55,8 @@ class _LooseContact(Disturbance):
 
     def command(self, command: Twist) -> Twist | None:
         return None if self._away() else command
+
+    def belief(self, belief: Belief) -> Belief:
+        if self._correction is None or not self._away():
+            self._correction = belief.map_from_odom
+        return with_correction(belief, self._correction)

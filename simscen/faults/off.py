@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -11,6 +10,7 @@ from simscen.core.belief import Belief
 from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
 from simscen.core.sensing import Reading
+from simscen.faults._belief import with_correction
 from simscen.faults.base import Disturbance, Fault, FaultSetting
 from simscen.spec.base import Spec
 
@@ -44,5 +44,4 @@ class _Silence(Disturbance):
     def belief(self, belief: Belief) -> Belief:
         if self._correction is None:
             self._correction = belief.map_from_odom
-        odometry = belief.map_from_odom.between(belief.pose)
-        return replace(belief, pose=self._correction.compose(odometry), map_from_odom=self._correction)
+        return with_correction(belief, self._correction)

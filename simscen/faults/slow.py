@@ -6,8 +6,11 @@ from typing import ClassVar
 
 import numpy as np
 
+from simscen.core.belief import Belief
+from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
 from simscen.core.sensing import Reading
+from simscen.faults._belief import with_correction
 from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Frequency
@@ -17,12 +20,12 @@ class Slow(Spec, Fault):
     """Fewer messages come than should: an overloaded computer, a sensor in its energy-saving mode.
 
     The first comes through, then the first of each further period; all others are lost. Of cmd_vel the base keeps the
-    last command, and stops after its `command_timeout`.
+    last command, and stops after its `command_timeout`; the localizer corrects the odometry less often.
 
     Example: `{sensor: lidar, slow: {rate: 2 Hz}}`
     """
 
-    affects: ClassVar[frozenset[str]] = frozenset({"Scan", "Odometry", "Imu", "Bump", "Image", "Command"})
+    affects: ClassVar[frozenset[str]] = frozenset({"Scan", "Odometry", "Imu", "Bump", "Image", "Command", "Belief"})
     rate: Frequency
     """Messages a second that come through."""
 
@@ -42,6 +45,7 @@ class _Seldom(Disturbance):
         self._period, self._now = setting.clock.rate / rate, setting.now
         self._first: int | None = None
         self._let = 0
+        self._correction: Pose2 | None = None
 
     def _due(self) -> bool:
         now = self._now()
@@ -57,3 +61,8 @@ class _Seldom(Disturbance):
 
     def command(self, command: Twist) -> Twist | None:
         return command if self._due() else None
+
+    def belief(self, belief: Belief) -> Belief:
+        if self._due() or self._correction is None:
+            self._correction = belief.map_from_odom
+        return with_correction(belief, self._correction)

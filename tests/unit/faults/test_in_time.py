@@ -131,3 +131,32 @@ def test_a_belief_jumps_in_the_robots_own_frame_and_then_moves_as_the_map_lies_n
     after = work.belief(belief(Pose2(2, 2.5, np.pi / 2), Pose2(0.5, 0)))
     assert (after.pose.x, after.pose.y) == pytest.approx((1.5, 3))
     assert after.map_from_odom.compose(Pose2(0.5, 0)) == pytest.approx(after.pose)
+
+
+def corrections(fault: dict, ticks: int, until: int | None = None) -> list[float]:
+    """What the navigator knows of a correction that grows by a metre a tick, as does the way by odometry."""
+    now = Hand()
+    work, told = begun(fault, "Belief", now), []
+    for now.tick in range(ticks):
+        if now.tick == until:
+            work = work.end()
+        got = work.belief(belief(Pose2(2.0 * now.tick, 0), Pose2(now.tick, 0))) if work else None
+        if got:
+            assert got.pose.x == pytest.approx(got.map_from_odom.x + now.tick)
+        told.append(got.map_from_odom.x if got else now.tick)
+    return told
+
+
+def test_corrections_of_the_localizer_come_late_in_order_and_are_carried_on_by_odometry():
+    told = corrections({"delay": {"latency": "50 ms"}}, 60)
+    assert told == pytest.approx([max(0, tick - 12) for tick in range(60)])
+    over = corrections({"delay": {"latency": "50 ms"}}, 60, until=30)
+    assert over[:41] == pytest.approx(told[:41])
+    assert over[41:] == pytest.approx(list(range(41, 60)))
+
+
+def test_corrections_that_come_seldom_or_not_stay_what_they_were():
+    assert corrections({"slow": {"rate": "10 Hz"}}, 60) == pytest.approx([24 * (tick // 24) for tick in range(60)])
+    gappy = corrections({"intermittent": {"up": "0.1 s", "down": "0.1 s"}}, 2400)
+    assert all(gappy[k] in (k, gappy[k - 1]) for k in range(1, 2400))
+    assert np.mean([gappy[k] != k for k in range(2400)]) == pytest.approx(0.5, abs=0.15)
