@@ -12,7 +12,7 @@ from simscen.spec.references import MovableName
 
 
 class Stop(Spec, Action):
-    """Stop an object where it is, or a door half-way; with `for` it goes on afterwards as if nothing had been.
+    """Stop an object where it is, a person, or a door half-way; with `for` a script goes on as if nothing had been.
 
     Imitates a person who stops in front of the robot to look at it, a cart that waits, a door that jams.
 

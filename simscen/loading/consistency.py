@@ -13,7 +13,7 @@ from simscen.loading.messages import quoted, suggestion
 from simscen.loading.names import ARTICLES, event_names, known_names, own_goal_names
 from simscen.loading.references import references
 from simscen.loading.sense.hardlyfails import hardly_fails
-from simscen.loading.sense.neverhappens import never_happens
+from simscen.loading.sense.neverhappens import goes_on, never_happens
 from simscen.loading.sense.neverholds import never_holds
 from simscen.loading.sense.people import namesakes
 from simscen.loading.sense.specwalk import below
@@ -44,7 +44,7 @@ def inconsistencies(
     unknown += _robots_and_things(loaded, world)
     if any(problem.severity == "error" for problem in unknown):
         return unknown
-    checks = (_undecidable, _short_faults, never_happens, never_holds, hardly_fails, vain_orders)
+    checks = (_undecidable, _short_faults, never_happens, goes_on, never_holds, hardly_fails, vain_orders)
     return [*unknown, *(problem for check in checks for problem in check(loaded))]
 
 

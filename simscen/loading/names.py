@@ -96,13 +96,18 @@ def standing(loaded: LoadedScenario, world: World | None = None) -> list[str]:
 
 def brought(loaded: LoadedScenario) -> list[str]:
     """What events put into the world: things, and people, also those of crowds."""
-    people = [
+    return _made(loaded, "spawn") + people(loaded)
+
+
+def people(loaded: LoadedScenario) -> list[str]:
+    """Who events bring to walk by themselves, also those of crowds."""
+    crowds = [
         action.chosen.names
         for step in loaded.spec.steps
         for action in step.actions
         if action.kind == "crowd" and hasattr(action.chosen, "names")
     ]
-    return _made(loaded, "spawn") + _made(loaded, "pedestrian") + [name for crowd in people for name in crowd]
+    return _made(loaded, "pedestrian") + [name for crowd in crowds for name in crowd]
 
 
 def _made(loaded: LoadedScenario, kind: str) -> list[str]:

@@ -206,6 +206,9 @@ class LiveStage:
 
     def motion(self, name: str) -> tuple[MotionPath, float] | None:
         """The path that moves an object now, and the seconds since it was set off."""
+        here = self.object(name)
+        if here is not None and self._walking.walks(name):
+            return MotionPath((0.0, 1.0), (here, here), "loop"), 0.0  # no path says where somebody walks next
         return self._simulation.motion(name)
 
     def mass(self, name: str) -> float:

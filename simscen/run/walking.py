@@ -72,6 +72,10 @@ class Walking:
         self._simulation.attend(self._period, self._step)
         return body
 
+    def walks(self, name: str) -> bool:
+        """Whether somebody walks by themselves."""
+        return name in self._behaviors
+
     def go(self, name: str) -> None:
         """Somebody walks no more by themselves; who does not anyway is nobody."""
         if self._behaviors.pop(name, None) is not None:

@@ -107,3 +107,24 @@ def test_marks_are_in_the_log_and_are_waited_for_and_judged_after(run):
     assert [verdict.status.value for verdict in done.result.verdicts if verdict.criterion == "stopped_within"] == [
         "pass"
     ]
+
+
+def test_somebody_who_walks_can_be_stopped_at_any_beat(tmp_path):
+    anna = "{pedestrian: {name: anna, pose: {x: 2, y: 3}, goals: [[6, 3]]}}"
+    file = tmp_path / "own.scenario.yaml"
+    for when in (1.0, 1.0125):
+        file.write_text(f"""\
+simscen: 1
+world: {{simscen: 1, walls: [{{points: [[0, 0], [8, 0], [8, 4], [0, 4], [0, 0]]}}]}}
+robot: {{pose: {{x: 1, y: 1}}}}
+stack: {{localizer: {{type: ground_truth}}}}
+goals: [{{pose: {{x: 3, y: 1}}}}]
+time_limit: 2 s
+events:
+  - {{when: {{time: 0 s}}, do: {anna}}}
+  - {{name: stands, when: {{time: {when} s}}, do: {{stop: {{name: anna}}}}}}
+pass: [{{collisions: {{max: 5}}}}]
+""")
+        done = simulate(prepare(load_scenario(file, tmp_path)))
+        assert {one.ordered.name: one.happened for one in done.result.disturbances}["stands"]
+        assert 2.3 < done.trace.objects["anna"].values[-1][0] < 2.9, "two seconds would have led her on"

@@ -8,7 +8,7 @@ from typing import Any
 from simscen.core.navigation import named
 from simscen.core.problems import Problem
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.names import own_goal_names
+from simscen.loading.names import own_goal_names, people
 from simscen.loading.tree import Key
 from simscen.model.disturbance import Step
 from simscen.model.robot import Holonomic, RobotSpec
@@ -47,6 +47,17 @@ def never_happens(loaded: LoadedScenario) -> Iterator[Problem]:
             message = f"`{name}` happens once, not {trigger.times} times: its condition stays true from then on"
             yield replace(loaded.problem((*keys, "times"), "SC052", message), severity="warning")
     yield from _over_before(run)
+
+
+def goes_on(loaded: LoadedScenario) -> Iterator[Problem]:
+    """People who are stopped for a while: they do not follow a script that could be gone on with."""
+    walking = people(loaded)
+    for step in loaded.spec.steps:
+        for keys, action in step.placed():
+            stop: Any = action.chosen
+            if action.kind == "stop" and stop.for_ is not None and stop.name in walking:
+                message = f"`{step.name}` can never happen: `{stop.name}`, once stopped, walks no more"
+                yield loaded.problem((*keys, "stop", "for"), "SC050", message, "leave `for` out")
 
 
 def _over_before(run: "_Run") -> Iterator[Problem]:
