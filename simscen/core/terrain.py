@@ -4,13 +4,20 @@ A world is flat unless one of its surfaces that face upwards begins so low that 
 the surfaces that lead on from there. What else stands in a world is walls: wheels never touch it, the hull does.
 """
 
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from simscen.core.geometry import Array
 from simscen.core.shapes import TriangleMesh
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    Faces = npt.NDArray[np.bool_]
 
 FLOOR = 0.005
 """Faces that lie wholly below this height in m are left to the ground plane, on which wheels roll smoothly."""
@@ -18,7 +25,6 @@ STEEPEST = math.radians(50)
 """What is steeper is a wall, whatever drives: rubber on dry concrete (friction 1) holds up to 45°."""
 
 Owners = frozenset[int]
-Faces = npt.NDArray[np.bool_]
 
 
 def normals(mesh: TriangleMesh) -> Array:

@@ -7,7 +7,7 @@ from simscen.core.world import World
 from simscen.loading.loaded import LoadedScenario
 from simscen.run.worldsource import load_robot
 from simscen.sim.robot_body import RobotBody
-from simscen.worlds.obstacles import is_flat, obstacles_of
+from simscen.worlds.flat import is_flat
 
 
 def in_the_way(solids: tuple[Solid, ...], body: RobotBody) -> tuple[Solid, ...]:
@@ -16,6 +16,7 @@ def in_the_way(solids: tuple[Solid, ...], body: RobotBody) -> tuple[Solid, ...]:
     if is_flat(solids, reach):
         return solids
     from simscen.sim.climb import climb_of
+    from simscen.worlds.obstacles import obstacles_of
 
     return obstacles_of(solids, reach, *climb_of(body))
 

@@ -4,7 +4,7 @@ A ramp is no obstacle to a robot that climbs it, yet its sides are, where they a
 """
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -13,9 +13,9 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.shapes import Box, Mesh, Solid, TriangleMesh
-from simscen.core.terrain import FLOOR, Owners, normals, terrain
+from simscen.core.terrain import Owners, normals, terrain
+from simscen.worlds.flat import is_flat
 from simscen.worlds.meshing import fuse
-from simscen.worlds.upright import upright
 
 PIECE = 0.1
 """m of an edge whose height is taken as one."""
@@ -25,12 +25,6 @@ THICKNESS = 0.01
 """m of what stands for an edge."""
 UPRIGHT = 0.5
 """z of the unit normal up to which a face is the edge of something (60°), not a slope."""
-
-
-def is_flat(solids: Iterable[Solid], reach: float) -> bool:
-    """Whether it is plain without a look at triangles that wheels get onto no solid."""
-    prisms = [upright(solid) for solid in solids]
-    return all(prism is not None and (prism.top > reach or prism.top <= FLOOR) for prism in prisms)
 
 
 def obstacles_of(solids: tuple[Solid, ...], reach: float, slope: float, step: float) -> tuple[Solid, ...]:

@@ -1,0 +1,13 @@
+"""Whether wheels find no ground in a world but its floor, in plain numbers: most worlds are of walls."""
+
+from collections.abc import Iterable
+
+from simscen.core.shapes import Solid
+from simscen.core.terrain import FLOOR
+from simscen.worlds.upright import upright
+
+
+def is_flat(solids: Iterable[Solid], reach: float) -> bool:
+    """Whether it is plain without a look at triangles that wheels get onto no solid."""
+    prisms = [upright(solid) for solid in solids]
+    return all(prism is not None and (prism.top > reach or prism.top <= FLOOR) for prism in prisms)
