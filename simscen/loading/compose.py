@@ -12,6 +12,7 @@ import yaml
 from yaml import events as ev
 
 from simscen.core.problems import Problem
+from simscen.loading.odd import ODD, described, odd_character
 from simscen.loading.scalars import resolve
 from simscen.loading.tree import Entry, Fields, Items, Leaf, Node, Place
 
@@ -203,6 +204,8 @@ class _Composer:
             col = line.find("\t") + 1
             return Problem(self.path, mark.line + 1, col, "SC003", "tab character", "indent with spaces")
         start = error.context_mark
+        if (odd := self._odd(lines, start.line if start else mark.line, mark.line)) is not None:
+            return odd
         if start is not None and mark.index >= len(self.text.rstrip()) and start.index < mark.index:
             what = (error.context or "this").removeprefix("while parsing a ").removeprefix("while scanning a ")
             return Problem(self.path, start.line + 1, start.column + 1, "SC003", f"this {what} never ends")
@@ -212,3 +215,14 @@ class _Composer:
         if mark.line < len(lines):
             return Problem(self.path, mark.line + 1, mark.column + 1, "SC003", message)
         return Problem(self.path, len(lines), len(lines[-1]) + 1, "SC003", message)
+
+    def _odd(self, lines: list[str], first: int, last: int) -> Problem | None:
+        """A character in these lines that only looks like one of YAML's."""
+        for number in range(first, min(last + 1, len(lines))):
+            index = odd_character(lines[number].partition(" #")[0])
+            if index is not None:
+                character = lines[number][index]
+                return Problem(
+                    self.path, number + 1, index + 1, "SC003", described(character), f"write {ODD[character][1]}"
+                )
+        return None

@@ -5,6 +5,7 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
+from simscen.loading.odd import mended
 from simscen.loading.tree import Fields, Items, Leaf, Node
 from simscen.spec.places import NAMESPACE
 
@@ -109,7 +110,8 @@ def explain(kind: str, context: Mapping[str, Any], node: Node, text: str) -> Mes
         return Message("SC019", str(context["problem"]), str(context["hint"]))
     if kind == "quantity":
         units = f"units: {context['units']}; a bare number is SI"
-        return Message("SC015", str(context["problem"]), _bare_number(node) or units)
+        written = str(node.value) if isinstance(node, Leaf) else ""
+        return Message("SC015", str(context["problem"]), mended(written) or _bare_number(node) or units)
     if "names" in context:
         hint = suggestion(str(context["value"]), str(context["names"]).split(", "))
         return Message("SC014", f"{shown(node)} is not one of the choices", hint)
@@ -124,6 +126,10 @@ def _type_hint(kind: str, node: Node) -> str:
         return ""
     if kind in ("int_type", "float_type"):
         return _bare_number(node)
+    if odd := mended(node.value):
+        return odd
+    if kind == "bool_type" and node.value.lower() in ("true", "false"):
+        return "remove the quotes"
     if kind == "bool_type" and node.value.lower() in ("yes", "no", "on", "off", "y", "n"):
         return f"write {'true' if node.value.lower() in ('yes', 'on', 'y') else 'false'}"
     return ""

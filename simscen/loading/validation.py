@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from simscen.core.problems import Problem
-from simscen.loading import messages
+from simscen.loading import messages, odd, slips
 from simscen.loading.grammar import keys_of, models_at, needs_nothing, types_at
 from simscen.loading.tree import (
     Fields,
@@ -96,7 +96,10 @@ def _translate(model: type[BaseModel], tree: Node, error: dict[str, Any]) -> Pro
         name = Leaf(tree.place, str(loc[-2]))
         return _problem(key_place(tree, loc), *messages.explain(kind, error.get("ctx", {}), name, error["msg"]))
     node = at(tree, loc)
-    return _problem(value_place(tree, loc), *messages.explain(kind, error.get("ctx", {}), node, error["msg"]))
+    message = messages.explain(kind, error.get("ctx", {}), node, error["msg"])
+    if not message.hint and kind in ("model_type", "model_attributes_type", "list_type"):
+        message = message._replace(hint=slips.of_wrong_type(kind, model, loc, node))
+    return _problem(value_place(tree, loc), *message)
 
 
 def _unknown_key(model: type[BaseModel], tree: Node, loc: tuple[Key, ...]) -> Problem:
@@ -105,7 +108,11 @@ def _unknown_key(model: type[BaseModel], tree: Node, loc: tuple[Key, ...]) -> Pr
     where = f" in `{holder}`" if holder else ""
     models = models_at(model, loc[:-1])
     hint = messages.suggestion(key, keys_of(models))
-    if not hint.startswith("did") and any(issubclass(one, Choice) and one.group for one in models):
+    if mended := odd.mended(key):
+        hint = mended
+    elif not hint.startswith("did") and (belongs := slips.of_place(model, loc[:-1], key)):
+        hint = belongs
+    elif not hint.startswith("did") and any(issubclass(one, Choice) and one.group for one in models):
         hint = "; ".join(filter(None, (hint, "`simscen plugins` lists what installed packages add")))
     return _problem(key_place(tree, loc), "SC012", f"unknown key {messages.quoted(key)}{where}", hint)
 
