@@ -8,7 +8,7 @@ from pathlib import Path
 from simscen.core.errors import UsageError
 from simscen.loading.compose import compose
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.resolved import resolved_text
+from simscen.loading.resolved import whole_text
 from simscen.loading.tree import Fields, Items, Leaf, Node
 
 _MODELINE = "# yaml-language-server:"
@@ -45,7 +45,7 @@ def copy_scenario(loaded: LoadedScenario, target: Path, root: Path) -> list[Path
 
 def _text_of(loaded: LoadedScenario) -> tuple[str, Node]:
     """The text to copy, without the line that tells editors where the schema is, and its tree."""
-    lines = resolved_text(loaded).split("\n")
+    lines = whole_text(loaded).split("\n")
     text = "\n".join(line for line in lines if not line.startswith(_MODELINE))
     tree, _ = compose(text, loaded.path)
     assert tree is not None

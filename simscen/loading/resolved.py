@@ -5,7 +5,9 @@ from dataclasses import replace
 
 from simscen.core.errors import InvalidInput
 from simscen.loading.compose import compose
+from simscen.loading.document import Library
 from simscen.loading.loaded import LoadedScenario
+from simscen.loading.paths import Fence
 from simscen.loading.placing import placed_criteria, places_of
 from simscen.loading.plugins import absent
 from simscen.loading.robots import each_of
@@ -30,6 +32,15 @@ def resolved_text(loaded: LoadedScenario) -> str:
     if isinstance(own, Fields) and own.plain == plain:
         return loaded.text
     return to_yaml(plain)
+
+
+def whole_text(loaded: LoadedScenario) -> str:
+    """Likewise, with all the variations that the file has instead of the values of one."""
+    if not loaded.variation:
+        return resolved_text(loaded)
+    own, _ = compose(loaded.text, loaded.path)
+    tree, _ = Library(Fence.around(loaded.root, loaded.world_path)).read(loaded.file, defaults=True)
+    return loaded.text if tree is None or own is None or own.plain == tree.plain else to_yaml(tree.plain)
 
 
 def spec_of_text(text: str, name: str) -> ScenarioSpec:

@@ -64,3 +64,21 @@ def test_a_copy_overwrites_nothing(simscen, tmp_path: Path) -> None:
     assert simscen("new", "mine", "--like", "navigation/goal").code == 2
     assert (tmp_path / "mine" / "house.world.yaml").read_text() == "precious"
     assert not (tmp_path / "mine.scenario.yaml").exists()
+
+
+@pytest.mark.parametrize("name", ["aisle.base.yaml", "deep/defaults.yaml"])
+def test_a_base_is_written_with_the_partial_schema_of_the_project(simscen, tmp_path: Path, name: str) -> None:
+    (tmp_path / "pyproject.toml").write_text("")
+    assert simscen("schema", "--write", "schemas").code == 0
+    assert simscen("new", name).code == 0
+    up = "../" * name.count("/")
+    assert (tmp_path / name).read_text().startswith(f"# yaml-language-server: $schema={up}schemas/base.schema.json\n")
+    assert simscen("validate", name) == (0, "1 base is valid\n", "")
+    assert simscen("new", "mine").code == 0
+    assert "$schema=schemas/scenario.schema.json" in (tmp_path / "mine.scenario.yaml").read_text().split("\n")[0]
+
+
+def test_a_copy_of_a_scenario_has_its_variations(simscen, tmp_path: Path) -> None:
+    assert simscen("new", "mine", "--like", "speeds").code == 0
+    listed = simscen("list", "mine.scenario.yaml").out
+    assert listed.count("mine[desired_linear_vel=") == 4
