@@ -86,6 +86,19 @@ def test_a_collision_has_a_red_star():
     assert near(pixel(draw(scene()), 3.0, 5.0), palette.RED)
 
 
+def test_a_mark_has_a_flag_where_the_robot_was():
+    plain, flagged = (np.asarray(draw(scene(events=events)).convert("RGB")) for events in ([], [[7.5, "mark", "now"]]))
+    rows, columns = np.nonzero(
+        (np.abs(flagged.astype(int) - palette.AMBER) < 30).all(axis=2) & (plain != flagged).any(2)
+    )
+    assert len(rows) > 50
+    assert near(pixel(draw(scene()), 4.5, 2.5), palette.ramp(0.75), 60), "the robot is there then"
+    left, foot = columns.min(), rows[columns == columns.min()].max()
+    scale = min(LARGEST[0] / (WIDE * RESOLUTION + 2 * MARGIN), LARGEST[1] / (TALL * RESOLUTION + 2 * MARGIN))
+    where = ((4.5 + MARGIN) * scale, (TALL * RESOLUTION + MARGIN - 2.5) * scale + HEADER)
+    assert (left, foot) == pytest.approx(where, abs=4)
+
+
 def test_the_verdict_is_on_the_picture_in_its_colour():
     image = draw(scene())
     assert near(image.getpixel((20, 31)), palette.RED)

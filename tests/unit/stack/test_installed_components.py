@@ -351,6 +351,12 @@ def test_a_stack_of_a_package_is_checked_beat_by_beat(odd, tmp_path: Path) -> No
         stack.decide(60, ())
 
 
+def test_a_stack_of_a_package_that_takes_no_zones_is_known_before_it_is_told(odd, tmp_path: Path) -> None:
+    spec = load_scenario(scenario(tmp_path, "{type: still, keepout: []}"), tmp_path).spec.stack
+    assert not build_stack(spec, driven_setting(), Streams(1), Clock(RATE)).can_switch_zones
+    assert build_stack(StackSpec(), driven_setting(), Streams(1), Clock(RATE)).can_switch_zones
+
+
 def driven_setting():
     from simscen.stack.protocols import Surroundings
 
