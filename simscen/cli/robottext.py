@@ -15,6 +15,9 @@ def as_table(body: "RobotBody", checked: "Checked") -> Iterator[str]:
     """At most 80 columns: what was driven, then every check with its figure and its limit."""
     drive = body.drive.type.replace("_", " ")
     yield f"  {drive}, {body.mass:.4g} kg, {len(body.wheels)} wheels"
+    slope, step = checked.climb
+    if slope:
+        yield f"  climbs {math.degrees(slope):.1f}° and a step of {1000 * step:.0f} mm, on dry concrete (closed forms)"
     yield ""
     yield f"  {'':9}{'driven in m':^24}{'turned in degrees':^25}  odometry   most"
     yield f"  {'':9}{'command odometry   truth'}  {'command odometry  truth'}  off at end  tilt"
@@ -49,6 +52,7 @@ def as_data(body: "RobotBody", checked: "Checked") -> dict[str, Any]:
         "robot": body.name,
         "drive": body.drive.type,
         "passed": not checked.failed,
+        "climb": {"slope": checked.climb.slope, "step": checked.climb.step},
         "rest": asdict(checked.rest),
         "trials": [_trial(trial) for trial in checked.trials],
         "checks": [{**asdict(check), "held": check.held} for check in checked.checks],

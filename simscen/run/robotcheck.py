@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from simscen.model.robot import Drive, Mecanum, SkidSteer
 from simscen.run.trialdrive import Rest, Trial, drive_once
+from simscen.sim.climb import Climb, climb_of
 from simscen.sim.robot_body import RobotBody
 
 LEAN, LIFT, CREEP = math.radians(1.0), 0.002, 0.001
@@ -47,6 +48,7 @@ class Checked:
     rest: Rest
     trials: tuple[Trial, ...]
     checks: tuple[Check, ...]
+    climb: Climb
 
     @property
     def failed(self) -> int:
@@ -57,7 +59,7 @@ class Checked:
 def check_robot(body: RobotBody) -> Checked:
     """Drive a robot and judge it. Raises RunError when the physics loses it."""
     rest, trials = drive_once(body)
-    return Checked(rest, trials, tuple(_checks(body, rest, {trial.name: trial for trial in trials})))
+    return Checked(rest, trials, tuple(_checks(body, rest, {trial.name: trial for trial in trials})), climb_of(body))
 
 
 def _checks(body: RobotBody, rest: Rest, trials: dict[str, Trial]) -> Iterator[Check]:

@@ -69,7 +69,7 @@ class Simulation:
             walls = static if obstacles is None else obstacles
             self.robots[name] = Robot(name, self._scene, static, walls, body, pose, period, clearance_range)
         for thing in sorted(bodies, key=lambda body: body.name):
-            actors.add(thing, 0)
+            actors.add(terrain.lifted(thing), 0)
         for _ in range(SETTLING):
             pybullet.stepSimulation(client)
         for name, robot in self.robots.items():
@@ -124,7 +124,7 @@ class Simulation:
 
     def spawn(self, body: Body) -> None:
         """Put a body into the world."""
-        self._scene.actors.add(body, self.tick)
+        self._scene.actors.add(self._scene.terrain.lifted(body), self.tick)
         self._scene.changed()
 
     def remove(self, name: str) -> None:

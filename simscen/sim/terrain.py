@@ -6,12 +6,13 @@ ones (height fields, meshes) stay triangles; on those a wheel loses some millime
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pybullet
 
 from simscen.core.geometry import Array, Pose2, Pose3
-from simscen.core.shapes import TriangleMesh
+from simscen.core.shapes import Body, TriangleMesh
 from simscen.core.terrain import Owners, terrain
 from simscen.sim import engine
 
@@ -41,6 +42,8 @@ class Terrain:
         for owner in sorted(self.owners):
             self._add(static, owner)
         if self.owners:
+            # The engine's rays meet nothing that has never been looked at.
+            pybullet.performCollisionDetection(physicsClientId=client)
             stays = ~np.isin(static.owners, sorted(self.owners))
             self.rest = TriangleMesh(static.vertices, static.faces[stays], static.owners[stays], static.names)
 
@@ -74,6 +77,11 @@ class Terrain:
             above, below, collisionFilterMask=engine.TERRAIN, physicsClientId=self._client
         )  # fmt: skip
         return np.array([max(0.0, hit[3][2]) if hit[0] in self.names else 0.0 for hit in found])
+
+    def lifted(self, body: Body) -> Body:
+        """A thing that is put where its own frame is on the ground, which may be a platform."""
+        height = float(self.heights(np.array([body.pose.position[:2]]))[0])
+        return replace(body, pose=body.pose._replace(z=body.pose.z + height)) if height else body
 
     def seat(self, pose: Pose2, feet: Array) -> Pose3:
         """The base frame of a robot that is set down with its `feet` (n, 2), in its own frame, on the ground.

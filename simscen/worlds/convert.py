@@ -48,7 +48,8 @@ def convert(world: World, height: float) -> Conversion:
     done = Conversion()
     for solid in world.solids:
         for form in forms_of(solid, height, done.changes):
-            done.obstacles.append(Obstacle.model_validate({"name": _name(solid.name), **form.fields}))
+            slippery = {"friction": solid.friction} if solid.friction != 1.0 else {}
+            done.obstacles.append(Obstacle.model_validate({"name": _name(solid.name), **form.fields, **slippery}))
     for body in world.bodies:
         _add_body(body, height, done)
     return done

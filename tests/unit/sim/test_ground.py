@@ -8,7 +8,7 @@ from playground import box, shipped
 
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.motion import Twist
-from simscen.core.shapes import Mesh, Solid
+from simscen.core.shapes import Body, Box, Mesh, Solid
 from simscen.sim.climb import climb_of, grip_angle
 from simscen.sim.embody import robot_body
 from simscen.worlds.meshing import fuse
@@ -156,3 +156,21 @@ def test_walls_leave_the_ground_flat(simulate):
     simulation.drive(Twist(0.1, 0, 0))
     simulation.step(24)
     assert abs(simulation.truth().pose.z) < 1e-4
+
+
+def test_a_thing_is_put_on_the_platform_that_is_there_and_a_robot_is_set_down_on_it(on_ground):
+    """A crate that is spawned on a platform stands on it, and lies still."""
+    simulation = on_ground("turtlebot", [box("platform", 3.0, 0, 2.0, 2.0, 0.03)])
+    crate = (Solid(Box((0.2, 0.2, 0.2)), Pose3(z=0.1), "crate"),)
+    simulation.spawn(Body("crate", crate, Pose3(3.5, 0.5, 0.0), mass=2.0))
+    simulation.place_robot(Pose2(2.8, -0.2, 0.5))
+    assert driven(simulation, 1) == []
+    assert simulation.truth().pose.z == pytest.approx(0.03, abs=1e-3)
+    assert simulation.objects()["crate"].z == pytest.approx(0.03, abs=2e-3)
+
+
+def test_an_imu_on_a_slope_feels_gravity_ahead(on_ground):
+    simulation = on_ground("turtlebot", [ramp(5)], pose=Pose2(FOOT + 1.0, 0.0, 0.0))
+    driven(simulation, 1)
+    base_from_world = simulation.truth().pose.rotation().T
+    assert (base_from_world @ (0.0, 0.0, 9.81))[0] == pytest.approx(9.81 * math.sin(math.radians(5)), abs=0.02)

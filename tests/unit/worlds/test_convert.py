@@ -153,3 +153,8 @@ def test_what_the_file_adds_itself_comes_after():
     done = convert(World("w", (Solid(Box((1, 1, 1)), Pose3(z=0.5), "theirs"),)), 0.2).onto(spec)
     assert done.sdf is None
     assert [obstacle.name for obstacle in done.obstacles] == ["theirs", "mine"]
+
+
+def test_a_slippery_plate_stays_slippery():
+    world, changes = converted(Solid(Box((1.0, 1.0, 0.02)), Pose3(z=0.01), "plate", 0.3))
+    assert (world.solids[0].friction, changes) == (0.3, [])
