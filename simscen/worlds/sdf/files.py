@@ -14,7 +14,7 @@ from simscen.worlds.sdf.report import Missing, Place, Unusable
 
 LONGEST_PATH = 1000
 WORLD_BYTES = 20 * 2**20
-MESH_BYTES = 20 * 2**20
+MESH_BYTES = 64 * 2**20
 
 
 class Trouble(Exception):

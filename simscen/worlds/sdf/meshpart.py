@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array
 
-MOST_FACES = 500_000
+MOST_FACES = 1_000_000
 
 
 class UnusableMesh(Exception):

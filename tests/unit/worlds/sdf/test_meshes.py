@@ -216,11 +216,11 @@ def test_a_mesh_beyond_10_km_is_refused(broken):
     assert "reaches farther than" in broken(dae(), "<scale>1e5 1 1</scale>").message
 
 
-def test_a_mesh_file_beyond_20_mib_is_refused_unread(refuse, tmp_path):
+def test_a_mesh_file_beyond_64_mib_is_refused_unread(refuse, tmp_path):
     with (tmp_path / "x.stl").open("wb") as file:
         file.truncate(200 * 2**20)
     tracemalloc.start()
-    assert "larger than 20 MiB" in refuse(world("x.stl"))[0].message
+    assert "larger than 64 MiB" in refuse(world("x.stl"))[0].message
     assert tracemalloc.get_traced_memory()[1] < 2**20
     tracemalloc.stop()
 
