@@ -112,7 +112,7 @@ class People:
             if person.who.reacts_within and "robots" not in person.who.blind_to:
                 visible = {robot.name: robot for robot in around.robots if self._in_view(person, robot)}
                 deeds += person.take(visible, seconds)
-            reacting.append(visible.get(person.reacts_to or ""))
+            reacting.append(None if person.reacts_to is None else visible.get(person.reacts_to))
         return reacting, deeds
 
     def _in_view(self, person: Person, robot: SeenRobot) -> bool:

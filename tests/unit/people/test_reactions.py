@@ -36,7 +36,7 @@ def test_the_impassive_take_a_robot_for_a_thing():
 def test_the_surprised_stop_and_look_until_they_have_seen_enough():
     crowd = people(walker("anna", 8.0, 1.0, (-9.0, 1.0), **SURPRISED))
     tracks, deeds = walk(crowd, 45.0, robot(0.0, 0.0))
-    assert [(deed.what, deed.about) for deed in deeds] == [("reacted", "robot"), ("calmed", "robot"), ("reached", "1")]
+    assert [(deed.what, deed.about) for deed in deeds] == [("reacted", ""), ("calmed", ""), ("reached", "1")]
     anna = tracks["anna"]
     begun = int(np.argmax(gaps(anna) <= 4.0))
     standing = slice(begun + 80, begun + int(29.0 / STEP))

@@ -185,6 +185,7 @@ LOGGED = {
     "event": ({"name": "a"}, EventKind.EVENT_STARTED),
     "recovery": ({"name": "spin"}, EventKind.RECOVERY_STARTED),
     "collision": ({"with": "a"}, EventKind.COLLISION_STARTED),
+    "pedestrian": ({"name": "anna", "status": "calmed"}, EventKind.PEDESTRIAN_CALMED),
 }
 
 
@@ -198,7 +199,7 @@ def test_what_was_logged_counts_by_kind_and_name(kind):
     assert holds({kind: words}, events=(Event(1, logged, "other"), Event(2, logged, name)))
 
 
-@pytest.mark.parametrize("kind", ["goal", "recovery", "collision"])
+@pytest.mark.parametrize("kind", ["goal", "recovery", "collision", "pedestrian"])
 def test_without_a_name_any_counts(kind):
     words, logged = LOGGED[kind]
     bare = {key: value for key, value in words.items() if key == "status"}
@@ -206,7 +207,7 @@ def test_without_a_name_any_counts(kind):
     assert not holds({kind: bare})
 
 
-@pytest.mark.parametrize("kind", ["goal", "recovery"])
+@pytest.mark.parametrize("kind", ["goal", "recovery", "pedestrian"])
 def test_as_often_as_is_asked(kind):
     words, logged = LOGGED[kind]
     name = words["name"]
