@@ -73,29 +73,28 @@ def wall(away: Array, gap: Array) -> Array:
     return force
 
 
-def group(places: Array, velocities: Array, members: Numbers) -> Array:
-    """What keeps a group together (n, 2): `members` are the numbers of those who belong to it, at least two."""
-    force = np.zeros_like(places)
-    here = places[members]
-    count = len(members)
-    middle = here.sum(axis=0) / count
-    for number, member in enumerate(members.tolist()):
-        others = (middle * count - here[number]) / (count - 1) - here[number]
-        force[member] -= GAZE * _head_turn(velocities[member], others) * velocities[member]
-        to_middle = middle - here[number]
-        distance = math.hypot(*to_middle)
+def group(places: Array, velocities: Array) -> Array:
+    """What keeps a group together (n, 2), of all who belong to it, at least two; in plain numbers, as it is small."""
+    here, moving = places.tolist(), velocities.tolist()
+    count = len(here)
+    mx, my = sum(x for x, _ in here) / count, sum(y for _, y in here) / count
+    forces = []
+    for (x, y), (vx, vy) in zip(here, moving, strict=True):
+        share = count / (count - 1)  # the middle of the others is so many times as far away as that of all
+        turn = GAZE * _head_turn(vx, vy, share * (mx - x), share * (my - y))
+        fx, fy, distance = -turn * vx, -turn * vy, math.hypot(mx - x, my - y)
         if distance > (count - 1) / 2:
-            force[member] += COHERENCE * to_middle / distance
-        gaps = here[number] - here
-        near = np.hypot(gaps[:, 0], gaps[:, 1])
-        close = (near < GROUP_GAP) & (near > 0)
-        force[member] += REPULSION * (gaps[close] / near[close, np.newaxis]).sum(axis=0)
-    return force
+            fx, fy = fx + COHERENCE * (mx - x) / distance, fy + COHERENCE * (my - y) / distance
+        for ox, oy in here:
+            gap = math.hypot(x - ox, y - oy)
+            if 0 < gap < GROUP_GAP:
+                fx, fy = fx + REPULSION * (x - ox) / gap, fy + REPULSION * (y - oy) / gap
+        forces.append((fx, fy))
+    return np.array(forces)
 
 
-def _head_turn(velocity: Array, others: Array) -> float:
-    """Radians that somebody has to turn the head beyond VISION to have the others of the group in view."""
-    if not velocity.any() or not others.any():
+def _head_turn(vx: float, vy: float, x: float, y: float) -> float:
+    """Radians that who walks at (vx, vy) has to turn the head beyond VISION to have (x, y) in view."""
+    if (vx == 0 and vy == 0) or (x == 0 and y == 0):
         return 0.0
-    turn = abs(math.atan2(velocity[0] * others[1] - velocity[1] * others[0], float(velocity @ others)))
-    return max(0.0, turn - VISION)
+    return max(0.0, abs(math.atan2(vx * y - vy * x, vx * x + vy * y)) - VISION)

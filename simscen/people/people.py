@@ -14,7 +14,7 @@ from simscen.people.forces import RELAXATION_TIME, Numbers
 from simscen.people.limits import Limits, limits, within
 from simscen.people.person import SCARED_FORCE, THREATENING_SPEED, Person, Wish
 from simscen.people.seen import SeenRobot, Surroundings, edges
-from simscen.people.walls import REACH, Walls, nearest_on
+from simscen.people.walls import REACH, Near, Walls, nearest_on
 
 VIEW = 10.0
 """m beyond which nobody minds anybody (HuNavSim's max_dist_view)."""
@@ -90,9 +90,10 @@ class People:
         wishes = [person.wish(robot) for person, robot in zip(people, reacting, strict=True)]
         places = np.array([person.place for person in people])
         velocities = np.array([person.velocity for person in people])
-        pushed = self._pushes(people, reacting, wishes, places, velocities, around)
+        walls = self._walls.near(places)
+        pushed = self._pushes(people, reacting, wishes, places, velocities, around, walls)
         moves, after = _relaxed(wishes, places, velocities, pushed, seconds)
-        allowed = within(moves, self._limits(people, places, around))
+        allowed = within(moves, self._limits(people, places, around, walls))
         cut = (allowed != moves).any(axis=1)
         after[cut] = allowed[cut] / seconds
         for person, by, velocity, wish in zip(people, allowed, after, wishes, strict=True):
@@ -135,13 +136,13 @@ class People:
         places: Array,
         velocities: Array,
         around: Surroundings,
+        walls: Near,
     ) -> Array:
         """The forces on everybody but their own wish, (n, 2)."""
         force = self._social(people, reacting, places, velocities, around)
-        force += self._obstacles(people, places, around)
+        force += self._obstacles(people, places, around, walls)
         for members in _groups(people):
-            together = forces.group(places, velocities, members)
-            force[members] += together[members]
+            force[members] += forces.group(places[members], velocities[members])
         for number, (person, robot, wish) in enumerate(zip(people, reacting, wishes, strict=True)):
             if wish.still:
                 force[number] = 0.0
@@ -171,9 +172,9 @@ class People:
         seen = self._walls.visible(places[one], others.places[other])
         return _summed(one[seen], force[seen], len(people))
 
-    def _obstacles(self, people: list[Person], places: Array, around: Surroundings) -> Array:
+    def _obstacles(self, people: list[Person], places: Array, around: Surroundings, walls: Near) -> Array:
         """Of walls, things, and the robot for whom it is but a thing: the nearest place of each."""
-        who, owner, nearest = self._walls.near(places)
+        who, owner, nearest = walls
         first = _first_of_each(who, owner, np.hypot(*(nearest - places[who]).T))
         found = [(who[first], nearest[first])]
         for thing in around.things:
@@ -190,9 +191,9 @@ class People:
         force = forces.wall(away / distance[:, np.newaxis], distance - radii[who])
         return _summed(who, force, len(people))
 
-    def _limits(self, people: list[Person], places: Array, around: Surroundings) -> list[Limits]:
+    def _limits(self, people: list[Person], places: Array, around: Surroundings, walls: Near) -> list[Limits]:
         radii = np.array([person.who.radius for person in people])
-        who, _, nearest = self._walls.near(places)
+        who, _, nearest = walls
         every = [_keep_off(who, nearest, places, radii, 1.0)]
         for blind, outlines in [
             *(("objects", thing.outlines) for thing in around.things),

@@ -15,6 +15,7 @@ REACH = 1.2
 SIGHT_CELL = 0.1
 """m; what hides is remembered in squares of this size, or larger ones in a world of more than MOST_CELLS."""
 MOST_CELLS = 4_000_000
+Near = tuple[Numbers, Numbers, Array]
 ARMS_LENGTH = 0.3
 """m from one's own middle and from that of what one looks at, within which nothing hides it."""
 
@@ -33,7 +34,7 @@ class Walls:
         self._known: dict[tuple[int, int], Numbers] = {}
         self._sight = _Sight(segments[opaque])
 
-    def near(self, points: Array) -> tuple[Numbers, Numbers, Array]:
+    def near(self, points: Array) -> Near:
         """Each meeting of a point (n, 2) with a segment within REACH: point, owner, and the nearest place (k, 2)."""
         cells = np.floor(points / CELL).astype(np.int64).tolist()
         found = [self._around(column, row) for column, row in cells]

@@ -27,6 +27,8 @@ HEIGHTS = (0.15, 0.5, 0.95)
 """m above the ground at which what stands is in somebody's way; what reaches the last hides what is behind it."""
 IN_THE_WAY = (0.05, 1.7)
 """m above the ground between which a thing is in somebody's way."""
+COARSE = 0.1
+"""m; the cells in which ways of people are searched."""
 ROOMY = 0.2
 """m of air that people like to have beside them where they plan a way."""
 KINDS = {
@@ -140,7 +142,7 @@ class Walking:
         """Around walls with room to spare, or without, or straight on where there is no way."""
         for room in (radius + ROOMY, radius):
             if room not in self._ways:
-                self._ways[room] = ways_in(self._built, (), room, IN_THE_WAY)
+                self._ways[room] = ways_in(self._built, (), room, IN_THE_WAY, COARSE)
             corners = self._ways[room].way(Pose2(*start, 0.0), Pose2(*goal, 0.0))
             if corners is not None:
                 return [(x, y) for x, y in corners[1:].tolist()]

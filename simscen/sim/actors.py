@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pybullet
@@ -47,6 +47,8 @@ class Actor:
     """What of that was last found not to be lost."""
     resting: bool = False
     """Whether it has not moved at all since the engine was asked before."""
+    scripted: dict[int, Pose3] = field(default_factory=dict)
+    """Where its path has it at the ticks that were asked for last."""
 
     @property
     def pushable(self) -> bool:
@@ -147,6 +149,7 @@ class Actors:
         """
         actor = self._actors[name]
         actor.path, actor.since, actor.speed = path, tick, speed
+        actor.scripted.clear()
 
     def _sort(self) -> None:
         self._posed_at = self._still_since = None
@@ -221,7 +224,12 @@ class Actors:
     def _pose(self, actor: Actor, tick: int) -> Pose3:
         actor.resting = not actor.pushable and actor.path is None
         if actor.path is not None:
-            return Pose3.planar(pose_at(actor.path, (tick - actor.since) / self._rate), actor.body.pose.z)
+            if tick not in actor.scripted:
+                if len(actor.scripted) > 1:
+                    actor.scripted.clear()
+                pose = pose_at(actor.path, (tick - actor.since) / self._rate)
+                actor.scripted[tick] = Pose3.planar(pose, actor.body.pose.z)
+            return actor.scripted[tick]
         if not actor.pushable:
             return actor.body.pose
         said: Placing = pybullet.getBasePositionAndOrientation(actor.id, physicsClientId=self._client)

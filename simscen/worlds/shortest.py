@@ -22,6 +22,8 @@ from simscen.worlds.taut import is_clear, length, tighten
 
 Z_RANGE = (0.03, 0.4)
 """What a robot may touch: above thresholds it rolls over, below what it passes under."""
+FINEST = 0.05
+"""m; the cells of the search."""
 MOST_CELLS = 1_000_000
 """Of the search; larger worlds are searched more coarsely."""
 
@@ -48,11 +50,13 @@ class ShortestWays:
         bounds: tuple[float, float, float, float],
         radius: float,
         z_range: tuple[float, float] = Z_RANGE,
+        finest: float = FINEST,
     ) -> None:
+        """Searched in cells of `finest` metres, or larger ones in a large world."""
         x0, y0, x1, y1 = bounds
         room = 2 * radius  # all around the world, so that a way may lead around it
         bounds = (x0 - room, y0 - room, x1 + room, y1 + room)
-        resolution = max(0.05, math.sqrt((x1 - x0 + 2 * room + 2) * (y1 - y0 + 2 * room + 2) / MOST_CELLS))
+        resolution = max(finest, math.sqrt((x1 - x0 + 2 * room + 2) * (y1 - y0 + 2 * room + 2) / MOST_CELLS))
         grid = empty_grid(bounds, resolution, "shortest way")
         self._radius = max(radius, 0.71 * resolution)
         self._too_small = radius < self._radius
@@ -146,10 +150,14 @@ class ShortestWays:
 
 
 def ways_in(
-    built: BuiltWorld, stops: Sequence[Pose2], radius: float, z_range: tuple[float, float] = Z_RANGE
+    built: BuiltWorld,
+    stops: Sequence[Pose2],
+    radius: float,
+    z_range: tuple[float, float] = Z_RANGE,
+    finest: float = FINEST,
 ) -> ShortestWays:
     """The shortest ways of a disc in a built world, wherever the stops are."""
-    return ShortestWays(built.mesh, _around(built, stops), radius, z_range)
+    return ShortestWays(built.mesh, _around(built, stops), radius, z_range, finest)
 
 
 def shortest_legs(
