@@ -36,9 +36,7 @@ def walker(name: str, x: float, y: float, *goals: tuple[float, float], **more) -
     return Walker(name, Pose2(x, y, more.pop("yaw", yaw)), goals, **more)
 
 
-def robot(
-    x: float, y: float, yaw: float = 0.0, speed: float = 0.0, name: str = "", radius: float = 0.2
-) -> SeenRobot:
+def robot(x: float, y: float, yaw: float = 0.0, speed: float = 0.0, name: str = "", radius: float = 0.2) -> SeenRobot:
     velocity = speed * math.cos(yaw), speed * math.sin(yaw)
     return SeenRobot(name, Pose2(x, y, yaw), velocity, radius, SQUARE * radius / 0.2)
 
