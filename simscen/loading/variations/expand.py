@@ -17,6 +17,8 @@ if TYPE_CHECKING:  # what most scenarios do not need is imported where it is
     from simscen.model.variations import Sampled, VariationBlock
 
 VARIATIONS = "variations"
+MOST_VALUES = 5_000_000
+"""Of all variations of a scenario together: each is looked at as a whole."""
 _SAID_OF_IT = frozenset({"description", "tags", "expected", "skip"})
 """What a variation may say that is no value it is run with: its name need not tell."""
 
@@ -76,6 +78,10 @@ def variations_of(tree: Fields) -> list[Variation] | list[Problem]:
     if (number := sum(math.prod(map(len, block)) for block in axes)) > MOST:
         message = f"these are {number} variations; a scenario may have {MOST}"
         return [Problem(*entry.value.place, "SC017", message, "`sampled` draws some of many")]
+    values = _size(own) + max((sum(max(map(_weight, axis)) for axis in block) for block in axes), default=0)
+    if number * values > MOST_VALUES:
+        message = f"{number} variations of up to {values} values are more than {MOST_VALUES} values in all"
+        return [Problem(*entry.value.place, "SC006", message)]
     options = [list(chosen) for block in axes for chosen in product(*block)]
     return expansion.named(options) if options else [Variation("", own)]
 
@@ -234,6 +240,15 @@ class _Expansion:
         problem = Problem(*place, code=code, message=message, hint=hint)
         if problem not in self.problems:
             self.problems.append(problem)
+
+
+def _weight(option: Option) -> int:
+    return sum(_size(change.value) for change in option.changes)
+
+
+def _size(node: Node) -> int:
+    """How many values there are."""
+    return sum(1 for _ in _places(node))
 
 
 def _places(node: Node) -> Iterator[Place]:

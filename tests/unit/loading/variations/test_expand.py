@@ -130,6 +130,14 @@ def test_a_thousand_million_combinations_are_refused_without_being_made() -> Non
     assert wrong(f"  grid: {{{grid}}}") == ["5:3 these are 1000000000 variations; a scenario may have 1000"]
 
 
+def test_many_variations_of_a_large_value_are_refused_without_being_made() -> None:
+    seeds = ", ".join(map(str, range(1, 1000)))
+    goals = ", ".join("{pose: desk}" for _ in range(3000))
+    (told,) = wrong(f"  grid: {{seed: [{seeds}], goals: [[{goals}]]}}")
+    assert "999 variations of up to 9" in told
+    assert told.endswith("values are more than 5000000 values in all")
+
+
 def test_each_variation_is_a_whole_scenario_with_its_values(write, scenario: str) -> None:
     file = write(
         "a.scenario.yaml",
