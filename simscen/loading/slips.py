@@ -17,12 +17,13 @@ DEEPEST = 3
 def of_wrong_type(kind: str, model: type[BaseModel], loc: Sequence[Key], node: Node) -> str:
     """How to write what was meant where a mapping or a list is expected at `loc` below `model`."""
     models = models_at(model, loc)
+    in_list = isinstance(next((part for part in reversed(loc) if not _is_tag(part)), ""), int)
     if kind == "list_type":
-        return _as_list(node, in_list=bool(loc) and isinstance(loc[-1], int))
+        return _as_list(node, in_list)
     if isinstance(node, Items):
         return _as_mapping(models, node)
     if isinstance(node, Leaf) and isinstance(node.value, str):
-        return _as_word(models, node.value, in_list=bool(loc) and isinstance(loc[-1], int))
+        return _as_word(models, node.value, in_list)
     return ""
 
 
