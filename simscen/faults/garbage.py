@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import ClassVar, Literal, TypeVar
+from typing import TYPE_CHECKING, ClassVar, Literal, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
 from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
@@ -16,8 +15,11 @@ from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Probability
 
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
 NUMBERS = {"nan": np.nan, "inf": np.inf, "zero": 0.0, "negative": -1.0, "huge": 1e30}
-T = TypeVar("T", bound=np.generic)
+T = TypeVar("T", bound="np.generic")
 SIZES = ("empty", "short")
 What = Literal["nan", "inf", "zero", "negative", "huge", "empty", "short", "anything"]
 

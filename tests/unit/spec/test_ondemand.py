@@ -61,7 +61,12 @@ def test_what_no_file_uses_is_not_imported():
         "import sys, simscen.model.scenario; print(*sorted(m for m in sys.modules if m.startswith('simscen.criteria')))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["simscen.criteria", "simscen.criteria.base", "simscen.criteria.criterion"]
+    assert done.stdout.split() == [
+        "simscen.criteria",
+        "simscen.criteria.base",
+        "simscen.criteria.codes",
+        "simscen.criteria.criterion",
+    ]
 
 
 class Sites(Spec):
