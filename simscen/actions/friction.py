@@ -47,6 +47,11 @@ class FrictionPatch(Spec, Action):
             raise ValueError("a disc needs both `at` and `radius`")
         return self
 
+    @property
+    def of_a_robot(self) -> bool:
+        """The floor is the same for all."""
+        return False
+
     def perform(self, stage: Stage) -> Effect:
         """Lay it down; whoever drives there will notice."""
         if self.region is not None:

@@ -117,6 +117,11 @@ class Pedestrian(_Walks, Action):
     group: Name | None = None
     """Those of one group keep together, side by side."""
 
+    @property
+    def of_a_robot(self) -> bool:
+        """Whoever comes, comes to all."""
+        return False
+
     def perform(self, stage: Stage) -> Effect:
         """Let them come; nothing comes of it where there is no room for them."""
         pose = self.pose.pose
@@ -151,6 +156,11 @@ class Crowd(_Walks, Action):
     def names(self) -> list[str]:
         """What they are called."""
         return [f"{self.name}-{number}" for number in range(1, self.count + 1)]
+
+    @property
+    def of_a_robot(self) -> bool:
+        """Whoever comes, comes to all."""
+        return False
 
     def perform(self, stage: Stage) -> Effect:
         """Let them come; nothing has come of it where there was no room for all."""

@@ -17,7 +17,7 @@ from simscen.judge.wording import DISTURBANCE
 
 T = TypeVar("T")
 SUCCESS = "success"
-OF_ALL = ("object.", "pedestrian.", "event.", "run.")
+OF_ALL = ("object.", "pedestrian.", "event.", "mark", "run.")
 """Kinds of events that happen to the world, and are in the log of each robot."""
 
 

@@ -160,7 +160,8 @@ def _unfit_goals(loaded: LoadedScenario) -> Iterator[Problem]:
 def _goals_sent_twice(loaded: LoadedScenario) -> Iterator[Problem]:
     taken = own_goal_names(loaded)
     for keys, action in (placed for step in loaded.spec.steps for placed in step.placed()):
-        name = getattr(action.chosen, "name", "") if action.kind == "new_goal" else ""
+        sent = action.kind == "new_goal" and loaded.concerns(action.robot)
+        name = getattr(action.chosen, "name", "") if sent else ""
         if name in taken:
             message = f"a goal is called {quoted(name)} already: criteria could not tell them apart"
             yield loaded.problem((*keys, "new_goal", "name"), "SC033", message, "give it another name")

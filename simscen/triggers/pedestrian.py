@@ -1,6 +1,6 @@
 """`pedestrian`: somebody reacted to the robot, lost interest, or reached a goal."""
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -18,6 +18,8 @@ class PedestrianStatus(Spec, Condition):
 
     Example: `when: {pedestrian: {name: anna, status: reacted}}`
     """
+
+    of_a_robot: ClassVar[bool] = False
 
     status: Literal["reacted", "calmed", "reached"]
     """What they must have done."""

@@ -5,6 +5,8 @@ import json
 
 import pytest
 from mcap.reader import make_reader
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
 
 from simscen.core.events import EventKind
 from simscen.core.result import Outcome
@@ -103,6 +105,23 @@ def test_a_log_says_the_same_of_each_robot_as_the_run_did(run):
     again = together(results, {name: one.trace for name, one in log.robots.items()})
     assert [(v.id, v.findings) for v in again.verdicts] == [(v.id, v.findings) for v in done.result.verdicts]
     assert json.loads(log.result)["verdicts"]
+
+
+def test_a_log_is_what_ros_2_tools_read_in_the_namespaces_of_its_robots(run):
+    done = run(f"robots: {{a: {{{EAST}}}, b: {{{FAR}}}}}\n{PASS}")
+    with AnyReader([done.log], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as bag:
+        topics = {connection.topic: connection.msgtype for connection in bag.connections}
+        assert {topic for topic in topics if not topic.startswith(("/a/", "/b/"))} == {"/clock"}
+        assert {topic[2:] for topic in topics if topic.startswith("/a/")} >= {
+            "/scan", "/odom", "/tf", "/tf_static", "/map", "/amcl_pose", "/plan", "/cmd_vel", "/ground_truth/odom"
+        }  # fmt: skip
+        assert topics["/a/scan"] == topics["/b/scan"] == "sensor_msgs/msg/LaserScan"
+        frames = set()
+        for connection, _, data in bag.messages([c for c in bag.connections if c.topic == "/a/tf"]):
+            frames |= {link.child_frame_id for link in bag.deserialize(data, connection.msgtype).transforms}
+        assert frames == {"base_link", "odom", "object/b"}
+        times = [time for _, time, _ in bag.messages([c for c in bag.connections if c.topic == "/clock"])]
+        assert len(times) == len(set(times)), "one clock for all"
 
 
 def test_one_robot_that_fails_fails_the_run_and_says_which_it_was(run):

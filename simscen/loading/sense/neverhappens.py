@@ -240,7 +240,7 @@ class _Run:
     @property
     def _may_be_rammed(self) -> bool:
         world = self.loaded.world
-        if world.spec is None or world.sdf is not None:
+        if world.spec is None or world.sdf is not None or self.loaded.other_robots:
             return True
         moving = self.does("move", "close", "open", "pedestrian", "crowd")
         return moving or any(thing.move for thing in world.spec.objects)

@@ -1,6 +1,6 @@
 """Which of several robots something is about: names that are possible, known, and given where it matters."""
 
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 
 from simscen.actions.action import AnyAction
 from simscen.actions.base import Action
@@ -45,9 +45,11 @@ def _outsiders(spec: ScenarioSpec, tree: Fields) -> Iterator[Problem]:
 
 def _nobodys(spec: ScenarioSpec, tree: Fields) -> Iterator[Problem]:
     """What is about a robot, and does not say which."""
+    events = {step.name for step in spec.steps}
+    faults = {fault.label for robot in (spec.robots or {}).values() for fault in robot.faults} - events
     for step in spec.steps:
         if step.when is not None:
-            for keys, test in _bare(step.when, (*step.keys, "when")):
+            for keys, test in _bare(step.when, (*step.keys, "when"), faults):
                 yield _unsaid(spec, tree, (*keys, test.kind), test.kind)
         for keys, action in step.placed():
             chosen = action.chosen
@@ -56,19 +58,19 @@ def _nobodys(spec: ScenarioSpec, tree: Fields) -> Iterator[Problem]:
                 yield _unsaid(spec, tree, (*keys, action.kind), action.kind)
 
 
-def _bare(test: Test, keys: Keys) -> Iterator[tuple[Keys, Test]]:
-    """The conditions on a robot that none is named for."""
+def _bare(test: Test, keys: Keys, faults: Container[str]) -> Iterator[tuple[Keys, Test]]:
+    """The conditions on a robot, or on a fault of it, that none is named for; `faults` are what these are called."""
     if test.robot is not None:
         return
     for key, inner in (("all", test.all), ("any", test.any)):
         for number, part in enumerate(inner or ()):
-            yield from _bare(part, (*keys, key, number))
+            yield from _bare(part, (*keys, key, number), faults)
     if test.not_ is not None:
-        yield from _bare(test.not_, (*keys, "not"))
+        yield from _bare(test.not_, (*keys, "not"), faults)
     elif not test.inner:
         condition = test.chosen
         assert isinstance(condition, Condition)
-        if condition.of_a_robot:
+        if condition.of_a_robot or (test.kind == "event" and getattr(condition, "name", "") in faults):
             yield keys, test
 
 

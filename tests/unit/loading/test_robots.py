@@ -76,6 +76,11 @@ WRONG = {
         f"robots: {{{A}, {B}}}\nevents: [{{when: {{time: 1}}, do: {{push: {{impulse: [1, 0]}}}}}}]\n" + PASS,
         (8, "SC043", "`push` is about a robot, and does not say which"),
     ),
+    "whose fault": (
+        "robots:\n  a: {pose: here, faults: [{sensor: lidar, off: {}}]}\n"
+        f"  {B}\nevents: [{{when: {{event: {{name: lidar.off}}}}, {REMOVE}}}]\n" + PASS,
+        (10, "SC043", "`event` is about a robot, and does not say which"),
+    ),
     "a stranger": (
         f"robots: {{{A}, {B}}}\nevents: [{{when: {{travelled: 1, robot: c}}, {REMOVE}}}]\n" + PASS,
         (8, "SC030", "no robot is called `c`"),
@@ -108,6 +113,12 @@ WRONG = {
 def test_what_is_wrong_is_told_where_it_is(load, case):
     text, expected = WRONG[case]
     assert expected in told(load(text))
+
+
+def test_each_robot_may_be_sent_a_goal_of_the_same_name(load):
+    sent = [f"{{new_goal: {{name: charger, pose: {{x: 2, y: 4}}}}, robot: {name}}}" for name in "ab"]
+    loaded = load(f"robots: {{{A}, {B}}}\nevents: [{{when: {{time: 1}}, do: [{', '.join(sent)}]}}]\n" + PASS)
+    assert not isinstance(loaded, list), told(loaded)
 
 
 def test_robots_that_start_in_one_another_are_told(load):
