@@ -167,9 +167,10 @@ class Crowd(_Walks, Action):
         came, first = 0, None
         for number in range(self.count):
             place = self._place(stage, number, first if number % self.group_size else None)
-            if place is not None and self._come(stage, number, place):
-                came += 1
-                first = first if number % self.group_size else place
+            if place is None or not self._come(stage, number, place):
+                break  # nor is there room for the next
+            came += 1
+            first = first if number % self.group_size else place
         if came < self.count:
             return Effect(False, f"there was room in {self.start} for {came} of {self.count} only")
         return Effect(True, f"{came} people come in {self.start}")
