@@ -14,7 +14,18 @@ from pydantic_core import PydanticUndefined
 from simscen.actions.action import AnyAction
 from simscen.criteria.criterion import AnyCriterion
 from simscen.faults.fault import AnyFault
-from simscen.model import anystack, navigation, robot, scenario, stack, stackfile, userconfig, variations, world
+from simscen.model import (
+    anystack,
+    expectederror,
+    navigation,
+    robot,
+    scenario,
+    stack,
+    stackfile,
+    userconfig,
+    variations,
+    world,
+)
 from simscen.model.disturbance import EventEntry, FaultEntry, StepEntry
 from simscen.model.rosmap import RosMapSpec
 from simscen.model.stackbase import SpeedZone
@@ -114,7 +125,7 @@ _SCENARIO: dict[str, type[BaseModel]] = {
     "initial_estimate": scenario.InitialEstimate,
     "goals": scenario.GoalEntry,
     "navigation": navigation.Navigation,
-    "expect": navigation.ExpectedError,
+    "expect": expectederror.ExpectedError,
     "on_reached": navigation.OnReached,
     "events": EventEntry,
     "then": StepEntry,

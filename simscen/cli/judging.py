@@ -96,7 +96,7 @@ class Judging:
         with _told_from_here(self._criteria):
             criteria = self._criteria.of("")
         case = self._foreign_case()
-        read = read_foreign(log, replace(self._wanted, goals=tuple(goal.name for goal in case.goals)))
+        read = read_foreign(log, replace(self._wanted, goals=tuple(goal.name for goal in case.goals if not goal.via)))
         self.notes += [f"{log}: {note}" for note in read.notes]
         missing = dict(read.coverage.missing)
         if case.footprint:

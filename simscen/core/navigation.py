@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, field
 from enum import Enum, IntEnum
 from typing import Literal
@@ -59,10 +58,6 @@ def error_code(number: int) -> ErrorCode | int:
     return ErrorCode(number) if number in {int(code) for code in ErrorCode} else number
 
 
-Mode = Literal["navigate_to_pose", "navigate_through_poses", "follow_waypoints"]
-"""Nav2's actions that take goals: one after the other, passed in one drive, or as waypoints with a task at each."""
-
-
 class TaskResult(str, Enum):
     """How a navigation task ended; nav2_simple_commander's names."""
 
@@ -87,27 +82,6 @@ class Goal:
     timeout: float | None = None
     via: bool = False
     wait: float = 0.0
-
-
-FAILED = "failed"
-"""How a goal is to end at which the robot is to fail with whatever code."""
-
-
-def in_loop(name: str, loop: int) -> str:
-    """What a goal of that name is called when the list of goals is driven for the `loop`-th time."""
-    return name if loop == 1 else f"{name}#{loop}"
-
-
-LOOP = re.compile(r"(.+)#[0-9]+")
-"""The name of a goal in a further loop."""
-
-
-def named(name: str, asked: str | None) -> bool:
-    """Whether a goal is the one that is asked for: `shelf` is `shelf` in every loop, `shelf#2` that of the second."""
-    if asked is None or name == asked:
-        return True
-    loop = LOOP.fullmatch(name)
-    return loop is not None and loop[1] == asked
 
 
 @dataclass(frozen=True, eq=False)

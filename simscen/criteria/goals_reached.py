@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from simscen.core.geometry import wrap
-from simscen.core.navigation import FAILED, named
+from simscen.core.goalnames import FAILED, named
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import at_least, at_most, held, missed, undecided

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from itertools import zip_longest
 from typing import TYPE_CHECKING
 
 from simscen.core.events import Event, EventKind, Value
-from simscen.core.navigation import FAILED, Goal
+from simscen.core.goalnames import FAILED
+from simscen.core.navigation import Goal
 from simscen.criteria.codes import code_of
 
 if TYPE_CHECKING:
@@ -123,7 +125,8 @@ def stories(trace: Trace, case: Case) -> list[GoalStory]:
     """The story of each goal of the scenario and of each that an event sent, in the order in which they were accepted.
 
     The k-th goal of a name is the k-th one reported under that name; a goal of the scenario that was never accepted
-    comes last, and one that no event sent has no story.
+    comes last, and one that no event sent has no story. Poses that are to be passed, and of which nothing is said, have
+    the story of the goal that their drive stops at: Nav2's status tells no more.
     """
     told = _reports(trace)
     before = _counted([goal.name for goal in case.goals])
@@ -131,6 +134,7 @@ def stories(trace: Trace, case: Case) -> list[GoalStory]:
         GoalStory(goal, *_nth(told.get(goal.name, []), before[k]), case.expected.get(goal.name, ""))
         for k, goal in enumerate(case.goals)
     ]
+    found = [_with_its_drive(story, found[k + 1 :], told) for k, story in enumerate(found)]
     for goal in case.sent:
         reports = told.get(goal.name, [])
         # What it preempted may be several poses of one drive.
@@ -138,6 +142,14 @@ def stories(trace: Trace, case: Case) -> list[GoalStory]:
         sent = max(len(reports), len(preempting))
         found += [GoalStory(goal, *_nth(reports, k)) for k in range(sent)]
     return sorted(found, key=began)
+
+
+def _with_its_drive(story: GoalStory, later: list[GoalStory], told: Mapping[str, list[_Report]]) -> GoalStory:
+    stop = next((each for each in later if not each.goal.via), None)
+    if not story.goal.via or story.goal.name in told or stop is None or stop.end is None:
+        return story
+    kind = EventKind.GOAL_PASSED if stop.reached is not None else stop.end.kind
+    return replace(story, accepted=stop.accepted, end=replace(stop.end, kind=kind, name=story.goal.name))
 
 
 def _counted(names: list[str]) -> list[int]:

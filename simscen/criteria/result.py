@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal
 
 from simscen.core.events import Event, EventKind
-from simscen.core.navigation import named
+from simscen.core.goalnames import named
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.bounds import held, missed, undecided

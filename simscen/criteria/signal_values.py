@@ -14,7 +14,7 @@ import numpy as np
 
 from simscen.core.events import EventKind
 from simscen.core.geometry import Array, wrap_array
-from simscen.core.navigation import named
+from simscen.core.goalnames import named
 from simscen.core.samples import Samples, Ticks
 from simscen.criteria.bounds import BrokenTrace
 from simscen.criteria.moments import spans

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-from simscen.core.navigation import LOOP
+from simscen.core.goalnames import LOOP
 from simscen.core.problems import Problem
 from simscen.core.time import Clock
 from simscen.core.world import World
@@ -24,8 +24,7 @@ from simscen.loading.tree import Fields, Key, key_place, real_keys, value_place
 from simscen.model.navigation import failure_of
 from simscen.model.robot import RobotSpec
 from simscen.model.scenario import MOST_GOALS
-from simscen.triggers.scan_age import ScanAge
-from simscen.triggers.trigger import Trigger
+from simscen.triggers.trigger import Test, Trigger
 
 COMMAND = "cmd_vel"
 
@@ -78,10 +77,11 @@ def _unknown_lidars(loaded: LoadedScenario) -> Iterator[Problem]:
         return
     lidars = [name for name, sensor in loaded.robot.spec.sensors.items() if sensor.says == "Scan"]
     for keys, part in below(loaded.spec, concerns=loaded.concerns):
-        if isinstance(part, ScanAge) and part.sensor is not None and part.sensor not in lidars:
-            message = f"robot `{loaded.robot.name}` has no lidar called {quoted(part.sensor)}"
-            hint = suggestion(part.sensor, lidars) or "it has none at all"
-            yield loaded.problem((*keys, "sensor"), "SC031", message, hint)
+        named = getattr(part.scan_age, "sensor", None) if isinstance(part, Test) else None
+        if named is not None and named not in lidars:
+            message = f"robot `{loaded.robot.name}` has no lidar called {quoted(named)}"
+            hint = suggestion(named, lidars) or "it has none at all"
+            yield loaded.problem((*keys, "scan_age", "sensor"), "SC031", message, hint)
 
 
 def _short_faults(loaded: LoadedScenario) -> Iterator[Problem]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from simscen.core.navigation import in_loop
+from simscen.core.goalnames import in_loop
 from simscen.core.world import World
 from simscen.criteria.criterion import verdict_names
 from simscen.loading.loaded import LoadedScenario

@@ -23,6 +23,7 @@ from simscen.loading.tree import (
     value_place,
 )
 from simscen.spec.choice import Choice
+from simscen.triggers.trigger import Test, Trigger
 
 Model = TypeVar("Model", bound=BaseModel)
 VERSION = 1
@@ -110,6 +111,8 @@ def _unknown_key(model: type[BaseModel], tree: Node, loc: tuple[Key, ...]) -> Pr
     hint = messages.suggestion(key, keys_of(models))
     if mended := odd.mended(key):
         hint = mended
+    elif key in Trigger.modifiers and models == [Test]:
+        hint = f"`{key}` is of the whole trigger: it stands beside the `all`, `any` or `not` of `when`"
     elif not hint.startswith("did") and (belongs := slips.of_place(model, loc[:-1], key)):
         hint = belongs
     elif not hint.startswith("did") and any(issubclass(one, Choice) and one.group for one in models):

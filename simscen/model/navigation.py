@@ -4,9 +4,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from simscen.core.navigation import FAILED, Mode
-from simscen.criteria.codes import Code
+from simscen.core.goalnames import FAILED, Mode
 from simscen.spec.base import Spec
+from simscen.spec.ondemand import OnDemand
 from simscen.spec.quantities import Duration, PositiveLength
 
 
@@ -28,30 +28,22 @@ class Navigation(Spec):
     goal's own `xy_tolerance` takes its place."""
 
 
-class ExpectedError(Spec):
-    """The robot is to fail at this goal with this code.
-
-    Example: `expect: {error_code: GOAL_OCCUPIED}`
-    """
-
-    error_code: Code
-    """One of Nav2's, by name or number."""
-
-
 def _text_or_mapping(value: Any) -> str:
     return "text" if isinstance(value, str) else "mapping"
 
 
 Expectation = Annotated[
-    Annotated[Literal["succeeded", "failed"], Tag("text")] | Annotated[ExpectedError, Tag("mapping")],
+    Annotated[Literal["succeeded", "failed"], Tag("text")]
+    | Annotated[Spec, OnDemand("simscen.model.expectederror", "ExpectedError"), Tag("mapping")],
     Discriminator(_text_or_mapping),
 ]
 
 
 def failure_of(expected: "Expectation") -> str:
     """How the robot is to fail: "failed", or the name of a code; "" where it is to arrive."""
-    if isinstance(expected, ExpectedError):
-        return expected.error_code.name
+    code = getattr(expected, "error_code", None)
+    if code is not None:
+        return str(code.name)
     return FAILED if expected == "failed" else ""
 
 

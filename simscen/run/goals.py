@@ -5,7 +5,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from simscen.actions.goals import NewGoal
-from simscen.core.navigation import Goal, in_loop
+from simscen.core.goalnames import in_loop
+from simscen.core.navigation import Goal
 from simscen.model.navigation import failure_of
 from simscen.model.scenario import GoalEntry, ScenarioSpec
 from simscen.model.stackbase import StackBase

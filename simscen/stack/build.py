@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from simscen.core.chance import Streams
 from simscen.core.events import Event
-from simscen.core.navigation import Mode
+from simscen.core.goalnames import Mode
 from simscen.core.time import Clock
 from simscen.model import stack as model
 from simscen.stack.collision_monitor import CollisionMonitor

@@ -8,8 +8,8 @@ import numpy as np
 
 from simscen.core.belief import Estimate
 from simscen.core.chance import Streams
+from simscen.core.goalnames import Mode
 from simscen.core.grid import OccupancyGrid
-from simscen.core.navigation import Mode
 from simscen.core.time import Clock
 from simscen.stack.footprint import Footprint
 from simscen.stack.protocols import Localizer, RobotModel, Surroundings

@@ -1,7 +1,8 @@
 """The list of goals: what is accepted, reached, passed, failed, canceled, and how the whole task ended."""
 
 from simscen.core.events import Event, EventKind, Value
-from simscen.core.navigation import ErrorCode, Goal, Mode, TaskResult
+from simscen.core.goalnames import Mode
+from simscen.core.navigation import ErrorCode, Goal, TaskResult
 from simscen.core.time import Clock
 
 

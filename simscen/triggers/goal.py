@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from simscen.core.events import EventKind
-from simscen.core.navigation import named
+from simscen.core.goalnames import named
 from simscen.core.stage import Situation
 from simscen.spec.base import Spec
 from simscen.spec.references import GoalName

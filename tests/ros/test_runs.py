@@ -66,6 +66,27 @@ def test_goals_go_to_an_action_of_nav2(with_interfaces, run, tmp_path: Path, act
     assert told == ["goal.accepted", "goal.reached"] * 2
 
 
+WAY = "goals: [{name: way, pose: {x: 1.8, y: 1}%s}, {name: end, pose: {x: 2.4, y: 1}}]"
+TOURS = {"navigate_through_poses": WAY % "", "follow_waypoints": WAY % ", on_reached: {wait: 1 s}"}
+
+
+@pytest.mark.parametrize("mode", ["navigate_through_poses", pytest.param("follow_waypoints", marks=pytest.mark.long)])
+def test_the_scenario_says_by_which_action_goals_go(with_interfaces, run, tmp_path: Path, mode: str) -> None:
+    head = "simscen: 1\nworld: room.world.yaml\nrobot: {pose: start}\ntime_limit: 90\n"
+    tour = f"navigation: {{mode: {mode}, loops: 2}}\n{TOURS[mode]}\npass: [{{goals_reached: {{}}}}]\n"
+    (tmp_path / "tour.scenario.yaml").write_text(head + tour)
+    launch = with_interfaces.node("navigator", action=mode)
+    ended = run("--launch", launch, scenario="tour.scenario.yaml")
+    assert ended.code == 0, ended.said
+    assert ended.about["goals"] == f"/{mode}"
+    events = [event for event in read_run(ended.logs[0]).trace.events if event.kind.value.startswith("goal.")]
+    way = "passed" if mode == "navigate_through_poses" else "reached"
+    told = [(event.kind.value, event.name) for event in events if event.kind.value != "goal.accepted"]
+    assert told == [
+        (f"goal.{kind}", name + loop) for loop in ("", "#2") for kind, name in ((way, "way"), ("reached", "end"))
+    ]
+
+
 @pytest.mark.parametrize("repeats", [4, pytest.param(20, marks=pytest.mark.long)])
 def test_runs_in_lockstep_are_equal_bit_for_bit_two_at_a_time(ros, run, repeats: int) -> None:
     """Two at a time: neither do they hear each other."""

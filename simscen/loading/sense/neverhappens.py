@@ -3,9 +3,10 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from types import SimpleNamespace
 from typing import Any
 
-from simscen.core.navigation import named
+from simscen.core.goalnames import named
 from simscen.core.problems import Problem
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.names import own_goal_names, people
@@ -13,7 +14,6 @@ from simscen.loading.tree import Key
 from simscen.model.disturbance import Step
 from simscen.model.robot import Holonomic, RobotSpec
 from simscen.model.stack import StackSpec
-from simscen.triggers.goal import GoalStatus
 from simscen.triggers.trigger import Test, Trigger
 
 Keys = tuple[Key, ...]
@@ -46,6 +46,11 @@ def never_happens(loaded: LoadedScenario) -> Iterator[Problem]:
         elif trigger.times > 1 and trigger.edge == "rising" and _latched(trigger):
             message = f"`{name}` happens once, not {trigger.times} times: its condition stays true from then on"
             yield replace(loaded.problem((*keys, "times"), "SC052", message), severity="warning")
+    for index, fault in enumerate(loaded.spec.faults):
+        if fault.when is not None and fault.when.times > 1 and fault.for_ is None:
+            message = f"`{fault.label}` happens once, not {fault.when.times} times: without `for` it lasts to the end"
+            keys = ("faults", index, "when", "times")
+            yield replace(loaded.problem(keys, "SC052", message, "say how long it lasts: `for`"), severity="warning")
     yield from _over_before(run)
 
 
@@ -213,7 +218,7 @@ class _Run:
         return None
 
     def _waypoint(self, waypoint: Any) -> str | None:
-        return self._goal(GoalStatus(status="reached", name=waypoint.name, count=waypoint.count))
+        return self._goal(SimpleNamespace(status="reached", name=waypoint.name, count=waypoint.count))
 
     def _replan(self, _: Any) -> str | None:
         return None if self.sent(None) else "the robot has no goal to plan for"

@@ -6,7 +6,7 @@ import numpy as np
 
 from simscen.core.events import EventKind
 from simscen.core.geometry import Array, Pose2
-from simscen.core.navigation import named
+from simscen.core.goalnames import named
 from simscen.core.samples import Samples
 from simscen.core.verdict import Status
 from simscen.judge.wording import comparison, subject

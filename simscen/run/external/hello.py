@@ -5,8 +5,9 @@ from typing import Any
 
 from simscen.core.belief import Estimate
 from simscen.core.geometry import Pose3
+from simscen.core.goalnames import Mode
 from simscen.core.grid import OccupancyGrid
-from simscen.core.navigation import Goal, Mode
+from simscen.core.navigation import Goal
 from simscen.core.version import __version__
 from simscen.peer import wire
 from simscen.record.topics import Topic

@@ -20,10 +20,10 @@ from simscen.core.chance import Streams
 from simscen.core.events import EventKind, Value
 from simscen.core.filtermasks import FilterMasks, SpeedLimits
 from simscen.core.geometry import Array, Pose2
+from simscen.core.goalnames import Mode
 from simscen.core.grid import OccupancyGrid
 from simscen.core.motion import Twist
 from simscen.core.navigation import Goal as CoreGoal
-from simscen.core.navigation import Mode
 from simscen.core.sensing import Bump, Image, Imu, Odometry, Reading, Scan
 from simscen.core.time import Clock
 from simscen.core.trace import Decision

@@ -2,7 +2,8 @@
 
 from collections.abc import Iterator
 
-from simscen.core.navigation import ErrorCode, named
+from simscen.core.goalnames import named
+from simscen.core.navigation import ErrorCode
 from simscen.criteria.result import ErrorCodeIs, Result
 from simscen.model.navigation import failure_of
 from simscen.model.scenario import ScenarioSpec

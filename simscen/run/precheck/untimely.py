@@ -4,8 +4,8 @@ import math
 from collections.abc import Iterator
 from itertools import pairwise
 
+from simscen.core.goalnames import named as is_named
 from simscen.core.navigation import Goal
-from simscen.core.navigation import named as is_named
 from simscen.core.problems import Problem
 from simscen.criteria.criterion import AnyCriterion
 from simscen.loading.sense.neverhappens import top_speed

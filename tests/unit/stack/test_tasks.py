@@ -4,7 +4,8 @@ import pytest
 
 from simscen.core.events import Event
 from simscen.core.geometry import Pose2
-from simscen.core.navigation import ErrorCode, Goal, error_code, in_loop, named
+from simscen.core.goalnames import in_loop, named
+from simscen.core.navigation import ErrorCode, Goal, error_code
 from simscen.core.time import Clock
 from simscen.stack.tasks import Task
 
