@@ -23,6 +23,8 @@ FLOOR = 0.005
 """Faces that lie wholly below this height in m are left to the ground plane, on which wheels roll smoothly."""
 STEEPEST = math.radians(50)
 """What is steeper is a wall, whatever drives: rubber on dry concrete (friction 1) holds up to 45°."""
+AT_ONCE = 64
+"""Solids that all others are compared with in one go, which takes memory for each pair."""
 
 Owners = frozenset[int]
 
@@ -57,8 +59,10 @@ def terrain(mesh: TriangleMesh, reach: float) -> Owners:
     reached = low[:, 2] <= reach
     fresh: Faces = reached
     while fresh.any():
-        apart = (low[:, None] > high[fresh] + reach) | (high[:, None] + reach < low[fresh])
-        leads: Faces = np.any(~np.any(apart, axis=2), axis=1)
+        leads = np.zeros(len(owners), dtype=np.bool_)
+        for some in np.array_split(np.flatnonzero(fresh), 1 + fresh.sum() // AT_ONCE):
+            apart = (low[:, None] > high[some] + reach) | (high[:, None] + reach < low[some])
+            leads |= np.any(~np.any(apart, axis=2), axis=1)
         fresh = leads & ~reached
         reached = reached | leads
     return frozenset(owners[reached].tolist())
