@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import pybullet
 
+from simscen.core.facemesh import compact
 from simscen.core.geometry import Array, Pose3
 from simscen.core.shapes import Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere, TriangleMesh
 from simscen.core.terrain import FLOOR
@@ -17,11 +18,6 @@ FACES_AT_ONCE = 40_000
 """Bullet's shared-memory commands hold at most 131072 vertices and 524288 indices."""
 STRIP = 20.0
 """m of x that lie together in one lot of faces."""
-CONVEX_FACES = 400
-"""A mesh of more faces is taken as concave without a look."""
-FLAT = 1e-6
-"""m by which corners may stand out of a face of a convex mesh."""
-
 AT_REST = 1e-6
 """(m/s)² below which a body is at rest; Bullet's own 0.05 would stop a ball that rolls at 0.2 m/s."""
 UNTIL_ASLEEP = 2.0
@@ -107,24 +103,6 @@ def above_floor(vertices: Array, faces: Faces) -> Faces:
     """Those faces that do not lie on the ground."""
     standing: Faces = faces[(vertices[faces, 2] > FLOOR).any(axis=1)]
     return standing
-
-
-def compact(vertices: Array, faces: Faces) -> Mesh:
-    """Some faces with the vertices that they use."""
-    used, indices = np.unique(faces, return_inverse=True)
-    return Mesh(vertices[used], indices.reshape(-1, 3).astype(np.int32))
-
-
-def is_convex(mesh: Mesh) -> bool:
-    """Whether a mesh is its own convex hull; one of many faces is not even looked at."""
-    if len(mesh.faces) > CONVEX_FACES:
-        return False
-    a, b, c = mesh.vertices[mesh.faces].swapaxes(0, 1)
-    normals = np.cross(b - a, c - a)
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    normals = normals / np.maximum(lengths, 1e-12)
-    heights = normals @ mesh.vertices.T - np.sum(normals * a, axis=1, keepdims=True)
-    return bool((heights <= FLAT).all())
 
 
 def _concave(client: int, mesh: TriangleMesh, faces: Faces) -> int:

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from simscen.core.facemesh import CONVEX_FACES
 from simscen.core.geometry import Array
 from simscen.core.shapes import TriangleMesh
-from simscen.sim.engine import CONVEX_FACES
 
 EDGE = 4.0
 """m of a tile. Twice the usual reach: a robot has a handful of tiles about it, of some hundred faces each."""

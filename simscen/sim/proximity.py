@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import pybullet
 
+from simscen.core.facemesh import compact, is_convex
 from simscen.core.geometry import Array, Pose3
 from simscen.core.shapes import TriangleMesh
 from simscen.core.terrain import FLOOR
@@ -98,11 +99,11 @@ class Proximity:
 
     def _build(self, part: int) -> list[int]:
         vertices, faces = self._mesh.vertices, self._mesh.faces[self._parts.faces(part)]
-        if self._parts.whole(part) and engine.is_convex(engine.compact(vertices, faces)):
-            shapes = [engine.convex_shape(self._client, engine.compact(vertices, faces).vertices)]
+        if self._parts.whole(part) and is_convex(compact(vertices, faces)):
+            shapes = [engine.convex_shape(self._client, compact(vertices, faces).vertices)]
         else:
             lots = engine.tiles(vertices, engine.above_floor(vertices, faces))
-            shapes = [engine.concave_shape(self._client, engine.compact(vertices, lot)) for lot in lots]
+            shapes = [engine.concave_shape(self._client, compact(vertices, lot)) for lot in lots]
         bodies = [engine.fixed(self._client, shape) for shape in shapes]
         for body in bodies:
             pybullet.changeDynamics(body, -1, collisionMargin=0.0, physicsClientId=self._client)
@@ -115,7 +116,7 @@ class Proximity:
 
     def convex(self, owner: int) -> bool:
         """Whether a solid is convex."""
-        return engine.is_convex(engine.compact(self._mesh.vertices, self._faces(owner)))
+        return is_convex(compact(self._mesh.vertices, self._faces(owner)))
 
     def _faces(self, owner: int) -> npt.NDArray[np.int32]:
         return self._mesh.faces[self._parts.faces_of(owner)]

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pybullet
 
+from simscen.core.facemesh import compact, is_convex
 from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.shapes import Body, TriangleMesh
 from simscen.core.terrain import Owners, terrain
@@ -52,12 +53,12 @@ class Terrain:
 
     def _add(self, static: TriangleMesh, owner: int) -> None:
         whole = static.faces[static.owners == owner]
-        solid = engine.compact(static.vertices, whole)
-        if engine.is_convex(solid):
+        solid = compact(static.vertices, whole)
+        if is_convex(solid):
             shapes = [engine.convex_shape(self._client, solid.vertices)]
         else:
             lots = engine.tiles(static.vertices, engine.above_floor(static.vertices, whole))
-            shapes = [engine.concave_shape(self._client, engine.compact(static.vertices, lot)) for lot in lots]
+            shapes = [engine.concave_shape(self._client, compact(static.vertices, lot)) for lot in lots]
         friction = static.frictions[owner] if static.frictions else 1.0
         for shape in shapes:
             body = engine.fixed(self._client, shape)

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from simscen.core.facemesh import compact, is_convex
 from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.shapes import Box, Mesh, Solid, TriangleMesh
 from simscen.core.terrain import Owners, normals, terrain
@@ -35,11 +36,17 @@ def obstacles_of(solids: tuple[Solid, ...], reach: float, slope: float, step: fl
     if slope <= 0 or is_flat(solids, reach):
         return solids
     mesh = fuse(solids)
-    ground = terrain(mesh, reach)
+    ground = frozenset(owner for owner in terrain(mesh, reach) if _is_plain(mesh, owner))
     if not ground:
         return solids
     stays = [solid for number, solid in enumerate(solids) if number not in ground]
     return (*stays, *_edges(mesh, ground, step), *_too_steep(mesh, ground, slope))
+
+
+def _is_plain(mesh: TriangleMesh, owner: int) -> bool:
+    """Whether a solid is convex, or a height field: of any other shape what is high above a low part is in the way."""
+    mine = mesh.owners == owner
+    return is_convex(compact(mesh.vertices, mesh.faces[mine])) or bool((normals(mesh)[mine, 2] >= 0).all())
 
 
 def _too_steep(mesh: TriangleMesh, ground: Owners, slope: float) -> Iterator[Solid]:

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.shapes import Box, Solid
+from simscen.core.shapes import Box, Mesh, Solid
 from simscen.worlds.meshing import fuse
 from simscen.worlds.obstacles import obstacles_of
 from simscen.worlds.ramps import wedge
@@ -57,3 +57,11 @@ def test_ramp_and_platform_join_without_a_wall_between_them():
     names = [s.name for s in obstacles_of(hall(5), *TURTLEBOT) if s.name in ("up", "down", "platform")]
     assert names.count("platform") == 4 + 2  # ends of the platform are at the walls' faces; four beside the ramps
     assert names.count("up") == names.count("down") == pytest.approx(18, abs=2)
+
+
+def test_a_concave_solid_with_a_low_part_stays_in_the_way_as_a_whole():
+    """Forks 3 cm high before a mast: wheels may roll on them, but nobody plans to."""
+    forks, mast = (box("jack", x, 0, length, 0.5, height) for x, length, height in ((0.5, 1.0, 0.03), (1.1, 0.2, 1.2)))
+    jack = fuse([forks, mast])
+    solids = (Solid(Mesh(jack.vertices, jack.faces), Pose3(), "jack"),)
+    assert obstacles_of(solids, *TURTLEBOT) is solids

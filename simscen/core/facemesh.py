@@ -1,0 +1,38 @@
+"""Faces of a mesh: some of them as a mesh of their own, and whether they are their own convex hull."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from simscen.core.geometry import Array
+from simscen.core.shapes import Mesh
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    Faces = npt.NDArray[np.int32]
+
+CONVEX_FACES = 400
+"""A mesh of more faces is taken as concave without a look."""
+FLAT = 1e-6
+"""m by which corners may stand out of a face of a convex mesh."""
+
+
+def compact(vertices: Array, faces: Faces) -> Mesh:
+    """Some faces with the vertices that they use."""
+    used, indices = np.unique(faces, return_inverse=True)
+    return Mesh(vertices[used], indices.reshape(-1, 3).astype(np.int32))
+
+
+def is_convex(mesh: Mesh) -> bool:
+    """Whether a mesh is its own convex hull; one of many faces is not even looked at."""
+    if len(mesh.faces) > CONVEX_FACES:
+        return False
+    a, b, c = mesh.vertices[mesh.faces].swapaxes(0, 1)
+    normals = np.cross(b - a, c - a)
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = normals / np.maximum(lengths, 1e-12)
+    heights = normals @ mesh.vertices.T - np.sum(normals * a, axis=1, keepdims=True)
+    return bool((heights <= FLAT).all())
