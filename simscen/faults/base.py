@@ -6,13 +6,13 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
-import numpy as np
-
 from simscen.core.readings import KINDS
 from simscen.core.time import Clock
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence
+
+    import numpy as np
 
     from simscen.core.belief import Belief
     from simscen.core.geometry import Array, Pose3
