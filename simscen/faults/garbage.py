@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar, Literal, TypeVar
@@ -18,7 +19,7 @@ from simscen.spec.quantities import Probability
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-NUMBERS = {"nan": np.nan, "inf": np.inf, "zero": 0.0, "negative": -1.0, "huge": 1e30}
+NUMBERS = {"nan": math.nan, "inf": math.inf, "zero": 0.0, "negative": -1.0, "huge": 1e30}
 T = TypeVar("T", bound="np.generic")
 SIZES = ("empty", "short")
 What = Literal["nan", "inf", "zero", "negative", "huge", "empty", "short", "anything"]

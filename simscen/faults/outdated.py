@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import Field
 
 from simscen.core.geometry import Array
@@ -15,6 +14,9 @@ from simscen.core.grid import FREE, OCCUPIED, OccupancyGrid
 from simscen.faults.base import Disturbance, Fault, FaultSetting
 from simscen.spec.base import Spec
 from simscen.spec.places import Ring
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
 
 Rings = Annotated[list[Ring], Field(max_length=100)]
 
