@@ -171,9 +171,9 @@ class TestStl:
         assert "has no triangles" in broken(stl(0, 0), name="x.stl").message
         assert "too short" in broken(b"solid", name="x.stl").message
 
-    def test_more_than_half_a_million_triangles_are_refused(self):
-        with pytest.raises(UnusableMesh, match="more than 500000 triangles"):
-            read_parts(stl(500_001, 1)[:84] + bytes(50 * 500_001), ".stl", "x.stl")
+    def test_more_than_a_million_triangles_are_refused(self):
+        with pytest.raises(UnusableMesh, match="more than 1000000 triangles"):
+            read_parts(stl(1_000_001, 1)[:84] + bytes(50 * 1_000_001), ".stl", "x.stl")
 
     def test_values_that_are_no_numbers_are_refused(self, broken):
         content = stl(1, 1).replace(struct.pack("<f", 1.0), struct.pack("<f", float("nan")))
