@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from simscen.judge import several
 from simscen.judge.result import result_of
 from simscen.judge.resultdata import read_result, to_json
-from simscen.loading.resolved import spec_of_text
+from simscen.loading.resolved import criteria_of_text, spec_of_text
 from simscen.record.difference import first_difference
 from simscen.record.replay import read_log
 
@@ -73,9 +74,21 @@ def test_verdicts_live_replayed_and_judged_again_are_the_same(together):
     assert logs
     for file in logs:
         live, log = read_result(file.with_name("result.json")), read_log(file)
-        criteria = spec_of_text(log.about.scenario, file.name).pass_
-        again = result_of(live.key, live.path, criteria, log.trace, log.about.case, live.lines)
+        again = judged_again(live, log, file.name)
         assert to_json(again) == file.with_name("result.json").read_text(encoding="utf-8") == log.result, file
+
+
+def judged_again(live, log, name):
+    """The result by what the log says alone; of several robots from those of each."""
+    if not log.robots:
+        criteria = spec_of_text(log.about.scenario, name).pass_
+        return result_of(live.key, live.path, criteria, log.trace, log.about.case, live.lines)
+    results, lines = {}, list(live.lines)
+    for robot, one in log.robots.items():
+        criteria = criteria_of_text(log.about.scenario, name, log.about.facts, robot).pass_
+        own, lines = tuple(lines[: len(criteria)]), lines[len(criteria) :]
+        results[robot] = result_of(live.key, live.path, criteria, one.trace, one.about.case, own)
+    return several.together(results, {robot: one.trace for robot, one in log.robots.items()})
 
 
 def test_another_seed_gives_another_trace(together, tmp_path):
