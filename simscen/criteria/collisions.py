@@ -62,6 +62,8 @@ class Collisions(Spec, Criterion):
         hits = [event for event in trace.of_kind(EventKind.COLLISION_STARTED) if self.object in (None, event.name)]
         if self.people:
             everybody = persons(trace)
+            if not everybody:
+                return [undecided("collisions", "there were no people")]
             hits = [event for event in hits if event.name in everybody]
         if self.caused_by_robot:
             hits = [event for event in hits if _moving(trace, event, case)]
