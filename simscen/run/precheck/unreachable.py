@@ -1,5 +1,6 @@
 """Goals that no way leads to: a sealed room, or a gap that is narrower than the robot."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -42,10 +43,20 @@ def unreachable(scene: Scene, ways: Ways, misplaced: set[Keys]) -> Iterator[tupl
             problem = scene.loaded.problem(keys, "SC302", what, "unless an action of an installed package opens a way")
             yield replace(problem, severity="warning"), place
         elif len(scene.certain) < len(world) and ways.lead(starts, goal.pose, scene.certain):
-            problem = scene.loaded.problem(keys, "SC302", what, "unless what is not upright there is a ramp")
+            problem = scene.loaded.problem(keys, "SC302", what, _slopes(scene))
             yield replace(problem, severity="warning"), place
         else:
             yield scene.loaded.problem(keys, "SC302", what, HINT), place
+
+
+def _slopes(scene: Scene) -> str:
+    """When a way may be open all the same: what is not upright may be a ramp."""
+    from simscen.run.worldsource import load_robot
+    from simscen.sim.climb import climb_of
+
+    slope = math.degrees(climb_of(load_robot(scene.loaded)[1]).slope)
+    climbs = f"climbs {slope:.1f}° without a run-up" if slope else "stays on the floor"
+    return f"unless what is not upright there is a ramp that it gets up; this robot {climbs}"
 
 
 def _cut_off(scene: Scene, ways: Ways, goal: Pose2, solids: tuple[Solid, ...]) -> tuple[str, tuple[float, float]]:
