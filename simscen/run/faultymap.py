@@ -16,12 +16,20 @@ from simscen.run.streamnames import stream_names
 
 
 def with_faulty_map(prepared: Prepared, seed: int) -> Prepared:
-    """The same with the map that the stack gets in a run with this seed, and which faults have changed it."""
+    """The same with the map that each stack gets in a run with this seed, and which faults have changed it."""
+    if not prepared.robots:
+        return _of_one(prepared, Streams(seed))
+    parts = {name: _of_one(part, Streams(seed, name)) for name, part in prepared.robots.items()}
+    first = next(iter(parts.values()))
+    return replace(prepared, map=first.map, mapped=first.mapped, robots=parts)
+
+
+def _of_one(prepared: Prepared, streams: Streams) -> Prepared:
     faults, grid = prepared.spec.faults, prepared.map
     mapped: list[int] = []
     for index, (entry, name) in enumerate(zip(faults, stream_names(faults), strict=True)):
         if grid is not None and INSTANCES.get(entry.sensor) == MAP and entry.sensor not in prepared.robot.sensors:
-            disturbed = _disturbed(grid, entry, Streams(seed).generator(f"fault{name}#1"), prepared)
+            disturbed = _disturbed(grid, entry, streams.generator(f"fault{name}#1"), prepared)
             mapped += [] if _same(grid, disturbed) else [index]
             grid = disturbed
     return replace(prepared, map=grid, mapped=tuple(mapped)) if mapped else prepared

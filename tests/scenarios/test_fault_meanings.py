@@ -216,3 +216,32 @@ def test_a_log_of_what_no_sensor_should_say_is_judged_again_as_it_was(tmp_path, 
     again = result_of(run.result.key, run.result.path, written, log.trace, log.about.case, run.result.lines)
     assert to_json(again) == to_json(run.result)
     assert first_difference(run.trace, log.trace) is None
+
+
+TWO = """\
+simscen: 1
+world:
+  simscen: 1
+  walls: [{name: outer, points: [[0, 0], [8, 0], [8, 5], [0, 5], [0, 0]]}]
+robots:
+  a:
+    pose: {x: 1, y: 1}
+    goals: [{pose: {x: 3, y: 1}}]
+    faults: [{sensor: cmd_vel, delay: {latency: 100 ms}}]
+    pass: [{goals_reached: {}}]
+  b:
+    pose: {x: 1, y: 4}
+    goals: [{pose: {x: 3, y: 4}}]
+    faults:
+      - {sensor: map, shift: {x: 5 cm}}
+      - {sensor: lidar, glass: {of: [outer]}, when: {time: 1 s}, for: 1 s}
+      - {sensor: localizer, jump: {y: 0.3 m}, when: {time: 2 s}, for: 1 s}
+    pass: [{goals_reached: {}}]
+time_limit: 5 s
+"""
+
+
+def test_each_of_several_robots_has_faults_of_its_own(tmp_path):
+    run, _ = play("", tmp_path, TWO)
+    told = {one.ordered.name: one.happened for one in run.result.disturbances}
+    assert told == dict.fromkeys(("a/cmd_vel.delay", "b/map.shift", "b/lidar.glass", "b/localizer.jump"), True)
