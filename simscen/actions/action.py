@@ -1,5 +1,6 @@
 """The list of actions: a new one is one file and one line here."""
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from simscen.actions.base import Action
@@ -43,10 +44,15 @@ class AnyAction(Choice):
         return self.kind in kinds or self.narrow is not None
 
     def perform(self, stage: "Stage") -> "Effect":
-        """Do it now, and say what came of it."""
+        """Do it now, and say what came of it, and of which robot where it names one."""
+        if self.robot is None:
+            return self._done(stage)
+        effect = self._done(stage.of(self.robot))
+        return replace(effect, what=f"{self.robot}: {effect.what}")
+
+    def _done(self, stage: "Stage") -> "Effect":
         action = self.chosen
         assert isinstance(action, Action)
-        stage = stage if self.robot is None else stage.of(self.robot)
         if self.narrow is None:
             return action.perform(stage)
         from simscen.actions.watched import perform_watched

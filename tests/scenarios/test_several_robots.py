@@ -150,3 +150,13 @@ def test_an_event_that_never_happens_is_told_once(run):
         "do: {push: {impulse: [1, 0]}, robot: b}}]\n" + PASS
     )
     assert [v.id for v in done.result.verdicts if v.status is Status.FAIL] == ["crash"]
+
+
+def test_what_an_action_did_says_to_which_robot(run):
+    done = run(
+        f"robots: {{a: {{{EAST}}}, b: {{{FAR}}}}}\n"
+        "events: [{when: {time: 0.5 s}, do: {push: {impulse: [1, 0]}, robot: b}}]\n" + PASS
+    )
+    assert [one.effect for one in done.result.disturbances] == ["b: pushed the robot with 1.0 N s"]
+    pushed = [len(robot.trace.of_kind(EventKind.ROBOT_PUSHED)) for robot in done.robots.values()]
+    assert pushed == [0, 1]
