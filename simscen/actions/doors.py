@@ -71,11 +71,12 @@ def _travel(stage: Stage, name: str, target: Pose2, duration: float, state: str)
     here = stage.object(name)
     if here is None:
         return Effect(False, f"{name} is not there any more")
-    left = _share(here, target, *stage.door(name))
+    closed, opened = stage.door(name)
+    left = _share(here, target, closed, opened)
     if left < SHUT:
         return Effect(False, f"{name} was {state} already")
-    motion, verb = stage.motion(name), "swings" if wrap(target.yaw - here.yaw) else "slides"
-    if motion is not None and _share(motion[0].poses[-1], target, *stage.door(name)) < SHUT:
+    motion, verb = stage.motion(name), "swings" if wrap(opened.yaw - closed.yaw) else "slides"
+    if motion is not None and _share(motion[0].poses[-1], target, closed, opened) < SHUT:
         return Effect(False, f"{name} {verb} {state} already")
     lasts = duration if left > 1 - SHUT else duration * left
     steps = STEPS if verb == "swings" else 1

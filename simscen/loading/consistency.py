@@ -53,8 +53,10 @@ def _unknown_names(loaded: LoadedScenario, world: World | None) -> Iterator[Prob
         names = known.get(reference.to)
         if names is None or reference.name in names:
             continue
-        if reference.to in ("movable", "mover") and reference.name in (known["object"] or ()):
-            what = "one of the robots" if reference.name in loaded.other_robots else "a fixed part of the world"
+        own = (loaded.robot_name,) if reference.to == "movable" else ()
+        robots = (*own, *loaded.other_robots)
+        if reference.to in ("movable", "mover") and reference.name in (*robots, *(known["object"] or ())):
+            what = "one of the robots" if reference.name in robots else "a fixed part of the world"
             message = f"{quoted(reference.name)} is {what}: it cannot move, go or be followed"
             yield loaded.problem(reference.keys, "SC035", message, "name an object, a door or what an event spawns")
             continue

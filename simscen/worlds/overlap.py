@@ -34,8 +34,14 @@ def first_overlapping(solids: Iterable[Solid], outline: Polygon, pose: Pose2, z_
 
 
 def polygons_overlap(one: Sequence[tuple[float, float]], other: Sequence[tuple[float, float]]) -> bool:
-    """Whether two filled polygons share inner points."""
+    """Whether two filled polygons share inner points.
+
+    A corner on the other's border tells nothing, as where both are the same: then their middles do.
+    """
     if holds(one, other[0]) or holds(other, one[0]):
+        return True
+    middles = [(sum(x for x, _ in ring) / len(ring), sum(y for _, y in ring) / len(ring)) for ring in (one, other)]
+    if any(holds(one, middle) and holds(other, middle) for middle in middles):
         return True
     edges = list(zip(other, (*other[1:], other[0]), strict=True))
     return any(crosses(a, b, c, d) for a, b in zip(one, (*one[1:], one[0]), strict=True) for c, d in edges)

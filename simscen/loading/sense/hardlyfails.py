@@ -12,6 +12,7 @@ from pydantic import BaseModel
 
 from simscen.core.problems import Problem
 from simscen.loading.loaded import LoadedScenario
+from simscen.loading.names import people
 from simscen.loading.sense.neverhappens import top_speed
 from simscen.loading.sense.specwalk import quantities
 from simscen.loading.tree import Fields, Key, Leaf, Node, at
@@ -172,7 +173,7 @@ def _idle_stack(loaded: LoadedScenario) -> Iterator[Problem]:
 
 
 def _idle_push(loaded: LoadedScenario, keys: Keys, push: Any) -> Iterator[Problem]:
-    """A push of nothing, or on what has no mass."""
+    """A push of nothing, on what has no mass, or on somebody who walks."""
     key = "impulse" if push.force is None else "force"
     if not any(push.impulse or push.force):
         yield loaded.problem((*keys, "push", key), "SC055", "a push of zero changes nothing")
@@ -182,6 +183,9 @@ def _idle_push(loaded: LoadedScenario, keys: Keys, push: Any) -> Iterator[Proble
     doors = [door.name for door in loaded.world.spec.doors] if loaded.world.spec else []
     if push.name in doors or (named and not any(thing.mass for thing in named)):
         message, hint = f"`{push.name}` has no mass: no push moves it", "give it a `mass`, or `move` it"
+        yield loaded.problem((*keys, "push", "name"), "SC055", message, hint)
+    elif push.name in people(loaded):
+        message, hint = f"`{push.name}` is a person: no push moves them", "`stop`, `teleport` or `move` them"
         yield loaded.problem((*keys, "push", "name"), "SC055", message, hint)
 
 

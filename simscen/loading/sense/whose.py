@@ -5,6 +5,7 @@ from collections.abc import Container, Iterator
 from simscen.actions.action import AnyAction
 from simscen.actions.base import Action
 from simscen.core.problems import Problem
+from simscen.criteria.criterion import verdict_names
 from simscen.loading.messages import quoted, suggestion
 from simscen.loading.robots import ROBOTS
 from simscen.loading.sense.specwalk import Keys, below
@@ -23,6 +24,7 @@ def whose(spec: ScenarioSpec, tree: Fields) -> Iterator[Problem]:
     if spec.robots:
         yield from _outsiders(spec, tree)
         yield from _nobodys(spec, tree)
+        yield from _never_judged(spec, tree)
 
 
 def _stranger(spec: ScenarioSpec, tree: Fields, name: str, keys: Keys) -> Problem:
@@ -56,6 +58,20 @@ def _nobodys(spec: ScenarioSpec, tree: Fields) -> Iterator[Problem]:
             assert isinstance(chosen, Action)
             if action.robot is None and chosen.of_a_robot:
                 yield _unsaid(spec, tree, (*keys, action.kind), action.kind)
+
+
+def _never_judged(spec: ScenarioSpec, tree: Fields) -> Iterator[Problem]:
+    """What is expected to fail and no verdict of the run is called: those on a robot have its name before them."""
+    known = [step.name for step in spec.steps]
+    for name, robot in sorted((spec.robots or {}).items()):
+        own = [*verdict_names([*spec.pass_, *robot.pass_]), *(fault.label for fault in robot.faults)]
+        known += [f"{name}/{one}" for one in own]
+    for number, expected in enumerate(spec.expected.criteria if spec.expected else ()):
+        if expected not in known:
+            meant = [one for one in known if one.partition("/")[2] == expected]
+            hint = f"write {' or '.join(f'`{one}`' for one in meant)}" if meant else suggestion(expected, known)
+            message = f"no criterion, event or fault is called {quoted(expected)}"
+            yield Problem(*value_place(tree, ("expected", "criteria", number)), "SC030", message, hint)
 
 
 def _bare(test: Test, keys: Keys, faults: Container[str]) -> Iterator[tuple[Keys, Test]]:

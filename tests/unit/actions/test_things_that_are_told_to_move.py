@@ -49,6 +49,11 @@ def test_a_door_that_slides_moves_straight():
     assert moved(stage) == MotionPath((0.0, 1.5), (Pose2(0.25, 0.0, 0.0), Pose2(1.0, 0.0, 0.0)))
 
 
+def test_a_sliding_door_slides_however_its_heading_is_rounded():
+    stage = PuppetStage(objects={"gate": Pose2(0.25, 0.0, 1e-15)})
+    assert perform(stage, open={"name": "gate"}).what == "gate slides open"
+
+
 def test_a_door_ajar_is_open_by_a_share_of_its_travel():
     stage = Swinging(objects={"gate": Pose2(0.0, 0.0, 0.0)})
     assert perform(stage, open={"name": "gate", "to": "30 %", "duration": 1.0}).what == "gate swings 30% open"

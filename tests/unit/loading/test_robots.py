@@ -102,6 +102,14 @@ WRONG = {
         "robots:\n  a: {pose: here, faults: [{sensor: sonar, off: {}}]}\n  " + B + "\n" + PASS,
         (8, "SC031", "robot `turtlebot` has no sensor called `sonar`"),
     ),
+    "an expectation of nobody": (
+        f"robots: {{{A}, {B}}}\nexpected: {{fail: NAV-1, criteria: [a/collisions, collisions]}}\n" + PASS,
+        (8, "SC030", "no criterion, event or fault is called `collisions`"),
+    ),
+    "an expectation of a stranger": (
+        f"robots: {{{A}, {B}}}\nexpected: {{fail: NAV-1, criteria: [a/collisions, c/collisions]}}\n" + PASS,
+        (8, "SC030", "no criterion, event or fault is called `c/collisions`"),
+    ),
     "a name in a scenario of one robot": (
         "robot: {pose: here}\nevents: [{when: {travelled: 1, robot: a}, do: {remove: {name: crate}}}]\n" + PASS,
         (8, "SC030", "no robot is called `a`: there is one only, which has no name"),
@@ -115,14 +123,20 @@ def test_what_is_wrong_is_told_where_it_is(load, case):
     assert expected in told(load(text))
 
 
+def test_a_robot_that_an_event_takes_for_a_thing_is_told_once(load):
+    text = f"robots: {{{A}, {B}}}\nevents: [{{when: {{time: 1}}, do: {{remove: {{name: b}}}}}}]\n"
+    assert told(load(text + PASS)) == [(8, "SC035", "`b` is one of the robots: it cannot move, go or be followed")]
+
+
 def test_each_robot_may_be_sent_a_goal_of_the_same_name(load):
     sent = [f"{{new_goal: {{name: charger, pose: {{x: 2, y: 4}}}}, robot: {name}}}" for name in "ab"]
     loaded = load(f"robots: {{{A}, {B}}}\nevents: [{{when: {{time: 1}}, do: [{', '.join(sent)}]}}]\n" + PASS)
     assert not isinstance(loaded, list), told(loaded)
 
 
-def test_robots_that_start_in_one_another_are_told(load):
-    loaded = load(f"robots: {{{A}, b: {{pose: {{x: 1.2, y: 1.1}}}}}}\n" + PASS)
+@pytest.mark.parametrize("pose", ["{x: 1.2, y: 1.1}", "here", "{x: 1, y: 1, yaw: 90 deg}"])
+def test_robots_that_start_in_one_another_are_told(load, pose):
+    loaded = load(f"robots: {{{A}, b: {{pose: {pose}}}}}\n" + PASS)
     (problem,) = [problem for problem in check(loaded) if problem.severity == "error"]
     assert (problem.line, problem.code) == (7, "SC044")
     assert "`b` starts in the same place as `a`" in problem.message
