@@ -2,11 +2,11 @@
 
 from collections.abc import Iterable, Sequence
 
-from pydantic import BaseModel
+from pydantic import BaseModel, ValidationError
 
 from simscen.loading.grammar import keys_of, models_at, needs_nothing
 from simscen.loading.messages import suggestion
-from simscen.loading.tree import Fields, Items, Key, Leaf, Node, dotted
+from simscen.loading.tree import Fields, Items, Key, Leaf, Node, dotted, real_keys
 from simscen.spec.choice import Choice
 from simscen.spec.places import PoseSpec
 
@@ -22,20 +22,35 @@ def of_wrong_type(kind: str, model: type[BaseModel], loc: Sequence[Key], node: N
         return _as_list(node, in_list)
     if isinstance(node, Items):
         return _as_mapping(models, node)
-    if isinstance(node, Leaf) and isinstance(node.value, str):
-        return _as_word(models, node.value, in_list)
+    if isinstance(node, Leaf):
+        word = _as_word(models, node.value, in_list) if isinstance(node.value, str) else ""
+        return word or _as_value(models, node) or _as_told(model, loc)
     return ""
 
 
-def of_place(model: type[BaseModel], loc: Sequence[Key], key: str) -> str:
-    """Where a key belongs that stands a level too deep or too high; "" where it is unknown on every level."""
-    for length in range(len(loc) - 1, -1, -1):
+def of_place(model: type[BaseModel], tree: Node, loc: Sequence[Key], key: str) -> str:
+    """Where a key belongs that stands a level too deep or too high; "" where it is unknown on every level.
+
+    What an item of a list says is said of that item: it is looked for no higher.
+    """
+    item = next((index + 1 for index, part in enumerate(loc) if isinstance(part, int)), 0)
+    for length in range(len(loc) - 1, item - 1, -1):
         if key in keys_of(models_at(model, loc[:length])):
-            above = dotted([part for part in loc[:length] if not _is_tag(part)])
+            above = dotted(real_keys(tree, loc[:length]))
             return f"it belongs into `{above}`, a level up" if above else "it belongs to the top level of the file"
-    for start, models in ((loc, models_at(model, loc)), ((), [model])):
+    starts = ((loc, models_at(model, loc)), ((), [model]))
+    for start, models in starts[:1] if item else starts:
         if (below := _deeper(models, key)) is not None:
-            return f"it belongs into `{dotted([*start, *below])}`"
+            return f"it belongs into `{dotted([*real_keys(tree, start), *below])}`"
+    return ""
+
+
+def of_several(loc: Sequence[Key], key: str) -> str:
+    """What a key means that stands where only others may: whose a fault or criterion is, and steps of steps."""
+    if key == "robot" and loc and loc[0] in ("faults", "pass", "robots"):
+        return "what is of one of several robots stands under its name: `robots: {NAME: {faults: …, pass: …}}`"
+    if key == "then" and "then" in loc:
+        return "a step has no steps of its own: write them behind it, in the same list"
     return ""
 
 
@@ -60,6 +75,29 @@ def _as_mapping(models: Iterable[type[BaseModel]], node: Items) -> str:
         if "pose" in model.model_fields:
             return f"write `{{pose: {pose}}}`"
     return ""
+
+
+def _as_value(models: Iterable[type[BaseModel]], node: Leaf) -> str:
+    """A mapping that needs one key, or none, of which only the value is written."""
+    plain = [model for model in models if not issubclass(model, Choice)]
+    fitting = {key for model in plain for key in keys_of([model]) if _holds(model, {key: node.value})}
+    if len(fitting) == 1 and not isinstance(node.value, bool):
+        return f"write `{{{fitting.pop()}: {node.value}}}`"
+    return "write `{}`" if node.value is True and plain and all(map(needs_nothing, plain)) else ""
+
+
+def _holds(model: type[BaseModel], value: dict[str, object]) -> bool:
+    try:
+        model.model_validate(value, by_alias=True, by_name=False)
+    except ValidationError:
+        return False
+    return True
+
+
+def _as_told(model: type[BaseModel], loc: Sequence[Key]) -> str:
+    """Where to read what a word takes."""
+    chosen = any(issubclass(one, Choice) and loc[-1] in one.choices() for one in models_at(model, loc[:-1]) if loc)
+    return f"`simscen explain {loc[-1]}` tells what it takes" if chosen else ""
 
 
 def _as_word(models: Iterable[type[BaseModel]], word: str, in_list: bool) -> str:

@@ -113,7 +113,9 @@ def _unknown_key(model: type[BaseModel], tree: Node, loc: tuple[Key, ...]) -> Pr
         hint = mended
     elif key in Trigger.modifiers and models == [Test]:
         hint = f"`{key}` is of the whole trigger: it stands beside the `all`, `any` or `not` of `when`"
-    elif not hint.startswith("did") and (belongs := slips.of_place(model, loc[:-1], key)):
+    elif elsewhere := slips.of_several(loc[:-1], key):
+        hint = elsewhere
+    elif not hint.startswith("did") and (belongs := slips.of_place(model, tree, loc[:-1], key)):
         hint = belongs
     elif not hint.startswith("did") and any(issubclass(one, Choice) and one.group for one in models):
         hint = "; ".join(filter(None, (hint, "`simscen plugins` lists what installed packages add")))
@@ -122,6 +124,8 @@ def _unknown_key(model: type[BaseModel], tree: Node, loc: tuple[Key, ...]) -> Pr
 
 def _missing_key(tree: Node, loc: tuple[Key, ...]) -> Problem:
     holder = dotted(real_keys(tree, loc[:-1]))
+    if isinstance(loc[-1], int):
+        return _problem(key_place(tree, loc[:-1]), "SC017", f"`{holder}` has too few values: none at [{loc[-1]}]")
     where = f" in `{holder}`" if holder else ""
     return _problem(key_place(tree, loc[:-1]), "SC010", f"missing key `{loc[-1]}`{where}")
 
