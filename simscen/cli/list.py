@@ -48,8 +48,9 @@ def _excuse(scenario: LoadedScenario) -> str:
 
 
 def _stack(scenario: LoadedScenario) -> str:
-    stack = scenario.spec.stack
-    return f"(stack {stack.external})" if isinstance(stack, ExternalStackSpec) else ""
+    stacks = [view.spec.stack for view in scenario.each.values()]
+    names = dict.fromkeys(stack.external for stack in stacks if isinstance(stack, ExternalStackSpec))
+    return f"({'stack' if len(names) == 1 else 'stacks'} {', '.join(names)})" if names else ""
 
 
 def _tags(scenario: LoadedScenario) -> str:

@@ -132,12 +132,11 @@ class Checks:
 
     def _variation(self, loaded: LoadedScenario) -> tuple[LoadedScenario | None, list[Problem]]:
         loaded, nobody = self.stacks.with_command(loaded.having(lenient=self.lenient))
-        if nobody is not None and self.runs:
-            return None, [*loaded.notes, nobody]
+        if nobody and self.runs:
+            return None, [*loaded.notes, *nobody]
         with files_read() as read:
             problems = [*loaded.notes, *([] if self.fast else checked(loaded, self.cache, self.pictures))]
-        if nobody is not None:
-            problems.append(replace(nobody, severity="warning"))
+        problems += [replace(problem, severity="warning") for problem in nobody]
         loaded = loaded.having(read=tuple(sorted(read)))
         usable = not any(problem.severity == "error" for problem in problems)
         return (loaded if usable else None), list(dict.fromkeys(problems))

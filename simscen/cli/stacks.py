@@ -19,7 +19,7 @@ from simscen.core.externalcommand import ExternalCommand
 from simscen.core.problems import Problem
 from simscen.core.result import RunKey
 from simscen.loading.discovery import STACK, default_root
-from simscen.loading.externalstack import undefined
+from simscen.loading.externalstack import torn, undefined
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.messages import quoted, suggestion
 from simscen.loading.scenario import load_scenario
@@ -29,7 +29,8 @@ from simscen.spec.registry import entries, find
 
 STACK_HELP = (
     "Run every scenario with this stack instead of its own: a command that speaks the stack protocol, a *.stack.yaml "
-    "file, `reference`, another type of stack, or a name in the user's configuration. "
+    "file, `reference`, another type of stack, or a name in the user's configuration. Of several robots, it drives each; "
+    "NAME='COMMAND' where a robot's stack is `external: NAME` only says what that runs. "
 )
 if TYPE_CHECKING:
     from simscen.loading.userconfig import UserConfig
@@ -54,18 +55,25 @@ class Stacks:
 
         return load_config(config_file())
 
-    def with_command(self, loaded: LoadedScenario) -> tuple[LoadedScenario, Problem | None]:
-        """The scenario with what its external stack runs, or with the problem that nobody says so.
+    def with_command(self, loaded: LoadedScenario) -> tuple[LoadedScenario, list[Problem]]:
+        """The scenario with what its external stacks run, or with the problems that nobody says so.
 
         Raises InvalidInput for a configuration that says it wrongly.
         """
+        if loaded.robots:
+            tried = {name: self.with_command(view) for name, view in loaded.robots.items()}
+            given = [choice.name for choice in self.chosen if choice.runs]
+            problems = [*(one for _, found in tried.values() for one in found), *torn(loaded, given, config_file())]
+            whole = replace(loaded, robots={name: view for name, (view, _) in tried.items()})
+            return whole, list(dict.fromkeys(problems))
         stack = loaded.spec.stack
         if not isinstance(stack, ExternalStackSpec):
-            return loaded, None
+            return loaded, []
         if (command := self.command(stack.external)) is not None:
-            return replace(loaded, runs=command), None
+            return replace(loaded, runs=command), []
         names = [*(choice.name for choice in self.chosen if choice.runs), *self.config.spec.stacks]
-        return loaded, undefined(loaded, names, self.config.file)
+        problem = undefined(loaded, names, self.config.file)
+        return loaded, [problem] if problem is not None else []
 
     def command(self, name: str) -> ExternalCommand | None:
         """What an external stack's name runs: as --stack says, else as the configuration does."""
@@ -77,7 +85,7 @@ class Stacks:
 
 def commands_of(scenarios: Iterable[LoadedScenario]) -> dict[str, dict[str, object]]:
     """What the external stacks of scenarios run, by name: nothing of the environment, which may hold secrets."""
-    stacks = ((loaded.spec.stack, loaded.runs) for loaded in scenarios)
+    stacks = ((view.spec.stack, view.runs) for loaded in scenarios for view in loaded.each.values())
     found = {stack.external: runs for stack, runs in stacks if isinstance(stack, ExternalStackSpec) and runs}
     return {
         name: {"command": list(runs.argv), "cwd": runs.cwd, "digest": runs.digest}
@@ -95,9 +103,9 @@ def load_with(
     home = root or default_root([file])
     stacks = stacks_of([] if stack is None else [stack], home, world_path)
     chosen = next(iter(stacks.chosen), None)
-    loaded, problem = stacks.with_command(load_scenario(file, home, world_path, chosen, variation))
-    if problem is not None:
-        raise InvalidInput([problem])
+    loaded, problems = stacks.with_command(load_scenario(file, home, world_path, chosen, variation))
+    if problems:
+        raise InvalidInput(problems)
     return loaded
 
 

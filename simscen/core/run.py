@@ -17,7 +17,7 @@ class Run:
 
     `log` is the MCAP file that holds all of it; None when none was asked for. `stack` is what an external stack said of
     itself; empty for one in the engine. `robots` is what came of each of several robots by name, as if it had been the
-    only one, e.g. `run.robots["left"].trace`; `trace` and `case` are then those of the first.
+    only one, e.g. `run.robots["left"].trace`; `trace`, `case` and `stack` are then those of the first.
     """
 
     result: RunResult

@@ -34,7 +34,7 @@ CODES = {
     "SC036": "A criterion cannot be decided before the time limit ends the run.",
     "SC040": "Two scenarios have the same id, or would have on a file system that ignores case.",
     "SC041": "A scenario's id cannot be a folder of its own in the output.",
-    "SC042": "A stack in a process of its own is to drive one of several robots.",
+    "SC042": "Several --stack, of which one run can have one, say what different robots of it run.",
     "SC043": "A trigger or an action is about a robot, and does not say about which of several.",
     "SC044": "Two robots start in the same place.",
     "SC050": "An event or fault can never happen, so that nothing would be tested.",

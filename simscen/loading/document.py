@@ -131,7 +131,8 @@ def extended(over: Fields, under: Fields) -> Fields:
 def merge(over: Fields, under: Fields) -> Fields:
     """Keys of `over` win; mappings on both sides are merged, everything else is replaced as a whole.
 
-    Mappings whose `type` differs are different things and are replaced, too, as is a stack by an `external` one.
+    Mappings whose `type` differs are different things and are replaced, too, as is a stack by an `external` one, and
+    that by one with a `type`.
     """
     entries = dict(over.entries)
     for key, below in under.entries.items():
@@ -144,7 +145,10 @@ def merge(over: Fields, under: Fields) -> Fields:
 
 
 def _same_type(key: str, above: Entry, below: Entry) -> bool:
-    if key == "stack" and _has(above, "external") and not _has(below, "external"):
+    if key == "stack" and (
+        (_has(above, "external") and not _has(below, "external"))
+        or (_has(above, "type") and _has(below, "external"))
+    ):
         return False
     types = [
         entry.value.entries["type"].value.plain

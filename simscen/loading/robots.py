@@ -4,10 +4,11 @@ from collections.abc import Iterator
 
 from simscen.core.problems import Problem
 from simscen.loading.document import merge
-from simscen.loading.tree import Entry, Fields, Items, Node, child
+from simscen.loading.stackchoice import EXTERNAL, StackChoice, with_stack
+from simscen.loading.tree import Entry, Fields, Items, Leaf, Node, child
 from simscen.model.scenario import RobotEntry
 
-ROBOT, ROBOTS, PASS, EXPECTED = "robot", "robots", "pass", "expected"
+ROBOT, ROBOTS, PASS, EXPECTED, STACK = "robot", "robots", "pass", "expected", "stack"
 OF_ONE = ("goals", "faults")
 """What a scenario of one robot says at top level, and one of several says of each."""
 
@@ -22,6 +23,12 @@ def each_of(tree: Fields) -> dict[str, Fields]:
     return {name: _of_one(tree, entries[name]) for name in sorted(entries)}
 
 
+def has_several(tree: Fields) -> bool:
+    """Whether there are several robots, as far as they can be looked at."""
+    robots = child(tree, ROBOTS)
+    return isinstance(robots, Fields) and all(isinstance(said.value, Fields) for said in robots.entries.values())
+
+
 def _of_one(tree: Fields, entry: Entry) -> Fields:
     said, place = entry.value, entry.value.place
     assert isinstance(said, Fields)
@@ -33,6 +40,40 @@ def _of_one(tree: Fields, entry: Entry) -> Fields:
         tree.place,
         {**whole.entries, ROBOT: Entry(entry.key, Fields(place, robot)), PASS: Entry(entry.key, criteria)},
     )
+
+
+def with_chosen(tree: Fields, choice: StackChoice) -> Fields:
+    """A scenario with the chosen stack in place of its own; of several robots, in place of each one's.
+
+    A command whose name is that of the external stack of one of them says what that runs: the others keep theirs.
+    """
+    robots = child(tree, ROBOTS)
+    if robots is None:
+        return with_stack(tree, choice)
+    if not isinstance(robots, Fields) or not has_several(tree):
+        return tree  # which is a mistake that is told as such
+    each = each_of(tree)
+    if choice.runs is not None and choice.name in map(external_of, each.values()):
+        return tree
+    chosen = {name: with_stack(part, choice) for name, part in each.items()}
+    if all(chosen[name] is part for name, part in each.items()):
+        return tree
+    own = {name: Entry(entry.key, _with(entry.value, chosen[name])) for name, entry in robots.entries.items()}
+    rest = _without(tree, STACK)
+    return Fields(tree.place, {**rest.entries, ROBOTS: Entry(tree.entries[ROBOTS].key, Fields(robots.place, own))})
+
+
+def _with(said: Node, part: Fields) -> Fields:
+    """What is said of a robot, with the whole of its stack, as there is none of all any more."""
+    assert isinstance(said, Fields)
+    return Fields(said.place, said.entries | {key: entry for key, entry in part.entries.items() if key == STACK})
+
+
+def external_of(tree: Fields) -> str | None:
+    """The name of the external stack of a scenario of one robot."""
+    stack = child(tree, STACK)
+    name = None if stack is None else child(stack, EXTERNAL)
+    return str(name.value) if isinstance(name, Leaf) else None
 
 
 def _items(node: Node | None) -> tuple[Node, ...]:

@@ -17,7 +17,7 @@ from simscen.loading.messages import quoted, suggestion
 from simscen.loading.paths import Fence
 from simscen.loading.placing import placed, places_of, unknown_places
 from simscen.loading.sense.whose import whose
-from simscen.loading.stackchoice import StackChoice, with_stack
+from simscen.loading.stackchoice import StackChoice
 from simscen.loading.tree import Fields, Key, Leaf, Node, at, child, value_place
 from simscen.loading.validation import check
 from simscen.loading.variations.expand import Variation, variations_of
@@ -95,7 +95,7 @@ def _with_choice(
     one: Variation, library: Library, file: Path, choice: StackChoice | None
 ) -> LoadedScenario | list[Problem]:
     """One variation with the chosen stack in place of its own, or all that is wrong with it."""
-    tree = one.tree if choice is None else with_stack(one.tree, choice)
+    tree = one.tree if choice is None else robots.with_chosen(one.tree, choice)
     if choice is not None and (lost := list(_without_effect(one, tree, choice))):
         return library.with_source(lost)
     spec = check(ScenarioSpec, tree, robots.lacking)
@@ -103,7 +103,7 @@ def _with_choice(
         return library.with_source(sorted([*spec, *_problems_of_world(tree, library)]))
     if problems := list(whose(spec, tree)):
         return library.with_source(problems)
-    loaded = _several(spec, tree, library, file, choice) if spec.robots else _one(spec, tree, library, file)
+    loaded = _several(spec, tree, library, file) if spec.robots else _one(spec, tree, library, file)
     if isinstance(loaded, list):
         return loaded
     return loaded.having(choice=choice, variation=one.name, set_by=one.set_by)
@@ -111,8 +111,9 @@ def _with_choice(
 
 def _without_effect(one: Variation, tree: Fields, choice: StackChoice) -> Iterator[Problem]:
     """Values for a stack that another takes the place of: the run would be called by what it is not run with."""
+    each = [tree, *robots.each_of(tree).values()] if robots.has_several(tree) else [tree]
     for change in one.changes:
-        if at(tree, change.target.keys) is not change.value:
+        if all(at(part, change.target.keys) is not change.value for part in each):
             message = f"{quoted(change.target.path)} changes nothing with --stack {choice.written}"
             hint = "choose variations without it with -k or --variation, or another stack"
             yield Problem(*change.target.place, "SC055", message, hint)
@@ -126,14 +127,11 @@ def _problems_of_world(tree: Node, library: Library) -> list[Problem]:
     return assets.problems
 
 
-def _several(
-    spec: ScenarioSpec, tree: Fields, library: Library, file: Path, choice: StackChoice | None
-) -> LoadedScenario | list[Problem]:
+def _several(spec: ScenarioSpec, tree: Fields, library: Library, file: Path) -> LoadedScenario | list[Problem]:
     """A scenario of several robots; what is wrong is told once, whomever of them it concerns."""
     views: dict[str, LoadedScenario] = {}
     problems: list[Problem] = []
-    for name, part in robots.each_of(tree).items():
-        own = with_stack(part, choice) if choice is not None else part
+    for name, own in robots.each_of(tree).items():
         one = check(ScenarioSpec, own)
         others = tuple(other for other in sorted(spec.robots or ()) if other != name)
         found = one if isinstance(one, list) else _one(one, own, library, file, name, others)

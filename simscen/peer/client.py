@@ -135,6 +135,12 @@ class Peer:
         robot: dict[str, Any] = self.hello["robot"]
         return robot
 
+    @property
+    def robot_name(self) -> str:
+        """What the robot is called, where the scenario has several; else ""."""
+        name: str = self.hello.get("robot_name", "")
+        return name
+
     def __iter__(self) -> Iterator[Step]:
         """Steps until the run ends; each is answered when the next one is asked for."""
         while True:

@@ -47,7 +47,7 @@ class Recorder:
         robot.append(moment)
 
     def close(self, end_tick: int, result: str = "", stack: Mapping[str, str] | None = None) -> None:
-        """Write the end of the run, its result (JSON) and what an external stack was, then give the file its name."""
+        """Write the end of the run, its result (JSON) and what external stacks were, then give the file its name."""
         if result:
             self._writer.attach(header.RESULT, "application/json", result.encode())
         if stack:

@@ -12,6 +12,8 @@ from typing import IO, Mapping, Optional
 
 from simscen.ros2.failure import Failure
 
+ROBOT = "SIMSCEN_ROBOT"
+"""The environment variable with the robot's name, where a scenario has several."""
 DOMAINS = range(1, 102)
 """Above 101 the ports of a domain may be those that Linux gives to clients; 0 is everybody's."""
 
@@ -41,6 +43,11 @@ def claim(wanted: Optional[int], environment: Mapping[str, str]) -> Domain:
         return Domain(number, lock)
     if wanted is None:
         raise Failure(f"all ROS domains from {DOMAINS[0]} to {DOMAINS[-1]} are in use by other runs")
+    if environment.get(ROBOT):
+        raise Failure(
+            f"another robot or run is using ROS domain {wanted}: with several robots, each has a ROS graph of its own; "
+            "with --launch each has nodes and a domain of its own"
+        )
     raise Failure(
         f"another run is using ROS domain {wanted}: nodes that you start yourself serve one run at a time "
         "(simscen run --jobs 1); with --launch each run has nodes and a domain of its own"

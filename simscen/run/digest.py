@@ -38,8 +38,16 @@ def _circumstances(loaded: LoadedScenario) -> dict[str, object]:
         "lenient": loaded.lenient,
         "plugins": fingerprints(plugins_of(loaded)),
         **({"scenario": loaded.tree.plain} if loaded.variation else {}),
+        **_stacks(loaded),
+    }
+
+
+def _stacks(loaded: LoadedScenario) -> dict[str, object]:
+    """What drives otherwise than the files say, or what they do not say."""
+    return {
         **({} if loaded.choice is None else {"stack": loaded.tree.plain.get("stack")}),
         **({} if loaded.runs is None else {"runs": loaded.runs.digest}),
+        **({"robots": {name: _stacks(view) for name, view in loaded.robots.items()}} if loaded.robots else {}),
     }
 
 

@@ -10,8 +10,10 @@ from simscen.core.run import Run
 from simscen.judge.resultdata import to_json
 from simscen.loading.resolved import resolved_text
 from simscen.run.agent import Log
+from simscen.run.external.build import for_robot
 from simscen.run.prepare import Prepared
 from simscen.run.simulate import simulate
+from simscen.sim.alone import NAMELESS
 
 Finish = Callable[[Prepared, Run, Path], None]
 """What is made of a run in its folder besides its log and its result, e.g. a picture."""
@@ -20,7 +22,8 @@ Finish = Callable[[Prepared, Run, Path], None]
 def perform(prepared: Prepared, seed: int, folder: Path, logs: tuple[Log, ...], finish: Finish) -> dict[str, Any]:
     """Do the run and leave run.mcap, result.json, scenario.yaml and what `finish` makes in `folder`.
 
-    What an external stack prints goes to stack.log there, what it says of itself to stack.json.
+    What an external stack prints goes to stack.log there, what it says of itself to stack.json; of several robots, to
+    stack.ROBOT.log and stack.ROBOT.json.
 
     Returns the end record: the outcome and the log's SHA-256, for the supervisor.
     """
@@ -28,7 +31,9 @@ def perform(prepared: Prepared, seed: int, folder: Path, logs: tuple[Log, ...], 
     (folder / "scenario.yaml").write_text(resolved_text(prepared.loaded), encoding="utf-8")
     run = simulate(prepared, seed, log=log, attach=lambda *_: logs, printed=folder / "stack.log")
     (folder / "result.json").write_text(to_json(run.result), encoding="utf-8")
-    if run.stack:
-        (folder / "stack.json").write_text(json.dumps(run.stack, indent=1) + "\n", encoding="utf-8")
+    for name, one in (run.robots or {NAMELESS: run}).items():
+        if one.stack:
+            file = for_robot(folder / "stack.json", name)
+            file.write_text(json.dumps(one.stack, indent=1) + "\n", encoding="utf-8")
     finish(prepared, run, folder)
     return {"outcome": run.result.outcome.value, "sha256": hashlib.sha256(log.read_bytes()).hexdigest()}

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from simscen.core.errors import InvalidInput, RunError
 from simscen.core.run import Run
@@ -45,7 +46,7 @@ def simulate(
 ) -> Run:
     """Run a prepared scenario with this seed (default: its own) and judge it; `log` is the MCAP file to write.
 
-    `printed` is the file for what an external stack prints.
+    `printed` is the file for what an external stack prints; of several robots, `printed` with the robot's name in it.
 
     *Given* the same scenario and seed *then* the same run and the same bytes in `log`, whatever ran before in this
     process. Raises RunError when the run cannot be completed, OSError when the log cannot be written.
@@ -71,22 +72,41 @@ def _simulated(
         recorder = log and closing.enter_context(Recorder(log, clock, log_header(prepared, seed)))
         rig = assemble(prepared, seed, printed)
         closing.callback(rig.simulation.close)
-        externals = [agent.stack for agent in rig.agents if isinstance(agent.stack, ExternalStack)]
-        for stack in externals:
+        agents = dict(zip(prepared.each, rig.agents, strict=True))
+        externals = {name: agent.stack for name, agent in agents.items() if isinstance(agent.stack, ExternalStack)}
+        for name, stack in externals.items():
             closing.callback(stack.close)
-        for agent, (name, part) in zip(rig.agents, prepared.each.items(), strict=True):
+            stack.begin(prepared.each[name].estimate)
+        for name, agent in agents.items():
+            part = prepared.each[name]
             agent.stack.start(part.estimate, part.case.goals)
             agent.logs = (builders[name], recorder.robots[name]) if recorder else (builders[name],)
         first = rig.agents[0]
         first.logs = (*first.logs, *(attach(rig, first.logs) if attach else ()))
         end = run_lockstep(rig)
-        external = externals[0] if externals else None
-        if external:
-            external.finish(end.name)
+        for stack in externals.values():
+            stack.end(end.name)
+        for stack in externals.values():
+            stack.finish()
         run = judged(prepared, seed, {name: builder.finish(end.tick) for name, builder in builders.items()}, log)
         if recorder:
-            recorder.close(end.tick, to_json(run.result), external.facts if external else None)
-    return replace(run, stack=external.described) if external else run
+            recorder.close(end.tick, to_json(run.result), _stack_facts(externals))
+    return _with_stacks(run, {name: stack.described for name, stack in externals.items()})
+
+
+def _stack_facts(externals: Mapping[str, ExternalStack]) -> dict[str, str]:
+    """What the external stacks were, for the log: of several robots, each fact with the robot's name in front."""
+    return {
+        f"{name}.{fact}" if name else fact: value
+        for name, stack in externals.items()
+        for fact, value in stack.facts.items()
+    }
+
+
+def _with_stacks(run: Run, said: Mapping[str, Mapping[str, Any]]) -> Run:
+    """The run with what the external stacks said of themselves, by robot."""
+    robots = {name: replace(one, stack=said.get(name, {})) for name, one in run.robots.items()}
+    return replace(run, robots=robots, stack=said.get(next(iter(robots), NAMELESS), {}))
 
 
 def simulate_file(

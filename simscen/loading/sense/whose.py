@@ -10,7 +10,6 @@ from simscen.loading.messages import quoted, suggestion
 from simscen.loading.robots import ROBOTS
 from simscen.loading.sense.specwalk import Keys, below
 from simscen.loading.tree import Fields, key_place, value_place
-from simscen.model.anystack import ExternalStackSpec
 from simscen.model.scenario import ScenarioSpec
 from simscen.triggers.base import Condition
 from simscen.triggers.trigger import Test
@@ -22,7 +21,6 @@ def whose(spec: ScenarioSpec, tree: Fields) -> Iterator[Problem]:
         if isinstance(part, Test | AnyAction) and part.robot is not None and part.robot not in (spec.robots or ()):
             yield _stranger(spec, tree, part.robot, (*keys, "robot"))
     if spec.robots:
-        yield from _outsiders(spec, tree)
         yield from _nobodys(spec, tree)
         yield from _never_judged(spec, tree)
 
@@ -32,17 +30,6 @@ def _stranger(spec: ScenarioSpec, tree: Fields, name: str, keys: Keys) -> Proble
     if not spec.robots:
         message, hint = f"{message}: there is one only, which has no name", "remove `robot`"
     return Problem(*value_place(tree, keys), "SC030", message, hint)
-
-
-def _outsiders(spec: ScenarioSpec, tree: Fields) -> Iterator[Problem]:
-    """Stacks in processes of their own, each of which would be told that its robot is the only one."""
-    for name, robot in (spec.robots or {}).items():
-        if isinstance(robot.stack or spec.stack, ExternalStackSpec):
-            keys: Keys = (ROBOTS, name, "stack") if robot.stack else ("stack",)
-            message = "an external stack drives one robot, and here are several"
-            hint = "each robot needs a stack in the engine: `reference`, or one of an installed package"
-            yield Problem(*key_place(tree, keys), "SC042", message, hint)
-            return
 
 
 def _nobodys(spec: ScenarioSpec, tree: Fields) -> Iterator[Problem]:

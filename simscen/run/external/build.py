@@ -17,7 +17,7 @@ from simscen.stack.protocols import Surroundings
 def build_external(
     prepared: Prepared, spec: ExternalStackSpec, surroundings: Surroundings, seed: int, printed: Path | None
 ) -> ExternalStack:
-    """The stack that a scenario names; what it prints goes to the file `printed`.
+    """The stack that a scenario names; what it prints goes to the file `printed`, as `for_robot` calls it.
 
     Raises InvalidInput when nobody says what the name runs.
     """
@@ -33,5 +33,11 @@ def build_external(
         robot_description=describe(prepared.body),
         stop_on_failure=prepared.spec.on_goal_failure == "stop",
         mode=prepared.spec.navigation.mode,
+        robot_name=prepared.loaded.robot_name,
     )
-    return ExternalStack(spec.external, command, surroundings, ordered, printed)
+    return ExternalStack(spec.external, command, surroundings, ordered, printed and for_robot(printed, ordered.robot_name))
+
+
+def for_robot(file: Path, robot: str) -> Path:
+    """What the file of a stack is called for that one of several robots: `stack.a.log`."""
+    return file.with_stem(f"{file.stem}.{robot}") if robot else file

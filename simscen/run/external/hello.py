@@ -17,7 +17,7 @@ from simscen.stack.protocols import RobotModel, Surroundings
 
 @dataclass(frozen=True)
 class Ordered:
-    """What of a run a stack is told besides its surroundings."""
+    """What of a run a stack is told besides its surroundings; `robot_name` is "" where there is one robot."""
 
     seed: int
     control_period: int
@@ -27,6 +27,7 @@ class Ordered:
     robot_description: str
     stop_on_failure: bool
     mode: Mode = "navigate_to_pose"
+    robot_name: str = ""
 
 
 def hello(
@@ -43,6 +44,7 @@ def hello(
         "control_period": ordered.control_period,
         "answer_limit": answer_limit,
         "mode": ordered.mode,
+        "robot_name": ordered.robot_name,
         "robot": _robot(surroundings.robot),
         "map": _grid(surroundings.map),
         "keepout": [_polygon(area) for area in surroundings.keepout],

@@ -30,6 +30,8 @@ TIME_TO_BURY = 5.0
 LONGEST_MESSAGE = 2000
 PEER_PATH = "SIMSCEN_PEER_PATH"
 """The environment variable with the folder of `simscen_peer`."""
+ROBOT = "SIMSCEN_ROBOT"
+"""The environment variable with the name of the robot, where there are several."""
 
 
 class StackProcess:
@@ -39,8 +41,9 @@ class StackProcess:
     answers, big frames and floods of output cannot block each other.
     """
 
-    def __init__(self, name: str, command: ExternalCommand, printed: Path | None) -> None:
-        self._name = name
+    def __init__(self, name: str, command: ExternalCommand, printed: Path | None, robot: str = "") -> None:
+        """Start what a stack's name runs, for that `robot` of several."""
+        self._name = f"{name} of robot `{robot}`" if robot else name
         self._outbox, self._inbox, self._reports = bytearray(), bytearray(), bytearray()
         self._ended = ""
         self._hung_up = False
@@ -72,10 +75,11 @@ class StackProcess:
         }
         for descriptor in self._takers:
             self._poll.register(descriptor, select.POLLIN)
-        self._order(command)
+        self._order(command, {ROBOT: robot} if robot else {})
 
-    def _order(self, command: ExternalCommand) -> None:
-        env = {**command.env, PEER_PATH: str(Path(wire.__file__).parent / "standalone")}
+    def _order(self, command: ExternalCommand, more: dict[str, str]) -> None:
+        inherited = {name: value for name, value in command.env.items() if name != ROBOT}
+        env = {**inherited, **more, PEER_PATH: str(Path(wire.__file__).parent / "standalone")}
         told = {"argv": command.argv, "env": env, "cwd": command.cwd, "variable": wire.DESCRIPTOR}
         order = json.dumps(told).encode()
         os.write(self._control, struct.pack("<I", len(order)) + order)
@@ -99,9 +103,8 @@ class StackProcess:
         self._outbox += frame
         self._post()
 
-    def farewell(self, frame: bytes, grace: float) -> bytes:
-        """Send the last frame and wait until the stack hangs up; the body of a BYE, "{}" when none came."""
-        self.send(frame)
+    def farewell(self, grace: float) -> bytes:
+        """Wait until the stack, which was sent its last frame, hangs up; the body of a BYE, "{}" when none came."""
         self._pump(lambda: self._hung_up, grace)
         with suppress(RunError):
             if self._has_frame():

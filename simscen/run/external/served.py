@@ -91,7 +91,7 @@ class ServedReference(Peer):
         self._stack = build_stack(
             self._spec,
             surroundings,
-            Streams(hello["seed"]),
+            Streams(hello["seed"], hello["robot_name"]),
             Clock(hello["tick_rate"]),
             stop_on_failure=told["on_goal_failure"] == "stop",
             mode=told["mode"],

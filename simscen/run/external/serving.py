@@ -13,7 +13,11 @@ from simscen.run.process.confine import environment
 
 
 def served(prepared: Prepared) -> Prepared:
-    """A prepared scenario whose stack, simscen's own, runs behind the stack protocol."""
+    """A prepared scenario whose stack, simscen's own, runs behind the stack protocol; of several robots, each one's."""
+    if prepared.robots:
+        parts = {name: served(part) for name, part in prepared.robots.items()}
+        loaded = replace(prepared.loaded, robots={name: part.loaded for name, part in parts.items()})
+        return replace(next(iter(parts.values())), loaded=loaded, robots=parts)
     stack = prepared.stack
     assert isinstance(stack, StackSpec)
     written = stack.model_dump_json(by_alias=True, exclude_none=True)

@@ -22,7 +22,7 @@ from simscen.run.external.feed import Feed
 from simscen.run.external.goals import ToldGoals
 from simscen.run.external.hello import Ordered, goal_data, hello, task
 from simscen.run.external.process import StackProcess
-from simscen.run.external.topics import KEEPOUT_MASK, SPEED_MASK
+from simscen.run.external.topics import KEEPOUT_MASK, SPEED_MASK, Offer
 from simscen.run.external.understand import Answer, by_topic, understood
 from simscen.run.external.welcome import Welcome
 from simscen.stack.protocols import Surroundings
@@ -34,7 +34,10 @@ _GOAL_ENDS = (EventKind.GOAL_REACHED, EventKind.GOAL_FAILED, EventKind.GOAL_CANC
 
 
 class ExternalStack:
-    """Speaks with the process of a stack; `start` starts it, `finish` and `close` end it.
+    """Speaks with the process of a stack; `begin` and `start` start it, `end`, `finish` and `close` end it.
+
+    With several robots each has a stack of its own: all begin before the first is waited for, and all are told the end
+    before any is waited for.
 
     Raises RunError of a kind in simscen.run.external.errors from whatever needs the process.
     """
@@ -53,6 +56,7 @@ class ExternalStack:
         self._goals = ToldGoals(ordered.stop_on_failure, surroundings.tick_rate, ordered.mode)
         self._feed = Feed(surroundings.tick_rate, ordered.sensors, ordered.mounts)
         self._process: StackProcess | None = None
+        self._offer = Offer.of(())
         self._welcome = Welcome()
         self._plan: Path | None = None
         self._held = Decision(STOP)
@@ -61,25 +65,31 @@ class ExternalStack:
         self._odometry: Odometry | None = None
         self._wheels = next((name for name, says in ordered.sensors.items() if says == Odometry.__name__), "")
 
-    def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:
-        """Start the process, say hello, and tell it its goals."""
+    def begin(self, estimate: Estimate) -> None:
+        """Start the process and say hello."""
         surroundings, feed = self._surroundings, self._feed
         feed.latch(surroundings.map, topics.MAP)
         feed.latch(surroundings.masks.keepout, KEEPOUT_MASK)
         speed = surroundings.masks.speed
         feed.latch(None if speed is None else speed.grid, SPEED_MASK)
         feed.latch_robot(self._ordered.robot_description, estimate)
-        offer = feed.offer()
-        self._answers = offer.answers
-        self._process = StackProcess(self._name, self._command, self._printed)
+        self._offer = offer = feed.offer()
+        self._process = StackProcess(self._name, self._command, self._printed, self._ordered.robot_name)
         told = hello(surroundings, self._ordered, offer, feed.named, self._command.answer_limit)
+        self._process.send(wire.json_frame(wire.HELLO, told))
+
+    def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:
+        """Begin, unless that is done, hear its answer, and tell it its goals."""
+        if self._process is None:
+            self.begin(estimate)
+        assert self._process is not None
+        offer = self._offer
         try:
-            frame, limit = wire.json_frame(wire.HELLO, told), self._command.start_limit
-            kind, body = self._process.exchange(frame, limit, "answer to HELLO")
+            kind, body = self._process.exchange(b"", self._command.start_limit, "answer to HELLO")
             self._welcome = self._allowed(
                 "the answer to HELLO", lambda: Welcome.of(kind, body, offer, self._ordered.mode)
             )
-            feed.want(offer, self._welcome.topics)
+            self._feed.want(offer, self._welcome.topics)
             self._process.send(wire.json_frame(wire.GOAL, task(estimate, goals, self._ordered)))
         except RunError:
             self.close()
@@ -129,10 +139,14 @@ class ExternalStack:
         self._told = self._canceling = False
         return self._decided(tick, answer, due)
 
-    def finish(self, reason: str) -> None:
-        """Tell the stack that the run is over, and let it end by itself."""
+    def end(self, reason: str) -> None:
+        """Tell the stack that the run is over."""
+        self._send(wire.END, {"reason": reason})
+
+    def finish(self) -> None:
+        """Let it end by itself, which it was told to."""
         if self._process is not None:
-            farewell = self._process.farewell(wire.json_frame(wire.END, {"reason": reason}), GRACE)
+            farewell = self._process.farewell(GRACE)
             self._welcome = self._welcome.with_farewell(farewell)
         self.close()
 
@@ -162,7 +176,7 @@ class ExternalStack:
         if answered != tick:
             raise NotAllowed(f"it answers tick {answered} instead of {tick}")
         dead_reckoned = None if self._odometry is None else self._odometry.pose
-        answer = understood(by_topic(said, self._answers), tick, self._time, self._correction, dead_reckoned)
+        answer = understood(by_topic(said, self._offer.answers), tick, self._time, self._correction, dead_reckoned)
         self._correction = answer.correction
         if due and answer.command is None:
             raise NotAllowed(f"no message on {topics.COMMAND.name}, though a command is due")

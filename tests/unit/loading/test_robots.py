@@ -94,10 +94,6 @@ WRONG = {
         f"robots: {{{A}, {B}}}\nevents: [{{when: {{time: 1}}, do: {{remove: {{name: b}}}}}}]\n" + PASS,
         (8, "SC035", "`b` is one of the robots: it cannot move, go or be followed"),
     ),
-    "an external stack": (
-        f"robots: {{{A}, {B}}}\nstack: {{external: mine}}\n" + PASS,
-        (8, "SC042", "an external stack drives one robot, and here are several"),
-    ),
     "a sensor of one": (
         "robots:\n  a: {pose: here, faults: [{sensor: sonar, off: {}}]}\n  " + B + "\n" + PASS,
         (8, "SC031", "robot `turtlebot` has no sensor called `sonar`"),

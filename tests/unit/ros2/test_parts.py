@@ -67,6 +67,8 @@ def test_a_domain_that_another_run_uses_cannot_be_had_by_number(tmp_path: Path) 
     held = claim(42, environment)
     with pytest.raises(Failure, match=r"another run is using ROS domain 42: .* --jobs 1"):
         claim(42, environment)
+    with pytest.raises(Failure, match=r"another robot or run is using ROS domain 42: with several robots"):
+        claim(42, {**environment, "SIMSCEN_ROBOT": "b"})
     held.release()
     assert claim(42, environment).number == 42
 

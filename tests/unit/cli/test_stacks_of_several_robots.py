@@ -1,0 +1,140 @@
+"""What --stack means for a scenario of several robots: each one's stack, or what the name of one of them runs."""
+
+from pathlib import Path
+
+import pytest
+
+from simscen.cli.select import Selection, load_all
+from simscen.loading.resolved import resolved_text, spec_of_text
+from simscen.run.digest import digest
+
+HEAD = """\
+simscen: 1
+world: {simscen: 1, walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]}
+time_limit: 1 s
+pass: [{collisions: {max: 0}}]
+"""
+MIXED = (
+    HEAD
+    + """\
+robots:
+  a: {pose: {x: 1, y: 1}, stack: {external: mine, controller_frequency: 10 Hz}}
+  b: {pose: {x: 3, y: 1}, stack: {controller: {type: dwb}}}
+  c: {pose: {x: 5, y: 1}, stack: {external: other}}
+"""
+)
+ALL = (
+    HEAD
+    + """\
+stack: {external: mine}
+robots:
+  a: {pose: {x: 1, y: 1}}
+  b: {pose: {x: 3, y: 1}, stack: {controller_frequency: 10 Hz}}
+  c: {pose: {x: 5, y: 1}, stack: {type: reference}}
+"""
+)
+
+
+@pytest.fixture
+def project(simscen, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with two scenarios, a program, and a configuration that says what `other` runs."""
+    (tmp_path / "good.scenario.yaml").unlink()
+    for name, text in (("mixed", MIXED), ("all", ALL)):
+        (tmp_path / f"{name}.scenario.yaml").write_text(text)
+    (tmp_path / "nav").write_text("#!/bin/sh\n")
+    (tmp_path / "nav").chmod(0o755)
+    (tmp_path / "home/simscen").mkdir(parents=True)
+    (tmp_path / "home/simscen/config.yaml").write_text("stacks: {other: {command: ./nav --other}}\n")
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "home"))
+    return tmp_path
+
+
+def loaded(name: str, *stacks: str):
+    return load_all([Path(f"{name}.scenario.yaml")], None, [], False, Selection(), stacks)[0]
+
+
+def runs(scenario) -> dict[str, str]:
+    """What drives each robot: the words of a command, or the type of stack in the engine."""
+    return {
+        name: " ".join(view.runs.argv) if view.runs else type(view.spec.stack).__name__
+        for name, view in scenario.robots.items()
+    }
+
+
+def test_a_command_under_the_name_of_one_robots_stack_runs_that_alone(project: Path) -> None:
+    (one,) = loaded("mixed", "mine=./nav --mine")
+    assert runs(one) == {"a": "./nav --mine", "b": "StackSpec", "c": "./nav --other"}
+    assert one.stack == "mine=./nav --mine"
+    assert one.robots["b"].spec.stack.controller.type == "dwb"
+
+
+def test_any_other_stack_takes_the_place_of_that_of_every_robot(project: Path) -> None:
+    (one,) = loaded("mixed", "v2=./nav --v2")
+    assert runs(one) == dict.fromkeys("abc", "./nav --v2")
+    assert one.robots["a"].spec.stack.controller_frequency == 10.0
+    (one,) = loaded("mixed", "reference")
+    assert runs(one) == dict.fromkeys("abc", "StackSpec")
+    assert one.robots["b"].spec.stack.controller.type == "dwb"
+    assert one.robots["a"].spec.stack.controller_frequency == 10.0
+    (project / "mppi.stack.yaml").write_text("simscen: 1\nstack: {controller: {type: mppi}}\n")
+    (one,) = loaded("mixed", "m=mppi.stack.yaml")
+    assert {view.spec.stack.controller.type for view in one.robots.values()} == {"mppi"}
+
+
+def test_the_stack_of_all_is_that_of_each_robot_which_says_nothing_else(project: Path) -> None:
+    (one,) = loaded("all", "mine=./nav")
+    assert runs(one) == {"a": "./nav", "b": "./nav", "c": "StackSpec"}
+    assert one.robots["b"].spec.stack.controller_frequency == 10.0
+    (one,) = loaded("all", "reference")
+    assert runs(one) == dict.fromkeys("abc", "StackSpec")
+
+
+def test_what_a_run_keeps_of_the_scenario_has_the_stacks_that_drove(project: Path) -> None:
+    for name, given in (("mixed", "v2=./nav"), ("all", "reference")):
+        (one,) = loaded(name, given)
+        kept = spec_of_text(resolved_text(one), "kept")
+        assert kept.robots is not None
+        for robot, view in one.robots.items():
+            own = kept.robots[robot].stack or kept.stack
+            assert own == view.spec.stack
+
+
+def test_a_name_that_nobody_defines_is_told_at_each_robot_that_has_it(simscen, project: Path) -> None:
+    ended = simscen("run", "mixed.scenario.yaml")
+    assert ended.code == 2
+    assert "mixed.scenario.yaml:6:45: error[SC060] nobody says what the stack `mine` runs" in ended.err
+    assert ended.err.count("SC060") == 1
+    assert simscen("run", "all.scenario.yaml").err.count("SC060") == 1
+    assert simscen("validate", ".").out.count("warning[SC060]") == 2
+
+
+def test_two_names_of_one_scenario_on_one_command_line_would_each_be_a_run_and_are_refused(simscen, project) -> None:
+    ended = simscen("run", "mixed.scenario.yaml", "--stack", "mine=./nav", "--stack", "other=./nav")
+    assert ended.code == 2
+    assert "error[SC042] robots here have the stacks `mine` and `other`, but a run has one --stack" in ended.err
+    assert "home/simscen/config.yaml" in ended.err
+
+
+def test_robots_that_are_no_robots_are_told_whatever_the_stack(simscen, project: Path) -> None:
+    (project / "bad.scenario.yaml").write_text(HEAD + "robots: {a: 3, b: {pose: {x: 1, y: 1}}}\n")
+    assert "bad.scenario.yaml:5:13: error" in simscen("validate", "bad.scenario.yaml", "--stack", "v2=./nav").out
+
+
+def test_a_variation_of_what_another_stack_replaces_changes_nothing_and_is_told(simscen, project: Path) -> None:
+    kept, replaced = "robots.a.stack.controller_frequency: [5 Hz, 20 Hz]", "robots.c.stack.external: [third, fourth]"
+    for path, lost in ((kept, False), (replaced, True)):
+        (project / "varied.scenario.yaml").write_text(MIXED + f"variations: {{grid: {{{path}}}}}\n")
+        ended = simscen("validate", "varied.scenario.yaml", "--stack", "v2=./nav")
+        assert ("SC055" in ended.out, ended.code) == (lost, 2 if lost else 0), ended.out
+
+
+def test_the_digest_has_what_each_robots_stack_runs(project: Path) -> None:
+    before = digest(loaded("mixed", "mine=./nav")[0])
+    assert digest(loaded("mixed", "mine=./nav")[0]) == before
+    assert digest(loaded("mixed", "mine=./nav 2")[0]) != before
+    (project / "home/simscen/config.yaml").write_text("stacks: {other: {command: ./nav --else}}\n")
+    assert digest(loaded("mixed", "mine=./nav")[0]) != before
+
+
+def test_a_list_names_the_stacks_that_robots_have(simscen, project: Path) -> None:
+    assert "(stacks mine, other)" in simscen("list", ".").out

@@ -1,0 +1,121 @@
+"""Two robots, each with a process of its own: they know whose they are, and neither outlives the other's end."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+from stack_programs import DRIVE
+
+from simscen.core.errors import RunError
+from simscen.core.result import Outcome
+from simscen.loading.scenario import load_scenario
+from simscen.run.perform import perform
+from simscen.run.prepare import prepare
+from simscen.run.simulate import simulate
+
+FLEET = """\
+simscen: 1
+world: {simscen: 1, walls: [{points: [[0, 0], [8, 0], [8, 6], [0, 6], [0, 0]]}]}
+robots:
+  left: {pose: {x: 1, y: 4}, goals: [{name: desk, pose: {x: 2, y: 4}}], stack: {external: mine}}
+  right: {pose: {x: 1, y: 1}, goals: [{name: desk, pose: {x: 2, y: 1}}], stack: {external: mine}}
+  third: {pose: {x: 6, y: 3}}
+time_limit: 4
+pass: [{collisions: {max: 0}}]
+"""
+TOLD = "print(peer.robot_name, os.environ['SIMSCEN_ROBOT'], os.getpid(), flush=True)\n"
+HELLO = 'peer = Peer("mine", topics=["/odom"], about={"floor": 1})\n' + TOLD
+GOALS = "for step in peer:\n    if step.tick == 0: print(peer.task['goals'][0]['y'], flush=True)\n"
+RIGHT = "if os.environ['SIMSCEN_ROBOT'] == 'right': "
+
+
+@pytest.fixture
+def fleet(program, tmp_path: Path):
+    def load(text: str, **limits):
+        file = tmp_path / "fleet.scenario.yaml"
+        file.write_text(FLEET)
+        loaded, runs = load_scenario(file, tmp_path), program(text, **limits)
+        robots = {
+            name: replace(view, runs=runs if name != "third" else None) for name, view in loaded.robots.items()
+        }
+        return prepare(replace(loaded, robots=robots))
+
+    return load
+
+
+def test_each_is_told_whose_it_is_and_leaves_what_it_printed_and_said(fleet, tmp_path: Path) -> None:
+    seen = []
+    perform(fleet(HELLO + DRIVE.replace("for step in peer:\n", GOALS)), 1, tmp_path, (), lambda *given: seen.append(given[1]))
+    (run,) = seen
+    assert run.result.outcome is Outcome.PASSED
+    assert run.result.events["goal.reached"] == 2
+    for name, y in (("left", "4.0"), ("right", "1.0")):
+        words = (tmp_path / f"stack.{name}.log").read_text().split()
+        assert (*words[:2], words[3]) == (name, name, y)
+        assert json.loads((tmp_path / f"stack.{name}.json").read_text())["about"] == {"floor": 1}
+    assert not list(tmp_path.glob("stack*third*"))
+    with (tmp_path / "run.mcap").open("rb") as stream:
+        notes = {note.name: note.metadata for note in make_reader(stream).iter_metadata()}
+    assert {key: value for key, value in notes["simscen.stack"].items() if key.endswith("external")} == {
+        "left.external": "mine",
+        "right.external": "mine",
+    }
+
+
+@pytest.mark.parametrize(
+    ("does", "kind", "told"),
+    [
+        ("os._exit(3)", "stack-crashed", "stack mine of robot `right`: its process exited 3"),
+        ("time.sleep(60)", "stack-timeout", "stack mine of robot `right`: no answer to the step of t = 0.050 s"),
+        ("peer._connection.send(b'garbage' * 9)", "stack-protocol", "stack mine of robot `right`: "),
+        ("peer.give_up('no map')", "stack-failed", "stack mine of robot `right`: no map"),
+    ],
+)
+def test_an_error_names_the_robot_and_leaves_no_other_stack_behind(fleet, tmp_path, does, kind, told) -> None:
+    steps = HELLO + f"for step in peer:\n    step.drive(0, 0)\n    if step.tick and peer.robot_name == 'right': {does}\n"
+    with pytest.raises(RunError) as raised:
+        simulate(fleet(steps, answer_limit=2.0), printed=tmp_path / "stack.log")
+    assert (raised.value.kind, told in str(raised.value)) == (kind, True), str(raised.value)
+    assert_gone(tmp_path)
+
+
+def test_one_that_never_answers_hello_is_told_and_the_other_is_ended(fleet, tmp_path: Path) -> None:
+    silent = "print('', '', '', os.getpid(), flush=True)\n" + RIGHT + "time.sleep(60)\n"
+    with pytest.raises(RunError, match=r"stack mine of robot `right`: no answer to HELLO within 1 s") as raised:
+        simulate(fleet(silent + HELLO + DRIVE, start_limit=1.0), printed=tmp_path / "stack.log")
+    assert raised.value.kind == "stack-timeout"
+    assert_gone(tmp_path)
+
+
+def test_both_are_told_the_end_before_either_is_waited_for(fleet, tmp_path: Path) -> None:
+    """Each says goodbye only when the other was told, too."""
+    meets = (
+        "say = peer._connection.send_json\n"
+        "def meet(kind, content):\n"
+        "    open(os.environ['SIMSCEN_ROBOT'], 'w').close()\n"
+        "    while not all(map(os.path.exists, ('left', 'right'))): time.sleep(0.01)\n"
+        "    print('met', flush=True)\n"
+        "    say(kind, content)\n"
+        "peer._connection.send_json = meet\n"
+    )
+    drive = HELLO + meets + "for step in peer: step.drive(0, 0)\n"
+    assert simulate(fleet(drive), printed=tmp_path / "stack.log").result.outcome is Outcome.PASSED
+    assert [(tmp_path / f"stack.{name}.log").read_text().split()[-1] for name in ("left", "right")] == ["met", "met"]
+
+
+def assert_gone(folder: Path) -> None:
+    """The first number that each has printed is that of its process."""
+    for name in ("left", "right"):
+        pid = next(filter(str.isdigit, (folder / f"stack.{name}.log").read_text().split()))
+        assert not Path(f"/proc/{pid}").exists(), name
+
+
+def test_a_robot_of_its_own_has_no_name(load, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever the environment of simscen itself says."""
+    monkeypatch.setenv("SIMSCEN_ROBOT", "somebody")
+    told = "print(repr(peer.robot_name), 'SIMSCEN_ROBOT' in os.environ)\n"
+    loaded = load('peer = Peer("mine", topics=["/odom"])\n' + told + DRIVE)
+    simulate(prepare(loaded), printed=tmp_path / "stack.log")
+    assert (tmp_path / "stack.log").read_text().split() == ["''", "False"]
