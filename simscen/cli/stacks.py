@@ -29,8 +29,8 @@ from simscen.spec.registry import entries, find
 
 STACK_HELP = (
     "Run every scenario with this stack instead of its own: a command that speaks the stack protocol, a *.stack.yaml "
-    "file, `reference`, another type of stack, or a name in the user's configuration. Of several robots, it drives each; "
-    "NAME='COMMAND' where a robot's stack is `external: NAME` only says what that runs. "
+    "file, `reference`, another type of stack, or a name in the user's configuration. Of several robots, it drives "
+    "each; NAME='COMMAND' where a robot's stack is `external: NAME` only says what that runs. "
 )
 if TYPE_CHECKING:
     from simscen.loading.userconfig import UserConfig

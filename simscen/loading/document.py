@@ -146,8 +146,7 @@ def merge(over: Fields, under: Fields) -> Fields:
 
 def _same_type(key: str, above: Entry, below: Entry) -> bool:
     if key == "stack" and (
-        (_has(above, "external") and not _has(below, "external"))
-        or (_has(above, "type") and _has(below, "external"))
+        (_has(above, "external") and not _has(below, "external")) or (_has(above, "type") and _has(below, "external"))
     ):
         return False
     types = [

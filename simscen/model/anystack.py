@@ -17,7 +17,8 @@ class ExternalStackSpec(StackBase):
     """A stack in a process of its own, in any language, in lockstep with the simulation.
 
     A scenario only names it. What the name runs is told on the command line (`--stack mine='COMMAND'`) or in the
-    user's own configuration, never in a scenario: a scenario stays data. Each of several robots has a process of its own.
+    user's own configuration, never in a scenario: a scenario stays data. Each of several robots has a process of
+    its own.
 
     Example: `stack: {external: mine, controller_frequency: 10 Hz}`
     """

@@ -35,7 +35,8 @@ def build_external(
         mode=prepared.spec.navigation.mode,
         robot_name=prepared.loaded.robot_name,
     )
-    return ExternalStack(spec.external, command, surroundings, ordered, printed and for_robot(printed, ordered.robot_name))
+    shown = printed and for_robot(printed, ordered.robot_name)
+    return ExternalStack(spec.external, command, surroundings, ordered, shown)
 
 
 def for_robot(file: Path, robot: str) -> Path:

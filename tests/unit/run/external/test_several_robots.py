@@ -37,9 +37,7 @@ def fleet(program, tmp_path: Path):
         file = tmp_path / "fleet.scenario.yaml"
         file.write_text(FLEET)
         loaded, runs = load_scenario(file, tmp_path), program(text, **limits)
-        robots = {
-            name: replace(view, runs=runs if name != "third" else None) for name, view in loaded.robots.items()
-        }
+        robots = {name: replace(view, runs=runs if name != "third" else None) for name, view in loaded.robots.items()}
         return prepare(replace(loaded, robots=robots))
 
     return load
@@ -47,7 +45,8 @@ def fleet(program, tmp_path: Path):
 
 def test_each_is_told_whose_it_is_and_leaves_what_it_printed_and_said(fleet, tmp_path: Path) -> None:
     seen = []
-    perform(fleet(HELLO + DRIVE.replace("for step in peer:\n", GOALS)), 1, tmp_path, (), lambda *given: seen.append(given[1]))
+    prepared = fleet(HELLO + DRIVE.replace("for step in peer:\n", GOALS))
+    perform(prepared, 1, tmp_path, (), lambda *given: seen.append(given[1]))
     (run,) = seen
     assert run.result.outcome is Outcome.PASSED
     assert run.result.events["goal.reached"] == 2
@@ -74,9 +73,9 @@ def test_each_is_told_whose_it_is_and_leaves_what_it_printed_and_said(fleet, tmp
     ],
 )
 def test_an_error_names_the_robot_and_leaves_no_other_stack_behind(fleet, tmp_path, does, kind, told) -> None:
-    steps = HELLO + f"for step in peer:\n    step.drive(0, 0)\n    if step.tick and peer.robot_name == 'right': {does}\n"
+    steps = "for step in peer:\n    step.drive(0, 0)\n    if step.tick and peer.robot_name == 'right': "
     with pytest.raises(RunError) as raised:
-        simulate(fleet(steps, answer_limit=2.0), printed=tmp_path / "stack.log")
+        simulate(fleet(HELLO + steps + does, answer_limit=2.0), printed=tmp_path / "stack.log")
     assert (raised.value.kind, told in str(raised.value)) == (kind, True), str(raised.value)
     assert_gone(tmp_path)
 
