@@ -21,11 +21,12 @@ SESSION = """\
 A session reports in results.json under `suite`, and `simscen report DIR` prints: `runs`; `success_rate` with its 95 %
 Wilson interval, of all runs, those with errors included; `spl` and `soft_spl`, means over the runs that have them
 (`spl_runs` of them); `collisions_per_km` and `collisions_per_hour` over `kilometres` driven and `hours` simulated of
-the `measured_runs` that came to their end. With several stacks (`--stack`), `simscen report` prints these for each,
+the `measured_runs` that came to their end. Each of several robots of a run drives, collides and has an SPL of its own;
+the run succeeds where all do. With several stacks (`--stack`), `simscen report` prints these for each,
 and `comparison` holds, for each stack against the first (`baseline`): `pairs` of the same scenario and seed, what was
 `left_out`, `flips` (passed with one, failed with the other) with McNemar's exact `flips_p`, and `differences` of time,
-way, clearance, jerk, standing, replans, recoveries, collisions and the metrics of installed packages: `difference` is
-the mean over pairs, `interval` its 95 % bootstrap interval (from five pairs on), `p` the sign test."""
+way, clearance, jerk, standing, replans, recoveries, collisions (of each robot: `a/collisions`) and the metrics of
+installed packages: `difference` is the mean over pairs, `interval` its 95 % bootstrap interval (from five pairs on), `p` the sign test."""
 
 
 def metric_topics(installed: bool = False) -> list[Topic]:

@@ -81,19 +81,32 @@ def _against(runs: Mapping[RunKey, RunResult], baseline: str, other: str) -> Aga
         p=sign_test(won, len(flips) - won),
         differences=tuple(
             found
-            for name in (*COMPARED, *_added(whole))
-            if (found := _difference(name, whole if name in ALWAYS else alike)) is not None
+            for name in (*_chosen(whole), *_added(whole))
+            if (found := _difference(name, whole if _kind(name) in ALWAYS else alike)) is not None
         ),
     )
 
 
+def _kind(name: str) -> str:
+    """What a metric measures, of whichever robot: `a/collisions` are collisions."""
+    return name.rpartition("/")[2]
+
+
+def _chosen(pairs: Sequence[Pair]) -> list[str]:
+    """The COMPARED metrics, those of each robot together."""
+    names = {name for pair in pairs for run in pair for name in run.metrics if _kind(name) in COMPARED}
+    return sorted(names, key=lambda name: (name.rpartition("/")[0], COMPARED.index(_kind(name))))
+
+
 def _added(pairs: Sequence[Pair]) -> list[str]:
     """The metrics that scenarios ask installed packages for."""
-    return sorted({name for pair in pairs for run in pair for name in run.metrics if name not in METRICS})
+    return sorted({name for pair in pairs for run in pair for name in run.metrics if _kind(name) not in METRICS})
 
 
-def _arrived(run: RunResult) -> bool:
-    return run.metrics.get("time_to_goal") is not None
+def _arrived(run: RunResult) -> set[str]:
+    """The robots that reached their last goals; the only one has no name."""
+    times = {name: value for name, value in run.metrics.items() if _kind(name) == "time_to_goal"}
+    return {name.rpartition("/")[0] for name, value in times.items() if value is not None}
 
 
 def _flip(pair: Pair) -> Flip | None:
@@ -126,7 +139,7 @@ def _difference(name: str, pairs: Sequence[Pair]) -> Difference | None:
     lower, higher = sum(value < 0 for value in differences), sum(value > 0 for value in differences)
     return Difference(
         metric=name,
-        unit=METRICS[name].unit if name in METRICS else "",
+        unit=METRICS[_kind(name)].unit if _kind(name) in METRICS else "",
         pairs=len(known),
         baseline=sum(one for one, _ in known) / len(known),
         value=sum(two for _, two in known) / len(known),

@@ -12,7 +12,8 @@ class Suite:
     """`success_rate` is of all `runs`, also of those that broke; its interval is Wilson's at 95 %.
 
     `spl` and `soft_spl` are means over the `spl_runs` that have a shortest way. Collisions are counted over the
-    `kilometres` driven and `hours` simulated of the `measured_runs`; a rate is None where nothing was driven.
+    `kilometres` driven and `hours` simulated of the `measured_runs`; a rate is None where nothing was driven. Each of
+    several robots counts as a run of its own would, but for `runs` and successes: a run succeeds where all robots do.
     """
 
     runs: int
@@ -52,7 +53,7 @@ def suite(results: Iterable[RunResult]) -> Suite:
         spl_runs=len(spl),
         collisions=round(sum(_known(measured, "collisions"))),
         kilometres=sum(_known(measured, "path_length")) / 1000.0,
-        hours=sum(run.simulated for run in measured) / 3600.0,
+        hours=sum(run.simulated * _robots(run) for run in measured) / 3600.0,
         measured_runs=len(measured),
     )
 
@@ -97,7 +98,17 @@ def _runs(number: int) -> str:
 
 
 def _known(runs: list[RunResult], name: str) -> list[float]:
-    return [value for run in runs if (value := run.metrics.get(name)) is not None]
+    """The values of a metric, those of each of several robots (`a/collisions`)."""
+    found = [value for run in runs for metric, value in run.metrics.items() if _is(metric, name)]
+    return [value for value in found if value is not None]
+
+
+def _robots(run: RunResult) -> int:
+    return max(1, sum(_is(metric, "path_length") for metric in run.metrics))
+
+
+def _is(metric: str, name: str) -> bool:
+    return metric.rpartition("/")[2] == name
 
 
 def _mean(values: list[float]) -> float | None:

@@ -148,3 +148,24 @@ def test_stacks_are_compared_by_what_they_did_whatever_their_scenario_expects() 
 def test_what_was_skipped_is_no_pair() -> None:
     skipped = [replace(run(name), outcome=Outcome.SKIPPED, verdicts=(), reason="NAV-1") for name in ("ref", "mine")]
     assert against(*skipped, run("ref", 2), run("mine", 2)).pairs == 1
+
+
+def fleet(stack: str, seed: int = 1, **metrics: float | None) -> RunResult:
+    """Of the robots a and b; `b_time_to_goal` is b's."""
+    own = {f"{robot}/{name}": value for robot in "ba" for name, value in {**GOOD, "ape_trans_max": 0.1}.items()}
+    own |= {name.replace("_", "/", 1): value for name, value in metrics.items()}
+    return replace(run(stack, seed), metrics={"success": 1.0, **own})
+
+
+def test_of_several_robots_the_same_metrics_are_compared_of_each() -> None:
+    one = against(fleet("ref"), fleet("mine", b_path_length=7.0))
+    names = [name for name in COMPARED if name in GOOD]
+    assert [found.metric for found in one.differences] == [f"{robot}/{name}" for robot in "ab" for name in names]
+    assert [of(one, f"{robot}/path_length").difference for robot in "ab"] == [0.0, 2.0]
+    assert of(one, "b/path_length").unit == METRICS["path_length"].unit
+
+
+def test_a_pair_in_which_another_robot_arrived_is_compared_by_collisions_alone() -> None:
+    one = against(fleet("ref", a_time_to_goal=None), fleet("mine", b_time_to_goal=None, a_collisions=1.0))
+    assert one.parted == 1
+    assert {found.metric: found.difference for found in one.differences} == {"a/collisions": 1.0, "b/collisions": 0.0}

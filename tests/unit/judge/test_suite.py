@@ -57,3 +57,19 @@ def test_runs_that_all_broke_did_not_succeed():
 def test_a_short_way_and_a_short_time_have_rates_too():
     figures = suite([run(1, simulated=36.0, success=0.0, collisions=2.0, path_length=10.0)])
     assert (figures.collisions_per_km, figures.collisions_per_hour) == (200.0, 200.0)
+
+
+def test_each_of_several_robots_drives_and_collides_and_a_run_succeeds_where_all_do():
+    metrics = {
+        "a/spl": 0.5,
+        "b/spl": None,
+        "a/collisions": 1.0,
+        "b/collisions": 2.0,
+        "a/success": 1.0,
+        "b/success": 0.0,
+    }
+    two = run(1, **metrics, success=0.0, **{"a/path_length": 1500.0, "b/path_length": 500.0})
+    figures = suite([two])
+    assert (figures.runs, figures.measured_runs, figures.success_rate) == (1, 1, 0.0)
+    assert (figures.spl, figures.spl_runs) == (0.5, 1)
+    assert (figures.collisions, figures.kilometres, figures.hours) == (3, 2.0, 1.0)
