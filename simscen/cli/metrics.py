@@ -26,7 +26,8 @@ the run succeeds where all do. With several stacks (`--stack`), `simscen report`
 and `comparison` holds, for each stack against the first (`baseline`): `pairs` of the same scenario and seed, what was
 `left_out`, `flips` (passed with one, failed with the other) with McNemar's exact `flips_p`, and `differences` of time,
 way, clearance, jerk, standing, replans, recoveries, collisions (of each robot: `a/collisions`) and the metrics of
-installed packages: `difference` is the mean over pairs, `interval` its 95 % bootstrap interval (from five pairs on), `p` the sign test."""
+installed packages: `difference` is the mean over pairs, `interval` its 95 % bootstrap interval (from five pairs on),
+`p` the sign test."""
 
 
 def metric_topics(installed: bool = False) -> list[Topic]:
