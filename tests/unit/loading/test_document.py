@@ -44,6 +44,19 @@ def test_a_mapping_of_another_type_is_replaced_not_merged(tmp_path: Path) -> Non
     assert plain["localizer"] == {"type": "amcl", "alpha1": 1, "alpha2": 2}
 
 
+@pytest.mark.parametrize(
+    ("own", "expected"),
+    [
+        ("{controller_frequency: 5}", {"external": "mine", "ground_truth": True, "controller_frequency": 5}),
+        ("{type: reference}", {"type": "reference"}),
+        ("{external: other}", {"external": "other", "ground_truth": True}),
+    ],
+)
+def test_an_external_stack_is_replaced_by_one_with_a_type(own, expected, tmp_path: Path) -> None:
+    files = {"a.yaml": f"extends: b.yaml\nstack: {own}\n", "b.yaml": "stack: {external: mine, ground_truth: true}\n"}
+    assert _read(tmp_path, files)[0]["stack"] == expected
+
+
 def test_places_stay_in_the_file_they_were_written_in(tmp_path: Path) -> None:
     library = _read(tmp_path, {"a.yaml": "extends: sub/b.yaml\n", "sub/b.yaml": "\nworld: w.yaml\n"})[2]
     tree, _ = library.read(tmp_path / "a.yaml")

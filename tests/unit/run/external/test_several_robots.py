@@ -8,11 +8,13 @@ import pytest
 from mcap.reader import make_reader
 from stack_programs import DRIVE
 
+from simscen.cli.run import WARM_PROCESS
 from simscen.core.errors import RunError
 from simscen.core.result import Outcome
 from simscen.loading.scenario import load_scenario
 from simscen.run.perform import perform
 from simscen.run.prepare import prepare
+from simscen.run.session import Options, plan, run_session
 from simscen.run.simulate import simulate
 
 FLEET = """\
@@ -25,22 +27,28 @@ robots:
 time_limit: 4
 pass: [{collisions: {max: 0}}]
 """
-TOLD = "print(peer.robot_name, os.environ['SIMSCEN_ROBOT'], os.getpid(), flush=True)\n"
+NOTED = "with open('pid.' + os.environ['SIMSCEN_ROBOT'], 'w') as file: file.write(str(os.getpid()))\n"
+TOLD = NOTED + "print(peer.robot_name, os.environ['SIMSCEN_ROBOT'], flush=True)\n"
 HELLO = 'peer = Peer("mine", topics=["/odom"], about={"floor": 1})\n' + TOLD
 GOALS = "for step in peer:\n    if step.tick == 0: print(peer.task['goals'][0]['y'], flush=True)\n"
 RIGHT = "if os.environ['SIMSCEN_ROBOT'] == 'right': "
 
 
 @pytest.fixture
-def fleet(program, tmp_path: Path):
+def load_fleet(program, tmp_path: Path):
     def load(text: str, **limits):
         file = tmp_path / "fleet.scenario.yaml"
         file.write_text(FLEET)
         loaded, runs = load_scenario(file, tmp_path), program(text, **limits)
         robots = {name: replace(view, runs=runs if name != "third" else None) for name, view in loaded.robots.items()}
-        return prepare(replace(loaded, robots=robots))
+        return replace(loaded, robots=robots)
 
     return load
+
+
+@pytest.fixture
+def fleet(load_fleet):
+    return lambda text, **limits: prepare(load_fleet(text, **limits))
 
 
 def test_each_is_told_whose_it_is_and_leaves_what_it_printed_and_said(fleet, tmp_path: Path) -> None:
@@ -52,7 +60,7 @@ def test_each_is_told_whose_it_is_and_leaves_what_it_printed_and_said(fleet, tmp
     assert run.result.events["goal.reached"] == 2
     for name, y in (("left", "4.0"), ("right", "1.0")):
         words = (tmp_path / f"stack.{name}.log").read_text().split()
-        assert (*words[:2], words[3]) == (name, name, y)
+        assert words == [name, name, y]
         assert json.loads((tmp_path / f"stack.{name}.json").read_text())["about"] == {"floor": 1}
     assert not list(tmp_path.glob("stack*third*"))
     with (tmp_path / "run.mcap").open("rb") as stream:
@@ -81,7 +89,7 @@ def test_an_error_names_the_robot_and_leaves_no_other_stack_behind(fleet, tmp_pa
 
 
 def test_one_that_never_answers_hello_is_told_and_the_other_is_ended(fleet, tmp_path: Path) -> None:
-    silent = "print('', '', '', os.getpid(), flush=True)\n" + RIGHT + "time.sleep(60)\n"
+    silent = NOTED + RIGHT + "time.sleep(60)\n"
     with pytest.raises(RunError, match=r"stack mine of robot `right`: no answer to HELLO within 1 s") as raised:
         simulate(fleet(silent + HELLO + DRIVE, start_limit=1.0), printed=tmp_path / "stack.log")
     assert raised.value.kind == "stack-timeout"
@@ -104,11 +112,21 @@ def test_both_are_told_the_end_before_either_is_waited_for(fleet, tmp_path: Path
     assert [(tmp_path / f"stack.{name}.log").read_text().split()[-1] for name in ("left", "right")] == ["met", "met"]
 
 
+def test_a_worker_that_is_killed_takes_the_stacks_of_all_robots_along(load_fleet, tmp_path: Path) -> None:
+    """The keeper is the parent of a stack, the worker the parent of the keeper."""
+    kill = "os.kill(int(open(f'/proc/{os.getppid()}/stat').read().rsplit(')', 1)[1].split()[1]), signal.SIGKILL)\n"
+    told = f"{HELLO}for step in peer:\n    if peer.robot_name == 'right': {kill}    step.drive(0, 0)\n"
+    options = Options(wall_limit=60.0)
+    jobs = plan([load_fleet(told, answer_limit=30.0)], options, tmp_path / "out")
+    ((answer,), _) = run_session(jobs, options, WARM_PROCESS, lambda event: None)
+    assert answer.result.error is not None
+    assert answer.result.error.kind == "crashed"
+    assert_gone(tmp_path)
+
+
 def assert_gone(folder: Path) -> None:
-    """The first number that each has printed is that of its process."""
     for name in ("left", "right"):
-        pid = next(filter(str.isdigit, (folder / f"stack.{name}.log").read_text().split()))
-        assert not Path(f"/proc/{pid}").exists(), name
+        assert not Path(f"/proc/{(folder / f'pid.{name}').read_text()}").exists(), name
 
 
 def test_a_robot_of_its_own_has_no_name(load, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
