@@ -63,11 +63,8 @@ def search(
     information.setStateValidityChecker(lambda state: free(state[0], state[1], state[0], state[1]))
     information.setMotionValidator(_Motions(information, free))
     information.setup()
-    for place in (start, goal):
-        if not free(*place, *place):
-            return (
-                None  # some of OMPL's planners sleep 5 ms for each iteration while they wait for a goal that is valid
-            )
+    if not (free(*start, *start) and free(*goal, *goal)):
+        return None  # some of OMPL's planners sleep 5 ms for each iteration, waiting for a goal that is valid
     problem = ob.ProblemDefinition(information)
     problem.setStartAndGoalStates(_state(information, start), _state(information, goal))
     planner = PLANNERS[kind](information)

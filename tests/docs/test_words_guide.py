@@ -1,0 +1,26 @@
+"""The guide that lists all words by need has all of them, each in its own part."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from simscen.actions.action import AnyAction
+from simscen.criteria.criterion import AnyCriterion
+from simscen.faults.fault import AnyFault
+from simscen.triggers.trigger import Trigger
+
+GUIDE = (Path(__file__).parents[2] / "docs" / "guides" / "words.md").read_text(encoding="utf-8")
+PARTS = dict(re.findall(r"^## ([^\n]+)\n(.*?)(?=^## |\Z)", GUIDE, re.MULTILINE | re.DOTALL))
+CHOICES = {
+    "When": [*Trigger.choices(), *(key.rstrip("_") for key in Trigger.modifiers if key != "robot")],
+    "What happens": [*AnyAction.choices()],
+    "What goes wrong": [*AnyFault.choices()],
+    "What must hold": [*AnyCriterion.choices()],
+}
+
+
+@pytest.mark.parametrize("part", CHOICES)
+def test_each_word_stands_in_its_part(part):
+    said = re.findall(r"`([a-z_]+)`", PARTS[part])
+    assert sorted(set(CHOICES[part]) - set(said)) == []
