@@ -47,6 +47,7 @@ class StackProcess:
         self._outbox, self._inbox, self._reports = bytearray(), bytearray(), bytearray()
         self._ended = ""
         self._hung_up = False
+        self._dismissed = 0.0
         self._log = KeptLog(printed)
         self._stream, theirs = socket.socketpair()
         control, self._control = os.pipe()
@@ -103,9 +104,14 @@ class StackProcess:
         self._outbox += frame
         self._post()
 
+    def dismiss(self, frame: bytes) -> None:
+        """Send the last frame."""
+        self.send(frame)
+        self._dismissed = time.monotonic()
+
     def farewell(self, grace: float) -> bytes:
-        """Wait until the stack, which was sent its last frame, hangs up; the body of a BYE, "{}" when none came."""
-        self._pump(lambda: self._hung_up, grace)
+        """Wait until the stack hangs up, at most `grace` after it was dismissed; the body of a BYE, else "{}"."""
+        self._pump(lambda: self._hung_up, max(0.0, self._dismissed + grace - time.monotonic()))
         with suppress(RunError):
             if self._has_frame():
                 kind, body = self._taken()
@@ -118,12 +124,15 @@ class StackProcess:
         printed = self._log.last(TAIL_BYTES).decode(errors="replace")
         return RunError(kind, f"stack {self._name}: {message}", tail(printed))
 
+    def release(self) -> None:
+        """Have the process ended, if it still runs, and all that it has started; `close` waits for that."""
+        if self._control >= 0:
+            os.close(self._control)
+            self._control = -1
+
     def close(self) -> None:
         """End the process, if it still runs, and all that it has started."""
-        if self._control < 0:
-            return
-        os.close(self._control)
-        self._control = -1
+        self.release()
         self._pump(lambda: self._shown not in self._takers and self._report not in self._takers, TIME_TO_BURY)
         self._keeper.kill()
         self._keeper.wait()

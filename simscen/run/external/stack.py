@@ -36,8 +36,8 @@ _GOAL_ENDS = (EventKind.GOAL_REACHED, EventKind.GOAL_FAILED, EventKind.GOAL_CANC
 class ExternalStack:
     """Speaks with the process of a stack; `begin` and `start` start it, `end`, `finish` and `close` end it.
 
-    With several robots each has a stack of its own: all begin before the first is waited for, and all are told the end
-    before any is waited for.
+    With several robots each has a stack of its own: all begin before the first is waited for, all are told the end
+    before any is waited for, and all are released before the first is closed.
 
     Raises RunError of a kind in simscen.run.external.errors from whatever needs the process.
     """
@@ -141,14 +141,19 @@ class ExternalStack:
 
     def end(self, reason: str) -> None:
         """Tell the stack that the run is over."""
-        self._send(wire.END, {"reason": reason})
+        if self._process is not None:
+            self._process.dismiss(wire.json_frame(wire.END, {"reason": reason}))
 
     def finish(self) -> None:
         """Let it end by itself, which it was told to."""
         if self._process is not None:
             farewell = self._process.farewell(GRACE)
             self._welcome = self._welcome.with_farewell(farewell)
-        self.close()
+
+    def release(self) -> None:
+        """Have the process ended, and all that it has started, without waiting for it."""
+        if self._process is not None:
+            self._process.release()
 
     def close(self) -> None:
         """End the process and all that it has started."""
