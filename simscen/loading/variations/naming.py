@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from simscen.loading.messages import quoted
 from simscen.loading.tree import Fields, Items, Leaf, Node
-from simscen.loading.variations.paths import Target
+from simscen.loading.variations.paths import Target, parts_of
 
 LONGEST, _LONGEST_VALUE = 100, 40
 _GIVEN = re.compile(r"[^\W][\w.,=+%-]*")
@@ -24,8 +24,8 @@ HINT = f"up to {LONGEST} letters, digits, `_`, `.`, `,`, `=`, `+`, `-` and `%`, 
 
 
 def keys_of(targets: Sequence[Target]) -> dict[str, str]:
-    """A short name for each path: its last part, and as many more before it as tell it from the others."""
-    parts = {target.path: [str(key) for key in target.keys] for target in targets}
+    """A short name for each path as written: its last part, and as many more before it as tell it from the others."""
+    parts = {target.path: parts_of(target.path) for target in targets}
     named = dict.fromkeys(parts, 1)
     while True:
         short = {path: ".".join(parts[path][-count:]) for path, count in named.items()}

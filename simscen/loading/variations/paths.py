@@ -44,7 +44,7 @@ class Target:
 
 def target_of(path: str, place: Place, tree: Fields) -> Target:
     """What a path means in a scenario, also where nothing is written there yet. Raises NoPath."""
-    parts = _parts(path)
+    parts = parts_of(path)
     if parts[0] in FIXED:
         raise NoPath(f"a variation cannot change `{parts[0]}`", FIXED[parts[0]])
     return Target(path, place, _keys(path, parts, tree))
@@ -57,7 +57,8 @@ def put(tree: Fields, target: Target, value: Node) -> Fields:
     return changed
 
 
-def _parts(path: str) -> list[str]:
+def parts_of(path: str) -> list[str]:
+    """What stands between the dots and in the brackets of a path. Raises NoPath."""
     parts, position = [], 0
     while position < len(path):
         match = _PART.match(path, position)
@@ -118,6 +119,8 @@ def _item(path: str, keys: list[Key], items: Items, part: str, rest: list[str]) 
         raise NoPath(f"{quoted(path)} names several: {len(found)} items of `{holder}` are called {quoted(part)}", hint)
     if not found:
         known = [name for item in items.items for name in _names(item)]
+        if keys[0] in BY_KIND:
+            known += [key for item in items.items if isinstance(item, Fields) for key in item.entries if key != "id"]
         hint = suggestion(part, known) if known else "say it by its number, [0] is the first"
         raise NoPath(f"{quoted(path)} names nothing: no item of `{holder}` is called {quoted(part)}", hint)
     if kinds and not (rest and rest[0] in ("id", "severity", "then", part)):
@@ -147,6 +150,8 @@ def _file_hint(keys: list[Key]) -> str:
     if keys in (["world"], ["map"], ["robot", "model"]):
         what = "name other files by the path of this key" + (", or write the world inline" if keys == ["world"] else "")
         return f"values in another file cannot be varied; {what}"
+    if keys[-1] == "pose":
+        return f"vary {quoted(dotted(keys))} as a whole, or write it as `{{x: …, y: …, yaw: …}}`"
     return ""
 
 

@@ -85,6 +85,12 @@ def test_drawn_values_are_those_of_the_tree_where_they_are_chosen() -> None:
     assert all(one.tree.plain["robot"]["pose"] in ({"x": 1, "y": 1}, "dock") for one in found)
 
 
+def test_items_of_lists_are_called_as_their_paths_call_them() -> None:
+    base = BASE.replace("[{pose: desk}]", "[{pose: desk}, {pose: sofa}]")
+    found = expanded("  pairs: {goals.desk.timeout: [1, 2], goals.1.timeout: [3, 4]}", base)
+    assert [one.name for one in found] == ["desk.timeout=1,1.timeout=3", "desk.timeout=2,1.timeout=4"]
+
+
 @pytest.mark.parametrize(
     ("variations", "expected"),
     [
