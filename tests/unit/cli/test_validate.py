@@ -136,3 +136,24 @@ def test_a_base_is_called_one_and_checked_for_what_it_says(simscen, tmp_path: Pa
     ended = simscen("validate", "defaults.yaml")
     assert ended.code == 2
     assert "defaults.yaml:1:1: error[SC012] unknown key `tag`" in ended.out
+
+
+DOCK = """\
+simscen: 1
+walls: [{points: [[0, 0], [8, 0], [8, 4], [0, 4], [0, 0]]}]
+obstacles: [{name: dock, box: [2, 2, 0.12], pose: {x: 1, y: 2}}, {name: shelf, box: [1, 1, 1], pose: {x: 6, y: 2}}]
+RAMP
+places: {up: {x: 1, y: 2}, shelf: {x: 6, y: 2}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("ramps", "inside"),
+    [("ramps: [{name: ramp, start: [3.5, 2], end: [2, 2], width: 2, height: 12 cm}]", ["shelf"]),
+     ("ramps: []", ["up", "shelf"])],
+    ids=["a ramp leads up", "nothing does"],
+)  # fmt: skip
+def test_a_place_may_be_on_what_a_ramp_leads_to(simscen, tmp_path: Path, ramps: str, inside: list[str]) -> None:
+    (tmp_path / "dock.world.yaml").write_text(DOCK.replace("RAMP", ramps))
+    ended = simscen("validate", "dock.world.yaml")
+    assert [name for name in ("up", "shelf") if f"place `{name}` is inside obstacle" in ended.out] == inside
