@@ -23,7 +23,7 @@ def files(incomplete: str) -> list[str]:
 
 def topics(incomplete: str) -> list[str]:
     """What `explain` knows; keys of a topic once its name and a dot are written."""
-    from simscen.cli.explain import known_names
+    from simscen.cli.explainable import known_names
 
     names = known_names(keys="." in incomplete)
     return [name for name in names if name.startswith(incomplete)]

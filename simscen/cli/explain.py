@@ -7,12 +7,10 @@ from typing import Annotated
 import typer
 
 from simscen.cli import completing
-from simscen.cli.catalogue import OPTIONAL, Field, Topic, topics
-from simscen.cli.codetopics import code_topics
+from simscen.cli.catalogue import OPTIONAL, Field, Topic
 from simscen.cli.diagnostics import print_text
-from simscen.cli.keytopics import key_topics, keys_of_topics
-from simscen.cli.metrics import metric_topics
-from simscen.cli.signals import signal_topics
+from simscen.cli.explainable import everything, known_names
+from simscen.cli.keytopics import key_topics
 from simscen.core.errors import UsageError
 from simscen.loading.codes import CODES
 from simscen.loading.messages import quoted, suggestion
@@ -51,23 +49,13 @@ def explained(name: str, width: int = 100) -> str:
     return "\n\n".join(_explained(topic, width) for topic in _called(name))
 
 
-def _everything() -> list[Topic]:
-    return [*topics(installed=True), *signal_topics(), *metric_topics(installed=True), *code_topics()]
-
-
-def known_names(keys: bool = False) -> list[str]:
-    """What there is to explain, in order; with `keys` the paths of keys instead."""
-    everything = _everything()
-    return keys_of_topics(everything) if keys else [*dict.fromkeys(topic.name for topic in everything), *CODES]
-
-
 def _called(name: str) -> list[Topic]:
-    everything = _everything()
+    known = everything()
     lowered = name.lower()
-    found = [topic for topic in everything if lowered in (name.lower() for name in _names(topic))]
-    found = found or key_topics(name, everything)
+    found = [topic for topic in known if lowered in (name.lower() for name in _names(topic))]
+    found = found or key_topics(name, known)
     if not found:
-        hint = suggestion(name, [*known_names(), *(known_names(keys=True) if "." in name else _bare_keys(everything))])
+        hint = suggestion(name, [*known_names(), *(known_names(keys=True) if "." in name else _bare_keys(known))])
         raise UsageError(
             f"nothing is called {quoted(name)}; "
             + (hint if hint.startswith("did") else "`simscen explain` lists what there is")
@@ -85,7 +73,7 @@ def _bare_keys(everything: list[Topic]) -> list[str]:
 
 def _overview(width: int) -> str:
     groups: dict[str, list[str]] = {}
-    for topic in _everything():
+    for topic in everything():
         groups.setdefault(topic.group, []).append(topic.name)
     lines = [f"{group}:\n{_wrapped(', '.join(names), width, '  ')}" for group, names in groups.items()]
     return "\n".join(

@@ -68,7 +68,7 @@ def test_73_a_disk_that_fills_up_is_an_error_that_says_so_of_every_run_it_hits(m
     for name in "bc":
         (folder / f"{name}.scenario.yaml").write_text(text.replace("x: 1.5, y: 1", "x: 5, y: 3"))
     script = '"$simscen" run . --out disk/out -j 1 --format json > told.json; code=$?; cp -r disk/out saved; exit $code'
-    done = mounted("size=1500k", script)
+    done = mounted("size=600k", script)
     assert done.returncode == 3
     runs = {run["scenario"]: run for run in json.loads((folder / "told.json").read_text())["runs"]}
     assert [run["outcome"] for run in runs.values()] == ["passed", "error", "error"]

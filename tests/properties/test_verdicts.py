@@ -39,7 +39,13 @@ LIMITS = {
     "recoveries": ("max",),
 }
 """Of each criterion the bounds that are loosened by raising them."""
-LOWERED = {"clearance": ("min",), "keepout": ("distance",), "replans": ("min",), "recoveries": ("min",)}
+LOWERED = {
+    "clearance": ("min",),
+    "personal_space": ("min",),
+    "keepout": ("distance",),
+    "replans": ("min",),
+    "recoveries": ("min",),
+}
 """And those that are loosened by lowering them."""
 FIXED = {
     "stopped_within": {"after": "lidar.off"},
@@ -87,8 +93,10 @@ def runs(draw) -> dict:
         "seconds": SECONDS,
         "truth": draw(waypoints()),
         "belief": draw(waypoints()),
+        "objects": {"anna": draw(waypoints())},
         "clearance": [[0, draw(BOUND)], [SECONDS, draw(BOUND)]],
-        "events": [[t, *kind] for t, kind, there in zip(times, kinds, chosen, strict=True) if there],
+        "events": [[0, "object.spawned", "anna", {"person": True, "size": [0.25, 1.7]}]]
+        + [[t, *kind] for t, kind, there in zip(times, kinds, chosen, strict=True) if there],
     }
 
 

@@ -63,10 +63,11 @@ def search(
     information.setStateValidityChecker(lambda state: free(state[0], state[1], state[0], state[1]))
     information.setMotionValidator(_Motions(information, free))
     information.setup()
-    if not (free(*start, *start) and free(*goal, *goal)):
-        return None  # some of OMPL's planners sleep 5 ms for each iteration, waiting for a goal that is valid
+    ends = _state(information, start), _state(information, goal)
+    if not all(information.satisfiesBounds(end) and information.isValid(end) for end in ends):
+        return None  # a planner would wait for a better goal, 5 ms an iteration
     problem = ob.ProblemDefinition(information)
-    problem.setStartAndGoalStates(_state(information, start), _state(information, goal))
+    problem.setStartAndGoalStates(*ends)
     planner = PLANNERS[kind](information)
     if hasattr(planner, "setRange"):
         planner.setRange(RANGE)

@@ -1,8 +1,9 @@
 import pytest
 
-from simscen.cli import explain
+from simscen.cli import explain, explainable
 from simscen.cli.codetopics import NAV2
-from simscen.cli.explain import explained, known_names
+from simscen.cli.explain import explained
+from simscen.cli.explainable import known_names
 from simscen.core.errors import Exit
 from simscen.core.navigation import ErrorCode
 
@@ -92,8 +93,9 @@ def test_misspelt_keys_and_codes_are_told_what_was_meant(simscen, name: str, mea
 
 
 def test_every_topic_every_key_and_every_code_is_explained(monkeypatch) -> None:
-    everything = explain._everything()
-    monkeypatch.setattr(explain, "_everything", lambda: everything)  # to collect it costs most of the time
+    everything = explainable.everything()
+    for module in (explain, explainable):
+        monkeypatch.setattr(module, "everything", lambda: everything)  # to collect it costs most of the time
     for name in [*known_names(), *known_names(keys=True)]:
         assert explained(name), name
 
