@@ -50,7 +50,11 @@ def test_its_contract_is_asked_for_by_the_name_of_its_entry_point(call, tmp_path
 @pytest.mark.parametrize(
     ("stack", "used", "scenarios"),
     [
-        ("{planner: {type: theta_star}}", "theta-star", ("navigation/path_length", "corner_cases/person_stops_in_front")),
+        (
+            "{planner: {type: theta_star}}",
+            "theta-star",
+            ("navigation/path_length", "corner_cases/person_stops_in_front"),
+        ),
         ("{type: vfh_plus}", "vfh-plus", ("navigation/goal", "obstacles/cart_crossing", "obstacles/pallet_on_plan")),
     ],
     ids=NAMES,
