@@ -41,10 +41,11 @@ class Agent:
     def look(self, tick: int) -> None:
         """Where the robot is now, and what it has touched."""
         self._truth = self.robot.truth() if tick % self.truth_period == 0 else None
-        self.stage.begin_beat(self._truth)
+        self.stage.begin_beat(self._truth, self.timetable.due(tick))
 
     def decide(self, tick: int) -> Moment:
         """Read the sensors that are due, and hand them to the stack after the faults have had their way with them."""
+        self.stage.pass_on(tick)
         readings = self.faults.disturb(self.senses.read(tick))
         decision = self.stack.decide(tick, readings)
         self.stage.heard(decision, readings)

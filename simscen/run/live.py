@@ -1,6 +1,6 @@
 """The running world as triggers see it and as actions change it."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -64,18 +64,34 @@ class LiveStage:
         self._clearance: float | None = None
         self._scanned: dict[str, int] = {}
         self._travelled = 0.0
+        self._due, self._orders = True, list[Callable[[int], None]]()
         self._history: tuple[Event, ...] = ()
         self._fresh: list[Event] = []
 
     # what the lockstep tells it
 
-    def begin_beat(self, truth: Truth | None) -> None:
-        """Time has passed: see where the robot is now, by the truth where it was sampled, and what it has touched."""
+    def begin_beat(self, truth: Truth | None, due: bool = True) -> None:
+        """Time has passed: see where the robot is now, by the truth where it was sampled, and what it has touched.
+
+        Where the beat is not `due` for this robot but for another, its stack hears orders at the next that is.
+        """
+        self._due = due
         before = self._pose
         self._look(truth)
         self._travelled += before.distance(self._pose)
         for collision in self._robot.collisions():
             self.note(collision)
+
+    def pass_on(self, tick: int) -> None:
+        """Give the stack the orders that have waited for this beat of its own."""
+        orders, self._orders = self._orders, []
+        for order in orders:
+            order(tick)
+
+    def _order(self, order: Callable[[int], None]) -> None:
+        self._orders.append(order)
+        if self._due:
+            self.pass_on(self.tick)
 
     def _look(self, truth: Truth | None = None) -> None:
         if truth is not None:
@@ -245,11 +261,12 @@ class LiveStage:
 
     def send_goal(self, name: str) -> None:
         """Preempt with a new goal."""
-        self._stack.preempt(self.tick, self._goals[name])
+        goal = self._goals[name]
+        self._order(lambda tick: self._stack.preempt(tick, goal))
 
     def cancel_goal(self) -> None:
         """Cancel what the robot is doing."""
-        self._stack.cancel(self.tick)
+        self._order(self._stack.cancel)
 
     def tell(self, event: Event) -> None:
         """Write an event to the logs of all robots: it happened to the world."""
@@ -267,7 +284,8 @@ class LiveStage:
             about: dict[str, Value] = {"filter": order.filter, "enabled": order.enabled}
             about |= {"speed_limit": limit} if limit and order.enabled else {}
             self.note(Event(0, EventKind.ZONE_SWITCHED, region, about))
-        self._stack.set_zones(self.tick, self._filters.zones)
+        zones, told = self._filters.zones, self._stack.set_zones
+        self._order(lambda tick: told(tick, zones))
         return ""
 
     def note(self, event: Event) -> None:

@@ -53,6 +53,19 @@ def messages(log, robot, seconds):
     return sha.hexdigest()
 
 
+@pytest.mark.parametrize(
+    "order", ["{new_goal: {name: sent, pose: {x: 2, y: 3}}, robot: a}", "{cancel_goal: {}, robot: a}"]
+)
+def test_an_order_at_the_beat_of_another_robot_arrives_at_the_next_of_its_own(run, order):
+    done = run(
+        f"robots: {{a: {{{EAST}}}, b: {{{FAR}, model: jackal}}}}\n"
+        f"events: [{{when: {{time: 330 ms}}, do: {order}}}]\npass: [{{collisions: {{max: 0}}}}]\n"
+    )
+    told = next(event for event in done.robots["a"].trace.events if event.kind is EventKind.GOAL_CANCELED)
+    began = next(event for event in done.robots["a"].trace.events if event.kind is EventKind.EVENT_STARTED)
+    assert (began.tick, told.tick) == (80, 84)
+
+
 def test_who_else_is_there_changes_nothing_for_a_robot_that_never_meets_them(run):
     two = run(f"robots: {{b: {{{FAR}}}, a: {{{EAST}}}}}\n{PASS}", "two")
     three = run(
