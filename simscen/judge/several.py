@@ -34,7 +34,7 @@ def together(
     told = [(verdict, line) for verdict, line in _lined(first) if _of_the_world(verdict, shared)]
     for name, result in results.items():
         own = ((verdict, line) for verdict, line in _lined(result) if not _of_the_world(verdict, shared))
-        told += [(replace(verdict, id=f"{name}/{verdict.id}"), line) for verdict, line in own]
+        told += [(_called(verdict, name), line) for verdict, line in own]
     verdicts = tuple(verdict for verdict, _ in told)
     came_out, on_that = as_expected(expected, verdicts, _worst(results), all(map(finished, traces.values())))
     if expected is not None and on_that is not None:
@@ -58,6 +58,14 @@ def together(
 
 def _lined(result: RunResult) -> list[tuple[Verdict, int]]:
     return list(zip(result.verdicts, result.lines or (0,) * len(result.verdicts), strict=True))
+
+
+def _called(verdict: Verdict, robot: str) -> Verdict:
+    """The verdict as one of this robot; that on a fault that did not happen tells the fault's name in its finding."""
+    findings = verdict.findings
+    if verdict.criterion == DISTURBANCE:
+        findings = tuple(replace(finding, measured=f"{robot}/{finding.measured}") for finding in findings)
+    return replace(verdict, id=f"{robot}/{verdict.id}", findings=findings)
 
 
 def _of_the_world(verdict: Verdict, events: set[str]) -> bool:

@@ -173,3 +173,11 @@ def test_what_an_action_did_says_to_which_robot(run):
     assert [one.effect for one in done.result.disturbances] == ["b: pushed the robot with 1.0 N s"]
     pushed = [len(robot.trace.of_kind(EventKind.ROBOT_PUSHED)) for robot in done.robots.values()]
     assert pushed == [0, 1]
+
+
+def test_a_fault_that_never_began_is_told_with_its_robot(run):
+    far = "{sensor: lidar, off: {}, when: {travelled: 90 m}}"
+    done = run(f"robots: {{a: {{{EAST}, faults: [{far}]}}, b: {{{FAR}}}}}\n{PASS}")
+    (verdict,) = [one for one in done.result.verdicts if one.status is Status.FAIL]
+    assert verdict.id == "a/lidar.off"
+    assert verdict.findings[0].measured == "a/lidar.off (when travelled: 90 m)"
