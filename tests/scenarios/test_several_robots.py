@@ -176,8 +176,8 @@ def test_what_an_action_did_says_to_which_robot(run):
 
 
 def test_a_fault_that_never_began_is_told_with_its_robot(run):
-    far = "{sensor: lidar, off: {}, when: {travelled: 90 m}}"
+    far = "{sensor: lidar, off: {}, when: {travelled: 8 m}}"
     done = run(f"robots: {{a: {{{EAST}, faults: [{far}]}}, b: {{{FAR}}}}}\n{PASS}")
     (verdict,) = [one for one in done.result.verdicts if one.status is Status.FAIL]
     assert verdict.id == "a/lidar.off"
-    assert verdict.findings[0].measured == "a/lidar.off (when travelled: 90 m)"
+    assert verdict.findings[0].measured == "a/lidar.off (when travelled: 8 m)"
