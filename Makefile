@@ -14,7 +14,7 @@ LOWEST_TESTS := tests/diagnostics tests/cases $(addprefix tests/unit/,cli loadin
 
 ROS := .venv-ros
 
-.PHONY: help setup run test test-lowest test-ros served library check lint types layers schemas docs mutation bench campaign fuzz build clean
+.PHONY: help setup run test test-lowest test-long test-ros served library check lint types layers schemas docs mutation bench campaign fuzz build clean
 
 help:  ## Print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -39,6 +39,9 @@ run: setup  ## Run the scenarios that ship
 test: setup  ## Run everything CI runs: checks, then the tests
 	@$(BIN)/python tests/ros/rig.py $(ROS) & $(MAKE) --no-print-directory check; failed=$$?; wait; exit $$failed
 	@$(BIN)/python -m pytest -m "not long"
+
+test-long: setup  ## Run the tests that `make test` leaves out because they take long
+	@$(BIN)/python -m pytest -m long
 
 test-ros: setup  ## Test with a real ROS 2 (rclpy on Fast DDS, from wheels into .venv-ros)
 	@$(BIN)/python tests/ros/rig.py $(ROS)

@@ -15,7 +15,7 @@ from simscen.record.replay import read_run
 ROOT = Path(__file__).parents[2]
 NODES = Path(__file__).with_name("nodes")
 SCENARIOS = [
-    "navigation/goal",
+    pytest.param("navigation/goal", marks=pytest.mark.long),
     pytest.param("navigation/patrol", marks=pytest.mark.long),
     "obstacles/pallet_on_plan",
 ]
@@ -39,7 +39,7 @@ def alive(word: str, program: str = "") -> list[int]:
     return sorted(found)
 
 
-@pytest.mark.parametrize("stamped", [False, True], ids=["Twist", "TwistStamped"])
+@pytest.mark.parametrize("stamped", [pytest.param(False, marks=pytest.mark.long), True], ids=["Twist", "TwistStamped"])
 def test_it_reaches_a_goal_by_goal_pose_in_a_namespace_with_remappings(ros, run, stamped: bool) -> None:
     names = ["-r", "__ns:=/robot1", "-r", "/tf:=tf", "-r", "/tf_static:=tf_static", "-r", "scan:=/front/scan"]
     words = ["--namespace", "robot1", "--remap", "/scan:=/front/scan"]
@@ -53,7 +53,9 @@ def test_it_passes_a_scenario_that_ships(ros, run, name: str) -> None:
     assert ended.code == 0, ended.said
 
 
-@pytest.mark.parametrize("action", ["navigate_to_pose", "navigate_through_poses", "follow_waypoints"])
+@pytest.mark.parametrize(
+    "action", ["navigate_to_pose", pytest.param("navigate_through_poses", marks=pytest.mark.long), "follow_waypoints"]
+)
 def test_goals_go_to_an_action_of_nav2(with_interfaces, run, tmp_path: Path, action: str) -> None:
     file = tmp_path / "short.scenario.yaml"
     file.write_text(

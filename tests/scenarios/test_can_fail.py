@@ -23,7 +23,12 @@ CHANGES = {
     for file in sorted(FOLDER.glob("*.yaml"))
     for name, ways in yaml.safe_load(file.read_text()).items()
 }
-CASES = [(scenario, *change) for scenario, changes in CHANGES.items() for change in changes]
+CASES = [
+    pytest.param(scenario, *change, id=f"{scenario}:{change[0]}", marks=[pytest.mark.long] if number else [])
+    for scenario, changes in CHANGES.items()
+    for number, change in enumerate(changes)
+]
+"""The first way of each scenario; `make test-long` tries the others."""
 
 
 def test_every_shipped_scenario_is_in_the_table():
@@ -32,7 +37,7 @@ def test_every_shipped_scenario_is_in_the_table():
     assert shipped - {name for name in shipped if name.startswith("corner_cases/")} == set(CHANGES)
 
 
-@pytest.mark.parametrize(("scenario", "criterion", "changes"), CASES, ids=[f"{case[0]}:{case[1]}" for case in CASES])
+@pytest.mark.parametrize(("scenario", "criterion", "changes"), CASES)
 def test_a_broken_scenario_fails_for_the_stated_reason(scenario, criterion, changes, tmp_path):
     result = run(changed(scenario, changes), scenario, tmp_path)
     assert result.outcome is Outcome.FAILED
