@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -102,3 +103,9 @@ def test_check_determinism_compares_the_logs_of_two_runs(tmp_path):
     done = simscen("run", "scenarios/navigation/goal.scenario.yaml", "--check-determinism", "--out", out)
     assert done.returncode == 0, done.stdout + done.stderr
     assert len(list(out.rglob("run.mcap"))) == 2
+
+
+def test_the_page_of_shipped_scenarios_has_a_row_for_each():
+    page = (ROOT / "docs/reference/scenarios.md").read_text(encoding="utf-8")
+    shipped = {file.relative_to(ROOT).as_posix() for file in (ROOT / "scenarios").rglob("*.scenario.yaml")}
+    assert set(re.findall(r"\]\(\.\./\.\./(scenarios/\S+)\)", page)) == shipped
