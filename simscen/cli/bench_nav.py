@@ -33,6 +33,9 @@ def command(
         int | None, typer.Option(min=1, max=1000, help="Seeds of each scenario; default: 5 for BARN, else 20.")
     ] = None,
     fields: Annotated[int, typer.Option(min=0, max=10_000, help="How many obstacle fields to generate.")] = 100,
+    dynamic: Annotated[
+        int, typer.Option(min=0, max=10_000, help="How many fields of moving cylinders at each speed.")
+    ] = 20,
     lost: Annotated[int, typer.Option(min=0, max=10_000, help="How often the robot does not know where it is.")] = 50,
     workers: Annotated[int | None, typer.Option("--workers", "-j", min=1, max=256, help="Default: all cores.")] = None,
     out: Annotated[Path | None, typer.Option(help="Output folder, new or empty.")] = None,
@@ -40,14 +43,21 @@ def command(
 ) -> None:
     """Measure how well the reference stack drives, and print one line for each experiment.
 
-    BARN and fields like it, Nav2's own system test, corner cases and localisation, each over many seeds. What cannot
-    be found is skipped, which is said on standard error, as is every run that did not come out well, with the command
-    that repeats it. Exit code 0, or 3 when a run could not be completed.
+    BARN and fields like it, fields of moving cylinders, Nav2's own system test, corner cases and localisation, each
+    over many seeds. What cannot be found is skipped, which is said on standard error, as is every run that did not come
+    out well, with the command that repeats it. Exit code 0, or 3 when a run could not be completed.
     """
     from simscen.cli.bench_run import drive
     from simscen.cli.bench_table import as_json, as_text
     from simscen.run.outfolder import make_folder
-    from simscen.study.experiments import barn_challenge, corner_cases, generated_fields, localizations, sandbox
+    from simscen.study.experiments import (
+        barn_challenge,
+        corner_cases,
+        dynamic_fields,
+        generated_fields,
+        localizations,
+        sandbox,
+    )
 
     folder = make_folder(out)
     made = folder / "generated"
@@ -55,6 +65,7 @@ def command(
     offers: dict[str, tuple[Path, Callable[[], list[Experiment]]]] = {
         "BARN": (barn, lambda: [barn_challenge(made, barn, range(1, (seeds or 5) + 1))]),
         "generated fields": (folder, lambda: [generated_fields(made, fields)] if fields else []),
+        "dynamic fields": (folder, lambda: dynamic_fields(made, dynamic) if dynamic else []),
         "tb3_sandbox": (nav2, lambda: sandbox(made, nav2, many)),
         "corner cases": (project / "scenarios", lambda: corner_cases(project / "scenarios", project, many)),
         "localization": (project / "worlds", lambda: localizations(made, project / "worlds", many, lost)),

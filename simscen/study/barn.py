@@ -9,13 +9,17 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from simscen.core.geometry import Pose2
+
 TIME_LIMIT = 100.0
 DWA = {"success": 0.850, "collisions": 0.056, "timeouts": 0.094, "score": 0.159}
 """Published for the dynamic window approach at 0.5 m/s in 50 worlds, 10 runs each."""
 
+START, GOAL = Pose2(-2.25, 3.0, 1.57), Pose2(-2.25, 13.0, 1.57)
+
 SETUP = """\
 map: none
-robot: {model: jackal, pose: {x: -2.25, y: 3.0, yaw: 1.57}}
+robot: {model: jackal, pose: <start>}
 stack:
   # As the Jackal's own robot_localization: wheels for the way, the gyroscope for turns, of which skidding wheels know
   # little.
@@ -24,7 +28,7 @@ stack:
   # Nav2's 0.9 m is for 0.5 m/s; at 2 m/s this bend is 2 m/s² sideways.
   controller: {desired_linear_vel: 2 m/s, regulated_linear_scaling_min_radius: 2 m}
 goals:
-  - {name: beyond, pose: {x: -2.25, y: 13.0, yaw: 1.57}, xy_tolerance: 0.5 m, yaw_tolerance: 180 deg}
+  - {name: beyond, pose: <goal>, xy_tolerance: 0.5 m, yaw_tolerance: 180 deg}
 time_limit: 100 s
 linger: 0
 events:
@@ -33,7 +37,7 @@ pass:
   - goals_reached: {tolerance: 1 m}
   - collisions: {max: 0}
 """
-"""All of a scenario but its world; the same for the challenge's worlds and for generated ones."""
+"""All of a scenario but its world and where it is driven; the same for the worlds of the challenge and of others."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +62,11 @@ def _listed(folder: Path, rows: Iterable[dict[str, str]]) -> Iterable[BarnWorld]
             raise ValueError(f"{folder / 'scenarios.csv'}: no column {error}") from error
 
 
-def scenario(name: str, world: str) -> str:
+def scenario(name: str, world: str, start: Pose2 = START, goal: Pose2 = GOAL) -> str:
     """The text of a scenario; `world` is what stands after `world:`."""
-    return f"simscen: 1\nname: {name}\nworld: {world}\n{SETUP}"
+    setup = SETUP.replace("<start>", _pose(start)).replace("<goal>", _pose(goal))
+    return f"simscen: 1\nname: {name}\nworld: {world}\n{setup}"
+
+
+def _pose(pose: Pose2) -> str:
+    return f"{{x: {pose.x}, y: {pose.y}, yaw: {pose.yaw}}}"

@@ -12,6 +12,7 @@ import numpy as np
 
 from simscen.core.chance import Streams
 from simscen.study import barn, localization, nav2_sandbox
+from simscen.study import dynamic_fields as movers
 from simscen.study.obstacle_fields import CELL, HEIGHT, ObstacleField, obstacle_field
 
 
@@ -58,6 +59,21 @@ def generated_fields(folder: Path, count: int) -> Experiment:
         file = _written(folder / f"fields/field_{number}.scenario.yaml", text)
         drives.append(Drive(file, [number], field.shortest))
     return Experiment("generated fields", tuple(drives), folder)
+
+
+def dynamic_fields(folder: Path, count: int) -> list[Experiment]:
+    """Fields of moving cylinders, an experiment for each mean speed; one seed each."""
+    experiments = []
+    for speed in movers.SPEEDS:
+        drives = []
+        for number in range(1, count + 1):
+            stem = f"dynamic/field_{number}_at_{speed:.2f}"
+            world = _written(folder / f"{stem}.world.yaml", _moving_world_text(movers.dynamic_field(number, speed)))
+            text = barn.scenario(f"dynamic field {number}", world.name, movers.START, movers.GOAL)
+            length = movers.START.distance(movers.GOAL)
+            drives.append(Drive(_written(folder / f"{stem}.scenario.yaml", text), [number], length))
+        experiments.append(Experiment(f"dynamic fields, {speed:.2f} m/s", tuple(drives), folder))
+    return experiments
 
 
 def sandbox(folder: Path, nav2: Path, seeds: Sequence[int]) -> list[Experiment]:
@@ -116,3 +132,19 @@ def _world_text(field: ObstacleField) -> str:
         for x, y in field.centres.tolist()
     )
     return f"simscen: 1\nname: field {field.number}\nobstacles:\n{pillars}\n"
+
+
+def _moving_world_text(field: movers.DynamicField) -> str:
+    lines = []
+    for number, mover in enumerate(field.movers, start=1):
+        keyframes = ", ".join(
+            f"[{time:.3f}, {x:.3f}, {y:.3f}, 0]"
+            for time, (x, y) in zip(mover.times.tolist(), mover.points.tolist(), strict=True)
+        )
+        x, y = mover.points[0].tolist()
+        lines.append(
+            f"  - name: cylinder {number}\n    cylinder: [{movers.RADIUS:g}, {movers.HEIGHT:g}]\n"
+            f"    pose: {{x: {x:.3f}, y: {y:.3f}}}\n    move:\n      keyframes: [{keyframes}]\n"
+            f"      repeat: back_and_forth\n      ease: spline\n      phase: {mover.phase:.3f} s\n"
+        )
+    return f"simscen: 1\nname: dynamic field {field.number}\nobjects:\n{''.join(lines)}"

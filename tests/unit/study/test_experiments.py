@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from simscen.loading.scenario import load_scenario
-from simscen.study.experiments import Experiment, corner_cases, generated_fields, localizations, sandbox
+from simscen.study.experiments import Experiment, corner_cases, dynamic_fields, generated_fields, localizations, sandbox
 
 PROJECT = Path(__file__).parents[3]
 SANDBOX = PROJECT.parent / "shared" / "data" / "nav2_tb3_sandbox"
@@ -20,6 +20,17 @@ def test_generated_fields_load_and_carry_their_reference_length(tmp_path: Path) 
     fields = generated_fields(tmp_path, 1)
     loads(fields)
     assert (fields.drives[0].reference_length or 0.0) >= 10.0
+
+
+def test_dynamic_fields_load_at_three_speeds(tmp_path: Path) -> None:
+    experiments = dynamic_fields(tmp_path, 1)
+    assert [each.name for each in experiments] == [
+        "dynamic fields, 0.74 m/s",
+        "dynamic fields, 1.23 m/s",
+        "dynamic fields, 1.72 m/s",
+    ]
+    for each in experiments:
+        loads(each)
 
 
 def test_localization_loads_and_misleads_in_another_direction_each_time(tmp_path: Path) -> None:
