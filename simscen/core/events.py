@@ -38,6 +38,7 @@ class EventKind(str, Enum):
     ROBOT_PLACED = "robot.placed"  # x, y, yaw
     ROBOT_PUSHED = "robot.pushed"  # impulse (N s); seconds it is spread over, where it is no blow
     ZONE_SWITCHED = "zone.switched"  # region, or "" for a mask; filter (keepout, speed), enabled, speed_limit (m/s)
+    FLOOR_CHANGED = "floor.changed"  # region or patch; outline, friction, until (s; absent for good)
     MARK = "mark"  # the mark; note
     RUN_ENDED = "run.ended"  # why: navigation ended, time limit
 

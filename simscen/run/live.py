@@ -1,5 +1,6 @@
 """The running world as triggers see it and as actions change it."""
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 
@@ -258,6 +259,10 @@ class LiveStage:
     def lay(self, name: str, patch: Patch) -> None:
         """Make a piece of floor slippery, or dry again."""
         self._simulation.lay(name, patch)
+        outline: list[Value] = [[round(x, 3), round(y, 3)] for x, y in patch.outline]
+        about: dict[str, Value] = {"outline": outline, "friction": patch.friction}
+        about |= {} if math.isinf(patch.until) else {"until": patch.until / self.clock.rate}
+        self.tell(Event(0, EventKind.FLOOR_CHANGED, name, about))
 
     def send_goal(self, name: str) -> None:
         """Preempt with a new goal."""

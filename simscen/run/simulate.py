@@ -20,6 +20,8 @@ from simscen.loading.resolved import resolved_text
 from simscen.loading.scenario import load_scenario
 from simscen.record.header import CHOSEN, STACK_NAME, VARIATION, LogHeader
 from simscen.record.recorder import Recorder
+from simscen.record.sceneryfile import NAME as SCENERY
+from simscen.record.sceneryfile import scenery_to_json
 from simscen.record.tracebuilder import TraceBuilder
 from simscen.run.agent import Log
 from simscen.run.assemble import assemble
@@ -28,6 +30,7 @@ from simscen.run.external.stack import ExternalStack
 from simscen.run.faultymap import with_faulty_map
 from simscen.run.lockstep import Rig, run_lockstep
 from simscen.run.prepare import Prepared, prepare
+from simscen.run.scenery import scenery_of
 from simscen.run.sensornames import sensor_frames, sensor_kinds
 from simscen.sim.alone import NAMELESS
 from simscen.sim.urdf.describe import describe
@@ -156,6 +159,7 @@ def _judged(prepared: Prepared, seed: int, trace: Trace, log: Path | None) -> Ru
 def log_header(prepared: Prepared, seed: int) -> LogHeader:
     """What the log says about the run."""
     header, parts = _log_header(prepared, seed), prepared.robots.items()
+    header = replace(header, files={SCENERY: scenery_to_json(scenery_of(prepared))})
     return replace(header, robots={name: _log_header(part, seed) for name, part in parts}) if parts else header
 
 

@@ -1,0 +1,64 @@
+"""What there is to see in a prepared world, for logs and pictures."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from simscen.core.maskcells import cells_of
+from simscen.core.scenery import Cells, Floor, Ground, Scenery, Thing, Zone
+from simscen.core.shapes import Body, TriangleMesh
+from simscen.core.terrain import facing_up, normals, terrain
+from simscen.core.world import World
+from simscen.run.prepare import Prepared
+from simscen.sim.outline import convex_hull, footprint, parts
+from simscen.worlds.shortest import Z_RANGE
+
+MILLIMETRES = 3
+"""Decimals of what is drawn."""
+
+
+def scenery_of(prepared: Prepared) -> Scenery:
+    """All of it; of several robots the zones of each."""
+    world, each = prepared.built.world, prepared.each
+    reach = max((2 * wheel.radius for part in each.values() for wheel in part.body.wheels), default=0.0)
+    same = all(part.map is prepared.built.map for part in each.values())
+    return Scenery(
+        places=dict(world.places),
+        things=tuple(_thing(body, world) for body in world.bodies),
+        ground=tuple(_ground(prepared.built.mesh, reach)),
+        floors=tuple(Floor(name, world.regions[name], friction) for name, friction in world.friction.items()),
+        zones=tuple(zone for name, part in each.items() for zone in _zones(part, name)),
+        map=None if same else Cells.of(prepared.built.map),
+    )
+
+
+def _thing(body: Body, world: World) -> Thing:
+    outlines = parts(body.solids, Z_RANGE) or ([footprint(body.solids)] if body.solids else [])
+    rounded = tuple(tuple((round(x, MILLIMETRES), round(y, MILLIMETRES)) for x, y in outline) for outline in outlines)
+    closed, opened = world.doors.get(body.name, (None, None))
+    return Thing(body.name, body.pose.plane, rounded, closed, opened, body.mass)
+
+
+def _ground(mesh: TriangleMesh, reach: float) -> Iterator[Ground]:
+    """What of the static world wheels may roll on, which are `reach` metres tall at most."""
+    up, slopes = facing_up(mesh), normals(mesh)
+    for owner in sorted(terrain(mesh, reach)):
+        own = mesh.owners == owner
+        corners = mesh.vertices[mesh.faces[own]].reshape(-1, 3)
+        normal = max(slopes[own & up].tolist(), key=lambda one: -one[2])  # its steepest part
+        uphill = (round(-normal[0] / normal[2], MILLIMETRES) + 0.0, round(-normal[1] / normal[2], MILLIMETRES) + 0.0)
+        outline = convex_hull(np.round(corners[:, :2], MILLIMETRES))
+        yield Ground(mesh.names[owner], outline, round(float(corners[:, 2].max()), MILLIMETRES), uphill)
+
+
+def _zones(part: Prepared, robot: str) -> Iterator[Zone]:
+    """What its stack is told from the start."""
+    regions, masks = part.built.world.regions, part.masks
+    for region in part.stack.keepout:
+        yield Zone("keepout", region, regions[region], robot=robot)
+    for zone in part.stack.speed_zones:
+        yield Zone("speed", zone.region, regions[zone.region], zone.speed_limit, robot=robot)
+    if masks.keepout is not None:
+        yield Zone("keepout", cells=cells_of(masks.keepout), robot=robot)
+    if masks.speed is not None:
+        yield Zone("speed", cells=cells_of(masks.speed.grid), robot=robot)

@@ -1,0 +1,88 @@
+"""What a log says there was to see."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from simscen.core.events import EventKind
+from simscen.loading.scenario import load_scenario
+from simscen.record.replay import read_log
+from simscen.record.sceneryfile import NAME, scenery_of
+from simscen.run.prepare import prepare
+from simscen.run.scenery import scenery_of as scenery_in
+from simscen.run.simulate import simulate
+
+ROOT = Path(__file__).parents[3]
+
+
+def scenery(name):
+    file = ROOT / f"scenarios/{name}.scenario.yaml"
+    return scenery_in(prepare(load_scenario(file, ROOT)))
+
+
+def test_a_door_is_drawn_from_its_hinge_to_its_post_when_closed():
+    (door,) = [thing for thing in scenery("obstacles/door_closes").things if thing.name == "door meeting room"]
+    (panel,) = door.outlines
+    assert door.closed is not None and door.opened is not None
+    shut = door.closed.apply(np.array(panel))
+    assert (shut[:, 0].min(), shut[:, 0].max()) == pytest.approx((8.5, 9.5), abs=0.002)
+    assert door.pose == pytest.approx(door.opened)
+    assert (door.opened.x, door.opened.y) == (9.5, 4.1)
+
+
+def test_ramps_and_sills_and_wet_floors_are_told_with_how_high_they_are(tmp_path):
+    file = tmp_path / "dock.scenario.yaml"
+    file.write_text("""\
+simscen: 1
+world:
+  simscen: 1
+  obstacles:
+    - {name: sill, box: [0.1, 1, 0.01], pose: {x: 3, y: 2}}
+    - {name: pillar, box: [0.5, 0.5, 2], pose: {x: 3, y: 4}}
+  ramps: [{name: ramp, start: [4.8, 1], end: [3.3, 1], width: 2, height: 12 cm}]
+  regions: {bay: [[0, 0], [1, 0], [1, 1]]}
+  friction: {bay: 0.35}
+robot: {pose: {x: 1, y: 1}}
+goals: [{pose: {x: 2, y: 1}}]
+time_limit: 1 s
+pass: [{collisions: {max: 0}}]
+""")
+    found = scenery_in(prepare(load_scenario(file, tmp_path)))
+    assert [(one.name, one.height, one.uphill) for one in found.ground] == [
+        ("sill", 0.01, (0.0, 0.0)),
+        ("ramp", 0.12, (-0.08, 0.0)),
+    ]
+    assert sorted(found.ground[1].outline) == [(3.3, 0.0), (3.3, 2.0), (4.8, 0.0), (4.8, 2.0)]
+    assert [(floor.region, floor.friction) for floor in found.floors] == [("bay", 0.35)]
+
+
+def test_zones_are_those_of_the_stack():
+    assert [(zone.filter, zone.region) for zone in scenery("zones/closed_passage").zones] == [("keepout", "passage")]
+    assert [(z.region, z.speed_limit) for z in scenery("zones/quiet_ward").zones] == [("north_corridor", 0.25)]
+
+
+def test_a_log_carries_the_scenery_the_map_as_it_is_and_what_is_spilt(tmp_path):
+    file = tmp_path / "spilt.scenario.yaml"
+    file.write_text("""\
+simscen: 1
+world: {simscen: 1, walls: [{points: [[0, 0], [4, 0], [4, 3], [0, 3], [0, 0]]}], places: {dock: {x: 3, y: 1}}}
+map: none
+robot: {pose: {x: 1, y: 1}}
+goals: [{pose: {x: 1.2, y: 1}}]
+events:
+  - {when: {time: 0.5 s}, do: {friction: {at: [2, 2], radius: 0.4 m, value: 0.1, for: 2 s}}}
+time_limit: 1 s
+pass: [{collisions: {max: 0}}]
+""")
+    prepared = prepare(load_scenario(file, tmp_path))
+    simulate(prepared, log=tmp_path / "run.mcap")
+    log = read_log(tmp_path / "run.mcap")
+    found = scenery_of(log.about)
+    assert found == scenery_in(prepared)
+    assert found.map is not None and np.array_equal(found.map.grid.cells, prepared.built.map.cells)
+    assert found.places["dock"].x == 3
+    (spilt,) = log.trace.of_kind(EventKind.FLOOR_CHANGED)
+    assert (spilt.name, spilt.data["friction"], spilt.data["until"]) == ("patch", 0.1, 2.5)
+    assert len(spilt.data["outline"]) == 32
+    assert NAME in log.about.files
