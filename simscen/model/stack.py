@@ -29,6 +29,7 @@ from simscen.spec.quantities import (
     Speed,
 )
 
+Patience = Annotated[float, Field(ge=-1, le=86400), Quantity("duration")]
 Noise = Annotated[float, Field(ge=0, le=100)]
 Iterations = Annotated[int, Field(ge=1, le=1_000_000)]
 
@@ -502,7 +503,11 @@ class StackSpec(InProcessStack):
     """What finds a way."""
     controller: Controller = by_default()
     """What follows a path."""
+    failure_tolerance: Patience = 0.3
+    """How long the controller may find no valid command; then the goal's drive fails with PATIENCE_EXCEEDED. 0: at once,
+    with NO_VALID_CONTROL; -1: for ever."""
     goal_checker: GoalChecker = by_default()
+    """What says whether a goal is reached."""
     progress_checker: ProgressChecker = by_default()
     """What says that the robot does not get on."""
     recovery: Recovery = by_default()

@@ -87,6 +87,7 @@ def reference_stack(spec: model.StackSpec, setting: Setting) -> ReferenceStack:
         ProgressChecker(spec.progress_checker),
         costmap,
         setting.control_period,
+        spec.failure_tolerance,
         journal,
     )
     return ReferenceStack(

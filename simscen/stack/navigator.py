@@ -2,8 +2,10 @@
 
 Without errors one step is: check the goal, check the plan, ask the controller. When planning or control fails, first
 the costmap is cleared and the same is tried again (the per-context recovery of Nav2's tree); when it fails again, the
-next behaviour of the round robin is run. After `number_of_retries` behaviours the goal has failed with the code of
-the last failure. A goal outside the map or inside a mapped wall fails after the first retry: no recovery changes that.
+next behaviour of the round robin is run. A plan that is found makes good a failure to plan; control has one retry until
+the next recovery, for its action goes on until the goal. After `number_of_retries` behaviours the goal has failed with
+the code of the last failure. A goal outside the map or inside a mapped wall fails after the first retry: no recovery
+changes that.
 """
 
 from simscen.core.events import Event, EventKind, Value
@@ -16,9 +18,6 @@ from simscen.stack.progress_checker import ProgressChecker
 from simscen.stack.protocols import Behavior, Controller, GoalChecker, NavigationFailure, Planner
 from simscen.stack.recovery import RoundRobin
 from simscen.stack.replanning import PlanInForce
-
-FAILURE_TOLERANCE = 0.3
-"""nav2 controller_server: seconds a controller may fail before it counts."""
 
 
 class Navigator:
@@ -33,11 +32,13 @@ class Navigator:
         progress: ProgressChecker,
         costmap: Costmap,
         period: float,
+        failure_tolerance: float,
         journal: list[Event],
     ) -> None:
+        """`period` between two steps and `failure_tolerance` in seconds; -1 bears a failing controller for ever."""
         self._plans, self._controller, self._recovery = plans, controller, recovery
         self._goal_checker, self._progress, self._costmap = goal_checker, progress, costmap
-        self._period, self._events = period, journal
+        self._period, self._failure_tolerance, self._events = period, failure_tolerance, journal
         self._clock = 0.0
         self.goal: Goal | None = None
         self.via: tuple[Goal, ...] = ()
@@ -58,7 +59,7 @@ class Navigator:
         self._plans.reset(self._clock)
         self._behavior: Behavior | None = None
         self._behavior_since = 0.0
-        self._retried = False
+        self._replanned = self._controlled_again = False
         self._trouble_since: float | None = None
 
     def pursue(self, goal: Goal) -> None:
@@ -96,6 +97,7 @@ class Navigator:
 
     def _follow(self, tick: int, goal: Goal, pose: Pose2, twist: Twist, held: bool) -> Twist:
         self._plans.step(tick, self._clock, goal, pose, self.via)
+        self._replanned = False
         following = (*self.via, goal)[0]  # a tour may end where it begins: only the last drive to its end ends it
         command = self._controller.command(pose, twist, self._costmap.view, following)
         if held:
@@ -108,21 +110,25 @@ class Navigator:
     def _failed(self, tick: int, goal: Goal, pose: Pose2, failure: NavigationFailure) -> Twist:
         """Bear it a moment, clear and try again, recover, or give up: in this order."""
         planning = 200 <= failure.code < 300
-        if not planning and failure.code != ErrorCode.FAILED_TO_MAKE_PROGRESS and self._tolerable():
-            return STOP
         if planning:
             self._note(tick, EventKind.PLAN_FAILED, "", **_described(failure))
+            retry, self._replanned = not self._replanned, True
         else:
+            if failure.code != ErrorCode.FAILED_TO_MAKE_PROGRESS:
+                if self._tolerable():
+                    return STOP
+                failure = self._impatient(failure)
             self._plans.not_followed()
-        if not self._retried:
-            self._retried = True
+            retry, self._controlled_again = not self._controlled_again, True
+        if retry:
+            self._trouble_since = None
             self._costmap.clear()
             self._plans.drop("recovery")
             return STOP
         if self._hopeless(goal, failure):
             raise failure
         self._plans.drop("recovery")
-        self._retried, self._trouble_since = False, None
+        self._replanned, self._controlled_again, self._trouble_since = False, False, None
         self._behavior = self._recovery.next()
         if self._behavior is None:
             raise failure
@@ -134,7 +140,14 @@ class Navigator:
     def _tolerable(self) -> bool:
         if self._trouble_since is None:
             self._trouble_since = self._clock
-        return self._clock - self._trouble_since < FAILURE_TOLERANCE
+        patience = self._failure_tolerance
+        return patience < 0.0 or self._clock - self._trouble_since < patience
+
+    def _impatient(self, failure: NavigationFailure) -> NavigationFailure:
+        """What nav2's controller server makes of a controller that has failed for too long."""
+        if self._failure_tolerance <= 0.0 or failure.code != ErrorCode.NO_VALID_CONTROL:
+            return failure
+        return NavigationFailure(ErrorCode.PATIENCE_EXCEEDED, f"for {self._failure_tolerance:g} s: {failure}")
 
     def _hopeless(self, goal: Goal, failure: NavigationFailure) -> bool:
         if failure.code == ErrorCode.GOAL_OUTSIDE_MAP:

@@ -64,13 +64,18 @@ class BackUp:
         self._from = pose
 
     def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:
-        """Back on; None when far enough. Raises BACKUP_COLLISION_AHEAD when there is not even a cell of room."""
+        """Back on; None when far enough.
+
+        Raises BACKUP_COLLISION_AHEAD when there is not even a cell of room, BACKUP_TIMEOUT, BACKUP_INVALID_INPUT.
+        """
         left = self._spec.backup_dist - self._from.distance(pose)
         speed = min(self._spec.backup_speed, self._robot.max_reverse)
         if left <= 0.0:
             return None
-        if seconds > TIME_ALLOWANCE or speed <= 0.0:
-            raise NavigationFailure(ErrorCode.BACKUP_COLLISION_AHEAD, "backing up did not move the robot")
+        if speed <= 0.0:
+            raise NavigationFailure(ErrorCode.BACKUP_INVALID_INPUT, "the robot cannot drive backward")
+        if seconds > TIME_ALLOWANCE:
+            raise NavigationFailure(ErrorCode.BACKUP_TIMEOUT, "backing up took too long")
         command = Twist(-speed, 0.0, 0.0)
         horizon = min(self._spec.simulate_ahead_time, left / speed)
         free = time_free(self._footprint, costmap, pose, command, horizon)

@@ -6,9 +6,9 @@ import pytest
 
 from simscen.core.geometry import Pose2
 from simscen.core.motion import STOP, Twist
-from simscen.core.navigation import Goal
+from simscen.core.navigation import ErrorCode, Goal, Path
 from simscen.model.stack import Costmap, GroundTruth, OmplPlanner, ProgressChecker, Recovery, StackSpec
-from simscen.stack.protocols import RobotModel
+from simscen.stack.protocols import NavigationFailure, RobotModel
 from simscen.testing.flatland import Drive, Flatland, box_robot, drive, round_robot
 
 TRUTH = GroundTruth(type="ground_truth")
@@ -112,7 +112,7 @@ def test_a_goal_occupied_by_something_that_is_not_on_the_map_fails_after_recover
     world.discs.append((9.0, 1.0, 0.1))
     d = start(world, grid=rooms()).run(90)
     # Which of them depends on how much of the thing it has seen when the retries end.
-    assert codes(d)[0] in ("GOAL_OCCUPIED", "NO_VALID_PATH", "NO_VALID_CONTROL")
+    assert codes(d)[0] in ("GOAL_OCCUPIED", "NO_VALID_PATH", "PATIENCE_EXCEEDED")
     assert d.kinds("recovery.started")
     assert d.least > 0.02
 
@@ -138,6 +138,69 @@ def test_a_robot_that_does_not_move_is_found_out() -> None:
     d._move = lambda *_: None
     d.run(60)
     assert codes(d) == ["FAILED_TO_MAKE_PROGRESS"]
+
+
+def test_a_plan_that_fails_now_and_then_is_made_anew_each_time_without_a_recovery() -> None:
+    """Nav2's RecoveryNode counts its retries from the last success on."""
+    d = start(rooms(), spec=StackSpec(localizer=TRUTH, planner=OmplPlanner(replanning="rate", replanning_rate=1.0)))
+    planner, calls = d.stack.inner._navigator.planner, []
+    plan = planner.plan
+
+    def flaky(*asked: object) -> Path:
+        calls.append(asked)
+        if len(calls) in (1, 3, 6):
+            raise NavigationFailure(ErrorCode.NO_VALID_PATH, "for once")
+        return plan(*asked)
+
+    planner.plan = flaky
+    d.run(60)
+    assert codes(d, "plan.failed") == ["NO_VALID_PATH"] * 3
+    assert not d.kinds("recovery.started")
+    assert d.result == "SUCCEEDED"
+
+
+def test_a_plan_that_fails_twice_in_a_row_leads_to_a_recovery() -> None:
+    d = start(rooms())
+    planner, calls = d.stack.inner._navigator.planner, []
+    plan = planner.plan
+
+    def flaky(*asked: object) -> Path:
+        calls.append(asked)
+        if len(calls) <= 2:
+            raise NavigationFailure(ErrorCode.NO_VALID_PATH, "twice")
+        return plan(*asked)
+
+    planner.plan = flaky
+    d.run(60)
+    assert [e.name for e in d.kinds("recovery.started")] == ["clear_costmap"]
+    assert d.result == "SUCCEEDED"
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "code", "seconds"),
+    [(0.3, "PATIENCE_EXCEEDED", 0.6), (1.0, "PATIENCE_EXCEEDED", 2.0), (0.0, "NO_VALID_CONTROL", 0.0)],
+)
+def test_a_controller_that_finds_no_command_fails_as_in_nav2s_controller_server(
+    tolerance: float, code: str, seconds: float
+) -> None:
+    spec = StackSpec(localizer=TRUTH, failure_tolerance=tolerance, recovery=Recovery(number_of_retries=0))
+    d = start(rooms(), spec=spec)
+    d.stack.inner._navigator._controller.command = no_command
+    d.run(10)
+    assert codes(d) == [code]
+    assert d.tick / 240 == pytest.approx(seconds, abs=0.3)  # its patience twice: once more after clearing
+
+
+def test_a_patience_of_minus_one_never_ends() -> None:
+    d = start(rooms(), spec=StackSpec(localizer=TRUTH, failure_tolerance=-1.0, recovery=Recovery(number_of_retries=0)))
+    d.stack.inner._navigator._controller.command = no_command
+    d.run(5)
+    assert not codes(d)
+    assert set(d.commands) == {STOP}
+
+
+def no_command(*_: object) -> Twist:
+    raise NavigationFailure(ErrorCode.NO_VALID_CONTROL, "nothing is free")
 
 
 def test_after_a_failed_goal_it_stops_or_goes_on_as_told() -> None:

@@ -74,6 +74,21 @@ def test_backup_fails_where_there_is_something_behind() -> None:
     assert failed.value.code == ErrorCode.BACKUP_COLLISION_AHEAD
 
 
+def test_backing_up_that_does_not_move_the_robot_times_out() -> None:
+    behavior = BackUp(model.BackUp(), setting(ROUND))
+    behavior.start(Pose2(0, 0))
+    with pytest.raises(NavigationFailure) as failed:
+        behavior.step(Pose2(0, 0), view_of(ROUND), 10.1)
+    assert failed.value.code == ErrorCode.BACKUP_TIMEOUT
+
+
+def test_a_robot_without_a_reverse_gear_cannot_be_told_to_back_up() -> None:
+    robot = replace(ROUND, max_reverse=0.0)
+    with pytest.raises(NavigationFailure) as failed:
+        run(BackUp(model.BackUp(), setting(robot)), view_of(robot))
+    assert failed.value.code == ErrorCode.BACKUP_INVALID_INPUT
+
+
 def test_backup_uses_what_room_there_is() -> None:
     pose, _, _ = run(BackUp(model.BackUp(), setting(ROUND)), view_of(ROUND, (-0.6, -1.0, -0.4, 1.0)))
     assert -0.2 < pose.x < -0.05
