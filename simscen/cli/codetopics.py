@@ -13,7 +13,7 @@ NAV2 = {
     ErrorCode.INVALID_PATH: "The controller was given a path that it cannot follow, an empty one for example.",
     ErrorCode.PATIENCE_EXCEEDED: "The controller found no valid command for longer than `failure_tolerance`.",
     ErrorCode.FAILED_TO_MAKE_PROGRESS: "The robot moved less than `progress_checker` asks for in the time it allows.",
-    ErrorCode.NO_VALID_CONTROL: "The controller found no valid command: all would lead into an obstacle; with `failure_tolerance: 0` only.",
+    ErrorCode.NO_VALID_CONTROL: "All that the controller tried leads into an obstacle, and `failure_tolerance` is 0.",
     ErrorCode.CONTROLLER_TIMED_OUT: "The controller took too long for a command.",
     ErrorCode.PLANNER_UNKNOWN: "The planner failed for a reason that it does not tell.",
     ErrorCode.START_OUTSIDE_MAP: "The robot believes to be outside of its map.",

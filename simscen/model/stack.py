@@ -504,8 +504,8 @@ class StackSpec(InProcessStack):
     controller: Controller = by_default()
     """What follows a path."""
     failure_tolerance: Patience = 0.3
-    """How long the controller may find no valid command; then the goal's drive fails with PATIENCE_EXCEEDED. 0: at once,
-    with NO_VALID_CONTROL; -1: for ever."""
+    """How long the controller may find no valid command until that is PATIENCE_EXCEEDED; at 0 it is NO_VALID_CONTROL at
+    once, with -1 it never fails."""
     goal_checker: GoalChecker = by_default()
     """What says whether a goal is reached."""
     progress_checker: ProgressChecker = by_default()
