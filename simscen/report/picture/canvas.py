@@ -9,9 +9,9 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from simscen.core.geometry import Array
+from simscen.report.picture.palette import Colour
 from simscen.report.text import one_line
 
-Colour = tuple[int, int, int]
 Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
 Bounds = tuple[float, float, float, float]
 

@@ -1,38 +1,77 @@
-"""Colours of a picture of a run. Distinct in grey and for the colour-blind: the path by lightness, failure by shape."""
+"""The colours of pictures and pages: told apart in grey and by the colour-blind, and never by colour alone.
 
-import numpy as np
+Hues are those of Okabe and Ito (2008), darkened until text in them has a contrast of 4.5 to 1 on white: good is a
+bluish green, bad vermilion, odd amber, which differ in blue and lightness as well. On the way of a robot time goes from
+dark blue to light orange. What failed has a cross beside its colour, what passed a tick.
+"""
 
 from simscen.core.result import Outcome
 from simscen.core.verdict import Status
-from simscen.report.picture.canvas import Colour
+
+Colour = tuple[int, int, int]
 
 PAGE: Colour = (255, 255, 255)
-FREE: Colour = (250, 249, 246)
+FREE: Colour = (252, 251, 249)
 UNKNOWN: Colour = (226, 223, 216)
 WALL: Colour = (58, 63, 71)
 INK: Colour = (38, 42, 48)
-FAINT_INK: Colour = (121, 126, 134)
+FAINT_INK: Colour = (98, 103, 111)
 RULE: Colour = (222, 224, 227)
+GRID: Colour = (233, 232, 228)
 BELIEF: Colour = (20, 20, 24)
 PLAN: Colour = (176, 203, 232)
-PLACE: Colour = (150, 154, 162)
-GOAL: Colour = (26, 110, 62)
+PLACE: Colour = (112, 116, 124)
 START: Colour = (96, 102, 110)
 ROBOT: Colour = (30, 34, 40)
-OBJECT: Colour = (20, 130, 150)
-RED: Colour = (200, 30, 40)
-AMBER: Colour = (190, 120, 0)
-GREEN: Colour = (28, 128, 66)
-GREY: Colour = (110, 115, 122)
+OBJECT: Colour = (0, 105, 148)
+PERSON: Colour = (122, 62, 130)
+GROUND: Colour = (196, 176, 140)
+SLIPPERY: Colour = (60, 140, 190)
+RED: Colour = (194, 48, 16)
+AMBER: Colour = (150, 98, 0)
+GREEN: Colour = (0, 113, 86)
+GREY: Colour = (98, 103, 111)
+GOAL = GREEN
+ROBOTS: tuple[Colour, ...] = ((30, 34, 40), (0, 113, 86), (122, 62, 130), (150, 98, 0), (0, 105, 148))
+"""The rims of the ways of several robots, in the order of their names."""
 
-OUTCOMES = {Outcome.PASSED: GREEN, Outcome.FAILED: RED, Outcome.ERROR: AMBER, Outcome.FAILED_AS_EXPECTED: AMBER}
+OUTCOMES = {
+    Outcome.PASSED: GREEN,
+    Outcome.FAILED: RED,
+    Outcome.ERROR: AMBER,
+    Outcome.FAILED_AS_EXPECTED: GREY,
+    Outcome.SKIPPED: GREY,
+}
 STATUSES = {Status.PASS: GREEN, Status.FAIL: RED, Status.INCONCLUSIVE: AMBER, Status.ERROR: AMBER}
+SIGNS = {Status.PASS: "✓", Status.FAIL: "✗", Status.INCONCLUSIVE: "?", Status.ERROR: "!"}
 
-_STOPS = np.array([(40, 60, 160), (110, 40, 170), (185, 40, 130), (225, 85, 75), (240, 150, 30)], dtype=np.float64)
+_STOPS = ((40, 60, 160), (110, 40, 170), (185, 40, 130), (225, 85, 75), (240, 150, 30))
 
 
 def ramp(share: float) -> Colour:
     """The colour of a share 0 … 1 of the run's time, from deep blue over purple to orange."""
     at = min(max(share, 0.0), 1.0) * (len(_STOPS) - 1)
-    r, g, b = (np.interp(at, np.arange(len(_STOPS)), _STOPS[:, channel]) for channel in range(3))
-    return round(float(r)), round(float(g)), round(float(b))
+    low = min(int(at), len(_STOPS) - 2)
+    r, g, b = (round(a + (at - low) * (z - a)) for a, z in zip(_STOPS[low], _STOPS[low + 1], strict=True))
+    return r, g, b
+
+
+LIGHT = {
+    "page": "#ffffff", "panel": "#f5f6f7", "rule": "#dcdfe3", "ink": "#262a30", "quiet": "#5c626b",
+    "good": "#00624b", "bad": "#b02a0c", "odd": "#7d5200", "link": "#00568c", "focus": "#00568c",
+}  # fmt: skip
+DARK = {
+    "page": "#15181c", "panel": "#1e2329", "rule": "#363d46", "ink": "#e7eaee", "quiet": "#a3abb6",
+    "good": "#4fc9a2", "bad": "#ff8a66", "odd": "#e9b44c", "link": "#7cc4f5", "focus": "#7cc4f5",
+}  # fmt: skip
+"""The pages' own, for light and dark surroundings; each of the texts has 4.5 to 1 on `page` and on `panel`."""
+
+
+def variables() -> str:
+    """Both themes as variables of CSS (`--good`, …), dark where the reader's system is."""
+    light, dark = ("".join(f"--{name}:{value};" for name, value in theme.items()) for theme in (LIGHT, DARK))
+    return (
+        f":root{{color-scheme:light dark;{light}}}\n@media (prefers-color-scheme:dark){{:root{{{dark}}}}}\n"
+        f':root[data-theme="light"]{{color-scheme:light;{light}}}\n'
+        f':root[data-theme="dark"]{{color-scheme:dark;{dark}}}\n'
+    )

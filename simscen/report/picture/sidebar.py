@@ -8,8 +8,9 @@ from PIL import Image, ImageDraw
 from simscen.core.verdict import Status
 from simscen.judge.wording import comparison, subject
 from simscen.report.picture import palette
-from simscen.report.picture.canvas import Colour, Note, font, shown, write
+from simscen.report.picture.canvas import Note, font, shown, write
 from simscen.report.picture.marks import round_step
+from simscen.report.picture.palette import Colour
 from simscen.report.picture.scene import Scene
 
 WIDTH = 340

@@ -1,0 +1,54 @@
+"""Colours that can be read and told apart."""
+
+import pytest
+
+from simscen.report.picture import palette
+
+TEXTS = ("ink", "quiet", "good", "bad", "odd", "link")
+
+
+def luminance(colour):
+    """Relative luminance as WCAG 2.1 defines it."""
+    parts = [part / 255 for part in colour]
+    r, g, b = (part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts)
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b
+
+
+def contrast(one, other):
+    """From 1 to 21."""
+    low, high = sorted((luminance(one), luminance(other)))
+    return (high + 0.05) / (low + 0.05)
+
+
+def rgb(text):
+    """Of #rrggbb."""
+    return tuple(int(text[k : k + 2], 16) for k in (1, 3, 5))
+
+
+def deuteranope(colour):
+    """What somebody sees who lacks the green cones (Viénot, Brettel and Mollon 1999, in linear light)."""
+    r, g, b = ((part / 255) ** 2.2 for part in colour)
+    seen = (0.2928 * r + 0.7072 * g, 0.2928 * r + 0.7072 * g, -0.0223 * r + 0.0223 * g + b)
+    return [max(0.0, part) ** (1 / 2.2) * 255 for part in seen]
+
+
+@pytest.mark.parametrize("theme", [palette.LIGHT, palette.DARK])
+@pytest.mark.parametrize("text", TEXTS)
+def test_every_text_of_a_page_can_be_read_on_it(theme, text):
+    for ground in ("page", "panel"):
+        assert contrast(rgb(theme[text]), rgb(theme[ground])) >= 4.5
+
+
+@pytest.mark.parametrize("colour", [palette.RED, palette.AMBER, palette.GREEN, palette.OBJECT, palette.PERSON])
+def test_every_text_of_a_picture_can_be_read_on_it(colour):
+    assert contrast(colour, palette.PAGE) >= 4.5
+
+
+def test_good_and_bad_differ_for_who_does_not_see_green():
+    apart = sum((a - b) ** 2 for a, b in zip(deuteranope(palette.GREEN), deuteranope(palette.RED), strict=True)) ** 0.5
+    assert apart > 60
+
+
+def test_the_colours_of_time_grow_lighter():
+    steps = [luminance(palette.ramp(k / 8)) for k in range(9)]
+    assert steps == sorted(steps)
