@@ -145,7 +145,7 @@ Localizer = Annotated[LocalizerSpec, ByType("localizer", _Localizers)]
 
 
 class Costmap(Ranged):
-    """nav2_costmap_2d: static, obstacle and inflation layers."""
+    """The global costmap (nav2_costmap_2d: static, obstacle and inflation layers), in the map frame, for plans."""
 
     resolution: PositiveLength = 0.05
     """Edge of the largest cell: those of a coarser map are split, those of a finer one stay as they are."""
@@ -167,6 +167,39 @@ class Costmap(Ranged):
     """Taken from files of Nav2; means nothing here."""
     rolling_size: PositiveLength = 24.0
     """Edge of the rolling window when driving without a map."""
+
+
+class LocalCostmap(Spec):
+    """The local costmap, which rolls with the robot in the odom frame, for controllers and behaviours.
+
+    It shows what the sensors see and keepout zones, and no map. What is not said here is as in `costmap`.
+    """
+
+    width: PositiveLength | None = None
+    """Along x of the odom frame; default: what the controller looks ahead at full speed, at least 3 m."""
+    height: PositiveLength | None = None
+    """Along y of the odom frame; default: as for the width."""
+    resolution: PositiveLength | None = None
+    """Edge of a cell."""
+    inflation_radius: NonNegativeLength | None = None
+    """How far around obstacles cells cost something."""
+    cost_scaling_factor: Annotated[float, Field(gt=0, le=100)] | None = None
+    """How fast cost falls with the distance to an obstacle, for each metre."""
+    update_frequency: Frequency | None = None
+    """How often what the sensors see is taken in."""
+    obstacle_max_range: PositiveLength | None = None
+    """What is seen further off is not marked."""
+    obstacle_min_range: NonNegativeLength | None = None
+    """What is seen nearer is not marked."""
+    raytrace_max_range: PositiveLength | None = None
+    """Beams clear cells up to this distance."""
+    raytrace_min_range: NonNegativeLength | None = None
+    """Beams clear cells from this distance on."""
+
+    def completed(self, shared: Costmap) -> Costmap:
+        """The costmap with what it does not say itself from `shared`."""
+        own = {name: value for name in sorted(Costmap.model_fields) if (value := getattr(self, name, None)) is not None}
+        return shared.model_copy(update=own)
 
 
 class PlannerSpec(Typed):
@@ -200,6 +233,11 @@ Planner = Annotated[PlannerSpec, ByType("planner", OmplPlanner)]
 
 class ControllerSpec(Typed):
     """What follows a path."""
+
+    @property
+    def looks_ahead(self) -> float:
+        """Seconds for which it follows what it may command: the local costmap reaches so far."""
+        return 2.0
 
 
 class RegulatedPurePursuit(Ranged, ControllerSpec):
@@ -250,6 +288,11 @@ class RegulatedPurePursuit(Ranged, ControllerSpec):
     allow_reversing: bool = False
     """Taken from files of Nav2; means nothing here."""
 
+    @property
+    def looks_ahead(self) -> float:
+        """The time to collision that it keeps."""
+        return self.max_allowed_time_to_collision_up_to_carrot
+
 
 class DynamicWindow(ControllerSpec):
     """A dynamic-window controller with DWB's critics (Fox et al. 1997; nav2_dwb_controller)."""
@@ -285,6 +328,11 @@ class DynamicWindow(ControllerSpec):
     forward_point_distance: NonNegativeLength = 0.1
     """How far ahead of its middle its front is."""
 
+    @property
+    def looks_ahead(self) -> float:
+        """As far as its trajectories."""
+        return self.sim_time
+
 
 class Mppi(ControllerSpec):
     """Model predictive path integral control (Williams et al. 2017; nav2_mppi_controller)."""
@@ -311,6 +359,11 @@ class Mppi(ControllerSpec):
     """How evenly samples are weighted: the lower, the more the best one counts."""
     gamma: Annotated[float, Field(ge=0, le=10)] = 0.015
     """Weight of staying near the last command, against the costs of a sample."""
+
+    @property
+    def looks_ahead(self) -> float:
+        """As far as its samples."""
+        return self.time_steps * self.model_dt
 
 
 _Controllers = Annotated[
@@ -498,7 +551,9 @@ class StackSpec(InProcessStack):
     localizer: Localizer = by_default()
     """What knows where the robot is."""
     costmap: Costmap = by_default()
-    """What the robot knows of the ground around it."""
+    """What the robot knows of the ground, for plans; the local costmap takes from it what it does not say itself."""
+    local_costmap: LocalCostmap = by_default()
+    """What the robot sees around it, for driving."""
     planner: Planner = by_default()
     """What finds a way."""
     controller: Controller = by_default()

@@ -1,6 +1,5 @@
 """From a specification to a stack."""
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -10,7 +9,7 @@ from simscen.core.goalnames import Mode
 from simscen.core.time import Clock
 from simscen.model import stack as model
 from simscen.stack.collision_monitor import CollisionMonitor
-from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.installed.behavior import InstalledBehavior
 from simscen.stack.installed.controller import InstalledController
 from simscen.stack.installed.goal_checker import InstalledGoalChecker
@@ -60,20 +59,20 @@ def reference_stack(spec: model.StackSpec, setting: Setting) -> ReferenceStack:
         surroundings = replace(surroundings, map=surroundings.map.refined(spec.costmap.resolution))
     robot, period = surroundings.robot, clock.period(spec.controller_frequency)
     journal: list[Event] = []
-    costmap = Costmap(spec.costmap, surroundings)
-    shared = replace(
+    driving = replace(
         setting,
         surroundings=surroundings,
-        name="planner",
-        resolution=costmap.view.resolution,
-        clear_costmap=costmap.clear,
+        name="controller",
+        resolution=spec.local_costmap.completed(spec.costmap).resolution,
     )
-    controller = InstalledController(spec.controller, shared.named("controller"))
+    controller = InstalledController(spec.controller, driving)
+    costmaps = Costmaps(spec, surroundings, controller.full_speed * spec.controller.looks_ahead)
+    driving = replace(driving, clear_costmap=costmaps.clear)
+    planning = replace(driving, name="planner", resolution=costmaps.wide.view.resolution)
     plans = PlanKeeper(
         spec.planner,
-        InstalledPlanner(spec.planner, shared),
-        controller,
-        costmap,
+        InstalledPlanner(spec.planner, planning),
+        costmaps.wide,
         lambda number: streams.integer(f"planner#{number}"),
         robot.inscribed_radius,
         journal,
@@ -82,25 +81,24 @@ def reference_stack(spec: model.StackSpec, setting: Setting) -> ReferenceStack:
     navigator = Navigator(
         plans,
         controller,
-        RoundRobin(_behaviors(spec.recovery, shared), spec.recovery.number_of_retries),
-        InstalledGoalChecker(spec.goal_checker, shared.named("goal_checker")),
+        RoundRobin(_behaviors(spec.recovery, driving), spec.recovery.number_of_retries),
+        InstalledGoalChecker(spec.goal_checker, driving.named("goal_checker")),
         ProgressChecker(spec.progress_checker),
-        costmap,
+        costmaps,
         setting.control_period,
         spec.failure_tolerance,
         journal,
     )
     return ReferenceStack(
         surroundings,
-        setting.heard(InstalledLocalizer(spec.localizer, shared.named("localizer"))),
-        costmap,
+        setting.heard(InstalledLocalizer(spec.localizer, driving.named("localizer"))),
+        costmaps,
         controller,
         navigator,
         Task(setting.stop_on_failure, journal, clock, setting.mode),
         VelocitySmoother(spec.velocity_smoother, robot, setting.control_period),
         CollisionMonitor(spec.collision_monitor, robot, surroundings.lidars, surroundings.tick_rate),
         period,
-        math.ceil(surroundings.tick_rate / spec.costmap.update_frequency),
         journal,
     )
 

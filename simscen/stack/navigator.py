@@ -8,11 +8,14 @@ the code of the last failure. A goal outside the map or inside a mapped wall fai
 changes that.
 """
 
+from dataclasses import replace
+
 from simscen.core.events import Event, EventKind, Value
-from simscen.core.geometry import Pose2
 from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import ErrorCode, Goal
-from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.costmap.costmaps import Costmaps
+from simscen.stack.frames import Frames
+from simscen.stack.local_path import LocalPath
 from simscen.stack.plan_keeper import PlanKeeper
 from simscen.stack.progress_checker import ProgressChecker
 from simscen.stack.protocols import Behavior, Controller, GoalChecker, NavigationFailure, Planner
@@ -21,7 +24,10 @@ from simscen.stack.replanning import PlanInForce
 
 
 class Navigator:
-    """One goal at a time; `step` is called at the controller's rate."""
+    """One goal at a time; `step` is called at the controller's rate.
+
+    Goals, plans and what is made of them are in the map frame; what drives the robot lives in the odom frame.
+    """
 
     def __init__(
         self,
@@ -30,14 +36,15 @@ class Navigator:
         recovery: RoundRobin,
         goal_checker: GoalChecker,
         progress: ProgressChecker,
-        costmap: Costmap,
+        costmaps: Costmaps,
         period: float,
         failure_tolerance: float,
         journal: list[Event],
     ) -> None:
         """`period` between two steps and `failure_tolerance` in seconds; -1 bears a failing controller for ever."""
         self._plans, self._controller, self._recovery = plans, controller, recovery
-        self._goal_checker, self._progress, self._costmap = goal_checker, progress, costmap
+        self._goal_checker, self._progress, self._costmaps = goal_checker, progress, costmaps
+        self._path = LocalPath(controller)
         self._period, self._failure_tolerance, self._events = period, failure_tolerance, journal
         self._clock = 0.0
         self.goal: Goal | None = None
@@ -75,7 +82,7 @@ class Navigator:
         self.goal, self.via = None, ()
         self._forget()
 
-    def step(self, tick: int, pose: Pose2, twist: Twist, held: bool = False) -> tuple[Twist, bool]:
+    def step(self, tick: int, frames: Frames, twist: Twist, held: bool = False) -> tuple[Twist, bool]:
         """The velocity wanted now, and whether the goal is reached. Raises NavigationFailure when it has failed.
 
         `held`: the collision monitor has kept the robot from driving for a while.
@@ -85,29 +92,32 @@ class Navigator:
             return STOP, False
         self._clock += self._period
         if self._behavior is not None:
-            return self._recover(tick, pose), False
-        if not self.via and self._goal_checker.reached(goal, pose, twist):
+            return self._recover(tick, frames), False
+        if not self.via and self._goal_checker.reached(goal, frames.pose, twist):
             return STOP, True
         try:
-            command = self._follow(tick, goal, pose, twist, held)
+            command = self._follow(tick, goal, frames, twist, held)
         except NavigationFailure as failure:
-            return self._failed(tick, goal, pose, failure), False
+            return self._failed(tick, goal, frames, failure), False
         self._trouble_since = None
         return command, False
 
-    def _follow(self, tick: int, goal: Goal, pose: Pose2, twist: Twist, held: bool) -> Twist:
-        self._plans.step(tick, self._clock, goal, pose, self.via)
+    def _follow(self, tick: int, goal: Goal, frames: Frames, twist: Twist, held: bool) -> Twist:
+        self._plans.step(tick, self._clock, goal, frames.pose, self.via)
         self._replanned = False
+        assert self._plans.plan is not None
+        self._path.tell(self._plans.plan, frames)
         following = (*self.via, goal)[0]  # a tour may end where it begins: only the last drive to its end ends it
-        command = self._controller.command(pose, twist, self._costmap.view, following)
+        local = replace(following, pose=frames.odom_from_map.compose(following.pose))
+        command = self._controller.command(frames.odometry, twist, self._costmaps.near.view, local)
         if held:
             raise NavigationFailure(ErrorCode.FAILED_TO_MAKE_PROGRESS, "the collision monitor holds the robot")
-        if self._progress.stuck(pose, self._clock):
+        if self._progress.stuck(frames.pose, self._clock):
             self._progress.reset()
             raise NavigationFailure(ErrorCode.FAILED_TO_MAKE_PROGRESS, "the robot does not get on")
         return command
 
-    def _failed(self, tick: int, goal: Goal, pose: Pose2, failure: NavigationFailure) -> Twist:
+    def _failed(self, tick: int, goal: Goal, frames: Frames, failure: NavigationFailure) -> Twist:
         """Bear it a moment, clear and try again, recover, or give up: in this order."""
         planning = 200 <= failure.code < 300
         if planning:
@@ -122,7 +132,7 @@ class Navigator:
             retry, self._controlled_again = not self._controlled_again, True
         if retry:
             self._trouble_since = None
-            self._costmap.clear()
+            self._costmaps.clear()
             self._plans.drop("recovery")
             return STOP
         if self._hopeless(goal, failure):
@@ -134,7 +144,7 @@ class Navigator:
             raise failure
         self._behavior_since = self._clock
         self._note(tick, EventKind.RECOVERY_STARTED, self._behavior.name, **_described(failure))
-        self._behavior.start(pose)
+        self._behavior.start(frames.odometry)
         return STOP
 
     def _tolerable(self) -> bool:
@@ -153,14 +163,14 @@ class Navigator:
         if failure.code == ErrorCode.GOAL_OUTSIDE_MAP:
             return True
         return failure.code == ErrorCode.GOAL_OCCUPIED and not all(
-            self._costmap.fits_static(each.pose, each.xy_tolerance) for each in (*self.via, goal)
+            self._costmaps.wide.fits_static(each.pose, each.xy_tolerance) for each in (*self.via, goal)
         )
 
-    def _recover(self, tick: int, pose: Pose2) -> Twist:
+    def _recover(self, tick: int, frames: Frames) -> Twist:
         behavior = self._behavior
         assert behavior is not None
         try:
-            command = behavior.step(pose, self._costmap.view, self._clock - self._behavior_since)
+            command = behavior.step(frames.odometry, self._costmaps.near.view, self._clock - self._behavior_since)
         except NavigationFailure as failure:
             self._note(tick, EventKind.RECOVERY_ENDED, behavior.name, outcome="failed", **_described(failure))
             command = None

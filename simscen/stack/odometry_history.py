@@ -15,6 +15,9 @@ class OdometryHistory:
         self._ticks: list[int] = []
         self._poses: list[Pose2] = []
 
+    def __bool__(self) -> bool:
+        return bool(self._poses)
+
     @property
     def now(self) -> Pose2:
         """The newest pose; the origin before there is any."""

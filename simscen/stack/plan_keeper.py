@@ -10,7 +10,7 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.navigation import ErrorCode, Goal, Path
 from simscen.model.stack import PlannerSpec
 from simscen.stack.costmap.costmap import Costmap
-from simscen.stack.protocols import Controller, CostmapView, NavigationFailure, Planner
+from simscen.stack.protocols import CostmapView, NavigationFailure, Planner
 from simscen.stack.replanning import PlanInForce
 
 TIGHT_PERIOD = 0.5
@@ -31,20 +31,19 @@ GONE = 8
 
 
 class PlanKeeper:
-    """Keeps the plan in force for one goal after another; `now` is the navigator's clock in seconds."""
+    """Keeps the plan in force for one goal after another, in the map frame; `now` is the navigator's clock in seconds."""
 
     def __init__(
         self,
         spec: PlannerSpec,
         planner: Planner,
-        controller: Controller,
         costmap: Costmap,
         plan_seed: Callable[[int], int],
         radius: float,
         journal: list[Event],
         steered: bool = False,
     ) -> None:
-        self._spec, self.planner, self._controller, self._costmap = spec, planner, controller, costmap
+        self._spec, self.planner, self._costmap = spec, planner, costmap
         self._plan_seed, self._radius, self._journal, self._steered = plan_seed, radius, journal, steered
         self._plans = 0
         self._via: tuple[Goal, ...] = ()
@@ -157,7 +156,6 @@ class PlanKeeper:
     def _adopt(self, tick: int, now: float, path: Path, reason: str) -> None:
         view = self._costmap.view
         self.plan = PlanInForce(path, self._radius, view)
-        self._controller.set_path(path)
         self._adopted = self._looked = now
         self._checked, self._most = view.revision, self._costmap.obstacle_cells
         made: dict[str, Value] = {"reason": reason, "length": round(path.length(), 6)}

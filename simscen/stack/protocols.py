@@ -104,7 +104,9 @@ LETHAL = 254
 
 @dataclass(frozen=True, eq=False)
 class CostmapView:
-    """A costmap at a moment, in the map frame.
+    """A costmap at a moment: the global one in the map frame, which planners see, or the local one in the odom frame.
+
+    Poses, paths and goals that come with it are in its frame.
 
     `costs` (height, width) uint8 with nav2_costmap_2d's values (0 free, 253 inscribed, 254 lethal, 255 unknown);
     row 0 is the lowest y, `origin` is the corner of cell (0, 0), without rotation. `distance` (height, width) float32
@@ -140,14 +142,17 @@ class Planner(Protocol):
 
 
 class Controller(Protocol):
-    """Follows a path.
+    """Follows a path. All that it is told is in the odom frame, in which the local costmap is: there nothing jumps.
 
     *Given* limits *then* no command exceeds them. *Given* an obstacle on the arc it is about to drive *then* fails
     with NO_VALID_CONTROL rather than drive into it.
     """
 
     def set_path(self, path: Path) -> None:
-        """Follow this path from now on."""
+        """Follow this path from now on.
+
+        It is a new one, or the rest of the one it follows, where the localizer has found that to be in the odom frame.
+        """
         ...
 
     @property
@@ -170,7 +175,7 @@ class Controller(Protocol):
 
 
 class Behavior(Protocol):
-    """A recovery behaviour such as spin: asked again and again until it is done."""
+    """A recovery behaviour such as spin: asked again and again until it is done. Its poses are in the odom frame."""
 
     name: str
 

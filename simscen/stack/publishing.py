@@ -4,6 +4,7 @@ import math
 
 from simscen.core.belief import Belief
 from simscen.core.navigation import Path
+from simscen.stack.frames import Frames, placed
 from simscen.stack.protocols import Controller, Localizer
 
 BELIEF_RATE, LOCAL_PLAN_RATE = 10.0, 5.0
@@ -35,9 +36,10 @@ class Publishing:
         self._plan = plan
         return plan
 
-    def local_plan(self, tick: int, driving: bool) -> Path | None:
-        """What the controller expects to drive, while there is a plan to follow."""
+    def local_plan(self, tick: int, driving: bool, frames: Frames) -> Path | None:
+        """What the controller expects to drive, in the map frame, while there is a plan to follow."""
         if not driving or tick - self._local_plan_told < self._local_plan_period:
             return None
         self._local_plan_told = tick
-        return self._controller.local_plan
+        plan = self._controller.local_plan
+        return None if plan is None else Path(placed(frames.map_from_odom, plan.points), plan.tick)

@@ -2,8 +2,6 @@
 
 from typing import Any
 
-import numpy as np
-
 from simscen.core.belief import Estimate
 from simscen.core.events import Event
 from simscen.core.motion import STOP, Twist
@@ -12,7 +10,8 @@ from simscen.core.sensing import Imu, Odometry, Readings, Scan
 from simscen.core.trace import Decision
 from simscen.core.zones import Zones
 from simscen.stack.collision_monitor import CollisionMonitor
-from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.costmap.costmaps import Costmaps
+from simscen.stack.frames import Frames
 from simscen.stack.localizers.ground_truth import TRUTH
 from simscen.stack.localizers.odometry_track import believable
 from simscen.stack.navigator import Navigator
@@ -37,28 +36,25 @@ class ReferenceStack:
         self,
         surroundings: Surroundings,
         localizer: Localizer,
-        costmap: Costmap,
+        costmaps: Costmaps,
         controller: Controller,
         navigator: Navigator,
         task: Task,
         smoother: VelocitySmoother,
         monitor: CollisionMonitor,
         control_period: int,
-        costmap_period: int,
         journal: list[Event],
     ) -> None:
         self._speed_filter = SpeedFilter(surroundings)
-        self._localizer, self._costmap, self._controller = localizer, costmap, controller
+        self._localizer, self._costmaps, self._controller = localizer, costmaps, controller
         self._navigator, self._task, self._smoother, self._monitor = navigator, task, smoother, monitor
         self._tick_rate, self._lidars = surroundings.tick_rate, frozenset(surroundings.lidars)
-        self._control_period, self._costmap_period = control_period, costmap_period
+        self._control_period = control_period
         self._publishing = Publishing(surroundings.tick_rate, localizer, controller)
         self._journal = journal
         self._tick = 0
         self._twist, self._command = STOP, STOP
         self._odometry, self._wheels = OdometryHistory(), False
-        self._scans: dict[str, Scan] = {}
-        self._mapped = -costmap_period
         self._zones: Zones | None = None
         self._free_at = 0
         self._nothing = Decision(STOP)
@@ -100,7 +96,7 @@ class ReferenceStack:
         """What is worth measuring: name → the component and its methods that take time."""
         return {
             "localizer": (self._localizer, "on_odometry", "on_imu", "on_scan"),
-            "costmap": (self._costmap, "update"),
+            "costmap": (self._costmaps, "update"),
             "planner": (self._navigator.planner, "plan"),
             "controller": (self._controller, "command", "set_path"),
             "collision monitor": (self._monitor, "allow", "on_scan"),
@@ -115,9 +111,9 @@ class ReferenceStack:
             return self._nothing
         local_plan = None
         if controls:
-            self._update_costmap(tick)
+            self._update_costmaps(tick)
             self._command = self._control(tick)
-            local_plan = self._publishing.local_plan(tick, self._navigator.plan is not None)
+            local_plan = self._publishing.local_plan(tick, self._navigator.plan is not None, self._frames)
         self._nothing = Decision(self._command)
         events, self._journal[:] = tuple(self._journal), []
         belief, plan = self._publishing.belief(tick, scanned), self._publishing.plan(self.plan)
@@ -141,7 +137,7 @@ class ReferenceStack:
                     pass
         for scan in scans:  # after all odometry of this beat, wherever that stands among the readings
             self._monitor.on_scan(scan, self._odometry.at(scan.tick))
-            self._scans[scan.sensor] = scan
+            self._costmaps.see(scan)
         return bool(scans)
 
     def _dead_reckon(self, reading: Odometry) -> None:
@@ -154,22 +150,19 @@ class ReferenceStack:
             self._twist = reading.twist
             self._odometry.add(reading.tick, reading.pose)
 
-    def _update_costmap(self, tick: int) -> None:
-        """Feed the newest scan of each lidar, not older than the costmap's own period."""
-        if tick - self._mapped < self._costmap_period:
-            return
-        if self._zones is not None:
-            self._costmap.set_zones(self._zones)
+    @property
+    def _frames(self) -> Frames:
+        """Where the robot is now; a robot without odometry has its map for odom frame."""
+        pose = self._localizer.belief.pose
+        return Frames(pose, self._odometry.now if self._odometry else pose)
+
+    def _update_costmaps(self, tick: int) -> None:
+        """Feed the newest scan of each sensor, not older than a costmap's own period, and honour new zones."""
+        if self._zones is not None and self._costmaps.due(tick):
+            self._costmaps.set_zones(self._zones)
             self._speed_filter.set_zones(self._zones)
             self._zones = None
-        if not self._scans:
-            return
-        self._mapped = tick
-        pose = self._localizer.belief.pose
-        for scan in self._scans.values():
-            if not np.isnan(scan.ranges).all():
-                self._costmap.update(self._odometry.then(pose, scan.tick), scan)
-        self._scans.clear()
+        self._costmaps.update(tick, self._frames, self._odometry)
 
     def _control(self, tick: int) -> Twist:
         goal = self._task.next(tick)
@@ -188,11 +181,11 @@ class ReferenceStack:
             self._smoother.reset(STOP)
             self._free_at = tick
             return STOP
-        pose = self._localizer.belief.pose
+        frames = self._frames
         if self._speed_filter:
-            self._controller.set_speed_limit(self._speed_filter.limit(pose, self._controller.full_speed))
+            self._controller.set_speed_limit(self._speed_filter.limit(frames.pose, self._controller.full_speed))
         try:
-            wanted, reached = self._navigator.step(tick, pose, self._twist, self._held(tick))
+            wanted, reached = self._navigator.step(tick, frames, self._twist, self._held(tick))
         except NavigationFailure as failure:
             return self._give_up(tick, failure)
         if reached:

@@ -39,6 +39,12 @@ class PlanInForce:
         """Note where the robot is."""
         self._track.locate(pose)
 
+    @property
+    def ahead(self) -> Array:
+        """The points (n, 3) from where the robot is on."""
+        points: Array = self._track.points[self._track.index :]
+        return points
+
     def missed(self, pose: Pose2) -> bool:
         """Whether a car that has not reached its goal can no longer do so on this plan."""
         x, y, _ = self._track.points[self._track.index].tolist()

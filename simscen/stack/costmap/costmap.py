@@ -1,4 +1,4 @@
-"""The costmap of a robot: static map below, live obstacles above, inflated, updated where something changed."""
+"""A costmap: static map below, live obstacles above, inflated, updated where something changed."""
 
 import math
 from dataclasses import replace
@@ -29,11 +29,21 @@ class Costmap:
     The distance field of the static map is computed once. A scan changes few cells, so distances to live obstacles
     are computed again only around those. For that to suffice, distances end at a reach of the inflation radius, or
     half a metre beyond the hull: farther away than that, nothing asks how far.
+
+    Where there is no map it is a window that rolls with the robot, `size` metres along x and y. It lives in the frame
+    in which it is told where the robot is: that of the map, or odom.
     """
 
-    def __init__(self, spec: CostmapSpec, surroundings: Surroundings) -> None:
+    def __init__(
+        self,
+        spec: CostmapSpec,
+        surroundings: Surroundings,
+        size: tuple[float, float] | None = None,
+        no_farther: float = math.inf,
+    ) -> None:
         self._spec, self._surroundings = spec, surroundings
         self._rolling = surroundings.map is None
+        self._size, self._no_farther = size or (spec.rolling_size, spec.rolling_size), no_farther
         self._inscribed = surroundings.robot.inscribed_radius
         resolution = spec.resolution if surroundings.map is None else surroundings.map.resolution
         reach = max(spec.inflation_radius, surroundings.robot.circumscribed_radius + BEYOND_HULL)
@@ -58,7 +68,7 @@ class Costmap:
 
     def update(self, base: Pose2, scan: Scan) -> None:
         """Clear what the beams pass through, then mark what they hit, seen from the robot at `base`."""
-        if self._rolling and left_behind(self._frame, base):
+        if self._rolling and left_behind(self._frame, base, self._no_farther):
             before = self._frame
             self._lay(self._layer(base))
             self._show(carried_over(self._live, before, self._frame))
@@ -107,7 +117,7 @@ class Costmap:
         return within(self._frame, start, goal) if self._rolling else goal
 
     def _layer(self, centre: Pose2) -> StaticLayer:
-        return self._layer_in(window_around(centre, self._spec.rolling_size, self._spec.resolution))
+        return self._layer_in(window_around(centre, self._size, self._spec.resolution))
 
     def _layer_in(self, window: Frame) -> StaticLayer:
         """What never changes but by an order; in this window, where there is no map."""

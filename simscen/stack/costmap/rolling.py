@@ -1,4 +1,4 @@
-"""The window that a robot without a map carries around: obstacles in it persist, what leaves it is forgotten."""
+"""A window that the robot carries around: obstacles in it persist, what leaves it is forgotten."""
 
 import math
 
@@ -11,21 +11,24 @@ from simscen.stack.costmap.static_layer import Mask
 EDGE = 0.6
 """Metres inside the window's edge where a goal beyond it is aimed at."""
 FOLLOW = 1 / 8
-"""The window is moved when the robot is this part of its size away from its middle."""
+"""The window is moved when the robot is this part of its size away from its middle, …"""
+NO_FARTHER = 0.25
+"""… and a local costmap's at the latest when it is so many metres away: Nav2 moves it at each update."""
 
 
-def window_around(centre: Pose2, size: float, resolution: float) -> Frame:
-    """A square window of edge `size` metres around a point; its cells are always the same ones of the plane."""
-    cells = math.ceil(size / resolution)
-    column, row = round(centre.x / resolution) - cells // 2, round(centre.y / resolution) - cells // 2
-    return Frame((column * resolution, row * resolution), resolution, (cells, cells))
+def window_around(centre: Pose2, size: tuple[float, float], resolution: float) -> Frame:
+    """A window of so many metres along x and y around a point; its cells are always the same ones of the plane."""
+    columns, rows = (math.ceil(edge / resolution) for edge in size)
+    column, row = round(centre.x / resolution) - columns // 2, round(centre.y / resolution) - rows // 2
+    return Frame((column * resolution, row * resolution), resolution, (rows, columns))
 
 
-def left_behind(frame: Frame, base: Pose2) -> bool:
+def left_behind(frame: Frame, base: Pose2, no_farther: float = math.inf) -> bool:
     """Whether the robot has come so far from the middle that the window should follow."""
-    size = frame.shape[0] * frame.resolution
-    middle = (frame.origin[0] + size / 2, frame.origin[1] + size / 2)
-    return max(abs(base.x - middle[0]), abs(base.y - middle[1])) > FOLLOW * size
+    rows, columns = frame.shape
+    across, up = columns * frame.resolution, rows * frame.resolution
+    off = abs(base.x - frame.origin[0] - across / 2), abs(base.y - frame.origin[1] - up / 2)
+    return off[0] > min(FOLLOW * across, no_farther) or off[1] > min(FOLLOW * up, no_farther)
 
 
 def carried_over(marks: Mask, before: Frame, now: Frame) -> Mask:
@@ -41,9 +44,12 @@ def within(frame: Frame, start: Pose2, goal: Pose2) -> Pose2:
     """The goal itself; or, when it is beyond the window, the point of the straight way to it just inside."""
     if frame.covers(goal.x, goal.y):
         return goal
-    size = frame.shape[0] * frame.resolution
+    across, up = frame.shape[1] * frame.resolution, frame.shape[0] * frame.resolution
     part = 1.0
-    for here, there, low in ((start.x, goal.x, frame.origin[0]), (start.y, goal.y, frame.origin[1])):
+    for here, there, low, size in (
+        (start.x, goal.x, frame.origin[0], across),
+        (start.y, goal.y, frame.origin[1], up),
+    ):
         if there != here:
             edge = low + size - EDGE if there > here else low + EDGE
             part = min(part, max(0.0, (edge - here) / (there - here)))

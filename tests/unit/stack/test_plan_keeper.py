@@ -56,7 +56,7 @@ class Bench:
         self.journal: list[Event] = []
         self.now = 0.0
         self.keeper = PlanKeeper(
-            PlannerSpec(**options), self.script, self.script, self.costmap, lambda k: 100 + k, 0.22, self.journal
+            PlannerSpec(**options), self.script, self.costmap, lambda k: 100 + k, 0.22, self.journal
         )
 
     def steps(self, count: int) -> list[object]:

@@ -6,20 +6,20 @@ from simscen.stack.costmap.rolling import carried_over, left_behind, window_arou
 
 
 def test_windows_around_different_points_share_their_cells() -> None:
-    one, other = window_around(Pose2(0.013, 0.0), 8.0, 0.05), window_around(Pose2(1.234, -2.7), 8.0, 0.05)
+    one, other = window_around(Pose2(0.013, 0.0), (8.0, 8.0), 0.05), window_around(Pose2(1.234, -2.7), (8.0, 8.0), 0.05)
     steps = (np.array(other.origin) - np.array(one.origin)) / 0.05
     assert steps == pytest.approx(np.round(steps), abs=1e-6)
     assert one.shape == (160, 160)
 
 
 def test_the_window_follows_a_robot_that_is_an_eighth_of_its_size_off_the_middle() -> None:
-    frame = window_around(Pose2(0, 0), 8.0, 0.05)
+    frame = window_around(Pose2(0, 0), (8.0, 8.0), 0.05)
     assert not left_behind(frame, Pose2(0.9, -0.9))
     assert left_behind(frame, Pose2(0.0, 1.1))
 
 
 def test_marks_stay_where_they_are_in_the_plane_and_are_lost_outside() -> None:
-    before, now = window_around(Pose2(0, 0), 8.0, 0.05), window_around(Pose2(3, 0), 8.0, 0.05)
+    before, now = window_around(Pose2(0, 0), (8.0, 8.0), 0.05), window_around(Pose2(3, 0), (8.0, 8.0), 0.05)
     marks = np.zeros(before.shape, dtype=bool)
     cells = before.cells(np.array([[2.0, 1.0], [-3.0, 0.0]]))
     marks[cells[:, 0], cells[:, 1]] = True
@@ -32,5 +32,5 @@ def test_marks_stay_where_they_are_in_the_plane_and_are_lost_outside() -> None:
     [((1.0, 1.0), (1.0, 1.0)), ((10.0, 0.0), (3.4, 0.0)), ((8.0, 8.0), (3.4, 3.4)), ((0.0, -9.0), (0.0, -3.4))],
 )
 def test_a_goal_beyond_the_window_is_aimed_at_from_inside(goal: tuple[float, float], aim: tuple[float, float]) -> None:
-    frame = window_around(Pose2(0, 0), 8.0, 0.05)
+    frame = window_around(Pose2(0, 0), (8.0, 8.0), 0.05)
     assert within(frame, Pose2(0, 0), Pose2(*goal))[:2] == pytest.approx(aim)

@@ -1,0 +1,105 @@
+"""The two costmaps of a stack, as in Nav2: a global one to plan on, and a local one to drive by."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from simscen.core.geometry import Pose2
+from simscen.core.sensing import Scan
+from simscen.core.zones import Zones
+from simscen.model.stack import StackSpec
+from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.costmap.rolling import NO_FARTHER
+from simscen.stack.frames import Frames, placed_polygon
+from simscen.stack.odometry_history import OdometryHistory
+from simscen.stack.protocols import Surroundings
+
+SMALLEST = 3.0
+"""Metres: the edge of Nav2's local costmap, and the least of ours unless somebody asks for less."""
+ZONES_MOVED = 0.02
+"""Metres by which zones may lie beside where they belong in the odom frame before they are painted anew."""
+
+
+class Costmaps:
+    """Keeps both up to date, each at its own rate.
+
+    The global one is in the map frame: the map, and what was seen from where the robot believed itself. The local one
+    rolls with the robot in the odom frame, knows no map, and shows where things are from the robot: a correction of
+    the localizer moves nothing in it but keepout zones, which are known in the map frame alone.
+    """
+
+    def __init__(self, spec: StackSpec, surroundings: Surroundings, reach: float) -> None:
+        """`reach`: how far in metres the controller looks ahead."""
+        self.wide = Costmap(spec.costmap, surroundings)
+        near = spec.local_costmap.completed(spec.costmap)
+        edge = max(SMALLEST, 2.0 * (reach + surroundings.robot.circumscribed_radius + NO_FARTHER))
+        size = spec.local_costmap.width or edge, spec.local_costmap.height or edge
+        bare = replace(surroundings, map=None, keepout=(), masks=replace(surroundings.masks, keepout=None))
+        self.near = Costmap(near, bare, size, NO_FARTHER)
+        self._reach = max(size) / 2
+        self._wide = _Rhythm(math.ceil(surroundings.tick_rate / spec.costmap.update_frequency))
+        self._near = _Rhythm(math.ceil(surroundings.tick_rate / near.update_frequency))
+        self._zones = Zones(surroundings.keepout, (), surroundings.masks)
+        self._odom_from_map: Pose2 | None = None
+        self._painted = False
+
+    def see(self, scan: Scan) -> None:
+        """A scan, to be taken in with the next update."""
+        for rhythm in (self._wide, self._near):
+            rhythm.scans[scan.sensor] = scan
+
+    def due(self, tick: int) -> bool:
+        """Whether it is time for an update of the global costmap."""
+        return self._wide.due(tick)
+
+    def set_zones(self, zones: Zones) -> None:
+        """Keep out of these from now on, and of no others."""
+        self._zones, self._odom_from_map = zones, None
+        self.wide.set_zones(zones)
+
+    def update(self, tick: int, frames: Frames, odometry: OdometryHistory) -> None:
+        """Feed the newest scan of each sensor to the costmaps that are due, seen from where it was taken."""
+        for scan in self._wide.take(tick):
+            self.wide.update(odometry.then(frames.pose, scan.tick), scan)
+        for scan in self._near.take(tick):
+            self._paint_zones(frames)
+            self.near.update(odometry.then(frames.odometry, scan.tick), scan)
+
+    def clear(self) -> None:
+        """Forget every live obstacle but those that the newest scans show (Nav2's ClearEntireCostmap of both)."""
+        self.wide.clear()
+        self.near.clear()
+
+    def _paint_zones(self, frames: Frames) -> None:
+        """Keepout zones where they belong in the odom frame by now."""
+        mask, known = self._zones.masks.keepout, self._odom_from_map
+        if not self._zones.keepout and mask is None and not self._painted:
+            return
+        if known is not None and frames.moved(known, self._reach) <= ZONES_MOVED:
+            return
+        moved, self._painted = frames.odom_from_map, True
+        self._odom_from_map = moved
+        polygons = tuple(placed_polygon(moved, polygon) for polygon in self._zones.keepout)
+        here = None if mask is None else replace(mask, origin=moved.compose(mask.origin))
+        self.near.set_zones(Zones(polygons, (), replace(self._zones.masks, keepout=here)))
+
+
+class _Rhythm:
+    """When a costmap is updated, and the scans that it has not taken in yet."""
+
+    def __init__(self, period: int) -> None:
+        self._period, self._updated = period, -period
+        self.scans: dict[str, Scan] = {}
+
+    def due(self, tick: int) -> bool:
+        return tick - self._updated >= self._period
+
+    def take(self, tick: int) -> list[Scan]:
+        """The scans to take in now; without any the update waits for one."""
+        if not self.scans or not self.due(tick):
+            return []
+        self._updated = tick
+        scans = [scan for scan in self.scans.values() if not np.isnan(scan.ranges).all()]
+        self.scans.clear()
+        return scans

@@ -1,0 +1,47 @@
+"""Where the robot is, in the map frame and in the odom frame: what tf2 would know."""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from simscen.core.geometry import Array, Pose2, wrap, wrap_array
+from simscen.core.world import Polygon
+
+
+@dataclass(frozen=True)
+class Frames:
+    """Where the robot is now: `pose` in the map frame, as believed, and `odometry` in the odom frame, as rolled.
+
+    Corrections of the localizer make `pose` jump; `odometry` never jumps, but drifts.
+    """
+
+    pose: Pose2
+    odometry: Pose2
+
+    @cached_property
+    def map_from_odom(self) -> Pose2:
+        """The correction that a localizer publishes."""
+        return self.pose.compose(self.odometry.inverse())
+
+    @cached_property
+    def odom_from_map(self) -> Pose2:
+        """Its inverse."""
+        return self.odometry.compose(self.pose.inverse())
+
+    def moved(self, odom_from_map: Pose2, reach: float) -> float:
+        """Metres by which what lies up to `reach` metres from the robot moved in odom since this was the correction."""
+        before = odom_from_map.compose(self.pose)
+        return before.distance(self.odometry) + reach * abs(wrap(before.yaw - self.odometry.yaw))
+
+
+def placed(frame: Pose2, poses: Array) -> Array:
+    """Poses (n, 3) given in `frame`, in the frame around it."""
+    return np.column_stack((frame.apply(poses[:, :2]), wrap_array(poses[:, 2] + frame.yaw)))
+
+
+def placed_polygon(frame: Pose2, polygon: Polygon) -> Polygon:
+    """A polygon given in `frame`, in the frame around it."""
+    c, s = math.cos(frame.yaw), math.sin(frame.yaw)
+    return tuple((frame.x + c * x - s * y, frame.y + s * x + c * y) for x, y in polygon)

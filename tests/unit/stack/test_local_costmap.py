@@ -1,0 +1,121 @@
+"""What the localizer corrects must move neither what the robot sees around it nor the wheel it steers by."""
+
+import math
+
+import numpy as np
+import pytest
+
+from simscen.core.geometry import Pose2
+from simscen.core.navigation import Goal
+from simscen.core.sensing import Odometry, Readings
+from simscen.core.trace import Decision
+from simscen.core.zones import Zones
+from simscen.model.stack import Costmap, GroundTruth, LocalCostmap, StackSpec
+from simscen.stack.costmap.costmaps import Costmaps
+from simscen.stack.protocols import CostmapView
+from simscen.testing.flatland import CONTROL, RATE, Drive, Flatland, drive, round_robot
+
+TRUTH = GroundTruth(type="ground_truth")
+CORRIDOR = Flatland().room(14, 1.6)
+START, GOAL = Pose2(1.0, 0.8), Goal("g", Pose2(12.0, 0.8), timeout=60.0)
+
+
+class Corrected:
+    """Between the sensors and a stack: what its localizer is told jumps at `at`, what its wheels say never does."""
+
+    def __init__(self, drive: Drive, at: float, jump: Pose2) -> None:
+        self.stack, self._at, self._jump = drive.stack, at * RATE, jump
+
+    def decide(self, tick: int, readings: Readings) -> Decision:
+        return self.stack.decide(tick, tuple(self._told(one) if tick >= self._at else one for one in readings))
+
+    def _told(self, reading: object) -> object:
+        if not isinstance(reading, Odometry) or reading.sensor != "ground_truth":
+            return reading
+        return Odometry(reading.sensor, reading.tick, self._jump.compose(reading.pose), reading.twist)
+
+
+def jumped(jump: Pose2, seconds: float) -> Drive:
+    """A drive along a corridor whose localizer jumps after three seconds."""
+    d = drive(CORRIDOR, START, GOAL, grid=CORRIDOR.grid((-0.5, -0.5, 14.5, 2.1)))
+    d.stack = Corrected(d, 3.0, jump)
+    return d.run(seconds)
+
+
+def costmaps(d: Drive) -> Costmaps:
+    stack = d.stack.stack if isinstance(d.stack, Corrected) else d.stack
+    return stack.inner._costmaps
+
+
+def lethal(view: CostmapView) -> np.ndarray:
+    """Points (n, 2) of the centres of lethal cells."""
+    cells = np.argwhere(view.costs == 254)
+    return (cells[:, ::-1] + 0.5) * view.resolution + view.origin
+
+
+@pytest.mark.parametrize("jump", [Pose2(0.0, 0.3), Pose2(0.0, -0.3), Pose2(0.3, 0.0), Pose2(0.0, 0.0, 0.05)])
+def test_a_jump_of_the_localizer_leaves_no_ghost_in_the_local_costmap_and_no_jerk_in_the_command(jump: Pose2) -> None:
+    d = jumped(jump, 4.5)
+    ghosts = CORRIDOR.distance(lethal(costmaps(d).near.view))  # here the odom frame is the true one
+    assert len(ghosts) > 50
+    assert np.abs(ghosts).max() < 0.1
+    robot, period = d.robot, CONTROL / RATE
+    driven = d.commands[RATE * 5 // 2 // 6 :]
+    for before, now in zip(driven, driven[1:], strict=False):
+        assert abs(now.vx - before.vx) <= max(robot.linear_acceleration, robot.linear_deceleration) * period + 1e-9
+        assert abs(now.wz - before.wz) <= robot.angular_acceleration * period + 1e-9
+
+
+def test_after_a_jump_the_robot_follows_its_plan_where_it_now_believes_that_to_be() -> None:
+    """Told that it is 0.1 m left of where it thought, it drives as far to the right."""
+    d = jumped(Pose2(0.0, 0.1), 12.0)
+    assert d.track[-1].y == pytest.approx(0.7, abs=0.03)
+
+
+def test_the_local_costmap_rolls_with_the_robot_and_knows_no_map() -> None:
+    mapped = Flatland([*CORRIDOR.boxes, (3.0, 0.0, 3.1, 0.3)])
+    d = drive(CORRIDOR, START, GOAL, grid=mapped.grid((-0.5, -0.5, 14.5, 2.1))).run(4.0)
+    view = costmaps(d).near.view
+    height, width = view.costs.shape
+    middle = view.origin[0] + width * view.resolution / 2, view.origin[1] + height * view.resolution / 2
+    assert math.dist(middle, d.pose[:2]) < 0.4
+    assert np.abs(CORRIDOR.distance(lethal(view))).max() < 0.1
+    assert (mapped.distance(lethal(costmaps(d).wide.view)) < 0.05).all()
+
+
+def test_its_size_resolution_and_rate_are_nav2s_or_what_is_asked_for() -> None:
+    def shape(**options: float) -> tuple[tuple[int, int], float]:
+        spec = StackSpec(localizer=TRUTH, local_costmap=LocalCostmap(**options))
+        view = costmaps(drive(CORRIDOR, START, GOAL, grid=None, spec=spec)).near.view
+        return view.costs.shape, view.resolution
+
+    assert shape() == ((60, 60), 0.05)
+    assert shape(width=5.0, height=2.0) == ((40, 100), 0.05)
+    assert shape(width=4.0, resolution=0.1) == ((30, 40), 0.1)
+
+
+def test_a_robot_that_is_faster_sees_as_far_as_it_looks_ahead() -> None:
+    spec = StackSpec(localizer=TRUTH, controller={"type": "dwb"})
+    fast = drive(CORRIDOR, START, GOAL, grid=None, robot=round_robot(speed=3.0), spec=spec)
+    view = costmaps(fast).near.view
+    assert view.costs.shape[1] * view.resolution / 2 > 1.7 * 3.0 + 0.22
+
+
+def test_what_the_local_costmap_does_not_say_itself_it_takes_from_the_global_one() -> None:
+    shared = Costmap(inflation_radius=0.3, obstacle_max_range=1.0)
+    assert LocalCostmap().completed(shared) == shared
+    own = LocalCostmap(inflation_radius=0.5, update_frequency=10.0).completed(shared)
+    assert (own.inflation_radius, own.obstacle_max_range, own.update_frequency) == (0.5, 1.0, 10.0)
+
+
+def test_keepout_zones_stand_in_the_local_costmap_where_the_robot_believes_them_to_be() -> None:
+    d = drive(CORRIDOR, START, GOAL, grid=CORRIDOR.grid((-0.5, -0.5, 14.5, 2.1)))
+    zone = ((3.0, 0.0), (3.4, 0.0), (3.4, 0.4), (3.0, 0.4))
+    d.stack.inner.set_zones(0, Zones(keepout=(zone,)))
+    d.stack = Corrected(d, 3.0, Pose2(0.2, 0.0))
+    for end, shift in ((2.9, 0.0), (4.0, 0.2)):
+        d.run(end - d.tick / RATE)
+        points = lethal(costmaps(d).near.view)
+        inside = points[(points[:, 1] > 0.1) & (points[:, 1] < 0.38)]
+        assert inside[:, 0].min() == pytest.approx(3.0 - shift, abs=0.06)
+        assert inside[:, 0].max() == pytest.approx(3.4 - shift, abs=0.06)
