@@ -141,6 +141,7 @@ _STACK: dict[str, type[BaseModel]] = {
     "speed_zones": SpeedZone,
     "speed_mask": SpeedMask,
     "costmap": stack.Costmap,
+    "local_costmap": stack.LocalCostmap,
     "planner": stack.OmplPlanner,
     "goal_checker": stack.SimpleGoalChecker,
     "progress_checker": stack.ProgressChecker,
