@@ -31,7 +31,7 @@ GONE = 8
 
 
 class PlanKeeper:
-    """Keeps the plan in force for one goal after another, in the map frame; `now` is the navigator's clock in seconds."""
+    """Keeps the plan in force for one goal after another, in the map frame; `now` is the navigator's clock."""
 
     def __init__(
         self,

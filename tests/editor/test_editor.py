@@ -150,7 +150,8 @@ PLACES = {
     "stack.speed_mask": Place("scenario", STACK + "speed_mask:\n    "),
     "stack.external": Place("scenario", STACK + "external: mine\n  "),
     **{f"stack.{key}": Place("scenario", f"{STACK}{key}:\n    ") for key in (
-        "costmap", "local_costmap", "planner", "goal_checker", "progress_checker", "recovery", "velocity_smoother", "collision_monitor",
+        "costmap", "local_costmap", "planner", "goal_checker", "progress_checker", "recovery", "velocity_smoother",
+        "collision_monitor",
     )},
     "stack file.stack file": Place("stack", ""),
     "stack file.configuration": Place("config", ""),

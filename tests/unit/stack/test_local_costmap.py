@@ -1,6 +1,7 @@
 """What the localizer corrects must move neither what the robot sees around it nor the wheel it steers by."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -61,7 +62,7 @@ def test_a_jump_of_the_localizer_leaves_no_ghost_in_the_local_costmap_and_no_jer
     assert np.abs(ghosts).max() < 0.1
     robot, period = d.robot, CONTROL / RATE
     driven = d.commands[RATE * 5 // 2 // 6 :]
-    for before, now in zip(driven, driven[1:], strict=False):
+    for before, now in pairwise(driven):
         assert abs(now.vx - before.vx) <= max(robot.linear_acceleration, robot.linear_deceleration) * period + 1e-9
         assert abs(now.wz - before.wz) <= robot.angular_acceleration * period + 1e-9
 
