@@ -13,7 +13,8 @@ from simscen.core.result import Outcome, RunKey
 from simscen.core.sessionevents import RunFinished, SessionEvent
 from simscen.loading.scenario import load_scenario
 from simscen.record.replay import read_log
-from simscen.report.lines import Naming, finished, text_of
+from simscen.report.line import text_of
+from simscen.report.lines import Naming, finished
 from simscen.run.outfolder import run_folder
 from simscen.run.process.jobs import Job
 from simscen.run.session import Options, run_session

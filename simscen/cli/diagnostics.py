@@ -5,7 +5,6 @@ import os
 import re
 import sys
 import textwrap
-import unicodedata
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import groupby
@@ -14,7 +13,7 @@ from typing import Any, TextIO
 
 from simscen.core.problems import Problem
 from simscen.report.checkout import in_checkout
-from simscen.report.text import ascii_only, no_marker, no_marker_in_json, one_line
+from simscen.report.text import ascii_only, no_marker, no_marker_in_json, one_line, width
 
 MOST_A_FILE = 50
 WIDEST = 100
@@ -92,24 +91,19 @@ def _excerpt(problem: Problem) -> list[str]:
     """The line and a caret under the key or value; a long line is cut around it."""
     source, start = problem.source.replace("\t", " "), max(problem.col - 1, 0)
     token = _TOKEN.match(source, start)
-    width = len(token[0]) if token else 1
+    length = len(token[0]) if token else 1
     first = max(0, start - WIDEST // 2) if len(source) > WIDEST else 0
     shown = source[first : first + WIDEST].rstrip()
-    width = max(1, min(width, len(shown) - (start - first)))
-    before, marked = shown[: start - first], shown[start - first : start - first + width]
+    length = max(1, min(length, len(shown) - (start - first)))
+    before, marked = shown[: start - first], shown[start - first : start - first + length]
     gutter = " " * (len(str(problem.line)) + 4)
-    carets = " " * _columns(before) + "^" * max(1, _columns(marked))
+    carets = " " * width(before) + "^" * max(1, width(marked))
     return [f"    {problem.line} | {_kept(shown)}", f"{gutter} | {carets}"]
 
 
 def _kept(source: str) -> str:
     """A line of the file with its spaces as they are; it follows a number and a bar, so it begins no line."""
     return no_marker(source)
-
-
-def _columns(text: str) -> int:
-    """How many columns of a terminal the text takes."""
-    return sum(0 if unicodedata.combining(c) else 2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text)
 
 
 def _annotation(problem: Problem) -> str:

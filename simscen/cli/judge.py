@@ -19,7 +19,7 @@ from simscen.core.sessionevents import RunFinished
 from simscen.judge.resultdata import as_data
 from simscen.record.foreign.wanted import TOPICS, Clock, Wanted
 from simscen.report.judged import in_a_line, in_full, summary, table
-from simscen.report.lines import text_of
+from simscen.report.line import text_of
 from simscen.report.results import as_document, in_order
 
 

@@ -20,7 +20,8 @@ from simscen.report.page import to_html
 from simscen.report.results import to_json
 from simscen.run.outfolder import RUNS, probe_writable, write_atomically
 
-OWN = ("results.json", "report.html", "run.json", NAME, RUNS)
+PAGE = "report.html"
+OWN = ("results.json", PAGE, "run.json", NAME, RUNS)
 """What a session writes into its folder beside junit.xml."""
 
 
@@ -62,7 +63,7 @@ class Reports:
         whole = {
             self.folder / "results.json": to_json(answers, str(self.folder), comparison).encode(),
             self.folder / "junit.xml": junit,
-            self.folder / "report.html": to_html(answers, comparison=comparison).encode(),
+            self.folder / PAGE: to_html(answers, comparison=comparison).encode(),
         }
         documents = {**({} if self._only else whole), self.junit: junit}
         outcomes = [_written(path, data) for path, data in documents.items()]  # every one is tried
@@ -89,6 +90,7 @@ class Reports:
             comparison=comparison,
             expected=count[Outcome.FAILED_AS_EXPECTED],
             skipped=count[Outcome.SKIPPED],
+            page="" if self._only else str(self.folder / PAGE),
         )
 
 

@@ -3,6 +3,7 @@
 import os
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -11,6 +12,7 @@ import typer
 from simscen.cli import completing
 from simscen.cli.diagnostics import as_text, print_text
 from simscen.cli.interrupts import signals_interrupt
+from simscen.cli.lastfailed import failed_runs
 from simscen.cli.reports import JunitFamily, Reports, require_writable, verdict
 from simscen.cli.screen import Format, Screen, screen
 from simscen.cli.select import Selection, load_all, shard_of
@@ -83,6 +85,18 @@ def command(
             help=STACK_HELP + "Repeatable: each scenario runs with each, and the first is compared with the others.",
         ),
     ] = None,
+    last_failed: Annotated[
+        bool,
+        typer.Option(
+            "--last-failed",
+            "--lf",
+            help="Only what failed when it was run last, by the sessions in simscen-out, or beside --out; everything, "
+            "where nothing did.",
+        ),
+    ] = False,
+    durations: Annotated[
+        int | None, typer.Option(min=0, metavar="N", help="List the N slowest runs in the end; 0 = all.")
+    ] = None,
     variation: Annotated[
         list[str] | None, typer.Option(help="Only the variation of exactly this name; repeatable.")
     ] = None,
@@ -113,13 +127,19 @@ def command(
         raise UsageError(f"--check-against {check_against}: there are no runs in it")
     for scenario in scenarios:
         seeds_of(scenario, options)
+    if last_failed:
+        if resume is not None:
+            raise UsageError("--last-failed and --resume exclude each other")
+        only, told = failed_runs(scenarios, options, out)
+        options = replace(options, only=only)
+        print_text(f"simscen: {told}", sys.stderr)
     require_writable(junit, out or resume, {file for each in scenarios for file in (*each.files.values(), *each.read)})
     folder, journal = _output_folder(out, resume)
     used = {"plugins": packages_of(plugins_of_all(scenarios)), "stacks": commands_of(scenarios)}
     reports = Reports(folder, junit, junit_family.value, used=used)
     reports.begin()
     work = begin(journal, plan(scenarios, options, folder), options.workers)
-    with screen(format_) as shown:
+    with screen(format_, durations) as shown:
         code = _run(work, options, reports, shown)
     sys.exit(shown.exit(code))
 

@@ -74,13 +74,15 @@ class Screen:
 
 
 @contextmanager
-def screen(format_: Format) -> Iterator[Screen]:
+def screen(format_: Format, slow: int | None = None) -> Iterator[Screen]:
     """Print a session on stdout, and on GitHub also as the summary of the step.
+
+    `slow` is how many of the slowest runs to list in the end; 0 = all.
 
     Raises UsageError when that cannot be written: it should be known before anything runs.
     """
     summary = _step_summary() if format_ is Format.GITHUB else None
-    printer = _printer(format_, summary)
+    printer = _printer(format_, summary, slow)
     shown = Screen(printer)
     printer.__enter__()
     try:
@@ -92,14 +94,14 @@ def screen(format_: Format) -> Iterator[Screen]:
             shown.sum_up(summary.getvalue())
 
 
-def _printer(format_: Format, summary: TextIO | None) -> Reporter:
+def _printer(format_: Format, summary: TextIO | None, slow: int | None) -> Reporter:
     match format_:
         case Format.TEXT:
-            return text_reporter(sys.stdout)
+            return text_reporter(sys.stdout, slow=slow)
         case Format.JSON:
             return json_reporter(sys.stdout)
         case Format.GITHUB:
-            return github_reporter(sys.stdout, summary)
+            return github_reporter(sys.stdout, summary, slow)
 
 
 def _step_summary() -> StringIO | None:

@@ -92,7 +92,7 @@ class SessionFinished:
     """The last event: counts, simulated and wall seconds of the whole session, and where the reports are.
 
     `expected` failed as their scenarios say, `skipped` were not run. `comparison` is what several stacks on the same
-    scenarios say about each other.
+    scenarios say about each other. `page` is the page that shows the session.
     """
 
     passed: int
@@ -106,6 +106,7 @@ class SessionFinished:
     comparison: Comparison | None = None
     expected: int = 0
     skipped: int = 0
+    page: str = ""
 
 
 SessionEvent = SessionStarted | RunStarted | RunProgress | RunFinished | SessionFinished

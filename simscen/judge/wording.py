@@ -1,12 +1,15 @@
 """How findings are told: one way for the console, JUnit, JSON and pictures."""
 
 from collections.abc import Sequence
+from math import isfinite
 
 from simscen.core.disturbance import Happening
 from simscen.core.verdict import Finding, Status, Verdict
 
 DISTURBANCE = "disturbance"
 """What the verdicts on events and faults are called that did not happen; the id is the name of the event or fault."""
+ARRIVAL = "goals_reached"
+"""The criterion that looks at how near to a goal the robot stopped."""
 SHOWN = 5
 """So many times of a disturbance that came again and again are told."""
 _RELATIONS = {"≤ ": ("≤ ", "> "), "≥ ": ("≥ ", "< "), "< ": ("< ", "≥ "), "> ": ("> ", "≤ ")}
@@ -65,20 +68,34 @@ def violations(verdict: Verdict) -> tuple[Finding, ...]:
 
 
 def tightest(verdicts: Sequence[Verdict]) -> str:
-    """The bound that was nearest to being broken, relative to its limit: "path_length +0.14 m"; "" when none has one.
+    """The bound that was nearest to being broken: "path_length +0.14 m, 1 % of its limit"; "" when none has one.
 
-    Numbers of events are left out: that 0 of 0 collisions happened is no news.
+    Numbers of events are left out: that 0 of 0 collisions happened is no news. So is how far from a goal the robot
+    stopped, and how long it stayed: it stops as soon as it is near enough, so that both are always at their limits.
     """
-    findings = [(v, f) for v in verdicts for f in v.findings if f.status is Status.PASS]
-    measured = [(v, f) for v, f in findings if f.unit and f.margin is not None]
+    findings = [(v, f) for v in verdicts for f in v.findings if f.status is Status.PASS and not _stopping(v, f)]
+    measured = [(v, f) for v, f in findings if f.unit and f.margin is not None and isfinite(f.margin)]
     if not measured:
         return ""
     verdict, finding = min(measured, key=lambda pair: _slack(pair[1]))
-    return f"{subject(verdict, finding)} {finding.margin:+.2f} {finding.unit}".rstrip()
+    margin = f"{subject(verdict, finding)} {finding.margin:+.2f} {finding.unit}".rstrip()
+    return f"{margin}, {100 * _slack(finding):.0f} % of its limit" if _limit(finding) else margin
+
+
+def _stopping(verdict: Verdict, finding: Finding) -> bool:
+    """Whether it is about where a robot stopped and stayed, rather than about how long it took."""
+    return verdict.criterion == ARRIVAL and not (finding.unit == "s" and finding.limit.startswith("≤"))
 
 
 def _slack(finding: Finding) -> float:
     """The margin as a share of the limit."""
-    margin, value = finding.margin or 0.0, finding.value or 0.0
-    limit = value - margin if finding.limit.startswith(("≥", ">")) else value + margin
+    margin, limit = finding.margin or 0.0, _limit(finding)
     return margin / abs(limit) if limit else margin
+
+
+def _limit(finding: Finding) -> float:
+    """What was allowed; 0 also where nobody said what was measured."""
+    if finding.value is None:
+        return 0.0
+    margin, value = finding.margin or 0.0, finding.value
+    return value - margin if finding.limit.startswith(("≥", ">")) else value + margin

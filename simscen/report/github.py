@@ -15,15 +15,18 @@ from simscen.report.text import one_line
 _MEANINGFUL = {ord(sign): f"&#{ord(sign)};" for sign in "\\`*_[]|~#@&<>"}
 
 
-def github_reporter(out: TextIO, summary: TextIO | None = None) -> Reporter:
-    """The plain lines, with annotations among them. `summary` is the file that $GITHUB_STEP_SUMMARY names."""
-    return _GitHub(out, summary)
+def github_reporter(out: TextIO, summary: TextIO | None = None, slow: int | None = None) -> Reporter:
+    """The lines of a pipe, with annotations among them. `summary` is the file that $GITHUB_STEP_SUMMARY names.
+
+    `slow` is as for text_reporter.
+    """
+    return _GitHub(out, summary, slow)
 
 
 class _GitHub:
-    def __init__(self, out: TextIO, summary: TextIO | None) -> None:
+    def __init__(self, out: TextIO, summary: TextIO | None, slow: int | None) -> None:
         self._out, self._summary = out, summary
-        self._plain = text_reporter(out, live=False)
+        self._plain = text_reporter(out, live=False, slow=slow)
         self._runs: list[RunFinished] = []
 
     def __enter__(self) -> "_GitHub":

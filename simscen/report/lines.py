@@ -1,24 +1,19 @@
 """A session as lines of text: what the console prints, piece by piece with the role of each piece."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from simscen.core.result import Outcome, RunKey
-from simscen.core.sessionevents import (
-    RunFinished,
-    RunProgress,
-    RunStarted,
-    SessionEvent,
-    SessionFinished,
-    SessionStarted,
-)
+from simscen.core.sessionevents import RunFinished, SessionFinished, SessionStarted
 from simscen.judge.wording import tightest, told
-from simscen.report.compared import compared
-from simscen.report.complaints import broken, complaints, excused, failure, label, place
+from simscen.report.complaints import broken, complaints, excused, failure, label, place, scenario_file
 from simscen.report.line import Line, Piece, Role
 from simscen.report.text import command, one_line
 
 TAIL = 12
+BESIDE_NAME = 33
+"""Columns that sign and times take, so that names are padded to what is left of a terminal's."""
+NARROWEST = 16
 MOST_HAPPENINGS = 8
 SIGNS = {
     Outcome.PASSED: ("✓", "good"),
@@ -49,7 +44,9 @@ class Naming:
         prefix = _common_folder(session.ids)
         longest = max((len(one) for one in session.ids), default=0) - len(prefix)
         extra = [*(["seed 1234"] if every_seed else []), *([max(stacks, key=len)] if stacks else [])]
-        return cls(every_seed, prefix, longest + (len(f" ({', '.join(extra)})") if extra else 0), columns)
+        width = longest + (len(f" ({', '.join(extra)})") if extra else 0)
+        room = width if columns is None else max(NARROWEST, columns - BESIDE_NAME)
+        return cls(every_seed, prefix, min(width, room), columns)
 
     def name(self, key: RunKey) -> str:
         """The run's name, padded."""
@@ -63,20 +60,6 @@ def _common_folder(ids: Sequence[str]) -> str:
     shortest, longest = min(ids), max(ids)
     same = next((k for k, (a, b) in enumerate(zip(shortest, longest, strict=False)) if a != b), len(shortest))
     return shortest[: shortest.rfind("/", 0, same) + 1]
-
-
-def lines_of(event: SessionEvent, naming: Naming) -> list[Line]:
-    """What an event is worth."""
-    match event:
-        case SessionStarted():
-            return [opening(event)]
-        case RunFinished():
-            return list(finished(event, naming))
-        case SessionFinished():
-            told = event.comparison and compared(event.comparison, naming.prefix, naming.columns)
-            return [*(told or ()), *closing(event)]
-        case RunStarted() | RunProgress():
-            return []
 
 
 def opening(started: SessionStarted) -> Line:
@@ -121,34 +104,43 @@ def complained(run: RunFinished) -> Iterator[Line]:
         yield from (((Piece(f"        {text}", "quiet")),) for text in complaint.detail)
     if run.outcome is not Outcome.PASSED:
         yield from _happened(run)
-        yield from _pointers(run)
+        yield _scenario(run)
+        yield from pointers(run)
 
 
-def closing(session: SessionFinished) -> Iterator[Line]:
-    """13 passed, 1 failed · 402 s simulated in 4.1 s (98x) · simscen-out/latest/junit.xml."""
+def closing(session: SessionFinished, left: Mapping[str, int]) -> Iterator[Line]:
+    """13 passed, 1 failed · 402 s simulated in 4.1 s · simscen-out/latest/junit.xml; then the page to open.
+
+    `left` are runs that were not done, by what to say of them.
+    """
+    yield (*counted(session, left), *_facts(session))
+    if session.page:
+        yield (Piece("page: ", "quiet"), Piece(one_line(session.page), file=session.page))
+
+
+def counted(session: SessionFinished, left: Mapping[str, int]) -> Iterator[Piece]:
+    """13 passed, 1 failed, 2 errors, 3 not run: what is `left` counts as an error in the reports, but not to people."""
     counts = [
         (session.passed, "passed", "good"),
         (session.failed, "failed", "bad"),
-        (session.errors, "errors", "odd"),
+        (session.errors - sum(left.values()), "errors", "odd"),
         (session.expected, "failed as expected", "odd"),
         (session.skipped, "skipped", "odd"),
+        *((number, word, "odd") for word, number in left.items()),
     ]
     shown = [(number, word, role) for number, word, role in counts if number or word == "passed"]
-    pieces: list[Piece] = []
-    for number, word, role in shown:
-        pieces += [Piece(", ")] if pieces else []
-        pieces.append(Piece(f"{number} {'error' if word == 'errors' and number == 1 else word}", _role(role)))
+    for nth, (number, word, role) in enumerate(shown):
+        if nth:
+            yield Piece(", ")
+        yield Piece(f"{number} {'error' if word == 'errors' and number == 1 else word}", _role(role))
+
+
+def _facts(session: SessionFinished) -> Iterator[Piece]:
     speed = f" ({session.simulated / session.wall:.0f}x)" if session.wall > 0 else ""
-    facts = f" · {session.simulated:.0f} s simulated in {session.wall:.1f} s{speed}"
-    files = f" · {one_line(session.junit)}" if session.junit else ""
-    yield (*pieces, Piece(facts + files, "quiet"))
-    if session.interrupted:
-        yield (Piece("interrupted: the runs that are missing are listed as such in the reports", "odd"),)
-
-
-def text_of(line: Line) -> str:
-    """The line without its roles."""
-    return "".join(piece.text for piece in line).rstrip()
+    yield Piece(f" · {session.simulated:.0f} s simulated in {session.wall:.1f} s{speed}", "quiet")
+    if session.junit:
+        yield Piece(" · ", "quiet")
+        yield Piece(one_line(session.junit), "quiet", file=session.junit)
 
 
 def _summary(run: RunFinished) -> tuple[Piece, ...]:
@@ -176,13 +168,24 @@ def _happened(run: RunFinished) -> Iterator[Line]:
         yield (Piece(f"      {'' if number else 'happened':9} ", "quiet"), Piece(text))
 
 
-def _pointers(run: RunFinished) -> Iterator[Line]:
+def pointers(run: RunFinished) -> Iterator[Line]:
+    """Where to look at a run, and how to see it again."""
+    files = run.artifacts
+    seen = [("picture", files.picture)] if files.picture else [("log", files.mcap)]
+    for name, path in seen:
+        if path:
+            yield (_label(name), Piece(one_line(path), file=path))
+    if run.again:
+        yield (_label("again"), Piece(command(run.again), shell=True))
+
+
+def _scenario(run: RunFinished) -> Line:
     first = next((complaint.line for complaint in complaints(run) if not complaint.warning), 0)
-    files = [("scenario", place(run, first)), ("picture", run.artifacts.picture), ("log", run.artifacts.mcap)]
-    shown = [(name, one_line(text)) for name, text in (*files[:2], *(() if run.artifacts.picture else files[2:]))]
-    for name, text in (*shown, ("again", command(run.again))):
-        if text:
-            yield (Piece(f"      {name:9} ", "quiet"), Piece(text))
+    return (_label("scenario"), Piece(place(run, first), file=scenario_file(run)))
+
+
+def _label(name: str) -> Piece:
+    return Piece(f"      {name:9} ", "quiet")
 
 
 def _count(number: int, noun: str) -> str:

@@ -1,10 +1,14 @@
-"""The console on a terminal: lines in colour, and live progress below them."""
+"""The console in colour, and on a terminal with live progress below the lines."""
 
+from collections.abc import Callable
+from pathlib import Path
+from time import monotonic
 from types import TracebackType
 from typing import TextIO
 
 from rich.console import Console, Group
 from rich.live import Live
+from rich.style import Style
 from rich.text import Text
 
 from simscen.core.result import RunKey
@@ -14,24 +18,42 @@ from simscen.core.sessionevents import (
     RunStarted,
     SessionEvent,
     SessionFinished,
-    SessionStarted,
 )
-from simscen.report.line import Line
-from simscen.report.lines import Naming, lines_of
-from simscen.report.text import one_line
+from simscen.report.console import PlainReporter
+from simscen.report.line import Line, text_of
+from simscen.report.look import Look
+from simscen.report.remaining import Remaining
+from simscen.report.telling import Telling
+from simscen.report.text import no_command, one_line
 
 STYLES = {"plain": "", "name": "bold", "good": "green", "bad": "red", "odd": "yellow", "quiet": "dim"}
 
 
-class LiveReporter:
-    """The same lines in colour, and below them one line for each run under way with its simulated time."""
+class ColourReporter(PlainReporter):
+    """The same lines in colour, for CI systems that show it. What one of them might obey stays without."""
 
-    def __init__(self, out: TextIO) -> None:
-        self._console = Console(file=out, highlight=False, soft_wrap=True, emoji=False, markup=False)
+    def __init__(self, out: TextIO, look: Look, slow: int | None = None) -> None:
+        super().__init__(out, look, slow)
+        self._console = _console(out, look)
+
+    def _print(self, line: Line) -> None:
+        if text_of(line) != no_command(text_of(line)):
+            super()._print(line)
+        else:
+            self._console.print(_styled(line))
+
+
+class LiveReporter:
+    """The same lines, and below them one line for each run under way with its simulated time."""
+
+    def __init__(
+        self, out: TextIO, look: Look, slow: int | None = None, clock: Callable[[], float] = monotonic
+    ) -> None:
+        self._console = _console(out, look)
         self._live = Live(console=self._console, refresh_per_second=8, transient=True)
+        self._telling = Telling(slow, lambda: look.columns)
+        self._remaining = Remaining(clock)
         self._under_way: dict[RunKey, tuple[RunStarted, float, str]] = {}
-        self._done, self._total = 0, 0
-        self._naming = Naming()
 
     def __enter__(self) -> "LiveReporter":
         self._live.start()
@@ -44,38 +66,53 @@ class LiveReporter:
 
     def __call__(self, event: SessionEvent) -> None:
         """Print what is final above, show what is under way below."""
+        self._remaining(event)
         match event:
-            case SessionStarted():
-                self._naming = Naming.of(event, self._console.width)
-                self._total = event.total
             case RunStarted():
                 self._under_way[event.key] = (event, 0.0, "")
             case RunProgress() if event.key in self._under_way:
                 self._under_way[event.key] = (self._under_way[event.key][0], event.simulated, event.note)
             case RunFinished():
                 self._under_way.pop(event.key, None)
-                self._done += 1
             case _:
                 pass
         self._live.update(self._status())
         if isinstance(event, SessionFinished):
             self._live.stop()
-        for line in lines_of(event, self._naming):
-            self._console.print(_styled(line))
+        for line in self._telling(event):
+            self._console.print(_styled(line, links=True))
 
     def _status(self) -> Group:
         rows = [self._row(*state) for _, state in sorted(self._under_way.items())]
-        counter = [Text(f"  {self._done} of {self._total}", style="dim")] if self._total > 1 and rows else []
-        return Group(*rows, *counter)
+        told = self._remaining.told
+        return Group(*rows, *([Text(f"  {told}", style="dim")] if told and rows else []))
 
     def _row(self, started: RunStarted, simulated: float, note: str) -> Text:
-        name = self._naming.name(started.key)
+        name = self._telling.naming.name(started.key)
         limit = f" of at most {started.time_limit:.0f} s" if started.time_limit else ""
-        return Text.assemble(
-            ("  … ", "cyan"), (f"{name} ", ""), (f"{simulated:6.1f} s{limit}  {one_line(note)}", "dim")
-        )
+        row = [("  … ", "cyan"), (f"{name} ", ""), (f"{simulated:6.1f} s{limit}  {one_line(note)}", "dim")]
+        return Text.assemble(*row, no_wrap=True, overflow="ellipsis")
 
 
-def _styled(line: Line) -> Text:
+def _console(out: TextIO, look: Look) -> Console:
+    """One that decides nothing by itself: what the environment says is in the look."""
+    return Console(
+        file=out,
+        force_terminal=True,
+        color_system="standard" if look.colour else None,
+        no_color=not look.colour,
+        highlight=False,
+        soft_wrap=True,
+        emoji=False,
+        markup=False,
+    )
+
+
+def _styled(line: Line, links: bool = False) -> Text:
     """As rich.Text: what users wrote is never read as markup."""
-    return Text.assemble(*((piece.text, STYLES[piece.role]) for piece in line))
+    return Text.assemble(*((piece.text, _style(STYLES[piece.role], piece.file if links else "")) for piece in line))
+
+
+def _style(look: str, file: str) -> Style:
+    """A path can be clicked in terminals that know OSC 8; others show the text alone."""
+    return Style.parse(look) + Style(link=Path(file).absolute().as_uri()) if file else Style.parse(look)

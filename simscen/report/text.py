@@ -1,6 +1,7 @@
 """Text from users and workers, made safe to show: what could move a cursor or lie about order becomes visible."""
 
 import re
+import unicodedata
 
 _UNSAFE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
 _MARKER = re.compile(r"##(\w*)\[")
@@ -28,6 +29,11 @@ def command(text: str) -> str:
     Line breaks and tabs stand between single quotes there; bash and zsh read `$'…'`.
     """
     return visible(text.replace("\n", "'$'\\n''").replace("\t", "'$'\\t''"))
+
+
+def width(text: str) -> int:
+    """How many columns of a terminal the text takes."""
+    return sum(0 if unicodedata.combining(c) else 2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text)
 
 
 def ascii_only(text: str) -> str:

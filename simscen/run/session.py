@@ -8,7 +8,7 @@ from pathlib import Path
 
 from simscen.core.chance import LARGEST_SEED
 from simscen.core.errors import Exit, UsageError
-from simscen.core.result import Outcome, RunFailure
+from simscen.core.result import Outcome, RunFailure, RunKey
 from simscen.core.sessionevents import Listener, RunFinished, RunProgress, RunStarted
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of_all
@@ -25,7 +25,8 @@ class Options:
     """How to run. `seed` None = each scenario's own; `repeat` runs use consecutive seeds.
 
     `twice` runs everything a second time with the same seed, to compare; `against` is the output folder of an earlier
-    session to compare with. `wall_limit` in seconds bounds each run.
+    session to compare with. `wall_limit` in seconds bounds each run. `only` are the keys of all that is to be run, with
+    their seeds; None = everything.
     """
 
     workers: int = 1
@@ -35,6 +36,7 @@ class Options:
     fail_fast: bool = False
     wall_limit: float = 300.0
     against: Path | None = None
+    only: frozenset[RunKey] | None = None
 
 
 def seeds_of(scenario: LoadedScenario, options: Options) -> range:
@@ -51,18 +53,27 @@ def plan(scenarios: Sequence[LoadedScenario], options: Options, out: Path) -> li
     jobs: list[Job] = []
     skipped = [scenario for scenario in scenarios if scenario.spec.skip is not None]
     scenarios = [scenario for scenario in scenarios if scenario.spec.skip is None]
-    for _, group in groupby(scenarios, key=lambda scenario: scenario.title):
+    for title, group in groupby(scenarios, key=lambda scenario: scenario.title):
         variants = list(group)
-        for seed in seeds_of(variants[0], options):
+        for seed in _seeds(title, variants[0], options):
             for scenario in variants:
                 key = scenario.key(seed)
+                if options.only is not None and key not in options.only:
+                    continue
                 for each in (key, key.twin) if options.twice else (key,):
                     jobs.append(Job(len(jobs), scenario, each, run_folder(out, each), options.wall_limit))
     # Once each, whatever the number of seeds, and behind the others: twins are told by their numbers.
-    for scenario in skipped:
+    for scenario in skipped if options.only is None else ():
         key = scenario.key(seeds_of(scenario, options)[0])
         jobs.append(Job(len(jobs), scenario, key, run_folder(out, key), options.wall_limit))
     return jobs
+
+
+def _seeds(title: str, scenario: LoadedScenario, options: Options) -> Sequence[int]:
+    """The seeds to run a scenario with, those of `only` where that is given."""
+    if options.only is None:
+        return seeds_of(scenario, options)
+    return sorted({key.seed for key in options.only if key.test == title})
 
 
 def run_session(

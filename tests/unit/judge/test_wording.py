@@ -43,8 +43,32 @@ def test_the_tightest_bound_is_the_one_with_the_least_share_of_its_limit_left():
         verdict(near, "path_length", "path_length"),
         verdict(count, "c", "c"),
     ]
-    assert tightest(verdicts) == "path_length +0.14 m"
+    assert tightest(verdicts) == "path_length +0.14 m, 1 % of its limit"
     assert tightest([]) == ""
+
+
+def test_where_the_robot_stopped_at_a_goal_and_how_long_it_stayed_are_never_the_tightest():
+    stopped = Finding(Status.PASS, "goal dock", "", "≤ 0.25 m from the goal", 0.01, "m", 0.24)
+    turned = Finding(Status.PASS, "goal dock heading", "", "≤ 0.25 rad from the goal's heading", 0.01, "rad", 0.24)
+    waited = Finding(Status.PASS, "goal dock wait", "", "≥ 3.00 s", 0.0, "s", 3.0)
+    within = Finding(Status.PASS, "goal dock time", "", "≤ 20.00 s", 15.0, "s", 5.0)
+    assert tightest([Verdict("goals_reached", "g", "fail", (stopped, turned, waited))]) == ""
+    told = tightest([Verdict("goals_reached", "g", "fail", (stopped, turned, waited, within))])
+    assert told == "g: goal dock time +15.00 s, 75 % of its limit"
+
+
+@pytest.mark.parametrize(
+    ("finding", "told"),
+    [
+        (Finding(Status.PASS, "own", "", "≤ 0.00 m/s", 0.2, "m/s", -0.2), "own +0.20 m/s"),
+        (Finding(Status.PASS, "own", "", "≥ 0.10 m", 0.3, "m", 0.4), "own +0.30 m, 300 % of its limit"),
+        (Finding(Status.PASS, "own", "", "in the yard", 0.3, "m"), "own +0.30 m"),
+        (Finding(Status.PASS, "own", "", "≥ 0.10 m", float("inf"), "m", float("inf")), ""),
+    ],
+    ids=["of zero there are no shares", "at least", "nobody said what was measured", "without end"],
+)
+def test_the_margin_is_told_as_a_share_where_there_is_one(finding, told):
+    assert tightest([verdict(finding, "own", "own")]) == told
 
 
 def bound(limit, margin, value):

@@ -86,5 +86,5 @@ def session(passed, failed, crashed):
         RunStarted(failed.key, failed.result.path, 60.0),
         failed,
         crashed,
-        SessionFinished(1, 1, 1, 49.2, 0.5, junit="out/junit.xml", folder="out"),
+        SessionFinished(1, 1, 1, 49.2, 0.5, junit="out/junit.xml", folder="out", page="out/report.html"),
     ]

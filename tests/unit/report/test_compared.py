@@ -11,7 +11,7 @@ from simscen.core.sessionevents import SessionFinished, SessionStarted
 from simscen.report.compared import compared, numbers, shortened
 from simscen.report.console import text_reporter
 from simscen.report.github import markdown
-from simscen.report.lines import text_of
+from simscen.report.line import text_of
 from simscen.report.page import to_html
 from simscen.report.results import to_json
 

@@ -18,7 +18,7 @@ from simscen.report.results import to_json
 
 EXPECTED = """\
 simscen 0.1.0 · 3 scenarios · 2 workers
-  ✓ navigation/goal        18.2 s simulated in 0.21 s   tightest: path_length +0.14 m
+  ✓ navigation/goal        18.2 s simulated in 0.21 s   tightest: path_length +0.14 m, 1 % of its limit
   ✗ faults/lidar_off       31.0 s simulated in 0.35 s
       stopped_within: 0.84 s > 0.50 s after lidar.off, at t = 10.84 s, (2.10, 3.41)
         drove 0.31 m blind at 0.37 m/s; the newest scan was 0.9 s old
@@ -34,7 +34,18 @@ simscen 0.1.0 · 3 scenarios · 2 workers
         | Segmentation fault
       scenario  scenarios/evil/[red]::error::x.scenario.yaml:1
       again     simscen run evil
+
+did not pass:
+  ✗ faults/lidar_off
+      stopped_within: 0.84 s > 0.50 s after lidar.off, at t = 10.84 s, (2.10, 3.41)
+      picture   out/x/map.png
+      again     simscen run scenarios/faults/lidar_off.scenario.yaml --seed 7
+  ! evil/[red]::error::x
+      crashed: SIGSEGV
+      again     simscen run evil
+
 1 passed, 1 failed, 1 error · 49 s simulated in 0.5 s (98x) · out/junit.xml
+page: out/report.html
 """
 
 
@@ -106,7 +117,7 @@ def test_a_terminal_that_knows_only_ascii_gets_plain_lines(session):
 def test_a_terminal_gets_the_same_facts_in_colour_and_user_text_is_no_markup(session):
     out = io.StringIO()
     told(text_reporter(out, live=True), session)
-    plain = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", out.getvalue())
+    plain = re.sub(r"\x1b(\[[0-9;?]*[a-zA-Z]|\]8;.*?\x1b\\)", "", out.getvalue())
     for line in EXPECTED.splitlines():
         if "##" not in line:
             assert line.strip() in plain

@@ -1,0 +1,36 @@
+"""A first Ctrl-C ends a session in good order, a second one at once."""
+
+import subprocess
+import sys
+
+PROGRAM = """
+import os, signal, sys
+from simscen.cli.interrupts import signals_interrupt
+from simscen.run.process.supervisor import Interrupted
+
+now = iter({times})
+try:
+    with signals_interrupt(lambda: next(now)):
+        os.kill(os.getpid(), signal.SIGINT)
+except Interrupted as interrupted:
+    print("interrupted by", interrupted.number, flush=True)
+os.kill(os.getpid(), signal.{second})
+print("reports are written", flush=True)
+"""
+
+
+def ended(times, second="SIGINT"):
+    program = PROGRAM.format(times=times, second=second)
+    return subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+
+
+def test_the_second_ends_it_at_once_and_says_how_to_get_the_reports():
+    done = ended([0.0, 3.0])
+    assert (done.returncode, done.stdout) == (130, "interrupted by 2\n")
+    assert done.stderr.startswith("simscen: ended at once, without reports: `simscen report` makes them")
+    assert ended([0.0, 3.0], "SIGTERM").returncode == 143
+
+
+def test_the_same_press_told_twice_is_one():
+    done = ended([0.0, 0.01])
+    assert (done.returncode, done.stdout) == (0, "interrupted by 2\nreports are written\n")

@@ -1,0 +1,67 @@
+"""`simscen run --last-failed`, as pytest's --last-failed."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+ROOM = """\
+simscen: 1
+world: {simscen: 1, walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]}
+robot: {pose: {x: 1, y: 1}}
+goals: [{pose: {x: 5, y: 3}}]
+time_limit: 0.5 s
+pass: [{collisions: {max: 0}}]
+"""
+FAILING = ROOM.replace("collisions: {max: 0}", "clearance: {min: 2}")
+
+
+@pytest.fixture
+def project(simscen, tmp_path: Path):
+    (tmp_path / "good.scenario.yaml").unlink()
+    for name, text in (("a", ROOM), ("b", FAILING), ("c", FAILING)):
+        (tmp_path / f"{name}.scenario.yaml").write_text(text)
+    return tmp_path
+
+
+def ran(folder: Path) -> list[tuple[str, int, str]]:
+    document = json.loads((folder / "simscen-out/latest/results.json").read_text())
+    return [(run["scenario"], run["seed"], run["outcome"]) for run in document["runs"]]
+
+
+def test_only_what_failed_runs_again_until_nothing_is_left(simscen, project: Path) -> None:
+    ended = simscen("run", ".", "--last-failed")
+    assert ended.err == "simscen: there is no earlier session in simscen-out: everything that is chosen runs\n"
+    assert len(ran(project)) == 3
+    ended = simscen("run", ".", "--lf")
+    assert (ended.code, ended.err) == (1, "simscen: 2 runs failed last\n")
+    assert ran(project) == [("b", 1, "failed"), ("c", 1, "failed")]
+    (project / "b.scenario.yaml").write_text(ROOM)
+    (project / "new.scenario.yaml").write_text(FAILING)
+    (project / "c.scenario.yaml").rename(project / "d.scenario.yaml")
+    ended = simscen("run", ".", "--lf")
+    assert (ended.code, ended.err) == (0, "simscen: 2 runs failed last: 1 is run, 1 is not among what is chosen\n")
+    assert ran(project) == [("b", 1, "passed")]
+    ended = simscen("run", "a.scenario.yaml", "--lf")
+    assert ended.err == "simscen: 1 run failed last, and is not among what is chosen: everything that is chosen runs\n"
+    assert ran(project) == [("a", 1, "passed")]
+
+
+def test_a_failed_run_keeps_its_seed(simscen, project: Path) -> None:
+    simscen("run", "b.scenario.yaml", "--repeat", "2", "--seed", "7")
+    simscen("run", "b.scenario.yaml", "--lf")
+    assert ran(project) == [("b", 7, "failed"), ("b", 8, "failed")]
+    simscen("run", "b.scenario.yaml", "--lf", "--seed", "8")
+    assert ran(project) == [("b", 8, "failed")]
+
+
+def test_sessions_are_looked_for_beside_the_output_folder(simscen, project: Path) -> None:
+    simscen("run", "a.scenario.yaml", "--out", "ci/1")
+    ended = simscen("run", "a.scenario.yaml", "--out", "ci/2", "--lf")
+    nothing = f"simscen: nothing failed in the last session, {project}/ci/1: everything that is chosen runs\n"
+    assert (ended.code, ended.err) == (0, nothing)
+
+
+def test_a_session_that_goes_on_knows_itself_what_is_left(simscen, project: Path) -> None:
+    ended = simscen("run", ".", "--resume", "out", "--last-failed")
+    assert (ended.code, ended.err) == (2, "simscen: --last-failed and --resume exclude each other\n")

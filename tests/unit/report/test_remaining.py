@@ -1,0 +1,61 @@
+"""How long a session will go on."""
+
+from dataclasses import replace
+
+import pytest
+
+from simscen.core.result import RunKey
+from simscen.core.sessionevents import RunStarted, SessionStarted
+from simscen.report.remaining import Remaining, _rounded
+
+
+class Clock:
+    now = 100.0
+
+    def __call__(self):
+        return self.now
+
+
+@pytest.fixture
+def session(passed):
+    """Runs of a session of ten, a second each; `kept` of them were there before."""
+
+    def told(done, kept=0):
+        clock = Clock()
+        remaining = Remaining(clock)
+        remaining(SessionStarted("0.1.0", 10, 10, 1))
+        for number in range(kept + done):
+            run = replace(passed, result=replace(passed.result, key=RunKey("navigation/goal", number + 1)))
+            if number >= kept:
+                remaining(RunStarted(run.key, run.result.path))
+                clock.now += 1.0
+            remaining(run)
+        return remaining
+
+    return told
+
+
+def test_the_rest_takes_as_long_as_what_was(session):
+    assert session(done=4).seconds == 6.0
+    assert session(done=4).told == "4 of 10, about 5 s left"
+
+
+def test_what_was_kept_from_an_earlier_session_took_no_time(session):
+    assert session(done=2, kept=5).seconds == 3.0
+
+
+def test_after_one_run_it_is_too_early_to_say(session):
+    assert session(done=1).told == "1 of 10"
+
+
+def test_a_single_run_counts_nothing():
+    remaining = Remaining(Clock())
+    remaining(SessionStarted("0.1.0", 1, 1, 1))
+    assert remaining.told == ""
+
+
+@pytest.mark.parametrize(
+    ("seconds", "told"), [(0.4, "5 s"), (42, "40 s"), (89, "90 s"), (100, "2 min"), (5000, "83 min"), (9000, "2.5 h")]
+)
+def test_times_are_told_in_steps(seconds, told):
+    assert _rounded(seconds) == told

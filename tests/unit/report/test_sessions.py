@@ -1,0 +1,86 @@
+"""What the sessions of an output folder say has failed last."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from simscen.core.result import Outcome, RunFailure, RunKey
+from simscen.report.journal import Journal
+from simscen.report.journaldata import Planned
+from simscen.report.sessions import last_failed, sessions_in
+
+
+@pytest.fixture
+def session(tmp_path, passed, failed, crashed):
+    """`session(n, a="failed", b="passed")` writes the n-th session of the folder; "…" names a kind of error."""
+    made = {"passed": passed, "failed": failed}
+
+    def write(number, **outcomes):
+        folder = tmp_path / f"s{number}"
+        folder.mkdir()
+        journal = Journal(folder)
+        journal.plan([Planned(key(name), "x") for name in outcomes], "0.1.0", 1)
+        for name, outcome in outcomes.items():
+            broken = replace(crashed, result=replace(crashed.result, error=RunFailure(outcome, "")))
+            run = made.get(outcome, broken)
+            journal(replace(run, result=replace(run.result, key=key(name))))
+        journal.close()
+        (folder / "run.json").write_text(json.dumps({"written": f"2026-01-0{number}T00:00:00+00:00"}))
+        return folder
+
+    return write
+
+
+def key(name):
+    return RunKey(name.removesuffix("_again"), 1).twin if name.endswith("_again") else RunKey(name, 1)
+
+
+def failed_in(folder):
+    return {key.scenario for key in last_failed(folder).runs}
+
+
+def test_without_a_session_there_is_nothing_to_say(tmp_path):
+    assert last_failed(tmp_path) is None
+    assert last_failed(tmp_path / "nowhere") is None
+
+
+def test_failures_and_errors_count_as_failed(session, tmp_path):
+    session(1, a="failed", b="passed", c="crashed")
+    assert failed_in(tmp_path) == {"a", "c"}
+
+
+def test_the_newest_outcome_of_each_run_counts(session, tmp_path):
+    session(2, a="passed", b="failed")
+    newest = session(3, b="passed")
+    session(1, a="failed", b="failed", c="failed")
+    assert sessions_in(tmp_path)[0] == newest
+    assert last_failed(tmp_path).folder == newest
+    assert failed_in(tmp_path) == {"c"}
+
+
+def test_a_run_that_was_interrupted_is_still_what_it_was(session, tmp_path):
+    session(1, a="failed", b="passed")
+    session(2, a="interrupted", b="not-run", c="interrupted")
+    assert failed_in(tmp_path) == {"a"}
+
+
+def test_of_two_runs_that_should_be_equal_one_failure_is_enough(session, tmp_path):
+    session(1, a="passed", a_again="nondeterministic")
+    assert failed_in(tmp_path) == {"a"}
+
+
+def test_a_journal_that_cannot_be_read_and_the_link_to_the_newest_are_passed_over(session, tmp_path):
+    (session(2, a="failed") / "events.jsonl").write_text("{")
+    folder = session(1, a="failed")
+    (tmp_path / "latest").symlink_to(folder.name)
+    assert len(sessions_in(tmp_path)) == 2
+    assert failed_in(tmp_path) == {"a"}
+
+
+def test_what_failed_as_expected_did_not_fail(session, tmp_path, failed):
+    journal = Journal(session(1, a="failed"), goes_on=True)
+    journal.plan([Planned(key("a"), "x")], "0.1.0", 1)
+    journal(replace(failed, result=replace(failed.result, key=key("a"), outcome=Outcome.FAILED_AS_EXPECTED)))
+    journal.close()
+    assert failed_in(tmp_path) == set()

@@ -1,0 +1,237 @@
+"""What the end of a session says once more."""
+
+import io
+import re
+from dataclasses import replace
+
+import pytest
+
+from simscen.core.result import Outcome, RunFailure, RunKey
+from simscen.core.sessionevents import SessionFinished, SessionStarted
+from simscen.core.verdict import Finding, Status, Verdict
+from simscen.report.console import text_reporter
+from simscen.report.line import text_of
+from simscen.report.live import ColourReporter, LiveReporter
+from simscen.report.look import Look
+from simscen.report.telling import Telling
+
+
+def of(run, **changes):
+    return replace(run, result=replace(run.result, **changes))
+
+
+def told(events, slow=None, columns=None):
+    telling = Telling(slow, lambda: columns)
+    return [text_of(line) for event in events for line in telling(event)]
+
+
+def keyed(run, number, name="faults/lidar_off", again=False):
+    key = RunKey(name, number)
+    return of(run, key=key.twin if again else key)
+
+
+AT_80 = """\
+simscen 0.1.0 · 3 scenarios · 2 workers
+  ✓ navigation/goal        18.2 s simulated in 0.21 s
+    tightest: path_length +0.14 m, 1 % of its limit
+  ✗ faults/lidar_off       31.0 s simulated in 0.35 s
+      stopped_within: 0.84 s > 0.50 s after lidar.off, at t = 10.84 s, (2.10,
+        3.41)
+        drove 0.31 m blind at 0.37 m/s; the newest scan was 0.9 s old
+      warning: speed: 0.60 m/s > 0.50 m/s, at t = 1.00 s, (1.00, 1.00)
+      scenario  scenarios/faults/lidar_off.scenario.yaml:27
+      picture   out/x/map.png
+      again     simscen run scenarios/faults/lidar_off.scenario.yaml --seed 7
+1 passed, 1 failed, 1 error · 49 s simulated in 0.5 s (98x) · out/junit.xml
+page: out/report.html
+"""
+
+AT_40 = """\
+simscen 0.1.0 · 3 scenarios · 2 workers
+  ✓ navigation/goal
+    18.2 s simulated in 0.21 s
+    tightest: path_length +0.14 m, 1 %
+    of its limit
+  ✗ faults/lidar_off
+    31.0 s simulated in 0.35 s
+      stopped_within: 0.84 s > 0.50 s
+        after lidar.off, at t = 10.84 s,
+        (2.10, 3.41)
+        drove 0.31 m blind at 0.37 m/s;
+          the newest scan was 0.9 s old
+      warning: speed: 0.60 m/s > 0.50
+        m/s, at t = 1.00 s, (1.00, 1.00)
+      scenario
+             scenarios/faults/lidar_off.scenario.yaml:27
+      picture   out/x/map.png
+      again     simscen run \\
+             scenarios/faults/lidar_off.scenario.yaml \\
+             --seed 7
+1 passed, 1 failed, 1 error · 49 s
+  simulated in 0.5 s (98x) ·
+  out/junit.xml
+page: out/report.html
+"""
+
+
+@pytest.mark.parametrize(("columns", "expected"), [(80, AT_80), (40, AT_40)])
+def test_a_narrow_terminal_breaks_no_word(session, passed, failed, columns, expected):
+    lines = told([session[0], passed, failed], columns=columns) + told([session[-1]], columns=columns)
+    assert "\n".join(lines) + "\n" == expected
+
+
+def test_a_wide_terminal_has_the_lines_of_a_pipe(session):
+    assert told(session, columns=200) == told(session)
+
+
+def test_every_criterion_that_failed_has_its_own_line(failed):
+    first, second = failed.result.verdicts
+    more = Verdict("speed", "slow", "fail", (*second.findings, *second.findings))
+    run = of(failed, verdicts=(first, more), lines=(27, 28))
+    lines = told([run])
+    assert sum(line.startswith("      ") and " > " in line for line in lines) == 3
+
+
+def test_a_recap_tells_the_first_cause_of_several_and_how_many_more_there_are(session, passed, failed):
+    first, second = failed.result.verdicts
+    run = of(failed, verdicts=(replace(second, severity="fail"), first), lines=(28, 27))
+    lines = told([passed, run, session[-1]])
+    recap = lines[lines.index("did not pass:") :]
+    assert recap[1:3] == [
+        "  ✗ faults/lidar_off (seed 7)".removesuffix(" (seed 7)"),
+        "      speed: 0.60 m/s > 0.50 m/s, at t = 1.00 s, (1.00, 1.00) (and 1 more)",
+    ]
+
+
+def test_a_single_run_is_not_told_twice(session, failed):
+    assert "did not pass:" not in told([failed, session[-1]])
+    assert "did not pass:" not in told([failed, keyed(failed, 7, again=True), session[-1]])
+
+
+def test_where_all_passed_there_is_no_recap(session, passed):
+    assert "did not pass:" not in told([passed, keyed(passed, 2), session[-1]])
+
+
+def test_of_very_many_failures_only_the_first_say_where_to_look(session, failed):
+    lines = told([*(keyed(failed, number) for number in range(1, 31)), session[-1]])
+    recap = lines[lines.index("did not pass:") :]
+    assert sum("✗" in line for line in recap) == 30
+    assert sum(line.startswith("      again ") for line in recap) == 20
+
+
+def test_the_slowest_are_listed_by_wall_time(session, passed, failed, crashed):
+    lines = told([passed, failed, crashed, session[-1]], slow=2)
+    at = lines.index("slowest:")
+    assert lines[at + 1 : at + 4] == [
+        "    1.25 s  evil/[red]::error::x   0.0 s simulated",
+        "    0.35 s  faults/lidar_off   31.0 s simulated",
+        "",
+    ]
+    everything = told([passed, failed, crashed, session[-1]], slow=0)
+    assert sum("s simulated" in line and line.startswith("    ") for line in everything) == 3
+
+
+def test_equal_logs_are_said_to_be_equal(session, failed, passed):
+    pair = [failed, keyed(failed, 7, again=True)]
+    assert "logs equal: 1 pair of runs, byte for byte" in told([*pair, session[-1]])
+    assert not any(line.startswith("logs") for line in told([passed, session[-1]]))
+
+
+def test_logs_that_differ_are_never_said_to_be_equal(session, failed):
+    other = of(
+        keyed(failed, 7, again=True),
+        outcome=Outcome.ERROR,
+        error=RunFailure("nondeterministic", "two runs with the same seed differ: truth at t = 1 s"),
+    )
+    lines = told([failed, other, keyed(failed, 8), keyed(failed, 8, again=True), session[-1]])
+    assert "logs differ: in 1 of 2 pairs of runs, byte for byte" in lines
+    assert not any(line.startswith("logs equal") for line in lines)
+
+
+def test_a_run_without_a_log_is_not_among_those_whose_logs_are_equal(session, failed):
+    bare = replace(failed.artifacts, mcap="")
+    pair = [failed, replace(keyed(failed, 7, again=True), artifacts=bare)]
+    assert not any(line.startswith("logs") for line in told([*pair, session[-1]]))
+
+
+def undone(run, number, kind):
+    return of(keyed(run, number), error=RunFailure(kind, f"{kind}!"))
+
+
+def test_an_interrupted_session_ends_with_two_lines(session, passed, crashed):
+    gone = [undone(crashed, 2, "interrupted"), undone(crashed, 3, "not-run"), undone(crashed, 4, "not-run")]
+    end = replace(session[-1], passed=1, failed=0, errors=4, interrupted=True)
+    lines = told([passed, crashed, *gone, end])
+    assert lines[-2:] == [
+        "interrupted: 1 passed, 1 error, 1 under way, 2 not begun",
+        "page: out/report.html   go on with --resume out",
+    ]
+    assert not any("not-run!" in line or "interrupted!" in line for line in lines)
+
+
+def test_runs_that_fail_fast_left_out_are_counted_and_not_listed(session, failed, crashed):
+    end = replace(session[-1], passed=0, failed=1, errors=2)
+    lines = told([failed, undone(crashed, 2, "not-run"), undone(crashed, 3, "not-run"), end])
+    assert lines[-2].startswith("0 passed, 1 failed, 2 not run · ")
+    assert not any("not-run!" in line for line in lines)
+
+
+def shown(events, look, reporter):
+    out = io.StringIO()
+    out.isatty = lambda: True
+    with reporter(out, look) as listen:
+        for event in events:
+            listen(event)
+    return out.getvalue()
+
+
+def test_forced_colours_come_without_moving_the_cursor(session):
+    text = shown(session, Look(colour=True, live=False, terminal=False), ColourReporter)
+    assert "\x1b[32m✓\x1b[0m" in text
+    assert set(re.findall(r"\x1b\[[0-9;?]*([a-zA-Z])", text)) == {"m"}
+    assert "\x1b]8" not in text
+
+
+def test_what_a_ci_might_obey_has_no_colours_that_could_hide_it(session):
+    text = shown(session, Look(colour=True, live=False, terminal=False), ColourReporter)
+    assert not re.search(r"^\s*::|##\[", text, re.MULTILINE)
+
+
+def test_a_terminal_without_colours_is_live_all_the_same(session):
+    text = shown(session, Look(colour=False, live=True, terminal=True), LiveReporter)
+    assert "\x1b[?25l" in text
+    assert not re.search(r"\x1b\[[0-9;]*m", text)
+
+
+def test_paths_can_be_clicked_where_there_are_colours(session, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    text = shown(session, Look(colour=True, live=True, terminal=True), LiveReporter)
+    assert re.search(rf"\x1b\]8;[^;]*;file://{re.escape(str(tmp_path))}/out/report.html\x1b\\", text)
+
+
+def test_progress_says_how_many_are_done(session, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "40")
+    text = shown([session[0], session[1], session[2]], Look(colour=True, live=True, terminal=True), LiveReporter)
+    rows = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "\n", text).splitlines()
+    assert any("0 of 3" in row for row in rows)
+    assert all(len(row.rstrip()) <= 40 for row in rows if "…" in row)
+
+
+def test_a_forced_colour_reaches_a_pipe():
+    out = io.StringIO()
+    out.isatty = lambda: False
+
+    class Utf8(io.StringIO):
+        encoding = "utf-8"
+
+    stream = Utf8()
+    with text_reporter(stream, environ={"FORCE_COLOR": "1"}) as listen:
+        listen(SessionStarted("0.1.0", 1, 1, 1))
+        listen(SessionFinished(1, 0, 0, 1.0, 1.0))
+    assert "\x1b[32m1 passed" in stream.getvalue()
+
+
+def test_a_finding_that_checked_nothing_is_told_in_a_recap_as_well(session, passed, failed):
+    nothing = Verdict("own", "own", "fail", (Finding(Status.INCONCLUSIVE, "own", "too short", ""),))
+    lines = told([passed, of(failed, verdicts=(nothing,), lines=(3,)), session[-1]])
+    assert "      own: inconclusive: too short" in lines[lines.index("did not pass:") :]
