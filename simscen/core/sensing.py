@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.motion import Twist
 
 if TYPE_CHECKING:
@@ -73,12 +73,18 @@ class Bump:
 
 @dataclass(frozen=True, eq=False)
 class Image:
-    """A camera frame: `rgb` (h, w, 3) uint8, `depth` (h, w) in metres, inf where nothing is."""
+    """A camera frame: `rgb` (h, w, 3) uint8, `depth` (h, w) in metres along the optical axis, inf where nothing is.
+
+    The camera sits at `mount` in the robot's base frame and looks along its x axis; `field_of_view` is horizontal, in
+    rad, of square pixels. 0 where nobody has said how it sees.
+    """
 
     sensor: str
     tick: int
     rgb: npt.NDArray[np.uint8]
     depth: npt.NDArray[np.float32]
+    mount: Pose3 = Pose3()
+    field_of_view: float = 0.0
 
 
 Reading = Scan | Odometry | Imu | Bump | Image

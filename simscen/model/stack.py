@@ -144,6 +144,17 @@ _Localizers = Annotated[
 Localizer = Annotated[LocalizerSpec, ByType("localizer", _Localizers)]
 
 
+class DenoiseLayer(Spec):
+    """nav2_costmap_2d's denoise layer: obstacles of very few cells are noise, and left out."""
+
+    enabled: bool = False
+    """Whether it is there at all."""
+    minimal_group_size: Annotated[int, Field(ge=1, le=1000)] = 2
+    """Groups of fewer cells are left out."""
+    group_connectivity_type: Literal[4, 8] = 8
+    """Whether cells that touch at a corner are of one group: 8, or 4 where only edges join."""
+
+
 class Costmap(Ranged):
     """The global costmap (nav2_costmap_2d: static, obstacle and inflation layers), in the map frame, for plans."""
 
@@ -163,8 +174,14 @@ class Costmap(Ranged):
     """Beams clear cells up to this distance."""
     raytrace_min_range: NonNegativeLength = 0.0
     """Beams clear cells from this distance on."""
+    min_obstacle_height: NonNegativeLength = 0.05
+    """Of what a camera sees, lower things are the ground. Lidars see at their own height, whatever this says."""
+    max_obstacle_height: NonNegativeLength = 2.0
+    """Of what a camera sees, higher things are not in the way."""
+    denoise_layer: DenoiseLayer = by_default()
+    """What is done about single cells."""
     track_unknown_space: bool = True
-    """Taken from files of Nav2; means nothing here."""
+    """Whether what the map does not know, and no beam has passed through, is unknown; else it is free."""
     rolling_size: PositiveLength = 24.0
     """Edge of the rolling window when driving without a map."""
 
@@ -195,6 +212,14 @@ class LocalCostmap(Spec):
     """Beams clear cells up to this distance."""
     raytrace_min_range: NonNegativeLength | None = None
     """Beams clear cells from this distance on."""
+    min_obstacle_height: NonNegativeLength | None = None
+    """Of what a camera sees, lower things are the ground."""
+    max_obstacle_height: NonNegativeLength | None = None
+    """Of what a camera sees, higher things are not in the way."""
+    denoise_layer: DenoiseLayer | None = None
+    """What is done about single cells."""
+    track_unknown_space: bool = False
+    """Whether what no beam has passed through is unknown; else it is free."""
 
     def completed(self, shared: Costmap) -> Costmap:
         """The costmap with what it does not say itself from `shared`."""

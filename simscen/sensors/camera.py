@@ -18,4 +18,4 @@ class CameraSensor:
         """Take a picture."""
         spec = self._spec
         rgb, depth = self._view.image(self._mount, spec.width, spec.height, spec.field_of_view, spec.max_range)
-        return Image(self.name, tick, rgb, depth)
+        return Image(self.name, tick, rgb, depth, self._mount, spec.field_of_view)

@@ -6,7 +6,7 @@ from simscen.core.belief import Estimate
 from simscen.core.events import Event
 from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import ErrorCode, Goal, Path
-from simscen.core.sensing import Imu, Odometry, Readings, Scan
+from simscen.core.sensing import Image, Imu, Odometry, Readings, Scan
 from simscen.core.trace import Decision
 from simscen.core.zones import Zones
 from simscen.stack.collision_monitor import CollisionMonitor
@@ -133,6 +133,8 @@ class ReferenceStack:
                     if reading.sensor in self._lidars:  # echoes of a sonar show obstacles, but no walls to match
                         self._localizer.on_scan(reading)
                     scans.append(reading)
+                case Image() if reading.field_of_view > 0.0:
+                    self._costmaps.see(reading)
                 case _:
                     pass
         for scan in scans:  # after all odometry of this beat, wherever that stands among the readings

@@ -4,23 +4,26 @@ import math
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
 from simscen.core.geometry import Pose2
-from simscen.core.sensing import Scan
+from simscen.core.sensing import Image, Scan
 from simscen.core.zones import Zones
 from simscen.model.stack import Costmap as CostmapSpec
+from simscen.stack.costmap.denoise_layer import without_specks
 from simscen.stack.costmap.frame import Cells, Frame
 from simscen.stack.costmap.inflation_layer import FAR, Inflation, squared_distances
-from simscen.stack.costmap.obstacle_layer import crossed, hits
-from simscen.stack.costmap.rolling import carried_over, left_behind, window_around, within
-from simscen.stack.costmap.static_layer import StaticLayer, empty_layer, static_layer
+from simscen.stack.costmap.live_layer import LiveLayer, Window
+from simscen.stack.costmap.obstacle_layer import crossed
+from simscen.stack.costmap.rolling import carried, left_behind, window_around, within
+from simscen.stack.costmap.static_layer import Mask, StaticLayer, empty_layer, static_layer
 from simscen.stack.protocols import CostmapView, Surroundings
 
-BESIDE_A_WALL = 2
-"""Hits within one cell (squared distance 2) of a mapped wall are the wall itself: marking them would tell nothing."""
 BEYOND_HULL = 0.5
 """Metres beyond the hull up to which distances are told, or the inflation radius if that is more."""
+LOOK_AROUND = 5
+"""Every which scan is asked what unknown cells it shows to be free: once a second at the default rate, Nav2's own for
+the global costmap. Nothing that drives waits for it, and of a map's outside there are many."""
+ALL = (slice(None), slice(None))
 
 
 class Costmap:
@@ -50,11 +53,14 @@ class Costmap:
         scaling = spec.cost_scaling_factor
         self._inflation = Inflation(resolution, self._inscribed, spec.inflation_radius, scaling, reach)
         self._margin = math.ceil(reach / resolution)
-        self._revision = 0
-        self._zoned = 0
-        self._newest: dict[str, tuple[Pose2, Scan]] = {}
-        self._lay(self._layer(Pose2(0.0, 0.0)))
-        self._show(np.zeros(self._frame.shape, dtype=bool))
+        self._speck = spec.denoise_layer.minimal_group_size if spec.denoise_layer.enabled else 0
+        self._revision, self._zoned, self._scans = 0, 0, 0
+        self._newest: dict[str, tuple[Pose2, Scan | Image]] = {}
+        layer = self._layer(Pose2(0.0, 0.0))
+        self._live = LiveLayer(spec, self._inscribed, layer.frame)
+        self._lay(layer)
+        self._unknown = layer.unknown
+        self._show()
 
     @property
     def view(self) -> CostmapView:
@@ -64,32 +70,25 @@ class Costmap:
     @property
     def obstacle_cells(self) -> int:
         """How many cells are marked as live obstacles, or were forbidden since the start."""
-        return int(np.count_nonzero(self._live)) + self._zoned
+        return int(np.count_nonzero(self._live.marked())) + self._zoned
 
-    def update(self, base: Pose2, scan: Scan) -> None:
-        """Clear what the beams pass through, then mark what they hit, seen from the robot at `base`."""
+    def update(self, base: Pose2, seen: Scan | Image) -> None:
+        """Clear what a sensor sees through, then mark what it sees, from the robot at `base`."""
         if self._rolling and left_behind(self._frame, base, self._no_farther):
-            before = self._frame
-            self._lay(self._layer(base))
-            self._show(carried_over(self._live, before, self._frame))
-        around = self._around(base, scan)
-        corner = np.array((around[0].start, around[1].start))
-        live = self._live[around]
-        was = live.copy()
-        marked = np.argwhere(live) + corner
-        if len(marked):
-            self._set(marked[crossed(marked, self._frame, scan, base, self._spec)], False)
-        self._set(self._hit(base, scan), True)
-        if len(marked):
-            self._set(marked[self._under_robot(marked, base)], False)
-        self._newest[scan.sensor] = (base, scan)
-        self._refresh(np.argwhere(was != live) + corner)
+            self._roll(base)
+        self._newest[seen.sensor] = (base, seen)
+        if isinstance(seen, Image):
+            self._refresh(self._live.on_image(base, seen, self._static_squared))
+            return
+        self._refresh(self._live.on_scan(base, seen, self._static_squared))
+        self._learn(base, seen)
 
     def clear(self) -> None:
-        """Forget every live obstacle but those that the newest scans show."""
-        self._show(np.zeros(self._frame.shape, dtype=bool))
-        for base, scan in list(self._newest.values()):
-            self.update(base, scan)
+        """Forget every live obstacle but those that the newest readings show."""
+        self._live.forget(self._frame)
+        self._show()
+        for base, seen in list(self._newest.values()):
+            self.update(base, seen)
 
     def set_zones(self, zones: Zones) -> None:
         """Keep out of these from now on, and of no others."""
@@ -97,7 +96,7 @@ class Costmap:
         self._surroundings = replace(self._surroundings, keepout=zones.keepout, masks=zones.masks)
         self._lay(self._layer_in(self._frame))
         self._zoned += self._forbidden() - before
-        self._show(self._live)
+        self._show()
 
     def _forbidden(self) -> int:
         return int(np.count_nonzero(self._static_squared == 0))
@@ -116,54 +115,67 @@ class Costmap:
         """Where to plan to: the goal, or when it is beyond a rolling window the nearest point to it inside."""
         return within(self._frame, start, goal) if self._rolling else goal
 
+    def _roll(self, base: Pose2) -> None:
+        """Follow the robot; what is new in the window is unknown, where that is tracked."""
+        before = self._frame
+        layer = self._layer(base)
+        self._lay(layer)
+        self._live.roll(layer.frame)
+        self._unknown = carried(self._unknown, before, layer.frame, self._spec.track_unknown_space)
+        self._show()
+
     def _layer(self, centre: Pose2) -> StaticLayer:
         return self._layer_in(window_around(centre, self._size, self._spec.resolution))
 
     def _layer_in(self, window: Frame) -> StaticLayer:
         """What never changes but by an order; in this window, where there is no map."""
         grid, keepout, mask = self._surroundings.map, self._surroundings.keepout, self._surroundings.masks.keepout
-        return empty_layer(window, keepout, mask) if grid is None else static_layer(grid, keepout, mask)
+        unknown = self._spec.track_unknown_space
+        if grid is None:
+            return empty_layer(window, keepout, mask, unknown)
+        return static_layer(grid, keepout, mask, unknown)
 
     def _lay(self, layer: StaticLayer) -> None:
-        self._frame, self._unknown = layer.frame, layer.unknown
+        self._frame = layer.frame
         self._static_squared = squared_distances(layer.lethal)
 
-    def _show(self, live: npt.NDArray[np.bool_]) -> None:
-        """Take these live obstacles and compute everything again."""
-        self._live = live
-        squared = np.minimum(self._static_squared, squared_distances(live))
+    def _show(self) -> None:
+        """Compute everything again."""
+        squared = np.minimum(self._static_squared, squared_distances(self._obstacles(ALL)))
         self._costs = self._inflation.costs(squared, self._unknown)
         self._distance = self._inflation.metres[squared]
         self._revision += 1
 
-    def _set(self, cells: Cells, marked: bool) -> None:
-        self._live[cells[:, 0], cells[:, 1]] = marked
+    def _obstacles(self, window: Window) -> Mask:
+        """Live obstacles in a window, without specks where they are noise."""
+        marked = self._live.marked(window)
+        if not self._speck:
+            return marked
+        return without_specks(marked, self._static_squared[window] == 0, self._spec.denoise_layer)
 
-    def _around(self, base: Pose2, scan: Scan) -> tuple[slice, slice]:
-        """The cells that the scan can reach."""
-        row, column = self._frame.cells(np.array([[base.x, base.y]]))[0].tolist()
-        far = max(self._spec.raytrace_max_range, self._spec.obstacle_max_range) + math.hypot(scan.mount.x, scan.mount.y)
-        return self._frame.window((row, column), (row, column), math.ceil(far / self._frame.resolution) + 1)
-
-    def _under_robot(self, cells: Cells, base: Pose2) -> npt.NDArray[np.bool_]:
-        """Nav2's footprint_clearing_enabled, for the inscribed circle."""
-        offset = self._frame.centres(cells) - np.array([base.x, base.y])
-        return np.asarray(np.hypot(offset[:, 0], offset[:, 1]) < self._inscribed)
-
-    def _hit(self, base: Pose2, scan: Scan) -> Cells:
-        points = hits(scan, base, self._spec.obstacle_min_range, self._spec.obstacle_max_range)
-        cells = self._frame.cells(points)
-        cells = cells[self._frame.inside(cells)]
-        return cells[self._static_squared[cells[:, 0], cells[:, 1]] > BESIDE_A_WALL]
+    def _learn(self, base: Pose2, scan: Scan) -> None:
+        """Unknown cells that the beams pass through are known from now on."""
+        self._scans += 1
+        if self._scans % LOOK_AROUND != 1:
+            return
+        around, corner = self._live.around(base, math.hypot(scan.mount.x, scan.mount.y))
+        cells = np.argwhere(self._unknown[around]) + corner
+        cells = cells[crossed(cells, self._frame, scan, base, self._spec)] if len(cells) else cells
+        if not len(cells):
+            return
+        rows, columns = cells[:, 0], cells[:, 1]
+        self._unknown[rows, columns] = False
+        self._costs[rows, columns] = self._inflation.at(self._distance[rows, columns])
+        self._revision += 1
 
     def _refresh(self, changed: Cells) -> None:
         """Compute distances and costs again wherever one of the changed cells can matter."""
         if not len(changed):
             return
         low, high = changed.min(axis=0).tolist(), changed.max(axis=0).tolist()
-        inner = self._frame.window((low[0], low[1]), (high[0], high[1]), self._margin)
-        outer = self._frame.window((low[0], low[1]), (high[0], high[1]), 2 * self._margin)
-        near = squared_distances(self._live[outer])
+        inner = self._frame.window((low[0], low[1]), (high[0], high[1]), self._margin + self._speck)
+        outer = self._frame.window((low[0], low[1]), (high[0], high[1]), 2 * (self._margin + self._speck))
+        near = squared_distances(self._obstacles(outer))
         near[near > self._margin * self._margin] = FAR
         part = (
             slice(inner[0].start - outer[0].start, inner[0].stop - outer[0].start),

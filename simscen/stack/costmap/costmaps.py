@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from simscen.core.geometry import Pose2
-from simscen.core.sensing import Scan
+from simscen.core.sensing import Image, Scan
 from simscen.core.zones import Zones
 from simscen.model.stack import StackSpec
 from simscen.stack.costmap.costmap import Costmap
@@ -44,10 +44,10 @@ class Costmaps:
         self._odom_from_map: Pose2 | None = None
         self._painted = False
 
-    def see(self, scan: Scan) -> None:
-        """A scan, to be taken in with the next update."""
+    def see(self, seen: Scan | Image) -> None:
+        """A reading, to be taken in with the next update."""
         for rhythm in (self._wide, self._near):
-            rhythm.scans[scan.sensor] = scan
+            rhythm.seen[seen.sensor] = seen
 
     def due(self, tick: int) -> bool:
         """Whether it is time for an update of the global costmap."""
@@ -60,11 +60,11 @@ class Costmaps:
 
     def update(self, tick: int, frames: Frames, odometry: OdometryHistory) -> None:
         """Feed the newest scan of each sensor to the costmaps that are due, seen from where it was taken."""
-        for scan in self._wide.take(tick):
-            self.wide.update(odometry.then(frames.pose, scan.tick), scan)
-        for scan in self._near.take(tick):
+        for seen in self._wide.take(tick):
+            self.wide.update(odometry.then(frames.pose, seen.tick), seen)
+        for seen in self._near.take(tick):
             self._paint_zones(frames)
-            self.near.update(odometry.then(frames.odometry, scan.tick), scan)
+            self.near.update(odometry.then(frames.odometry, seen.tick), seen)
 
     def clear(self) -> None:
         """Forget every live obstacle but those that the newest scans show (Nav2's ClearEntireCostmap of both)."""
@@ -86,20 +86,20 @@ class Costmaps:
 
 
 class _Rhythm:
-    """When a costmap is updated, and the scans that it has not taken in yet."""
+    """When a costmap is updated, and the readings that it has not taken in yet."""
 
     def __init__(self, period: int) -> None:
         self._period, self._updated = period, -period
-        self.scans: dict[str, Scan] = {}
+        self.seen: dict[str, Scan | Image] = {}
 
     def due(self, tick: int) -> bool:
         return tick - self._updated >= self._period
 
-    def take(self, tick: int) -> list[Scan]:
-        """The scans to take in now; without any the update waits for one."""
-        if not self.scans or not self.due(tick):
+    def take(self, tick: int) -> list[Scan | Image]:
+        """The readings to take in now; without any the update waits for one."""
+        if not self.seen or not self.due(tick):
             return []
         self._updated = tick
-        scans = [scan for scan in self.scans.values() if not np.isnan(scan.ranges).all()]
-        self.scans.clear()
-        return scans
+        seen = [one for one in self.seen.values() if isinstance(one, Image) or not np.isnan(one.ranges).all()]
+        self.seen.clear()
+        return seen

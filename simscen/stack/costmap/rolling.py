@@ -1,12 +1,15 @@
 """A window that the robot carries around: obstacles in it persist, what leaves it is forgotten."""
 
 import math
+from typing import TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from simscen.core.geometry import Pose2
 from simscen.stack.costmap.frame import Frame
-from simscen.stack.costmap.static_layer import Mask
+
+Cell = TypeVar("Cell", bound=np.generic)
 
 EDGE = 0.6
 """Metres inside the window's edge where a goal beyond it is aimed at."""
@@ -31,13 +34,20 @@ def left_behind(frame: Frame, base: Pose2, no_farther: float = math.inf) -> bool
     return off[0] > min(FOLLOW * across, no_farther) or off[1] > min(FOLLOW * up, no_farther)
 
 
-def carried_over(marks: Mask, before: Frame, now: Frame) -> Mask:
-    """The marks of a window in the window after it."""
-    moved = np.zeros(now.shape, dtype=bool)
-    cells = now.cells(before.centres(np.argwhere(marks)))
-    cells = cells[now.inside(cells)]
-    moved[cells[:, 0], cells[:, 1]] = True
+def carried(layer: npt.NDArray[Cell], before: Frame, now: Frame, new: float) -> npt.NDArray[Cell]:
+    """The cells of a window in an equal one elsewhere in the plane; `new` where it had none."""
+    moved = np.full(now.shape, new, dtype=layer.dtype)
+    steps = [round((now.origin[axis] - before.origin[axis]) / now.resolution) for axis in (1, 0)]
+    kept = [_kept(step, cells) for step, cells in zip(steps, before.shape, strict=True)]
+    target = tuple(slice(first - step, last - step) for (first, last), step in zip(kept, steps, strict=True))
+    moved[target] = layer[tuple(slice(first, last) for first, last in kept)]
     return moved
+
+
+def _kept(step: int, cells: int) -> tuple[int, int]:
+    """The first and one past the last of so many cells in a row that are still among them after a step."""
+    first = min(max(0, step), cells)
+    return first, max(first, min(cells, cells + step))
 
 
 def within(frame: Frame, start: Pose2, goal: Pose2) -> Pose2:

@@ -25,8 +25,13 @@ class StaticLayer:
     unknown: Mask
 
 
-def static_layer(grid: OccupancyGrid, keepout: tuple[Polygon, ...], mask: OccupancyGrid | None = None) -> StaticLayer:
-    """The layer of a map; a map with a turned origin is sampled into an unrotated frame of the same resolution."""
+def static_layer(
+    grid: OccupancyGrid, keepout: tuple[Polygon, ...], mask: OccupancyGrid | None = None, unknown: bool = True
+) -> StaticLayer:
+    """The layer of a map; a map with a turned origin is sampled into an unrotated frame of the same resolution.
+
+    Where unknown space is not tracked (`unknown`), what the map does not know is free, as in Nav2.
+    """
     if abs(grid.origin.yaw) < 1e-9:
         frame = Frame((grid.origin.x, grid.origin.y), grid.resolution, grid.shape)
         cells = grid.cells
@@ -34,12 +39,14 @@ def static_layer(grid: OccupancyGrid, keepout: tuple[Polygon, ...], mask: Occupa
         frame = _bounding_frame(grid)
         cells = grid.values_at(_all_centres(frame)).reshape(frame.shape)
     lethal = np.ascontiguousarray(cells >= OCCUPIED_FROM) | _forbidden(frame, keepout, mask)
-    return StaticLayer(frame, lethal, np.ascontiguousarray(cells == UNKNOWN) & ~lethal)
+    return StaticLayer(frame, lethal, (cells == UNKNOWN) & ~lethal & unknown)
 
 
-def empty_layer(frame: Frame, keepout: tuple[Polygon, ...], mask: OccupancyGrid | None = None) -> StaticLayer:
-    """The layer of a robot without a map: nothing but keepout zones and masks."""
-    return StaticLayer(frame, _forbidden(frame, keepout, mask), np.zeros(frame.shape, dtype=bool))
+def empty_layer(
+    frame: Frame, keepout: tuple[Polygon, ...], mask: OccupancyGrid | None = None, unknown: bool = False
+) -> StaticLayer:
+    """The layer of a robot without a map: nothing but keepout zones and masks; all of it `unknown`, or free."""
+    return StaticLayer(frame, _forbidden(frame, keepout, mask), np.full(frame.shape, unknown))
 
 
 def _forbidden(frame: Frame, keepout: tuple[Polygon, ...], mask: OccupancyGrid | None) -> Mask:

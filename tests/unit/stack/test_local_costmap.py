@@ -104,7 +104,7 @@ def test_a_robot_that_is_faster_sees_as_far_as_it_looks_ahead() -> None:
 
 def test_what_the_local_costmap_does_not_say_itself_it_takes_from_the_global_one() -> None:
     shared = Costmap(inflation_radius=0.3, obstacle_max_range=1.0)
-    assert LocalCostmap().completed(shared) == shared
+    assert LocalCostmap(track_unknown_space=True).completed(shared) == shared
     own = LocalCostmap(inflation_radius=0.5, update_frequency=10.0).completed(shared)
     assert (own.inflation_radius, own.obstacle_max_range, own.update_frequency) == (0.5, 1.0, 10.0)
 

@@ -218,8 +218,40 @@ def test_zones_that_are_switched_on_make_the_costmap_that_has_them_from_the_star
 
 
 def test_zones_are_switched_in_a_window_that_rolls() -> None:
-    map_ = costmap(None, Spec(rolling_size=6.0))
+    map_ = costmap(None, Spec(rolling_size=6.0, track_unknown_space=False))
     map_.set_zones(Zones(keepout=(((1.0, 0.5), (2.0, 0.5), (2.0, 1.5), (1.0, 1.5)),)))
     assert at(map_, 1.5, 1.0)[0] == 254
     map_.set_zones(Zones())
     assert at(map_, 1.5, 1.0)[0] == 0
+
+
+def test_unknown_space_is_free_where_it_is_not_tracked() -> None:
+    cells = np.full((40, 40), -1, dtype=np.int8)
+    cells[20, 20] = 100
+    surroundings = Surroundings(ROBOT, OccupancyGrid(cells, 0.05), RATE)
+    assert at(Costmap(Spec(), surroundings), 1.025, 1.825)[0] == 255
+    assert at(Costmap(Spec(track_unknown_space=False), surroundings), 1.025, 1.825)[0] == 0
+    assert at(costmap(None), 5.0, 5.0)[0] == 255
+    assert at(costmap(None, Spec(track_unknown_space=False)), 5.0, 5.0)[0] == 0
+
+
+def test_unknown_space_that_a_beam_passes_through_is_known_with_the_cost_it_has() -> None:
+    world = Flatland().room(8, 6)
+    known = costmap(world)
+    grid = world.grid(BOUNDS)
+    map_ = Costmap(Spec(), Surroundings(ROBOT, OccupancyGrid(np.where(grid.cells, 100, -1).astype(np.int8), 0.05,
+                                                             grid.origin), RATE))  # fmt: skip
+    pose = Pose2(4.0, 1.0)
+    for each in (known, map_):
+        each.update(pose, scan_of(world, pose))
+    for x, y in ((4.0, 0.5), (5.5, 1.0), (4.0, 3.5), (3.0, 0.6)):
+        assert at(map_, x, y) == at(known, x, y)
+    assert at(map_, 4.0, 5.0)[0] == 255  # out of reach
+
+
+def test_a_window_that_rolls_goes_on_knowing_what_it_knew() -> None:
+    map_ = costmap(None, Spec(rolling_size=8.0))
+    map_.update(Pose2(0.0, 0.0), scan_of(Flatland(), Pose2(0.0, 0.0)))
+    map_.update(Pose2(1.5, 0.0), scan_of(Flatland(), Pose2(1.5, 0.0)))
+    assert at(map_, -1.0, 0.0)[0] == 0
+    assert at(map_, 5.0, 0.0)[0] == 255

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.stack.costmap.rolling import carried_over, left_behind, window_around, within
+from simscen.stack.costmap.rolling import carried, left_behind, window_around, within
 
 
 def test_windows_around_different_points_share_their_cells() -> None:
@@ -23,8 +23,14 @@ def test_marks_stay_where_they_are_in_the_plane_and_are_lost_outside() -> None:
     marks = np.zeros(before.shape, dtype=bool)
     cells = before.cells(np.array([[2.0, 1.0], [-3.0, 0.0]]))
     marks[cells[:, 0], cells[:, 1]] = True
-    found = now.centres(np.argwhere(carried_over(marks, before, now)))
+    found = now.centres(np.argwhere(carried(marks, before, now, False)))
     assert found == pytest.approx(before.centres(cells[:1]))
+
+
+@pytest.mark.parametrize("to", [Pose2(9, 0), Pose2(-9, 0), Pose2(0, 20), Pose2(-8, -8)])
+def test_of_a_window_that_shares_nothing_with_the_next_nothing_is_kept(to: Pose2) -> None:
+    before, now = window_around(Pose2(0, 0), (8.0, 8.0), 0.05), window_around(to, (8.0, 8.0), 0.05)
+    assert np.isnan(carried(np.ones(before.shape), before, now, np.nan)).all()
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,66 @@
+"""Obstacles that a depth camera sees above and below the plane of a lidar: Nav2's voxel layer, without its voxels.
+
+A cell remembers at what height something was seen in it. It is cleared when the camera sees through that very point,
+so that looking over a low box or under a table top clears neither.
+"""
+
+import math
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.geometry import Array, Pose2
+from simscen.core.sensing import Image
+from simscen.model.stack import Costmap as CostmapSpec
+from simscen.stack.costmap.frame import Cells, Frame
+from simscen.stack.costmap.static_layer import Mask
+
+Heights = npt.NDArray[np.float32]
+
+
+def heights_seen(image: Image, base: Pose2, frame: Frame, spec: CostmapSpec) -> tuple[Cells, Heights]:
+    """Cells (n, 2) in which the camera sees something that is no ground, and at what height (n,) above it."""
+    across, up = _slopes(image.depth.shape, image.field_of_view)
+    depth = image.depth.astype(np.float64)
+    used = np.isfinite(depth) & (depth <= spec.obstacle_max_range) & (depth > 0.0)
+    depth, across, up = depth[used], across[used], up[used]
+    points = image.mount.apply(np.column_stack((depth, depth * across, depth * up)))
+    away = np.hypot(points[:, 0] - image.mount.x, points[:, 1] - image.mount.y)
+    counts = (points[:, 2] >= spec.min_obstacle_height) & (points[:, 2] <= spec.max_obstacle_height)
+    counts &= (away >= spec.obstacle_min_range) & (away <= spec.obstacle_max_range)
+    points = points[counts]
+    cells = frame.cells(base.apply(points[:, :2]))
+    inside = frame.inside(cells)
+    return cells[inside], points[inside, 2].astype(np.float32)
+
+
+def seen_through(cells: Cells, heights: Heights, frame: Frame, image: Image, base: Pose2, spec: CostmapSpec) -> Mask:
+    """Which of the cells (n, 2) the camera looks through at their heights (n,), to something farther away."""
+    place = base.inverse().apply(frame.centres(cells))
+    seen = image.mount.inverse().apply(np.column_stack((place, heights.astype(np.float64))))
+    ahead = seen[:, 0] > 0.0
+    depth = np.where(ahead, seen[:, 0], 1.0)
+    rows, columns = image.depth.shape
+    focal = _focal(columns, image.field_of_view)
+    column = np.floor(columns / 2 - focal * seen[:, 1] / depth).astype(np.int64)
+    row = np.floor(rows / 2 - focal * seen[:, 2] / depth).astype(np.int64)
+    inside = ahead & (row >= 0) & (column >= 0) & (row < rows) & (column < columns)
+    shown = image.depth[np.where(inside, row, 0), np.where(inside, column, 0)]
+    with np.errstate(invalid="ignore"):
+        through = inside & (shown > depth + frame.resolution) & (depth <= spec.raytrace_max_range)
+    return np.asarray(through)
+
+
+def _focal(columns: int, field_of_view: float) -> float:
+    """In pixels."""
+    return columns / 2 / math.tan(field_of_view / 2)
+
+
+@lru_cache(maxsize=8)
+def _slopes(shape: tuple[int, int], field_of_view: float) -> tuple[Array, Array]:
+    """For each pixel how far it looks to the left, and up, for each metre of depth."""
+    rows, columns = shape
+    focal = _focal(columns, field_of_view)
+    left, up = (columns / 2 - 0.5 - np.arange(columns)) / focal, (rows / 2 - 0.5 - np.arange(rows)) / focal
+    return np.broadcast_to(left, shape), np.broadcast_to(up[:, None], shape)

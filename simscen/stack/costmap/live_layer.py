@@ -1,0 +1,97 @@
+"""What the sensors show on top of a map: cells that a lidar marked, and cells in which a depth camera saw something."""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.geometry import Pose2
+from simscen.core.sensing import Image, Scan
+from simscen.model.stack import Costmap as CostmapSpec
+from simscen.stack.costmap.depth_layer import Heights, heights_seen, seen_through
+from simscen.stack.costmap.frame import Cells, Frame
+from simscen.stack.costmap.inflation_layer import Squared
+from simscen.stack.costmap.obstacle_layer import crossed, hits
+from simscen.stack.costmap.rolling import carried
+from simscen.stack.costmap.static_layer import Mask
+
+BESIDE_A_WALL = 2
+"""Hits within one cell (squared distance 2) of a mapped wall are the wall itself: marking them would tell nothing."""
+Window = tuple[slice, slice]
+
+
+class LiveLayer:
+    """Marks and clears; a lidar never clears what a camera saw above or below it, nor a camera what a lidar sees."""
+
+    def __init__(self, spec: CostmapSpec, inscribed: float, frame: Frame) -> None:
+        self._spec, self._inscribed = spec, inscribed
+        self.forget(frame)
+
+    def forget(self, frame: Frame) -> None:
+        """Begin with nothing, on these cells."""
+        self._frame = frame
+        self._scanned: Mask = np.zeros(frame.shape, dtype=bool)
+        self._heights: Heights | None = None
+
+    def roll(self, frame: Frame) -> None:
+        """Go on in another window, with what lies in both."""
+        before, self._frame = self._frame, frame
+        self._scanned = carried(self._scanned, before, frame, False)
+        if self._heights is not None:
+            self._heights = carried(self._heights, before, frame, np.nan)
+
+    def marked(self, window: Window = (slice(None), slice(None))) -> Mask:
+        """The cells in which something is."""
+        if self._heights is None:
+            return self._scanned[window]
+        both: Mask = self._scanned[window] | ~np.isnan(self._heights[window])
+        return both
+
+    def on_scan(self, base: Pose2, scan: Scan, walls: Squared) -> Cells:
+        """Clear what the beams pass through, then mark what they hit; returns the cells that have changed."""
+        around, corner = self.around(base, math.hypot(scan.mount.x, scan.mount.y))
+        scanned = self._scanned[around]
+        was = scanned.copy()
+        marked = np.argwhere(scanned) + corner
+        if len(marked):
+            _set(self._scanned, marked[crossed(marked, self._frame, scan, base, self._spec)], False)
+        points = hits(scan, base, self._spec.obstacle_min_range, self._spec.obstacle_max_range)
+        cells = self._frame.cells(points)
+        _set(self._scanned, _off_walls(cells[self._frame.inside(cells)], walls), True)
+        if len(marked):
+            _set(self._scanned, marked[self._under_robot(marked, base)], False)
+        return np.argwhere(was != scanned) + corner
+
+    def on_image(self, base: Pose2, image: Image, walls: Squared) -> Cells:
+        """Clear what the camera sees through, then mark what it sees; returns the cells that may have changed."""
+        if self._heights is None:
+            self._heights = np.full(self._frame.shape, np.nan, dtype=np.float32)
+        marked = np.argwhere(~np.isnan(self._heights))
+        heights = self._heights[marked[:, 0], marked[:, 1]]
+        gone = seen_through(marked, heights, self._frame, image, base, self._spec) | self._under_robot(marked, base)
+        _set(self._heights, marked[gone], np.nan)
+        cells, heights = heights_seen(image, base, self._frame, self._spec)
+        shown = (walls[cells[:, 0], cells[:, 1]] > BESIDE_A_WALL) & ~self._under_robot(cells, base)
+        cells = cells[shown]
+        self._heights[cells[:, 0], cells[:, 1]] = heights[shown]
+        return np.concatenate((marked[gone], cells))
+
+    def around(self, base: Pose2, mount: float) -> tuple[Window, Cells]:
+        """The cells that a sensor `mount` metres from the base can reach, and the corner that they are counted from."""
+        row, column = self._frame.cells(np.array([[base.x, base.y]]))[0].tolist()
+        far = max(self._spec.raytrace_max_range, self._spec.obstacle_max_range) + mount
+        window = self._frame.window((row, column), (row, column), math.ceil(far / self._frame.resolution) + 1)
+        return window, np.array((window[0].start, window[1].start))
+
+    def _under_robot(self, cells: Cells, base: Pose2) -> Mask:
+        """Nav2's footprint_clearing_enabled, for the inscribed circle."""
+        offset = self._frame.centres(cells) - np.array([base.x, base.y])
+        return np.asarray(np.hypot(offset[:, 0], offset[:, 1]) < self._inscribed)
+
+
+def _off_walls(cells: Cells, walls: Squared) -> Cells:
+    return cells[walls[cells[:, 0], cells[:, 1]] > BESIDE_A_WALL]
+
+
+def _set(layer: npt.NDArray[np.generic], cells: Cells, value: float) -> None:
+    layer[cells[:, 0], cells[:, 1]] = value

@@ -1,0 +1,56 @@
+"""A lidar sees one plane: what is lower, or hangs higher, it drives into; with a depth camera the robot drives around."""
+
+from pathlib import Path
+
+import pytest
+
+from simscen.loading.scenario import load_scenario
+from simscen.run.prepare import prepare
+from simscen.run.simulate import simulate
+
+ROBOT = """\
+simscen: 1
+name: waiter
+description: A TurtleBot with a tray on a mast.
+mass: 1.8 kg
+radius: 0.22 m
+body:
+  - {cylinder: [0.22, 0.09], z: 0.03}
+  - {cylinder: [0.06, 0.50], z: 0.12}
+drive: {type: differential, wheel_radius: 0.033, wheel_separation: 0.287, wheel_width: 0.018}
+limits: {linear: 0.5 m/s, angular: 2, linear_acceleration: 1, linear_deceleration: 1.5, angular_acceleration: 3.2}
+sensors:
+  lidar: {lidar: {mount: {z: 0.18}}}
+  odom: {odometry: {}}
+"""
+CAMERA = "  depth: {camera: {mount: {x: 0.05, z: 0.4}, width: 64, height: 64, field_of_view: 1.2, max_range: 5}}\n"
+SCENARIO = """\
+simscen: 1
+world:
+  simscen: 1
+  walls: [{name: outer wall, points: [[0, 0], [7, 0], [7, 4], [0, 4], [0, 0]]}]
+  obstacles: [{name: thing, %s}]
+robot: {model: waiter.robot.yaml, pose: {x: 1, y: 2}}
+stack: {localizer: {type: ground_truth}}
+goals: [{pose: {x: 6, y: 2}, timeout: 30 s}]
+time_limit: 30 s
+pass:
+  - goals_reached: {}
+  - collisions: {max: 0}
+"""
+LOW_BOX = "box: [0.3, 0.5, 0.12], pose: {x: 3.5, y: 2}"
+TABLE_TOP = "box: [0.4, 0.6, 0.05], z: 0.5, pose: {x: 3.5, y: 2}"
+
+
+def outcome(tmp_path: Path, thing: str, camera: bool) -> dict[str, str]:
+    """Of each criterion its status."""
+    (tmp_path / "waiter.robot.yaml").write_text(ROBOT + camera * CAMERA)
+    file = tmp_path / "own.scenario.yaml"
+    file.write_text(SCENARIO % thing)
+    return {v.criterion: v.status.value for v in simulate(prepare(load_scenario(file, tmp_path))).result.verdicts}
+
+
+@pytest.mark.parametrize("thing", [LOW_BOX, TABLE_TOP], ids=["low box", "table top"])
+def test_a_robot_that_collides_by_its_lidar_alone_does_not_with_a_depth_camera(tmp_path: Path, thing: str) -> None:
+    assert outcome(tmp_path, thing, camera=False)["collisions"] == "fail"
+    assert outcome(tmp_path, thing, camera=True) == {"goals_reached": "pass", "collisions": "pass"}

@@ -1,0 +1,67 @@
+"""Specks go, things stay: nav2_costmap_2d's denoise layer."""
+
+import math
+
+import numpy as np
+import pytest
+
+from simscen.core.geometry import Pose2
+from simscen.core.sensing import Scan
+from simscen.model.stack import Costmap as Spec
+from simscen.model.stack import DenoiseLayer
+from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.costmap.denoise_layer import without_specks
+from simscen.stack.protocols import Surroundings
+from simscen.testing.flatland import RATE, Flatland, round_robot
+
+
+def scan_of(world: Flatland, pose: Pose2, noise: float) -> Scan:
+    step = 2 * math.pi / 360
+    ranges = world.cast((pose.x, pose.y), -math.pi + step * np.arange(360) + pose.yaw)
+    ranges = ranges + np.random.default_rng(3).normal(0, noise, 360)
+    return Scan("lidar", 0, np.where(ranges > 12.0, np.inf, ranges), -math.pi, step, 0.05, 12.0)
+
+
+PICTURE = """
+#.....##...
+.#.....#...
+......#....
+...........
+#..........
+"""
+MARKED = np.array([[c == "#" for c in row] for row in PICTURE.split()])
+NO_WALLS = np.zeros_like(MARKED)
+
+
+@pytest.mark.parametrize(
+    ("size", "connectivity", "left"),
+    [(1, 8, 7), (2, 8, 6), (3, 8, 4), (5, 8, 0), (2, 4, 3), (3, 4, 3), (4, 4, 0)],
+)
+def test_groups_of_fewer_cells_are_left_out(size: int, connectivity: int, left: int) -> None:
+    spec = DenoiseLayer(enabled=True, minimal_group_size=size, group_connectivity_type=connectivity)
+    kept = without_specks(MARKED, NO_WALLS, spec)
+    assert kept.sum() == left
+    assert not (kept & ~MARKED).any()
+
+
+def test_a_cell_beside_a_wall_is_part_of_it() -> None:
+    walls = NO_WALLS.copy()
+    walls[3, :] = True
+    kept = without_specks(MARKED, walls, DenoiseLayer(enabled=True, minimal_group_size=8))
+    assert kept[4, 0]
+    assert not kept[0, 0]
+
+
+def test_a_drive_sees_the_same_with_updates_as_if_all_were_computed_anew() -> None:
+    """What is computed again around changed cells is what a costmap of the same marks shows."""
+    chance = np.random.default_rng(5)
+    world = Flatland(discs=[(x, y, 0.03) for x, y in chance.uniform(-3, 3, (12, 2)).tolist() if math.hypot(x, y) > 1])
+    spec = Spec(denoise_layer=DenoiseLayer(enabled=True, minimal_group_size=4), rolling_size=8.0)
+    map_ = Costmap(spec, Surroundings(round_robot(), None, RATE))
+    for k in range(6):
+        pose = Pose2(0.1 * k, 0.0)
+        map_.update(pose, scan_of(world, pose, noise=0.03))
+        costs, distance = map_.view.costs.copy(), map_.view.distance.copy()
+        map_._show()
+        assert np.array_equal(map_.view.costs, costs)
+        assert np.array_equal(map_.view.distance, distance)

@@ -1,0 +1,105 @@
+"""A depth camera shows what a lidar passes under and over."""
+
+import math
+
+import numpy as np
+import pytest
+
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.sensing import Image, Scan
+from simscen.model.stack import Costmap as Spec
+from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.protocols import Surroundings
+from simscen.testing.flatland import RATE, round_robot
+
+MOUNT = Pose3(0.1, 0.0, 0.3)
+WIDTH, HEIGHT, VIEW = 64, 48, 1.2
+FOCAL = WIDTH / 2 / math.tan(VIEW / 2)
+Slab = tuple[float, float, float, float, float]
+
+
+def image(*slabs: Slab, base: Pose2 = Pose2(0.0, 0.0)) -> Image:
+    """What the camera sees of upright sheets across x (x, least y, greatest y, bottom, top), and of the ground.
+
+    Worked out pixel by pixel from what each looks at, the other way round than the costmap does it. For a base that
+    looks along x.
+    """
+    depth = np.full((HEIGHT, WIDTH), np.inf)
+    eye = base.x + MOUNT.x, base.y + MOUNT.y, MOUNT.z
+    for row in range(HEIGHT):
+        for column in range(WIDTH):
+            left, up = (WIDTH / 2 - 0.5 - column) / FOCAL, (HEIGHT / 2 - 0.5 - row) / FOCAL
+            if up < 0.0:
+                depth[row, column] = eye[2] / -up
+            for x, low, high, bottom, top in slabs:
+                away = x - eye[0]
+                if away > 0 and low <= eye[1] + left * away <= high and bottom <= eye[2] + up * away <= top:
+                    depth[row, column] = min(depth[row, column], away)
+    return Image("camera", 0, np.zeros((HEIGHT, WIDTH, 3), np.uint8), depth.astype(np.float32), MOUNT, VIEW)
+
+
+def costmap(**options: float) -> Costmap:
+    return Costmap(
+        Spec(rolling_size=8.0, track_unknown_space=False, **options), Surroundings(round_robot(), None, RATE)
+    )
+
+
+def lethal(map_: Costmap) -> np.ndarray:
+    view = map_.view
+    return (np.argwhere(view.costs == 254)[:, ::-1] + 0.5) * view.resolution + view.origin
+
+
+LOW_BOX, TABLE_TOP, LAMP = (1.5, -0.3, 0.3, 0.0, 0.12), (1.5, -0.3, 0.3, 0.7, 0.75), (1.5, -0.3, 0.3, 0.5, 0.9)
+
+
+@pytest.mark.parametrize("thing", [LOW_BOX, (1.5, -0.3, 0.3, 0.5, 0.75)])
+def test_what_stands_below_or_hangs_above_the_plane_of_a_lidar_is_marked_where_it_is(thing: Slab) -> None:
+    map_ = costmap()
+    map_.update(Pose2(0.0, 0.0), image(thing))
+    points = lethal(map_)
+    assert points[:, 0] == pytest.approx(1.5, abs=0.06)
+    assert points[:, 1].min() == pytest.approx(-0.3, abs=0.08)
+    assert points[:, 1].max() == pytest.approx(0.3, abs=0.08)
+
+
+def test_the_ground_is_no_obstacle_nor_is_what_hangs_higher_than_the_robot() -> None:
+    map_ = costmap(max_obstacle_height=0.4)
+    map_.update(Pose2(0.0, 0.0), image(LAMP))
+    assert not len(lethal(map_))
+    assert len(lethal(_seen(costmap(max_obstacle_height=1.0), LAMP)))
+
+
+def _seen(map_: Costmap, *things: Slab) -> Costmap:
+    map_.update(Pose2(0.0, 0.0), image(*things))
+    return map_
+
+
+def test_what_the_camera_sees_through_is_cleared() -> None:
+    map_ = _seen(costmap(), LOW_BOX)
+    assert len(lethal(map_))
+    assert not len(lethal(_seen(map_)))
+
+
+def test_looking_over_a_low_box_at_a_wall_behind_it_does_not_clear_the_box() -> None:
+    wall = (2.2, -1.0, 1.0, 0.0, 2.0)
+    map_ = _seen(costmap(), LOW_BOX)
+    before = {tuple(p) for p in np.round(lethal(map_), 3)}
+    after = {tuple(p) for p in np.round(lethal(_seen(map_, LOW_BOX, wall)), 3)}
+    assert before <= after
+    assert any(x > 2.1 for x, _ in after)
+
+
+def test_a_lidar_that_sees_nothing_there_does_not_clear_what_a_camera_saw_below_it() -> None:
+    map_ = _seen(costmap(), LOW_BOX)
+    before = lethal(map_)
+    nothing = np.full(360, np.inf)
+    map_.update(Pose2(0.0, 0.0), Scan("lidar", 0, nothing, -math.pi, 2 * math.pi / 360, 0.05, 12.0))
+    assert np.array_equal(lethal(map_), before)
+
+
+def test_what_left_the_picture_is_remembered_while_the_robot_drives_on() -> None:
+    map_ = _seen(costmap(), LOW_BOX)
+    before = {tuple(p) for p in np.round(lethal(map_), 3)}
+    base = Pose2(1.2, 0.6)  # beside the box, which is out of the picture now; the window has rolled on
+    map_.update(base, image(base=base))
+    assert before == {tuple(p) for p in np.round(lethal(map_), 3)}
