@@ -1,4 +1,4 @@
-"""A lidar sees one plane: what is lower, or hangs higher, it drives into; with a depth camera the robot drives around."""
+"""A lidar sees one plane: what is lower, or hangs higher, it drives into; with a depth camera it drives around."""
 
 from pathlib import Path
 
