@@ -37,10 +37,10 @@ if TYPE_CHECKING:
     from simscen.criteria.measure import Measure
     from simscen.criteria.signals import clearance, drive, pose_error, speed, truth, turn_rate
     from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance, Sight, Wheels
+    from simscen.model.controllerspec import ControllerSpec
     from simscen.model.robot import Mount, SensorSpec
     from simscen.model.stack import (
         BehaviorSpec,
-        ControllerSpec,
         GoalCheckerSpec,
         InProcessStack,
         LocalizerSpec,
@@ -253,12 +253,12 @@ _WHERE = {
     # What a specification is: one base for each kind.
     "simscen.model.stack": (
         "BehaviorSpec",
-        "ControllerSpec",
         "GoalCheckerSpec",
         "InProcessStack",
         "LocalizerSpec",
         "PlannerSpec",
     ),
+    "simscen.model.controllerspec": ("ControllerSpec",),
     "simscen.model.robot": (
         "Mount",
         "SensorSpec",

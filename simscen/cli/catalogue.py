@@ -16,6 +16,7 @@ from simscen.criteria.criterion import AnyCriterion
 from simscen.faults.fault import AnyFault
 from simscen.model import (
     anystack,
+    controllers,
     expectederror,
     navigation,
     robot,
@@ -106,7 +107,7 @@ def topics(installed: bool = False) -> list[Topic]:
         *(_topic("localizer", kind, model) for kind, model in by_type(stack.Localizer)),
         *_more("localizer", installed),
         *_more("planner", installed),
-        *(_topic("controller", kind, model) for kind, model in by_type(stack.Controller)),
+        *(_topic("controller", kind, model) for kind, model in by_type(controllers.Controller)),
         *_more("controller", installed),
         *(_topic("behavior", name, model) for name, model in _BEHAVIORS.items()),
         *_more("behavior", installed),

@@ -5,6 +5,7 @@ from typing import Annotated, ClassVar, Literal, get_args
 from pydantic import Discriminator, Field, Tag
 
 from simscen.core.navigation import RecoveryBehavior
+from simscen.model.controllers import Controller
 from simscen.model.stackbase import GoalTolerances, StackBase
 from simscen.spec.base import Ranged, Spec, by_default, type_or
 from simscen.spec.bytype import ByType
@@ -18,7 +19,6 @@ from simscen.spec.quantities import (
     NonNegativeAngularSpeed,
     NonNegativeLength,
     PositiveAcceleration,
-    PositiveAngle,
     PositiveAngularAcceleration,
     PositiveAngularSpeed,
     PositiveDuration,
@@ -26,7 +26,6 @@ from simscen.spec.quantities import (
     PositiveSpeed,
     Probability,
     Quantity,
-    Speed,
 )
 
 Patience = Annotated[float, Field(ge=-1, le=86400), Quantity("duration")]
@@ -256,150 +255,6 @@ class OmplPlanner(PlannerSpec):
 Planner = Annotated[PlannerSpec, ByType("planner", OmplPlanner)]
 
 
-class ControllerSpec(Typed):
-    """What follows a path."""
-
-    @property
-    def looks_ahead(self) -> float:
-        """Seconds for which it follows what it may command: the local costmap reaches so far."""
-        return 2.0
-
-
-class RegulatedPurePursuit(Ranged, ControllerSpec):
-    """nav2_regulated_pure_pursuit_controller (Macenski et al. 2023)."""
-
-    component: ClassVar[str] = "simscen.stack.controllers.regulated_pure_pursuit:RegulatedPurePursuit"
-    type: Literal["regulated_pure_pursuit"] = "regulated_pure_pursuit"
-    desired_linear_vel: PositiveSpeed | None = None
-    """Default: 0.5 m/s, or what the robot can do if that is less."""
-    lookahead_dist: PositiveLength = 0.6
-    """To the point of the plan that is followed, where its distance is not scaled by speed."""
-    min_lookahead_dist: PositiveLength = 0.3
-    """The least, where it is scaled by speed."""
-    max_lookahead_dist: PositiveLength = 0.9
-    """The greatest, where it is scaled by speed."""
-    lookahead_time: PositiveDuration = 1.5
-    """The lookahead distance is the way driven in this time."""
-    use_velocity_scaled_lookahead_dist: bool = True
-    """Whether the lookahead distance is scaled by speed."""
-    rotate_to_heading_angular_vel: PositiveAngularSpeed = 1.8
-    """Turn rate when it turns in place."""
-    rotate_to_heading_min_angle: PositiveAngle = 0.785
-    """It turns in place when the plan leads off by more than this."""
-    use_rotate_to_heading: bool = True
-    """Whether it turns in place at all."""
-    min_approach_linear_velocity: PositiveSpeed = 0.05
-    """The least speed on the last stretch to the goal."""
-    approach_velocity_scaling_dist: PositiveLength = 0.6
-    """How far from the plan's end it begins to slow down."""
-    use_collision_detection: bool = True
-    """Whether it stops when what it commands would lead into an obstacle."""
-    max_allowed_time_to_collision_up_to_carrot: PositiveDuration = 1.0
-    """How far ahead it looks for collisions, no further than the point that it follows."""
-    use_regulated_linear_velocity_scaling: bool = True
-    """Whether it slows down in narrow curves."""
-    regulated_linear_scaling_min_radius: PositiveLength = 0.9
-    """Narrower curves are driven slower."""
-    regulated_linear_scaling_min_speed: PositiveSpeed = 0.25
-    """The least speed that curves and costs slow it down to."""
-    use_cost_regulated_linear_velocity_scaling: bool = True
-    """Whether it slows down near obstacles."""
-    cost_scaling_dist: PositiveLength = 0.6
-    """How near an obstacle must be to slow it down."""
-    cost_scaling_gain: Annotated[float, Field(gt=0, le=1), Quantity("ratio")] = 1.0
-    """How much: speed times this share of the distance over `cost_scaling_dist`."""
-    max_angular_accel: PositiveAngularAcceleration = 3.2
-    """Of its turn rate, when it turns in place."""
-    allow_reversing: bool = False
-    """Taken from files of Nav2; means nothing here."""
-
-    @property
-    def looks_ahead(self) -> float:
-        """The time to collision that it keeps."""
-        return self.max_allowed_time_to_collision_up_to_carrot
-
-
-class DynamicWindow(ControllerSpec):
-    """A dynamic-window controller with DWB's critics (Fox et al. 1997; nav2_dwb_controller)."""
-
-    component: ClassVar[str] = "simscen.stack.controllers.dwb:DynamicWindowController"
-    type: Literal["dwb"]
-    max_vel_x: PositiveSpeed | None = None
-    """Greatest speed forward; default: 0.5 m/s, or what the robot can do if that is less."""
-    min_vel_x: Annotated[Speed, Field(ge=-10, le=0)] = 0.0
-    """Greatest speed backward, negative."""
-    max_vel_theta: PositiveAngularSpeed = 1.0
-    """Greatest turn rate."""
-    vx_samples: Annotated[int, Field(ge=2, le=200)] = 20
-    """Speeds forward that are tried."""
-    vy_samples: Annotated[int, Field(ge=1, le=200)] = 5
-    """Taken from files of Nav2; means nothing here."""
-    vtheta_samples: Annotated[int, Field(ge=2, le=200)] = 20
-    """Turn rates that are tried."""
-    sim_time: PositiveDuration = 1.7
-    """How far ahead each is followed."""
-    base_obstacle_scale: Noise = 0.02
-    """Weight of the costs that it comes through."""
-    path_align_scale: Noise = 32.0
-    """Weight of how far its front is from the plan."""
-    path_dist_scale: Noise = 32.0
-    """Weight of how far it is from the plan."""
-    goal_align_scale: Noise = 24.0
-    """Weight of how far its front is from the plan's end."""
-    goal_dist_scale: Noise = 24.0
-    """Weight of how far it is from the plan's end."""
-    rotate_to_goal_scale: Noise = 32.0
-    """Taken from files of Nav2; means nothing here."""
-    forward_point_distance: NonNegativeLength = 0.1
-    """How far ahead of its middle its front is."""
-
-    @property
-    def looks_ahead(self) -> float:
-        """As far as its trajectories."""
-        return self.sim_time
-
-
-class Mppi(ControllerSpec):
-    """Model predictive path integral control (Williams et al. 2017; nav2_mppi_controller)."""
-
-    component: ClassVar[str] = "simscen.stack.controllers.mppi:MppiController"
-    type: Literal["mppi"]
-    time_steps: Annotated[int, Field(ge=5, le=200)] = 56
-    """Steps that each sample looks ahead."""
-    model_dt: PositiveDuration = 0.05
-    """How long a step is."""
-    batch_size: Annotated[int, Field(ge=50, le=10_000)] = 1000
-    """Samples drawn for each command."""
-    vx_max: PositiveSpeed | None = None
-    """Greatest speed forward; default: 0.5 m/s, or what the robot can do if that is less."""
-    vx_min: Annotated[Speed, Field(ge=-10, le=0)] = -0.35
-    """Greatest speed backward, negative."""
-    wz_max: PositiveAngularSpeed = 1.9
-    """Greatest turn rate."""
-    vx_std: PositiveSpeed = 0.2
-    """Standard deviation of the sampled speeds."""
-    wz_std: PositiveAngularSpeed = 0.4
-    """Standard deviation of the sampled turn rates."""
-    temperature: Annotated[float, Field(gt=0, le=100)] = 0.3
-    """How evenly samples are weighted: the lower, the more the best one counts."""
-    gamma: Annotated[float, Field(ge=0, le=10)] = 0.015
-    """Weight of staying near the last command, against the costs of a sample."""
-
-    @property
-    def looks_ahead(self) -> float:
-        """As far as its samples."""
-        return self.time_steps * self.model_dt
-
-
-_Controllers = Annotated[
-    Annotated[RegulatedPurePursuit, Tag("regulated_pure_pursuit")]
-    | Annotated[DynamicWindow, Tag("dwb")]
-    | Annotated[Mppi, Tag("mppi")],
-    Discriminator(type_or("regulated_pure_pursuit")),
-]
-Controller = Annotated[ControllerSpec, ByType("controller", _Controllers)]
-
-
 class GoalCheckerSpec(GoalTolerances, Typed):
     """What says whether a goal is reached; the tolerances are those of goals that name none."""
 
@@ -612,9 +467,9 @@ LOCALIZERS = {
 }
 PLANNERS = dict.fromkeys(get_args(OmplPlanner.model_fields["type"].annotation), _HERE + "OmplPlanner")
 CONTROLLERS = {
-    "regulated_pure_pursuit": _HERE + "RegulatedPurePursuit",
-    "dwb": _HERE + "DynamicWindow",
-    "mppi": _HERE + "Mppi",
+    "regulated_pure_pursuit": "simscen.model.controllers:RegulatedPurePursuit",
+    "dwb": "simscen.model.controllers:DynamicWindow",
+    "mppi": "simscen.model.mppi:Mppi",
 }
 BEHAVIORS = {
     "clear_costmap": _HERE + "ClearCostmap",

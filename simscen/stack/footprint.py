@@ -39,23 +39,24 @@ class Footprint:
 
     A round robot collides where a lethal cell's centre is within its radius. Any other collides where one is within
     the inscribed radius or anywhere under the hull; far from everything (circumscribed radius) it never does. `reach`
-    is how far turning in place moves the hull: 0 when it is round; `circumscribed` is the radius around all of it.
+    is how far turning in place moves the hull: 0 when it is round; `circumscribed` is the radius around all of it,
+    `inscribed` that of the largest circle within.
     """
 
     def __init__(self, robot: RobotModel, resolution: float) -> None:
-        self._inscribed = robot.inscribed_radius
+        self.inscribed = robot.inscribed_radius
         self._round = robot.radius is not None
         self.reach = 0.0 if self._round else robot.circumscribed_radius
         self.circumscribed = robot.circumscribed_radius
         corners = np.array(robot.footprint, dtype=np.float64)
-        inner = _inner_points(corners, resolution, self._inscribed)
+        inner = _inner_points(corners, resolution, self.inscribed)
         self._hull = np.concatenate((_edge_points(corners, resolution), inner))
         self.discs = Discs(robot)
 
     def free(self, costmap: CostmapView, poses: Array) -> Mask:
         """Which of the poses (n, 3) hit nothing."""
         distance = distances(costmap, poses[:, :2])
-        free: Mask = np.asarray(distance > np.float32(self._inscribed))
+        free: Mask = np.asarray(distance > np.float32(self.inscribed))
         if self._round:
             return free
         unsure = np.flatnonzero(free & (distance <= self.circumscribed + costmap.resolution))
@@ -66,10 +67,10 @@ class Footprint:
     def clearance(self, costmap: CostmapView, poses: Array) -> Array:
         """About how far (n,) the hull's edge is from the nearest lethal cell in metres; negative in collision."""
         if self._round:
-            gap: Array = distances(costmap, poses[:, :2]).astype(np.float64) - self._inscribed
+            gap: Array = distances(costmap, poses[:, :2]).astype(np.float64) - self.inscribed
             return gap
         edge = distances(costmap, self._placed(poses)).min(axis=1).astype(np.float64)
-        middle = distances(costmap, poses[:, :2]).astype(np.float64) - self._inscribed
+        middle = distances(costmap, poses[:, :2]).astype(np.float64) - self.inscribed
         return np.asarray(np.minimum(edge, middle))
 
     def _hull_free(self, costmap: CostmapView, poses: Array) -> Mask:

@@ -112,7 +112,8 @@ class CostmapView:
     row 0 is the lowest y, `origin` is the corner of cell (0, 0), without rotation. `distance` (height, width) float32
     is the distance in metres from each cell's centre to the nearest lethal cell's centre; a costmap may cap it, at no
     less than the inflation radius and half a metre beyond the hull. `revision` grows with each
-    change. The arrays may be windows on a costmap that goes on living: they hold until its next update.
+    change; `inflation_radius` is how far in metres an obstacle's costs reach. The arrays may be windows on a costmap
+    that goes on living: they hold until its next update.
     """
 
     costs: npt.NDArray[np.uint8]
@@ -120,6 +121,7 @@ class CostmapView:
     resolution: float
     origin: tuple[float, float]
     revision: int = 0
+    inflation_radius: float = 0.55
 
     def with_less_room(self, metres: float) -> "CostmapView":
         """The same place with every obstacle so much larger all round."""

@@ -14,8 +14,9 @@ from simscen.actions.base import Action
 from simscen.criteria.base import Criterion
 from simscen.criteria.measure import Measure
 from simscen.faults.base import Fault
+from simscen.model.controllerspec import ControllerSpec
 from simscen.model.robot import SensorSpec
-from simscen.model.stack import BehaviorSpec, ControllerSpec, GoalCheckerSpec, LocalizerSpec, PlannerSpec
+from simscen.model.stack import BehaviorSpec, GoalCheckerSpec, LocalizerSpec, PlannerSpec
 from simscen.model.stackbase import StackBase
 from simscen.spec.registry import GROUPS, BrokenPlugin, Entry, find
 from simscen.stack.protocols import RobotModel

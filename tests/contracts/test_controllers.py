@@ -2,7 +2,8 @@
 
 import pytest
 
-from simscen.model.stack import ControllerSpec, DynamicWindow, Mppi, RegulatedPurePursuit
+from simscen.model.controllers import DynamicWindow, Mppi, RegulatedPurePursuit
+from simscen.model.controllerspec import ControllerSpec
 from simscen.testing import Promise, promises_of
 
 SPECS: dict[str, ControllerSpec] = {

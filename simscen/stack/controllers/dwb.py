@@ -8,7 +8,7 @@ import numpy.typing as npt
 from simscen.core.geometry import Array, Pose2
 from simscen.core.motion import Twist
 from simscen.core.navigation import ErrorCode, Goal, Path
-from simscen.model.stack import DynamicWindow as DwbSpec
+from simscen.model.controllers import DynamicWindow as DwbSpec
 from simscen.stack.controllers.goal_pose import GoalPose
 from simscen.stack.controllers.tracking import PathTracker
 from simscen.stack.protocols import CostmapView, NavigationFailure

@@ -7,7 +7,7 @@ import numpy as np
 from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import ErrorCode, Goal, Path
-from simscen.model.stack import RegulatedPurePursuit as RppSpec
+from simscen.model.controllers import RegulatedPurePursuit as RppSpec
 from simscen.stack.arcs import poses_along
 from simscen.stack.controllers.goal_pose import GoalPose
 from simscen.stack.controllers.tracking import AT_CUSP, PathTracker

@@ -5,7 +5,7 @@ from bisect import bisect_right
 
 import numpy as np
 
-from simscen.core.geometry import Pose2
+from simscen.core.geometry import Array, Pose2
 from simscen.core.navigation import Path
 from simscen.stack.cusps import cusps, forward_steps
 
@@ -57,6 +57,12 @@ class PathTracker:
         ahead = self.points[self.index : self._stop(SEARCH_AHEAD)]
         square = (ahead[:, 0] - pose.x) ** 2 + (ahead[:, 1] - pose.y) ** 2
         self.index += int(square.argmin())
+
+    def ahead(self, metres: float) -> tuple[Array, Array]:
+        """Points (n, 3) of this piece for so many metres, at least two where it has any, and metres (n,) to them."""
+        end = min(self._stop(metres) + 1, self._ends[0] + 1)
+        start = min(self.index, max(0, end - 2))
+        return self.points[start:end], self.along[start:end] - self.along[start]
 
     def remaining(self) -> float:
         """Metres of path from the nearest point to the end."""

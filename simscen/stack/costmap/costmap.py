@@ -65,7 +65,8 @@ class Costmap:
     @property
     def view(self) -> CostmapView:
         """The costmap now. Its arrays are windows on this costmap and valid until the next update."""
-        return CostmapView(self._costs, self._distance, self._frame.resolution, self._frame.origin, self._revision)
+        frame, radius = self._frame, self._spec.inflation_radius
+        return CostmapView(self._costs, self._distance, frame.resolution, frame.origin, self._revision, radius)
 
     @property
     def obstacle_cells(self) -> int:

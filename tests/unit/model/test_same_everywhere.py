@@ -9,9 +9,10 @@ from annotated_types import MaxLen, MinLen
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from simscen.cli.everyfield import Written, every_value
+from simscen.model.controllers import DynamicWindow
 from simscen.model.robot import InertialUnit, SkidSteer
 from simscen.model.scenario import Physics, ScenarioSpec
-from simscen.model.stack import Amcl, DynamicWindow
+from simscen.model.stack import Amcl
 from simscen.spec.orplace import OrPlace
 from simscen.spec.places import PoseSpec
 from simscen.spec.quantities import AnyQuantity, Quantity
@@ -33,6 +34,27 @@ PLAIN = {
     "DynamicWindow.goal_align_scale": "a weight of a critic",
     "DynamicWindow.goal_dist_scale": "a weight of a critic",
     "DynamicWindow.rotate_to_goal_scale": "a weight of a critic",
+    "DynamicWindow.slowing_factor": "a weight of a critic",
+    "DynamicWindow.twirling_scale": "a weight of a critic",
+    **{
+        f"Mppi{critic}Critic.cost_weight": "a weight of a critic"
+        for critic in (
+            "Constraint",
+            "Cost",
+            "Goal",
+            "GoalAngle",
+            "PathAlign",
+            "PathFollow",
+            "PathAngle",
+            "PreferForward",
+            "Twirling",
+        )
+    },
+    "MppiCostCritic.critical_cost": "a cost, as the costmap's",
+    "MppiCostCritic.collision_cost": "a cost, as the costmap's",
+    "MppiObstaclesCritic.repulsion_weight": "a weight of a critic",
+    "MppiObstaclesCritic.critical_weight": "a weight of a critic",
+    "MppiObstaclesCritic.collision_cost": "a cost",
     "Mppi.temperature": "of a softmax over costs without a dimension",
     "Mppi.gamma": "a weight of costs",
     "Smoothness.min_sparc": "spectral arc length, which has no dimension",

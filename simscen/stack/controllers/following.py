@@ -1,0 +1,50 @@
+"""What all controllers have in common: the path and the place on it, the full speed and a limit of it."""
+
+from simscen.core.geometry import Pose2
+from simscen.core.navigation import ErrorCode, Path
+from simscen.stack.controllers.tracking import PathTracker
+from simscen.stack.protocols import NavigationFailure, RobotModel
+
+DEFAULT_SPEED = 0.5
+"""m/s: Nav2's desired_linear_vel, and vx_max of MPPI."""
+
+
+class PathFollower:
+    """Follows a path at a speed that can be limited; a controller says how, in `command`."""
+
+    def __init__(self, wanted: float | None, robot: RobotModel) -> None:
+        self._fastest = min(wanted or DEFAULT_SPEED, robot.max_linear)
+        self._limit: float | None = None
+        self._track: PathTracker | None = None
+
+    def set_path(self, path: Path) -> None:
+        """Follow this path from now on."""
+        if not len(path.points):
+            raise NavigationFailure(ErrorCode.INVALID_PATH, "the path has no points")
+        self._track = PathTracker(path)
+
+    @property
+    def full_speed(self) -> float:
+        """What it drives at in m/s where nothing limits it."""
+        return self._fastest
+
+    def set_speed_limit(self, limit: float | None) -> None:
+        """Drive no faster than this in m/s; None lifts the limit."""
+        self._limit = limit
+
+    @property
+    def _speed(self) -> float:
+        """The greatest speed now in m/s."""
+        return self._fastest if self._limit is None else min(self._fastest, self._limit)
+
+    @property
+    def _share(self) -> float:
+        """Of all its velocities under the limit: Nav2's DWB and MPPI scale sideways and turning, too."""
+        return self._speed / self._fastest
+
+    def _located(self, pose: Pose2) -> PathTracker:
+        """The path, and where the robot is on it."""
+        if self._track is None:
+            raise NavigationFailure(ErrorCode.INVALID_PATH, "there is no path to follow")
+        self._track.locate(pose)
+        return self._track

@@ -1,0 +1,42 @@
+"""The plan ahead as controllers that score trajectories see it: nav2_controller's path handler."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.geometry import Array, Pose2
+from simscen.stack.controllers.tracking import PathTracker
+
+Floats = npt.NDArray[np.float32]
+SPACING = 0.05
+"""Metres between points: Nav2's planners put one into each cell of a costmap, and its critics count points."""
+
+
+@dataclass(frozen=True, eq=False)
+class LocalPlan:
+    """Poses (n, 3) from where the robot is on its path, `spacing` metres apart, and its `length`.
+
+    It ends where the robot must next turn round, at the path's end, or after as many metres as were asked for.
+    """
+
+    points: Array
+    spacing: float
+    length: float
+
+    def about(self, pose: Pose2) -> tuple[Floats, Floats, Floats]:
+        """x, y (n,) with the robot at the origin of the unrotated frame, and yaw: short numbers for float32."""
+        x, y, yaw = self.points.T
+        return (x - pose.x).astype(np.float32), (y - pose.y).astype(np.float32), yaw.astype(np.float32)
+
+
+def local_plan(track: PathTracker, metres: float) -> LocalPlan:
+    """The next `metres` of the path."""
+    points, along = track.ahead(metres)
+    length = float(min(metres, along[-1]))
+    steps = max(1, math.ceil(length / SPACING - 1e-9))
+    at = np.linspace(0.0, length, steps + 1)
+    x, y = np.interp(at, along, points[:, 0]), np.interp(at, along, points[:, 1])
+    yaw = points[np.minimum(np.searchsorted(along, at + 1e-9, side="right"), len(points)) - 1, 2]
+    return LocalPlan(np.column_stack((x, y, yaw)), length / steps, length)

@@ -1,0 +1,1 @@
+"""Model predictive path integral control with the critics of nav2_mppi_controller."""

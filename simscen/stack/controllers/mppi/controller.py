@@ -1,0 +1,165 @@
+"""Model predictive path integral control (Williams et al. 2017), as nav2_mppi_controller does it.
+
+A thousand noisy versions of the last control sequence are rolled out, each is scored, and the new sequence is their
+average weighted by exp(-score / temperature).
+"""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.geometry import Array, Pose2
+from simscen.core.motion import Twist
+from simscen.core.navigation import ErrorCode, Goal, Path
+from simscen.model.mppi import Mppi as MppiSpec
+from simscen.stack.controllers.following import PathFollower
+from simscen.stack.controllers.free_way import FreeWay
+from simscen.stack.controllers.goal_pose import GoalPose
+from simscen.stack.controllers.local_plan import LocalPlan, local_plan
+from simscen.stack.controllers.mppi.judgement import Judgement
+from simscen.stack.controllers.mppi.limits import Limits, limits_of
+from simscen.stack.controllers.mppi.rollouts import VX, VY, WZ, Rollouts, delay, integrated, predicted
+from simscen.stack.controllers.mppi.scene import Scene
+from simscen.stack.controllers.mppi.sequence import PAST, later, smoothed, within_limits
+from simscen.stack.protocols import CostmapView, NavigationFailure
+from simscen.stack.setting import Setting
+
+Floats = npt.NDArray[np.float32]
+SURE = 0.5
+"""Seconds that the command itself must be free of collisions for."""
+BEYOND = 1.0
+"""Metres of plan beyond what the rollouts reach, for the critics that look at points further on."""
+SPREAD = 0.5
+"""Standard deviation of the sampled speeds, of the greatest. What draws the speed up grows with its square, what holds
+it back (gamma) with the speed: Nav2's 0.2 m/s comes to rest at about 0.5 m/s, whatever the limit."""
+
+
+class MppiController(PathFollower):
+    """Keeps a control sequence and improves it at each call."""
+
+    def __init__(self, spec: MppiSpec, setting: Setting) -> None:
+        robot = setting.robot
+        super().__init__(spec.vx_max, robot)
+        self._spec, self._footprint, self._chance = spec, setting.footprint, setting.chance
+        self._base = limits_of(spec, robot, self._fastest)
+        model = spec.motion_model or ("Omni" if self._base.vy_max > 0.0 else "DiffDrive")
+        self._axes = 3 if model == "Omni" else 2
+        deviations = (spec.vx_std or SPREAD * self._fastest, spec.wz_std, spec.vy_std or SPREAD * self._base.vy_max)
+        self._std = np.array(deviations[: self._axes], np.float32)
+        late = (spec.model_delay_vx, spec.model_delay_wz, spec.model_delay_vy)
+        self._delays = tuple(math.floor(each / spec.model_dt + 0.5) for each in late[: self._axes])
+        self._judgement = Judgement(spec, omni=model == "Omni")
+        self._period, self._shift = setting.control_period, setting.control_period / spec.model_dt
+        self._goal_pose = GoalPose(robot, spec.wz_max, robot.angular_acceleration, setting.control_period)
+        self._free_way = FreeWay(setting.footprint)
+        self._reach = max(spec.prune_distance, self._fastest * spec.time_steps * spec.model_dt + BEYOND)
+        self._forget()
+
+    def _forget(self) -> None:
+        """Begin with nothing, and with other noise: what was found leads nowhere."""
+        axes, steps = self._axes, self._spec.time_steps
+        self._sequence = np.zeros((axes, steps), np.float32)
+        self._sent = np.zeros((axes, max(PAST, *self._delays)), np.float32)
+        self._draw()
+        self._driven: Rollouts | None = None
+        self._pose, self._from = Pose2(0.0, 0.0), Pose2(0.0, 0.0)
+
+    def _draw(self) -> None:
+        shape = (self._axes, self._spec.time_steps, self._spec.batch_size)
+        self._noise = self._chance.standard_normal(shape, dtype=np.float32) * self._std[:, None, None]
+
+    def set_path(self, path: Path) -> None:
+        """Follow this path from now on; the control sequence is kept as a start."""
+        super().set_path(path)
+        self._goal_pose.reset()
+
+    @property
+    def _limits(self) -> Limits:
+        return self._base.scaled(self._share)
+
+    @property
+    def local_plan(self) -> Path | None:
+        """What the control sequence would do."""
+        return None if self._driven is None else Path(self._poses(self._driven))
+
+    def command(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> Twist:
+        """The velocity to drive now. Raises NO_VALID_CONTROL when every rollout, or the average, hits something."""
+        track, self._pose = self._located(pose), pose
+        if self._goal_pose.reached(pose, twist, goal, track.remaining()):
+            self._forget()
+            command = self._goal_pose.turn_to_goal(pose, goal, twist)
+        else:
+            plan = local_plan(track, self._reach)
+            command = self._optimised(twist, lambda rolled: self._scene(rolled, plan, costmap, goal))
+        free = self._free_way.seconds(costmap, pose, command, SURE)
+        return self._free_way.within(command, free, SURE, SURE)
+
+    def _scene(self, rolled: Rollouts, plan: LocalPlan, costmap: CostmapView, goal: Goal) -> Scene:
+        return Scene(
+            rolled, plan, self._pose, goal.pose.yaw, costmap, self._footprint, self._limits, self._spec.model_dt,
+            goal.xy_tolerance,
+        )  # fmt: skip
+
+    def _optimised(self, twist: Twist, seen: Callable[[Rollouts], Scene]) -> Twist:
+        """Improve the sequence; what hits something is forgotten, and begun anew as often as is allowed."""
+        for _ in range(1 + self._spec.retry_attempt_limit):
+            now = self._velocity(twist)
+            free = False
+            for _ in range(self._spec.iteration_count):
+                free = self._improve(now, seen)
+            rolled = integrated(self._sequence[:, :, None], self._pose.yaw, self._spec.model_dt)
+            if free and self._valid(seen(rolled)):
+                self._driven, self._from = rolled, self._pose
+                return self._next()
+            self._forget()
+        raise NavigationFailure(ErrorCode.NO_VALID_CONTROL, "all that the optimizer finds hits something")
+
+    def _velocity(self, twist: Twist) -> Floats:
+        """The velocity (axes,) when this command takes effect: on the way to the last command, as far as it can be."""
+        sent, limits = self._sent[:, -1].astype(np.float64), self._limits
+        if self._spec.open_loop:
+            return self._sent[:, -1]
+        measured = np.array((twist.vx, twist.wz, twist.vy))[: self._axes]
+        change = (limits.slower * self._period, limits.faster * self._period)
+        near = np.clip(sent, measured + change[0][: self._axes], measured + change[1][: self._axes])
+        return near.astype(np.float32)
+
+    def _improve(self, now: Floats, seen: Callable[[Rollouts], Scene]) -> bool:
+        """One iteration; whether any rollout hits nothing."""
+        spec, limits, dt = self._spec, self._limits, self._spec.model_dt
+        self._sequence[:, 0] = now
+        if spec.regenerate_noises:
+            self._draw()
+        controls = self._sequence[:, :, None] + self._noise
+        velocities = predicted(now, controls, limits, dt)
+        delay(velocities, self._sent, self._delays)
+        costs, all_hit = self._judgement.costs(seen(integrated(velocities, self._pose.yaw, dt)))
+        for axis, deviation in enumerate(self._std.tolist()):
+            costs += spec.gamma / deviation**2 * (self._sequence[axis] @ self._noise[axis])
+        weights = np.exp((costs.min() - costs) / spec.temperature)
+        weights /= weights.sum()
+        average = controls @ weights.astype(np.float32)
+        average = smoothed(average, self._sent[:, -PAST:], spec.sgf_order)
+        self._sequence = within_limits(average, now, limits, dt)
+        return not all_hit
+
+    def _valid(self, scene: Scene) -> bool:
+        """nav2_mppi_controller's DefaultOptimalTrajectoryValidator."""
+        spec, rolled = self._spec.TrajectoryValidator, scene.rolled
+        steps = min(round(spec.collision_lookahead_time / scene.dt), len(rolled.x))
+        x, y, yaw = rolled.x[:steps], rolled.y[:steps], rolled.yaw[:steps]
+        return not scene.hit(x, y, yaw, spec.consider_footprint is not False).any()
+
+    def _next(self) -> Twist:
+        """What the sequence says of the end of this period; then the sequence moves on by a period."""
+        self._sequence = later(self._sequence, self._shift)
+        first = self._sequence[:, :1]
+        self._sent = np.concatenate((self._sent[:, 1:], first), axis=1)
+        vx, wz = float(first[VX, 0]), float(first[WZ, 0])
+        return Twist(vx, float(first[VY, 0]) if self._axes > VY else 0.0, wz)
+
+    def _poses(self, rolled: Rollouts) -> Array:
+        columns = (rolled.x[:, 0] + self._from.x, rolled.y[:, 0] + self._from.y, rolled.yaw[:, 0])
+        return np.column_stack(columns).astype(np.float64)

@@ -1,0 +1,60 @@
+"""The control sequence that MPPI keeps and improves (axes, steps)."""
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.stack.controllers.mppi.limits import Limits
+from simscen.stack.controllers.mppi.rollouts import VX, WZ
+
+Floats = npt.NDArray[np.float32]
+KERNELS = {
+    1: np.full(9, 1.0 / 9.0, np.float32),
+    2: np.array([-21, 14, 39, 54, 59, 54, 39, 14, -21], np.float32) / np.float32(231.0),
+}
+"""Savitzky-Golay filters of nine points by their order (Savitzky and Golay 1964)."""
+TOO_SHORT = 21
+"""Steps from which on a sequence is smoothed."""
+PAST = 4
+"""Commands of the past that the filter sees."""
+
+
+def smoothed(sequence: Floats, past: Floats, order: int) -> Floats:
+    """The sequence after the filter, all but its last step; `past` (axes, 4) are the commands before it."""
+    if sequence.shape[1] < TOO_SHORT:
+        return sequence
+    wide = np.concatenate((past, sequence, np.repeat(sequence[:, -1:], PAST, axis=1)), axis=1)
+    result: Floats = sequence.copy()
+    for axis, row in enumerate(wide):
+        result[axis, :-1] = np.convolve(row, KERNELS[order], mode="valid")[:-1]
+    return result
+
+
+def within_limits(sequence: Floats, now: Floats, limits: Limits, dt: float) -> Floats:
+    """The nearest that the base can drive, from the velocity of `now` (axes,), which is the first of the sequence."""
+    low, high = limits.low.tolist(), limits.high.tolist()
+    faster, slower = (limits.faster * dt).tolist(), (limits.slower * dt).tolist()
+    _keep_to_curve(sequence, limits)
+    result = np.empty_like(sequence)
+    for axis in range(len(sequence)):
+        last = float(now[axis])
+        result[axis, 0] = last
+        for step, asked in enumerate(sequence[axis, 1:].tolist(), start=1):
+            wanted = min(max(asked, low[axis]), high[axis])
+            least, most = (slower[axis], faster[axis]) if last >= 0.0 else (-faster[axis], -slower[axis])
+            last = min(max(wanted, last + least), last + most)
+            result[axis, step] = last
+    _keep_to_curve(result, limits)
+    return result
+
+
+def _keep_to_curve(sequence: Floats, limits: Limits) -> None:
+    """Ackermann: never turn tighter than the turning radius; in place."""
+    if limits.turning_radius > 0.0:
+        most = np.abs(sequence[VX]) / np.float32(limits.turning_radius)
+        np.clip(sequence[WZ], -most, most, out=sequence[WZ])
+
+
+def later(sequence: Floats, steps: float) -> Floats:
+    """The sequence from so many steps on, its end repeated: it was made for then, and this is now."""
+    here = np.arange(sequence.shape[1], dtype=np.float64)
+    return np.stack([np.interp(here + steps, here, row) for row in sequence]).astype(np.float32)

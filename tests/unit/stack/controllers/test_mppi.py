@@ -1,0 +1,249 @@
+"""MPPI: the speeds that it reaches, and its parts against numbers worked out by hand from nav2_mppi_controller."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from simscen.core.geometry import Pose2
+from simscen.core.motion import Twist
+from simscen.core.navigation import Goal, Path
+from simscen.model import mppi as model
+from simscen.model.stack import Costmap as CostmapSpec
+from simscen.stack.arcs import poses_along
+from simscen.stack.controllers.local_plan import LocalPlan
+from simscen.stack.controllers.mppi import critics, path_critics
+from simscen.stack.controllers.mppi.controller import MppiController
+from simscen.stack.controllers.mppi.limits import Limits
+from simscen.stack.controllers.mppi.rollouts import Rollouts, delay, integrated, predicted
+from simscen.stack.controllers.mppi.scene import Scene
+from simscen.stack.controllers.mppi.sequence import later, smoothed, within_limits
+from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.footprint import Footprint
+from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
+from simscen.testing.flatland import RATE, Flatland, round_robot, setting
+
+PERIOD = 0.05
+LIMITS = Limits(0.5, -0.35, 0.5, 1.9, 3.0, -3.0, 3.0, -3.0, 3.5, 0.0)
+
+
+def view_of(*boxes: tuple[float, float, float, float], length: float = 12.0) -> CostmapView:
+    grid = Flatland(list(boxes)).grid((-2.0, -3.0, length, 3.0))
+    return Costmap(CostmapSpec(), Surroundings(round_robot(), grid, RATE)).view
+
+
+def straight(length: float) -> np.ndarray:
+    x = np.arange(0.0, length + 1e-9, 0.05)
+    return np.column_stack((x, np.zeros_like(x), np.zeros_like(x)))
+
+
+def driven(robot: RobotModel, length: float, seconds: float, **options: Any) -> list[Twist]:
+    """Commands on an empty straight, to a base that follows them at once."""
+    controller = MppiController(model.Mppi(type="mppi", **options), setting(robot))
+    controller.set_path(Path(straight(length)))
+    view, goal = view_of(length=length + 2.0), Goal("far", Pose2(length, 0.0))
+    pose, twist, commands = Pose2(0.0, 0.0), Twist(), []
+    for _ in range(round(seconds / PERIOD)):
+        twist = controller.command(pose, twist, view, goal)
+        pose = Pose2(*poses_along(pose, twist, np.array([PERIOD]))[0].tolist())
+        commands.append(twist)
+    return commands
+
+
+@pytest.mark.parametrize("speed", [0.5, 1.0, 2.0])
+def test_on_an_empty_straight_it_reaches_the_speed_that_it_is_asked_for(speed: float) -> None:
+    commands = driven(round_robot(speed=2.5), 6.0 * speed + 4.0, 3.0, vx_max=speed)
+    assert max(each.vx for each in commands) <= speed + 1e-6
+    assert min(each.vx for each in commands[-20:]) > 0.9 * speed
+
+
+def test_it_reaches_its_speed_at_steps_twice_as_long_as_its_period() -> None:
+    commands = driven(round_robot(speed=2.5), 14.0, 3.0, vx_max=1.0, model_dt=0.1, time_steps=28)
+    assert min(each.vx for each in commands[-20:]) > 0.9
+
+
+def test_its_commands_keep_to_the_accelerations_of_the_base() -> None:
+    robot = round_robot(speed=1.0, linear_acceleration=0.8, linear_deceleration=0.8)
+    speeds = np.array([each.vx for each in driven(robot, 8.0, 1.5, vx_max=1.0, batch_size=200)])
+    assert np.diff(speeds).max() <= 0.8 * PERIOD + 1e-6
+
+
+def test_velocities_follow_the_control_of_the_step_before_as_fast_as_accelerations_allow() -> None:
+    controls = np.array([[1.0, 1.0, -1.0, 0.0], [0.1, -5.0, 0.0, 0.0]], np.float32)[:, :, None]
+    velocities = predicted(np.array([0.0, 0.0], np.float32), controls, LIMITS, 0.1)[:, :, 0]
+    assert velocities[0] == pytest.approx([0.0, 0.3, 0.6, 0.3], abs=1e-6)
+    assert velocities[1] == pytest.approx([0.0, 0.1, -0.25, 0.0], abs=1e-6)
+
+
+def test_braking_is_bounded_by_the_deceleration_whichever_way_it_goes() -> None:
+    limits = Limits(2.0, -2.0, 0.0, 1.0, 1.0, -3.0, 1.0, -3.0, 1.0, 0.0)
+    for sign in (1.0, -1.0):
+        controls = np.zeros((2, 3, 1), np.float32)
+        velocities = predicted(np.array([sign, 0.0], np.float32), controls, limits, 0.1)
+        assert sign * velocities[0, :, 0] == pytest.approx([1.0, 0.7, 0.4], abs=1e-6)
+
+
+def test_a_step_keeps_the_heading_that_it_begins_with() -> None:
+    velocities = np.array([[1.0, 1.0], [math.pi, 0.0], [0.0, 0.5]], np.float32)[:, :, None]
+    rolled = integrated(velocities, 0.0, 0.5)
+    assert rolled.yaw[:, 0] == pytest.approx([math.pi / 2, math.pi / 2], abs=1e-6)
+    assert rolled.x[:, 0] == pytest.approx([0.5, 0.5 - 0.25], abs=1e-6)
+    assert rolled.y[:, 0] == pytest.approx([0.0, 0.5], abs=1e-6)
+
+
+def test_what_was_sent_and_is_under_way_comes_before_what_is_being_chosen() -> None:
+    velocities = np.arange(10, dtype=np.float32).reshape(2, 5, 1)
+    delay(velocities, np.tile(np.array([6.0, 7.0, 8.0, 9.0], np.float32), (2, 1)), (3, 0))
+    assert velocities[0, :, 0].tolist() == [0.0, 8.0, 9.0, 1.0, 2.0]
+    assert velocities[1, :, 0].tolist() == [5.0, 6.0, 7.0, 8.0, 9.0]
+
+
+def test_the_filter_keeps_parabolas_and_flattens_noise() -> None:
+    steps = np.arange(-4.0, 30.0)
+    parabola = (0.01 * steps**2).astype(np.float32)
+    kept = smoothed(parabola[None, 4:], parabola[None, :4], 2)
+    assert kept[0, :25] == pytest.approx(parabola[4:29], abs=1e-5)
+    spike = np.zeros((1, 30), np.float32)
+    spike[0, 10] = 1.0
+    past = np.zeros((1, 4), np.float32)
+    assert smoothed(spike, past, 2)[0, 10] == pytest.approx(59 / 231)
+    assert smoothed(spike, past, 1)[0, 6:15] == pytest.approx(np.full(9, 1 / 9))
+
+
+def test_a_sequence_too_short_to_smooth_stays_as_it_is() -> None:
+    spike = np.eye(1, 20, dtype=np.float32)
+    assert smoothed(spike, np.zeros((1, 4), np.float32), 2) is spike
+
+
+def test_a_car_never_turns_tighter_than_its_radius() -> None:
+    car = Limits(1.0, -1.0, 0.0, 5.0, 3.0, -3.0, 3.0, -3.0, 9.0, 2.0)
+    sequence = np.array([[0.5, 0.5, 0.5], [3.0, 3.0, -3.0]], np.float32)
+    kept = within_limits(sequence, np.array([0.5, 0.0], np.float32), car, 0.05)
+    assert (np.abs(kept[1]) <= np.abs(kept[0]) / 2.0 + 1e-6).all()
+
+
+def test_a_sequence_moves_on_by_parts_of_a_step() -> None:
+    sequence = np.array([[0.0, 1.0, 3.0]], np.float32)
+    assert later(sequence, 1.0)[0].tolist() == [1.0, 3.0, 3.0]
+    assert later(sequence, 0.5)[0].tolist() == [0.5, 2.0, 3.0]
+
+
+def scene(velocities: np.ndarray, view: CostmapView | None = None, length: float = 3.0, **more: Any) -> Scene:
+    """Rollouts (axes, steps, n) at 0.1 s from the origin, and a plan along x with points 5 cm apart."""
+    robot = round_robot()
+    plan = LocalPlan(straight(length), 0.05, length)
+    rolled = integrated(velocities.astype(np.float32), 0.0, 0.1)
+    told = {"pose": Pose2(0.0, 0.0), "goal_yaw": 0.0, "limits": LIMITS, "dt": 0.1, "tolerance": 0.25, **more}
+    return Scene(rolled, plan, costmap=view or view_of(), footprint=Footprint(robot, 0.05), **told)
+
+
+def along(*speeds: float, steps: int = 10, turn: float = 0.0) -> np.ndarray:
+    """Velocities of rollouts that go straight at these speeds."""
+    vx = np.tile(np.array(speeds), (steps, 1))
+    return np.stack((vx, np.full_like(vx, turn)))
+
+
+def test_constraint_critic_counts_metres_per_second_too_many_over_time() -> None:
+    said = critics.constraint(model.MppiConstraintCritic(), scene(along(0.5, 0.8, -0.45)))
+    assert said == pytest.approx([0.0, 4.0 * 0.3, 4.0 * 0.1], abs=1e-5)
+
+
+def test_constraint_critic_counts_how_much_too_tightly_a_car_turns() -> None:
+    car = Limits(0.5, -0.35, 0.0, 1.9, 3.0, -3.0, 3.0, -3.0, 3.5, 1.0)
+    said = critics.constraint(model.MppiConstraintCritic(), scene(along(0.4, turn=0.8), limits=car))
+    assert said == pytest.approx([4.0 * 0.5 * 1.0], abs=1e-5)
+
+
+def test_cost_critic_is_the_mean_cost_over_254_and_a_collision_costs_a_million() -> None:
+    view = view_of((1.0, -3.0, 1.2, 3.0))
+    spec = model.MppiCostCritic(near_goal_distance=0.0, trajectory_point_step=1)
+    seen = scene(along(0.0, 0.5, 1.5), view)
+    said, hit = critics.cost(spec, seen)
+    costs, _ = seen.costs(seen.rolled.x, seen.rolled.y)
+    assert hit.tolist() == [False, False, True]
+    assert said[1] == pytest.approx(3.81 / 254 * costs[:, 1].mean(), rel=1e-5)
+    assert said[2] == pytest.approx(3.81 / 254 / 10 * 1e6, rel=1e-5)
+
+
+def test_cost_critic_near_the_goal_counts_what_is_all_but_a_collision_and_no_more() -> None:
+    view = view_of((1.0, -3.0, 1.2, 3.0))
+    said, _ = critics.cost(model.MppiCostCritic(), scene(along(0.5), view, length=0.9))
+    assert said == pytest.approx([0.0])
+    said, _ = critics.cost(model.MppiCostCritic(near_collision_cost=20), scene(along(0.5), view, length=0.9))
+    assert said[0] > 1.0
+
+
+def test_obstacles_critic_counts_nearness_within_its_margin() -> None:
+    view = view_of((1.0, -3.0, 1.2, 3.0))
+    seen = scene(along(0.7), view)
+    gap = seen.gap(seen.rolled.x, seen.rolled.y, seen.rolled.yaw, whole=True)[:, 0]
+    said, hit = critics.obstacles(model.MppiObstaclesCritic(repulsion_weight=0.0), seen)
+    assert not hit.any()
+    assert said[0] == pytest.approx(20.0 * np.clip(0.1 - gap, 0, None).sum(), rel=1e-4)
+
+
+def test_a_robot_in_collision_may_go_out_of_it_and_not_further_in() -> None:
+    view = view_of((0.15, -3.0, 1.0, 3.0))
+    _, hit = critics.cost(model.MppiCostCritic(), scene(along(0.4, -0.4), view))
+    assert hit.tolist() == [True, False]
+
+
+def test_goal_critic_is_the_mean_distance_to_the_end_of_the_plan() -> None:
+    said = critics.goal(model.MppiGoalCritic(), scene(along(0.5), length=1.0))
+    assert said == pytest.approx([5.0 * np.mean(1.0 - 0.05 * np.arange(1, 11))], rel=1e-5)
+
+
+def test_goal_angle_critic_is_the_mean_angle_and_knows_symmetric_robots() -> None:
+    turning = scene(along(0.0), length=0.3, goal_yaw=math.pi - 0.2)
+    assert critics.goal_angle(model.MppiGoalAngleCritic(), turning) == pytest.approx([3.0 * (math.pi - 0.2)])
+    either = model.MppiGoalAngleCritic(symmetric_yaw_tolerance=True)
+    assert critics.goal_angle(either, turning) == pytest.approx([3.0 * 0.2], rel=1e-4)
+
+
+def test_the_furthest_point_of_the_plan_is_the_nearest_to_the_end_of_a_rollout() -> None:
+    assert scene(along(0.2, 0.5)).furthest == 10 - 1
+
+
+def test_path_align_critic_compares_with_the_plan_after_as_many_metres() -> None:
+    beside = along(1.0, steps=17, turn=0.0)
+    seen = scene(beside)
+    offset = Scene(
+        Rollouts(seen.rolled.x, seen.rolled.y + np.float32(0.3), seen.rolled.yaw, seen.rolled.velocities),
+        *(getattr(seen, name) for name in ("plan", "pose", "goal_yaw", "costmap", "footprint", "limits", "dt")), 0.25,
+    )  # fmt: skip
+    said = path_critics.path_align(model.MppiPathAlignCritic(), offset)
+    # Metres are counted from the first pose looked at, 0.1 m from the plan's first point: so it is 0.1 m ahead, too;
+    # the last is compared with the point before the furthest.
+    mean = (3 * math.hypot(0.3, 0.1) + math.hypot(0.3, 0.15)) / 4
+    assert said == pytest.approx([14.0 * mean], rel=1e-3)
+
+
+def test_path_align_critic_is_silent_before_the_robot_has_got_going_and_where_the_plan_is_blocked() -> None:
+    assert path_critics.path_align(model.MppiPathAlignCritic(), scene(along(0.1))) is None
+    blocked = scene(along(1.5), view_of((0.9, -0.1, 1.1, 0.1)))
+    assert path_critics.path_align(model.MppiPathAlignCritic(), blocked) is None
+
+
+def test_path_follow_critic_is_the_distance_to_a_free_point_beyond_the_furthest() -> None:
+    said = path_critics.path_follow(model.MppiPathFollowCritic(), scene(along(0.5, 0.2)))
+    assert said == pytest.approx([5.0 * (0.45 + 0.25 - 0.5), 5.0 * (0.70 - 0.2)], rel=1e-3)
+
+
+@pytest.mark.parametrize(("mode", "weighed"), [(0, math.pi), (1, None), (2, math.pi)])
+def test_path_angle_critic_lets_a_robot_that_may_reverse_look_back(mode: int, weighed: float | None) -> None:
+    turned = scene(along(0.0), pose=Pose2(0.0, 0.0, math.pi))
+    back = integrated(along(0.0).astype(np.float32), math.pi, 0.1)
+    turned = Scene(back, *(getattr(turned, n) for n in ("plan", "pose", "goal_yaw", "costmap", "footprint", "limits",
+                   "dt", "tolerance")))  # fmt: skip
+    said = path_critics.path_angle(model.MppiPathAngleCritic(mode=mode), turned)
+    assert said is None if weighed is None else said == pytest.approx([2.0 * weighed], rel=1e-5)
+
+
+def test_prefer_forward_critic_counts_metres_driven_backward() -> None:
+    said = critics.prefer_forward(model.MppiPreferForwardCritic(), scene(along(0.3, -0.2)))
+    assert said == pytest.approx([0.0, 5.0 * 0.2], abs=1e-6)
+
+
+def test_twirling_critic_is_the_mean_turn_rate() -> None:
+    assert critics.twirling(model.MppiTwirlingCritic(), scene(along(0.3, turn=-0.5))) == pytest.approx([5.0])
