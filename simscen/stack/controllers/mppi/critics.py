@@ -32,7 +32,7 @@ def cost(spec: model.MppiCostCritic, scene: Scene) -> tuple[Floats, Mask]:
     """The mean cost of the costmap along each rollout; and which rollouts hit something."""
     part = slice(None, None, spec.trajectory_point_step)
     x, y, yaw = scene.rolled.x[part], scene.rolled.y[part], scene.rolled.yaw[part]
-    costs, _ = scene.costs(x, y)
+    costs = scene.costs(x, y)
     hit: Mask = np.asarray(scene.hit(x, y, yaw, spec.consider_footprint is not False).any(axis=0))
     paid = np.where(costs >= spec.near_collision_cost, np.float32(spec.critical_cost), np.float32(0))
     if scene.plan.length >= spec.near_goal_distance:
@@ -50,7 +50,7 @@ def obstacles(spec: model.MppiObstaclesCritic, scene: Scene) -> tuple[Floats, Ma
     near = np.maximum(np.float32(spec.collision_margin_distance) - gap, 0).sum(axis=0)
     total = spec.critical_weight * np.where(hit, np.float32(spec.collision_cost), near)
     if scene.plan.length >= spec.near_goal_distance:
-        costs, _ = scene.costs(x, y)
+        costs = scene.costs(x, y)
         inflated = np.float32(scene.costmap.inflation_radius)
         repulsion = np.where(costs >= 1, inflated - gap, np.float32(0)).sum(axis=0)
         total = total + spec.repulsion_weight * (repulsion - repulsion.min()) / len(x)

@@ -15,7 +15,7 @@ from simscen.stack.protocols import CostmapView
 
 Floats = npt.NDArray[np.float32]
 Mask = npt.NDArray[np.bool_]
-INSCRIBED, LETHAL, UNKNOWN = 253, 254, 255
+INSCRIBED, UNKNOWN = 253, 255
 ESCAPE = 0.01
 """Metres: a robot in collision may go where it is no more than so much nearer to the obstacle."""
 
@@ -54,19 +54,20 @@ class Scene:
 
     @cached_property
     def free_points(self) -> Mask:
-        """Which points (m,) of the plan the middle of the robot can be at."""
-        costs, on_map = self.costs(*self.path[:2])
-        return np.asarray(on_map & ((costs < INSCRIBED) | (costs == UNKNOWN)))
+        """Which points (m,) of the plan the middle of the robot can be at, as far as is known."""
+        costs = self.costs(*self.path[:2])
+        return np.asarray((costs < INSCRIBED) | (costs == UNKNOWN))
 
     @cached_property
     def _here(self) -> float:
         """The clearance of the whole hull now."""
         return float(self.footprint.clearance(self.costmap, np.array([self.pose]))[0])
 
-    def costs(self, x: Floats, y: Floats) -> tuple[npt.NDArray[np.uint8], Mask]:
-        """Costs (…,) at points (…,), and which of them lie on the costmap; 0 off it."""
+    def costs(self, x: Floats, y: Floats) -> npt.NDArray[np.uint8]:
+        """Costs (…,) at points (…,); 0 off the costmap."""
         rows, columns, on_map = self._cells(x, y)
-        return np.where(on_map, self.costmap.costs[rows, columns], np.uint8(0)), on_map
+        costs = self.costmap.costs[rows, columns]
+        return costs if on_map.all() else np.where(on_map, costs, np.uint8(0))
 
     def hit(self, x: Floats, y: Floats, yaw: Floats, whole: bool) -> Mask:
         """Which poses (…,) touch something: with the whole hull, or with its inscribed circle.

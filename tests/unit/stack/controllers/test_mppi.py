@@ -160,7 +160,7 @@ def test_cost_critic_is_the_mean_cost_over_254_and_a_collision_costs_a_million()
     spec = model.MppiCostCritic(near_goal_distance=0.0, trajectory_point_step=1)
     seen = scene(along(0.0, 0.5, 1.5), view)
     said, hit = critics.cost(spec, seen)
-    costs, _ = seen.costs(seen.rolled.x, seen.rolled.y)
+    costs = seen.costs(seen.rolled.x, seen.rolled.y)
     assert hit.tolist() == [False, False, True]
     assert said[1] == pytest.approx(3.81 / 254 * costs[:, 1].mean(), rel=1e-5)
     assert said[2] == pytest.approx(3.81 / 254 / 10 * 1e6, rel=1e-5)
