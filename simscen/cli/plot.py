@@ -17,7 +17,8 @@ from simscen.judge.result import result_of
 from simscen.judge.resultdata import from_json
 from simscen.judge.several import together
 from simscen.loading.resolved import criteria_of_text
-from simscen.record.replay import Log, read_run
+from simscen.record.replay import Log, invalid, read_run
+from simscen.record.sceneryfile import scenery_of
 
 LOGS = ("run.mcap", "run.partial.mcap")
 
@@ -28,9 +29,9 @@ def command(
 ) -> None:
     """Draw a recorded run from its log alone.
 
-    The map that the robot had, the true way, the belief, the plans, what was spawned, and where each criterion was
-    violated. What only the world knows, its places and the shapes of its objects, is not in a log. One that broke off
-    (run.partial.mcap) is drawn as far as it goes. Exit code 0; 2: not a usable log, or the picture cannot be written.
+    The map, zones, the true way, the belief, the plans, goals, doors, people, faults, and where each criterion was
+    violated, in the world as it was. A log that broke off (run.partial.mcap) is drawn as far as it goes. Exit code 0;
+    2: not a usable log, or the picture cannot be written.
     """
     file = _log(run)
     log = read_run(file)
@@ -53,7 +54,12 @@ def _log(run: Path) -> Path:
 def _draw(log: Log, file: Path, picture: Path) -> None:
     from simscen.report.picture import Scene, with_robots, write_picture
 
-    scene = Scene(log.trace, log.about.case, log.about.map or _nothing(log), _result(log, file))
+    try:
+        scenery = scenery_of(log.about)
+        map_ = scenery.map.grid if scenery.map else log.about.map or _nothing(log)
+    except ValueError as error:
+        raise invalid(file, "SC802", f"the log is damaged: {error}") from error
+    scene = Scene(log.trace, log.about.case, map_, _result(log, file), scenery)
     robots = {name: (one.trace, one.about.case) for name, one in log.robots.items()}
     save(picture, lambda path: write_picture(with_robots(scene, robots), path), [file])
 

@@ -18,6 +18,7 @@ from simscen.run.process.jobs import Job
 from simscen.run.process.whereabouts import settle_in
 from simscen.run.process.worker import Progress
 from simscen.run.process.zygote import Zygote
+from simscen.run.scenery import scenery_of
 
 _PREPARED = PreparedCache()
 
@@ -49,8 +50,7 @@ def _perform(job: Job, tell: Callable[[float], None]) -> dict[str, Any]:
 
 
 def _finish(prepared: Prepared, run: Run, folder: Path) -> None:
-    world = prepared.built.world
-    scene = Scene(run.trace, run.case, prepared.built.map, run.result, world.places, world.bodies)
+    scene = Scene(run.trace, run.case, prepared.built.map, run.result, scenery_of(prepared))
     robots = {name: (one.trace, one.case) for name, one in run.robots.items()}
     write_picture(with_robots(scene, robots), folder / "map.png")
 

@@ -1,9 +1,13 @@
-"""A canvas in metres: shapes are drawn twice as large and shrunk, text is set sharp on top."""
+"""A canvas in metres: shapes are drawn twice as large and shrunk, text is set sharp on top.
+
+It keeps a list of what was drawn, in metres, so that a picture can be compared part by part.
+"""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
@@ -14,9 +18,12 @@ from simscen.report.text import one_line
 
 Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
 Bounds = tuple[float, float, float, float]
+Fill = tuple[int, ...]
 
 SAMPLES = 2
 """Supersampling: 2 is where edges look smooth; 3 costs twice the time for no visible gain."""
+COARSE = 4
+"""Pixels of a cell in which labels look for room."""
 
 
 @lru_cache(maxsize=16)
@@ -42,8 +49,18 @@ class Note:
     halo: Colour | None = None
 
 
+class Part(NamedTuple):
+    """Something on a picture: what it is ("door meeting room"), and its points (n, 2) in metres of the world."""
+
+    what: str
+    points: Array
+
+
 class Canvas:
-    """The part `bounds` (x0, y0, x1, y1) of the plane, y up, at `scale` pixels a metre."""
+    """The part `bounds` (x0, y0, x1, y1) of the plane, y up, at `scale` pixels a metre.
+
+    What is drawn with `part` is on the list of `parts`; with `busy`, labels keep off it.
+    """
 
     def __init__(self, bounds: Bounds, scale: float, background: Colour) -> None:
         self.bounds, self.scale = bounds, scale
@@ -51,7 +68,10 @@ class Canvas:
         self.width, self.height = max(1, math.ceil((x1 - x0) * scale)), max(1, math.ceil((y1 - y0) * scale))
         self._image = Image.new("RGB", (self.width * SAMPLES, self.height * SAMPLES), background)
         self._draw = ImageDraw.Draw(self._image, "RGBA")
-        self._notes: list[Note] = []
+        self._busy = Image.new("L", (-(-self.width // COARSE), -(-self.height // COARSE)), 0)
+        self._keep_off = ImageDraw.Draw(self._busy)
+        self.notes: list[Note] = []
+        self.parts: list[Part] = []
 
     def paste(self, image: Image.Image) -> None:
         """Put an image of the whole canvas, supersampled, under everything drawn later."""
@@ -62,12 +82,26 @@ class Canvas:
         """Width and height of the supersampled image."""
         return self._image.size
 
+    @property
+    def busy(self) -> Array:
+        """Where labels should not be: a share 0 … 1 for each cell of COARSE pixels, rows from the top."""
+        return np.asarray(self._busy, dtype=np.float64) / 255
+
     def pixel(self, x: float, y: float) -> tuple[float, float]:
         """The pixel of a point of the plane."""
         return (x - self.bounds[0]) * self.scale, (self.bounds[3] - y) * self.scale
 
+    def shows(self, x: float, y: float) -> bool:
+        """Whether a point of the plane is on it."""
+        u, v = self.pixel(x, y)
+        return 0 <= u < self.width and 0 <= v < self.height
+
+    def tell(self, what: str, points: Array | Sequence[tuple[float, float]]) -> None:
+        """Put something on the list of parts."""
+        self.parts.append(Part(what, np.array(points, dtype=np.float64).reshape(-1, 2)))
+
     def polygon(
-        self, points: Array, fill: tuple[int, ...] | None, outline: Colour | None = None, width: float = 1.5
+        self, points: Array, fill: Fill | None, outline: Colour | None = None, width: float = 1.5, busy: bool = False
     ) -> None:
         """A closed shape; points (n, 2) in metres, `width` in pixels."""
         corners = self._corners(points)
@@ -75,11 +109,43 @@ class Canvas:
             self._draw.polygon(corners, fill=fill)
         if outline is not None:
             self._draw.line([*corners, corners[0]], fill=outline, width=_wide(width), joint="curve")
+        if busy:
+            self._keep_off.polygon([(u / SAMPLES / COARSE, v / SAMPLES / COARSE) for u, v in corners], fill=255)
 
-    def line(self, points: Array, colour: Colour, width: float = 1.5) -> None:
+    def hatch(
+        self, outlines: Sequence[Array], colour: Fill, rising: bool, gap: float = 11.0, width: float = 1.2
+    ) -> None:
+        """Slanted lines in closed shapes, `gap` pixels apart; `rising` to the right, or falling."""
+        corners = [self._corners(outline) for outline in outlines]
+        points = np.array([corner for outline in corners for corner in outline]).reshape(-1, 2)
+        if not len(points):
+            return
+        (left, top), (right, low) = np.floor(points.min(axis=0)), np.ceil(points.max(axis=0))
+        left, top = max(left, 0), max(top, 0)
+        wide, high = int(min(right, self.samples[0]) - left) + 1, int(min(low, self.samples[1]) - top) + 1
+        if wide < 1 or high < 1:
+            return
+        inside, lines = Image.new("L", (wide, high), 0), Image.new("L", (wide, high), 0)
+        pen, fill = ImageDraw.Draw(lines), ImageDraw.Draw(inside)
+        for outline in corners:
+            fill.polygon([(u - left, v - top) for u, v in outline], fill=255)
+        step = gap * SAMPLES
+        first = -high - ((left + (top if rising else -top)) % step)  # the same slant everywhere on the canvas
+        for at in np.arange(first, wide + high, step).tolist():
+            ends = [(at, 0), (at - high, high)] if rising else [(at, 0), (at + high, high)]
+            pen.line(ends, fill=colour[3] if len(colour) > 3 else 255, width=_wide(width))
+        lines.paste(0, (0, 0), inside.point(lambda value: 255 - value))
+        self._image.paste(colour[:3], (int(left), int(top)), lines)
+
+    def line(self, points: Array, colour: Fill, width: float = 1.5, busy: bool = False) -> None:
         """A line through points (n, 2) in metres."""
         if len(points) > 1:
-            self._draw.line(self._corners(points), fill=colour, width=_wide(width), joint="curve")
+            corners = self._corners(points)
+            self._draw.line(corners, fill=colour, width=_wide(width), joint="curve")
+            if busy:
+                self._keep_off.line(
+                    [(u / SAMPLES / COARSE, v / SAMPLES / COARSE) for u, v in corners], fill=255, width=2
+                )
 
     def dashes(self, points: Array, colour: Colour, width: float = 1.5, dash: float = 5.0) -> None:
         """A dashed line; `dash` is the length of a dash and of a gap in pixels."""
@@ -96,30 +162,38 @@ class Canvas:
         x: float,
         y: float,
         radius: float,
-        fill: tuple[int, ...] | None,
+        fill: Fill | None,
         outline: Colour | None = None,
         width: float = 1.5,
+        busy: bool = False,
     ) -> None:
         """A disc of `radius` pixels at a point in metres."""
         u, v = (SAMPLES * part for part in self.pixel(x, y))
         reach = SAMPLES * radius
         box = (u - reach, v - reach, u + reach, v + reach)
         self._draw.ellipse(box, fill=fill, outline=outline, width=_wide(width))
+        if busy:
+            self._keep_off.ellipse([part / SAMPLES / COARSE for part in box], fill=255)
 
     def sign(self, x: float, y: float, offsets: Sequence[tuple[float, float]], fill: Colour) -> None:
-        """A filled sign at a point in metres; `offsets` are its corners in pixels, y down."""
+        """A filled sign at a point in metres; `offsets` are its corners in pixels, y down. Labels keep off it."""
         u, v = self.pixel(x, y)
         self._draw.polygon([((u + dx) * SAMPLES, (v + dy) * SAMPLES) for dx, dy in offsets], fill=fill)
+        self._keep_off.polygon([((u + dx) / COARSE, (v + dy) / COARSE) for dx, dy in offsets], fill=255)
+
+    def leader(self, here: tuple[float, float], there: tuple[float, float], colour: Colour) -> None:
+        """A thin line between two pixels."""
+        self._draw.line([(u * SAMPLES, v * SAMPLES) for u, v in (here, there)], fill=colour, width=_wide(0.8))
 
     def note(self, note: Note) -> None:
         """Set text once everything is drawn."""
-        self._notes.append(note)
+        self.notes.append(note)
 
     def finish(self) -> Image.Image:
         """The picture at its final size."""
         image = self._image.reduce(SAMPLES)
         draw = ImageDraw.Draw(image, "RGBA")
-        for note in self._notes:
+        for note in self.notes:
             write(draw, note)
         return image
 

@@ -1,32 +1,62 @@
 """map.png: a run at one glance."""
 
 import math
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 from PIL import Image, ImageDraw
 
+from simscen.core.events import EventKind
 from simscen.core.geometry import Array
-from simscen.report.picture import ground, marks, palette
-from simscen.report.picture.canvas import Bounds, Canvas, Note, font, shown, write
+from simscen.core.result import Outcome
+from simscen.report.picture import goals, grid, ground, happenings, palette, things, ways, zones
+from simscen.report.picture.canvas import COARSE, Bounds, Canvas, Note, Part, font, shown, write
+from simscen.report.picture.labels import Label, place
 from simscen.report.picture.scene import Scene
 from simscen.report.picture.sidebar import WIDTH, sidebar
 
 HEADER = 66
 LARGEST = (1000, 800)
 """Pixels that the map may take."""
+_EDGE = 14
+"""Pixels above the map and to its right."""
+
+Draw = Callable[[Canvas, Scene], Iterator[Label]]
+_OF_ALL: tuple[Draw, ...] = (zones.draw_ground, zones.draw_floors)
+_THINGS: tuple[Draw, ...] = (happenings.draw_places, things.draw_things)
+_UNDER: tuple[Draw, ...] = (zones.draw_zones, happenings.draw_faulty, ways.draw_plans, goals.draw_goals)
+_OVER: tuple[Draw, ...] = (
+    ways.draw_truth,
+    ways.draw_belief,
+    ways.draw_robot,
+    happenings.draw_faults,
+    happenings.draw_events,
+    ways.draw_carried,
+    happenings.draw_marks,
+    happenings.draw_collisions,
+)
 
 
 def draw(scene: Scene) -> Image.Image:
     """The picture: header, map with everything that happened on it, and the criteria beside it."""
-    map_ = _map(scene)
-    words = sidebar(scene, map_.height)
-    image = Image.new("RGB", (map_.width + WIDTH, HEADER + max(map_.height, words.height)), palette.PAGE)
-    image.paste(palette.UNKNOWN, (0, HEADER, map_.width, image.height))
-    image.paste(map_, (0, HEADER + (image.height - HEADER - map_.height) // 2))
-    image.paste(words, (map_.width, HEADER))
+    canvas = _map(scene)
+    map_ = canvas.finish()
+    wide, high = grid.LEFT + map_.width + _EDGE, _EDGE + map_.height + grid.BELOW
+    words = sidebar(scene, [part.what for part in canvas.parts], high)
+    image = Image.new("RGB", (wide + WIDTH, HEADER + max(high, words.height)), palette.PAGE)
+    left, top = grid.LEFT, HEADER + _EDGE
+    image.paste(map_, (left, top))
+    image.paste(words, (wide, HEADER))
+    pen = ImageDraw.Draw(image, "RGBA")
+    grid.write_coordinates(pen, canvas, left, top)
     _header(image, scene)
     return image
+
+
+def parts(scene: Scene) -> list[Part]:
+    """What is on the map, and where in metres of the world."""
+    return _map(scene).parts
 
 
 def write_picture(scene: Scene, path: Path) -> None:
@@ -34,24 +64,28 @@ def write_picture(scene: Scene, path: Path) -> None:
     draw(scene).save(path, format="PNG", compress_level=3)
 
 
-def _map(scene: Scene) -> Image.Image:
+def _map(scene: Scene) -> Canvas:
     bounds = ground.extent(scene.map, _shown(scene))
     canvas = Canvas(bounds, _scale(bounds), palette.UNKNOWN)
     ground.lay(canvas, scene.map)
-    marks.draw_places(canvas, scene)
-    for draw_mark in (marks.draw_plans, marks.draw_goals):
-        for robot in scene.each:
-            draw_mark(canvas, robot)
-    marks.draw_objects(canvas, scene)
-    for draw_mark in (marks.draw_truth, marks.draw_belief, marks.draw_robot):
-        for robot in scene.each:
-            draw_mark(canvas, robot)
-    for robot in scene.each:
-        marks.draw_marks(canvas, robot)
-        marks.draw_collisions(canvas, robot)
-    marks.draw_violations(canvas, scene)
-    _scale_bar(canvas)
-    return canvas.finish()
+    grid.draw_grid(canvas)
+    labels = [label for draw_all in _OF_ALL for label in draw_all(canvas, scene)]
+    labels += [label for draw_one in _UNDER for robot in scene.each for label in draw_one(canvas, robot)]
+    labels += [label for draw_all in _THINGS for label in draw_all(canvas, scene)]
+    labels += [label for draw_one in _OVER for robot in scene.each for label in draw_one(canvas, robot)]
+    labels += happenings.draw_violations(canvas, scene)
+    place(canvas, labels, _walls(canvas, scene))
+    return canvas
+
+
+def _walls(canvas: Canvas, scene: Scene) -> Array:
+    """Where the map is not free, as a share of each cell in which labels look for room."""
+    rows, columns = canvas.busy.shape
+    v, u = np.mgrid[:rows, :columns] * COARSE + COARSE / 2
+    x, y = canvas.bounds[0] + u / canvas.scale, canvas.bounds[3] - v / canvas.scale
+    values = scene.map.values_at(np.column_stack((x.ravel(), y.ravel())))
+    taken: Array = (values > 50).reshape(rows, columns).astype(np.float64)
+    return taken
 
 
 def _shown(scene: Scene) -> Array:
@@ -64,20 +98,6 @@ def _shown(scene: Scene) -> Array:
 def _scale(bounds: Bounds) -> float:
     x0, y0, x1, y1 = bounds
     return min(LARGEST[0] / (x1 - x0), LARGEST[1] / (y1 - y0))
-
-
-def _scale_bar(canvas: Canvas) -> None:
-    most = canvas.width / canvas.scale / 4
-    power = 10.0 ** math.floor(math.log10(most))
-    metres = max(power * factor for factor in (1, 2, 5) if power * factor <= most)
-    x0, y0, _, _ = canvas.bounds
-    left, low = x0 + 14 / canvas.scale, y0 + 16 / canvas.scale
-    tick = 4 / canvas.scale
-    canvas.line(np.array([(left, low), (left + metres, low)]), palette.INK, 2.0)
-    for x in (left, left + metres):
-        canvas.line(np.array([(x, low - tick), (x, low + tick)]), palette.INK, 2.0)
-    u, v = canvas.pixel(left + metres / 2, low)
-    canvas.note(Note(u, v - 11, f"{metres:g} m", 12, palette.INK, "mm", halo=palette.UNKNOWN))
 
 
 def _header(image: Image.Image, scene: Scene) -> None:
@@ -96,5 +116,17 @@ def _facts(scene: Scene) -> str:
     length = result.metrics.get("path_length")
     key = result.key
     facts = [f"seed {key.seed}", key.variation, key.stack_name, f"{result.simulated:.1f} s simulated"]
-    facts += [f"{length:.1f} m driven" if length is not None else "", f"ended: {shown(result.ended)}"]
+    facts += [f"{length:.1f} m driven" if length is not None else "", f"ended: {shown(ended(scene))}"]
     return "   ·   ".join(fact for fact in facts if fact)
+
+
+def ended(scene: Scene) -> str:
+    """Why the run ended, with Nav2's code where navigation failed: "navigation ended: NO_VALID_PATH (208)"."""
+    if scene.result.outcome is Outcome.ERROR and scene.result.error is not None:
+        return f"{scene.result.error.kind}: {scene.result.error.message}"
+    told = [scene.result.ended]
+    for robot in scene.each:
+        for event in robot.trace.of_kind(EventKind.NAVIGATION_ENDED)[-1:]:
+            how = " ".join(part for part in (event.name, goals.code_of(event)) if part)
+            told += [robot.called(how)] if event.name != "SUCCEEDED" else []
+    return ", ".join(part for part in told if part)

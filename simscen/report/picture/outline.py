@@ -6,62 +6,37 @@ import numpy as np
 
 from simscen.core.events import Event, EventKind
 from simscen.core.geometry import Array, Pose2
-from simscen.core.shapes import Body, Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Shape, Sphere
+from simscen.core.scenery import Thing
 from simscen.core.trace import Trace
 
 _UNKNOWN_RADIUS = 0.2
+Outlines = tuple[Array, ...]
 
 
-def outlines(trace: Trace, bodies: Sequence[Body]) -> dict[str, Array]:
-    """The outline (n, 2) of each object in its own frame: from the world's bodies and from what was spawned."""
-    found = {body.name: of_body(body) for body in bodies if body.solids}
+def outlines(trace: Trace, things: Sequence[Thing]) -> dict[str, Outlines]:
+    """The outlines, each (n, 2), of each object in its own frame: what was spawned, and else the world's things."""
+    found = {thing.name: tuple(map(np.array, thing.outlines)) for thing in things if thing.outlines}
     found.update({event.name: of_event(event) for event in trace.of_kind(EventKind.OBJECT_SPAWNED)})
     for name in trace.objects:
-        found.setdefault(name, _circle(_UNKNOWN_RADIUS))
+        found.setdefault(name, (_circle(_UNKNOWN_RADIUS),))
     return found
 
 
-def of_body(body: Body) -> Array:
-    """The outline of its largest solid."""
-    return max((solid_pose_applied(solid.shape, solid.pose.plane) for solid in body.solids), key=_area)
-
-
-def solid_pose_applied(shape: Shape, pose: Pose2) -> Array:
-    """The outline of a shape that stands at `pose`."""
-    return pose.apply(of_shape(shape))
-
-
-def of_shape(shape: Shape) -> Array:
-    """The outline of a shape in its own frame, seen along z; of a mesh its bounding rectangle."""
-    match shape:
-        case Box(size):
-            return _rectangle(size[0], size[1])
-        case Cylinder(radius, _) | Sphere(radius) | Capsule(radius, _) | Cone(radius, _):
-            return _circle(radius)
-        case Ellipsoid(radii):
-            return _circle(1.0) * np.array(radii[:2], dtype=np.float64)
-        case Extrusion(polygon, _):
-            return np.array(polygon, dtype=np.float64)
-        case Mesh(vertices, _):
-            (x0, y0), (x1, y1) = vertices[:, :2].min(axis=0), vertices[:, :2].max(axis=0)
-            return np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
-
-
-def of_event(event: Event) -> Array:
-    """The outline that an object.spawned event describes: its largest part, or `shape` with `size` or `points`."""
+def of_event(event: Event) -> Outlines:
+    """The outlines that an object.spawned event describes: its parts, or else `shape` with `size` or `points`."""
     size, points = _floats(event.data, "size"), event.data.get("points")
     parts = event.data.get("parts")
     if isinstance(parts, list) and parts:
-        return max((np.array(part, dtype=np.float64) for part in parts), key=_area)
+        return tuple(np.array(part, dtype=np.float64) for part in parts)
     match event.data.get("shape"):
         case "box" if len(size) >= 2:
-            return _rectangle(size[0], size[1])
+            return (_rectangle(size[0], size[1]),)
         case "cylinder" if size:
-            return _circle(size[0])
+            return (_circle(size[0]),)
         case "polygon" if isinstance(points, list) and len(points) > 2:
-            return np.array(points, dtype=np.float64)
+            return (np.array(points, dtype=np.float64),)
         case _:
-            return _circle(_UNKNOWN_RADIUS)
+            return (_circle(_UNKNOWN_RADIUS),)
 
 
 def pose_of(event: Event) -> Pose2:
@@ -84,8 +59,3 @@ def _rectangle(length: float, width: float) -> Array:
 def _circle(radius: float) -> Array:
     angles = np.linspace(0, 2 * np.pi, 32, endpoint=False)
     return radius * np.column_stack((np.cos(angles), np.sin(angles)))
-
-
-def _area(polygon: Array) -> float:
-    x, y = polygon.T
-    return abs(float(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))) / 2

@@ -4,27 +4,25 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from simscen.core.case import Case
-from simscen.core.geometry import Pose2
 from simscen.core.grid import OccupancyGrid
 from simscen.core.result import RunResult
-from simscen.core.shapes import Body
+from simscen.core.scenery import Scenery
 from simscen.core.trace import Trace
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A finished run: everything here is in its log, but for `places` and `bodies`, which belong to the world.
+    """A finished run: everything here is in its log.
 
-    `map` is the world as it is (not necessarily the map the robot was given). `bodies` are the world's moving things,
-    for their shapes. `robots` is what there is of each of several robots; one of these has a `name`.
+    `map` is the world as it is (not necessarily the map the robot was given), `scenery` what else there was to see.
+    `robots` is what there is of each of several robots; one of these has a `name`.
     """
 
     trace: Trace
     case: Case
     map: OccupancyGrid
     result: RunResult
-    places: Mapping[str, Pose2] = field(default_factory=dict)
-    bodies: Sequence[Body] = ()
+    scenery: Scenery = field(default_factory=Scenery)
     robots: Mapping[str, "Scene"] = field(default_factory=dict)
     name: str = ""
 
@@ -32,6 +30,11 @@ class Scene:
     def each(self) -> Sequence["Scene"]:
         """What is shown of each robot."""
         return tuple(self.robots.values()) or (self,)
+
+    @property
+    def number(self) -> int:
+        """Which of several robots it is of, by name; 0 for the only one."""
+        return sorted(self.robots).index(self.name) if self.name in self.robots else 0
 
     def called(self, what: str) -> str:
         """What something of this robot is called on the picture."""
@@ -41,4 +44,4 @@ class Scene:
 def with_robots(scene: Scene, robots: Mapping[str, tuple[Trace, Case]]) -> Scene:
     """The scene with several robots, which are not things in it."""
     parts = {name: replace(scene, trace=trace, case=case, name=name) for name, (trace, case) in robots.items()}
-    return replace(scene, robots=parts)
+    return replace(scene, robots={name: replace(part, robots=parts) for name, part in parts.items()})

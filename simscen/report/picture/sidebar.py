@@ -1,31 +1,37 @@
 """The words beside the map: what the run was, how each criterion came out, and what the signs mean."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from PIL import Image, ImageDraw
 
+from simscen.core.result import Outcome
 from simscen.core.verdict import Status
-from simscen.judge.wording import comparison, subject
+from simscen.judge.wording import comparison, spot, subject
 from simscen.report.picture import palette
 from simscen.report.picture.canvas import Note, font, shown, write
-from simscen.report.picture.marks import round_step
 from simscen.report.picture.palette import Colour
 from simscen.report.picture.scene import Scene
+from simscen.report.picture.ways import round_step
 
-WIDTH = 340
+WIDTH = 360
 _PAD = 18
 _LINE = 17
-Sample = Callable[[ImageDraw.ImageDraw, float, float], None]
+_ORDER = (Status.ERROR, Status.FAIL, Status.INCONCLUSIVE, Status.PASS)
+Pen = ImageDraw.ImageDraw
+Sample = Callable[[Pen, float, float], None]
+Row = tuple[Status, Colour, list[str]]
 
 
-def sidebar(scene: Scene, height: int) -> Image.Image:
-    """The sidebar, at least `height` pixels tall."""
-    rows, legend = _criteria(scene), _legend(round_step(scene.result.simulated))
-    needed = 40 + sum(_LINE * len(lines) + 8 for _, lines in rows) + 14 + 20 * len(legend) + 62
+def sidebar(scene: Scene, parts: Sequence[str], height: int) -> Image.Image:
+    """The sidebar, at least `height` pixels tall; its legend explains what is among the `parts` of the map."""
+    reasons, rows = _reasons(scene), _criteria(scene)
+    legend = [entry[1:] for entry in _legend(round_step(scene.result.simulated)) if _is_on(parts, entry[0])]
+    said = len(reasons) * _LINE + (14 if reasons else 0) + sum(_LINE * len(lines) + 8 for _, _, lines in rows)
+    needed = 54 + said + 26 + 20 * len(legend) + 62
     image = Image.new("RGB", (WIDTH, max(height, needed)), palette.PAGE)
     draw = ImageDraw.Draw(image, "RGBA")
-    _criteria_list(draw, rows)
+    _criteria_list(draw, reasons, rows)
     top = image.height - 20 * len(legend) - 50
     for number, (text, sample) in enumerate(legend):
         y = top + 20 * number
@@ -35,94 +41,174 @@ def sidebar(scene: Scene, height: int) -> Image.Image:
     return image
 
 
-def _criteria(scene: Scene) -> list[tuple[Colour, list[str]]]:
-    rows = []
-    for verdict in scene.result.verdicts:
+def _is_on(parts: Sequence[str], wanted: str) -> bool:
+    """Whether a kind of part is on the map; "failed" is the end of one."""
+    return any(part.startswith(wanted) or part.endswith(f" {wanted}") for part in parts)
+
+
+def _reasons(scene: Scene) -> list[str]:
+    """Why the run could not be completed, or why its failure is none."""
+    result = scene.result
+    if result.error is not None:
+        return _wrapped(shown(f"{result.error.kind}: {result.error.message}"), _PAD)
+    if result.outcome in (Outcome.FAILED_AS_EXPECTED, Outcome.SKIPPED):
+        return _wrapped(shown(f"{result.outcome.value.replace('-', ' ')}: {result.reason}"), _PAD)
+    return []
+
+
+def _criteria(scene: Scene) -> list[Row]:
+    """What did not pass comes first."""
+    rows: list[Row] = []
+    for verdict in sorted(scene.result.verdicts, key=lambda verdict: _ORDER.index(verdict.status)):
         finding = verdict.tightest
         warned = verdict.severity == "warn" and verdict.status is not Status.PASS
         colour = palette.AMBER if warned else palette.STATUSES[verdict.status]
         if finding is None:
-            rows.append((colour, [f"{shown(verdict.id)}: checked nothing"]))
+            rows.append((verdict.status, colour, _wrapped(f"{shown(verdict.id)}: checked nothing")))
             continue
-        told = shown(f"{subject(verdict, finding)}: {comparison(finding)}")
-        details = [shown(text) for text in finding.detail[:2]] if verdict.status is not Status.PASS else []
-        rows.append((colour, [line for text in (told, *details) for line in _wrapped(text)]))
+        failed = verdict.status is not Status.PASS
+        where = spot(finding, scene.result.tick_rate) if failed else ""
+        told = ", ".join(part for part in (f"{subject(verdict, finding)}: {comparison(finding)}", where) if part)
+        texts = [f"warning: {told}" if warned else told, *(finding.detail if failed else ())]
+        rows.append((verdict.status, colour, [line for text in texts for line in _wrapped(shown(text))]))
     return rows
 
 
-def _criteria_list(draw: ImageDraw.ImageDraw, rows: list[tuple[Colour, list[str]]]) -> None:
+def _criteria_list(draw: Pen, reasons: list[str], rows: list[Row]) -> None:
     y = 24.0
+    for line in reasons:
+        write(draw, Note(_PAD, y, line, 13, palette.INK))
+        y += _LINE
+    y += 14 if reasons else 0
     write(draw, Note(_PAD, y, "criteria", 12, palette.FAINT_INK))
     y += 22
-    for colour, lines in rows:
-        _tick_or_cross(draw, _PAD + 5, y, colour)
+    for status, colour, lines in rows:
+        (_tick if status is Status.PASS else _cross)(draw, _PAD + 5, y, colour)
         for line in lines:
             write(draw, Note(_PAD + 20, y, line, 13, palette.INK))
             y += _LINE
         y += 8
 
 
-def _tick_or_cross(draw: ImageDraw.ImageDraw, x: float, y: float, colour: Colour) -> None:
-    if colour == palette.GREEN:
-        draw.line([(x - 5, y), (x - 1, y + 4), (x + 5, y - 5)], fill=colour, width=2)
-    else:
-        draw.line([(x - 4, y - 4), (x + 4, y + 4)], fill=colour, width=2)
-        draw.line([(x - 4, y + 4), (x + 4, y - 4)], fill=colour, width=2)
-
-
-def _wrapped(text: str, size: int = 13) -> list[str]:
-    """The text in lines that fit; at most four."""
+def _wrapped(text: str, left: int = _PAD + 20, size: int = 13) -> list[str]:
+    """The whole text in lines that fit; a word that is longer than a line is broken."""
+    room = WIDTH - left - 12
     lines, current = [], ""
     for word in text.split(" "):
         longer = f"{current} {word}".strip()
-        if current and font(size).getlength(longer) > WIDTH - _PAD - 30:
+        if current and font(size).getlength(longer) > room:
             lines.append(current)
-            current = word
-        else:
-            current = longer
-    lines.append(current)
-    return lines if len(lines) <= 4 else [*lines[:3], f"{lines[3]} …"]
+            longer = word
+        while font(size).getlength(longer) > room:
+            fits = next(k for k in range(len(longer) - 1, 0, -1) if k == 1 or font(size).getlength(longer[:k]) <= room)
+            lines.append(longer[:fits])
+            longer = longer[fits:]
+        current = longer
+    return [*lines, current]
 
 
-def _legend(step: float) -> list[tuple[str, Sample]]:
+def _tick(draw: Pen, x: float, y: float, colour: Colour) -> None:
+    draw.line([(x - 5, y), (x - 1, y + 4), (x + 5, y - 5)], fill=colour, width=2)
+
+
+def _cross(draw: Pen, x: float, y: float, colour: Colour) -> None:
+    draw.line([(x - 4, y - 4), (x + 4, y + 4)], fill=colour, width=2)
+    draw.line([(x - 4, y + 4), (x + 4, y - 4)], fill=colour, width=2)
+
+
+def _legend(step: float) -> list[tuple[str, str, Sample]]:
+    """What a part's name begins with, what its sign means, and the sign."""
     return [
-        (f"where it truly was, a dot every {step:g} s", _way),
-        ("where it thought it was", _dashes),
-        ("plans", lambda d, x, y: d.line([(x, y), (x + 24, y)], fill=palette.PLAN, width=4)),
-        ("goal, its tolerance and heading", _ring),
-        ("robot at the end", _robot),
-        ("object at the end; before, in its time's colour", _block),
-        ("collision", lambda d, x, y: d.regular_polygon((x + 12, y, 7), 5, fill=palette.RED)),
-        ("where a criterion failed", lambda d, x, y: _tick_or_cross(d, x + 12, y, palette.RED)),
+        ("", f"where it truly was, a dot every {step:g} s", _way),
+        ("belief", "where it thought it was", _dashes),
+        ("", "plans", lambda d, x, y: d.line([(x, y), (x + 24, y)], fill=palette.PLAN, width=4)),
+        ("set down", "carried elsewhere: lifted, set down", _arrow),
+        ("goal", "goal, its tolerance and heading", _ring(palette.GREEN, False)),
+        ("failed", "goal that failed", _ring(palette.RED, True)),
+        ("robot", "robot at the end", _robot),
+        ("object", "object at the end; before, in its time's colour", _block(palette.OBJECT)),
+        ("door", "door at the end; dashed: where it can be", _door),
+        ("person", "person at the end, and where they look", _person),
+        ("keepout zone", "zone to keep out of", _hatched(palette.RED, -6)),
+        ("speed zone", "zone with a speed limit", _hatched(palette.AMBER, 6)),
+        ("ground", "ramp or sill; chevrons point uphill", _block(palette.GROUND)),
+        ("floor", "floor of another friction", _block(palette.SLIPPERY)),
+        ("fault", "a fault began; band: it was on", _band),
+        ("event", "where the robot was at an event", _diamond),
+        ("collision", "collision", lambda d, x, y: d.regular_polygon((x + 12, y, 7), 5, fill=palette.RED)),
+        ("violation", "where a criterion failed", lambda d, x, y: _cross(d, x + 12, y, palette.RED)),
     ]
 
 
-def _way(draw: ImageDraw.ImageDraw, x: float, y: float) -> None:
+def _way(draw: Pen, x: float, y: float) -> None:
     for k in range(24):
         draw.line([(x + k, y), (x + k + 1, y)], fill=palette.ramp(k / 24), width=3)
     draw.ellipse((x + 8, y - 4, x + 16, y + 4), fill=palette.PAGE, outline=palette.ramp(0.5), width=2)
 
 
-def _robot(draw: ImageDraw.ImageDraw, x: float, y: float) -> None:
+def _robot(draw: Pen, x: float, y: float) -> None:
     draw.rectangle((x + 4, y - 6, x + 20, y + 6), fill=palette.START, outline=palette.ROBOT)
     draw.polygon([(x + 13, y - 3), (x + 18, y), (x + 13, y + 3)], fill=palette.PAGE)
 
 
-def _dashes(draw: ImageDraw.ImageDraw, x: float, y: float) -> None:
+def _dashes(draw: Pen, x: float, y: float) -> None:
     for k in range(3):
         draw.line([(x + 10 * k, y), (x + 10 * k + 5, y)], fill=palette.BELIEF, width=2)
 
 
-def _ring(draw: ImageDraw.ImageDraw, x: float, y: float) -> None:
-    draw.ellipse((x + 5, y - 7, x + 19, y + 7), fill=(*palette.GOAL, 46), outline=palette.GOAL, width=2)
-    draw.line([(x + 12, y), (x + 25, y)], fill=palette.GOAL, width=2)
+def _arrow(draw: Pen, x: float, y: float) -> None:
+    draw.line([(x + 12, y + 6), (x + 12, y - 3)], fill=palette.AMBER, width=3)
+    draw.polygon([(x + 7, y - 2), (x + 12, y - 8), (x + 17, y - 2)], fill=palette.AMBER)
 
 
-def _block(draw: ImageDraw.ImageDraw, x: float, y: float) -> None:
-    draw.rectangle((x + 3, y - 6, x + 21, y + 6), fill=(*palette.OBJECT, 150), outline=palette.OBJECT)
+def _ring(colour: Colour, crossed: bool) -> Sample:
+    def sample(draw: Pen, x: float, y: float) -> None:
+        draw.ellipse((x + 5, y - 7, x + 19, y + 7), fill=(*colour, 46), outline=colour, width=2)
+        if crossed:
+            _cross(draw, x + 12, y, colour)
+        else:
+            draw.line([(x + 12, y), (x + 25, y)], fill=colour, width=2)
+
+    return sample
 
 
-def _time_bar(draw: ImageDraw.ImageDraw, scene: Scene, y: float) -> None:
+def _block(colour: Colour) -> Sample:
+    def sample(draw: Pen, x: float, y: float) -> None:
+        draw.rectangle((x + 3, y - 6, x + 21, y + 6), fill=(*colour, 110), outline=colour)
+
+    return sample
+
+
+def _door(draw: Pen, x: float, y: float) -> None:
+    draw.rectangle((x + 2, y - 2, x + 22, y + 2), fill=(*palette.OBJECT, 150), outline=palette.OBJECT)
+    for k in range(3):
+        draw.line([(x + 2, y - 2 - 3 * k), (x + 2, y - 3 - 3 * k)], fill=palette.OBJECT)
+
+
+def _person(draw: Pen, x: float, y: float) -> None:
+    draw.ellipse((x + 6, y - 6, x + 18, y + 6), fill=(*palette.PERSON, 150), outline=palette.PERSON)
+    draw.line([(x + 12, y), (x + 23, y)], fill=palette.PERSON, width=2)
+
+
+def _hatched(colour: Colour, down: float) -> Sample:
+    def sample(draw: Pen, x: float, y: float) -> None:
+        for k in range(3):
+            draw.line([(x + 7 * k, y + down), (x + 7 * k + 9, y - down)], fill=colour, width=1)
+
+    return sample
+
+
+def _band(draw: Pen, x: float, y: float) -> None:
+    draw.line([(x, y), (x + 24, y)], fill=palette.FAULTY, width=10)
+    draw.polygon([(x + 13, y - 8), (x + 8, y + 1), (x + 12, y + 1), (x + 11, y + 8), (x + 17, y - 2), (x + 13, y - 2)],
+                 fill=palette.AMBER)  # fmt: skip
+
+
+def _diamond(draw: Pen, x: float, y: float) -> None:
+    draw.polygon([(x + 12, y - 6), (x + 18, y), (x + 12, y + 6), (x + 6, y)], fill=palette.INK)
+
+
+def _time_bar(draw: Pen, scene: Scene, y: float) -> None:
     """The colours of the driven way, from the start to the end of the run."""
     end = f"{scene.result.simulated:.0f} s"
     left, right = _PAD + 34, WIDTH - _PAD - math.ceil(font(12).getlength(end)) - 8

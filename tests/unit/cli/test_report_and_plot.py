@@ -15,7 +15,11 @@ from simscen.report.journal import Journal
 
 SCENARIO = """\
 simscen: 1
-world: {simscen: 1, walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]}
+world:
+  simscen: 1
+  walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]
+  doors: [{name: gate, points: [[0.2, 3], [0.2, 2]], closed: false}]
+  places: {dock: {x: 5, y: 1}}
 robot: {pose: {x: 1, y: 1}}
 goals: [{pose: {x: 5, y: 3}}]
 time_limit: 9 s
@@ -123,7 +127,6 @@ def test_a_run_is_drawn_from_its_log_alone(simscen, out: Path, tmp_path: Path) -
 
 
 def test_the_picture_is_that_of_the_run(simscen, out: Path) -> None:
-    """This world has no places and no objects, which a log would not hold."""
     before = (out / "runs/short/seed-1/map.png").read_bytes()
     (out / "runs/short/seed-1/map.png").unlink()
     assert simscen("plot", "out/runs/short/seed-1").code == 0

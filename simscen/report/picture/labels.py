@@ -1,0 +1,107 @@
+"""Names beside what they name: where they cover no way, no robot, no goal and no other name."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from simscen.core.geometry import Array
+from simscen.report.picture import palette
+from simscen.report.picture.canvas import COARSE, Canvas, Note, text_size
+from simscen.report.picture.palette import Colour
+
+_AWAY = (4.0, 12.0, 22.0, 36.0, 54.0, 76.0, 104.0, 140.0)
+"""Pixels between a mark's rim and its label, in the order in which they are tried."""
+_ANGLES = tuple(math.radians(degrees) for degrees in (0, 180, 90, 270, 30, 150, 330, 210, 60, 120, 300, 240))
+_LED = 16.0
+"""Pixels from which on a line leads from the label to its mark."""
+_WALL_WEIGHT, _FAR_WEIGHT = 0.25, 0.0015
+"""What a label over walls, and each pixel of distance, count against one over a way."""
+_CROWDED = 0.2
+"""Share of a label that may be over something; beyond it a label that can be missed is left out."""
+
+
+@dataclass(frozen=True)
+class Label:
+    """Text for a mark at (x, y) in metres whose rim is `rim` pixels away; `plate` is the colour of its ground.
+
+    One that is `spare` is left out where there is no room. Those of a low `rank` are placed first.
+    """
+
+    rank: int
+    x: float
+    y: float
+    text: str
+    colour: Colour
+    size: int = 12
+    rim: float = 6.0
+    plate: Colour | None = None
+    spare: bool = False
+
+
+def place(canvas: Canvas, labels: list[Label], walls: Array) -> None:
+    """Set all labels; `walls` is a share 0 … 1 for each cell of the canvas's `busy`."""
+    taken = canvas.busy + _WALL_WEIGHT * walls
+    for label in sorted(labels, key=lambda label: label.rank):
+        if not canvas.shows(label.x, label.y):
+            continue
+        cost, (left, top, right, low) = _best(canvas, label, taken)
+        if label.spare and cost > _CROWDED:
+            continue
+        rows, columns = (
+            slice(int(top // COARSE), int(low // COARSE) + 1),
+            slice(int(left // COARSE), int(right // COARSE) + 1),
+        )
+        taken[rows, columns] = 3.0
+        u, v = canvas.pixel(label.x, label.y)
+        end = min(max(u, left), right), min(max(v, top), low)
+        apart = math.dist((u, v), end)
+        if apart > label.rim + _LED:
+            share = label.rim / apart
+            canvas.leader((u + share * (end[0] - u), v + share * (end[1] - v)), end, label.plate or label.colour)
+        halo = None if label.plate else palette.FREE
+        middle = (left + right) / 2, (top + low) / 2
+        canvas.note(Note(*middle, label.text, label.size, label.colour, "mm", label.plate, halo))
+        canvas.tell(f"label {label.text}", [(label.x, label.y)])
+
+
+Box = tuple[float, float, float, float]
+
+
+def _best(canvas: Canvas, label: Label, taken: Array) -> tuple[float, Box]:
+    """The best of all places tried, and what counts against it."""
+    sums = np.zeros((taken.shape[0] + 1, taken.shape[1] + 1))
+    sums[1:, 1:] = taken.cumsum(axis=0).cumsum(axis=1)
+    wide, high = text_size(label.text, label.size)
+    wide, high = wide + 10, high + 10
+    u, v = canvas.pixel(label.x, label.y)
+    best: tuple[float, Box] = (math.inf, (u, v, u + wide, v + high))
+    for away in _AWAY:
+        if best[0] <= _FAR_WEIGHT * away:
+            break  # what is farther away cannot be better
+        for number, angle in enumerate(_ANGLES):
+            box = _box(canvas, (u, v), angle, label.rim + away, (wide, high))
+            cost = _covered(sums, box) + _FAR_WEIGHT * (away + number / 4)
+            if cost < best[0]:
+                best = (cost, box)
+    return best
+
+
+def _box(canvas: Canvas, at: tuple[float, float], angle: float, away: float, size: tuple[float, float]) -> Box:
+    """The box whose nearest point is that far from a pixel, moved onto the canvas."""
+    c, s = math.cos(angle), -math.sin(angle)
+    middle = at[0] + c * (away + abs(c) * size[0] / 2), at[1] + s * (away + abs(s) * size[1] / 2)
+    if abs(c) > 0.1 and abs(s) > 0.1:  # at a corner: beside the mark, not above it
+        middle = at[0] + math.copysign(away * abs(c) + size[0] / 2, c), middle[1]
+    left = min(max(middle[0] - size[0] / 2, 2.0), max(2.0, canvas.width - size[0] - 2.0))
+    top = min(max(middle[1] - size[1] / 2, 2.0), max(2.0, canvas.height - size[1] - 2.0))
+    return left, top, left + size[0], top + size[1]
+
+
+def _covered(sums: Array, box: Box) -> float:
+    """The share of a box that is taken."""
+    left, top, right, low = (int(part // COARSE) for part in box)
+    right, low = min(right + 1, sums.shape[1] - 1), min(low + 1, sums.shape[0] - 1)
+    inside = float(sums[low, right] - sums[top, right] - sums[low, left] + sums[top, left])
+    cells: int = max(1, (right - left) * (low - top))
+    return inside / cells

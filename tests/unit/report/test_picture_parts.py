@@ -1,0 +1,208 @@
+"""What is on a picture and where, in metres of the world, part by part."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from simscen.core.geometry import Pose2
+from simscen.core.grid import OccupancyGrid
+from simscen.core.maskcells import MaskCells
+from simscen.core.result import RunKey
+from simscen.core.scenery import Floor, Ground, Scenery, Thing, Zone
+from simscen.criteria.criterion import AnyCriterion
+from simscen.judge.result import result_of
+from simscen.judge.sketch import sketch, sketch_case
+from simscen.loading.scenario import load_scenario
+from simscen.record.replay import read_log
+from simscen.record.sceneryfile import scenery_of
+from simscen.report.picture import Scene, compose, draw, parts, sidebar, with_robots
+from simscen.report.picture.canvas import COARSE
+from simscen.run.prepare import prepare
+from simscen.run.scenery import scenery_of as scenery_in
+from simscen.run.simulate import simulate
+
+GOLDEN = Path(__file__).parent / "everything.parts.txt"
+PANEL = ((0.0, -0.05), (1.0, -0.05), (1.0, 0.05), (0.0, 0.05))
+TRUTH = [[0, 1, 1], [4, 1, 3], [4.02, 7, 1], [10, 9, 1]]
+
+
+def room():
+    cells = np.zeros((60, 100), dtype=np.int8)
+    cells[[0, -1], :] = cells[:, [0, -1]] = cells[:, 50] = 100
+    return OccupancyGrid(cells, 0.1)
+
+
+def everything(**changes):
+    """A robot that is carried off, with all that a picture knows."""
+    words = {
+        "seconds": 10,
+        "truth": TRUTH,
+        "belief": [[0, 1, 1], [4, 1, 3], [8, 1, 4.5], [8.1, 8, 1], [10, 9, 1]],
+        "plans": [[0, [[1, 1], [1, 5], [2, 5]]]],
+        "objects": {"door": [[0, 5, 2, 0], [2, 5, 2, 1.5708]], "anna": [[0, 3, 1, 0], [10, 3, 4, 0]]},
+        "events": [
+            [0, "goal.accepted", "shelf"],
+            [0, "object.spawned", "anna", {"shape": "cylinder", "size": [0.3, 1.7], "person": True}],
+            [1, "object.spawned", "crate", {"shape": "box", "size": [1, 1, 1], "x": 2, "y": 5.2, "yaw": 0}],
+            [1, "event.started", "gate shuts", {"entry": 0}],
+            [2, "fault.started", "lidar.off", {"entry": 0}],
+            [3, "object.removed", "crate"],
+            [3, "zone.switched", "ward", {"filter": "speed", "enabled": True, "speed_limit": 0.2}],
+            [3, "floor.changed", "oil", {"outline": [[6, 4], [7, 4], [7, 5]], "friction": 0.1, "until": 5.0}],
+            [4, "robot.placed", "", {"x": 7, "y": 1, "yaw": 0}],
+            [5, "fault.ended", "lidar.off", {"entry": 0}],
+            [5, "goal.failed", "shelf", {"error_code": 208, "error_name": "NO_VALID_PATH"}],
+            [5, "goal.accepted", "late"],
+            [6, "mark", "now"],
+            [7, "collision.started", "crate", {"x": 8.0, "y": 1.2}],
+            [10, "goal.reached", "late"],
+            [10, "navigation.ended", "FAILED", {"error_code": 208, "error_name": "NO_VALID_PATH"}],
+        ],
+        **changes,
+    }  # fmt: skip
+    case = sketch_case({
+        "goals": [{"name": "shelf", "pose": [2, 5, 0]}, {"name": "never", "pose": [9, 5, 0]}],
+        "sent": [{"name": "late", "pose": [9, 1, 0]}, {"name": "unsent", "pose": [8, 3, 0]}],
+        "footprint": [[-0.2, -0.2], [0.2, 0], [-0.2, 0.2]],
+        "regions": {"ward": [[6, 2], [8, 2], [8, 3], [6, 3]]},
+    })  # fmt: skip
+    trace = sketch(words)
+    criteria = [AnyCriterion.model_validate(one) for one in ({"goals_reached": {}}, {"clearance": {"min": 2.0}})]
+    result = result_of(RunKey("room/all", 3), "room/all.scenario.yaml", criteria, trace, case)
+    scenery = Scenery(
+        places={"dock": Pose2(1, 1)},
+        things=(Thing("door", Pose2(5, 2), (PANEL,), Pose2(5, 2, np.pi / 2), Pose2(5, 2, 0.0)),),
+        ground=(Ground("ramp", ((7, 4), (9, 4), (9, 5), (7, 5)), 0.1, (0.05, 0.0)),),
+        floors=(Floor("bay", ((0, 0), (1, 0), (1, 1)), 0.4),),
+        zones=(
+            Zone("keepout", "vault", ((2, 2), (4, 2), (4, 3), (2, 3))),
+            Zone("keepout", cells=MaskCells(0.5, Pose2(6, 5), ((0, 0, 2, 1, 100), (3, 0, 1, 1, 50)))),
+        ),
+    )
+    return Scene(trace, case, room(), result, scenery)
+
+
+def told(scene):
+    """The parts, one a line: what, then where in metres."""
+    lines = []
+    for what, points in parts(scene):
+        rounded = np.round(points, 2) + 0.0
+        lines.append(f"{what}: " + " ".join(f"({x:.2f}, {y:.2f})" for x, y in rounded[:8].tolist()))
+    return lines
+
+
+def of(scene, what):
+    """The points of the parts that are called so."""
+    return [points for name, points in parts(scene) if name.startswith(what)]
+
+
+def test_the_picture_has_every_part_where_the_world_has_it():
+    assert told(everything()) == GOLDEN.read_text(encoding="utf-8").splitlines()
+
+
+def test_a_door_that_shut_hangs_on_its_hinge_and_ends_at_its_post():
+    (panel,) = of(everything(), "door door")
+    assert (panel[:, 1].min(), panel[:, 1].max()) == pytest.approx((2.0, 3.0))
+    assert panel[:, 0].mean() == pytest.approx(5.0, abs=0.001)
+
+
+def test_a_robot_that_is_carried_leaves_a_gap_with_a_mark_on_either_side():
+    scene = everything()
+    ways = of(scene, "way")
+    assert [np.round(way, 1).tolist() for way in ways] == [[[1, 1], [1, 3]], [[7, 1], [9, 1]]]
+    assert np.round(of(scene, "lifted")[0], 1).tolist() == [[1, 3]]
+    assert np.round(of(scene, "set down")[0], 1).tolist() == [[7, 1]]
+
+
+def test_a_short_teleport_leaves_a_gap_as_well():
+    near = everything(truth=[[0, 1, 1], [4, 1, 3], [4.02, 1.1, 3], [10, 3, 3]])
+    assert len(of(near, "way")) == 2
+
+
+def test_a_belief_that_jumps_is_not_a_line_through_walls():
+    assert len(of(everything(), "belief")) == 2
+
+
+@pytest.mark.parametrize(("goal", "fate"), [("shelf", "failed"), ("never", "not tried"), ("late", "reached")])
+def test_a_goal_says_what_came_of_it(goal, fate):
+    assert [name for name, _ in parts(everything()) if name.startswith(f"goal {goal}")] == [f"goal {goal} {fate}"]
+
+
+def test_a_goal_that_was_never_sent_is_not_there():
+    assert of(everything(), "goal unsent") == []
+
+
+def test_a_goal_that_only_the_robot_believes_reached_has_failed():
+    events = [[0, "goal.accepted", "shelf"], [9, "goal.reached", "shelf"]]
+    assert "goal shelf failed" in {name for name, _ in parts(everything(events=events))}
+
+
+def test_a_failure_is_told_with_the_code_and_name_that_nav2_gives_it():
+    assert compose.ended(everything()) == "navigation ended, FAILED NO_VALID_PATH (208)"
+    assert any("shelf: failed, NO_VALID_PATH (208)" in name for name, _ in parts(everything()))
+
+
+def test_labels_keep_off_ways_robots_goals_and_each_other():
+    canvas = compose._map(everything())
+    busy, boxes = canvas.busy, []
+    for note in canvas.notes:
+        wide = compose.font(note.size).getlength(note.text)
+        left, right = (note.x - wide / 2) / COARSE, (note.x + wide / 2) / COARSE
+        top, low = (note.y - note.size / 2) / COARSE, (note.y + note.size / 2) / COARSE
+        covered = busy[max(0, int(top)) : int(low) + 1, max(0, int(left)) : int(right) + 1]
+        assert covered.mean() < 0.15, note.text
+        assert not any(left < r and a < right and top < b and t < low for a, t, r, b in boxes), note.text
+        boxes.append((left, top, right, low))
+
+
+def test_no_reason_is_cut_off_beside_the_map():
+    long = " ".join(f"reason{k}" for k in range(60)) + " " + "x" * 90
+    assert " ".join(sidebar._wrapped(long)).replace(" ", "") == long.replace(" ", "")
+    scene = everything()
+    verdicts = tuple(
+        replace(v, findings=tuple(replace(f, detail=(long,) * 5) for f in v.findings)) for v in scene.result.verdicts
+    )
+    tall = replace(scene, result=replace(scene.result, verdicts=verdicts))
+    assert draw(tall).height > draw(scene).height + 400
+
+
+def test_each_of_several_robots_is_drawn_with_its_name():
+    one = everything()
+    names = {name for name, _ in parts(with_robots(one, {"a": (one.trace, one.case), "b": (one.trace, one.case)}))}
+    assert {"a: way", "b: way", "goal a: late reached", "a: robot at the end", "b: belief"} <= names
+
+
+DOORS = """\
+simscen: 1
+world:
+  simscen: 1
+  walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]
+  doors: [{name: gate, points: [[3, 1], [3, 2]], closed: false}, {name: slide, points: [[4, 1], [4, 2]], motion: slide}]
+  places: {dock: {x: 5, y: 3}}
+map: none
+robot: {pose: {x: 1, y: 1}}
+goals: [{pose: {x: 1.5, y: 1}}]
+events:
+  - {name: shut, when: {time: 0 s}, do: {close: {name: gate, duration: 0.5 s}}}
+  - {name: opens, when: {time: 0 s}, do: {open: {name: slide, duration: 0.5 s}}}
+time_limit: 1 s
+pass: [{collisions: {max: 0}}]
+"""
+
+
+def test_a_picture_from_the_log_alone_has_the_parts_of_that_of_the_run(tmp_path):
+    file = tmp_path / "doors.scenario.yaml"
+    file.write_text(DOORS)
+    prepared = prepare(load_scenario(file, tmp_path))
+    run = simulate(prepared, log=tmp_path / "run.mcap")
+    scene = Scene(run.trace, run.case, prepared.built.map, run.result, scenery_in(prepared))
+    log = read_log(tmp_path / "run.mcap")
+    found = scenery_of(log.about)
+    assert found.map is not None
+    again = Scene(log.trace, log.about.case, found.map.grid, run.result, found)
+    assert told(again) == told(scene)
+    (gate,), (slide,) = of(again, "door gate"), of(again, "door slide")
+    assert (gate[:, 1].min(), gate[:, 1].max()) == pytest.approx((1.0, 2.0))
+    assert (slide[:, 1].min(), slide[:, 1].max()) == pytest.approx((0.0, 1.0))
