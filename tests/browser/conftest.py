@@ -1,0 +1,97 @@
+"""Pages in a real browser: Debian's Chromium, driven by Playwright; axe-core from npm in a folder of its own.
+
+Where there is no Chromium the tests skip, but for CI with root rights: there it is installed.
+"""
+
+import fcntl
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+from rig import Opened, Opener
+
+ROOT = Path(__file__).parents[2]
+FOLDER = ROOT / ".browser"
+AXE = "axe-core@4.14.1"
+NAMES = ("chromium", "chromium-browser", "google-chrome-stable", "google-chrome")
+NPM = ["npm", "install", "--no-audit", "--no-fund", "--no-save", "--ignore-scripts", "--fetch-retries=0"]
+
+
+@pytest.fixture(scope="session")
+def chromium() -> str:
+    """The path of a Chromium."""
+    found = next(filter(None, map(shutil.which, NAMES)), None)
+    if found is None and os.environ.get("CI") == "true" and os.geteuid() == 0 and shutil.which("apt-get"):
+        with _locked():
+            if shutil.which(NAMES[0]) is None:
+                apt = ["apt-get", "-o", "DPkg::Lock::Timeout=120"]
+                subprocess.run([*apt, "update"], check=False, capture_output=True, timeout=120)
+                install = [*apt, "install", "--yes", "--no-install-recommends", "chromium"]
+                done = subprocess.run(install, check=False, capture_output=True, text=True, timeout=300)
+                if done.returncode:
+                    pytest.skip(f"Chromium cannot be installed: {(done.stderr.strip().splitlines() or ['?'])[-1]}")
+        found = shutil.which(NAMES[0])
+    if found is None:
+        pytest.skip(f"there is no browser: none of {', '.join(NAMES)} is on the PATH")
+    return found
+
+
+@pytest.fixture(scope="session")
+def browser(chromium: str) -> Iterator[Any]:
+    """A browser of this process of pytest."""
+    driver = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    with driver.sync_playwright() as playwright:
+        arguments = ["--no-sandbox"] if os.geteuid() == 0 else []
+        running = playwright.chromium.launch(executable_path=chromium, args=arguments)
+        yield running
+        running.close()
+
+
+@pytest.fixture
+def open_page(browser: Any) -> Iterator[Opener]:
+    """Opens files in the browser; afterwards none of them may have logged an error or asked for anything else."""
+    opened: list[Opened] = []
+
+    def open_(file: Path, *, size: tuple[int, int] = (1280, 800), dark: bool = False, where: str = "") -> Opened:
+        opened.append(Opened(browser, file, size, dark, where))
+        return opened[-1]
+
+    yield open_
+    complaints = [complaint for one in opened for complaint in one.close()]
+    assert complaints == []
+
+
+@pytest.fixture(scope="session")
+def axe() -> str:
+    """axe-core as a script to be put into a page."""
+    if shutil.which("npm") is None:
+        pytest.skip("there is no npm to install axe-core with")
+    script = FOLDER / "node_modules" / "axe-core" / "axe.min.js"
+    with _locked():
+        stamp = FOLDER / "installed"
+        if not stamp.exists() or stamp.read_text() != AXE:
+            command = [*NPM, "--fetch-timeout=8000", f"--prefix={FOLDER}", AXE]
+            done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=240)
+            if done.returncode:
+                pytest.skip(f"{AXE} cannot be installed: {(done.stderr.strip().splitlines() or ['?'])[-1]}")
+            stamp.write_text(AXE)
+    return script.read_text(encoding="utf-8")
+
+
+class _locked:
+    """Several processes of pytest would install the same at once."""
+
+    def __enter__(self) -> None:
+        FOLDER.mkdir(exist_ok=True)
+        self._file = (FOLDER / ".lock").open("w")
+        fcntl.flock(self._file, fcntl.LOCK_EX)
+
+    def __exit__(self, *_: object) -> None:
+        self._file.close()
