@@ -22,6 +22,7 @@ COMMANDS = {
     "judge": "Judge recorded runs, without simulating them.",
     "report": "Write the reports of an output folder anew.",
     "plot": "Draw a recorded run.",
+    "replay": "Make a page that plays a recorded run, or two side by side.",
     "localize": "Run a recorded drive through the localizer alone.",
     "log": "Mend the logs of runs that broke off.",
     "new": "Write a commented scenario to start from.",

@@ -48,6 +48,19 @@ def spec_of_text(text: str, name: str) -> ScenarioSpec:
     return _checked(ScenarioSpec, _read(text, name))
 
 
+def parts_of_text(text: str, name: str, robot: str = "") -> tuple[ScenarioSpec, Fields]:
+    """The specification in a resolved text, of one of several robots if named, and the tree that says where it stands.
+
+    Raises InvalidInput.
+    """
+    tree = _read(text, name)
+    if isinstance(tree, Fields) and robot:
+        tree = each_of(tree).get(robot, tree)
+    spec = _checked(ScenarioSpec, tree)
+    assert isinstance(tree, Fields)
+    return spec, tree
+
+
 def criteria_of_text(text: str, name: str, facts: Mapping[str, str], robot: str = "") -> CriteriaSpec:
     """What a resolved text says must hold; `name` is what problems call it, `facts` are those of the log it is from,
     `robot` the one of several that is meant.

@@ -12,6 +12,7 @@ from simscen.core.trace import Trace
 from simscen.record import event_text, frames, header, topics, unpack
 from simscen.record.header import LogHeader
 from simscen.record.rows import Rows
+from simscen.record.seen import Seen
 from simscen.record.simtime import SECOND, SimTime
 
 Handler = Callable[[int, bytes], None]
@@ -22,10 +23,14 @@ class Foreign(ValueError):
 
 
 class Contents:
-    """Takes a log's records in the order of the file. Raises ValueError, KeyError or struct.error on a wrong one."""
+    """Takes a log's records in the order of the file. Raises ValueError, KeyError or struct.error on a wrong one.
 
-    def __init__(self) -> None:
+    With `looks`, what no trace holds is kept for whoever wants to see it, too.
+    """
+
+    def __init__(self, looks: bool = False) -> None:
         self.end: int | None = None
+        self._looks, self._seen = looks, Seen()
         self._facts: dict[str, str] = {}
         self._files: dict[str, bytes] = {}
         self._rows = Rows()
@@ -96,6 +101,10 @@ class Contents:
             contents.end, contents._last = self.end, max(self._last, contents._last)
         return {name: contents.trace() for name, contents in self.robots.items()}
 
+    def seen(self) -> Seen:
+        """What no trace holds, where it was asked for."""
+        return self._seen
+
     def result(self) -> str:
         """The result of the run; "" when there is none."""
         return str(self._files.get(header.RESULT, b""), "utf-8")
@@ -104,9 +113,9 @@ class Contents:
         if facts.get("format") != header.FORMAT:
             raise Foreign(f"its format is {facts.get('format')}, this simscen reads {header.FORMAT}")
         self._facts = facts
-        self._time = SimTime(int(facts["tick_rate"]))
+        self._time = self._seen.time = SimTime(int(facts["tick_rate"]))
         for name in json.loads(facts.get(header.ROBOTS, "[]")):
-            contents = self.robots[name] = Contents()
+            contents = self.robots[name] = Contents(self._looks)
             contents._begin({**header.facts_of(facts, name), header.ROBOTS: "[]"})
 
     def _attached(self, file: records.Attachment) -> None:
@@ -150,8 +159,9 @@ class Contents:
         handler = by_topic.get((channel.topic, kind))
         if kind == topics.SCAN_TYPE:
             handler = self._scan
-        if handler is not None:
-            self._handlers[channel.id] = handler
+        taker = self._seen.taker(channel.topic, kind) if self._looks else None
+        if found := [one for one in (handler, taker) if one is not None]:
+            self._handlers[channel.id] = found[0] if len(found) == 1 else _each(found)
 
     def _truth(self, tick: int, data: bytes) -> None:
         pose, twist = unpack.odometry(data)
@@ -180,7 +190,7 @@ class Contents:
                 self._rows.object(name).add(tick, link.pose)
 
     def _mounts(self, _: int, data: bytes) -> None:
-        self._frames = {link.child: Pose3(*link.pose) for link in unpack.transforms(data)}
+        self._frames = self._seen.mounts = {link.child: Pose3(*link.pose) for link in unpack.transforms(data)}
 
     def _grid(self, _: int, data: bytes) -> None:
         origin = Pose2(*json.loads(self._facts["map.origin"]))
@@ -188,3 +198,13 @@ class Contents:
 
     def _describe(self, _: int, data: bytes) -> None:
         self._robot_description = unpack.string(data)
+
+
+def _each(handlers: list[Handler]) -> Handler:
+    """One handler that hands a message to all of them."""
+
+    def handle(tick: int, data: bytes) -> None:
+        for one in handlers:
+            one(tick, data)
+
+    return handle

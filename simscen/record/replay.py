@@ -16,6 +16,7 @@ from simscen.record.contents import Contents, Foreign
 from simscen.record.header import LogHeader
 from simscen.record.logfile import PARTIAL_SUFFIX
 from simscen.record.openlog import WholeRecords, open_log
+from simscen.record.seen import Seen
 from simscen.record.writer import MAGIC
 
 # What the libraries and our own readers raise on bytes that no Recorder wrote.
@@ -37,7 +38,8 @@ class Log:
     """A log that was read: how the run was ordered, what happened, and its result (JSON; "" while there is none).
 
     `complete` is False for the log of a run that broke off; its trace then ends with the last message. `robots` has
-    what the log says of each of several robots, by name; `about` and `trace` are then those of the first.
+    what the log says of each of several robots, by name; `about` and `trace` are then those of the first. `seen` is
+    what no trace holds; empty unless it was asked for.
     """
 
     about: LogHeader
@@ -45,6 +47,7 @@ class Log:
     result: str
     complete: bool
     robots: Mapping[str, "Log"] = field(default_factory=dict)
+    seen: Seen = field(default_factory=Seen)
 
     @property
     def traces(self) -> list[Trace]:
@@ -52,24 +55,25 @@ class Log:
         return [log.trace for log in self.robots.values()] or [self.trace]
 
 
-def read_run(path: Path) -> Log:
+def read_run(path: Path, looks: bool = False) -> Log:
     """Read a log to judge or draw its run. Raises InvalidInput as `read_log` does, and where there is no truth."""
-    log = read_log(path)
+    log = read_log(path, looks=looks)
     if not len(log.trace.truth):
         raise invalid(path, "SC803", "the log holds no truth: its run broke off before it began")
     return log
 
 
-def read_log(path: "str | Path", partial: bool | None = None) -> Log:
+def read_log(path: "str | Path", partial: bool | None = None, looks: bool = False) -> Log:
     """Read a log that a Recorder wrote.
 
     Its trace is the one that a TraceBuilder makes of the same moments, equal to the last bit. With `partial`, a log
-    that ends too early is read as far as it goes; by default that is so for files named `*.partial.mcap`. Raises
-    InvalidInput when the file cannot be read, is no MCAP, is none of simscen's, is damaged, or ends too early.
+    that ends too early is read as far as it goes; by default that is so for files named `*.partial.mcap`. With `looks`,
+    what no trace holds is kept in `seen`. Raises InvalidInput when the file cannot be read, is no MCAP, is none of
+    simscen's, is damaged, or ends too early.
     """
     path = Path(path)
     forgiving = path.name.endswith(PARTIAL_SUFFIX) if partial is None else partial
-    contents = Contents()
+    contents = Contents(looks)
     try:
         with open_log(path) as stream:
             whole = _read(stream, contents)
@@ -77,8 +81,11 @@ def read_log(path: "str | Path", partial: bool | None = None) -> Log:
         if not whole and not forgiving:
             hint = "to read what there is, name it *.partial.mcap"
             raise invalid(path, "SC803", "the log ends too early: its run broke off", hint)
-        robots = {name: Log(about.robots[name], trace, "", whole) for name, trace in contents.traces().items()}
-        return Log(about, contents.trace(), contents.result(), whole, robots)
+        robots = {
+            name: Log(about.robots[name], trace, "", whole, seen=contents.robots[name].seen())
+            for name, trace in contents.traces().items()
+        }
+        return Log(about, contents.trace(), contents.result(), whole, robots, contents.seen())
     except OSError as error:
         raise invalid(path, "SC800", f"cannot read the log: {error.strerror}") from error
     except Foreign as error:

@@ -1,0 +1,461 @@
+// A run at a tick, drawn on a canvas in metres.
+import { roundLength } from "./camera.js";
+
+const UNKNOWN_RADIUS = 0.2;
+const images = new WeakMap();
+
+/** Draw all that is wanted. `view` has context, width, height (CSS pixels), camera, colours, layers and marked. */
+export function drawRun(view, run, tick) {
+  const { context: c, width, height, colours } = view;
+  c.fillStyle = colours.unknown;
+  c.fillRect(0, 0, width, height);
+  if (view.layers.has("map")) for (const robot of run.robots.slice(0, 1)) if (robot.map) drawGrid(view, robot.map, run.column, mapColour(colours));
+  drawLines(view);
+  if (view.layers.has("costmap")) for (const robot of run.robots) drawCostmaps(view, robot, run, tick);
+  if (view.layers.has("zones")) drawZones(view, run, tick);
+  for (const robot of run.robots) {
+    if (view.layers.has("plan")) drawPath(view, robot.planAt(tick), colours.plan, 3);
+    if (view.layers.has("goals")) drawGoals(view, robot, robot.goalAt(tick));
+  }
+  if (view.layers.has("things")) for (const thing of run.thingsAt(tick)) drawThing(view, thing);
+  run.robots.forEach((robot, number) => drawRobot(view, robot, number, tick, run));
+  drawMarks(view, run, tick);
+  drawScale(view);
+}
+
+function drawRobot(view, robot, number, tick, run) {
+  const { colours, layers } = view, colour = number ? colours.other : colours.truth;
+  const believed = robot.beliefAt(tick), true_ = robot.truthAt(tick);
+  if (layers.has("truth")) drawTrail(view, robot, tick, colour);
+  if (layers.has("belief")) drawParticles(view, robot.particlesAt(tick));
+  if (layers.has("scan")) for (const points of robot.scansAt(tick)) drawPoints(view, points, colours.scan);
+  if (layers.has("local")) drawPath(view, robot.localAt(tick), colours.local, 2.5);
+  if (layers.has("truth")) drawHull(view, robot, true_, colour, true);
+  if (layers.has("belief") && believed) drawBelief(view, robot, believed);
+  if (run.robots.length > 1) label(view, robot.name, true_.x, true_.y, colour, 22);
+}
+
+/** Follow the points of a polygon in the frame of a pose. */
+function outline(view, points, pose) {
+  const { context: c } = view, cos = Math.cos(pose.yaw), sin = Math.sin(pose.yaw);
+  c.beginPath();
+  for (const [x, y] of points) c.lineTo(...spot(view, pose.x + cos * x - sin * y, pose.y + sin * x + cos * y));
+  c.closePath();
+}
+
+function spot(view, x, y) {
+  return view.camera.pixel(x, y, view.width, view.height);
+}
+
+function mapColour(colours) {
+  const [free, wall, unknown] = [colours.free, colours.wall, colours.unknown].map(rgb);
+  return (value) => (value < 0 ? [...unknown, 255] : [...free.map((part, k) => part + (wall[k] - part) * Math.min(value, 100) / 100), 255]);
+}
+
+function costColour(colours) {
+  const [low, high] = [rgb(colours.belief), rgb(colours.bad)];
+  return (value) => (value <= 0 ? [0, 0, 0, 0] : [...low.map((part, k) => part + (high[k] - part) * value / 100), 60 + value]);
+}
+
+function drawGrid(view, grid, column, colour, cells = null) {
+  const { context: c, camera } = view;
+  let image = images.get(grid);
+  if (!image || image.theme !== view.theme) {
+    image = { theme: view.theme, canvas: painted(grid, cells ?? column(grid.cells), colour) };
+    images.set(grid, image);
+  }
+  const [u, v] = spot(view, grid.origin[0], grid.origin[1]), size = grid.resolution * camera.scale;
+  c.save();
+  c.translate(u, v);
+  c.rotate(-grid.origin[2]);
+  c.scale(size, -size);
+  c.imageSmoothingEnabled = size < 1;
+  c.drawImage(image.canvas, 0, 0);
+  c.restore();
+}
+
+function painted(grid, cells, colour) {
+  const canvas = document.createElement("canvas");
+  canvas.width = grid.width;
+  canvas.height = grid.height;
+  const context = canvas.getContext("2d"), image = context.createImageData(grid.width, grid.height), known = new Map();
+  cells.forEach((value, k) => {
+    if (!known.has(value)) known.set(value, colour(value));
+    image.data.set(known.get(value), 4 * k);
+  });
+  context.putImageData(image, 0, 0);
+  return canvas;
+}
+
+function rgb(text) {
+  const number = parseInt(text.slice(1), 16);
+  return [number >> 16, (number >> 8) & 255, number & 255];
+}
+
+/** Lines a round length apart, with their coordinates at the edges. */
+function drawLines(view) {
+  const { context: c, camera, width, height, colours } = view, step = roundLength(camera.scale, 130);
+  const [x0, y1] = camera.point(0, 0, width, height), [x1, y0] = camera.point(width, height, width, height);
+  c.strokeStyle = colours.rule;
+  c.fillStyle = colours.faint;
+  c.lineWidth = 1;
+  c.font = "10px system-ui, sans-serif";
+  c.globalAlpha = 0.4;
+  const digits = step < 1 ? 1 : 0;
+  c.beginPath();
+  for (let k = Math.ceil(x0 / step); k * step <= x1; k++) {
+    const [u] = spot(view, k * step, 0);
+    c.moveTo(Math.round(u) + 0.5, 0);
+    c.lineTo(Math.round(u) + 0.5, height);
+  }
+  for (let k = Math.ceil(y0 / step); k * step <= y1; k++) {
+    const [, v] = spot(view, 0, k * step);
+    c.moveTo(0, Math.round(v) + 0.5);
+    c.lineTo(width, Math.round(v) + 0.5);
+  }
+  c.stroke();
+  c.globalAlpha = 1;
+  c.textAlign = "center";
+  c.textBaseline = "top";
+  for (let k = Math.ceil(x0 / step); k * step <= x1; k++) halo(view, (k * step).toFixed(digits), spot(view, k * step, 0)[0], 3, colours.faint);
+  c.textAlign = "left";
+  c.textBaseline = "middle";
+  for (let k = Math.ceil(y0 / step); k * step <= y1; k++) halo(view, (k * step).toFixed(digits), 4, spot(view, 0, k * step)[1], colours.faint);
+}
+
+function halo(view, text, u, v, colour) {
+  const { context: c, colours } = view;
+  c.lineWidth = 3;
+  c.lineJoin = "round";
+  c.strokeStyle = colours.free;
+  c.strokeText(text, u, v);
+  c.fillStyle = colour;
+  c.fillText(text, u, v);
+}
+
+function label(view, text, x, y, colour, down = 0) {
+  const { context: c } = view, [u, v] = spot(view, x, y);
+  c.font = "600 12px system-ui, sans-serif";
+  c.textAlign = "center";
+  c.textBaseline = "middle";
+  halo(view, text, u, v + down, colour);
+}
+
+function drawCostmaps(view, robot, run, tick) {
+  for (const costmap of robot.costmaps) {
+    const grid = costmapAt(costmap, run, tick);
+    if (grid) drawGrid(view, grid, run.column, costColour(view.colours), grid.whole);
+  }
+}
+
+/** The newest grid of a costmap, whole: changes are put on what was before. */
+function costmapAt(costmap, run, tick) {
+  let k = costmap.grids.length - 1;
+  while (k >= 0 && costmap.grids[k].tick > tick) k--;
+  if (k < 0) return null;
+  let first = k;
+  while (costmap.grids[first].changes && !costmap.grids[first].whole) first--;
+  for (let j = first; j <= k; j++) {
+    const grid = costmap.grids[j];
+    if (grid.whole) continue;
+    const cells = run.column(grid.cells);
+    grid.whole = grid.changes ? cells.map((value, i) => value + costmap.grids[j - 1].whole[i]) : cells;
+  }
+  return costmap.grids[k];
+}
+
+/** Ramps and floors, then the zones in force; what only some of the time is a zone is not drawn otherwise. */
+function drawZones(view, run, tick) {
+  const { colours } = view;
+  for (const ground of run.scenery.ground) drawArea(view, ground.outline, colours.ground, "");
+  for (const floor of run.scenery.floors) drawArea(view, floor.outline, colours.thing, `friction ${floor.friction}`);
+  for (const zone of run.zonesAt(tick)) {
+    const colour = zone.filter === "keepout" ? colours.bad : colours.zone, said = zone.filter === "keepout" ? "keep out" : `${zone.limit} m/s`;
+    if (zone.mask) for (const block of zone.mask.blocks) drawHatched(view, boxOf(zone.mask, block), colour, "");
+    else if (run.regions[zone.region]) drawHatched(view, run.regions[zone.region], colour, `${said}: ${zone.region}`);
+  }
+}
+
+const STILL = { x: 0, y: 0, yaw: 0 };
+
+function drawArea(view, points, colour, said) {
+  const { context: c } = view;
+  outline(view, points, STILL);
+  c.fillStyle = colour;
+  c.globalAlpha = 0.18;
+  c.fill();
+  c.globalAlpha = 0.7;
+  c.strokeStyle = colour;
+  c.lineWidth = 1;
+  c.stroke();
+  c.globalAlpha = 1;
+  if (said) label(view, said, ...middle(points), colour);
+}
+
+function drawHatched(view, points, colour, said) {
+  const { context: c } = view;
+  outline(view, points, STILL);
+  c.save();
+  c.clip();
+  hatch(view, points, colour);
+  c.restore();
+  outline(view, points, STILL);
+  c.strokeStyle = colour;
+  c.lineWidth = 1.5;
+  c.setLineDash([6, 4]);
+  c.stroke();
+  c.setLineDash([]);
+  if (said) label(view, said, ...middle(points), colour);
+}
+
+function boxOf({ origin: [ox, oy, yaw], resolution }, [column, row, width, height]) {
+  const c = Math.cos(yaw), s = Math.sin(yaw);
+  const corners = [[column, row], [column + width, row], [column + width, row + height], [column, row + height]].map(([i, j]) => [i * resolution, j * resolution]);
+  return corners.map(([x, y]) => [ox + c * x - s * y, oy + s * x + c * y]);
+}
+
+function hatch(view, points, colour) {
+  const { context: c } = view, pixels = points.map(([x, y]) => spot(view, x, y));
+  const us = pixels.map(([u]) => u), vs = pixels.map(([, v]) => v);
+  const [u0, u1] = [Math.max(Math.min(...us), 0), Math.min(Math.max(...us), view.width)];
+  const [v0, v1] = [Math.max(Math.min(...vs), 0), Math.min(Math.max(...vs), view.height)];
+  c.strokeStyle = colour;
+  c.globalAlpha = 0.35;
+  c.lineWidth = 1;
+  c.beginPath();
+  for (let u = u0 - (v1 - v0); u < u1; u += 9) {
+    c.moveTo(u, v1);
+    c.lineTo(u + (v1 - v0), v0);
+  }
+  c.stroke();
+  c.globalAlpha = 1;
+}
+
+function middle(points) {
+  return [0, 1].map((axis) => (Math.min(...points.map((p) => p[axis])) + Math.max(...points.map((p) => p[axis]))) / 2);
+}
+
+function drawPath(view, path, colour, width) {
+  if (!path || path.x.length < 2) return;
+  const { context: c } = view;
+  c.beginPath();
+  path.x.forEach((x, k) => c.lineTo(...spot(view, x, path.y[k])));
+  c.strokeStyle = colour;
+  c.lineWidth = width;
+  c.lineJoin = "round";
+  c.stroke();
+}
+
+function drawGoals(view, robot, active) {
+  const { context: c, camera, colours } = view, told = new Map();
+  for (const goal of robot.goals) {
+    const [x, y, yaw] = goal.pose, [u, v] = spot(view, x, y), now = active?.name === goal.name || active?.name.startsWith(`${goal.name}#`);
+    const reach = Math.max(goal.xy * camera.scale, 5);
+    c.beginPath();
+    c.arc(u, v, reach, 0, 2 * Math.PI);
+    c.fillStyle = colours.goal;
+    c.globalAlpha = now ? 0.3 : 0.1;
+    c.fill();
+    c.globalAlpha = 1;
+    c.strokeStyle = colours.goal;
+    c.lineWidth = now ? 2.5 : 1.2;
+    c.stroke();
+    if (!goal.via) {
+      c.beginPath();
+      c.moveTo(u, v);
+      c.lineTo(u + (reach + 9) * Math.cos(yaw), v - (reach + 9) * Math.sin(yaw));
+      c.stroke();
+    }
+    const key = `${x} ${y}`;
+    told.set(key, [...(told.get(key) ?? []), goal.name]);
+    if (told.get(key).length === 1) label(view, goal.name, x, y, colours.goal, -reach - 10);
+  }
+}
+
+function drawThing(view, thing) {
+  const { context: c, colours } = view, colour = thing.person ? colours.person : colours.thing;
+  const parts = thing.parts?.length ? thing.parts : [circle(UNKNOWN_RADIUS)];
+  for (const part of parts) {
+    outline(view, part, thing.pose);
+    c.globalAlpha = 0.4;
+    c.fillStyle = colour;
+    c.fill();
+    c.globalAlpha = 1;
+    c.strokeStyle = colour;
+    c.lineWidth = 1.5;
+    c.stroke();
+  }
+  if (thing.person) drawHeading(view, thing.pose, colour, 0.3);
+  label(view, thing.name, thing.pose.x, thing.pose.y, colour, -0.45 * view.camera.scale - 6);
+}
+
+function drawHeading(view, pose, colour, length) {
+  const { context: c } = view;
+  c.beginPath();
+  c.moveTo(...spot(view, pose.x, pose.y));
+  c.lineTo(...spot(view, pose.x + length * Math.cos(pose.yaw), pose.y + length * Math.sin(pose.yaw)));
+  c.strokeStyle = colour;
+  c.lineWidth = 2;
+  c.stroke();
+}
+
+function circle(radius) {
+  return Array.from({ length: 24 }, (_, k) => [radius * Math.cos((k * Math.PI) / 12), radius * Math.sin((k * Math.PI) / 12)]);
+}
+
+/** The way it truly drove: what is over strong, what is to come faint. */
+function drawTrail(view, robot, tick, colour) {
+  const { context: c } = view, { ticks, x, y } = robot.truth;
+  for (const past of [false, true]) {
+    c.beginPath();
+    for (let k = 0; k < ticks.length; k++) {
+      if (past && ticks[k] > tick) break;
+      const jumped = k && Math.hypot(x[k] - x[k - 1], y[k] - y[k - 1]) > 0.5;
+      if (k && !jumped) c.lineTo(...spot(view, x[k], y[k]));
+      else c.moveTo(...spot(view, x[k], y[k]));
+    }
+    c.strokeStyle = colour;
+    c.globalAlpha = past ? 0.85 : 0.22;
+    c.lineWidth = past ? 1.8 : 1.5;
+    c.setLineDash(past ? [] : [2, 4]);
+    c.stroke();
+  }
+  c.setLineDash([]);
+  c.globalAlpha = 1;
+}
+
+function drawHull(view, robot, pose, colour, solid) {
+  const { context: c, colours } = view, hull = robot.footprint.length > 2 ? robot.footprint : circle(UNKNOWN_RADIUS);
+  outline(view, hull, pose);
+  c.fillStyle = colour;
+  c.globalAlpha = solid ? 0.85 : 0.12;
+  c.fill();
+  c.globalAlpha = 1;
+  c.strokeStyle = solid ? colours.free : colour;
+  c.lineWidth = solid ? 1.5 : 2;
+  c.setLineDash(solid ? [] : [5, 3]);
+  c.stroke();
+  c.setLineDash([]);
+  const nose = Math.max(...hull.map(([x]) => x)), side = Math.max(...hull.map(([, y]) => y));
+  outline(view, [[0.3 * nose, -0.45 * side], [0.9 * nose, 0], [0.3 * nose, 0.45 * side]], pose);
+  c.fillStyle = solid ? colours.free : colour;
+  c.fill();
+}
+
+function drawBelief(view, robot, believed) {
+  const { context: c, camera, colours } = view, [u, v] = spot(view, believed.x, believed.y), { a, b, yaw } = believed.ellipse;
+  c.beginPath();
+  c.ellipse(u, v, Math.max(a * camera.scale, 1), Math.max(b * camera.scale, 1), -yaw, 0, 2 * Math.PI);
+  c.fillStyle = colours.belief;
+  c.globalAlpha = 0.16;
+  c.fill();
+  c.globalAlpha = 1;
+  c.strokeStyle = colours.belief;
+  c.lineWidth = 1;
+  c.stroke();
+  drawHull(view, robot, believed, colours.belief, false);
+}
+
+function drawParticles(view, cloud) {
+  if (!cloud) return;
+  const { context: c, colours, camera } = view, reach = Math.min(0.12 * camera.scale, 9);
+  c.strokeStyle = colours.belief;
+  c.globalAlpha = 0.45;
+  c.lineWidth = 1;
+  c.beginPath();
+  cloud.x.forEach((x, k) => {
+    const [u, v] = spot(view, x, cloud.y[k]);
+    c.moveTo(u, v);
+    c.lineTo(u + reach * Math.cos(cloud.yaw[k]), v - reach * Math.sin(cloud.yaw[k]));
+  });
+  c.stroke();
+  c.globalAlpha = 1;
+}
+
+function drawPoints(view, points, colour) {
+  const { context: c } = view, size = Math.min(Math.max(view.camera.scale * 0.04, 2), 5);
+  c.fillStyle = colour;
+  for (let k = 0; k < points.length; k += 2) {
+    const [u, v] = spot(view, points[k], points[k + 1]);
+    c.fillRect(u - size / 2, v - size / 2, size, size);
+  }
+}
+
+/** Where something went wrong: contacts that have begun, and what did not hold; what is selected in a ring. */
+function drawMarks(view, run, tick) {
+  const { colours } = view;
+  for (const event of run.events) {
+    if (event.kind === "collision.started" && event.place && event.tick <= tick) star(view, event.place, colours.bad);
+    if (event.kind === "mark" && event.tick <= tick) label(view, `⚑ ${event.name}`, ...spotOf(run, event), colours.fault, -14);
+  }
+  for (const { verdict, finding } of run.failures) {
+    if (finding.place) crossed(view, finding.place, verdict.severity === "warn" ? colours.odd : colours.bad);
+  }
+  if (view.marked) ring(view, view.marked, colours.select);
+}
+
+function spotOf(run, event) {
+  const robot = run.robots.find((one) => one.name === (event.robot ?? "")) ?? run.robots[0], pose = robot.truthAt(event.tick);
+  return event.place ?? [pose.x, pose.y];
+}
+
+function star(view, [x, y], colour) {
+  const { context: c } = view, [u, v] = spot(view, x, y);
+  c.beginPath();
+  for (let k = 0; k < 16; k++) {
+    const reach = k % 2 ? 5 : 11, angle = (k * Math.PI) / 8;
+    c.lineTo(u + reach * Math.cos(angle), v + reach * Math.sin(angle));
+  }
+  c.closePath();
+  c.fillStyle = colour;
+  c.fill();
+  c.strokeStyle = view.colours.free;
+  c.lineWidth = 1;
+  c.stroke();
+}
+
+function crossed(view, [x, y], colour) {
+  const { context: c } = view, [u, v] = spot(view, x, y);
+  c.beginPath();
+  c.arc(u, v, 10, 0, 2 * Math.PI);
+  c.fillStyle = view.colours.free;
+  c.globalAlpha = 0.9;
+  c.fill();
+  c.globalAlpha = 1;
+  c.strokeStyle = colour;
+  c.lineWidth = 2;
+  c.stroke();
+  c.lineWidth = 3;
+  c.beginPath();
+  for (const [a, b] of [[-4, -4], [-4, 4]]) {
+    c.moveTo(u + a, v + b);
+    c.lineTo(u - a, v - b);
+  }
+  c.stroke();
+}
+
+function ring(view, [x, y], colour) {
+  const { context: c } = view, [u, v] = spot(view, x, y);
+  c.beginPath();
+  c.arc(u, v, 17, 0, 2 * Math.PI);
+  c.strokeStyle = colour;
+  c.lineWidth = 3;
+  c.stroke();
+}
+
+function drawScale(view) {
+  const { context: c, camera, colours, height } = view, length = roundLength(camera.scale, 160), wide = length * camera.scale;
+  const u = 40, v = height - 16;
+  c.strokeStyle = colours.ink;
+  c.lineWidth = 2;
+  c.beginPath();
+  c.moveTo(u, v - 4);
+  c.lineTo(u, v);
+  c.lineTo(u + wide, v);
+  c.lineTo(u + wide, v - 4);
+  c.stroke();
+  c.font = "11px system-ui, sans-serif";
+  c.textAlign = "center";
+  c.textBaseline = "bottom";
+  halo(view, `${length} m`, u + wide / 2, v - 3, colours.ink);
+}

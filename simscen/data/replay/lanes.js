@@ -1,0 +1,82 @@
+// The timeline: a lane for each kind of thing that happens, over a stretch of the run.
+import { clockText, el, fill, svg } from "./dom.js";
+
+export const LANES = [
+  { id: "goals", name: "Goals" },
+  { id: "events", name: "Events" },
+  { id: "faults", name: "Faults" },
+  { id: "plans", name: "Plans" },
+  { id: "recoveries", name: "Recoveries" },
+  { id: "failures", name: "Failures" },
+];
+const ROW = 18, QUIET = new Set(["goal.reached", "goal.passed", "goal.canceled", "recovery.ended", "collision.ended", "fault.ended",
+  "fault.took_effect", "event.ended", "object.moved"]);
+
+/** What an event is called in a list: its kind's last word, its name, what is said of it. */
+export function told(event) {
+  return [event.kind.replace(".", " ").replace("_", " "), event.name].filter(Boolean).join(" ");
+}
+
+/** Whether it deserves a sign of its own; what only ends something is the end of its bar. */
+export function isShown(event) {
+  return !QUIET.has(event.kind);
+}
+
+/** Lanes for one run or two; `chosen` is called with what is clicked on. */
+export class Lanes {
+  constructor(runs, chosen) {
+    this.runs = runs;
+    this.chosen = chosen;
+    this.rows = LANES.filter((lane) => lane.id === "failures" || runs.some((run) => run.events.some((event) => event.lane === lane.id && isShown(event))));
+    this.tracks = this.rows.map(() => svg("svg", { class: "track", height: ROW * runs.length, "aria-hidden": "true" }));
+    this.element = el("div", { class: "lanes" }, ...this.rows.map((lane, k) => el("div", { class: "row" }, el("span", { class: "gutter" }, lane.name), this.tracks[k])));
+  }
+
+  /** Draw them anew for the stretch [from, to] in seconds. */
+  layOut(from, to, width, selected) {
+    this.tracks.forEach((track, k) => {
+      const at = (seconds) => ((seconds - from) / (to - from)) * width;
+      const signs = this.runs.flatMap((run, number) => this.#signs(run, this.rows[k].id, at, number * ROW, width, selected));
+      fill(track, ...signs);
+    });
+  }
+
+  #signs(run, lane, at, top, width, selected) {
+    const events = run.events.filter((event) => event.lane === lane && isShown(event)).map((event) => this.#event(run, event, at, top, width, selected));
+    const failures = lane === "failures" ? run.failures.map((failure) => this.#failure(run, failure, at, top, width, selected)) : [];
+    return [...events, ...failures].filter(Boolean);
+  }
+
+  #event(run, event, at, top, width, selected) {
+    const begin = at(event.tick / run.rate), end = event.until === undefined ? begin : at(event.until / run.rate);
+    if (end < -8 || begin > width + 8) return null;
+    const lit = selected?.kind === "e" && selected.number === event.number && selected.run === run;
+    const text = `${told(event)}, ${clockText(event.tick / run.rate)}${event.until === undefined ? "" : ` to ${clockText(event.until / run.rate)}`}${event.text ? `\n${event.text}` : ""}`;
+    const look = `sign ${event.lane}${event.bad || event.ended === "goal.failed" ? " bad" : ""}${lit ? " lit" : ""}`;
+    const choose = () => this.chosen(run, { kind: "e", number: event.number });
+    if (event.until === undefined) return svg("g", { class: look, onclick: choose }, svg("title", {}, text), sign(event, begin, top + ROW / 2));
+    const wide = Math.max(end - begin, 3), name = event.robot ? `${event.robot}: ${event.name}` : event.name;
+    const shown = wide > 8 * name.length * 0.85 + 8 ? svg("text", { x: Math.max(begin, 0) + 6, y: top + ROW / 2 + 4 }, name) : null;
+    return svg("g", { class: look, onclick: choose }, svg("title", {}, text), svg("rect", { x: begin, y: top + 3, width: wide, height: ROW - 6, rx: 3 }), shown);
+  }
+
+  #failure(run, { verdict, finding }, at, top, width, selected) {
+    if (finding.tick === null) return null;
+    const u = at(finding.tick / run.rate), lit = selected?.kind === "v" && selected.number === verdict.number && selected.run === run;
+    if (u < -8 || u > width + 8) return null;
+    const text = `${finding.what}: ${finding.said}, ${clockText(finding.tick / run.rate)}`;
+    const look = `sign failures ${verdict.severity === "warn" ? "odd" : "bad"}${lit ? " lit" : ""}`;
+    const choose = () => this.chosen(run, { kind: "v", number: verdict.number });
+    return svg("g", { class: look, onclick: choose }, svg("title", {}, text), cross(u, top + ROW / 2));
+  }
+}
+
+function sign(event, u, v) {
+  if (event.bad) return cross(u, v);
+  if (event.lane === "plans") return svg("path", { d: `M${u - 4} ${v + 4}L${u} ${v - 5}L${u + 4} ${v + 4}Z` });
+  return svg("path", { d: `M${u} ${v - 5}L${u + 5} ${v}L${u} ${v + 5}L${u - 5} ${v}Z` });
+}
+
+function cross(u, v) {
+  return svg("path", { class: "cross", d: `M${u - 4} ${v - 4}L${u + 4} ${v + 4}M${u - 4} ${v + 4}L${u + 4} ${v - 4}` });
+}

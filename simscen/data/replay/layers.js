@@ -1,0 +1,23 @@
+// What a map can show, in the order in which it is drawn, with the colour that stands for it.
+
+export const LAYERS = [
+  { id: "map", name: "Map of the robot", key: "1" },
+  { id: "costmap", name: "Costmap", key: "2", off: true },
+  { id: "zones", name: "Zones and ground", key: "3", colour: "--zone", sign: "area" },
+  { id: "goals", name: "Goals", key: "4", colour: "--goal", sign: "ring" },
+  { id: "plan", name: "Plan", key: "5", colour: "--plan", sign: "line" },
+  { id: "local", name: "Local plan", key: "6", colour: "--local", sign: "line" },
+  { id: "things", name: "Things and people", key: "7", colour: "--thing", sign: "area" },
+  { id: "scan", name: "Scan, from the belief", key: "8", colour: "--scan", sign: "dots" },
+  { id: "belief", name: "Belief, particles, 95 % ellipse", key: "9", colour: "--belief", sign: "dash" },
+  { id: "truth", name: "Robot and its way (truth)", key: "0", colour: "--truth", sign: "line" },
+];
+
+const COLOURS = ["page", "ink", "faint", "rule", "free", "wall", "unknown", "zone", "goal", "plan", "local", "thing", "person", "scan",
+  "belief", "truth", "other", "bad", "odd", "good", "fault", "select", "ground"];
+
+/** The colours of the page as they are now. */
+export function coloursNow() {
+  const style = getComputedStyle(document.documentElement);
+  return Object.fromEntries(COLOURS.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
+}

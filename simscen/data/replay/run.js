@@ -1,0 +1,199 @@
+// A run to ask: what was where at a tick, and what went on.
+import { ellipse, newest, poseAt } from "./series.js";
+
+const SCAN_AGE = 0.5, LOCAL_AGE = 1.0, MOTION_GAP = 0.15;
+
+/** A recorded run; `letter` is "A" or "B" where there are two. */
+export class Run {
+  constructor(data, column, letter) {
+    Object.assign(this, data);
+    this.letter = letter;
+    this.column = column;
+    this.seconds = this.end / this.rate;
+    this.robots = data.robots.map((robot) => new Robot(robot, this));
+    this.things = new Map(data.things.map((thing) => [thing.name, readAll(column, thing)]));
+    this.shapes = new Map(Object.entries(data.scenery.things));
+    this.title = [data.scenario, data.variation].filter(Boolean).join(" ");
+    this.events.forEach((event, number) => (event.number = number));
+    this.verdicts.forEach((verdict, number) => (verdict.number = number));
+  }
+
+  tick(seconds) {
+    return Math.min(Math.max(seconds, 0) * this.rate, this.end);
+  }
+
+  /** Everything that can move and is there: its name, its outlines in its own frame, and its pose. */
+  thingsAt(tick) {
+    const found = [];
+    for (const name of new Set([...this.shapes.keys(), ...this.things.keys(), ...this.spawned.map((one) => one.name)])) {
+      const shown = this.#thing(name, tick);
+      if (shown) found.push(shown);
+    }
+    return found;
+  }
+
+  #thing(name, tick) {
+    const spawns = this.spawned.filter((one) => one.name === name), spawn = spawns.filter((one) => one.tick <= tick).at(-1);
+    const known = this.shapes.get(name);
+    if (spawns.length && !spawn && !known) return null;
+    const since = spawn ? spawn.tick : 0;
+    if (this.gone.some(([gone, when]) => gone === name && when >= since && when <= tick)) return null;
+    const track = this.things.get(name);
+    const at = track && poseAt(track, tick, MOTION_GAP * this.rate);
+    const rest = spawn ? spawn.pose : known?.pose;
+    const pose = at ?? (rest ? { x: rest[0], y: rest[1], yaw: rest[2] } : null);
+    return pose && { name, pose, parts: (spawn ?? known)?.parts ?? null, person: (spawn ?? known)?.person ?? false };
+  }
+
+  /** What lasts and goes on at a tick, of one lane. */
+  going(lane, tick) {
+    return this.events.filter((event) => event.lane === lane && event.until !== undefined && event.tick <= tick && tick < event.until);
+  }
+
+  /** The zones in force at a tick: those of the start, switched by what happened since. */
+  zonesAt(tick) {
+    const zones = new Map(this.scenery.zones.map((zone) => [`${zone.filter} ${zone.region}`, zone]));
+    for (const event of this.events) {
+      if (event.tick > tick) break;
+      if (event.kind !== "zone.switched") continue;
+      const about = event.about ?? {};
+      const key = `${about.filter} ${event.name}`, known = this.scenery.zones.find((zone) => `${zone.filter} ${zone.region}` === key);
+      if (about.enabled) zones.set(key, { ...known, region: event.name, filter: about.filter, limit: about.speed_limit ?? known?.limit ?? 0 });
+      else zones.delete(`${about.filter} ${event.name}`);
+    }
+    return [...zones.values()];
+  }
+
+  /** The findings that did not hold, the gravest first: which verdict, which finding, and when. */
+  get failures() {
+    const order = { error: 0, fail: 0, inconclusive: 1 };
+    return this.verdicts
+      .flatMap((verdict) => verdict.findings.map((finding) => ({ verdict, finding })))
+      .filter(({ finding }) => finding.status !== "pass")
+      .sort((a, b) => (a.verdict.severity === "warn") - (b.verdict.severity === "warn") || order[a.finding.status] - order[b.finding.status]);
+  }
+
+  /** Every strip of every robot, by name. */
+  strip(name) {
+    return this.robots.map((robot) => robot.strips.get(name)).filter(Boolean);
+  }
+}
+
+/** One of the robots of a run. */
+class Robot {
+  constructor(data, run) {
+    Object.assign(this, data);
+    this.run = run;
+    const { column } = run;
+    this.truth = readAll(column, data.truth);
+    this.belief = data.belief && readAll(column, data.belief);
+    this.plans = paths(column, data.plans);
+    this.local = paths(column, data.local);
+    this.strips = new Map(data.strips.map((strip) => [strip.name, new Strip(strip, this, column)]));
+  }
+
+  truthAt(tick) {
+    return poseAt(this.truth, tick, 3 * this.run.rate) ?? { x: this.start[0], y: this.start[1], yaw: this.start[2] };
+  }
+
+  /** Where it thinks it is, its 95 % ellipse, and how old that is in seconds. */
+  beliefAt(tick) {
+    if (!this.belief) return null;
+    const k = newest(this.belief.ticks, tick);
+    if (k < 0) return null;
+    const pose = poseAt(this.belief, tick, this.run.rate);
+    const { xx, xy, yy } = this.belief;
+    return { ...pose, ...{ ellipse: ellipse(xx[k], xy[k], yy[k]) }, age: (tick - this.belief.ticks[k]) / this.run.rate };
+  }
+
+  planAt(tick) {
+    return pathAt(this.plans, tick, Infinity);
+  }
+
+  localAt(tick) {
+    return pathAt(this.local, tick, LOCAL_AGE * this.run.rate);
+  }
+
+  /** The newest scan of each lidar, as points of the map: x, y, x, y, … seen from where the robot thought it was. */
+  scansAt(tick) {
+    return this.scans.flatMap((lidar) => {
+      const { column } = this.run, k = newest(column(lidar.ticks), tick);
+      if (k < 0 || tick - column(lidar.ticks)[k] > Math.max(SCAN_AGE * this.run.rate, 1.5 * pace(column(lidar.ticks)))) return [];
+      const when = column(lidar.measured)[k], pose = this.beliefAt(when) ?? this.truthAt(when);
+      return [hits(lidar, column(lidar.ranges).subarray(k * lidar.beams, (k + 1) * lidar.beams), pose)];
+    });
+  }
+
+  /** x, y, yaw columns of the newest cloud. */
+  particlesAt(tick) {
+    if (!this.particles) return null;
+    const { column } = this.run, ticks = column(this.particles.ticks), k = newest(ticks, tick);
+    if (k < 0 || tick - ticks[k] > Math.max(this.run.rate * 2, 1.5 * pace(ticks))) return null;
+    const numbers = column(this.particles.numbers);
+    let from = 0;
+    for (let before = 0; before < k; before++) from += numbers[before];
+    const cut = (name) => column(this.particles[name]).subarray(from, from + numbers[k]);
+    return { x: cut("x"), y: cut("y"), yaw: cut("yaw") };
+  }
+
+  /** The goal that it drives to; null between goals. */
+  goalAt(tick) {
+    const events = this.run.events.filter((one) => one.kind === "goal.accepted" && (one.robot ?? "") === this.name && one.tick <= tick);
+    const event = events.at(-1);
+    return event && (event.until === undefined || tick < event.until) ? event : null;
+  }
+}
+
+/** A signal over the clock of its robot, or over ticks of its own. */
+class Strip {
+  constructor(data, robot, column) {
+    Object.assign(this, data);
+    this.robot = robot;
+    this.where = { ticks: data.ticks ?? robot.clock, values: data.values };
+    this.column = column;
+  }
+
+  get clock() {
+    return this.column(this.where.ticks);
+  }
+
+  get samples() {
+    return this.column(this.where.values);
+  }
+
+  at(tick) {
+    return this.samples[Math.max(newest(this.clock, tick), 0)];
+  }
+}
+
+function readAll(column, table) {
+  return Object.fromEntries(Object.entries(table).map(([key, value]) => [key, Array.isArray(value) && key !== "parts" ? column(value) : value]));
+}
+
+function paths(column, table) {
+  if (!table) return null;
+  const numbers = column(table.numbers), begins = new Float64Array(numbers.length + 1);
+  numbers.forEach((number, k) => (begins[k + 1] = begins[k] + number));
+  return { ticks: column(table.ticks), begins, x: column(table.x), y: column(table.y) };
+}
+
+function pathAt(table, tick, oldest) {
+  const k = table ? newest(table.ticks, tick) : -1;
+  if (k < 0 || tick - table.ticks[k] > oldest) return null;
+  return { x: table.x.subarray(table.begins[k], table.begins[k + 1]), y: table.y.subarray(table.begins[k], table.begins[k + 1]) };
+}
+
+function pace(ticks) {
+  return ticks.length > 1 ? (ticks[ticks.length - 1] - ticks[0]) / (ticks.length - 1) : 0;
+}
+
+function hits(lidar, ranges, pose) {
+  const [mx, my, turn] = lidar.mount, c = Math.cos(pose.yaw), s = Math.sin(pose.yaw);
+  const x = pose.x + c * mx - s * my, y = pose.y + s * mx + c * my, points = [];
+  for (let k = 0; k < ranges.length; k++) {
+    if (!(ranges[k] >= lidar.least && ranges[k] <= lidar.most)) continue;
+    const angle = pose.yaw + turn + lidar.first + k * lidar.step;
+    points.push(x + ranges[k] * Math.cos(angle), y + ranges[k] * Math.sin(angle));
+  }
+  return points;
+}

@@ -1,0 +1,46 @@
+"""A short drive on which much happens and something fails, for pages to show."""
+
+from pathlib import Path
+
+SCENARIO = """\
+simscen: 1
+name: a bit of everything
+# what this team wants to know
+world:
+  simscen: 1
+  name: hall
+  walls: [{name: outer wall, points: [[0, 0], [9, 0], [9, 5], [0, 5], [0, 0]]}]
+  obstacles: [{name: rack, box: [1.5, 0.6, 1], pose: {x: 4.5, y: 4}}]
+  regions: {lane: [[3, 0], [6, 0], [6, 3], [3, 3]]}
+robot: {pose: {x: 1, y: 2}}
+stack: {speed_zones: [{region: lane, speed_limit: 0.3 m/s}]}
+goals:
+  - {name: shelf, pose: {x: 6.5, y: 2.2}}
+events:
+  - name: pallet falls
+    when: {time: 3 s}
+    do:
+      - spawn: {name: pallet, box: [0.5, 0.6, 0.5], pose: {x: 4.5, y: 1.0}}
+      - mark: {name: bang}
+  - name: somebody walks by
+    when: {time: 1 s}
+    do: {pedestrian: {name: anna, pose: {x: 7.5, y: 4.5, yaw: 180 deg}, goals: [[2, 4.6]]}}
+faults:
+  - {sensor: lidar, noise: {std: 0.05 m}, when: {time: 4 s}, for: 2 s}
+pass:
+  - goals_reached: {}
+  - clearance: {min: 0.9 m}
+  - {speed: {max: 0.2 m/s}, severity: warn}
+  - localization_error: {max: 0.5 m}
+"""
+
+
+def drive(folder: Path, seed: int = 1) -> Path:
+    """Run it; the log."""
+    from simscen.run.simulate import simulate_file
+
+    folder.mkdir(parents=True, exist_ok=True)
+    file, log = folder / "everything.scenario.yaml", folder / "run.mcap"
+    file.write_text(SCENARIO)
+    simulate_file(file, seed, log, folder)
+    return log

@@ -1,0 +1,37 @@
+"""A log whose every name tries to break out of a page."""
+
+from simscen.core.case import Case
+from simscen.core.geometry import Pose2
+from simscen.core.navigation import Goal
+from simscen.core.result import RunKey, RunResult
+from simscen.core.verdict import Finding, Status, Verdict
+from simscen.judge.judge import outcome
+from simscen.judge.sketch import sketch
+from simscen.record.header import LogHeader
+from simscen.record.replay import Log
+
+EVIL = "</script><img src=x onerror=pwned()>\u202eevil\u2066 \x1b[31m{{data}}"
+TEXT = f'simscen: 1\nname: "{EVIL}"\n# --> ]]> <!-- <script>pwned()</script>\n'
+
+
+def hostile_log() -> tuple[Log, RunResult]:
+    """The log, and a result that fails."""
+    trace = sketch(
+        {
+            "seconds": 4,
+            "truth": [[0, 0, 0], [4, 2, 0]],
+            "events": [
+                [0.5, "goal.accepted", EVIL, {"x": 2.0, "y": 0.0}],
+                [1, "mark", EVIL, {"note": EVIL}],
+                [2, "object.spawned", EVIL, {"x": 1.0, "y": 1.0, "yaw": 0.0, "shape": EVIL, "size": []}],
+                [3, "fault.started", EVIL, {"entry": 0, "sensor": EVIL, "fault": EVIL}],
+            ],
+            "objects": {EVIL: [[0, 1, 1], [4, 2, 1]]},
+        }
+    )
+    case = Case(Pose2(0, 0), (Goal(EVIL, Pose2(2, 0)),), regions={EVIL: ((0, 0), (1, 0), (1, 1))})
+    about = LogHeader(EVIL, 1, case, TEXT, facts={"stack": EVIL, "variation": EVIL})
+    finding = Finding(Status.FAIL, EVIL, EVIL, EVIL, -1.0, "m", 2.0, 480, (1.0, 0.0), (EVIL,))
+    verdicts = (Verdict(EVIL, EVIL, "fail", (finding,)),)
+    result = RunResult(RunKey(EVIL, 1, EVIL, EVIL), EVIL, outcome(verdicts), verdicts, ended=EVIL, simulated=4.0)
+    return Log(about, trace, "", True), result

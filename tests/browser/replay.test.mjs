@@ -1,0 +1,60 @@
+// The maths of the replay page's modules, with node's own test runner.
+import assert from "node:assert/strict";
+import test from "node:test";
+import { deflateRawSync } from "node:zlib";
+
+const FOLDER = new URL("../../simscen/data/replay/", import.meta.url);
+const load = (name) => import(new URL(`${name}.js`, FOLDER).href);
+
+test("what zlib deflates is inflated again, stored, fixed and dynamic", async () => {
+  const { inflate } = await load("inflate");
+  for (const size of [0, 1, 70, 5_000, 200_000]) {
+    const bytes = Uint8Array.from({ length: size }, (_, k) => (k * k + (k >> 5)) % 251);
+    for (const level of [0, 1, 6, 9]) assert.deepEqual(inflate(deflateRawSync(bytes, { level })), bytes);
+    assert.deepEqual(inflate(deflateRawSync(bytes, { strategy: 4 })), bytes); // fixed codes
+  }
+  assert.throws(() => inflate(deflateRawSync(new Uint8Array(999)).subarray(0, 3)), /cut short/);
+  assert.throws(() => inflate(Uint8Array.of(7)), /not deflated/);
+});
+
+test("the newest sample counts", async () => {
+  const { newest } = await load("series");
+  assert.deepEqual([-1, 0, 5, 10, 99].map((tick) => newest([0, 10, 20], tick)), [-1, 0, 0, 1, 2]);
+});
+
+test("between samples it is on the straight line, the shorter way round; over pauses and jumps the older sample holds", async () => {
+  const { poseAt } = await load("series");
+  const poses = { ticks: [0, 10, 100, 110], x: [0, 0.2, 0.2, 5], y: [0, 0, 0, 0], yaw: [3.1, -3.1, 0, 0] };
+  const half = poseAt(poses, 5, 20);
+  assert.ok(Math.abs(half.x - 0.1) < 1e-12 && Math.abs(Math.abs(half.yaw) - Math.PI) < 1e-9);
+  assert.equal(poseAt(poses, 60, 20).x, 0.2);
+  assert.equal(poseAt(poses, 105, 20).x, 0.2);
+  assert.equal(poseAt(poses, -1, 20), null);
+});
+
+test("an ellipse holds 95 % of what its covariance says", async () => {
+  const { ellipse } = await load("series");
+  const { a, b, yaw } = ellipse(0.04, 0, 0.01);
+  assert.ok(Math.abs(a - 0.2 * 2.4477) < 1e-3 && Math.abs(b - 0.1 * 2.4477) < 1e-3 && yaw === 0);
+  assert.ok(Math.abs(ellipse(1, 0.5, 1).yaw - Math.PI / 4) < 1e-12);
+});
+
+test("pixels become points and points pixels; what is under the pointer stays when it zooms", async () => {
+  const { Camera, roundLength } = await load("camera");
+  const camera = new Camera(2, 3, 50);
+  const [u, v] = camera.pixel(4, 1, 800, 600);
+  assert.deepEqual(camera.point(u, v, 800, 600), [4, 1]);
+  camera.zoom(3, u, v, 800, 600);
+  const [x, y] = camera.point(u, v, 800, 600);
+  assert.ok(Math.hypot(x - 4, y - 1) < 1e-9);
+  camera.fit([0, 0, 10, 2], 800, 600, 0);
+  assert.equal(camera.scale, 80);
+  assert.deepEqual([roundLength(100, 160), roundLength(40, 160), roundLength(3, 160)], [1, 2, 50]);
+});
+
+test("an address names a time and what is selected, and nonsense names nothing", async () => {
+  const { fromHash, toHash } = await load("link");
+  assert.equal(toHash(12.4, null), "#t=12.4");
+  assert.deepEqual(fromHash(toHash(3.25, { kind: "v", number: 2 })), { time: 3.25, selected: { kind: "v", number: 2 } });
+  for (const hash of ["", "#", "#t=", "#t=abc", "#t=-1", "#t=Infinity", "#v=x", "#e=-1", "#<script>"]) assert.deepEqual(fromHash(hash), { time: null, selected: null });
+});

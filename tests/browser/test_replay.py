@@ -1,0 +1,222 @@
+"""The replay page in a browser: what a person who was told "it failed" gets to see, and how they get about in it."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+from drive import drive
+from hostile import EVIL, hostile_log
+from rig import Opened, Opener
+
+from simscen.judge.resultdata import from_json
+from simscen.record.replay import read_run
+from simscen.report.replay import write_replay
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="session")
+def logs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """Two seeds of a drive."""
+    return [drive(tmp_path_factory.mktemp(f"seed-{seed}"), seed) for seed in (1, 2)]
+
+
+def made(page: Path, logs: list[Path]) -> Path:
+    read = [read_run(log, looks=True) for log in logs]
+    write_replay(page, [(log, from_json(log.result)) for log in read])
+    return page
+
+
+@pytest.fixture(scope="session")
+def one(logs: list[Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return made(tmp_path_factory.mktemp("one") / "replay.html", logs[:1])
+
+
+@pytest.fixture(scope="session")
+def two(logs: list[Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return made(tmp_path_factory.mktemp("two") / "replay.html", logs)
+
+
+def ready(opened: Opened) -> Opened:
+    opened.page.wait_for_selector("html[data-ready]", state="attached")
+    return opened
+
+
+def time(opened: Opened) -> float:
+    return float(opened.page.evaluate("simscen.page.player.time"))
+
+
+FOCUSED = "document.activeElement.getAttribute('aria-label') ?? document.activeElement.textContent.slice(0, 20)"
+COLOURS = """([x, y, reach]) => {
+    const map = simscen.page.maps[0], [w, h] = map.size, dense = devicePixelRatio;
+    const [u, v] = map.camera.pixel(x, y, w, h).map((one) => one * dense), r = reach * map.camera.scale * dense;
+    const data = map.canvas.getContext("2d").getImageData(u - r, v - r, 2 * r, 2 * r).data, seen = new Set();
+    for (let k = 0; k < data.length; k += 4) seen.add(`${data[k]} ${data[k + 1]} ${data[k + 2]}`);
+    return seen.size;
+}"""
+
+
+def colours(opened: Opened, x: float, y: float, reach: float = 0.35) -> int:
+    """How many colours there are on the map around a point."""
+    return int(opened.page.evaluate(COLOURS, [x, y, reach]))
+
+
+def test_a_failed_run_opens_at_its_failing_moment_with_the_line_lit_that_asks_for_it(
+    open_page: Opener, one: Path, logs: list[Path]
+) -> None:
+    result = from_json(read_run(logs[0]).result)
+    failed = next(verdict.tightest for verdict in result.verdicts if verdict.id == "clearance")
+    assert failed is not None and failed.tick is not None and failed.status.value == "fail"
+    opened = ready(open_page(one))
+    assert time(opened) == pytest.approx(failed.tick / result.tick_rate)
+    page = opened.page
+    assert page.locator("header").inner_text().startswith("FAILED")
+    assert "clearance: 0.5" in page.locator("header .why").inner_text()
+    assert page.locator(".line.lit code").all_inner_texts() == ["  - clearance: {min: 0.9 m}"]
+    assert page.locator(".card.lit .what").inner_text() == "clearance"
+    opened.until("location.hash.startsWith('#t=')")
+
+
+def test_a_link_points_at_a_time_and_at_what_is_selected(open_page: Opener, one: Path) -> None:
+    opened = ready(open_page(one, where="#t=3.5"))
+    assert time(opened) == pytest.approx(3.5)
+    opened.page.evaluate("location.hash = '#t=1.25'")
+    opened.until("Math.abs(simscen.page.player.time - 1.25) < 1e-3")
+    opened.page.evaluate("location.hash = '#v=2&t=0.5'")
+    opened.until("document.querySelector('.card.lit .what')?.textContent === 'speed'")
+
+
+def test_what_lies_on_the_map_moves_with_the_time(open_page: Opener, one: Path, logs: list[Path]) -> None:
+    trace = read_run(logs[0]).trace
+    opened = ready(open_page(one, where="#t=0"))
+    for seconds in (2.0, 6.0, 10.0):
+        opened.page.evaluate("(t) => simscen.page.player.seek(t)", seconds)
+        opened.page.wait_for_timeout(50)
+        x, y = trace.place(round(seconds * trace.tick_rate))
+        shown = opened.page.evaluate("(t) => simscen.runs[0].robots[0].truthAt(t * simscen.runs[0].rate)", seconds)
+        assert (shown["x"], shown["y"]) == pytest.approx((x, y), abs=0.0011)
+    assert colours(opened, x, y) > 12
+    names = opened.page.evaluate("simscen.runs[0].thingsAt(240 * 10).map((thing) => thing.name).sort()")
+    assert names == ["anna", "pallet"]
+    assert opened.page.evaluate("simscen.runs[0].thingsAt(10).map((thing) => thing.name)") == []
+
+
+def test_it_scrubs_by_mouse_and_plays(open_page: Opener, one: Path) -> None:
+    opened = ready(open_page(one, where="#t=0"))
+    box = opened.page.locator(".strip canvas").first.bounding_box()
+    opened.page.mouse.click(box["x"] + box["width"] / 2, box["y"] + 20)
+    end = opened.page.evaluate("simscen.page.player.end")
+    assert time(opened) == pytest.approx(end / 2, rel=0.01)
+    opened.page.get_by_role("button", name="Play", exact=True).click()
+    opened.until(f"simscen.page.player.time > {end / 2 + 0.3}")
+    opened.page.get_by_role("button", name="Pause").click()
+    stopped = time(opened)
+    opened.page.wait_for_timeout(80)
+    assert time(opened) == stopped
+
+
+def test_everything_is_done_by_keys_alone(open_page: Opener, one: Path) -> None:
+    opened = ready(open_page(one, where="#t=0"))
+    press = opened.page.keyboard.press
+    press("ArrowRight")
+    assert time(opened) == pytest.approx(0.1)
+    press("Shift+ArrowRight")
+    assert time(opened) == pytest.approx(1.1)
+    press("End")
+    assert time(opened) == opened.page.evaluate("simscen.page.player.end")
+    press("p")
+    assert time(opened) <= opened.page.evaluate("simscen.page.player.end")
+    press("Home")
+    press("n")
+    first = opened.page.locator("#live").inner_text()
+    press("n")
+    assert opened.page.locator("#live").inner_text() != first
+    press("f")
+    assert opened.page.locator(".card.lit").count() == 1
+    press("?")
+    assert opened.page.get_by_role("dialog").is_visible()
+    press("Escape")
+    assert not opened.page.get_by_role("dialog").is_visible()
+    press("e")
+    assert opened.page.get_by_role("tabpanel", name="Events").is_visible()
+    before = opened.page.evaluate("simscen.page.camera.scale")
+    press("+")
+    assert opened.page.evaluate("simscen.page.camera.scale") > before
+    reached: set[str] = set()
+    for _ in range(40):
+        press("Tab")
+        reached.add(opened.page.evaluate(FOCUSED))
+    assert {"Play", "Time", "Next event"} <= reached and any(name.startswith("Map of") for name in reached)
+
+
+@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+@pytest.mark.parametrize("width", [1280, 390], ids=["wide", "phone"])
+def test_axe_finds_nothing_serious(open_page: Opener, one: Path, axe: str, dark: bool, width: int) -> None:
+    opened = ready(open_page(one, dark=dark, size=(width, 800)))
+    for view in ("Scenario", "Now", "Events"):
+        opened.page.get_by_role("tab", name=view).click()
+        assert opened.grave_findings(axe) == []
+    assert opened.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+
+
+def test_two_runs_play_side_by_side_in_one_time(open_page: Opener, two: Path, logs: list[Path], axe: str) -> None:
+    opened = ready(open_page(two, where="#t=5"))
+    traces = [read_run(log).trace for log in logs]
+    assert opened.page.locator(".map canvas").count() == 2
+    for number, trace in enumerate(traces):
+        shown = opened.page.evaluate("(k) => simscen.runs[k].robots[0].truthAt(1200)", number)
+        assert (shown["x"], shown["y"]) == pytest.approx(trace.place(1200), abs=0.0011)
+    assert opened.page.evaluate("simscen.page.maps[0].camera === simscen.page.maps[1].camera")
+    assert opened.page.locator(".of-run h2").all_inner_texts() == ["A failed", "B failed"]
+    assert opened.grave_findings(axe) == []
+
+
+def test_names_cannot_break_out(open_page: Opener, tmp_path: Path) -> None:
+    log, result = hostile_log()
+    page = tmp_path / "replay.html"
+    write_replay(page, [(log, result)])
+    opened = ready(open_page(page))
+    opened.page.get_by_role("tab", name="Events").click()
+    assert opened.page.evaluate("typeof pwned") == "undefined"
+    assert opened.page.locator("img, iframe, object, embed, link[href]").count() == 0
+    assert opened.page.locator("script").count() == 2
+    shown = opened.page.locator("body").inner_text()
+    assert "<img src=x onerror=pwned()>" in shown
+    assert not set(shown) & set("\u202e\u2066\x1b\x00")
+    assert EVIL.split("\u202e")[0] in opened.page.title()
+
+
+def test_its_policy_allows_nothing_but_its_own_parts(open_page: Opener, one: Path) -> None:
+    opened = ready(open_page(one))
+    policy = opened.page.locator("meta[http-equiv=Content-Security-Policy]").get_attribute("content")
+    assert policy.startswith("default-src 'none'; script-src 'sha256-") and "unsafe" not in policy
+    blocked = opened.page.evaluate("fetch('data:text/plain,hello').then(() => 'fetched', () => 'refused')")
+    assert blocked == "refused"
+    opened.forgive("console: ")  # the refusal is told there
+
+
+def test_it_opens_within_a_second(open_page: Opener, one: Path, record_property, capsys) -> None:
+    """Measured and told, not asserted: a machine may be busy."""
+    opened = ready(open_page(one))
+    took = int(opened.page.evaluate("document.documentElement.dataset.ready"))
+    size = one.stat().st_size
+    record_property("replay_ready_ms", took)
+    seconds = opened.page.evaluate("simscen.runs[0].seconds")
+    with capsys.disabled():
+        print(f"\nreplay.html of {seconds:.0f} s: {size / 1e3:.0f} kB, ready after {took} ms")
+    assert size < 2_000_000
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="there is no node")
+def test_the_maths_of_its_modules() -> None:
+    command = ["node", "--test", "--test-reporter=tap", str(ROOT / "tests/browser/replay.test.mjs")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 0, done.stdout
+
+
+def test_equal_logs_make_equal_pages(one: Path, logs: list[Path], tmp_path: Path) -> None:
+    assert made(tmp_path / "again.html", logs[:1]).read_bytes() == one.read_bytes()
