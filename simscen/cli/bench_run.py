@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from simscen.cli.run import WARM_PROCESS
+from simscen.cli.runsession import WARM_PROCESS
 from simscen.cli.select import checked
 from simscen.core.errors import InvalidInput
 from simscen.core.result import Outcome, RunKey

@@ -107,7 +107,7 @@ def speed() -> str:
 
 def run_twice() -> str:
     """A second of a real run passes, and its log is the same when it is run again."""
-    from simscen.cli.run import WARM_PROCESS
+    from simscen.cli.runsession import WARM_PROCESS
     from simscen.core.result import Outcome
     from simscen.loading.scenario import load_scenario
     from simscen.run.session import Options, plan, run_session

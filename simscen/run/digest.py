@@ -22,7 +22,7 @@ def digest(loaded: LoadedScenario) -> str:
     sha = hashlib.sha256(json.dumps(_circumstances(loaded), sort_keys=True).encode())
     for name, text in sorted(loaded.sources.items()):
         _take(sha, name, text.encode())
-    for file in sorted({*_named(loaded), *loaded.read}):
+    for file in sorted({*named_files(loaded), *loaded.read}):
         _take(sha, _name(file, loaded), file.read_bytes())
     return sha.hexdigest()
 
@@ -51,7 +51,7 @@ def _stacks(loaded: LoadedScenario) -> dict[str, object]:
     }
 
 
-def _named(loaded: LoadedScenario) -> list[Path]:
+def named_files(loaded: LoadedScenario) -> list[Path]:
     """Map images, SDF and URDF files."""
     views = list(loaded.each.values())
     maps = [loaded.world.map, *(view.map for view in views if view.map != "none")]

@@ -32,14 +32,19 @@ def fingerprints(plugins: Iterable[Entry]) -> dict[str, list[str]]:
 def _files_digest(value: str) -> str:
     """SHA-256 over the files of the outermost package that the class is in; of its module alone where there is none."""
     sha = hashlib.sha256()
-    for name, file in _files(value.partition(":")[0]):
+    for name, file in _files(value):
         data = file.read_bytes()
         sha.update(f"{name}\0{len(data)}\0".encode() + data)
     return sha.hexdigest()
 
 
-def _files(module: str) -> Iterator[tuple[str, Path]]:
-    found = importlib.util.find_spec(module)
+def files_of(plugins: Iterable[Entry]) -> list[Path]:
+    """The files of the outermost packages that their classes are in."""
+    return [file for entry in plugins for _, file in _files(entry.value)]
+
+
+def _files(value: str) -> Iterator[tuple[str, Path]]:
+    found = importlib.util.find_spec(value.partition(":")[0])
     if found is None or found.origin is None:
         return
     file = Path(found.origin)

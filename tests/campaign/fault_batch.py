@@ -17,9 +17,9 @@ from junitparser import JUnitXml
 
 TELLING = Path(__file__).parents[1] / "conformance" / "telling_zygote.py"
 SIMSCEN = f"""
-import simscen.cli.run
+import simscen.cli.runsession
 from simscen.cli.main import main
-simscen.cli.run.WARM_PROCESS = ({str(TELLING)!r},)
+simscen.cli.runsession.WARM_PROCESS = ({str(TELLING)!r},)
 main()
 """
 FAULTS = {

@@ -16,9 +16,9 @@ from simscen.record.replay import read_log
 TELLING = Path(__file__).with_name("telling_zygote.py")
 WITH_FAULTS = f"""
 import sys
-import simscen.cli.run
+import simscen.cli.runsession
 from simscen.cli.main import main
-simscen.cli.run.WARM_PROCESS = ({str(TELLING)!r},)
+simscen.cli.runsession.WARM_PROCESS = ({str(TELLING)!r},)
 main()
 """
 LIMIT = 10.0

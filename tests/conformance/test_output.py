@@ -16,10 +16,10 @@ from simscen.record.replay import read_log
 SIMSCEN = str(Path(sys.executable).with_name("simscen"))
 TELLING = Path(__file__).with_name("telling_zygote.py")
 IMPATIENT = f"""
-import simscen.cli.run
+import simscen.cli.runsession
 from simscen.cli.main import main
 from simscen.run.process import supervisor
-simscen.cli.run.WARM_PROCESS = ({str(TELLING)!r},)
+simscen.cli.runsession.WARM_PROCESS = ({str(TELLING)!r},)
 supervisor.SILENCE = 5.0
 main()
 """

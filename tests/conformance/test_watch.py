@@ -1,0 +1,73 @@
+"""`simscen run --watch` through the front door."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOM = "simscen: 1\nwalls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]\n"
+SCENARIO = """\
+simscen: 1
+world: room.world.yaml
+robot: {pose: {x: 1, y: 1}}
+goals: [{pose: {x: 5, y: 3}}]
+time_limit: 0.5 s
+pass: [{collisions: {max: 0}}]
+"""
+
+
+class Watch:
+    """A `simscen run --watch` that is read until it says what is expected."""
+
+    def __init__(self, folder: Path) -> None:
+        command = [sys.executable, "-m", "simscen.cli.main", "run", ".", "-j", "1", "--watch"]
+        self.process = subprocess.Popen(
+            command, cwd=folder, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+        )
+
+    def until(self, text: str) -> str:
+        assert self.process.stdout is not None
+        told = b""
+        while text.encode() not in told:
+            piece = os.read(self.process.stdout.fileno(), 4096)
+            assert piece, f"it ended without {text!r}:\n{told.decode()}"
+            told += piece
+        return told.decode()
+
+    def press(self, key: str) -> None:
+        assert self.process.stdin is not None
+        self.process.stdin.write(key.encode())
+        self.process.stdin.flush()
+
+
+@pytest.fixture
+def watch(tmp_path: Path) -> Iterator[Watch]:
+    (tmp_path / "room.world.yaml").write_text(ROOM)
+    (tmp_path / "other.world.yaml").write_text(ROOM)
+    (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
+    (tmp_path / "b.scenario.yaml").write_text(SCENARIO.replace("room", "other"))
+    watch = Watch(tmp_path)
+    yield watch
+    watch.process.kill()
+    watch.process.communicate()
+
+
+def test_it_runs_what_a_saved_file_touches_and_what_keys_say_until_q(watch: Watch, tmp_path: Path) -> None:
+    assert "2 passed" in watch.until("q = quit")
+    (tmp_path / "other.world.yaml").write_text(ROOM.replace("walls", "wals"))
+    assert "unknown key `wals`" in watch.until("q = quit")
+    (tmp_path / "other.world.yaml").write_text(ROOM.replace("[6, 0]", "[6.5, 0]"))
+    told = watch.until("q = quit")
+    assert "1 scenario ·" in told and "✓ b" in told
+    (tmp_path / "a.scenario.yaml").write_text(SCENARIO.replace("collisions: {max: 0}", "clearance: {min: 2}"))
+    assert "0 passed, 1 failed" in watch.until("what did not pass (1), q = quit")
+    watch.press("f")
+    told = watch.until("q = quit")
+    assert "0 passed, 1 failed" in told and "1 scenario ·" in told
+    watch.press("a")
+    assert "1 passed, 1 failed" in watch.until("q = quit")
+    watch.press("q")
+    assert watch.process.wait(timeout=60) == 1
