@@ -56,21 +56,23 @@ class _Wrapping:
         else:
             for blank, word, last in _words(piece):
                 tail = glued if last else len(_GOES_ON) if piece.shell else 0
-                if self._used + width(blank + word) + tail <= self._columns or self._used <= self._indent:
+                if self._used + width(blank + word) + tail <= self._columns or not self._used:
                     self._put(piece, blank + word)
                 else:
-                    self._next(piece, word)
+                    self._next(piece, word, tail)
 
     def _put(self, piece: Piece, text: str) -> None:
         self._line.append(replace(piece, text=text))
         self._used += width(text)
 
-    def _next(self, piece: Piece, text: str) -> None:
+    def _next(self, piece: Piece, text: str, tail: int = 0) -> None:
+        """Go on in the next line; what is too long for its place there begins further to the left."""
         if piece.shell and self._line and self._line[-1].shell:
             self._put(piece, _GOES_ON)
+        indent = max(0, min(self._indent, self._columns - width(text) - tail))
         self._end()
-        self._line.append(Piece(" " * self._indent))
-        self._used = self._indent
+        self._line.append(Piece(" " * indent))
+        self._used = indent
         self._put(piece, text)
 
     def _end(self) -> None:

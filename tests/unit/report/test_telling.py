@@ -62,10 +62,10 @@ simscen 0.1.0 · 3 scenarios · 2 workers
       warning: speed: 0.60 m/s > 0.50
         m/s, at t = 1.00 s, (1.00, 1.00)
       scenario
-             scenarios/faults/lidar_off.scenario.yaml:27
+scenarios/faults/lidar_off.scenario.yaml:27
       picture   out/x/map.png
       again     simscen run \\
-             scenarios/faults/lidar_off.scenario.yaml \\
+scenarios/faults/lidar_off.scenario.yaml \\
              --seed 7
 1 passed, 1 failed, 1 error · 49 s
   simulated in 0.5 s (98x) ·

@@ -58,7 +58,9 @@ def test_a_command_that_goes_on_in_the_next_line_is_still_the_command(columns):
 
 def test_a_path_is_longer_than_a_line_rather_than_broken():
     path = "simscen-out/20261122T074142Z-09d4/runs/scenarios/faults/lidar_off/seed-1/map.png"
-    assert texts((Piece("      picture   ", "quiet"), Piece(path, file=path)), 40)[-1].strip() == path
+    line = (Piece("      picture   ", "quiet"), Piece(path, file=path))
+    assert texts(line, 40)[-1] == path
+    assert texts(line, len(path) + 2) == ["      picture", f"  {path}"]
 
 
 def test_what_follows_a_word_without_a_blank_stays_with_it():
