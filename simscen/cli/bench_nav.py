@@ -12,7 +12,7 @@ import typer
 from simscen.core.errors import Exit, NothingSelected
 
 if TYPE_CHECKING:
-    from simscen.study.experiments import Experiment
+    from simscen.study.experiment import Experiment
 
 DATA = Path("../shared/data")
 

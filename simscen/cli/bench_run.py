@@ -19,7 +19,7 @@ from simscen.run.outfolder import run_folder
 from simscen.run.process.jobs import Job
 from simscen.run.session import Options, run_session
 from simscen.study.consistency import anees, bounds, nees_at
-from simscen.study.experiments import Experiment
+from simscen.study.experiment import Drive, Experiment
 from simscen.study.tally import Row, Trial, mean, tally
 
 MOMENTS = (5.0, 10.0, 20.0, 30.0)
@@ -54,16 +54,16 @@ def drive(experiments: Sequence[Experiment], out: Path, workers: int) -> list[Me
     answers, _ = run_session(jobs, options, WARM_PROCESS, _Progress(len(jobs), {job.key: job for job in jobs}))
     trials: list[list[Trial]] = [[] for _ in experiments]
     for answer in answers:
-        number, reference = owners[answer.key]
-        trials[number].append(Trial(answer, reference))
+        number, drive = owners[answer.key]
+        trials[number].append(Trial(answer, drive.reference_length, drive.world or str(drive.file)))
     return [_measured(experiment, runs) for experiment, runs in zip(experiments, trials, strict=True)]
 
 
-Owner = tuple[int, float | None]
+Owner = tuple[int, Drive]
 
 
 def _planned(experiments: Sequence[Experiment], out: Path) -> tuple[list[Job], dict[RunKey, Owner]]:
-    """A job for each run, and the experiment and reference length it belongs to."""
+    """A job for each run, and the experiment and the drive that it belongs to."""
     jobs: list[Job] = []
     owners: dict[RunKey, Owner] = {}
     for number, experiment in enumerate(experiments):
@@ -74,7 +74,7 @@ def _planned(experiments: Sequence[Experiment], out: Path) -> tuple[list[Job], d
             for seed in planned.seeds:
                 key = RunKey(scenario.id, seed)
                 jobs.append(Job(len(jobs), scenario, key, run_folder(out, key), Options().wall_limit))
-                owners[key] = number, planned.reference_length
+                owners[key] = number, planned
     return jobs, owners
 
 

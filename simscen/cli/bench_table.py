@@ -8,21 +8,25 @@ from simscen.cli.bench_run import Localized, Measured
 from simscen.study.barn import DWA
 from simscen.study.tally import Row
 
+PUBLISHED = (
+    "BARN's own figures for DWA at 0.5 m/s, in another simulator and all 50 worlds: "
+    + ", ".join(f"{name} {value:.3f}" for name, value in DWA.items())
+)
 HEAD = ("experiment", "runs", "success", "95 % interval", "collision", "timeout", "failed", "time", "score", "path")
 
 
 def as_text(rows: Sequence[Measured]) -> str:
-    """Aligned columns; DWA's published numbers below BARN's."""
+    """Aligned columns; published figures of another simulator as a footnote."""
     table: list[tuple[str, ...]] = [HEAD]
     for measured in rows:
         table.append(_cells(measured.tally))
-        if measured.tally.case == "BARN":
-            table.append(_published())
     widths = [max(len(row[column]) for row in table) for column in range(len(HEAD))]
     lines = [_aligned(row, widths) for row in table]
     for measured in rows:
         if measured.localized is not None:
             lines += ["", *_belief(measured.tally.case, measured.localized)]
+    if any(measured.tally.case.startswith("BARN") for measured in rows):
+        lines += ["", PUBLISHED]
     return "\n".join(lines)
 
 
@@ -32,12 +36,12 @@ def as_json(rows: Sequence[Measured]) -> str:
 
 
 def _cells(row: Row) -> tuple[str, ...]:
-    low, high = row.success_interval
+    interval = row.success_interval
     return (
         row.case,
         f"{row.runs}",
         f"{row.success:.3f}",
-        f"{low:.3f} … {high:.3f}",
+        "one world" if interval is None else f"{interval[0]:.3f} … {interval[1]:.3f}",
         f"{row.collisions:.3f}",
         f"{row.timeouts:.3f}",
         f"{row.failed + row.errors:.3f}",
@@ -45,11 +49,6 @@ def _cells(row: Row) -> tuple[str, ...]:
         _or_none(row.score, ".3f"),
         _or_none(row.path_ratio, ".2f"),
     )
-
-
-def _published() -> tuple[str, ...]:
-    rates = [f"{DWA[name]:.3f}" for name in ("success", "collisions", "timeouts", "score")]
-    return ("  DWA, published", "500", rates[0], "", rates[1], rates[2], "", "", rates[3], "")
 
 
 def _or_none(value: float | None, form: str, unit: str = "") -> str:

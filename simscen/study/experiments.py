@@ -5,7 +5,6 @@ can be repeated by hand.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,34 +12,15 @@ import numpy as np
 from simscen.core.chance import Streams
 from simscen.study import barn, localization, nav2_sandbox
 from simscen.study import dynamic_fields as movers
+from simscen.study.experiment import Drive, Experiment, written
 from simscen.study.obstacle_fields import CELL, HEIGHT, ObstacleField, obstacle_field
-
-
-@dataclass(frozen=True)
-class Drive:
-    """A scenario file, the seeds to run it with, and BARN's reference length in metres where it has one."""
-
-    file: Path
-    seeds: Sequence[int]
-    reference_length: float | None = None
-
-
-@dataclass(frozen=True)
-class Experiment:
-    """One line of the table. `root` and `world_path` are what `simscen run` needs to find everything."""
-
-    name: str
-    drives: tuple[Drive, ...]
-    root: Path
-    world_path: tuple[Path, ...] = ()
-    localization: bool = False
 
 
 def barn_challenge(folder: Path, dataset: Path, seeds: Sequence[int]) -> Experiment:
     """The worlds of the dataset. Raises OSError or ValueError when it is unusable."""
     drives = [
         Drive(
-            _written(folder / f"barn/{world.file.stem}.scenario.yaml", barn.scenario(world.file.stem, world.file.name)),
+            written(folder / f"barn/{world.file.stem}.scenario.yaml", barn.scenario(world.file.stem, world.file.name)),
             seeds,
             world.reference_length,
         )
@@ -54,9 +34,9 @@ def generated_fields(folder: Path, count: int) -> Experiment:
     drives = []
     for number in range(1, count + 1):
         field = obstacle_field(number)
-        world = _written(folder / f"fields/field_{number}.world.yaml", _world_text(field))
+        world = written(folder / f"fields/field_{number}.world.yaml", _world_text(field))
         text = barn.scenario(f"field {number}", world.name)
-        file = _written(folder / f"fields/field_{number}.scenario.yaml", text)
+        file = written(folder / f"fields/field_{number}.scenario.yaml", text)
         drives.append(Drive(file, [number], field.shortest))
     return Experiment("generated fields", tuple(drives), folder)
 
@@ -68,10 +48,10 @@ def dynamic_fields(folder: Path, count: int) -> list[Experiment]:
         drives = []
         for number in range(1, count + 1):
             stem = f"dynamic/field_{number}_at_{speed:.2f}"
-            world = _written(folder / f"{stem}.world.yaml", _moving_world_text(movers.dynamic_field(number, speed)))
+            world = written(folder / f"{stem}.world.yaml", _moving_world_text(movers.dynamic_field(number, speed)))
             text = barn.scenario(f"dynamic field {number}", world.name, movers.START, movers.GOAL)
             length = movers.START.distance(movers.GOAL)
-            drives.append(Drive(_written(folder / f"{stem}.scenario.yaml", text), [number], length))
+            drives.append(Drive(written(folder / f"{stem}.scenario.yaml", text), [number], length))
         experiments.append(Experiment(f"dynamic fields, {speed:.2f} m/s", tuple(drives), folder))
     return experiments
 
@@ -81,7 +61,7 @@ def sandbox(folder: Path, nav2: Path, seeds: Sequence[int]) -> list[Experiment]:
     return [
         Experiment(
             name,
-            (Drive(_written(folder / f"nav2/{stem}.scenario.yaml", nav2_sandbox.scenario(name, box)), seeds),),
+            (Drive(written(folder / f"nav2/{stem}.scenario.yaml", nav2_sandbox.scenario(name, box)), seeds),),
             folder,
             (nav2, nav2 / "models"),
         )
@@ -104,7 +84,7 @@ def localizations(folder: Path, worlds: Path, seeds: Sequence[int], lost: int) -
         return Experiment(f"localization, {name}", drives, folder, (worlds,), localization=known)
 
     def one(stem: str, text: str, seeds: Sequence[int]) -> Drive:
-        return Drive(_written(folder / f"localization/{stem}.scenario.yaml", text), seeds)
+        return Drive(written(folder / f"localization/{stem}.scenario.yaml", text), seeds)
 
     numbers = range(1, lost + 1)
     directions = {seed: float(Streams(seed).generator("direction").uniform(-np.pi, np.pi)) for seed in numbers}
@@ -118,12 +98,6 @@ def localizations(folder: Path, worlds: Path, seeds: Sequence[int], lost: int) -
         experiment("start unknown", one("start_unknown", localization.start_unknown(), numbers)),
         experiment("kidnapped", one("kidnapped", localization.kidnapped(), numbers)),
     ]
-
-
-def _written(file: Path, text: str) -> Path:
-    file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text(text, encoding="utf-8")
-    return file
 
 
 def _world_text(field: ObstacleField) -> str:

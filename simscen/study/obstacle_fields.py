@@ -32,7 +32,7 @@ Cells = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class ObstacleField:
-    """`centres` (n, 2) of cylinders and the length of the shortest way of a disc of GAP from START to GOAL, in m."""
+    """`centres` (n, 2) of cylinders and the length of the shortest way of the disc from START to GOAL, in m."""
 
     number: int
     centres: Array
@@ -47,15 +47,16 @@ class ObstacleField:
         return float(np.count_nonzero(inside)) / (FIELD_ROWS * (COLUMNS - 2))
 
 
-def obstacle_field(number: int) -> ObstacleField:
+def obstacle_field(number: int, gap: float = GAP, too_wide: float | None = None) -> ObstacleField:
     """The field of this number (from 1): always the same, and one that can be crossed.
 
-    Density is drawn anew until a disc of GAP has a way. Raises RuntimeError after MOST_TRIES (never seen).
+    Density is drawn anew until a disc of radius `gap` has a way, and one of `too_wide`, where that is given, has none.
+    Raises RuntimeError after MOST_TRIES (never seen).
     """
-    chance = Streams(number).generator("obstacle field")
+    chance = Streams(number).generator("obstacle field" if gap == GAP else f"obstacle field {gap:g}")
     for _ in range(MOST_TRIES):
         centres = _centres(_smoothed(chance))
-        if _crossable(centres) and np.isfinite(length := _shortest(centres)):
+        if _crossable(centres, gap, too_wide) and np.isfinite(length := _shortest(centres, gap)):
             return ObstacleField(number, centres, length)
     raise RuntimeError(f"no way through any of {MOST_TRIES} fields of number {number}")
 
@@ -88,19 +89,26 @@ def _centres(field: Cells) -> Array:
     return np.column_stack(((columns + 0.5 - COLUMNS) * CELL, (rows + 0.5) * CELL))
 
 
-def _crossable(centres: Array) -> bool:
-    """Whether start and goal are in one piece of the free space: quick, for most fields are not crossable."""
+def _crossable(centres: Array, gap: float, too_wide: float | None) -> bool:
+    """Whether start and goal are in one piece of the free space of a disc of `gap`, and not of one that is too wide.
+
+    Quick, for most fields are not crossable.
+    """
     from scipy import ndimage, spatial
 
     step = CELL / 3
     x, y = np.meshgrid(np.arange(-COLUMNS * CELL, 0.0, step), np.arange(0.0, GOAL.y + 1.0, step))
     distance, _ = spatial.cKDTree(centres).query(np.stack((x, y), axis=-1))
-    pieces, _ = ndimage.label(distance > GAP + CELL / 2)
-    start, goal = (pieces[round(pose.y / step), round((pose.x + COLUMNS * CELL) / step)] for pose in (START, GOAL))
-    return bool(start and start == goal)
+
+    def joined(radius: float) -> bool:
+        pieces, _ = ndimage.label(distance > radius + CELL / 2)
+        start, goal = (pieces[round(pose.y / step), round((pose.x + COLUMNS * CELL) / step)] for pose in (START, GOAL))
+        return bool(start and start == goal)
+
+    return joined(gap) and not (too_wide is not None and joined(too_wide))
 
 
-def _shortest(centres: Array) -> float:
+def _shortest(centres: Array, gap: float) -> float:
     from simscen.worlds.meshing import fuse
     from simscen.worlds.shortest import ShortestWays
 
@@ -108,4 +116,4 @@ def _shortest(centres: Array) -> float:
     mesh = fuse(tuple(Solid(pillar, Pose3(x, y, HEIGHT / 2), "") for x, y in centres.tolist()))
     # As wide as the lane, so that no way leads around its walls: those end where the field ends.
     bounds = (-COLUMNS * CELL, 0.0, 0.0, GOAL.y + 1.0)
-    return ShortestWays(mesh, bounds, GAP).length(START, GOAL)
+    return ShortestWays(mesh, bounds, gap).length(START, GOAL)

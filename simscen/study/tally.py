@@ -4,7 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
+import numpy as np
+
+from simscen.core.chance import Streams
 from simscen.core.intervals import wilson
+from simscen.core.paired import mean_interval
 from simscen.core.result import Outcome
 from simscen.core.sessionevents import RunFinished
 from simscen.core.verdict import Status
@@ -26,10 +30,11 @@ class Fate(str, Enum):
 
 @dataclass(frozen=True)
 class Trial:
-    """A run, and the reference length in metres that its score refers to (None = the case has no score)."""
+    """A run, the reference length in metres that its score refers to (None = the case has no score), and its world."""
 
     run: RunFinished
     reference_length: float | None = None
+    world: str = ""
 
     @property
     def fate(self) -> Fate:
@@ -59,13 +64,14 @@ class Trial:
 class Row:
     """One line of the table. Rates are of all runs; seconds and path ratio are means over those that arrived.
 
-    `path_ratio` is driven over shortest length. `success_interval` is the 95 % interval of the success rate.
+    `path_ratio` is driven over shortest length. `success_interval` is the 95 % interval of the success rate in worlds
+    like these, None where there is but one: seeds tell of the noise in it, not of other worlds.
     """
 
     case: str
     runs: int
     success: float
-    success_interval: tuple[float, float]
+    success_interval: tuple[float, float] | None
     collisions: float
     timeouts: float
     failed: float
@@ -84,7 +90,7 @@ def tally(case: str, trials: Sequence[Trial]) -> Row:
         case=case,
         runs=len(trials),
         success=_rate(fates, Fate.SUCCESS),
-        success_interval=wilson(len(good), len(trials)),
+        success_interval=over_worlds(trials),
         collisions=_rate(fates, Fate.COLLISION),
         timeouts=_rate(fates, Fate.TIMEOUT),
         failed=_rate(fates, Fate.FAILED),
@@ -93,6 +99,21 @@ def tally(case: str, trials: Sequence[Trial]) -> Row:
         score=mean([trial.score for trial in trials]),
         path_ratio=mean([trial.metric("path_length_ratio") for trial in arrived]),
     )
+
+
+def over_worlds(trials: Sequence[Trial]) -> tuple[float, float] | None:
+    """Between what bounds the success rate lies with 95 % in worlds like these; None of fewer than five worlds.
+
+    By bootstrap over worlds. Where all worlds say the same it has no width: there it is Wilson's, each world a trial.
+    """
+    worlds: dict[str, list[bool]] = {}
+    for trial in trials:
+        worlds.setdefault(trial.world, []).append(trial.fate is Fate.SUCCESS)
+    rates = [float(np.mean(fates)) for fates in worlds.values()]
+    interval = mean_interval(rates, Streams(1).generator("worlds"))
+    if interval is not None and min(rates) == max(rates) and rates[0] in (0.0, 1.0):
+        return wilson(round(sum(rates)), len(rates))
+    return interval
 
 
 def _rate(fates: Sequence[Fate], which: Fate) -> float:

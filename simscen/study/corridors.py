@@ -1,0 +1,85 @@
+"""Two robots that meet in a corridor, and ramps in a hall: generated, each like nothing that ships."""
+
+from pathlib import Path
+
+import numpy as np
+
+from simscen.core.chance import Streams
+from simscen.study.experiment import Drive, Experiment, written
+
+WIDTH = (1.4, 2.4)
+"""Metres of a corridor: two robots of 0.44 m pass each other in the narrowest with 17 cm on each side."""
+LENGTH = 14.0
+SLOPE, HEIGHT = (2.0, 8.0), (0.03, 0.20)
+"""Degrees and metres of ramps."""
+
+
+def two_robots(folder: Path, count: int) -> Experiment:
+    """Two robots set out at the ends of a corridor, each to where the other began; a corridor for each number."""
+    drives = [
+        Drive(written(folder / f"corridor_{number}.scenario.yaml", _meeting(number)), [number])
+        for number in range(1, count + 1)
+    ]
+    return Experiment("two robots in a corridor", tuple(drives), folder)
+
+
+def _meeting(number: int) -> str:
+    chance = Streams(number).generator("corridor")
+    width = float(chance.uniform(*WIDTH))
+    free = width / 2 - 0.35
+    west, east = chance.uniform(-free, free, 2).tolist()
+    return f"""\
+simscen: 1
+name: two robots meet in {width:.2f} m
+world:
+  simscen: 1
+  walls:
+    - {{name: corridor, points: [[0, 0], [{LENGTH:g}, 0], [{LENGTH:g}, {width:.3f}], [0, {width:.3f}], [0, 0]]}}
+robots:
+  eastbound:
+    pose: {{x: 1.0, y: {width / 2 + west:.3f}}}
+    goals: [{{name: east, pose: {{x: {LENGTH - 1:g}, y: {width / 2 + east:.3f}}}}}]
+  westbound:
+    pose: {{x: {LENGTH - 1:g}, y: {width / 2 + east:.3f}, yaw: 180 deg}}
+    goals: [{{name: west, pose: {{x: 1.0, y: {width / 2 + west:.3f}, yaw: 180 deg}}}}]
+time_limit: 120 s
+pass:
+  - goals_reached: {{}}
+  - collisions: {{max: 0}}
+"""
+
+
+def ramps(folder: Path, count: int) -> Experiment:
+    """Up a ramp, over a platform and down again; slopes, heights and where the robot comes from are drawn."""
+    drives = [
+        Drive(written(folder / f"ramp_{number}.scenario.yaml", _ramp(number)), [number])
+        for number in range(1, count + 1)
+    ]
+    return Experiment("ramps", tuple(drives), folder)
+
+
+def _ramp(number: int) -> str:
+    chance = Streams(number).generator("ramp")
+    slope, height = float(chance.uniform(*SLOPE)), float(chance.uniform(*HEIGHT))
+    run, flat, width = height / float(np.tan(np.radians(slope))), float(chance.uniform(1.5, 3.0)), 2.4
+    up, down = 3.0 + run, 3.0 + run + flat
+    end, y = down + run + 3.0, float(chance.uniform(0.6, width - 0.6))
+    middle = f"{width / 2:g}"
+    return f"""\
+simscen: 1
+name: a ramp of {slope:.1f} degrees
+world:
+  simscen: 1
+  walls: [{{name: hall, points: [[0, 0], [{end:.3f}, 0], [{end:.3f}, {width}], [0, {width}], [0, 0]]}}]
+  ramps:
+    - {{name: up, start: [3, {middle}], end: [{up:.4f}, {middle}], width: {width - 0.1:g}, height: {height:.4f}}}
+    - {{name: down, start: [{down + run:.4f}, {middle}], end: [{down:.4f}, {middle}], width: {width - 0.1:g}, height: {height:.4f}}}
+  obstacles:
+    - {{name: platform, box: [{flat:.4f}, {width - 0.1:g}, {height:.4f}], pose: {{x: {(up + down) / 2:.4f}, y: {middle}}}}}
+robot: {{pose: {{x: 1.0, y: {y:.3f}}}}}
+goals: [{{pose: {{x: {end - 1:.3f}, y: {middle}}}}}]
+time_limit: 120 s
+pass:
+  - goals_reached: {{}}
+  - collisions: {{max: 0}}
+"""

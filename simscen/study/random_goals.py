@@ -1,0 +1,78 @@
+"""Drives from anywhere to anywhere: in the shipped worlds, in generated buildings, with sensors that fail."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from simscen.core.geometry import Pose2
+from simscen.core.world import BuiltWorld
+from simscen.study.experiment import Drive, Experiment, written
+from simscen.study.free_poses import Errand, errands
+
+RADIUS = 0.22
+"""Metres: the disc of the default robot, a TurtleBot."""
+SLOWEST = 0.2
+"""m/s: whoever is slower than this on average has not arrived in time."""
+FAULTS = {
+    "lidar noise": ("{sensor: lidar, noise: {std: …}}", ("3 cm", "6 cm", "12 cm")),
+    "lidar garbage": ("{sensor: lidar, garbage: {probability: …}}", ("3 %", "10 %", "25 %")),
+    "lidar delay": ("{sensor: lidar, delay: {latency: …}}", ("50 ms", "150 ms", "250 ms")),
+    "lidar sector": ("{sensor: lidar, sector: {from: 180 deg, to: …}}", ("210 deg", "270 deg", "350 deg")),
+    "loose lidar": ("{sensor: lidar, intermittent: {up: 2 s, down: …}}", ("0.2 s", "0.5 s", "1 s")),
+    "odometry scale": ("{sensor: odom, scale: {factor: …}}", ("103 %", "108 %", "120 %")),
+    "odometry slip": ("{sensor: odom, slip: {left: …, right: 0 %}}", ("3 %", "10 %", "25 %")),
+    "late commands": ("{sensor: cmd_vel, delay: {latency: …}}", ("50 ms", "120 ms", "250 ms")),
+}
+"""What a sensor or an actuator has during the whole drive: weak, medium and strong."""
+STRENGTHS = ("weak", "medium", "strong")
+
+
+def scenario(name: str, world: str, errand: Errand, faults: Sequence[str] = ()) -> str:
+    """The text of a scenario: one drive of the default robot, without a contact that it causes."""
+    disturbed = "".join(["faults:\n", *(f"  - {fault}\n" for fault in faults)]) if faults else ""
+    limit = errand.length / SLOWEST + 30.0
+    return (
+        f"simscen: 1\nname: {name}\nworld: {world}\nrobot: {{pose: {_pose(errand.start)}}}\n"
+        f"goals:\n  - {{pose: {_pose(errand.goal)}}}\n{disturbed}time_limit: {limit:.0f} s\n"
+        "pass:\n  - goals_reached: {}\n  - collisions: {max: 0}\n"
+    )
+
+
+def random_goals(
+    name: str, folder: Path, worlds: Mapping[str, BuiltWorld], count: int, world_path: tuple[Path, ...] = ()
+) -> Experiment:
+    """`count` drives in each of the worlds, which are named as a scenario in `folder` names them."""
+    drives = []
+    for world, built in worlds.items():
+        for number, errand in enumerate(errands(built, RADIUS, count, 1), start=1):
+            file = folder / f"{_stem(world)}_{number}.scenario.yaml"
+            drives.append(Drive(written(file, scenario(name, world, errand)), [number], world=world))
+    return Experiment(name, tuple(drives), folder, world_path)
+
+
+def degraded(
+    folder: Path, worlds: Mapping[str, BuiltWorld], count: int, world_path: tuple[Path, ...] = ()
+) -> list[Experiment]:
+    """`count` such drives for each fault; an experiment for each of three strengths, with the same drives."""
+    errand_of = {world: list(errands(built, RADIUS, count * len(FAULTS), 2)) for world, built in worlds.items()}
+    names = list(errand_of)
+    experiments = []
+    for level, strength in enumerate(STRENGTHS):
+        drives = []
+        for kind, fault in enumerate(FAULTS):
+            for number in range(1, count + 1):
+                world = names[number % len(names)]
+                errand = errand_of[world][(kind * count + number - 1) % len(errand_of[world])]
+                said, values = FAULTS[fault]
+                text = scenario(f"{fault}, {strength}", world, errand, [said.replace("…", values[level])])
+                file = folder / strength / f"{_stem(fault)}_{number}.scenario.yaml"
+                drives.append(Drive(written(file, text), [number], world=f"{fault} {number}"))
+        experiments.append(Experiment(f"degraded sensing, {strength}", tuple(drives), folder, world_path))
+    return experiments
+
+
+def _pose(pose: Pose2) -> str:
+    return f"{{x: {pose.x:.3f}, y: {pose.y:.3f}, yaw: {pose.yaw:.4f}}}"
+
+
+def _stem(text: str) -> str:
+    return Path(text).name.split(".")[0].replace(" ", "_")
