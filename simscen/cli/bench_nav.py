@@ -2,7 +2,6 @@
 
 import os
 import sys
-from collections.abc import Callable
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -28,13 +27,20 @@ def command(
     barn: Annotated[Path, typer.Option(help="BARN's worlds, with their scenarios.csv.")] = DATA / "barn_sample",
     nav2: Annotated[Path, typer.Option(help="Nav2's TurtleBot3 sandbox.")] = DATA / "nav2_tb3_sandbox",
     project: Annotated[Path, typer.Option(help="Folder with simscen's scenarios/ and worlds/.")] = Path(),
-    only: Annotated[list[str] | None, typer.Option(help="Part of an experiment's name; repeatable.")] = None,
+    only: Annotated[
+        list[str] | None, typer.Option(help="Part of the name of experiments; repeatable.")
+    ] = None,
     seeds: Annotated[
         int | None, typer.Option(min=1, max=1000, help="Seeds of each scenario; default: 5 for BARN, else 20.")
     ] = None,
-    fields: Annotated[int, typer.Option(min=0, max=10_000, help="How many obstacle fields to generate.")] = 100,
+    fields: Annotated[
+        int, typer.Option(min=0, max=10_000, help="How many obstacle fields to generate; narrow ones: half as many.")
+    ] = 50,
     dynamic: Annotated[
         int, typer.Option(min=0, max=10_000, help="How many fields of moving cylinders at each speed.")
+    ] = 20,
+    goals: Annotated[
+        int, typer.Option(min=1, max=10_000, help="How many random goals in each world, ramps, corridors.")
     ] = 20,
     lost: Annotated[int, typer.Option(min=0, max=10_000, help="How often the robot does not know where it is.")] = 50,
     workers: Annotated[int | None, typer.Option("--workers", "-j", min=1, max=256, help="Default: all cores.")] = None,
@@ -43,39 +49,28 @@ def command(
 ) -> None:
     """Measure how well the reference stack drives, and print one line for each experiment.
 
-    BARN and fields like it, fields of moving cylinders, Nav2's own system test, corner cases and localisation, each
-    over many seeds. What cannot be found is skipped, which is said on standard error, as is every run that did not come
+    BARN and fields like it, narrow fields, fields of moving cylinders, random goals in shipped worlds and generated
+    buildings, sensors that fail, ramps, two robots in a corridor, Nav2's own system test, corner cases and
+    localisation. What cannot be found is skipped, which is said on standard error, as is every run that did not come
     out well, with the command that repeats it. Exit code 0, or 3 when a run could not be completed.
     """
+    from simscen.cli.bench_offers import Sizes, offers
     from simscen.cli.bench_run import drive
     from simscen.cli.bench_table import as_json, as_text
     from simscen.run.outfolder import make_folder
-    from simscen.study.experiments import (
-        barn_challenge,
-        corner_cases,
-        dynamic_fields,
-        generated_fields,
-        localizations,
-        sandbox,
-    )
 
     folder = make_folder(out)
     made = folder / "generated"
-    many = range(1, (seeds or 20) + 1)
-    offers: dict[str, tuple[Path, Callable[[], list[Experiment]]]] = {
-        "BARN": (barn, lambda: [barn_challenge(made, barn, range(1, (seeds or 5) + 1))]),
-        "generated fields": (folder, lambda: [generated_fields(made, fields)] if fields else []),
-        "dynamic fields": (folder, lambda: dynamic_fields(made, dynamic) if dynamic else []),
-        "tb3_sandbox": (nav2, lambda: sandbox(made, nav2, many)),
-        "corner cases": (project / "scenarios", lambda: corner_cases(project / "scenarios", project, many)),
-        "localization": (project / "worlds", lambda: localizations(made, project / "worlds", many, lost)),
-    }
+    made.mkdir()
     experiments: list[Experiment] = []
-    for name, (needed, make) in offers.items():
-        if not needed.is_dir():
-            print(f"{name}: skipped, there is no folder {needed}", file=sys.stderr)
-        elif _wanted(name, only) or name != "generated fields":  # those take a while to generate
-            experiments += [made for made in make() if _wanted(name, only) or _wanted(made.name, only)]
+    for offer in offers(barn, nav2, project, made, Sizes(seeds, fields, dynamic, goals, lost)):
+        whole = _named(offer.name, only)
+        if not whole and not any(offer.name.casefold() in part.casefold() for part in only or ()):
+            continue
+        if not offer.needs.is_dir():
+            print(f"{offer.name}: skipped, there is no folder {offer.needs}", file=sys.stderr)
+            continue
+        experiments += [each for each in offer.make() if whole or _named(each.name, only)]
     if not experiments:
         raise NothingSelected("no experiment is called so, or its data is not here")
     rows = drive(experiments, folder, workers or len(os.sched_getaffinity(0)))
@@ -84,5 +79,5 @@ def command(
         sys.exit(Exit.INCOMPLETE)
 
 
-def _wanted(name: str, only: list[str] | None) -> bool:
+def _named(name: str, only: list[str] | None) -> bool:
     return not only or any(part.casefold() in name.casefold() for part in only)

@@ -8,9 +8,8 @@ from simscen.cli.bench_run import Localized, Measured
 from simscen.study.barn import DWA
 from simscen.study.tally import Row
 
-PUBLISHED = (
-    "BARN's own figures for DWA at 0.5 m/s, in another simulator and all 50 worlds: "
-    + ", ".join(f"{name} {value:.3f}" for name, value in DWA.items())
+PUBLISHED = "BARN's own figures for DWA at 0.5 m/s, in another simulator and all 50 worlds: " + ", ".join(
+    f"{name} {value:.3f}" for name, value in DWA.items()
 )
 HEAD = ("experiment", "runs", "success", "95 % interval", "collision", "timeout", "failed", "time", "score", "path")
 

@@ -17,17 +17,34 @@ DWA = {"success": 0.850, "collisions": 0.056, "timeouts": 0.094, "score": 0.159}
 
 START, GOAL = Pose2(-2.25, 3.0, 1.57), Pose2(-2.25, 13.0, 1.57)
 
+LOCALIZER = "{type: ekf, rotation_noise: 0.5}"
+"""As the Jackal's own robot_localization: wheels for the way, the gyroscope for turns, of which skidding wheels know
+little."""
+COSTMAP = "{obstacle_max_range: 8 m, raytrace_max_range: 10 m, update_frequency: 10 Hz}"
+TUNED = f"""\
+  localizer: {LOCALIZER}
+  costmap: {COSTMAP}
+  # Nav2's 0.9 m is for 0.5 m/s; at 2 m/s this bend is 2 m/s² sideways.
+  controller: {{desired_linear_vel: 2 m/s, regulated_linear_scaling_min_radius: 2 m}}
+"""
+"""The stack's parameters for the speed of the challenge."""
+DEFAULT = f"  localizer: {LOCALIZER}\n"
+"""No parameter changed: 0.5 m/s."""
+CONTROLLERS = {
+    f"{name} at 0.5 m/s": f"  localizer: {LOCALIZER}\n  costmap: {COSTMAP}\n  controller: {said}\n"
+    for name, said in (
+        ("regulated pure pursuit", "{desired_linear_vel: 0.5 m/s}"),
+        ("dwb", "{type: dwb, max_vel_x: 0.5 m/s}"),
+        ("mppi", "{type: mppi, vx_max: 0.5 m/s}"),
+    )
+}
+"""Each of our own controllers at the speed of the challenge's DWA."""
+
 SETUP = """\
 map: none
 robot: {model: jackal, pose: <start>}
 stack:
-  # As the Jackal's own robot_localization: wheels for the way, the gyroscope for turns, of which skidding wheels know
-  # little.
-  localizer: {type: ekf, rotation_noise: 0.5}
-  costmap: {obstacle_max_range: 8 m, raytrace_max_range: 10 m, update_frequency: 10 Hz}
-  # Nav2's 0.9 m is for 0.5 m/s; at 2 m/s this bend is 2 m/s² sideways.
-  controller: {desired_linear_vel: 2 m/s, regulated_linear_scaling_min_radius: 2 m}
-goals:
+<stack>goals:
   - {name: beyond, pose: <goal>, xy_tolerance: 0.5 m, yaw_tolerance: 180 deg}
 time_limit: 100 s
 linger: 0
@@ -37,7 +54,7 @@ pass:
   - goals_reached: {tolerance: 1 m}
   - collisions: {max: 0}
 """
-"""All of a scenario but its world and where it is driven; the same for the worlds of the challenge and of others."""
+"""All of a scenario but its world, its stack and where it is driven; the same for worlds of others."""
 
 
 @dataclass(frozen=True)
@@ -62,9 +79,9 @@ def _listed(folder: Path, rows: Iterable[dict[str, str]]) -> Iterable[BarnWorld]
             raise ValueError(f"{folder / 'scenarios.csv'}: no column {error}") from error
 
 
-def scenario(name: str, world: str, start: Pose2 = START, goal: Pose2 = GOAL) -> str:
-    """The text of a scenario; `world` is what stands after `world:`."""
-    setup = SETUP.replace("<start>", _pose(start)).replace("<goal>", _pose(goal))
+def scenario(name: str, world: str, start: Pose2 = START, goal: Pose2 = GOAL, stack: str = TUNED) -> str:
+    """The text of a scenario; `world` is what stands after `world:`, `stack` the lines below `stack:`."""
+    setup = SETUP.replace("<stack>", stack).replace("<start>", _pose(start)).replace("<goal>", _pose(goal))
     return f"simscen: 1\nname: {name}\nworld: {world}\n{setup}"
 
 

@@ -12,6 +12,8 @@ WIDTH = (1.4, 2.4)
 LENGTH = 14.0
 SLOPE, HEIGHT = (2.0, 8.0), (0.03, 0.20)
 """Degrees and metres of ramps."""
+HALL = 2.4
+"""Metres of the hall that they are in, from wall to wall."""
 
 
 def two_robots(folder: Path, count: int) -> Experiment:
@@ -61,23 +63,25 @@ def ramps(folder: Path, count: int) -> Experiment:
 def _ramp(number: int) -> str:
     chance = Streams(number).generator("ramp")
     slope, height = float(chance.uniform(*SLOPE)), float(chance.uniform(*HEIGHT))
-    run, flat, width = height / float(np.tan(np.radians(slope))), float(chance.uniform(1.5, 3.0)), 2.4
-    up, down = 3.0 + run, 3.0 + run + flat
-    end, y = down + run + 3.0, float(chance.uniform(0.6, width - 0.6))
-    middle = f"{width / 2:g}"
+    run, flat = height / float(np.tan(np.radians(slope))), float(chance.uniform(1.5, 3.0))
+    top, below = (3.0 + run, 3.0 + run + flat), 3.0 + 2 * run + flat
+    end, y = below + 3.0, float(chance.uniform(0.6, HALL - 0.6))
+    middle, size = HALL / 2, f"width: {HALL - 0.1:g}, height: {height:.4f}"
     return f"""\
 simscen: 1
 name: a ramp of {slope:.1f} degrees
 world:
   simscen: 1
-  walls: [{{name: hall, points: [[0, 0], [{end:.3f}, 0], [{end:.3f}, {width}], [0, {width}], [0, 0]]}}]
+  walls: [{{name: hall, points: [[0, 0], [{end:.3f}, 0], [{end:.3f}, {HALL:g}], [0, {HALL:g}], [0, 0]]}}]
   ramps:
-    - {{name: up, start: [3, {middle}], end: [{up:.4f}, {middle}], width: {width - 0.1:g}, height: {height:.4f}}}
-    - {{name: down, start: [{down + run:.4f}, {middle}], end: [{down:.4f}, {middle}], width: {width - 0.1:g}, height: {height:.4f}}}
+    - {{name: up, start: [3, {middle:g}], end: [{top[0]:.4f}, {middle:g}], {size}}}
+    - {{name: down, start: [{below:.4f}, {middle:g}], end: [{top[1]:.4f}, {middle:g}], {size}}}
   obstacles:
-    - {{name: platform, box: [{flat:.4f}, {width - 0.1:g}, {height:.4f}], pose: {{x: {(up + down) / 2:.4f}, y: {middle}}}}}
+    - name: platform
+      box: [{flat:.4f}, {HALL - 0.1:g}, {height:.4f}]
+      pose: {{x: {sum(top) / 2:.4f}, y: {middle:g}}}
 robot: {{pose: {{x: 1.0, y: {y:.3f}}}}}
-goals: [{{pose: {{x: {end - 1:.3f}, y: {middle}}}}}]
+goals: [{{pose: {{x: {end - 1:.3f}, y: {middle:g}}}}}]
 time_limit: 120 s
 pass:
   - goals_reached: {{}}

@@ -20,13 +20,17 @@ class Drive:
 
 @dataclass(frozen=True)
 class Experiment:
-    """One line of the table. `root` and `world_path` are what `simscen run` needs to find everything."""
+    """One line of the table. `root` and `world_path` are what `simscen run` needs to find everything.
+
+    `mapless`: the robot has no map, so that only some localizers can be tried.
+    """
 
     name: str
     drives: tuple[Drive, ...]
     root: Path
     world_path: tuple[Path, ...] = ()
     localization: bool = False
+    mapless: bool = False
 
 
 def written(file: Path, text: str) -> Path:

@@ -15,30 +15,48 @@ from simscen.study import dynamic_fields as movers
 from simscen.study.experiment import Drive, Experiment, written
 from simscen.study.obstacle_fields import CELL, HEIGHT, ObstacleField, obstacle_field
 
+NARROW = (0.30, 0.20, 0.10)
+"""Metres that the widest way through a narrow field is wider than the robot."""
+WIDTH = 0.42
+"""Metres from wheel to wheel of the robot that drives there."""
 
-def barn_challenge(folder: Path, dataset: Path, seeds: Sequence[int]) -> Experiment:
-    """The worlds of the dataset. Raises OSError or ValueError when it is unusable."""
-    drives = [
-        Drive(
-            written(folder / f"barn/{world.file.stem}.scenario.yaml", barn.scenario(world.file.stem, world.file.name)),
-            seeds,
-            world.reference_length,
-        )
-        for world in barn.barn_worlds(dataset)
-    ]
-    return Experiment("BARN", tuple(drives), folder, (dataset,))
+
+def barn_challenge(
+    folder: Path, dataset: Path, seeds: Sequence[int], variant: str = "", stack: str = barn.TUNED
+) -> Experiment:
+    """The worlds of the dataset with these lines below `stack:`. Raises OSError or ValueError when it is unusable."""
+    name = f"BARN, {variant}" if variant else "BARN"
+    drives = []
+    for world in barn.barn_worlds(dataset):
+        text = barn.scenario(world.file.stem, world.file.name, stack=stack)
+        file = folder / "barn" / (variant.replace("/", " per ") or "tuned") / f"{world.file.stem}.scenario.yaml"
+        drives.append(Drive(written(file, text), seeds, world.reference_length))
+    return Experiment(name, tuple(drives), folder, (dataset,), mapless=True)
 
 
 def generated_fields(folder: Path, count: int) -> Experiment:
     """Fields of the same kind and density, one seed each."""
-    drives = []
-    for number in range(1, count + 1):
-        field = obstacle_field(number)
-        world = written(folder / f"fields/field_{number}.world.yaml", _world_text(field))
-        text = barn.scenario(f"field {number}", world.name)
-        file = written(folder / f"fields/field_{number}.scenario.yaml", text)
-        drives.append(Drive(file, [number], field.shortest))
-    return Experiment("generated fields", tuple(drives), folder)
+    drives = [_field(folder / "fields", obstacle_field(number)) for number in range(1, count + 1)]
+    return Experiment("generated fields", tuple(drives), folder, mapless=True)
+
+
+def narrow_fields(folder: Path, count: int) -> list[Experiment]:
+    """Fields whose widest way is little wider than the robot: an experiment for each of three widths."""
+    experiments = []
+    for room in NARROW:
+        gap, too_wide = (WIDTH + room) / 2, (WIDTH + room + 0.1) / 2
+        to = folder / f"narrow/{round(100 * room)}_cm"
+        drives = [_field(to, obstacle_field(number, gap, too_wide)) for number in range(1, count + 1)]
+        name = f"narrow fields, robot + {100 * room:.0f} cm"
+        experiments.append(Experiment(name, tuple(drives), folder, mapless=True))
+    return experiments
+
+
+def _field(folder: Path, field: ObstacleField) -> Drive:
+    world = written(folder / f"field_{field.number}.world.yaml", _world_text(field))
+    text = barn.scenario(f"field {field.number}", world.name)
+    file = written(folder / f"field_{field.number}.scenario.yaml", text)
+    return Drive(file, [field.number], field.shortest)
 
 
 def dynamic_fields(folder: Path, count: int) -> list[Experiment]:
@@ -52,7 +70,7 @@ def dynamic_fields(folder: Path, count: int) -> list[Experiment]:
             text = barn.scenario(f"dynamic field {number}", world.name, movers.START, movers.GOAL)
             length = movers.START.distance(movers.GOAL)
             drives.append(Drive(written(folder / f"{stem}.scenario.yaml", text), [number], length))
-        experiments.append(Experiment(f"dynamic fields, {speed:.2f} m/s", tuple(drives), folder))
+        experiments.append(Experiment(f"dynamic fields, {speed:.2f} m/s", tuple(drives), folder, mapless=True))
     return experiments
 
 

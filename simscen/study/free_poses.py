@@ -13,6 +13,8 @@ from simscen.worlds.shortest import ShortestWays
 
 ROOM = 0.12
 """Metres between a robot's hull, as a disc, and the nearest wall, where it starts and where it is sent."""
+MOVABLE = 1.5
+"""Metres from a door or a thing that may move within which no drive begins or ends."""
 TRIES = 2000
 
 
@@ -40,9 +42,14 @@ def errands(built: BuiltWorld, radius: float, count: int, seed: int, least: floa
             return
         ends = grid.centre_of(free[chance.integers(0, len(free), 2)]).tolist()
         start, goal = (Pose2(x, y, float(chance.uniform(-math.pi, math.pi))) for x, y in ends)
-        if start.distance(goal) < least / 2:
+        if start.distance(goal) < least / 2 or any(_near(end, built) for end in (start, goal)):
             continue
         length = ways.length(start, goal)
         if math.isfinite(length) and length >= least:
             found += 1
             yield Errand(start, goal, length)
+
+
+def _near(pose: Pose2, built: BuiltWorld) -> bool:
+    """Whether something that may move, of which the map knows nothing, is or may come there."""
+    return any(math.hypot(pose.x - body.pose.x, pose.y - body.pose.y) < MOVABLE for body in built.world.bodies)

@@ -11,8 +11,12 @@ from simscen.study.experiment import Experiment, written
 
 
 def varied(experiment: Experiment, name: str, stack: Mapping[str, Any], folder: Path) -> Experiment:
-    """The same drives with these parameters on top of their own, as files in `folder` that extend theirs."""
+    """The same drives with these parameters on top of their own, as files in `folder` that extend theirs.
+
+    Where there is no map the robot keeps the localizer that the drive has chosen for that.
+    """
     drives = []
+    stack = {key: value for key, value in stack.items() if not (experiment.mapless and key == "localizer")}
     for number, drive in enumerate(experiment.drives, start=1):
         stem = drive.file.name.split(".")[0]
         file = folder / f"{number}_{stem}.scenario.yaml"

@@ -1,0 +1,95 @@
+"""The experiments that `simscen bench nav` has to offer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from simscen.study import barn, corridors, experiments, random_goals
+from simscen.study.buildings import write_building
+from simscen.study.experiment import Experiment
+
+if TYPE_CHECKING:
+    from simscen.core.world import BuiltWorld
+
+SHIPPED = ("house", "office", "warehouse")
+LIDAR_HEIGHT = 0.2
+"""Metres: at which the maps of worlds are made that drives are drawn from."""
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """How many of what; `seeds` is None for each experiment's own number."""
+
+    seeds: int | None = None
+    fields: int = 50
+    dynamic: int = 20
+    goals: int = 20
+    lost: int = 50
+
+    def seeded(self, usual: int) -> Sequence[int]:
+        """The seeds of a scenario that is usually run with so many."""
+        return range(1, (self.seeds or usual) + 1)
+
+
+@dataclass(frozen=True)
+class Offer:
+    """Experiments that come together: what they are called, the folder that they need, and how to get them."""
+
+    name: str
+    needs: Path
+    make: Callable[[], Sequence[Experiment]]
+
+
+def offers(data: Path, nav2: Path, project: Path, made: Path, sizes: Sizes) -> list[Offer]:
+    """All of them, in the order of the table; what is generated goes to `made`."""
+    worlds, scenarios = project / "worlds", project / "scenarios"
+    return [
+        Offer("BARN", data, lambda: list(_barn(made, data, sizes))),
+        Offer("generated fields", made, lambda: [experiments.generated_fields(made, sizes.fields)]),
+        Offer("narrow fields", made, lambda: experiments.narrow_fields(made, sizes.fields // 2)),
+        Offer("dynamic fields", made, lambda: experiments.dynamic_fields(made, sizes.dynamic)),
+        Offer("random goals", worlds, lambda: list(_random_goals(made, worlds, sizes))),
+        Offer("degraded sensing", worlds, lambda: _degraded(made, worlds, sizes)),
+        Offer("ramps", made, lambda: [corridors.ramps(made / "ramps", sizes.goals)]),
+        Offer("two robots", made, lambda: [corridors.two_robots(made / "corridors", sizes.goals)]),
+        Offer("tb3_sandbox", nav2, lambda: experiments.sandbox(made, nav2, sizes.seeded(20))),
+        Offer("corner cases", scenarios, lambda: experiments.corner_cases(scenarios, project, sizes.seeded(20))),
+        Offer("localization", worlds, lambda: experiments.localizations(made, worlds, sizes.seeded(20), sizes.lost)),
+    ]
+
+
+def _barn(made: Path, data: Path, sizes: Sizes) -> Iterator[Experiment]:
+    """As it is set up for 2 m/s, with no parameter changed, and each controller at the same speed."""
+    seeds = sizes.seeded(5)
+    yield experiments.barn_challenge(made, data, seeds)
+    yield experiments.barn_challenge(made, data, seeds, "default parameters", barn.DEFAULT)
+    for controller, stack in barn.CONTROLLERS.items():
+        yield experiments.barn_challenge(made, data, seeds, controller, stack)
+
+
+def _random_goals(made: Path, worlds: Path, sizes: Sizes) -> Iterator[Experiment]:
+    folder = made / "random_goals"
+    built = _built(folder, worlds, [f"{name}.world.yaml" for name in SHIPPED])
+    yield random_goals.random_goals("random goals", folder, built, sizes.goals, (worlds.absolute(),))
+    maps = made / "buildings"
+    files = [write_building(number, maps).name for number in range(1, sizes.goals + 1)]
+    yield random_goals.random_goals("random goals, ROS maps", maps, _built(maps, maps, files), 3)
+
+
+def _degraded(made: Path, worlds: Path, sizes: Sizes) -> list[Experiment]:
+    folder = made / "degraded"
+    built = _built(folder, worlds, [f"{name}.world.yaml" for name in SHIPPED])
+    return random_goals.degraded(folder, built, max(1, sizes.goals // 4), (worlds.absolute(),))
+
+
+def _built(folder: Path, worlds: Path, files: Sequence[str]) -> Mapping[str, BuiltWorld]:
+    """Worlds by the name that scenarios in `folder` give them, made ready."""
+    from simscen.loading.worldfile import load_world_file
+    from simscen.run.worldsource import world_of
+    from simscen.worlds.build import build
+
+    folder.mkdir(parents=True, exist_ok=True)
+    return {file: build(world_of(load_world_file(worlds / file, worlds), worlds), LIDAR_HEIGHT) for file in files}
