@@ -27,9 +27,7 @@ def command(
     barn: Annotated[Path, typer.Option(help="BARN's worlds, with their scenarios.csv.")] = DATA / "barn_sample",
     nav2: Annotated[Path, typer.Option(help="Nav2's TurtleBot3 sandbox.")] = DATA / "nav2_tb3_sandbox",
     project: Annotated[Path, typer.Option(help="Folder with simscen's scenarios/ and worlds/.")] = Path(),
-    only: Annotated[
-        list[str] | None, typer.Option(help="Part of the name of experiments; repeatable.")
-    ] = None,
+    only: Annotated[list[str] | None, typer.Option(help="Part of the name of experiments; repeatable.")] = None,
     seeds: Annotated[
         int | None, typer.Option(min=1, max=1000, help="Seeds of each scenario; default: 5 for BARN, else 20.")
     ] = None,
@@ -43,6 +41,10 @@ def command(
         int, typer.Option(min=1, max=10_000, help="How many random goals in each world, ramps, corridors.")
     ] = 20,
     lost: Annotated[int, typer.Option(min=0, max=10_000, help="How often the robot does not know where it is.")] = 50,
+    stack: Annotated[
+        Path | None,
+        typer.Option(help="A *.stack.yaml: every drive once more with its parameters on top, and what that changes."),
+    ] = None,
     workers: Annotated[int | None, typer.Option("--workers", "-j", min=1, max=256, help="Default: all cores.")] = None,
     out: Annotated[Path | None, typer.Option(help="Output folder, new or empty.")] = None,
     format_: Annotated[Format, typer.Option("--format", help="What to print.")] = Format.TEXT,
@@ -51,13 +53,15 @@ def command(
 
     BARN and fields like it, narrow fields, fields of moving cylinders, random goals in shipped worlds and generated
     buildings, sensors that fail, ramps, two robots in a corridor, Nav2's own system test, corner cases and
-    localisation. What cannot be found is skipped, which is said on standard error, as is every run that did not come
-    out well, with the command that repeats it. Exit code 0, or 3 when a run could not be completed.
+    localisation. Intervals are by bootstrap over worlds. What cannot be found is skipped, which is said on standard
+    error, as is every run that did not come out well, with the command that repeats it. Exit code 0, or 3 when a run
+    could not be completed.
     """
     from simscen.cli.bench_offers import Sizes, offers
-    from simscen.cli.bench_run import drive
+    from simscen.cli.bench_run import drive, measured
     from simscen.cli.bench_table import as_json, as_text
     from simscen.run.outfolder import make_folder
+    from simscen.study.versus import versus
 
     folder = make_folder(out)
     made = folder / "generated"
@@ -73,10 +77,29 @@ def command(
         experiments += [each for each in offer.make() if whole or _named(each.name, only)]
     if not experiments:
         raise NothingSelected("no experiment is called so, or its data is not here")
-    rows = drive(experiments, folder, workers or len(os.sched_getaffinity(0)))
-    print(as_json(rows) if format_ is Format.JSON else as_text(rows))
+    others = [] if stack is None else _with_stack(stack, experiments, made, project)
+    trials = drive([*experiments, *others], folder, workers or len(os.sched_getaffinity(0)))
+    rows = [measured(one, runs) for one, runs in zip([*experiments, *others], trials, strict=True)]
+    pairs = [
+        versus(one.name, before, after)
+        for one, before, after in zip(experiments if others else [], trials, trials[len(experiments) :], strict=False)
+    ]
+    print(as_json(rows, pairs) if format_ is Format.JSON else as_text(rows, pairs))
     if any(row.tally.errors for row in rows):
         sys.exit(Exit.INCOMPLETE)
+
+
+def _with_stack(file: Path, experiments: list["Experiment"], made: Path, project: Path) -> list["Experiment"]:
+    """The same experiments with the parameters of a stack file. Raises InvalidInput."""
+    from simscen.loading.stackfile import load_stack_file
+    from simscen.study.variants import varied
+
+    choice = load_stack_file(file.name.split(".")[0], str(file), file, project)
+    said = choice.section.plain if choice.section else {}
+    return [
+        varied(one, f"{one.name}, {choice.name}", said, made / "with_stack" / str(number))
+        for number, one in enumerate(experiments)
+    ]
 
 
 def _named(name: str, only: list[str] | None) -> bool:

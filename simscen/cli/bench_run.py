@@ -47,16 +47,17 @@ class Measured:
     localized: Localized | None = None
 
 
-def drive(experiments: Sequence[Experiment], out: Path, workers: int) -> list[Measured]:
-    """Do all runs, tell of progress and of what went wrong on stderr, and sum up. Raises InvalidInput."""
+def drive(experiments: Sequence[Experiment], out: Path, workers: int) -> list[list[Trial]]:
+    """Do all runs of each experiment, and tell of progress and of what went wrong on stderr. Raises InvalidInput."""
     jobs, owners = _planned(experiments, out)
     options = Options(workers=workers)
     answers, _ = run_session(jobs, options, WARM_PROCESS, _Progress(len(jobs), {job.key: job for job in jobs}))
+    of = {answer.key: answer for answer in answers}
     trials: list[list[Trial]] = [[] for _ in experiments]
-    for answer in answers:
-        number, drive = owners[answer.key]
-        trials[number].append(Trial(answer, drive.reference_length, drive.world or str(drive.file)))
-    return [_measured(experiment, runs) for experiment, runs in zip(experiments, trials, strict=True)]
+    for job in jobs:
+        number, drive = owners[job.key]
+        trials[number].append(Trial(of[job.key], drive.reference_length, drive.world or str(drive.file)))
+    return trials
 
 
 Owner = tuple[int, Drive]
@@ -104,7 +105,8 @@ class _Progress:
             print(f"{self._done} of {self._total} runs", end="\r", file=sys.stderr, flush=True)
 
 
-def _measured(experiment: Experiment, trials: list[Trial]) -> Measured:
+def measured(experiment: Experiment, trials: list[Trial]) -> Measured:
+    """The line of an experiment whose runs these are."""
     row = tally(experiment.name, trials)
     return Measured(row, _localized(trials) if experiment.localization else None)
 

@@ -7,15 +7,17 @@ from dataclasses import asdict
 from simscen.cli.bench_run import Localized, Measured
 from simscen.study.barn import DWA
 from simscen.study.tally import Row
+from simscen.study.versus import Difference, Versus
 
 PUBLISHED = "BARN's own figures for DWA at 0.5 m/s, in another simulator and all 50 worlds: " + ", ".join(
     f"{name} {value:.3f}" for name, value in DWA.items()
 )
+VERSUS = ("same drives, with and without", "pairs", "better", "worse", "success", "seconds", "score")
 HEAD = ("experiment", "runs", "success", "95 % interval", "collision", "timeout", "failed", "time", "score", "path")
 
 
-def as_text(rows: Sequence[Measured]) -> str:
-    """Aligned columns; published figures of another simulator as a footnote."""
+def as_text(rows: Sequence[Measured], pairs: Sequence[Versus] = ()) -> str:
+    """Aligned columns; what another stack changes; published figures of another simulator as a footnote."""
     table: list[tuple[str, ...]] = [HEAD]
     for measured in rows:
         table.append(_cells(measured.tally))
@@ -24,14 +26,35 @@ def as_text(rows: Sequence[Measured]) -> str:
     for measured in rows:
         if measured.localized is not None:
             lines += ["", *_belief(measured.tally.case, measured.localized)]
+    if pairs:
+        lines += ["", *_versus(pairs)]
     if any(measured.tally.case.startswith("BARN") for measured in rows):
         lines += ["", PUBLISHED]
     return "\n".join(lines)
 
 
-def as_json(rows: Sequence[Measured]) -> str:
+def as_json(rows: Sequence[Measured], pairs: Sequence[Versus] = ()) -> str:
     """All numbers, and DWA's."""
-    return json.dumps({"experiments": [asdict(row) for row in rows], "dwa_published": DWA}, indent=2)
+    told = {"experiments": [asdict(row) for row in rows], "dwa_published": DWA}
+    return json.dumps({**told, "versus": [asdict(pair) for pair in pairs]} if pairs else told, indent=2)
+
+
+def _versus(pairs: Sequence[Versus]) -> list[str]:
+    """What the other stack changes in the same drives, pair by pair."""
+    table: list[tuple[str, ...]] = [VERSUS]
+    for pair in pairs:
+        changes = (_change(pair.success, ".3f"), _change(pair.seconds, ".1f"), _change(pair.score, ".3f"))
+        table.append((pair.case, f"{pair.pairs}", f"{pair.better}", f"{pair.worse}", *changes))
+    widths = [max(len(row[column]) for row in table) for column in range(len(VERSUS))]
+    return [_aligned(row, widths) for row in table]
+
+
+def _change(difference: Difference | None, form: str) -> str:
+    if difference is None:
+        return "-"
+    if difference.interval is None:
+        return f"{difference.mean:+{form}}"
+    return f"{difference.mean:+{form}} ({difference.interval[0]:+{form}} … {difference.interval[1]:+{form}})"
 
 
 def _cells(row: Row) -> tuple[str, ...]:
@@ -40,7 +63,7 @@ def _cells(row: Row) -> tuple[str, ...]:
         row.case,
         f"{row.runs}",
         f"{row.success:.3f}",
-        "one world" if interval is None else f"{interval[0]:.3f} … {interval[1]:.3f}",
+        "-" if interval is None else f"{interval[0]:.3f} … {interval[1]:.3f}",
         f"{row.collisions:.3f}",
         f"{row.timeouts:.3f}",
         f"{row.failed + row.errors:.3f}",

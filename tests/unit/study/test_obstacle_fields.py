@@ -35,3 +35,21 @@ def test_lonely_cells_vanish_and_crowded_ones_fill() -> None:
     alone = np.zeros((3, 3), np.bool_)
     alone[1, 1] = True
     assert obstacle_fields._neighbours(alone).tolist() == [[1, 1, 1], [1, 0, 1], [1, 1, 1]]
+
+
+def test_a_narrow_field_has_a_way_for_the_robot_and_none_for_a_wider_one_by_the_word_of_another_library() -> None:
+    gap, too_wide = 0.31, 0.36
+    field = obstacle_field(2, gap, too_wide)
+    lane = box(-30 * CELL, 0.0, 0.0, GOAL.y + 1.0)
+
+    def crossable(radius: float) -> bool:
+        free = lane.difference(MultiPoint(field.centres).buffer(CELL / 2 + radius))
+        pieces = [piece for piece in getattr(free, "geoms", [free]) if piece.contains(Point(START.x, START.y))]
+        return bool(pieces) and bool(pieces[0].contains(Point(GOAL.x, GOAL.y)))
+
+    assert crossable(gap - 0.002)
+    assert not crossable(too_wide + CELL / 3)  # as fine as the lattice on which that is looked for
+
+
+def test_a_field_of_another_width_leaves_the_usual_ones_as_they_are() -> None:
+    assert obstacle_field(3).shortest == obstacle_field(3, GAP).shortest

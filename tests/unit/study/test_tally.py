@@ -1,22 +1,9 @@
 import pytest
+from finishedruns import ARRIVED, GAVE_UP, HIT, LATE, run
 
-from simscen.core.result import Outcome, RunFailure, RunKey, RunResult
+from simscen.core.result import Outcome
 from simscen.core.sessionevents import RunFinished
-from simscen.core.verdict import Finding, Status, Verdict
 from simscen.study.tally import Fate, Trial, tally
-
-
-def run(outcome: Outcome, collided: bool = False, ended: str = "navigation ended", seconds: float = 8.0) -> RunFinished:
-    status = Status.FAIL if collided else Status.PASS
-    verdict = Verdict("collisions", "collisions", "error", (Finding(status, "collisions", "", ""),))
-    broken = RunFailure("crashed", "it crashed") if outcome is Outcome.ERROR else None
-    metrics = {"time_to_goal": seconds, "path_length_ratio": 1.1}
-    key = RunKey("s", 1)
-    return RunFinished(RunResult(key, "s.scenario.yaml", outcome, (verdict,), (), metrics, ended=ended, error=broken))
-
-
-ARRIVED, HIT = run(Outcome.PASSED), run(Outcome.FAILED, collided=True)
-LATE, GAVE_UP = run(Outcome.FAILED, ended="time limit"), run(Outcome.FAILED)
 
 
 @pytest.mark.parametrize(

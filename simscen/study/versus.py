@@ -1,0 +1,71 @@
+"""A stack against another in the same drives: nothing but their differences counts, world by world."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from simscen.core.chance import Streams
+from simscen.core.paired import mean_interval
+from simscen.study.tally import Fate, Trial
+
+Pair = tuple[Trial, Trial]
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A mean over worlds of `other` less `reference`; its 95 % interval by bootstrap over worlds, None of too few."""
+
+    mean: float
+    interval: tuple[float, float] | None
+
+
+@dataclass(frozen=True)
+class Versus:
+    """`other` less `reference`: success rate, seconds where both arrived, BARN's score where there is one.
+
+    `better` and `worse` count the runs that only one of them succeeded in.
+    """
+
+    case: str
+    pairs: int
+    better: int
+    worse: int
+    success: Difference
+    seconds: Difference | None
+    score: Difference | None
+
+
+def versus(case: str, reference: Sequence[Trial], other: Sequence[Trial]) -> Versus:
+    """Compare trials of the same drives and seeds, in the same order. Raises ValueError where they are not."""
+    pairs = list(zip(reference, other, strict=True))
+    if any(one.world != two.world or one.run.key.seed != two.run.key.seed for one, two in pairs):
+        raise ValueError(f"{case}: the runs are not of the same drives")
+    decided = [pair for pair in pairs if Fate.ERROR not in (pair[0].fate, pair[1].fate)]
+    success = _difference(decided, lambda trial: float(trial.fate is Fate.SUCCESS))
+    return Versus(
+        case=case,
+        pairs=len(decided),
+        better=sum(_won(two) > _won(one) for one, two in decided),
+        worse=sum(_won(two) < _won(one) for one, two in decided),
+        success=success or Difference(0.0, None),
+        seconds=_difference([pair for pair in decided if all(map(_won, pair))], lambda t: t.metric("time_to_goal")),
+        score=_difference(decided, lambda trial: trial.score),
+    )
+
+
+def _won(trial: Trial) -> bool:
+    return trial.fate is Fate.SUCCESS
+
+
+def _difference(pairs: Sequence[Pair], measure: Callable[[Trial], float | None]) -> Difference | None:
+    """None where no pair has the measure."""
+    worlds: dict[str, list[float]] = {}
+    for one, two in pairs:
+        before, after = measure(one), measure(two)
+        if before is not None and after is not None:
+            worlds.setdefault(one.world, []).append(after - before)
+    if not worlds:
+        return None
+    means = [float(np.mean(values)) for values in worlds.values()]
+    return Difference(float(np.mean(means)), mean_interval(means, Streams(1).generator("worlds")))

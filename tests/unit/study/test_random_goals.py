@@ -1,0 +1,103 @@
+"""Drives from anywhere to anywhere, and the worlds that are made for them."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from scipy import ndimage
+
+from simscen.core.geometry import Pose3
+from simscen.core.shapes import Body, Box, Solid
+from simscen.core.world import BuiltWorld, World
+from simscen.loading.scenario import load_scenario
+from simscen.loading.worldfile import load_world_file
+from simscen.run.worldsource import world_of
+from simscen.study import corridors
+from simscen.study.buildings import FREE, building, write_building
+from simscen.study.free_poses import MOVABLE, ROOM, errands
+from simscen.study.random_goals import FAULTS, degraded, random_goals
+from simscen.study.variants import varied
+from simscen.worlds.build import build
+
+
+def two_rooms() -> BuiltWorld:
+    """10 x 6 m, parted at x = 5 by a wall without a door; something that may move at (2, 3)."""
+    solids = [Solid(Box((10.2, 0.1, 1.0)), Pose3(5.0, y, 0.5), "wall") for y in (0.0, 6.0)] + [
+        Solid(Box((0.1, 6.0, 1.0)), Pose3(x, 3.0, 0.5), "wall") for x in (0.0, 5.0, 10.0)
+    ]
+    thing = Body("cart", (Solid(Box((0.4, 0.4, 0.4)), Pose3(), "cart"),), Pose3(2.0, 3.0, 0.2))
+    return build(World("rooms", tuple(solids), (thing,), bounds=(0.0, 0.0, 10.0, 6.0)), 0.2)
+
+
+def test_every_errand_can_be_driven_and_has_room_at_both_ends() -> None:
+    found = list(errands(two_rooms(), 0.22, 20, 1, least=2.0))
+    assert len(found) == 20
+    for one in found:
+        assert (one.start.x < 5.0) == (one.goal.x < 5.0)  # nothing leads through the wall
+        assert one.length >= max(2.0, one.start.distance(one.goal) - 1e-6)
+        for end in (one.start, one.goal):
+            to_walls = min(abs(end.x - x) for x in (0.0, 5.0, 10.0)), min(end.y, 6.0 - end.y)
+            assert min(to_walls) >= 0.05 + 0.22 + ROOM - 0.01
+            assert math.hypot(end.x - 2.0, end.y - 3.0) >= MOVABLE
+
+
+def test_errands_are_those_of_their_seed() -> None:
+    one, same, other = (list(errands(two_rooms(), 0.22, 5, seed, least=2.0)) for seed in (1, 1, 2))
+    assert one == same != other
+
+
+def test_a_building_is_a_map_with_one_large_free_part_that_loads(tmp_path: Path) -> None:
+    for number in range(1, 7):
+        mapped, resolution = building(number)
+        parts, _ = ndimage.label(mapped == FREE)
+        largest = np.bincount(parts.ravel())[1:].max()
+        assert largest * resolution**2 > 100.0
+        assert largest > 0.6 * np.count_nonzero(mapped == FREE)
+    file = write_building(1, tmp_path)
+    world = world_of(load_world_file(file, tmp_path), tmp_path)
+    assert world.grid is not None
+    assert world.grid.resolution == building(1)[1]
+    assert np.array_equal(world.grid.cells == 0, np.flipud(building(1)[0] == FREE)[::-1])
+
+
+def test_random_goals_and_degraded_drives_load(tmp_path: Path) -> None:
+    file = write_building(2, tmp_path)
+    built = {file.name: build(world_of(load_world_file(file, tmp_path), tmp_path), 0.2)}
+    [*_, last] = plain = [random_goals("random goals", tmp_path, built, 2)]
+    weak, medium, strong = degraded(tmp_path / "degraded", built, 1, (tmp_path,))
+    assert len(last.drives) == 2
+    for one in (*plain, weak, medium, strong):
+        for drive in one.drives:
+            load_scenario(drive.file, one.root, one.world_path)
+    assert len(weak.drives) == len(medium.drives) == len(strong.drives) == len(FAULTS)
+    for a, b in zip(weak.drives, strong.drives, strict=True):
+        before, after = (load_scenario(drive.file, weak.root, weak.world_path).spec for drive in (a, b))
+        assert before.own.pose == after.own.pose and before.goals == after.goals
+        assert before.faults != after.faults
+
+
+def test_corridors_and_ramps_load_and_are_not_all_alike(tmp_path: Path) -> None:
+    for made in (corridors.two_robots(tmp_path / "c", 3), corridors.ramps(tmp_path / "r", 3)):
+        names = {load_scenario(drive.file, made.root).spec.name for drive in made.drives}
+        assert len(names) == 3
+
+
+OTHER = {"controller": {"desired_linear_vel": 0.3}, "localizer": {"type": "odometry"}}
+
+
+def test_a_variant_has_the_same_drives_with_other_parameters(tmp_path: Path) -> None:
+    made = corridors.ramps(tmp_path / "r", 2)
+    other = varied(made, "slow", OTHER, tmp_path / "v")
+    for before, after in zip(made.drives, other.drives, strict=True):
+        one = load_scenario(before.file, made.root).spec
+        two = load_scenario(after.file, other.root, other.world_path).spec
+        assert one.goals == two.goals
+        assert (two.stack.controller.desired_linear_vel, two.stack.localizer.type) == (0.3, "odometry")
+
+
+def test_a_variant_of_drives_without_a_map_keeps_the_localizer_that_needs_none(tmp_path: Path) -> None:
+    made = replace(corridors.ramps(tmp_path / "r", 1), mapless=True)
+    other = varied(made, "slow", OTHER, tmp_path / "v")
+    spec = load_scenario(other.drives[0].file, other.root, other.world_path).spec
+    assert (spec.stack.controller.desired_linear_vel, spec.stack.localizer.type) == (0.3, "amcl")
