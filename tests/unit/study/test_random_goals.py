@@ -62,7 +62,7 @@ def test_a_building_is_a_map_with_one_large_free_part_that_loads(tmp_path: Path)
 
 
 def test_random_goals_and_degraded_drives_load(tmp_path: Path) -> None:
-    file = write_building(2, tmp_path)
+    file = write_building(3, tmp_path)
     built = {file.name: build(world_of(load_world_file(file, tmp_path), tmp_path), 0.2)}
     [*_, last] = plain = [random_goals("random goals", tmp_path, built, 2)]
     weak, medium, strong = degraded(tmp_path / "degraded", built, 1, (tmp_path,))
