@@ -2,7 +2,7 @@
 
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from simscen.model.controllerspec import ControllerSpec, Weight
 from simscen.model.mppi import Mppi
@@ -81,7 +81,13 @@ class RegulatedPurePursuit(Ranged, ControllerSpec):
     max_angular_accel: PositiveAngularAcceleration = 3.2
     """Of its turn rate, when it turns in place."""
     allow_reversing: bool = False
-    """Whether it drives backward to where the plan begins behind it."""
+    """Whether it drives backward to a carrot behind it."""
+
+    @model_validator(mode="after")
+    def _has_a_point_to_interpolate(self) -> "RegulatedPurePursuit":
+        if self.interpolate_curvature_after_goal and not self.use_fixed_curvature_lookahead:
+            raise ValueError("`interpolate_curvature_after_goal` is for `use_fixed_curvature_lookahead: true`")
+        return self
 
     @property
     def looks_ahead(self) -> float:
@@ -92,7 +98,7 @@ class RegulatedPurePursuit(Ranged, ControllerSpec):
 class DynamicWindow(ControllerSpec):
     """A dynamic-window controller with DWB's critics (Fox et al. 1997; nav2_dwb_controller)."""
 
-    component: ClassVar[str] = "simscen.stack.controllers.dwb:DynamicWindowController"
+    component: ClassVar[str] = "simscen.stack.controllers.dwb.controller:DynamicWindowController"
     type: Literal["dwb"]
     max_vel_x: PositiveSpeed | None = None
     """Greatest speed forward; default: 0.5 m/s, or what the robot can do if that is less."""
@@ -136,8 +142,8 @@ class DynamicWindow(ControllerSpec):
     """And at most such a turn."""
     trans_stopped_velocity: NonNegativeSpeed = 0.25
     """At the goal it turns to its heading from this speed down."""
-    prune_distance: PositiveLength = 2.0
-    """How much of the plan ahead it looks at; no less than it can drive in `sim_time`."""
+    prune_distance: PositiveLength = 1.5
+    """How much of the plan ahead it looks at, at least (Nav2: 2 m, of which its costmap shows 1.5 m)."""
     base_obstacle_scale: Weight = 0.02
     """Weight of the costs at the end of a trajectory."""
     path_align_scale: Weight = 32.0

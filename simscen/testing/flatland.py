@@ -32,13 +32,12 @@ def round_robot(radius: float = 0.22, speed: float = 0.5, **limits: float) -> Ro
     corners = tuple((radius * math.cos(a), radius * math.sin(a)) for a in angles)
     data: dict[str, Any] = {
         "max_reverse": speed,
+        "max_lateral": 0.0,
         "max_angular": 1.9,
         "linear_acceleration": 2.5,
         "linear_deceleration": 2.5,
     }
-    return RobotModel(
-        corners, radius, max_linear=speed, max_lateral=0.0, angular_acceleration=3.2, **{**data, **limits}
-    )
+    return RobotModel(corners, radius, max_linear=speed, angular_acceleration=3.2, **{**data, **limits})
 
 
 def box_robot(length: float = 0.42, width: float = 0.31, speed: float = 2.0) -> RobotModel:
@@ -182,13 +181,14 @@ class Drive:
         r = self.robot
         slower = r.linear_deceleration if abs(command.vx) < abs(self.twist.vx) else r.linear_acceleration
         vx = self.twist.vx + np.clip(command.vx - self.twist.vx, -slower * dt, slower * dt)
+        vy = self.twist.vy + np.clip(command.vy - self.twist.vy, -slower * dt, slower * dt)
         turn = r.angular_acceleration * dt
         wz = self.twist.wz + np.clip(command.wz - self.twist.wz, -turn, turn)
-        self.twist = Twist(float(vx), 0.0, float(wz))
+        self.twist = Twist(float(vx), float(vy), float(wz))
         middle = self.pose.yaw + wz * dt / 2
         self.pose = Pose2(
-            float(self.pose.x + vx * math.cos(middle) * dt),
-            float(self.pose.y + vx * math.sin(middle) * dt),
+            float(self.pose.x + (vx * math.cos(middle) - vy * math.sin(middle)) * dt),
+            float(self.pose.y + (vx * math.sin(middle) + vy * math.cos(middle)) * dt),
             math.remainder(float(self.pose.yaw + wz * dt), 2 * math.pi),
         )
         self.track.append(self.pose)

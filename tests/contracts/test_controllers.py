@@ -10,7 +10,7 @@ SPECS: dict[str, ControllerSpec] = {
     "regulated_pure_pursuit": RegulatedPurePursuit(),
     "rpp without regulation": RegulatedPurePursuit(
         use_regulated_linear_velocity_scaling=False, use_cost_regulated_linear_velocity_scaling=False,
-        use_velocity_scaled_lookahead_dist=False, use_rotate_to_heading=False,
+        use_velocity_scaled_lookahead_dist=False,
     ),
     "dwb": DynamicWindow(type="dwb"),
     "mppi": Mppi(type="mppi", batch_size=400),

@@ -7,6 +7,8 @@ from simscen.stack.protocols import NavigationFailure, RobotModel
 
 DEFAULT_SPEED = 0.5
 """m/s: Nav2's desired_linear_vel, and vx_max of MPPI."""
+SAME_END = 0.1
+"""Metres by which corrections of the localizer may move the end of the path that is being followed."""
 
 
 class PathFollower:
@@ -16,12 +18,19 @@ class PathFollower:
         self._fastest = min(wanted or DEFAULT_SPEED, robot.max_linear)
         self._limit: float | None = None
         self._track: PathTracker | None = None
+        self._end: Pose2 | None = None
 
     def set_path(self, path: Path) -> None:
         """Follow this path from now on."""
         if not len(path.points):
             raise NavigationFailure(ErrorCode.INVALID_PATH, "the path has no points")
-        self._track = PathTracker(path)
+        end = Pose2(*path.points[-1].tolist())
+        if self._end is None or end.distance(self._end) > SAME_END:
+            self.begin()
+        self._end, self._track = end, PathTracker(path)
+
+    def begin(self) -> None:
+        """Forget what held for the way to another end; a new path to the same one may be the rest of the old."""
 
     @property
     def full_speed(self) -> float:

@@ -31,11 +31,11 @@ class LocalPlan:
         return (x - pose.x).astype(np.float32), (y - pose.y).astype(np.float32), yaw.astype(np.float32)
 
 
-def local_plan(track: PathTracker, metres: float) -> LocalPlan:
-    """The next `metres` of the path."""
+def local_plan(track: PathTracker, metres: float, spacing: float = SPACING) -> LocalPlan:
+    """The next `metres` of the path, its points at most `spacing` metres apart."""
     points, along = track.ahead(metres)
     length = float(min(metres, along[-1]))
-    steps = max(1, math.ceil(length / SPACING - 1e-9))
+    steps = max(1, math.ceil(length / spacing - 1e-9))
     at = np.linspace(0.0, length, steps + 1)
     x, y = np.interp(at, along, points[:, 0]), np.interp(at, along, points[:, 1])
     yaw = points[np.minimum(np.searchsorted(along, at + 1e-9, side="right"), len(points)) - 1, 2]

@@ -72,6 +72,12 @@ class PathTracker:
         """Metres of path to the end of this piece."""
         return self._metres[self._ends[0]] - self._metres[self.index]
 
+    @property
+    def piece_end(self) -> tuple[float, float]:
+        """Where this piece ends."""
+        x, y, _ = self.points[self._ends[0]].tolist()
+        return x, y
+
     def carrot(self, pose: Pose2, distance: float, beyond: bool = False) -> tuple[float, float]:
         """Where the piece leaves the circle of `distance` around the robot; its end if it does not leave.
 

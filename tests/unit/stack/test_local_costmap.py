@@ -96,7 +96,7 @@ def test_its_size_resolution_and_rate_are_nav2s_or_what_is_asked_for() -> None:
 
 
 def test_a_robot_that_is_faster_sees_as_far_as_it_looks_ahead() -> None:
-    spec = StackSpec(localizer=TRUTH, controller={"type": "dwb"})
+    spec = StackSpec(localizer=TRUTH, controller={"type": "dwb", "max_vel_x": 3.0})
     fast = drive(CORRIDOR, START, GOAL, grid=None, robot=round_robot(speed=3.0), spec=spec)
     view = costmaps(fast).near.view
     assert view.costs.shape[1] * view.resolution / 2 > 1.7 * 3.0 + 0.22

@@ -70,9 +70,8 @@ class MppiController(PathFollower):
         shape = (self._axes, self._spec.time_steps, self._spec.batch_size)
         self._noise = self._chance.standard_normal(shape, dtype=np.float32) * self._std[:, None, None]
 
-    def set_path(self, path: Path) -> None:
-        """Follow this path from now on; the control sequence is kept as a start."""
-        super().set_path(path)
+    def begin(self) -> None:
+        """Another goal; the control sequence is kept as a start."""
         self._goal_pose.reset()
 
     @property
