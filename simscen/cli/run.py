@@ -14,6 +14,7 @@ from simscen.cli.select import Selection, shard_of
 from simscen.cli.stacks import STACK_HELP
 from simscen.cli.watch import watched
 from simscen.report.journaldata import NAME
+from simscen.run.process.jobs import Replays
 from simscen.run.session import Options
 
 
@@ -90,6 +91,9 @@ def command(
     ] = None,
     root: Annotated[Path | None, typer.Option(help="Files inside scenarios stay in this folder.")] = None,
     world_path: Annotated[list[Path] | None, typer.Option(help="Folder with worlds and models; repeatable.")] = None,
+    replay: Annotated[
+        Replays, typer.Option(help="Which runs get replay.html, a page that plays them; see `simscen replay`.")
+    ] = Replays.FAILED,
     lenient: Annotated[
         bool, typer.Option("--lenient", help="Leave out what of an SDF world cannot be used, with a warning.")
     ] = False,
@@ -97,8 +101,8 @@ def command(
     """Run scenarios and report what passed.
 
     Everything is validated first; with one bad file nothing is run. Each run leaves its MCAP log, a picture and its
-    verdicts in the output folder, beside results.json and junit.xml. Should simscen itself be killed, `simscen report`
-    makes these from the journal, and --resume goes on where it stopped.
+    verdicts in the output folder, and one that failed a page that plays it, beside results.json and junit.xml. Should
+    simscen itself be killed, `simscen report` makes these from the journal, and --resume goes on where it stopped.
 
     Exit code 0: all passed, or failed as expected; 1: a criterion failed, or held although it was expected to fail; 2:
     an invalid scenario or an unusable output folder (nothing was run); 3: a run could not be completed; 5: nothing
@@ -109,7 +113,9 @@ def command(
     asked = Asked(
         paths,
         Selection(keyword, tag or [], shard_of(shard), variation or []),
-        Options(workers or cores(), seed, repeat, check_determinism, fail_fast, wall_limit, check_against),
+        Options(
+            workers or cores(), seed, repeat, check_determinism, fail_fast, wall_limit, check_against, replay=replay
+        ),
         root,
         world_path or [],
         lenient,

@@ -3,18 +3,20 @@
 import resource
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import simscen.sim.simulation
 import simscen.stack.build  # noqa: F401 - engines are imported here so that the forks need not
 from simscen.core.run import Run
+from simscen.record.replay import read_run
 from simscen.report.picture import Scene, with_robots, write_picture
 from simscen.run.perform import perform
 from simscen.run.prepare import Prepared
 from simscen.run.prepared_cache import PreparedCache
 from simscen.run.process.confine import MEMORY_BYTES
-from simscen.run.process.jobs import Job
+from simscen.run.process.jobs import Job, Replays
 from simscen.run.process.whereabouts import settle_in
 from simscen.run.process.worker import Progress
 from simscen.run.process.zygote import Zygote
@@ -46,13 +48,17 @@ def _memory() -> int:
 def _perform(job: Job, tell: Callable[[float], None]) -> dict[str, Any]:
     prepared = _PREPARED.prepared(job.scenario)
     progress = Progress(prepared.spec.physics.tick_rate, tell)
-    return perform(prepared, job.key.seed, job.folder, (progress,), _finish)
+    return perform(prepared, job.key.seed, job.folder, (progress,), partial(_finish, replay=job.replay))
 
 
-def _finish(prepared: Prepared, run: Run, folder: Path) -> None:
+def _finish(prepared: Prepared, run: Run, folder: Path, replay: Replays) -> None:
     scene = Scene(run.trace, run.case, prepared.built.map, run.result, scenery_of(prepared))
     robots = {name: (one.trace, one.case) for name, one in run.robots.items()}
     write_picture(with_robots(scene, robots), folder / "map.png")
+    if replay.wants(run.result.outcome) and run.log is not None:
+        from simscen.report.replay import write_replay
+
+        write_replay(folder / "replay.html", [(read_run(run.log, looks=True), run.result)])
 
 
 if __name__ == "__main__":

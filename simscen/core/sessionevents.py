@@ -16,6 +16,7 @@ class Artifacts:
     mcap: str = ""
     picture: str = ""
     result: str = ""
+    replay: str = ""
 
 
 @dataclass(frozen=True)

@@ -119,7 +119,7 @@ def _output(run: RunFinished) -> str:
     """Warnings, what fired when, then attachments as Jenkins and GitLab read them."""
     warnings = [complaint for complaint in complaints(run) if complaint.warning]
     lines = [f"{place(run, warning.line)}: warning: {warning.message}" for warning in warnings]
-    files = (run.artifacts.picture, run.artifacts.mcap, run.artifacts.result)
+    files = (run.artifacts.picture, run.artifacts.replay, run.artifacts.mcap, run.artifacts.result)
     lines += [one_line(f"{one.ordered.kind} {told(one, run.result.tick_rate)}") for one in run.result.disturbances]
     told_of = [line.replace("[[ATTACHMENT|", "[ [ATTACHMENT|") for line in lines]  # names are no files to attach
     return "\n".join([*told_of, *(f"[[ATTACHMENT|{one_line(file)}]]" for file in files if file)])

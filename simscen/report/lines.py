@@ -171,7 +171,7 @@ def _happened(run: RunFinished) -> Iterator[Line]:
 def pointers(run: RunFinished) -> Iterator[Line]:
     """Where to look at a run, and how to see it again."""
     files = run.artifacts
-    seen = [("picture", files.picture)] if files.picture else [("log", files.mcap)]
+    seen = [("replay", files.replay), ("picture", files.picture)] if files.picture else [("log", files.mcap)]
     for name, path in seen:
         if path:
             yield (_label(name), Piece(one_line(path), file=path))

@@ -42,7 +42,8 @@ def in_order(runs: Sequence[RunFinished]) -> list[RunFinished]:
 
 
 def _artifacts(run: RunFinished, folder: str) -> dict[str, str]:
-    files = {"mcap": run.artifacts.mcap, "picture": run.artifacts.picture, "result": run.artifacts.result}
+    made = run.artifacts
+    files = {"mcap": made.mcap, "picture": made.picture, "replay": made.replay, "result": made.result}
     return {name: relative(path, folder) for name, path in files.items() if path}
 
 

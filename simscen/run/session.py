@@ -15,7 +15,7 @@ from simscen.loading.plugins import plugins_of_all
 from simscen.run.against import agreed
 from simscen.run.outfolder import run_folder
 from simscen.run.process.answer import answer_to, not_done, not_to_do
-from simscen.run.process.jobs import Job
+from simscen.run.process.jobs import Job, Replays
 from simscen.run.process.supervisor import Advanced, Ended, Interrupted, Started, supervise
 from simscen.run.process.whereabouts import whereabouts
 
@@ -26,7 +26,7 @@ class Options:
 
     `twice` runs everything a second time with the same seed, to compare; `against` is the output folder of an earlier
     session to compare with. `wall_limit` in seconds bounds each run. `only` are the keys of all that is to be run, with
-    their seeds; None = everything.
+    their seeds; None = everything. `replay` says which runs get a page that plays them.
     """
 
     workers: int = 1
@@ -36,6 +36,7 @@ class Options:
     fail_fast: bool = False
     wall_limit: float = 300.0
     against: Path | None = None
+    replay: Replays = Replays.NONE
     only: frozenset[RunKey] | None = None
 
 
@@ -61,7 +62,9 @@ def plan(scenarios: Sequence[LoadedScenario], options: Options, out: Path) -> li
                 if options.only is not None and key not in options.only:
                     continue
                 for each in (key, key.twin) if options.twice else (key,):
-                    jobs.append(Job(len(jobs), scenario, each, run_folder(out, each), options.wall_limit))
+                    jobs.append(
+                        Job(len(jobs), scenario, each, run_folder(out, each), options.wall_limit, options.replay)
+                    )
     # Once each, whatever the number of seeds, and behind the others: twins are told by their numbers.
     for scenario in skipped if options.only is None else ():
         key = scenario.key(seeds_of(scenario, options)[0])

@@ -61,7 +61,7 @@ def _artifacts(folder: Path) -> Artifacts:
     def path(name: str) -> str:
         return str(folder / name) if (folder / name).exists() else ""
 
-    return Artifacts(str(folder), path("run.mcap"), path("map.png"), path("result.json"))
+    return Artifacts(str(folder), path("run.mcap"), path("map.png"), path("result.json"), path("replay.html"))
 
 
 def _failure(end: ProcessEnd | PreparerDeath) -> RunFailure | None:

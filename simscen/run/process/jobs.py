@@ -5,24 +5,38 @@ import os
 import pickle
 import struct
 from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
-from simscen.core.result import RunKey
+from simscen.core.result import Outcome, RunKey
 from simscen.loading.loaded import LoadedScenario
 
 _LENGTH = struct.Struct("<I")
 
 
+class Replays(str, Enum):
+    """Which runs get a page that plays them."""
+
+    NONE = "none"
+    FAILED = "failed"
+    ALL = "all"
+
+    def wants(self, outcome: Outcome) -> bool:
+        """Whether a run that came out so gets one."""
+        return self is Replays.ALL or (self is Replays.FAILED and not outcome.good)
+
+
 @dataclass(frozen=True)
 class Job:
-    """One run: a scenario that has been validated, a seed, and the folder its files go to."""
+    """One run: a scenario that has been validated, a seed, the folder its files go to, and whether it gets a page."""
 
     number: int
     scenario: LoadedScenario
     key: RunKey
     folder: Path
     wall_limit: float
+    replay: Replays = Replays.NONE
 
 
 @dataclass(frozen=True)

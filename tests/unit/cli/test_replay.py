@@ -1,0 +1,97 @@
+"""`simscen replay`, and the pages that `simscen run` leaves of runs that failed."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SCENARIO = """\
+simscen: 1
+world:
+  simscen: 1
+  walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]
+robot: {pose: {x: 1, y: 1}}
+goals: [{pose: {x: 3, y: 2}}]
+pass: [CRITERION]
+"""
+GOOD, BAD = (SCENARIO.replace("CRITERION", text) for text in ("goals_reached: {}", "speed: {max: 0.2 m/s}"))
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The output folder of a session with a run that passes and one that fails."""
+    home = tmp_path_factory.mktemp("home")
+    (home / "good.scenario.yaml").write_text(GOOD)
+    (home / "bad.scenario.yaml").write_text(BAD)
+    command = [sys.executable, "-m", "simscen", "run", ".", "-j1", "--out", "out"]
+    done = subprocess.run(command, cwd=home, capture_output=True, text=True, check=False)
+    assert done.returncode == 1, done.stderr
+    assert "replay    out/runs/bad/seed-1/replay.html" in done.stdout
+    return home / "out"
+
+
+def test_a_run_that_failed_leaves_a_page_that_all_reports_name(out: Path) -> None:
+    assert [path.parent.parent.name for path in out.rglob("replay.html")] == ["bad"]
+    results = json.loads((out / "results.json").read_text())
+    pages = {run["scenario"]: run["artifacts"].get("replay") for run in results["runs"]}
+    assert pages == {"bad": "runs/bad/seed-1/replay.html", "good": None}
+    assert "[[ATTACHMENT|out/runs/bad/seed-1/replay.html]]" in (out / "junit.xml").read_text()
+
+
+def test_the_page_is_the_same_as_that_of_the_command(simscen, out: Path, tmp_path: Path) -> None:
+    run = out / "runs" / "bad" / "seed-1"
+    ended = simscen("replay", str(run), "--out", "page.html")
+    assert (ended.code, ended.out) == (0, "page.html\n")
+    assert (tmp_path / "page.html").read_bytes() == (run / "replay.html").read_bytes()
+
+
+def test_every_log_below_a_folder_gets_its_page(simscen, out: Path) -> None:
+    page = out / "runs" / "good" / "seed-1" / "replay.html"
+    ended = simscen("replay", str(out))
+    assert ended.code == 0 and ended.out.splitlines() == [str(page).replace("good", name) for name in ("bad", "good")]
+    assert page.is_file()
+    page.unlink()
+
+
+def test_two_runs_are_set_side_by_side(simscen, out: Path, tmp_path: Path) -> None:
+    good, bad = (str(out / "runs" / name / "seed-1") for name in ("good", "bad"))
+    assert simscen("replay", good, "--against", bad, "--out", "both.html").code == 0
+    assert "<title>good, seed 1, passed against bad, seed 1, failed</title>" in (tmp_path / "both.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "told"),
+    [
+        (("nowhere",), 2, "nowhere:0:0: error[SC800]"),
+        (("good.scenario.yaml",), 2, "SC801"),
+        ((".",), 5, "no logs found"),
+    ],
+)
+def test_what_is_no_log_is_told(simscen, arguments: tuple[str, ...], code: int, told: str) -> None:
+    ended = simscen("replay", *arguments)
+    assert ended.code == code and told.replace(":0:0", "") in ended.err
+
+
+def test_one_page_cannot_be_that_of_several_runs(simscen, out: Path) -> None:
+    ended = simscen("replay", str(out), "--out", "page.html")
+    assert ended.code == 2 and "--out is for one run, and there are 2" in ended.err
+
+
+def test_the_log_is_not_overwritten(simscen, out: Path) -> None:
+    log = out / "runs" / "bad" / "seed-1" / "run.mcap"
+    before = log.read_bytes()
+    assert simscen("replay", str(log), "--out", str(log)).code == 2
+    assert log.read_bytes() == before
+
+
+def test_a_page_is_made_without_engines(out: Path, tmp_path: Path) -> None:
+    heavy = {"pybullet", "ompl", "scipy", "filterpy", "PIL", "trimesh", "embreex"}
+    probe = (
+        "import atexit, sys\nfrom simscen.cli.main import main\n"
+        f"sys.argv = ['simscen', 'replay', {str(out / 'runs/bad/seed-1')!r}, '--out', {str(tmp_path / 'x.html')!r}]\n"
+        f"atexit.register(lambda: print('imported:', *set(sys.modules) & {heavy!r}))\nmain()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "imported:"

@@ -1,0 +1,180 @@
+"""What a replay page is made of: the log's own numbers to within their steps, and every event."""
+
+import base64
+import json
+import math
+import re
+import struct
+import zlib
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from simscen.core.case import Case
+from simscen.core.geometry import Pose2
+from simscen.core.navigation import Goal
+from simscen.core.result import Outcome, RunKey, RunResult
+from simscen.core.verdict import Finding, Status, Verdict
+from simscen.judge.sketch import sketch
+from simscen.record.header import LogHeader
+from simscen.record.replay import Log
+from simscen.report.replay import replay_page
+from simscen.report.replay.columns import Columns
+from simscen.report.replay.page import FOLDER, script
+from simscen.report.replay.thin import evenly, paced, with_extremes
+
+TEXT = """\
+simscen: 1
+world: hall.world.yaml
+robot: {pose: dock}
+goals:
+  - {pose: shelf}
+  - {name: home, pose: {x: 0, y: 0}}
+events:
+  - name: push
+    when: {time: 1 s}
+    do: {mark: {name: pushed}}
+pass:
+  - goals_reached: {}
+  - speed: {max: 0.4 m/s}
+"""
+
+
+def log_of(words: dict[str, Any], case: Case | None = None, text: str = "") -> Log:
+    about = LogHeader("hall/drive", 7, case or Case(Pose2(0, 0), ()), text)
+    return Log(about, sketch(words), "", True)
+
+
+def result_of(*verdicts: Verdict) -> RunResult:
+    return RunResult(RunKey("hall/drive", 7), "hall/drive.scenario.yaml", Outcome.FAILED, verdicts, simulated=4.0)
+
+
+class Read:
+    """What the page holds, read back as it does."""
+
+    def __init__(self, page: bytes) -> None:
+        found = re.search(r'<script type="application/octet-stream" id="data">([^<]*)</script>', page.decode())
+        assert found is not None
+        data = zlib.decompress(base64.b64decode(found[1]), wbits=-15)
+        (size,) = struct.unpack_from("<I", data)
+        self.runs = json.loads(data[4 : 4 + size])["runs"]
+        self._numbers = data[4 + size :]
+
+    def column(self, where: Sequence[float]) -> list[float]:
+        begin, count, step = where
+        at, whole, values = int(begin), 0, []
+        for _ in range(int(count)):
+            coded, shift = 0, 0
+            while True:
+                byte = self._numbers[at]
+                at += 1
+                coded |= (byte & 127) << shift
+                shift += 7
+                if byte < 128:
+                    break
+            whole += (coded >> 1) ^ -(coded & 1)
+            special = {2**30: math.inf, -(2**30): -math.inf, 2**30 + 1: math.nan}
+            values.append(special.get(whole, whole * step))
+        return values
+
+
+@pytest.mark.parametrize("step", [1.0, 0.01, 1e-5])
+def test_numbers_come_back_to_within_half_a_step(step: float) -> None:
+    values = np.concatenate(([0.0, -1e3, 1e3, math.inf, -math.inf], np.random.default_rng(3).normal(0, 50, 500)))
+    columns = Columns()
+    columns.add([1.0])
+    where = columns.add(values, step)
+    read = Read.__new__(Read)
+    read._numbers = columns.data
+    back = np.array(read.column(where))
+    assert np.array_equal(back[~np.isfinite(values)], values[~np.isfinite(values)])
+    finite = np.isfinite(values)
+    assert np.abs(back[finite] - values[finite]).max() <= step / 2 + 1e-9
+
+
+def test_what_is_no_number_stays_none() -> None:
+    columns = Columns()
+    where = columns.add([1.0, math.nan, 2.0])
+    read = Read.__new__(Read)
+    read._numbers = columns.data
+    first, second, third = read.column(where)
+    assert (first, third) == (1.0, 2.0) and math.isnan(second)
+
+
+def test_positions_are_those_of_the_log_and_every_event_is_there() -> None:
+    words = {
+        "seconds": 4,
+        "truth": [[0, 0, 0, 0], [2, 1, 0.5, 3.0], [4, 1, 2, -3.0]],
+        "belief": {"offset": [0.1, 0, 0.05]},
+        "events": [
+            [0, "goal.accepted", "shelf"],
+            [1, "event.started", "push", {"entry": 0}],
+            [2, "plan.made", ""],
+            [3, "goal.failed", "shelf", {"error_code": 208, "error_name": "NO_VALID_PATH"}],
+        ],
+    }
+    log = log_of(words, Case(Pose2(0, 0), (Goal("shelf", Pose2(2, 2)), Goal("home", Pose2(0, 0)))), TEXT)
+    read = Read(replay_page([(log, result_of())]))
+    run = read.runs[0]
+    robot = run["robots"][0]
+    truth = np.column_stack([read.column(robot["truth"][name]) for name in ("ticks", "x", "y")])
+    assert np.array_equal(truth[:, 0], log.trace.truth.ticks)
+    assert np.abs(truth[:, 1:] - log.trace.truth.values[:, :2]).max() <= 0.0005 + 1e-9
+    turned = np.exp(1j * np.array(read.column(robot["truth"]["yaw"]))) / np.exp(1j * log.trace.truth.values[:, 2])
+    assert np.abs(np.angle(turned)).max() <= 0.0005 + 1e-9
+    believed = np.array(read.column(robot["belief"]["x"]))
+    assert np.abs(believed - log.trace.belief.values[:, 0]).max() <= 0.0005 + 1e-9
+    assert [(event["tick"], event["kind"]) for event in run["events"]] == [
+        (event.tick, str(event.kind)) for event in log.trace.events
+    ]
+    goal = run["events"][0]
+    assert (goal["until"], goal["ended"], goal["line"]) == (720, "goal.failed", 5)
+    assert run["events"][1]["line"] == 8
+    assert [goal["line"] for goal in robot["goals"]] == [5, 6]
+
+
+def test_a_bound_is_drawn_on_the_signal_that_it_bounds() -> None:
+    finding = Finding(Status.FAIL, "speed", "0.50 m/s", "≤ 0.40 m/s", -0.1, "m/s", 0.5, 240, (1.0, 0.0))
+    log = log_of({"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]]}, text=TEXT)
+    run = Read(replay_page([(log, result_of(Verdict("speed", "speed", "fail", (finding,))))])).runs[0]
+    bound = {"signal": "speed", "value": 0.4, "least": False, "verdict": "speed", "status": "fail"}
+    assert run["robots"][0]["limits"] == [bound]
+    assert run["verdicts"][0]["line"] == 13
+    assert "speed" in [strip["name"] for strip in run["robots"][0]["strips"]]
+
+
+def test_a_log_of_little_makes_a_page_of_little() -> None:
+    log = log_of({"seconds": 1, "truth": [[0, 0, 0]], "belief": None, "scans": [], "ended": None})
+    run = Read(replay_page([(replace(log, complete=False), result_of())])).runs[0]
+    assert run["complete"] is False and run["robots"][0]["belief"] is None and run["robots"][0]["map"] is None
+
+
+def test_equal_runs_give_equal_bytes_and_two_runs_one_page() -> None:
+    log = log_of({"seconds": 2, "truth": [[0, 0, 0], [2, 1, 0]]}, text=TEXT)
+    one = replay_page([(log, result_of())])
+    assert one == replay_page([(log, result_of())])
+    assert [run["seed"] for run in Read(replay_page([(log, result_of()), (log, result_of())])).runs] == [7, 7]
+
+
+def test_what_is_thinned_keeps_ends_pauses_and_extremes() -> None:
+    assert evenly(3, 10).tolist() == [0, 1, 2] and evenly(100, 3).tolist() == [0, 50, 99]
+    ticks = np.array([0, 6, 12, 18, 24, 264, 504, 510])
+    kept = ticks[paced(ticks, 12)].tolist()
+    assert kept == [0, 12, 24, 264, 504, 510]
+    values = np.zeros(10_000)
+    values[[1234, 7777]] = 5.0, -5.0
+    chosen = with_extremes(values, 100)
+    assert len(chosen) <= 100 and {1234, 7777} <= set(chosen.tolist())
+
+
+def test_its_script_is_one_module_without_imports_and_never_makes_markup_of_text() -> None:
+    text = script()
+    assert not re.search(r"^(import|export) ", text, re.MULTILINE)
+    assert not re.search(r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|\beval\b|new Function", text)
+    assert "</script" not in text.lower()
+    for module in FOLDER.glob("*.js"):
+        for name in re.findall(r"^export (?:async )?(?:function|class|const) (\w+)", module.read_text(), re.MULTILINE):
+            assert len(re.findall(rf"^(?:async )?(?:function|class|const) {name}\b", text, re.MULTILINE)) == 1
