@@ -182,3 +182,8 @@ _Controllers = Annotated[
     Discriminator(type_or("regulated_pure_pursuit")),
 ]
 Controller = Annotated[ControllerSpec, ByType("controller", _Controllers)]
+CONTROLLERS = {
+    "regulated_pure_pursuit": "simscen.model.controllers:RegulatedPurePursuit",
+    "dwb": "simscen.model.controllers:DynamicWindow",
+    "mppi": "simscen.model.mppi:Mppi",
+}

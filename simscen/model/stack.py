@@ -466,11 +466,6 @@ LOCALIZERS = {
     "odometry": _HERE + "OdometryOnly",
 }
 PLANNERS = dict.fromkeys(get_args(OmplPlanner.model_fields["type"].annotation), _HERE + "OmplPlanner")
-CONTROLLERS = {
-    "regulated_pure_pursuit": "simscen.model.controllers:RegulatedPurePursuit",
-    "dwb": "simscen.model.controllers:DynamicWindow",
-    "mppi": "simscen.model.mppi:Mppi",
-}
 BEHAVIORS = {
     "clear_costmap": _HERE + "ClearCostmap",
     "spin": _HERE + "Spin",

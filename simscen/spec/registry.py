@@ -52,7 +52,7 @@ GROUPS: dict[str, Group] = {
     "stack": Group("simscen.model.stack:InProcessStack", "simscen.model.stack:STACKS", ("external",)),
     "localizer": Group("simscen.model.stack:LocalizerSpec", "simscen.model.stack:LOCALIZERS"),
     "planner": Group("simscen.model.stack:PlannerSpec", "simscen.model.stack:PLANNERS"),
-    "controller": Group("simscen.model.stack:ControllerSpec", "simscen.model.stack:CONTROLLERS"),
+    "controller": Group("simscen.model.controllers:ControllerSpec", "simscen.model.controllers:CONTROLLERS"),
     "behavior": Group("simscen.model.stack:BehaviorSpec", "simscen.model.stack:BEHAVIORS"),
     "goal_checker": Group("simscen.model.stack:GoalCheckerSpec", "simscen.model.stack:GOAL_CHECKERS"),
     "criterion": Group(

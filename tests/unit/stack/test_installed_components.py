@@ -29,10 +29,8 @@ from simscen.core.belief import Belief
 from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import Path
 from simscen.core.trace import Decision
-from simscen.model.controllers import RegulatedPurePursuit
-from simscen.model.controllerspec import ControllerSpec
-from simscen.model.stack import (BehaviorSpec, GoalCheckerSpec, InProcessStack, LocalizerSpec, OmplPlanner,
-                                 PlannerSpec)
+from simscen.model.controllers import ControllerSpec, RegulatedPurePursuit
+from simscen.model.stack import BehaviorSpec, GoalCheckerSpec, InProcessStack, LocalizerSpec, OmplPlanner, PlannerSpec
 from simscen.spec.quantities import PositiveLength
 from simscen.stack.planners.build import ompl_planner
 
