@@ -8,10 +8,10 @@ from typing import Any
 from simscen.core.case import Case
 from simscen.core.result import Outcome, RunResult
 from simscen.core.trace import Trace
-from simscen.core.verdict import Verdict
+from simscen.core.verdict import Status, Verdict
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Run:
     """A run: its `result` (outcome, verdicts, metrics), the `trace` it was judged from, the `case` it was judged by.
 
@@ -26,6 +26,13 @@ class Run:
     log: Path | None = None
     stack: Mapping[str, Any] = field(default_factory=dict)
     robots: Mapping[str, "Run"] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        """What it is and why it did not pass, so that `assert run.passed` says it."""
+        broken = [(v.id, v.tightest) for v in self.result.verdicts if v.status is not Status.PASS]
+        why = [f"{name} {finding.measured} ({finding.limit})" for name, finding in broken if finding is not None]
+        told = f"<Run of {self.result.key.test}, seed {self.result.key.seed}: {self.result.outcome.value}"
+        return f"{told}{''.join(f'; {each}' for each in why)}>"
 
     @property
     def passed(self) -> bool:

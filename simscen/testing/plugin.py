@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
     from simscen.testing.promise import Promise
 
+pytest_plugins = ("simscen.pytesting.plugin",)
+"""What collects scenarios stands above the command line, and this below it: it is named, not imported."""
+
 _PROMISES: pytest.StashKey[list[Promise]] = pytest.StashKey()
 
 

@@ -7,7 +7,7 @@ answer: the worker's own last word counts only if its process also exited with s
 import json
 import signal
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -60,10 +60,10 @@ def supervise(
     `entry` is how Python is called to be the warm process, e.g. `-m module`. `go_on` is asked before each new job.
     When the consumer stops early (or an exception passes through), everything that still runs is killed.
     """
-    return _Supervisor(jobs, workers, entry, go_on).happenings()
+    return Supervisor(jobs, workers, entry, go_on).happenings()
 
 
-class _Supervisor:
+class Supervisor:
     """Jobs wait, run, and are answered.
 
     When the warm process dies by itself, the job that it was preparing is to blame, and its neighbours run again in
@@ -80,7 +80,12 @@ class _Supervisor:
         self._tried: set[int] = set()
         self._alive = False
 
-    def happenings(self) -> Iterator[Happening]:
+    def add(self, job: Job) -> None:
+        """One more job, behind the others; of `happenings` that have come to an end nothing more is heard."""
+        self._waiting.append(job)
+
+    def happenings(self) -> Generator[Happening, None, None]:
+        """What happens, until there is nothing left to do; where its consumer closes it, everything is killed."""
         while (self._waiting or self._suspects) and self._go_on():
             self._alive = False
             warm = WarmProcess(self._entry)

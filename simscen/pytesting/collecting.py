@@ -1,0 +1,127 @@
+"""A scenario's file as pytest collects it: an item for each of its runs, named as the command line names it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from simscen.cli.diagnostics import as_text
+from simscen.cli.select import Checks, checked
+from simscen.cli.stacks import stacks_of
+from simscen.core.errors import InvalidInput, SimscenError, UsageError
+from simscen.core.result import Outcome
+from simscen.loading.discovery import default_root
+from simscen.pytesting.failure import ScenarioFailed, as_seen
+from simscen.pytesting.runner import runner_of
+from simscen.report.complaints import label
+from simscen.run.session import Options, seeds_of
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from simscen.core.problems import Problem
+    from simscen.core.sessionevents import RunFinished
+    from simscen.loading.loaded import LoadedScenario
+
+OF_PYTEST = frozenset(
+    {"skip", "skipif", "xfail", "usefixtures", "filterwarnings", "parametrize", "tryfirst", "trylast"}
+)
+"""Markers that pytest obeys: a tag of such a name is no marker."""
+
+
+class ScenarioFile(pytest.File):
+    """The runs of a scenario. A file that is wrong is an error of the collection, told as `simscen validate` would."""
+
+    def collect(self) -> Iterator[pytest.Item]:
+        """An item for each variation, seed and stack."""
+        try:
+            yield from self._items()
+        except InvalidInput as error:
+            raise self.CollectError(as_text(error.problems)) from error
+        except SimscenError as error:
+            raise self.CollectError(str(error)) from error
+
+    def _items(self) -> Iterator[pytest.Item]:
+        config = self.config
+        root, world_path = default_root([self.path]), config.getini("simscen_world_path")
+        chosen = config.getoption("--simscen-stack") or config.getini("simscen_stack")
+        checks = Checks(root, world_path, fast=True, stacks=stacks_of(chosen, root, world_path))
+        options = Options(seed=_seed(config), repeat=config.getoption("--simscen-repeat"))
+        for choice in checks.choices:
+            scenarios, problems = checks.scenario(self.path, choice)
+            _refuse(problems)
+            for scenario in scenarios:
+                loaded = scenario.having(several_stacks=len(checks.choices) > 1)
+                for seed in seeds_of(loaded, options):
+                    every_seed = options.repeat > 1
+                    yield ScenarioRun.made(self, loaded, seed, every_seed)
+
+
+class ScenarioRun(pytest.Item):
+    """One run of a scenario. It passes, fails with simscen's own reasons, or is expected to fail or skipped."""
+
+    def __init__(self, *, scenario: LoadedScenario, seed: int, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        self._scenario, self._seed = scenario, seed
+
+    @classmethod
+    def made(cls, parent: ScenarioFile, scenario: LoadedScenario, seed: int, every_seed: bool) -> ScenarioRun:
+        """The item, with its tags as markers."""
+        folder = scenario.id.rpartition("/")[0]
+        name = label(scenario.key(seed), every_seed, f"{folder}/" if folder else "")
+        item: ScenarioRun = cls.from_parent(parent, name=name, scenario=scenario, seed=seed)
+        for tag in ("simscen", *scenario.spec.tags):
+            if tag not in OF_PYTEST:
+                item.config.addinivalue_line("markers", f"{tag}: a tag of scenarios")
+                item.add_marker(tag)
+        if scenario.spec.skip is not None:
+            item.add_marker(pytest.mark.skip(reason=scenario.spec.skip))
+        return item
+
+    def runtest(self) -> None:
+        """Run it, in a process of its own."""
+        _refuse(checked(self._scenario))
+        run = runner_of(self.config).run(self._scenario, self._seed)
+        self.user_properties += _properties(run)
+        if run.outcome is Outcome.FAILED_AS_EXPECTED:
+            pytest.xfail(run.result.reason)
+        if run.outcome is not Outcome.PASSED:
+            raise ScenarioFailed(run)
+
+    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
+        """What was violated, where and when, in place of a traceback."""
+        if isinstance(excinfo.value, ScenarioFailed):
+            return as_seen(excinfo.value.run)
+        if isinstance(excinfo.value, InvalidInput):
+            return as_text(excinfo.value.problems)
+        return super().repr_failure(excinfo)
+
+    def reportinfo(self) -> tuple[Path, int | None, str]:
+        """Where it is written."""
+        return self.path, 0, self.name
+
+
+def _refuse(problems: list[Problem]) -> None:
+    """Raise InvalidInput for errors; warnings are what `simscen validate` is for."""
+    if errors := [problem for problem in problems if problem.severity == "error"]:
+        raise InvalidInput(errors)
+
+
+def _seed(config: pytest.Config) -> int | None:
+    """That of the command line, or of the configuration. Raises UsageError."""
+    given = config.getoption("--simscen-seed")
+    written = config.getini("simscen_seed")
+    if given is not None or not written:
+        return None if given is None else int(given)
+    if not written.isdecimal():
+        raise UsageError(f"simscen_seed: {written!r} is not a whole number")
+    return int(written)
+
+
+def _properties(run: RunFinished) -> list[tuple[str, object]]:
+    """What junit.xml says of it."""
+    files = {"log": run.artifacts.mcap, "picture": run.artifacts.picture}
+    facts = {"seed": run.key.seed, "simulated_seconds": f"{run.result.simulated:.3f}", "again": run.again, **files}
+    return [(name, value) for name, value in facts.items() if value]

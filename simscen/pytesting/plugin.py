@@ -1,0 +1,103 @@
+"""The part of the pytest plug-in that is about scenarios: `pytest --simscen scenarios/`, and the fixture `simscen`.
+
+It is loaded by every pytest in an environment where simscen is installed, so it imports nothing and collects nothing
+until it is asked: by --simscen, by `simscen_paths` in the configuration, or by a scenario's file on the command line.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from simscen.pytesting.fixture import Simscen
+    from simscen.pytesting.runner import Runner
+
+RUNNER: pytest.StashKey[Runner] = pytest.StashKey()
+SUFFIXES = (".scenario.yaml", ".scenario.yml")
+OUT = "simscen_out"
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the options, and what the configuration may say instead."""
+    group = parser.getgroup("simscen")
+    group.addoption(
+        "--simscen",
+        action="store_true",
+        help="collect the *.scenario.yaml below the given paths: an item for each run, as `simscen run` would make it",
+    )
+    group.addoption(
+        "--simscen-seed",
+        type=int,
+        metavar="N",
+        help="run scenarios with this seed instead of their own (ini: simscen_seed)",
+    )
+    group.addoption(
+        "--simscen-repeat", type=int, default=1, metavar="N", help="run scenarios with this many seeds in a row"
+    )
+    group.addoption(
+        "--simscen-stack",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="run scenarios with this stack instead of their own, as --stack of `simscen run`; repeatable "
+        "(ini: simscen_stack)",
+    )
+    group.addoption(
+        "--simscen-out",
+        metavar="DIR",
+        help="folder in which each session leaves its logs and pictures (ini: simscen_out; default: simscen-out)",
+    )
+    parser.addini("simscen_paths", "folders and files whose scenarios are collected without --simscen", "paths", [])
+    parser.addini("simscen_seed", "as --simscen-seed", default="")
+    parser.addini("simscen_stack", "as --simscen-stack, one in a line", "linelist", [])
+    parser.addini("simscen_world_path", "folders with worlds and models, as --world-path", "paths", [])
+    parser.addini(OUT, "as --simscen-out", default="")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Tell of the marker that all scenarios have."""
+    config.addinivalue_line("markers", "simscen: every run of a scenario; its tags are markers, too")
+
+
+def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
+    """A scenario's file, where somebody asks for it."""
+    if not file_path.name.endswith(SUFFIXES) or not _asked(file_path, parent):
+        return None
+    from simscen.pytesting.collecting import ScenarioFile
+
+    collected: pytest.Collector = ScenarioFile.from_parent(parent, path=file_path)
+    return collected
+
+
+def _asked(file: Path, parent: pytest.Collector) -> bool:
+    config = parent.config
+    if config.getoption("--simscen") or parent.session.isinitpath(file):
+        return True
+    return any(file.is_relative_to(path) for path in config.getini("simscen_paths"))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_configure_node(node: Any) -> None:
+    """With xdist: all workers leave their logs in one folder."""
+    from simscen.pytesting.runner import runner_of
+
+    node.workerinput[OUT] = str(runner_of(node.config).folder)
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """End the warm process."""
+    if (runner := config.stash.get(RUNNER, None)) is not None:
+        runner.close()
+
+
+@pytest.fixture
+def simscen(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Simscen]:
+    """`simscen("goal.scenario.yaml", seed=7)` runs a scenario here and now: a Run with result, metrics and trace."""
+    from simscen.pytesting.fixture import Simscen
+
+    yield Simscen(request.path.parent, tmp_path)

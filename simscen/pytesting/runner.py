@@ -1,0 +1,61 @@
+"""Runs scenarios for pytest: one warm process for each worker, and a folder for each session."""
+
+import secrets
+from contextlib import ExitStack
+from datetime import datetime, timezone
+from itertools import count
+from pathlib import Path
+
+import pytest
+
+from simscen.core.sessionevents import RunFinished
+from simscen.loading.loaded import LoadedScenario
+from simscen.loading.plugins import plugins_of
+from simscen.pytesting.plugin import OUT, RUNNER
+from simscen.run.outfolder import DEFAULT, run_folder
+from simscen.run.process.answer import answer_to
+from simscen.run.process.jobs import Job
+from simscen.run.process.standby import Standby
+from simscen.run.process.whereabouts import whereabouts
+
+WARM_PROCESS = ("-m", "simscen.cli.warm_process")
+WALL_LIMIT = 300.0
+"""Seconds that one run may take, as with `simscen run`."""
+
+
+class Runner:
+    """Runs one after the other, each in a process of its own, and leaves their files in `folder`."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._numbers = count()
+        self._standbys: dict[tuple[str, ...], Standby] = {}
+        self._closing = ExitStack()
+
+    def run(self, scenario: LoadedScenario, seed: int) -> RunFinished:
+        """The answer to a run."""
+        key = scenario.key(seed)
+        job = Job(next(self._numbers), scenario, key, run_folder(self.folder, key), WALL_LIMIT)
+        told = whereabouts(plugins_of(scenario))
+        if told not in self._standbys:
+            self._standbys[told] = self._closing.enter_context(Standby((*WARM_PROCESS, *told)))
+        return answer_to(job, self._standbys[told].run(job))
+
+    def close(self) -> None:
+        """End the warm processes."""
+        self._closing.close()
+
+
+def runner_of(config: pytest.Config) -> Runner:
+    """That of this process; a worker of xdist is told its folder."""
+    if (known := config.stash.get(RUNNER, None)) is None:
+        known = config.stash[RUNNER] = Runner(_folder(config))
+    return known
+
+
+def _folder(config: pytest.Config) -> Path:
+    told = getattr(config, "workerinput", {}).get(OUT)
+    if told is not None:
+        return Path(told)
+    home = Path(config.getoption("--simscen-out") or config.getini(OUT) or DEFAULT)
+    return home / f"{datetime.now(timezone.utc):%Y%m%dT%H%M%SZ}-{secrets.token_hex(2)}-pytest"

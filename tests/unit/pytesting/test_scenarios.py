@@ -1,0 +1,153 @@
+"""Scenarios in pytest, as the team of a foreign project calls it: in a pytest of its own."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+ROOM = """\
+simscen: 1
+tags: [smoke]
+world: {simscen: 1, walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]}
+robot: {pose: {x: 1, y: 1}}
+goals: [{pose: {x: 5, y: 3}}]
+time_limit: 0.5 s
+pass: [{collisions: {max: 0}}]
+"""
+FAILING = ROOM.replace("collisions: {max: 0}", "clearance: {min: 2}").replace("smoke", "skip, far")
+FILES = {
+    "scenarios/good.scenario.yaml": ROOM,
+    "scenarios/bad.scenario.yaml": FAILING,
+    "scenarios/known.scenario.yaml": FAILING + "expected: {fail: too near to the wall, criteria: [clearance]}\n",
+    "scenarios/held.scenario.yaml": ROOM + "expected: {fail: no more, criteria: [collisions]}\n",
+    "scenarios/later.scenario.yaml": ROOM + "skip: the dock is being built\n",
+    "scenarios/speeds.scenario.yaml": ROOM + "variations: {grid: {time_limit: [0.1 s, 0.2 s]}}\n",
+    "test_own.py": "def test_own():\n    pass\n",
+}
+TEST = """
+import pytest
+
+
+def test_it_passes(simscen):
+    run = simscen("scenarios/good.scenario.yaml", seed=7)
+    assert run.passed
+    assert run.result.metrics["collisions"] == 0
+    assert run.trace.end == 120
+    assert run.log.is_file()
+    assert simscen.variations("scenarios/speeds.scenario.yaml") != [""]
+
+
+def test_it_does_not(simscen):
+    assert simscen("scenarios/bad.scenario.yaml").passed
+"""
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    """A project with scenarios of every kind, and a test of its own."""
+    for name, text in FILES.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+@pytest.fixture
+def run(project: Path):
+    def call(*arguments: str) -> tuple[int, str]:
+        plugin = ("-p", "no:simscen", "-p", "simscen.testing.plugin", "--strict-markers", "--color=no")
+        done = subprocess.run(
+            [sys.executable, "-m", "pytest", *plugin, *arguments],
+            cwd=project, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        return done.returncode, done.stdout + done.stderr
+
+    return call
+
+
+def collected(told: str) -> list[str]:
+    return [line for line in told.splitlines() if "::" in line]
+
+
+def test_a_foreign_project_is_not_surprised(run, project: Path) -> None:
+    code, told = run("--collect-only", "-q")
+    assert (code, collected(told)) == (0, ["test_own.py::test_own"])
+    assert not (project / "simscen-out").exists()
+
+
+def test_where_the_configuration_names_folders_scenarios_are_collected_there_and_nowhere_else(
+    run, project: Path
+) -> None:
+    (project / "pytest.ini").write_text("[pytest]\nsimscen_paths = scenarios\nsimscen_seed = 9\n")
+    (project / "elsewhere.scenario.yaml").write_text(ROOM)
+    code, told = run("--collect-only", "-q", "-k", "good or elsewhere or test_own")
+    assert code == 0, told
+    assert collected(told) == ["scenarios/good.scenario.yaml::good", "test_own.py::test_own"]
+    code, told = run("--collect-only", "-q", "elsewhere.scenario.yaml")  # named, so asked for
+    assert collected(told) == ["elsewhere.scenario.yaml::elsewhere"]
+
+
+def test_every_run_is_an_item_with_the_name_of_the_command_line_and_its_tags(run) -> None:
+    code, told = run("--simscen", "--collect-only", "-q", "scenarios", "--simscen-repeat", "2", "-m", "smoke")
+    assert code == 0, told
+    names = [line.partition("::")[2] for line in collected(told)]
+    assert names == [
+        "good (seed 1)", "good (seed 2)", "held (seed 1)", "held (seed 2)", "later (seed 1)", "later (seed 2)",
+        "speeds[time_limit=0.1s] (seed 1)", "speeds[time_limit=0.1s] (seed 2)",
+        "speeds[time_limit=0.2s] (seed 1)", "speeds[time_limit=0.2s] (seed 2)",
+    ]  # fmt: skip
+
+
+def test_runs_pass_fail_with_simscens_own_words_are_skipped_and_expected_to_fail(run, project: Path) -> None:
+    code, told = run("--simscen", "-p", "no:xdist", "scenarios", "--junitxml=junit.xml", "--simscen-out=logs")
+    assert code == 1, told
+    assert re.search(r"2 failed, 3 passed, 1 skipped, 1 xfailed", told)
+    assert "Traceback" not in told
+    assert re.search(r"^clearance: 0\.\d\d m < 2.00 m, at t = ", told, re.MULTILINE)
+    assert re.search(r"^scenario  scenarios/bad.scenario.yaml:7$", told, re.MULTILINE)
+    assert re.search(r"^again     simscen run scenarios/bad.scenario.yaml --seed 1$", told, re.MULTILINE)
+    picture = re.search(r"^picture   (logs/\S+-pytest/runs/scenarios/bad/seed-1/map.png)$", told, re.MULTILINE)
+    assert picture and (project / picture[1]).is_file()
+    assert re.search(r"^FAILED scenarios/bad.scenario.yaml::bad - clearance: 0", told, re.MULTILINE)
+    assert "FAILED scenarios/held.scenario.yaml::held" in told  # strict, as for `simscen run`
+    cases = {case.get("name"): case for case in ElementTree.parse(project / "junit.xml").iter("testcase")}
+    failure = cases["bad"].find("failure")
+    assert failure is not None and str(failure.get("message")).startswith("clearance: 0.")
+    assert cases["known"].find("skipped").get("message") == "too near to the wall"  # type: ignore[union-attr]
+    assert {one.get("name") for one in cases["good"].iter("property")} >= {"seed", "log", "again"}
+
+
+def test_workers_share_a_folder_and_what_failed_runs_again(run, project: Path) -> None:
+    code, told = run("--simscen", "-n2", "scenarios", "-k", "good or bad")
+    assert code == 1, told
+    assert "1 failed, 1 passed" in told
+    assert re.search(r"^clearance: 0\.\d\d m < 2.00 m, at t = ", told, re.MULTILINE)
+    assert len(list((project / "simscen-out").iterdir())) == 1
+    code, told = run("--simscen", "-p", "no:xdist", "scenarios", "--lf")
+    assert "1 failed" in told and "passed" not in told.splitlines()[-1]
+
+
+def test_a_wrong_file_is_an_error_of_the_collection_with_line_and_hint(run, project: Path) -> None:
+    (project / "scenarios/wrong.scenario.yaml").write_text(ROOM.replace("goals", "gaols"))
+    code, told = run("--simscen", "-p", "no:xdist", "scenarios")
+    assert code == 2
+    assert "wrong.scenario.yaml:5:1: error[SC012]" in told
+    assert "Traceback" not in told
+
+
+def test_a_stack_and_a_seed_that_cannot_be_are_told_in_words(run, project: Path) -> None:
+    code, told = run("--simscen", "-p", "no:xdist", "scenarios/good.scenario.yaml", "--simscen-stack", "nothing")
+    assert code == 2 and "cannot read --stack nothing" in told and "Traceback" not in told
+    (project / "pytest.ini").write_text("[pytest]\nsimscen_seed = seven\n")
+    code, told = run("--simscen", "-p", "no:xdist", "scenarios/good.scenario.yaml")
+    assert code == 2 and "simscen_seed: 'seven' is not a whole number" in told
+
+
+def test_the_fixture_runs_a_scenario_in_a_test_and_says_why_it_did_not_pass(run, project: Path) -> None:
+    (project / "test_own.py").write_text(TEST)
+    code, told = run("-p", "no:xdist", "test_own.py")
+    assert code == 1, told
+    assert "1 failed, 1 passed" in told
+    assert re.search(r"<Run of scenarios/bad, seed 1: failed; clearance 0\.\d\d m \(≥ 2.00 m\)>.passed", told)
