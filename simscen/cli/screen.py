@@ -12,9 +12,10 @@ from typing import TextIO
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import Exit, UsageError
 from simscen.core.sessionevents import SessionEvent
-from simscen.report.console import Reporter, text_reporter
+from simscen.report.console import text_reporter
 from simscen.report.github import github_reporter
 from simscen.report.machine import json_reporter
+from simscen.report.plain import Reporter
 from simscen.run.outfolder import probe_writable
 
 STEP_SUMMARY = "GITHUB_STEP_SUMMARY"

@@ -10,16 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from simscen.pytesting.names import OUT
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
     from simscen.pytesting.fixture import Simscen
-    from simscen.pytesting.runner import Runner
 
-RUNNER: pytest.StashKey[Runner] = pytest.StashKey()
 SUFFIXES = (".scenario.yaml", ".scenario.yml")
-OUT = "simscen_out"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -87,12 +86,6 @@ def pytest_configure_node(node: Any) -> None:
     from simscen.pytesting.runner import runner_of
 
     node.workerinput[OUT] = str(runner_of(node.config).folder)
-
-
-def pytest_unconfigure(config: pytest.Config) -> None:
-    """End the warm process."""
-    if (runner := config.stash.get(RUNNER, None)) is not None:
-        runner.close()
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ import pytest
 from simscen.core.sessionevents import RunFinished
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of
-from simscen.pytesting.plugin import OUT, RUNNER
+from simscen.pytesting.names import OUT
 from simscen.run.outfolder import DEFAULT, run_folder
 from simscen.run.process.answer import answer_to
 from simscen.run.process.jobs import Job
@@ -46,10 +46,14 @@ class Runner:
         self._closing.close()
 
 
+_RUNNER: pytest.StashKey[Runner] = pytest.StashKey()
+
+
 def runner_of(config: pytest.Config) -> Runner:
-    """That of this process; a worker of xdist is told its folder."""
-    if (known := config.stash.get(RUNNER, None)) is None:
-        known = config.stash[RUNNER] = Runner(_folder(config))
+    """That of this process, until pytest ends; a worker of xdist is told its folder."""
+    if (known := config.stash.get(_RUNNER, None)) is None:
+        known = config.stash[_RUNNER] = Runner(_folder(config))
+        config.add_cleanup(known.close)
     return known
 
 

@@ -9,7 +9,8 @@ from simscen.judge.wording import tightest
 from simscen.report.checkout import in_checkout
 from simscen.report.comparedpage import as_markdown
 from simscen.report.complaints import broken, complaints, excused, label, scenario_file
-from simscen.report.console import Reporter, text_reporter
+from simscen.report.console import text_reporter
+from simscen.report.plain import Reporter
 from simscen.report.text import one_line
 
 _MEANINGFUL = {ord(sign): f"&#{ord(sign)};" for sign in "\\`*_[]|~#@&<>"}

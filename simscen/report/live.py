@@ -19,9 +19,9 @@ from simscen.core.sessionevents import (
     SessionEvent,
     SessionFinished,
 )
-from simscen.report.console import PlainReporter
 from simscen.report.line import Line, text_of
 from simscen.report.look import Look
+from simscen.report.plain import PlainReporter
 from simscen.report.remaining import Remaining
 from simscen.report.telling import Telling
 from simscen.report.text import no_command, one_line
