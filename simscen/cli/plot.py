@@ -33,7 +33,8 @@ def command(
 
 
 def _draw(log: Log, file: Path, picture: Path) -> None:
-    from simscen.report.picture import Scene, with_robots, write_picture
+    from simscen.report.picture.compose import write_picture
+    from simscen.report.picture.scene import Scene, with_robots
 
     try:
         scenery = scenery_of(log.about)

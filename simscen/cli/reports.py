@@ -5,6 +5,7 @@ import os
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from enum import Enum
+from functools import cached_property
 from pathlib import Path
 
 from simscen.cli import circumstances
@@ -16,8 +17,9 @@ from simscen.core.result import Outcome
 from simscen.core.sessionevents import RunFinished, SessionFinished
 from simscen.report.journaldata import NAME
 from simscen.report.junit import Family, to_xml
-from simscen.report.page import to_html
 from simscen.report.results import to_json
+from simscen.report.suite import Live, Session, to_html
+from simscen.report.suite.history import Past, past_sessions
 from simscen.run.outfolder import RUNS, probe_writable, write_atomically
 
 PAGE = "report.html"
@@ -63,11 +65,24 @@ class Reports:
         whole = {
             self.folder / "results.json": to_json(answers, str(self.folder), comparison).encode(),
             self.folder / "junit.xml": junit,
-            self.folder / PAGE: to_html(answers, comparison=comparison).encode(),
+            self.folder / PAGE: self._page(answers, comparison),
         }
         documents = {**({} if self._only else whole), self.junit: junit}
         outcomes = [_written(path, data) for path, data in documents.items()]  # every one is tried
         return all(outcomes)
+
+    def write_live(self, answers: Sequence[RunFinished], live: Live) -> bool:
+        """Write the page of a session that goes on."""
+        page = to_html(Session(answers, self._past, folder=str(self.folder), live=live))
+        return _written(self.folder / PAGE, page.encode())
+
+    def _page(self, answers: Sequence[RunFinished], comparison: Comparison | None) -> bytes:
+        files = ("results.json", "junit.xml", "run.json")
+        return to_html(Session(answers, self._past, comparison, str(self.folder), files)).encode()
+
+    @cached_property
+    def _past(self) -> Sequence[Past]:
+        return past_sessions(self.folder)
 
     def end(self, wall: float) -> bool:
         """Write run.json anew, with the seconds that the session took."""

@@ -86,6 +86,9 @@ def command(
     watch: Annotated[
         bool, typer.Option("--watch", help="Stay, and run again what a saved file touches; keys are told then.")
     ] = False,
+    open_: Annotated[
+        bool, typer.Option("--open", help="Open the report in a browser, where it follows the runs as they end.")
+    ] = False,
     variation: Annotated[
         list[str] | None, typer.Option(help="Only the variation of exactly this name; repeatable.")
     ] = None,
@@ -127,5 +130,6 @@ def command(
         format_,
         durations,
         last_failed,
+        open_,
     )
     sys.exit(watched(asked) if watch else session(asked))

@@ -11,6 +11,7 @@ from typing import Protocol
 from simscen.cli.diagnostics import as_text, print_text
 from simscen.cli.interrupts import signals_interrupt
 from simscen.cli.lastfailed import failed_runs
+from simscen.cli.livepage import LivePage
 from simscen.cli.reports import JunitFamily, Reports, require_writable, verdict
 from simscen.cli.screen import Format, Screen, screen
 from simscen.cli.select import Selection, load_all
@@ -18,7 +19,7 @@ from simscen.cli.stacks import commands_of
 from simscen.cli.work import Work, begin
 from simscen.core.errors import Exit, UsageError
 from simscen.core.result import RunKey
-from simscen.core.sessionevents import SessionEvent
+from simscen.core.sessionevents import Listener, SessionEvent
 from simscen.judge.measure.compare import compare
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of_all
@@ -61,6 +62,7 @@ class Asked:
     format_: Format = Format.TEXT
     durations: int | None = None
     last_failed: bool = False
+    open_: bool = False
 
 
 def session(asked: Asked, observer: Observer | None = None) -> Exit:
@@ -85,7 +87,8 @@ def session(asked: Asked, observer: Observer | None = None) -> Exit:
     reports.begin()
     work = begin(journal, plan(scenarios, options, folder), options.workers)
     with screen(asked.format_, asked.durations) as shown:
-        code = _run(work, options, reports, shown, observer)
+        listeners: list[Listener] = [*([observer] if observer else []), *([LivePage(reports)] if asked.open_ else [])]
+        code = _run(work, options, reports, shown, listeners)
     return shown.exit(code)
 
 
@@ -97,19 +100,22 @@ def _last_failed(scenarios: Sequence[LoadedScenario], asked: Asked) -> frozenset
     return only
 
 
-def _run(work: Work, options: Options, reports: Reports, shown: Screen, observer: Observer | None) -> Exit:
-    """Do what is left to do, tell the journal, the screen and the reports, and say how it went."""
+def _run(work: Work, options: Options, reports: Reports, shown: Screen, listeners: Sequence[Listener]) -> Exit:
+    """Do what is left to do, tell the journal, the screen, all who listen and the reports, and say how it went."""
     begun = time.monotonic()
+
+    def show(event: SessionEvent) -> None:
+        shown(event)
+        for each in listeners:
+            each(event)
 
     def listen(event: SessionEvent) -> None:
         work.journal(event)
-        shown(event)
-        if observer is not None:
-            observer(event)
+        show(event)
 
-    shown(work.started(reports.folder))
+    show(work.started(reports.folder))
     for answer in work.kept:
-        shown(answer)
+        show(answer)
     with signals_interrupt():
         answers, stopped = run_session(work.jobs, options, WARM_PROCESS, listen)
     answers = [*work.kept, *answers]

@@ -11,7 +11,8 @@ import simscen.sim.simulation
 import simscen.stack.build  # noqa: F401 - engines are imported here so that the forks need not
 from simscen.core.run import Run
 from simscen.record.replay import read_run
-from simscen.report.picture import Scene, with_robots, write_picture
+from simscen.report.picture.compose import write_picture
+from simscen.report.picture.scene import Scene, with_robots
 from simscen.run.perform import perform
 from simscen.run.prepare import Prepared
 from simscen.run.prepared_cache import PreparedCache

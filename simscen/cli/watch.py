@@ -31,6 +31,8 @@ def watched(asked: Asked) -> int:
     for name, value in (("--out", asked.out), ("--resume", asked.resume)):
         if value is not None:
             raise UsageError(f"--watch and {name} exclude each other: every session has a folder of its own")
+    if asked.open_:
+        raise UsageError("--watch and --open exclude each other: every session has a page of its own")
     if asked.wanted.shard != (1, 1):
         raise UsageError("--watch and --shard exclude each other")
     home = asked.root or default_root(asked.paths)

@@ -68,7 +68,7 @@ class RunFinished:
     """A run is over: its result, and what only this session knows of it.
 
     `wall` is in seconds. `again` is the command that repeats the run from the working folder, and `file` the scenario
-    as seen from there, for people to open; "" = the result's own.
+    as seen from there, for people to open; "" = the result's own. `tags` are the scenario's.
     """
 
     result: RunResult
@@ -76,6 +76,7 @@ class RunFinished:
     artifacts: Artifacts = field(default_factory=Artifacts)
     again: str = ""
     file: str = ""
+    tags: tuple[str, ...] = ()
 
     @property
     def key(self) -> RunKey:

@@ -44,10 +44,12 @@ def read_planned(data: dict[str, Any]) -> Planned:
 def run_data(run: RunFinished, folder: Path) -> dict[str, Any]:
     """An answer as plain data: its result.json and what that leaves out. Files are relative to `folder`."""
     files = {name: relative(path, str(folder)) if path else "" for name, path in asdict(run.artifacts).items()}
-    return {"wall": run.wall, "again": run.again, "file": run.file, "files": files, "result": as_data(run.result)}
+    about = {"wall": run.wall, "again": run.again, "file": run.file, "tags": list(run.tags)}
+    return {**about, "files": files, "result": as_data(run.result)}
 
 
 def read_run(data: dict[str, Any], folder: Path) -> RunFinished:
     """The answer that `run_data` described, its files now in `folder`. Raises KeyError, TypeError or ValueError."""
     files = {name: str(folder / path) if path else "" for name, path in data["files"].items()}
-    return RunFinished(from_data(data["result"]), data["wall"], Artifacts(**files), data["again"], data["file"])
+    result, tags = from_data(data["result"]), tuple(data.get("tags", ()))
+    return RunFinished(result, data["wall"], Artifacts(**files), data["again"], data["file"], tags)

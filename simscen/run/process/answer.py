@@ -33,19 +33,26 @@ def answer_to(job: Job, end: ProcessEnd | PreparerDeath) -> RunFinished:
         artifacts=_artifacts(job.folder),
         again=repeat_command(job.scenario, job.key.seed),
         file=shown(job.scenario.file),
+        tags=tuple(job.scenario.spec.tags),
     )
 
 
 def not_done(job: Job, failure: RunFailure) -> RunFinished:
     """The answer to a run that was never finished, or never begun."""
     result = unfinished(job.key, job.scenario.path, failure, job.scenario.stack)
-    return RunFinished(result, again=repeat_command(job.scenario, job.key.seed), file=shown(job.scenario.file))
+    return _told(job, result)
 
 
 def not_to_do(job: Job, reason: str) -> RunFinished:
     """The answer to a run that its scenario says to skip."""
     result = skipped(job.key, job.scenario.path, reason, job.scenario.stack)
-    return RunFinished(result, again=repeat_command(job.scenario, job.key.seed), file=shown(job.scenario.file))
+    return _told(job, result)
+
+
+def _told(job: Job, result: RunResult) -> RunFinished:
+    """The answer to a run that never began, or was never finished."""
+    again, file = repeat_command(job.scenario, job.key.seed), shown(job.scenario.file)
+    return RunFinished(result, again=again, file=file, tags=tuple(job.scenario.spec.tags))
 
 
 def _result(job: Job, said: str) -> RunResult:

@@ -17,8 +17,10 @@ from simscen.judge.sketch import sketch, sketch_case
 from simscen.loading.scenario import load_scenario
 from simscen.record.replay import read_log
 from simscen.record.sceneryfile import scenery_of
-from simscen.report.picture import Scene, compose, draw, parts, sidebar, with_robots
+from simscen.report.picture import compose, sidebar
 from simscen.report.picture.canvas import COARSE
+from simscen.report.picture.compose import draw, parts
+from simscen.report.picture.scene import Scene, with_robots
 from simscen.run.prepare import prepare
 from simscen.run.scenery import scenery_of as scenery_in
 from simscen.run.simulate import simulate

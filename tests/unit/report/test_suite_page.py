@@ -1,0 +1,225 @@
+"""report.html as text: what is on it, in which order, and that nothing from outside is more than text."""
+
+import json
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import pytest
+from PIL import Image
+
+from simscen.core.result import Outcome, RunKey
+from simscen.core.sessionevents import Artifacts
+from simscen.report.results import to_json
+from simscen.report.suite import Live, Session, pictures, to_html
+from simscen.report.suite.bits import anchor
+from simscen.report.suite.history import past_sessions
+from simscen.report.suite.run import share_left, theme
+
+VOID = ("meta", "img", "input", "rect", "polyline", "circle")
+
+
+def of(run, **changes):
+    """The run with another result."""
+    return replace(run, result=replace(run.result, **changes))
+
+
+def called(run, scenario, seed=1, variation=""):
+    """The same run of another scenario."""
+    return of(run, key=RunKey(scenario, seed, variation))
+
+
+class Tags(HTMLParser):
+    def __init__(self):
+        super().__init__()
+        self.seen, self.open = [], []
+
+    def handle_starttag(self, tag, attributes):
+        self.seen.append((tag, dict(attributes)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attributes):
+        self.seen.append((tag, dict(attributes)))
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def parsed(html):
+    tags = Tags()
+    tags.feed(html)
+    assert tags.open == []
+    return tags.seen
+
+
+def runs_on(html):
+    return [attributes for tag, attributes in parsed(html) if tag == "details" and "run" in attributes["class"].split()]
+
+
+def test_what_did_not_pass_comes_first_and_stands_open(passed, failed, crashed):
+    html = to_html(Session([passed, failed, crashed]))
+    assert ["open" in attributes for attributes in runs_on(html)] == [True, True, False]
+    assert [attributes["data-status"] for attributes in runs_on(html)] == ["error", "failed", "passed"]
+    assert "<h1>✓ 1 passed, ✗ 1 failed, ! 1 error</h1>" in html
+
+
+def test_each_violated_criterion_has_a_line_with_its_reason_and_where_it_is_written(failed):
+    html = to_html(Session([failed]))
+    row = html[html.index("<td>fail</td>") : html.index("</tr>", html.index("<td>fail</td>"))]
+    assert "stopped_within" in row
+    assert "0.84 s &gt; 0.50 s after lidar.off, at t = 10.84 s, (2.10, 3.41)" in row
+    assert "<li>drove 0.31 m blind" in row
+    assert f"{failed.result.path}:27" in row
+    assert "<td>warning</td><td>speed</td>" in html
+
+
+def test_text_from_outside_makes_no_tag_no_attribute_and_no_link(passed, crashed):
+    evil = '"><script>alert(1)</script><img src=x onerror=y>'
+    bad = replace(
+        of(passed, key=RunKey(f"{evil}/x", 1, evil, "s"), reason=evil, ended=evil),
+        again=evil,
+        file=f"javascript:{evil}",
+        tags=(evil, "javascript:1"),
+        artifacts=Artifacts("javascript:1", "javascript:alert(1)", "/etc/passwd", "out/../../x"),
+    )
+    harmless = {tag for tag, _ in parsed(to_html(Session([passed, crashed])))}
+    html = to_html(Session([bad, crashed], folder="out", title=evil))
+    seen = parsed(html)
+    assert {tag for tag, _ in seen} <= harmless | {"option", "select", "span"}
+    assert [tag for tag, _ in seen].count("script") == 1
+    assert not any(name.startswith("on") for _, attributes in seen for name in attributes)
+    assert not any("javascript" in (attributes.get("href") or "") for _, attributes in seen)
+    assert not [attributes for tag, attributes in seen if tag == "a"]
+    assert not re.search("\x1b", html)
+
+
+def test_nothing_but_the_pages_own_style_and_script_is_let_in(passed):
+    html = to_html(Session([passed]))
+    policy = next(a["content"] for tag, a in parsed(html) if a.get("http-equiv") == "Content-Security-Policy")
+    assert policy.startswith("default-src 'none'; img-src data:; style-src 'sha256-")
+    assert "unsafe" not in policy
+    assert not [a for _, a in parsed(html) if "style" in a or (a.get("src") or "data:")[:5] != "data:"]
+
+
+def test_the_same_results_give_the_same_bytes_in_whatever_order_they_came(passed, failed, crashed):
+    runs = [replace(passed, tags=("b", "a")), failed, crashed]
+    assert to_html(Session(runs)) == to_html(Session(runs[::-1]))
+
+
+def test_a_scenario_that_runs_several_times_is_a_group_with_a_sign_for_each_run(passed, failed):
+    group = [called(passed, "a/speeds", seed, variation) for seed in (1, 2) for variation in ("slow", "fast")]
+    html = to_html(Session([*group, called(failed, "a/speeds", 3, "slow"), called(passed, "b/alone")]))
+    assert "4 of 5 as they should be" in html
+    assert 'aria-label="each run: passed, passed, passed, passed, failed"' in html
+    assert html.count('class="group many" open') == 1
+    assert html.count('class="group"') == 1
+
+
+def test_runs_tell_what_they_are_filtered_and_sorted_by(failed):
+    (data,) = runs_on(to_html(Session([replace(failed, tags=("door", "smoke"))])))
+    found = {name: value for name, value in data.items() if name.startswith("data-")}
+    assert found == {
+        "data-status": "failed",
+        "data-tags": "door smoke",
+        "data-theme": "faults",
+        "data-simulated": "31.000",
+        "data-wall": "0.350",
+        "data-margin": "-0.6800",
+    }
+
+
+def test_the_least_margin_is_a_share_of_its_limit(passed, failed):
+    assert share_left(passed) == pytest.approx(0.014)
+    assert share_left(failed) == pytest.approx(-0.68)
+    assert theme(RunKey("navigation/goal", 1)) == "navigation"
+    assert theme(RunKey("goal", 1)) == ""
+
+
+def test_every_run_has_an_anchor_of_its_own(passed):
+    keys = [RunKey("a/b", 1), RunKey("a/b", 2), RunKey("a/b", 1, "x=1"), RunKey("a/b", 1, "x=1", "dwb")]
+    assert [anchor(key) for key in keys] == [
+        "run-a-b-seed-1", "run-a-b-seed-2", "run-a-b-x=1-seed-1", "run-a-b-x=1-seed-1-dwb",
+    ]  # fmt: skip
+
+
+def test_links_lead_to_what_the_run_left_in_the_folder(failed, tmp_path):
+    folder = tmp_path / "out"
+    (folder / "runs/a b").mkdir(parents=True)
+    (folder / "runs/a b/worker.log").write_text("said")
+    (folder / "runs/a b/stack.log").write_text("")
+    run = replace(failed, artifacts=Artifacts(str(folder / "runs/a b"), str(folder / "runs/a b/run.mcap")))
+    links = [a["href"] for tag, a in parsed(to_html(Session([run], folder=str(folder)))) if tag == "a"]
+    assert links == ["./runs/a%20b/run.mcap", "./runs/a%20b/worker.log"]
+
+
+def test_the_picture_is_inside_the_page(failed, tmp_path):
+    path = tmp_path / "map.png"
+    Image.new("RGB", (4, 4)).save(path)
+    html = to_html(Session([replace(failed, artifacts=Artifacts(picture=str(path)))]))
+    (image,) = [attributes for tag, attributes in parsed(html) if tag == "img"]
+    assert image["src"].startswith("data:image/png;base64,")
+    assert image["alt"] == "map of faults/lidar_off, seed 7: failed"
+
+
+def test_a_picture_that_is_gone_is_left_out(failed):
+    assert "<img" not in to_html(Session([failed]))
+
+
+def test_pictures_fill_the_page_only_so_far_and_those_of_failures_first(passed, failed, tmp_path, monkeypatch):
+    picture = tmp_path / "map.png"
+    Image.new("L", (8, 8)).save(picture)
+    monkeypatch.setattr(pictures, "MOST_BYTES", picture.stat().st_size)
+    runs = [replace(run, artifacts=Artifacts(picture=str(picture))) for run in (passed, failed)]
+    html = to_html(Session(runs))
+    assert [tag for tag, _ in parsed(html)].count("img") == 1
+    assert html.index("<img") < html.index(f"picture: <code>{picture}")
+
+
+@pytest.fixture
+def sessions(tmp_path, passed, failed):
+    """A folder with two sessions, and a third that has just ended."""
+    out = tmp_path / "simscen-out"
+    runs = [called(passed, "a/flaky"), called(passed, "a/steady")]
+    broke = [called(failed, "a/flaky"), called(passed, "a/steady")]
+    for number, (name, answers) in enumerate((("one", runs), ("two", broke), ("three", runs))):
+        (out / name).mkdir(parents=True)
+        (out / name / "results.json").write_text(to_json(answers))
+        (out / name / "events.jsonl").write_text("")
+        (out / name / "run.json").write_text(json.dumps({"written": f"2026-01-0{number + 1}T00:00:00+00:00"}))
+    (out / "latest").symlink_to("three")
+    return out
+
+
+def test_sessions_before_it_are_told_the_newest_first_and_what_has_changed(sessions, passed):
+    past = past_sessions(sessions / "three")
+    assert [session.name for session in past] == ["two", "one"]
+    html = to_html(Session([called(passed, "a/flaky"), called(passed, "a/steady")], past))
+    assert "1 newly passing" in html
+    assert html.index("../two/report.html") < html.index("../one/report.html")
+    assert '<a href="#run-a-flaky-seed-1">a/flaky, seed 1</a>: passed, failed before' in html
+    assert 'aria-label="last sessions and this: passed, failed, passed">✓✗✓</span>' in html
+    assert [run.get("data-changed") for run in runs_on(html)] == ["1", None]
+
+
+def test_a_session_that_left_no_results_or_damaged_ones_is_passed_over(sessions, tmp_path):
+    (sessions / "two/results.json").write_text("{")
+    (sessions / "one/results.json").unlink()
+    assert past_sessions(sessions / "three") == []
+    assert past_sessions(tmp_path / "elsewhere") == []
+
+
+def test_a_page_of_a_session_that_goes_on_says_how_far_it_is_and_comes_again(passed, failed):
+    html = to_html(Session([passed], live=Live(3, (failed.key,))))
+    assert "1 of 3 runs done, under way: faults/lidar_off, seed 7" in html
+    assert "<noscript><meta http-equiv=refresh" in html
+    assert "refresh" not in to_html(Session([passed])).replace("refreshing", "").partition("<script>")[0]
+
+
+def test_a_session_without_a_run_has_a_page_too():
+    assert "<h1>✓ 0 passed</h1>" in to_html(Session([], live=Live(5)))
+
+
+def test_every_outcome_has_a_sign_beside_its_colour(passed):
+    page = to_html(Session([passed]))
+    assert f'class="pill {Outcome.PASSED.value}"><span aria-hidden="true">✓ </span>passed' in page
