@@ -14,7 +14,7 @@ LOWEST_TESTS := tests/diagnostics tests/cases $(addprefix tests/unit/,cli loadin
 
 ROS := .venv-ros
 
-.PHONY: help setup run test test-lowest test-long test-ros served library check lint types layers schemas docs mutation bench campaign fuzz build clean
+.PHONY: help setup run test test-lowest test-long test-ros served library check lint types layers schemas docs mutation screenshots bench campaign fuzz build clean
 
 help:  ## Print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -82,6 +82,9 @@ docs: setup  ## Write schemas/ and docs/reference/ anew
 
 mutation: setup  ## Change what decides verdicts, a little at a time: some test must fail each time (long)
 	@nice -n 10 $(BIN)/python tests/mutation/run.py --write
+
+screenshots: setup  ## Take the pictures of the replay page for the docs (needs Chromium)
+	@$(BIN)/python tests/browser/screenshots.py
 
 bench: setup  ## Measure speed (simscen bench)
 	@$(BIN)/simscen bench

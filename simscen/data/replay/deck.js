@@ -41,8 +41,9 @@ export class Deck {
     for (const strip of this.strips.values()) strip.draw(this.from, this.to, width, colours);
     const step = roundSeconds((this.to - this.from) / Math.max(2, width / 90)), marks = [];
     for (let k = Math.ceil(this.from / step - 1e-9); k * step <= this.to + 1e-9; k++) {
-      const mark = el("span", {}, `${Number((k * step).toFixed(2))} s`);
-      mark.style.left = `${((k * step - this.from) / (this.to - this.from)) * 100}%`;
+      const share = (k * step - this.from) / (this.to - this.from), mark = el("span", {}, `${Number((k * step).toFixed(2))} s`);
+      if (share > 0.985) continue;
+      mark.style.left = `${share * 100}%`;
       marks.push(mark);
     }
     fill(this.axis, ...marks);

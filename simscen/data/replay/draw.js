@@ -18,8 +18,9 @@ export function drawRun(view, run, tick) {
     if (view.layers.has("goals")) drawGoals(view, robot, robot.goalAt(tick));
   }
   if (view.layers.has("things")) for (const thing of run.thingsAt(tick)) drawThing(view, thing);
-  run.robots.forEach((robot, number) => drawRobot(view, robot, number, tick, run));
   drawMarks(view, run, tick);
+  run.robots.forEach((robot, number) => drawRobot(view, robot, number, tick, run));
+  if (view.marked) ring(view, view.marked, colours.select, 0.35 * view.camera.scale + 8);
   drawScale(view);
 }
 
@@ -205,7 +206,16 @@ function drawHatched(view, points, colour, said) {
   c.setLineDash([6, 4]);
   c.stroke();
   c.setLineDash([]);
-  if (said) label(view, said, ...middle(points), colour);
+  if (said) corner(view, said, points, colour);
+}
+
+/** A name inside the upper left of an area: its middle is where things happen. */
+function corner(view, text, points, colour) {
+  const { context: c } = view, [u, v] = spot(view, Math.min(...points.map((p) => p[0])), Math.max(...points.map((p) => p[1])));
+  c.font = "600 11px system-ui, sans-serif";
+  c.textAlign = "left";
+  c.textBaseline = "top";
+  halo(view, text, Math.max(u, 0) + 6, Math.max(v, 16) + 5, colour);
 }
 
 function boxOf({ origin: [ox, oy, yaw], resolution }, [column, row, width, height]) {
@@ -286,7 +296,18 @@ function drawThing(view, thing) {
     c.stroke();
   }
   if (thing.person) drawHeading(view, thing.pose, colour, 0.3);
-  label(view, thing.name, thing.pose.x, thing.pose.y, colour, -0.45 * view.camera.scale - 6);
+  nameThing(view, thing, parts, colour);
+}
+
+/** Its name above it; small and quiet where it belongs to the world, as doors do. */
+function nameThing(view, thing, parts, colour) {
+  const { context: c, colours } = view, cos = Math.cos(thing.pose.yaw), sin = Math.sin(thing.pose.yaw);
+  const corners = parts.flat().map(([x, y]) => spot(view, thing.pose.x + cos * x - sin * y, thing.pose.y + sin * x + cos * y));
+  const us = corners.map(([u]) => u);
+  c.font = thing.brought ? "600 12px system-ui, sans-serif" : "10px system-ui, sans-serif";
+  c.textAlign = "center";
+  c.textBaseline = "bottom";
+  halo(view, thing.name, (Math.min(...us) + Math.max(...us)) / 2, Math.min(...corners.map(([, v]) => v)) - 4, thing.brought ? colour : colours.faint);
 }
 
 function drawHeading(view, pose, colour, length) {
@@ -391,7 +412,6 @@ function drawMarks(view, run, tick) {
   for (const { verdict, finding } of run.failures) {
     if (finding.place) crossed(view, finding.place, verdict.severity === "warn" ? colours.odd : colours.bad);
   }
-  if (view.marked) ring(view, view.marked, colours.select);
 }
 
 function spotOf(run, event) {
@@ -414,14 +434,23 @@ function star(view, [x, y], colour) {
   c.stroke();
 }
 
+/** A cross on a pin, so that what stands at the place is seen. */
 function crossed(view, [x, y], colour) {
-  const { context: c } = view, [u, v] = spot(view, x, y);
+  const { context: c } = view, [u, foot] = spot(view, x, y), v = foot - Math.max(0.35 * view.camera.scale, 10) - 16;
+  c.beginPath();
+  c.moveTo(u, foot);
+  c.lineTo(u, v);
+  c.strokeStyle = colour;
+  c.lineWidth = 1.5;
+  c.stroke();
+  c.beginPath();
+  c.arc(u, foot, 2.5, 0, 2 * Math.PI);
+  c.fillStyle = colour;
+  c.fill();
   c.beginPath();
   c.arc(u, v, 10, 0, 2 * Math.PI);
   c.fillStyle = view.colours.free;
-  c.globalAlpha = 0.9;
   c.fill();
-  c.globalAlpha = 1;
   c.strokeStyle = colour;
   c.lineWidth = 2;
   c.stroke();
@@ -434,10 +463,10 @@ function crossed(view, [x, y], colour) {
   c.stroke();
 }
 
-function ring(view, [x, y], colour) {
+function ring(view, [x, y], colour, reach) {
   const { context: c } = view, [u, v] = spot(view, x, y);
   c.beginPath();
-  c.arc(u, v, 17, 0, 2 * Math.PI);
+  c.arc(u, v, Math.max(reach, 17), 0, 2 * Math.PI);
   c.strokeStyle = colour;
   c.lineWidth = 3;
   c.stroke();

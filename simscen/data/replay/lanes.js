@@ -9,7 +9,7 @@ export const LANES = [
   { id: "recoveries", name: "Recoveries" },
   { id: "failures", name: "Failures" },
 ];
-const ROW = 18, QUIET = new Set(["goal.reached", "goal.passed", "goal.canceled", "recovery.ended", "collision.ended", "fault.ended",
+const QUIET = new Set(["goal.reached", "goal.passed", "goal.canceled", "recovery.ended", "collision.ended", "fault.ended",
   "fault.took_effect", "event.ended", "object.moved"]);
 
 /** What an event is called in a list: its kind's last word, its name, what is said of it. */
@@ -27,37 +27,41 @@ export class Lanes {
   constructor(runs, chosen) {
     this.runs = runs;
     this.chosen = chosen;
+    this.groups = runs.flatMap((run) => run.robots.map((robot, number) => ({ run, robot: robot.name, first: number === 0 })));
+    this.row = this.groups.length > 1 ? 14 : 18;
     this.rows = LANES.filter((lane) => lane.id === "failures" || runs.some((run) => run.events.some((event) => event.lane === lane.id && isShown(event))));
-    this.tracks = this.rows.map(() => svg("svg", { class: "track", height: ROW * runs.length, "aria-hidden": "true" }));
-    this.element = el("div", { class: "lanes" }, ...this.rows.map((lane, k) => el("div", { class: "row" }, el("span", { class: "gutter" }, lane.name), this.tracks[k])));
+    this.tracks = this.rows.map(() => svg("svg", { class: "track", height: this.row * this.groups.length, "aria-hidden": "true" }));
+    this.element = el("div", { class: "lanes" }, ...this.rows.map((lane, k) => el("div", { class: "row" }, el("span", { class: "gutter" }, lane.name), runs.length > 1 ? letters(runs) : null, this.tracks[k])));
   }
 
   /** Draw them anew for the stretch [from, to] in seconds. */
   layOut(from, to, width, selected) {
     this.tracks.forEach((track, k) => {
       const at = (seconds) => ((seconds - from) / (to - from)) * width;
-      const signs = this.runs.flatMap((run, number) => this.#signs(run, this.rows[k].id, at, number * ROW, width, selected));
+      const signs = this.groups.flatMap((group, number) => this.#signs(group, this.rows[k].id, at, number * this.row, width, selected));
       fill(track, ...signs);
     });
   }
 
-  #signs(run, lane, at, top, width, selected) {
-    const events = run.events.filter((event) => event.lane === lane && isShown(event)).map((event) => this.#event(run, event, at, top, width, selected));
-    const failures = lane === "failures" ? run.failures.map((failure) => this.#failure(run, failure, at, top, width, selected)) : [];
+  /** Those of a robot; what happens to the world and has no robot is in the row of the first. */
+  #signs({ run, robot, first }, lane, at, top, width, selected) {
+    const mine = (whose) => (whose ?? "") === robot || (first && !whose);
+    const events = run.events.filter((event) => event.lane === lane && isShown(event) && mine(event.robot)).map((event) => this.#event(run, event, at, top, width, selected));
+    const failures = lane === "failures" ? run.failures.filter(({ verdict }) => mine(verdict.robot)).map((failure) => this.#failure(run, failure, at, top, width, selected)) : [];
     return [...events, ...failures].filter(Boolean);
   }
 
   #event(run, event, at, top, width, selected) {
-    const begin = at(event.tick / run.rate), end = event.until === undefined ? begin : at(event.until / run.rate);
+    const lasts = event.until > event.tick, begin = at(event.tick / run.rate), end = lasts ? at(event.until / run.rate) : begin;
     if (end < -8 || begin > width + 8) return null;
     const lit = selected?.kind === "e" && selected.number === event.number && selected.run === run;
-    const text = `${told(event)}, ${clockText(event.tick / run.rate)}${event.until === undefined ? "" : ` to ${clockText(event.until / run.rate)}`}${event.text ? `\n${event.text}` : ""}`;
+    const text = `${told(event)}, ${clockText(event.tick / run.rate)}${lasts ? ` to ${clockText(event.until / run.rate)}` : ""}${event.text ? `\n${event.text}` : ""}`;
     const look = `sign ${event.lane}${event.bad || event.ended === "goal.failed" ? " bad" : ""}${lit ? " lit" : ""}`;
     const choose = () => this.chosen(run, { kind: "e", number: event.number });
-    if (event.until === undefined) return svg("g", { class: look, onclick: choose }, svg("title", {}, text), sign(event, begin, top + ROW / 2));
+    if (!lasts) return svg("g", { class: look, onclick: choose }, svg("title", {}, text), sign(event, begin, top + this.row / 2));
     const wide = Math.max(end - begin, 3), name = event.robot ? `${event.robot}: ${event.name}` : event.name;
-    const shown = wide > 8 * name.length * 0.85 + 8 ? svg("text", { x: Math.max(begin, 0) + 6, y: top + ROW / 2 + 4 }, name) : null;
-    return svg("g", { class: look, onclick: choose }, svg("title", {}, text), svg("rect", { x: begin, y: top + 3, width: wide, height: ROW - 6, rx: 3 }), shown);
+    const shown = wide > 8 * name.length * 0.85 + 8 ? svg("text", { x: Math.max(begin, 0) + 6, y: top + this.row / 2 + 4 }, name) : null;
+    return svg("g", { class: look, onclick: choose }, svg("title", {}, text), svg("rect", { x: begin, y: top + 2, width: wide, height: this.row - 4, rx: 3 }), shown);
   }
 
   #failure(run, { verdict, finding }, at, top, width, selected) {
@@ -67,8 +71,13 @@ export class Lanes {
     const text = `${finding.what}: ${finding.said}, ${clockText(finding.tick / run.rate)}`;
     const look = `sign failures ${verdict.severity === "warn" ? "odd" : "bad"}${lit ? " lit" : ""}`;
     const choose = () => this.chosen(run, { kind: "v", number: verdict.number });
-    return svg("g", { class: look, onclick: choose }, svg("title", {}, text), cross(u, top + ROW / 2));
+    return svg("g", { class: look, onclick: choose }, svg("title", {}, text), cross(u, top + this.row / 2));
   }
+}
+
+/** Which row is whose, where two runs share a lane. */
+function letters(runs) {
+  return el("span", { class: "letters", "aria-hidden": "true" }, ...runs.map((run) => el("span", {}, run.letter)));
 }
 
 function sign(event, u, v) {

@@ -1,16 +1,16 @@
 // What a map can show, in the order in which it is drawn, with the colour that stands for it.
 
 export const LAYERS = [
-  { id: "map", name: "Map of the robot", key: "1" },
-  { id: "costmap", name: "Costmap", key: "2", off: true },
-  { id: "zones", name: "Zones and ground", key: "3", colour: "--zone", sign: "area" },
-  { id: "goals", name: "Goals", key: "4", colour: "--goal", sign: "ring" },
-  { id: "plan", name: "Plan", key: "5", colour: "--plan", sign: "line" },
-  { id: "local", name: "Local plan", key: "6", colour: "--local", sign: "line" },
-  { id: "things", name: "Things and people", key: "7", colour: "--thing", sign: "area" },
-  { id: "scan", name: "Scan, from the belief", key: "8", colour: "--scan", sign: "dots" },
-  { id: "belief", name: "Belief, particles, 95 % ellipse", key: "9", colour: "--belief", sign: "dash" },
-  { id: "truth", name: "Robot and its way (truth)", key: "0", colour: "--truth", sign: "line" },
+  { id: "map", name: "Map of the robot", key: "1", sign: "area" },
+  { id: "costmap", name: "Costmap", key: "2", sign: "area", off: true },
+  { id: "zones", name: "Zones and ground", key: "3", sign: "area" },
+  { id: "goals", name: "Goals", key: "4", sign: "ring" },
+  { id: "plan", name: "Plan", key: "5", sign: "line" },
+  { id: "local", name: "Local plan", key: "6", sign: "line" },
+  { id: "things", name: "Things and people", key: "7", sign: "area" },
+  { id: "scan", name: "Scan, from the belief", key: "8", sign: "dots" },
+  { id: "belief", name: "Belief, particles, 95 % ellipse", key: "9", sign: "dash" },
+  { id: "truth", name: "Robot and its way (truth)", key: "0", sign: "line" },
 ];
 
 const COLOURS = ["page", "ink", "faint", "rule", "free", "wall", "unknown", "zone", "goal", "plan", "local", "thing", "person", "scan",

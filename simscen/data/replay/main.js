@@ -18,15 +18,16 @@ const root = document.documentElement;
 async function start() {
   const { about, column } = await unpack(document.getElementById("data").textContent);
   const runs = about.runs.map((data, number) => new Run(data, column, about.runs.length > 1 ? "AB"[number] : ""));
-  const page = new Page(runs);
+  const page = new Page(runs, about.leftOut);
   page.open();
   globalThis.simscen = { page, runs };
   root.dataset.ready = performance.now().toFixed(0);
 }
 
 class Page {
-  constructor(runs) {
+  constructor(runs, leftOut) {
     this.runs = runs;
+    this.leftOut = leftOut;
     this.camera = new Camera();
     this.layers = new Set(LAYERS.filter((layer) => !layer.off).map((layer) => layer.id));
     this.selected = null;
@@ -152,7 +153,12 @@ class Page {
     const tool = (name, sign, act) => el("button", { type: "button", "aria-label": name, title: name, onclick: act }, sign);
     this.follow = el("button", { type: "button", "aria-pressed": "false", title: "The map follows the robot (c)", onclick: () => this.#follow() }, "Follow");
     return el("div", { class: "tools" }, tool("Nearer (+)", "+", () => this.maps[0].zoom(1.4)), tool("Further (−)", "−", () => this.maps[0].zoom(1 / 1.4)), tool("Fit all (0)", "Fit", () => this.fit()), this.follow,
-      el("details", { class: "menu" }, el("summary", {}, "Layers"), el("div", { class: "choice" }, ...boxes)));
+      el("details", { class: "menu" }, el("summary", {}, "Layers"), el("div", { class: "choice" }, ...boxes, this.#missing())));
+  }
+
+  /** What there was no room for, in words. */
+  #missing() {
+    return this.leftOut.length ? el("p", { class: "quiet left-out" }, "Of a long log the page keeps a choice. ", ...this.leftOut.flatMap((text) => [text, el("br")])) : null;
   }
 
   #follow() {

@@ -25,7 +25,8 @@ export class MapView {
       ondblclick: () => told("fit"),
       onkeydown: (event) => this.#key(event),
     });
-    this.element = el("div", { class: "map" }, this.canvas, this.spot);
+    const letter = run.letter ? el("span", { class: `pill letter ${run.outcome}`, "aria-hidden": "true" }, run.letter) : null;
+    this.element = el("div", { class: "map" }, this.canvas, this.spot, ...(letter ? [letter] : []));
   }
 
   /** Pixels of the page. */

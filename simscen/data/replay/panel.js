@@ -41,12 +41,12 @@ export class Panel {
     for (const { element, run: whose, number } of this.cards) {
       const lit = selected?.kind === "v" && whose === run && number === selected.number;
       element.classList.toggle("lit", lit);
-      if (lit) element.scrollIntoView({ block: "nearest" });
+      if (lit) reveal(element, this.elements[0]);
     }
     for (const [key, row] of this.rows) {
       const lit = selected?.kind === "e" && key === `${run?.letter ?? ""}${selected.number}`;
       row.classList.toggle("lit", lit);
-      if (lit) row.scrollIntoView({ block: "nearest" });
+      if (lit) reveal(row, this.list);
     }
     if (run && this.shownText !== run) this.#fillText(run);
     for (const [number, row] of this.lines) {
@@ -54,7 +54,7 @@ export class Panel {
       row.classList.toggle("lit", lit);
       if (lit) row.setAttribute("aria-current", "true");
       else row.removeAttribute("aria-current");
-      if (lit && !this.text.hidden) row.scrollIntoView({ block: "center" });
+      if (lit) reveal(row, this.text);
     }
   }
 
@@ -120,7 +120,7 @@ export class Panel {
     const asked = new Set([...run.verdicts, ...run.events, ...run.disturbances].map((one) => one.line).filter(Boolean));
     const rows = run.text.map((text, k) => {
       const number = k + 1, mark = run.verdicts.filter((verdict) => verdict.line === number);
-      const look = mark.some((verdict) => verdict.status !== "pass" && verdict.severity !== "warn") ? " bad" : mark.length ? " good" : "";
+      const look = mark.some((verdict) => verdict.status !== "pass" && verdict.severity !== "warn") ? " bad" : mark.some((verdict) => verdict.status !== "pass") ? " odd" : mark.length ? " good" : "";
       const row = el("div", { class: `line${asked.has(number) ? " asked" : ""}${look}`, "data-line": number }, el("span", { class: "number", "aria-hidden": "true" }, String(number)), el("code", {}, ...coloured(text)));
       this.lines.set(number, row);
       return row;
@@ -165,6 +165,13 @@ export class Panel {
     return el("section", {}, head ? el("h3", {}, head) : null,
       el("dl", {}, ...facts.filter(([, told_]) => told_).flatMap(([name, told_]) => [el("dt", {}, name), el("dd", {}, told_)])));
   }
+}
+
+/** Scroll a box, and nothing around it, so that something in it is seen. */
+function reveal(element, box) {
+  const inner = element.getBoundingClientRect(), outer = box.getBoundingClientRect();
+  if (inner.top >= outer.top && inner.bottom <= outer.bottom) return;
+  box.scrollTop += inner.top - outer.top - Math.max(outer.height - inner.height, 0) / 2;
 }
 
 function poseText({ x, y, yaw }) {

@@ -42,7 +42,7 @@ export class Run {
     const at = track && poseAt(track, tick, MOTION_GAP * this.rate);
     const rest = spawn ? spawn.pose : known?.pose;
     const pose = at ?? (rest ? { x: rest[0], y: rest[1], yaw: rest[2] } : null);
-    return pose && { name, pose, parts: (spawn ?? known)?.parts ?? null, person: (spawn ?? known)?.person ?? false };
+    return pose && { name, pose, parts: (spawn ?? known)?.parts ?? null, person: (spawn ?? known)?.person ?? false, brought: Boolean(spawn?.tick) };
   }
 
   /** What lasts and goes on at a tick, of one lane. */

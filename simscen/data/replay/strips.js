@@ -21,7 +21,7 @@ export class StripView {
     this.name = name;
     this.lines = runs.flatMap((run) => run.strip(name).map((strip) => ({ run, strip })));
     this.about = this.lines[0].strip;
-    this.limits = runs.flatMap((run) => run.robots.flatMap((robot) => robot.limits.filter((limit) => limit.signal === name)));
+    this.limits = boundsOf(name, runs);
     this.canvas = el("canvas", { class: "track", "aria-hidden": "true" });
     this.value = el("span", { class: "value" });
     const label = el("span", { class: "gutter", title: this.about.text }, el("span", { class: "name" }, name.replaceAll("_", " ")), this.value);
@@ -31,7 +31,8 @@ export class StripView {
 
   /** What the signal is at a time, in words. */
   tell(seconds) {
-    this.value.textContent = this.lines.map(({ run, strip }) => shown(strip, strip.at(run.tick(seconds)))).join(" · ");
+    const unit = this.about.unit && !this.about.asks ? ` ${this.about.unit}` : "";
+    this.value.textContent = this.lines.map(({ run, strip }) => shown(strip, strip.at(run.tick(seconds)))).join(" · ") + unit;
   }
 
   draw(from, to, width, colours) {
@@ -70,6 +71,11 @@ export class StripView {
       c.lineTo(width, y);
       c.stroke();
       c.setLineDash([]);
+      c.fillStyle = c.strokeStyle;
+      c.font = "10px system-ui, sans-serif";
+      c.textAlign = "right";
+      c.textBaseline = y < HEIGHT / 2 ? "top" : "bottom";
+      c.fillText(`${limit.least ? "≥" : "≤"} ${Number(limit.value.toPrecision(3))}`, width - 3, y + (y < HEIGHT / 2 ? 2 : -1));
     }
   }
 
@@ -102,6 +108,16 @@ export class StripView {
   }
 }
 
+/** The bounds of a signal, each once, broken where any run broke it. */
+function boundsOf(name, runs) {
+  const found = new Map();
+  for (const limit of runs.flatMap((run) => run.robots.flatMap((robot) => robot.limits))) {
+    const key = `${limit.value} ${limit.least}`;
+    if (limit.signal === name && (!found.has(key) || limit.status !== "pass")) found.set(key, limit);
+  }
+  return [...found.values()];
+}
+
 function finiteExtremes(values) {
   return extremes(values.filter(Number.isFinite), 0, values.filter(Number.isFinite).length);
 }
@@ -110,5 +126,5 @@ function shown(strip, value) {
   if (strip.asks) return value ? "yes" : "no";
   if (!Number.isFinite(value)) return value > 0 ? "far" : "–";
   const digits = Math.abs(value) >= 100 ? 0 : Number.isInteger(value) && !strip.unit ? 0 : 2;
-  return `${value.toFixed(digits)}${strip.unit ? ` ${strip.unit}` : ""}`;
+  return value.toFixed(digits);
 }

@@ -13,9 +13,10 @@ Column = list[float]
 
 
 class Columns:
-    """Columns of numbers, one after the other."""
+    """Columns of numbers, one after the other. `left_out` tells readers of the page what there was no room for."""
 
     def __init__(self) -> None:
+        self.left_out: list[str] = []
         self._parts: list[bytes] = []
         self._size = 0
 
@@ -27,6 +28,11 @@ class Columns:
         self._parts.append(data)
         self._size += len(data)
         return [begin, len(whole), step]
+
+    def thinned(self, what: str, kept: int, among: int) -> None:
+        """Say how many of something were kept, where that is not all."""
+        if kept < among:
+            self.left_out.append(f"{what}: {kept} of {among}")
 
     @property
     def data(self) -> bytes:

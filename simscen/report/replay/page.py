@@ -33,9 +33,8 @@ def replay_page(runs: Sequence[tuple[Log, RunResult]]) -> bytes:
     """The page of a run, or of two to be compared. Equal logs give equal bytes."""
     columns = Columns()
     described = [run_data(log, result, columns) for log, result in runs]
-    about = json.dumps(
-        {"format": FORMAT, "runs": described}, separators=(",", ":"), ensure_ascii=False, allow_nan=False
-    )
+    whole = {"format": FORMAT, "runs": described, "leftOut": list(dict.fromkeys(columns.left_out))}
+    about = json.dumps(whole, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     title = " against ".join(_title(run) for run in described)
     return page(title, about.encode(), columns.data).encode()
 

@@ -67,6 +67,7 @@ def _goals(case: Case, lines: Lines) -> list[dict[str, Any]]:
 
 def _poses(samples: Samples, columns: Columns) -> dict[str, Any]:
     kept = evenly(len(samples), POSES)
+    columns.thinned("poses", len(kept), len(samples))
     x, y, yaw = samples.values[kept, :3].T
     return {
         "ticks": columns.add(samples.ticks[kept]),

@@ -49,7 +49,7 @@ def run_data(log: Log, result: RunResult, columns: Columns) -> dict[str, Any]:
         "disturbances": disturbances_of(result, lines),
         "metrics": {name: value for name, value in sorted(result.metrics.items()) if value is not None},
         "events": sorted(events, key=lambda event: event["tick"]),
-        "text": visible(log.about.scenario[:MOST_TEXT]).split("\n"),
+        "text": visible(log.about.scenario[:MOST_TEXT]).rstrip("\n").split("\n"),
         "regions": {one_line(name): points(polygon) for name, polygon in log.about.case.regions.items()},
         "scenery": scenery_data(log, columns),
         "spawned": [

@@ -17,6 +17,7 @@ BEAMS, RANGES = 360, 300_000
 """Beams of a scan that are kept, and ranges of a lidar in all."""
 PARTICLES, CLOUDS = 250, 300
 PLAN_POINTS, POINTS = 120, 60_000
+LOCAL_PLANS = 1500
 CELLS = 2_000_000
 _CENTIMETRE = 0.01
 
@@ -33,6 +34,8 @@ def _lidar(topic: str, messages: Messages, seen: Seen, columns: Columns) -> dict
     kept = evenly(len(messages), max(1, RANGES // max(1, beams))).tolist()
     scans = [(messages[k][0], seen.scan(messages[k][1])) for k in kept]
     scans = [(tick, scan) for tick, scan in scans if len(scan.ranges) == len(first.ranges)]
+    columns.thinned(f"scans on {one_line(topic)}", len(scans), len(messages))
+    columns.thinned(f"beams of a scan on {one_line(topic)}", beams, len(first.ranges))
     ranges = np.array([scan.ranges[::stride] for _, scan in scans])
     ranges[~np.isfinite(ranges)] = 0.0
     return {
@@ -43,7 +46,6 @@ def _lidar(topic: str, messages: Messages, seen: Seen, columns: Columns) -> dict
         "least": round(first.range_min, 4),
         "most": round(first.range_max, 4),
         "beams": beams,
-        "of": {"beams": len(first.ranges), "scans": len(messages)},
         "ticks": columns.add([tick for tick, _ in scans]),
         "measured": columns.add([scan.tick for _, scan in scans]),
         "ranges": columns.add(ranges, _CENTIMETRE),
@@ -58,10 +60,11 @@ def particles_of(seen: Seen, columns: Columns) -> dict[str, Any] | None:
     clouds = [(seen.particles[k][0], seen.cloud(seen.particles[k][1])) for k in kept]
     chosen = [cloud[evenly(len(cloud), PARTICLES)] for _, cloud in clouds]
     table = np.concatenate(chosen)
+    columns.thinned("particle clouds", len(clouds), len(seen.particles))
+    columns.thinned("particles of a cloud", max(map(len, chosen)), max(len(cloud) for _, cloud in clouds))
     return {
         "ticks": columns.add([tick for tick, _ in clouds]),
         "numbers": columns.add([len(cloud) for cloud in chosen]),
-        "of": max(len(cloud) for _, cloud in clouds),
         "x": columns.add(table[:, 0], _CENTIMETRE),
         "y": columns.add(table[:, 1], _CENTIMETRE),
         "yaw": columns.add(table[:, 2], 0.02),
@@ -75,7 +78,8 @@ def plans_of(plans: Sequence[Path], columns: Columns) -> dict[str, Any] | None:
 
 def local_plans_of(seen: Seen, columns: Columns) -> dict[str, Any] | None:
     """What the controller meant to drive next."""
-    kept = evenly(len(seen.local_plans), 1500).tolist()
+    kept = evenly(len(seen.local_plans), LOCAL_PLANS).tolist()
+    columns.thinned("local plans", len(kept), len(seen.local_plans))
     return _paths([(seen.local_plans[k][0], seen.path(seen.local_plans[k][1])) for k in kept], columns)
 
 
@@ -114,6 +118,7 @@ def _costmap(topic: str, messages: Messages, seen: Seen, columns: Columns) -> di
     _, first = seen.costmap(messages[0][1])
     most = max(1, CELLS // max(1, first.cells.size))
     kept = times([tick for tick, _ in messages], max(1, (messages[-1][0] - messages[0][0]) // most))
+    columns.thinned(f"grids on {one_line(topic)}", len(kept), len(messages))
     grids = []
     before = None
     for k in kept:

@@ -1,0 +1,79 @@
+"""Takes the pictures of the replay page that the docs show: `make screenshots`.
+
+A shipped scenario, made harder, is run with seeds until one fails and one passes.
+"""
+
+import os
+import shutil
+import sys
+import tempfile
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+from PIL import Image
+from playwright.sync_api import sync_playwright
+
+from simscen.judge.resultdata import from_json
+from simscen.record.replay import read_run
+from simscen.report.replay import write_replay
+from simscen.run.simulate import simulate_file
+
+ROOT = Path(__file__).parents[2]
+IMAGES = ROOT / "docs" / "images"
+SCENARIO = ROOT / "scenarios" / "localization" / "kidnapped.scenario.yaml"
+HARDER = {"time: 120 s": "time: 12 s", "timeout: 240 s": "timeout: 60 s", "../../worlds/": "worlds/"}
+SEEDS = range(2, 12)
+
+
+def main() -> None:
+    """Run, make the pages, and take their pictures."""
+    browser = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if browser is None:
+        sys.exit("there is no Chromium to take pictures with")
+    with tempfile.TemporaryDirectory() as folder:
+        failed, passed = _runs(Path(folder))
+        pages = {"replay-failure": [failed], "replay-against": [failed, passed]}
+        with sync_playwright() as playwright:
+            arguments = ["--no-sandbox"] if os.geteuid() == 0 else []
+            running = playwright.chromium.launch(executable_path=browser, args=arguments)
+            for name, logs in pages.items():
+                page = Path(folder) / f"{name}.html"
+                read = [read_run(log, looks=True) for log in logs]
+                write_replay(page, [(log, from_json(log.result)) for log in read])
+                _shoot(running, page, name, "#t=20" if len(logs) > 1 else "")
+            running.close()
+
+
+def _runs(folder: Path) -> tuple[Path, Path]:
+    """A log that failed and one that passed."""
+    text = SCENARIO.read_text()
+    for before, after in HARDER.items():
+        assert before in text, before
+        text = text.replace(before, after)
+    shutil.copytree(ROOT / "worlds", folder / "worlds")
+    file, found = folder / "kidnapped.scenario.yaml", dict[bool, Path]()
+    file.write_text(text)
+    for seed in SEEDS:
+        log = folder / f"{seed}.mcap"
+        found.setdefault(simulate_file(file, seed, log, folder).passed, log)
+        if len(found) == 2:
+            return found[False], found[True]
+    sys.exit(f"seeds {SEEDS} all ended alike")
+
+
+def _shoot(browser: Any, page: Path, name: str, where: str) -> None:
+    """In light, and of one run in dark, too."""
+    for scheme in ("light", "dark") if name == "replay-failure" else ("light",):
+        context = browser.new_context(viewport={"width": 1280, "height": 800}, color_scheme=scheme)
+        shown = context.new_page()
+        shown.goto(page.as_uri() + where)
+        shown.wait_for_selector("html[data-ready]", state="attached")
+        shown.wait_for_timeout(300)
+        file = IMAGES / f"{name}{'-dark' if scheme == 'dark' else ''}.png"
+        Image.open(BytesIO(shown.screenshot())).quantize(256, dither=Image.Dither.NONE).save(file, optimize=True)
+        context.close()
+
+
+if __name__ == "__main__":
+    main()
