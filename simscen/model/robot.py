@@ -7,6 +7,7 @@ from pydantic import Field, model_validator
 
 from simscen.core.mecanum import MecanumWheels
 from simscen.core.readings import READINGS
+from simscen.model.latency import RobotLatency
 from simscen.spec.base import Ranged, Spec, by_default
 from simscen.spec.choice import Choice
 from simscen.spec.component import Component
@@ -14,6 +15,7 @@ from simscen.spec.objects import Shaped
 from simscen.spec.places import Name, PoseSpec, Ring
 from simscen.spec.quantities import (
     Angle,
+    Duration,
     Frequency,
     Length,
     NonNegativeAcceleration,
@@ -181,6 +183,8 @@ class SensorSpec(Component):
 
     rate: Frequency = 10.0
     """How often it says something."""
+    latency: Duration = 0.0
+    """How long a reading takes from the moment it shows to the stack: exposure, sweep, driver, bus."""
 
     @classmethod
     def broken_promise(cls) -> str:
@@ -338,9 +342,13 @@ class RobotSpec(Spec):
     """What its base can do."""
     sensors: dict[Name, Sensor]
     """By instance name: what faults refer to."""
+    latency: RobotLatency = by_default()
+    """What computing and sensing take on it, for scenarios that ask for it."""
 
     @model_validator(mode="after")
     def _consistent(self) -> "RobotSpec":
+        if strange := sorted(self.latency.sensors.keys() - self.sensors.keys()):
+            raise ValueError(f"`latency` names `{strange[0]}`, which is none of its sensors")
         if (self.urdf is None) == (self.body is None):
             raise ValueError("expected exactly one of: body, urdf")
         if self.urdf is None and (self.packages or self.arguments):

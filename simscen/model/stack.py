@@ -6,6 +6,7 @@ from pydantic import Discriminator, Field, Tag
 
 from simscen.core.navigation import RecoveryBehavior
 from simscen.model.controllers import Controller
+from simscen.model.latency import Latency
 from simscen.model.stackbase import GoalTolerances, StackBase
 from simscen.spec.base import Ranged, Spec, by_default, type_or
 from simscen.spec.bytype import ByType
@@ -419,6 +420,12 @@ class CollisionMonitor(Spec):
     """STOP: nothing may be nearer to the footprint than this, in the direction of travel."""
 
 
+_LatencyOrRobots = Annotated[
+    Annotated[Literal["robot"], Tag("a name")] | Annotated[Latency, Tag("durations")],
+    Discriminator(lambda value: "a name" if isinstance(value, str) else "durations"),
+]
+
+
 class InProcessStack(StackBase, Typed):
     """A whole stack that lives in the process of its run: simscen's own, or one that an installed package adds."""
 
@@ -451,6 +458,8 @@ class StackSpec(InProcessStack):
     """What limits the accelerations of commands."""
     collision_monitor: CollisionMonitor = by_default()
     """What stops the robot, whatever it is told."""
+    latency: _LatencyOrRobots = by_default()
+    """What computing takes: durations, or `robot` for what the robot's file says, of its sensors, too."""
 
     @property
     def told_truth(self) -> bool:

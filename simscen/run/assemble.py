@@ -21,6 +21,7 @@ from simscen.run.external.build import build_external
 from simscen.run.faultrig import FaultRig
 from simscen.run.faultsettings import FaultSettings
 from simscen.run.filters import Filters
+from simscen.run.latency import command_latencies, sensor_latencies, with_latency
 from simscen.run.live import LiveStage, described
 from simscen.run.lockstep import Rig
 from simscen.run.prepare import Prepared
@@ -110,7 +111,7 @@ def _agent(
     if prepared.stack.told_truth:
         # Last, because the log takes the first odometry for the robot's own.
         sensors = (*sensors, TruthSensor(robot, control_period))
-    senses = Senses(sensors)
+    senses = Senses(sensors, sensor_latencies(prepared, clock))
 
     def told(belief: Belief) -> Belief:
         return faults.belief(simulation.tick, belief)
@@ -136,7 +137,10 @@ def _agent(
         faults=faults,
         stage=stage,
         ending=Ending(clock, spec.time_limit, spec.linger, idle=bool(name) and not prepared.case.goals),
-        timetable=Timetable((truth_period, control_period, *senses.periods)),
+        timetable=Timetable(
+            (truth_period, control_period, *senses.periods),
+            (*senses.arrivals, *((control_period, late) for late in command_latencies(prepared, clock))),
+        ),
         truth_period=truth_period,
     )
 
@@ -163,7 +167,7 @@ def _stack(
     if isinstance(prepared.stack, ExternalStackSpec):
         return build_external(prepared, prepared.stack, surroundings, seed, printed)
     return build_stack(
-        prepared.stack,
+        with_latency(prepared.stack, prepared.robot),
         surroundings,
         streams,
         clock,

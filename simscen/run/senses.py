@@ -1,23 +1,42 @@
 """All sensors of the robot, each at its own rate."""
 
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import Mapping, Sequence
 
 from simscen.core.sensing import Reading, Readings
 from simscen.sensors.sensor import Sensor
 
 
 class Senses:
-    """Reads the sensors that are due at a tick, in the order of the robot's specification."""
+    """Reads the sensors that are due at a tick, in the order of the robot's specification.
 
-    def __init__(self, sensors: Sequence[Sensor]) -> None:
+    A reading shows the moment it carries the tick of; of a sensor that is late it comes so many ticks after that.
+    """
+
+    def __init__(self, sensors: Sequence[Sensor], latencies: Mapping[str, int] | None = None) -> None:
+        """`latencies`: ticks from a reading to the stack, by the sensor's name."""
         self._sensors = tuple(sensors)
+        latencies = latencies or {}
+        self._latencies = [latencies.get(sensor.name, 0) for sensor in self._sensors]
+        self._late: list[deque[Reading]] = [deque() for _ in self._sensors]
 
     @property
     def periods(self) -> tuple[int, ...]:
         """The period of each sensor in ticks."""
         return tuple(sensor.period for sensor in self._sensors)
 
+    @property
+    def arrivals(self) -> tuple[tuple[int, int], ...]:
+        """For each sensor that is late its period, and how much later its readings come, in ticks."""
+        pairs = zip(self.periods, self._latencies, strict=True)
+        return tuple((period, latency) for period, latency in pairs if latency)
+
     def read(self, tick: int) -> Readings:
-        """The new readings of this tick."""
-        due: list[Reading] = [sensor.read(tick) for sensor in self._sensors if tick % sensor.period == 0]
-        return tuple(due)
+        """The readings that come at this tick."""
+        come: list[Reading] = []
+        for sensor, latency, late in zip(self._sensors, self._latencies, self._late, strict=True):
+            if tick % sensor.period == 0:
+                (late if latency else come).append(sensor.read(tick))
+            while late and late[0].tick + latency <= tick:
+                come.append(late.popleft())
+        return tuple(come)

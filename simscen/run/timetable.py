@@ -4,18 +4,20 @@ from collections.abc import Iterable
 
 
 class Timetable:
-    """The ticks that are a multiple of at least one period, in order.
+    """The ticks that are a multiple of at least one period, or so much later than one, in order.
 
     Nothing is tabulated: the pattern repeats only after the least common multiple of the periods, which may be long.
     """
 
-    def __init__(self, periods: Iterable[int]) -> None:
-        self._periods = tuple(sorted(set(periods)))
+    def __init__(self, periods: Iterable[int], later: Iterable[tuple[int, int]] = ()) -> None:
+        """`later`: periods, and ticks after each multiple."""
+        late = {(period, ticks % period) for period, ticks in later}
+        self._beats = tuple(sorted({(period, 0) for period in periods} | late))
 
     def due(self, tick: int) -> bool:
         """Whether anything is due at `tick`."""
-        return any(tick % period == 0 for period in self._periods)
+        return any((tick - ticks) % period == 0 for period, ticks in self._beats)
 
     def until_next(self, tick: int) -> int:
         """How many ticks lie between `tick` and the next one at which something is due; at least 1."""
-        return min(period - tick % period for period in self._periods)
+        return min(period - (tick - ticks) % period for period, ticks in self._beats)

@@ -4,11 +4,12 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from simscen.core.chance import Streams
-from simscen.core.events import Event
 from simscen.core.goalnames import Mode
 from simscen.core.time import Clock
 from simscen.model import stack as model
+from simscen.model.latency import Latency
 from simscen.stack.collision_monitor import CollisionMonitor
+from simscen.stack.commands import HELD, Commands
 from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.installed.behavior import InstalledBehavior
 from simscen.stack.installed.controller import InstalledController
@@ -58,7 +59,7 @@ def reference_stack(spec: model.StackSpec, setting: Setting) -> ReferenceStack:
     if surroundings.map is not None:
         surroundings = replace(surroundings, map=surroundings.map.refined(spec.costmap.resolution))
     robot, period = surroundings.robot, clock.period(spec.controller_frequency)
-    journal: list[Event] = []
+    latency = _ticks(spec, clock)
     driving = replace(
         setting,
         surroundings=surroundings,
@@ -66,7 +67,7 @@ def reference_stack(spec: model.StackSpec, setting: Setting) -> ReferenceStack:
         resolution=spec.local_costmap.completed(spec.costmap).resolution,
     )
     controller = InstalledController(spec.controller, driving)
-    costmaps = Costmaps(spec, surroundings, controller.full_speed * spec.controller.looks_ahead)
+    costmaps = Costmaps(spec, surroundings, controller.full_speed * spec.controller.looks_ahead, latency["costmap"])
     driving = replace(driving, clear_costmap=costmaps.clear)
     planning = replace(driving, name="planner", resolution=costmaps.wide.view.resolution)
     plans = PlanKeeper(
@@ -75,8 +76,8 @@ def reference_stack(spec: model.StackSpec, setting: Setting) -> ReferenceStack:
         costmaps.wide,
         lambda number: streams.integer(f"planner#{number}"),
         robot.inscribed_radius,
-        journal,
         steered=robot.turning_radius > 0.0,
+        latency=latency["planner"],
     )
     navigator = Navigator(
         plans,
@@ -87,7 +88,14 @@ def reference_stack(spec: model.StackSpec, setting: Setting) -> ReferenceStack:
         costmaps,
         setting.control_period,
         spec.failure_tolerance,
-        journal,
+    )
+    monitor = CollisionMonitor(spec.collision_monitor, robot, surroundings.lidars, surroundings.tick_rate)
+    commands = Commands(
+        VelocitySmoother(spec.velocity_smoother, robot, setting.control_period),
+        monitor,
+        period,
+        clock.ticks(HELD),
+        (latency["controller"], latency["collision_monitor"]),
     )
     return ReferenceStack(
         surroundings,
@@ -95,12 +103,18 @@ def reference_stack(spec: model.StackSpec, setting: Setting) -> ReferenceStack:
         costmaps,
         controller,
         navigator,
-        Task(setting.stop_on_failure, journal, clock, setting.mode),
-        VelocitySmoother(spec.velocity_smoother, robot, setting.control_period),
-        CollisionMonitor(spec.collision_monitor, robot, surroundings.lidars, surroundings.tick_rate),
+        Task(setting.stop_on_failure, clock, setting.mode),
+        commands,
+        monitor,
         period,
-        journal,
+        latency["localizer"],
     )
+
+
+def _ticks(spec: model.StackSpec, clock: Clock) -> dict[str, int]:
+    """What each part takes in whole ticks; the robot's own values have been put in by whoever knows its file."""
+    latency = spec.latency if isinstance(spec.latency, Latency) else Latency()
+    return {part: clock.ticks(getattr(latency, part)) for part in Latency.model_fields}
 
 
 def _behaviors(spec: model.Recovery, shared: Setting) -> list[Behavior]:

@@ -8,7 +8,7 @@ the code of the last failure. A goal outside the map or inside a mapped wall fai
 changes that.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from simscen.core.events import Event, EventKind, Value
 from simscen.core.motion import STOP, Twist
@@ -21,6 +21,16 @@ from simscen.stack.progress_checker import ProgressChecker
 from simscen.stack.protocols import Behavior, Controller, GoalChecker, NavigationFailure, Planner
 from simscen.stack.recovery import RoundRobin
 from simscen.stack.replanning import PlanInForce
+
+
+@dataclass(frozen=True)
+class Step:
+    """What comes of a step: the velocity wanted, whether the goal is reached or has failed, and what happened."""
+
+    command: Twist = STOP
+    reached: bool = False
+    failure: NavigationFailure | None = None
+    events: tuple[Event, ...] = ()
 
 
 class Navigator:
@@ -39,13 +49,12 @@ class Navigator:
         costmaps: Costmaps,
         period: float,
         failure_tolerance: float,
-        journal: list[Event],
     ) -> None:
         """`period` between two steps and `failure_tolerance` in seconds; -1 bears a failing controller for ever."""
         self._plans, self._controller, self._recovery = plans, controller, recovery
         self._goal_checker, self._progress, self._costmaps = goal_checker, progress, costmaps
         self._path = LocalPath(controller)
-        self._period, self._failure_tolerance, self._events = period, failure_tolerance, journal
+        self._period, self._failure_tolerance = period, failure_tolerance
         self._clock = 0.0
         self.goal: Goal | None = None
         self.via: tuple[Goal, ...] = ()
@@ -82,30 +91,34 @@ class Navigator:
         self.goal, self.via = None, ()
         self._forget()
 
-    def step(self, tick: int, frames: Frames, twist: Twist, held: bool = False) -> tuple[Twist, bool]:
-        """The velocity wanted now, and whether the goal is reached. Raises NavigationFailure when it has failed.
+    def step(self, tick: int, frames: Frames, twist: Twist, held: bool = False, periods: int = 1) -> Step:
+        """What to do now, so many periods after the last step.
 
         `held`: the collision monitor has kept the robot from driving for a while.
         """
         goal = self.goal
         if goal is None:
-            return STOP, False
-        self._clock += self._period
+            return Step()
+        self._clock += periods * self._period
         if self._behavior is not None:
-            return self._recover(tick, frames), False
+            return self._recover(tick, frames, self._behavior)
         if not self.via and self._goal_checker.reached(goal, frames.pose, twist):
-            return STOP, True
+            return Step(reached=True)
+        events: tuple[Event, ...] = ()
         try:
-            command = self._follow(tick, goal, frames, twist, held)
+            events = self._plans.step(tick, self._clock, goal, frames.pose, self.via)
+            command = self._follow(goal, frames, twist, held)
         except NavigationFailure as failure:
-            return self._failed(tick, goal, frames, failure), False
+            step = self._failed(tick, goal, frames, failure)
+            return replace(step, events=(*events, *step.events))
         self._trouble_since = None
-        return command, False
+        return Step(command, events=events)
 
-    def _follow(self, tick: int, goal: Goal, frames: Frames, twist: Twist, held: bool) -> Twist:
-        self._plans.step(tick, self._clock, goal, frames.pose, self.via)
+    def _follow(self, goal: Goal, frames: Frames, twist: Twist, held: bool) -> Twist:
+        """The controller's command on the plan in force; the robot stands while the first plan is worked out."""
+        if self._plans.plan is None:
+            return STOP
         self._replanned = False
-        assert self._plans.plan is not None
         self._path.tell(self._plans.plan, frames)
         following = (*self.via, goal)[0]  # a tour may end where it begins: only the last drive to its end ends it
         local = replace(following, pose=frames.odom_from_map.compose(following.pose))
@@ -117,16 +130,16 @@ class Navigator:
             raise NavigationFailure(ErrorCode.FAILED_TO_MAKE_PROGRESS, "the robot does not get on")
         return command
 
-    def _failed(self, tick: int, goal: Goal, frames: Frames, failure: NavigationFailure) -> Twist:
+    def _failed(self, tick: int, goal: Goal, frames: Frames, failure: NavigationFailure) -> Step:
         """Bear it a moment, clear and try again, recover, or give up: in this order."""
-        planning = 200 <= failure.code < 300
+        planning, events = 200 <= failure.code < 300, tuple[Event, ...]()
         if planning:
-            self._note(tick, EventKind.PLAN_FAILED, "", **_described(failure))
+            events = (Event(tick, EventKind.PLAN_FAILED, "", _described(failure)),)
             retry, self._replanned = not self._replanned, True
         else:
             if failure.code != ErrorCode.FAILED_TO_MAKE_PROGRESS:
                 if self._tolerable():
-                    return STOP
+                    return Step()
                 failure = self._impatient(failure)
             self._plans.not_followed()
             retry, self._controlled_again = not self._controlled_again, True
@@ -134,18 +147,18 @@ class Navigator:
             self._trouble_since = None
             self._costmaps.clear()
             self._plans.drop("recovery")
-            return STOP
+            return Step(events=events)
         if self._hopeless(goal, failure):
-            raise failure
+            return Step(failure=failure, events=events)
         self._plans.drop("recovery")
         self._replanned, self._controlled_again, self._trouble_since = False, False, None
         self._behavior = self._recovery.next()
         if self._behavior is None:
-            raise failure
+            return Step(failure=failure, events=events)
         self._behavior_since = self._clock
-        self._note(tick, EventKind.RECOVERY_STARTED, self._behavior.name, **_described(failure))
         self._behavior.start(frames.odometry)
-        return STOP
+        begun = Event(tick, EventKind.RECOVERY_STARTED, self._behavior.name, _described(failure))
+        return Step(events=(*events, begun))
 
     def _tolerable(self) -> bool:
         if self._trouble_since is None:
@@ -166,25 +179,17 @@ class Navigator:
             self._costmaps.wide.fits_static(each.pose, each.xy_tolerance) for each in (*self.via, goal)
         )
 
-    def _recover(self, tick: int, frames: Frames) -> Twist:
-        behavior = self._behavior
-        assert behavior is not None
+    def _recover(self, tick: int, frames: Frames, behavior: Behavior) -> Step:
+        ended: dict[str, Value] = {"outcome": "succeeded"}
         try:
             command = behavior.step(frames.odometry, self._costmaps.near.view, self._clock - self._behavior_since)
         except NavigationFailure as failure:
-            self._note(tick, EventKind.RECOVERY_ENDED, behavior.name, outcome="failed", **_described(failure))
-            command = None
-        else:
-            if command is None:
-                self._note(tick, EventKind.RECOVERY_ENDED, behavior.name, outcome="succeeded")
-        if command is None:
-            self._behavior = None
-            self._progress.reset()
-            return STOP
-        return command
-
-    def _note(self, tick: int, kind: EventKind, name: str, **data: Value) -> None:
-        self._events.append(Event(tick, kind, name, data))
+            command, ended = None, {"outcome": "failed", **_described(failure)}
+        if command is not None:
+            return Step(command)
+        self._behavior = None
+        self._progress.reset()
+        return Step(events=(Event(tick, EventKind.RECOVERY_ENDED, behavior.name, ended),))
 
 
 def _described(failure: NavigationFailure) -> dict[str, Value]:

@@ -2,6 +2,7 @@
 
 import contextlib
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -40,11 +41,12 @@ class PlanKeeper:
         costmap: Costmap,
         plan_seed: Callable[[int], int],
         radius: float,
-        journal: list[Event],
         steered: bool = False,
+        latency: int = 0,
     ) -> None:
+        """`latency`: ticks from the question to the plan."""
         self._spec, self.planner, self._costmap = spec, planner, costmap
-        self._plan_seed, self._radius, self._journal, self._steered = plan_seed, radius, journal, steered
+        self._plan_seed, self._radius, self._steered, self._latency = plan_seed, radius, steered, latency
         self._plans = 0
         self._via: tuple[Goal, ...] = ()
         self.reset(0.0)
@@ -57,42 +59,65 @@ class PlanKeeper:
         self._steps, self._cautious = 0, False
 
     def drop(self, reason: str) -> None:
-        """Make a new plan at the next step, for this reason."""
+        """Make a new plan at the next step, for this reason; what is being worked out is of no use any more."""
         self.plan: PlanInForce | None = None
+        self._asked: _Asked | None = None
         self._reason = reason
 
     def not_followed(self) -> None:
         """The plan could not be followed: until the next goal, take a roomier way where there is one."""
         self._cautious = True
 
-    def step(self, tick: int, now: float, goal: Goal, pose: Pose2, via: tuple[Goal, ...] = ()) -> None:
-        """See to it that there is a plan that can be followed. Raises NavigationFailure when there is none.
+    def step(self, tick: int, now: float, goal: Goal, pose: Pose2, via: tuple[Goal, ...] = ()) -> tuple[Event, ...]:
+        """See to it that there is a plan that can be followed; there is none while the first one is being worked out.
 
-        One plan leads past all poses of `via` (Nav2's ComputePathThroughPoses).
+        One plan leads past all poses of `via` (Nav2's ComputePathThroughPoses). Returns that a plan was made, if it
+        was. Raises NavigationFailure when there is none.
         """
         self._via = via
-        if self.plan is None:
-            self._adopt(tick, now, self._compute(tick, goal, pose), self._reason)
+        if self.plan is None and self._asked is None:
+            self._ask(tick, goal, pose, self._reason)
+        made = self._hear(tick, now)
         self._steps += 1
-        if self._steps % RECONSIDER == 0:
-            assert self.plan is not None
-            self.plan.locate(pose)
+        if made or self.plan is None or self._steps % RECONSIDER:
+            return made
+        self.plan.locate(pose)
+        if self._asked is None:
             self._reconsider(tick, now, goal, pose, self.plan)
+        return self._hear(tick, now)
 
     def _reconsider(self, tick: int, now: float, goal: Goal, pose: Pose2, plan: PlanInForce) -> None:
-        """Replace the plan when it is blocked, outdated, or clearly longer than need be."""
+        """Ask for another plan when this one is blocked, outdated, or may be clearly longer than need be."""
         reason = self._must_replan(now, pose, plan)
         if reason:
-            self._adopt(tick, now, self._compute(tick, goal, pose), reason)
-            return
-        wish = self._may_replan(now, plan)
-        if wish:
-            try:
-                other = self._compute(tick, goal, pose)
-            except NavigationFailure:
-                return  # it was only a look: the plan that is being followed is still good
-            if wish == "tight" or plan.worse_than(other):
-                self._adopt(tick, now, other, wish)
+            self._ask(tick, goal, pose, reason)
+        elif wish := self._may_replan(now, plan):
+            self._ask(tick, goal, pose, wish, wished=True)
+
+    def _ask(self, tick: int, goal: Goal, pose: Pose2, reason: str, wished: bool = False) -> None:
+        """Plan from here and now; the answer is there when the planner would be done."""
+        due, before = tick + self._latency, (self._partial, self._origin)
+        try:
+            answer: Path | NavigationFailure = self._compute(due, goal, pose)
+        except NavigationFailure as failure:
+            answer = failure
+        self._asked = _Asked(due, reason, wished, answer, self._partial, self._origin)
+        self._partial, self._origin = before
+
+    def _hear(self, tick: int, now: float) -> tuple[Event, ...]:
+        """Follow the plan that was asked for, once it is there. Raises what it failed with."""
+        asked = self._asked
+        if asked is None or tick < asked.due:
+            return ()
+        self._asked = None
+        if isinstance(asked.answer, NavigationFailure):
+            if asked.wished:
+                return ()  # it was only a look: the plan that is being followed is still good
+            raise asked.answer
+        if asked.wished and asked.reason != "tight" and (self.plan is None or not self.plan.worse_than(asked.answer)):
+            return ()
+        self._partial, self._origin = asked.partial, asked.origin
+        return (self._adopt(tick, now, asked.answer, asked.reason),)
 
     def _must_replan(self, now: float, pose: Pose2, plan: PlanInForce) -> str:
         """Why the plan cannot be followed any more; "" if it can."""
@@ -153,10 +178,22 @@ class PlanKeeper:
                 return self.planner.plan(view.with_less_room(room), pose, aim, seed)
         return self.planner.plan(view, pose, aim, seed)
 
-    def _adopt(self, tick: int, now: float, path: Path, reason: str) -> None:
+    def _adopt(self, tick: int, now: float, path: Path, reason: str) -> Event:
         view = self._costmap.view
         self.plan = PlanInForce(path, self._radius, view)
         self._adopted = self._looked = now
         self._checked, self._most = view.revision, self._costmap.obstacle_cells
         made: dict[str, Value] = {"reason": reason, "length": round(path.length(), 6)}
-        self._journal.append(Event(tick, EventKind.PLAN_MADE, "", made))
+        return Event(tick, EventKind.PLAN_MADE, "", made)
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """A question to the planner, and what it will have found at the tick `due`; `wished`: it may as well not be."""
+
+    due: int
+    reason: str
+    wished: bool
+    answer: Path | NavigationFailure
+    partial: bool
+    origin: tuple[float, float]

@@ -4,12 +4,13 @@ from typing import Any
 
 from simscen.core.belief import Estimate
 from simscen.core.events import Event
-from simscen.core.motion import STOP, Twist
+from simscen.core.motion import STOP
 from simscen.core.navigation import ErrorCode, Goal, Path
 from simscen.core.sensing import Image, Imu, Odometry, Readings, Scan
 from simscen.core.trace import Decision
 from simscen.core.zones import Zones
 from simscen.stack.collision_monitor import CollisionMonitor
+from simscen.stack.commands import Commands
 from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.frames import Frames
 from simscen.stack.localizers.ground_truth import TRUTH
@@ -19,14 +20,8 @@ from simscen.stack.odometry_history import OdometryHistory
 from simscen.stack.protocols import Controller, Localizer, NavigationFailure, Surroundings
 from simscen.stack.publishing import Publishing
 from simscen.stack.tasks import Task
-from simscen.stack.velocity_smoother import VelocitySmoother
+from simscen.stack.underway import Underway
 from simscen.stack.zones import SpeedFilter
-
-CRAWL = 0.02
-"""m/s and rad/s (times five): what is slower does not count as driving."""
-HELD = 1.0
-"""Seconds for which the collision monitor may hold the robot before that counts as a failure: the controller cannot see
-what the monitor sees (an obstacle nearer than a cell), and would try the same until no progress is made."""
 
 
 class ReferenceStack:
@@ -40,23 +35,23 @@ class ReferenceStack:
         controller: Controller,
         navigator: Navigator,
         task: Task,
-        smoother: VelocitySmoother,
+        commands: Commands,
         monitor: CollisionMonitor,
         control_period: int,
-        journal: list[Event],
+        localizer_latency: int = 0,
     ) -> None:
         self._speed_filter = SpeedFilter(surroundings)
         self._localizer, self._costmaps, self._controller = localizer, costmaps, controller
-        self._navigator, self._task, self._smoother, self._monitor = navigator, task, smoother, monitor
+        self._navigator, self._task, self._commands, self._monitor = navigator, task, commands, monitor
         self._tick_rate, self._lidars = surroundings.tick_rate, frozenset(surroundings.lidars)
         self._control_period = control_period
         self._publishing = Publishing(surroundings.tick_rate, localizer, controller)
-        self._journal = journal
+        self._matched = Underway[Scan](localizer_latency)
+        self._events: list[Event] = []
         self._tick = 0
-        self._twist, self._command = STOP, STOP
+        self._twist = STOP
         self._odometry, self._wheels = OdometryHistory(), False
         self._zones: Zones | None = None
-        self._free_at = 0
         self._nothing = Decision(STOP)
 
     def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:
@@ -68,14 +63,15 @@ class ReferenceStack:
 
     def preempt(self, tick: int, goal: Goal) -> None:
         """Drive to this goal first; it takes the place of the current one."""
-        self._task.preempt(tick, goal)
+        self._events += self._task.preempt(tick, goal)
         self._navigator.stop()
 
     def cancel(self, tick: int) -> None:
         """Cancel the current goal and all after it."""
-        self._task.cancel(tick)
+        self._events += self._task.cancel(tick)
         self._navigator.stop()
-        self._command, self._nothing = STOP, Decision(STOP)
+        self._commands.stop(tick)
+        self._nothing = Decision(STOP)
 
     def set_zones(self, tick: int, zones: Zones) -> None:
         """These zones hold from the next update of the costmap on, and no others."""
@@ -105,23 +101,27 @@ class ReferenceStack:
     def decide(self, tick: int, readings: Readings) -> Decision:
         """Take the readings of this beat and say what to drive."""
         self._tick = tick
-        scanned = self._take(readings) if readings else False
+        scanned = self._take(readings)
         controls = tick % self._control_period == 0
-        if not controls and not readings and not self._journal:
+        if controls:
+            self._update_costmaps(tick)
+            self._control(tick)
+        self._commands.step(tick, self._odometry.now)
+        sent = self._commands.sent
+        if not controls and not readings and not self._events and sent is self._nothing.command:
             return self._nothing
         local_plan = None
         if controls:
-            self._update_costmaps(tick)
-            self._command = self._control(tick)
             local_plan = self._publishing.local_plan(tick, self._navigator.plan is not None, self._frames)
-        self._nothing = Decision(self._command)
-        events, self._journal[:] = tuple(self._journal), []
+        self._nothing = Decision(sent)
+        events, self._events = tuple(self._events), []
         belief, plan = self._publishing.belief(tick, scanned), self._publishing.plan(self.plan)
-        return Decision(self._command, belief, plan, local_plan, events)
+        return Decision(sent, belief, plan, local_plan, events)
 
     def _take(self, readings: Readings) -> bool:
         """Hand the readings on; whether there was a scan among them."""
         scans: list[Scan] = []
+        self._match()
         for reading in readings:
             match reading:
                 case Odometry():
@@ -131,7 +131,8 @@ class ReferenceStack:
                     self._localizer.on_imu(reading)
                 case Scan():
                     if reading.sensor in self._lidars:  # echoes of a sonar show obstacles, but no walls to match
-                        self._localizer.on_scan(reading)
+                        self._matched.put(self._tick, reading)
+                        self._match()
                     scans.append(reading)
                 case Image() if reading.field_of_view > 0.0:
                     self._costmaps.see(reading)
@@ -141,6 +142,11 @@ class ReferenceStack:
             self._monitor.on_scan(scan, self._odometry.at(scan.tick))
             self._costmaps.see(scan)
         return bool(scans)
+
+    def _match(self) -> None:
+        """The localizer is done with these scans by now: so much later it knows what they are worth."""
+        for scan in self._matched.take(self._tick):
+            self._localizer.on_scan(scan)
 
     def _dead_reckon(self, reading: Odometry) -> None:
         """Remember the way the robot took; the truth only stands in for wheels where there are none."""
@@ -166,68 +172,55 @@ class ReferenceStack:
             self._zones = None
         self._costmaps.update(tick, self._frames, self._odometry)
 
-    def _control(self, tick: int) -> Twist:
-        goal = self._task.next(tick)
+    def _control(self, tick: int) -> None:
+        """See to the goals, and to the command that is wanted."""
+        self._events += self._task.next(tick)
+        self._pass(tick)
+        goal = self._task.goal
         if goal is None:
-            self._smoother.reset(STOP)
-            self._free_at = tick
-            return STOP
-        goal = self._passed(tick, goal)
+            self._commands.stop(tick)
+            return
         last = (goal, *self._task.ahead)[-1]
         if self._navigator.goal is not last:
             self._navigator.pursue(last)
         self._navigator.via = tuple(each for each in (goal, *self._task.ahead) if each is not last)
         if goal.timeout is not None and tick - self._task.since > goal.timeout * self._tick_rate:
-            return self._give_up(tick, NavigationFailure(ErrorCode.NAVIGATE_TIMEOUT, f"{goal.timeout:g} s are over"))
-        if self._monitor.silent(tick):
-            self._smoother.reset(STOP)
-            self._free_at = tick
-            return STOP
-        frames = self._frames
+            self._give_up(tick, NavigationFailure(ErrorCode.NAVIGATE_TIMEOUT, f"{goal.timeout:g} s are over"))
+        elif self._monitor.silent(tick):
+            self._commands.stop(tick)
+        elif not self._commands.busy(tick):
+            self._navigate(tick)
+
+    def _navigate(self, tick: int) -> None:
+        """One step of the navigator, and what comes of it."""
+        frames, periods = self._frames, self._commands.periods(tick)
         if self._speed_filter:
             self._controller.set_speed_limit(self._speed_filter.limit(frames.pose, self._controller.full_speed))
-        try:
-            wanted, reached = self._navigator.step(tick, frames, self._twist, self._held(tick))
-        except NavigationFailure as failure:
-            return self._give_up(tick, failure)
-        if reached:
-            self._task.reached(tick)
-            self._navigator.stop()
-            self._smoother.reset(STOP)
-            return STOP
-        return self._guarded(wanted)
+        step = self._navigator.step(tick, frames, self._twist, self._commands.held(tick), periods)
+        self._events += step.events
+        if step.failure is not None:
+            self._give_up(tick, step.failure)
+        elif step.reached:
+            self._events += self._task.reached(tick)
+            self._stop(tick)
+        else:
+            self._commands.want(tick, step.command)
 
-    def _passed(self, tick: int, goal: Goal) -> Goal:
-        """The goal that is next to be passed or reached, once those that the robot is near to are behind it.
+    def _pass(self, tick: int) -> None:
+        """Poses that the robot is near to are behind it.
 
         Nav2's RemovePassedGoals: the way on is planned through the poses that remain.
         """
-        while goal.via and self._localizer.belief.pose.distance(goal.pose) <= goal.xy_tolerance:
-            self._task.passed(tick)
-            following = self._task.next(tick)
-            assert following is not None, "what is passed is on the way to something"
-            goal = following
-        return goal
+        while (goal := self._task.goal) is not None and goal.via:
+            if self._localizer.belief.pose.distance(goal.pose) > goal.xy_tolerance:
+                return
+            self._events += self._task.passed(tick)
+            self._events += self._task.next(tick)
 
-    def _held(self, tick: int) -> bool:
-        """Whether the monitor has allowed nothing for HELD; once told, the waiting begins anew."""
-        held = tick - self._free_at >= HELD * self._tick_rate
-        if held:
-            self._free_at = tick
-        return held
+    def _give_up(self, tick: int, failure: NavigationFailure) -> None:
+        self._events += self._task.failed(tick, failure.code, str(failure))
+        self._stop(tick)
 
-    def _guarded(self, wanted: Twist) -> Twist:
-        smooth = self._smoother.smooth(wanted)
-        allowed = self._monitor.allow(smooth, self._odometry.now)
-        if allowed is not smooth:
-            self._smoother.reset(allowed)
-        crawls = abs(allowed.vx) + abs(allowed.vy) < CRAWL and abs(allowed.wz) < 5 * CRAWL
-        if not crawls or wanted == STOP:
-            self._free_at = self._tick
-        return allowed
-
-    def _give_up(self, tick: int, failure: NavigationFailure) -> Twist:
-        self._task.failed(tick, failure.code, str(failure))
+    def _stop(self, tick: int) -> None:
         self._navigator.stop()
-        self._smoother.reset(STOP)
-        return STOP
+        self._commands.stop(tick)

@@ -21,24 +21,24 @@ class VelocitySmoother:
         """What the base is doing now, after somebody else decided."""
         self._last = twist
 
-    def smooth(self, wanted: Twist) -> Twist:
-        """The velocity to send now."""
+    def smooth(self, wanted: Twist, periods: int = 1) -> Twist:
+        """The velocity to send now, so many periods after the last one."""
         if not self._enabled:
             return wanted
         last = self._last
-        vx = self._towards(last.vx, wanted.vx)
+        vx = self._towards(last.vx, wanted.vx, periods)
         if self._steered and wanted.vx != 0.0:
             turn = vx * wanted.wz / wanted.vx  # nav2's scale_velocities: a car keeps to the curve while it speeds up
         else:
-            turn = self._turned(last.wz, wanted.wz)
-        self._last = Twist(vx, self._towards(last.vy, wanted.vy), turn)
+            turn = self._turned(last.wz, wanted.wz, periods)
+        self._last = Twist(vx, self._towards(last.vy, wanted.vy, periods), turn)
         return self._last
 
-    def _towards(self, now: float, wanted: float) -> float:
+    def _towards(self, now: float, wanted: float, periods: int) -> float:
         if now * wanted < 0.0:
             wanted = 0.0
-        step = self._faster if abs(wanted) > abs(now) else self._slower
+        step = periods * (self._faster if abs(wanted) > abs(now) else self._slower)
         return min(max(wanted, now - step), now + step)
 
-    def _turned(self, now: float, wanted: float) -> float:
-        return min(max(wanted, now - self._turn), now + self._turn)
+    def _turned(self, now: float, wanted: float, periods: int) -> float:
+        return min(max(wanted, now - periods * self._turn), now + periods * self._turn)

@@ -23,8 +23,8 @@ class ToldGoals:
     """The goals of a run, and how they stand by what the stack says."""
 
     def __init__(self, stop_on_failure: bool, tick_rate: int, mode: Mode = "navigate_to_pose") -> None:
-        self._journal: list[Event] = []
-        self._task = Task(stop_on_failure, self._journal, Clock(tick_rate), mode)
+        self._events: list[Event] = []
+        self._task = Task(stop_on_failure, Clock(tick_rate), mode)
         self._rate = tick_rate
         self._dropped: set[str] = set()
 
@@ -40,7 +40,7 @@ class ToldGoals:
     def preempt(self, tick: int, goal: Goal) -> None:
         """Another goal takes the place of the current one, as the stack will be told."""
         self._drop()
-        self._task.preempt(tick, goal)
+        self._events += self._task.preempt(tick, goal)
 
     def hear(self, tick: int, said: dict[str, Any]) -> None:
         """An event as the stack tells it. Raises NotAllowed."""
@@ -54,25 +54,26 @@ class ToldGoals:
                 self._accept(tick, name)
             case "goal.reached":
                 self._current(kind, name)
-                self._task.reached(tick)
+                self._events += self._task.reached(tick)
             case "goal.passed":
                 self._current(kind, name)
                 if self._task.goal is not None and not self._task.goal.via:
                     raise NotAllowed(f"goal.passed `{name[:60]}`, which is a goal to stop at")
-                self._task.passed(tick)
+                self._events += self._task.passed(tick)
             case "goal.failed":
                 self._current(kind, name)
-                self._task.failed(tick, _code(data.get("error_code")), str(data.get("message", ""))[:LONGEST_TEXT])
+                code, message = _code(data.get("error_code")), str(data.get("message", ""))[:LONGEST_TEXT]
+                self._events += self._task.failed(tick, code, message)
             case "goal.canceled":
                 self._cancel(tick, name)
             case _ if kind in _FREE:
-                self._journal.append(Event(tick, EventKind(kind), name[:LONGEST_TEXT], _plain(data)))
+                self._events.append(Event(tick, EventKind(kind), name[:LONGEST_TEXT], _plain(data)))
             case _:
                 raise NotAllowed(f"an event `{kind[:60]}`, which is not a stack's to tell")
 
     def rest(self, tick: int) -> None:
         """Time has come to this tick: a wait may be over, and with it the task."""
-        self._task.rest(tick)
+        self._events += self._task.rest(tick)
 
     def overdue(self, tick: int) -> bool:
         """Whether the time of the current goal is over, and the stack does not say so itself: then it fails now."""
@@ -80,12 +81,12 @@ class ToldGoals:
         if goal is None or goal.timeout is None or tick - self._task.since <= goal.timeout * self._rate:
             return False
         self._drop()
-        self._task.failed(tick, ErrorCode.NAVIGATE_TIMEOUT, f"{goal.timeout:g} s are over")
+        self._events += self._task.failed(tick, ErrorCode.NAVIGATE_TIMEOUT, f"{goal.timeout:g} s are over")
         return True
 
     def take(self) -> tuple[Event, ...]:
         """The events since this was last asked."""
-        events, self._journal[:] = tuple(self._journal), []
+        events, self._events = tuple(self._events), []
         return events
 
     def _drop(self) -> None:
@@ -96,13 +97,14 @@ class ToldGoals:
     def _accept(self, tick: int, name: str) -> None:
         if self._task.goal is not None:
             raise NotAllowed(f"goal.accepted, but goal `{self._task.goal.name}` is under way")
-        if self._task.rest(tick):
+        self.rest(tick)
+        if self._task.stays:
             raise NotAllowed(f"goal.accepted `{name[:60]}`, but the robot is to stay where it is for a while")
         following = self._task.following
         if following is None or name not in ("", following.name):
             waits = "none is waiting" if following is None else f"the next one is `{following.name}`"
             raise NotAllowed(f"goal.accepted `{name[:60]}`, but {waits}")
-        self._task.next(tick)
+        self._events += self._task.next(tick)
 
     def _current(self, kind: str, name: str) -> None:
         goal = self._task.goal
@@ -116,7 +118,7 @@ class ToldGoals:
             self._dropped.discard(name)
             return
         self._current("goal.canceled", name)
-        self._task.cancel(tick)
+        self._events += self._task.cancel(tick)
 
 
 def _code(told: Any) -> ErrorCode | int:

@@ -14,6 +14,7 @@ from simscen.stack.costmap.rolling import NO_FARTHER
 from simscen.stack.frames import Frames, placed_polygon
 from simscen.stack.odometry_history import OdometryHistory
 from simscen.stack.protocols import Surroundings
+from simscen.stack.underway import Underway
 
 SMALLEST = 3.0
 """Metres: the edge of Nav2's local costmap, and the least of ours unless somebody asks for less."""
@@ -29,8 +30,8 @@ class Costmaps:
     the localizer moves nothing in it but keepout zones, which are known in the map frame alone.
     """
 
-    def __init__(self, spec: StackSpec, surroundings: Surroundings, reach: float) -> None:
-        """`reach`: how far in metres the controller looks ahead."""
+    def __init__(self, spec: StackSpec, surroundings: Surroundings, reach: float, latency: int = 0) -> None:
+        """`reach`: how far in metres the controller looks ahead; `latency`: ticks that an update takes."""
         self.wide = Costmap(spec.costmap, surroundings)
         near = spec.local_costmap.completed(spec.costmap)
         edge = max(SMALLEST, 2.0 * (reach + surroundings.robot.circumscribed_radius + NO_FARTHER))
@@ -38,8 +39,8 @@ class Costmaps:
         bare = replace(surroundings, map=None, keepout=(), masks=replace(surroundings.masks, keepout=None))
         self.near = Costmap(near, bare, size, NO_FARTHER)
         self._reach = max(size) / 2
-        self._wide = _Rhythm(math.ceil(surroundings.tick_rate / spec.costmap.update_frequency))
-        self._near = _Rhythm(math.ceil(surroundings.tick_rate / near.update_frequency))
+        self._wide = _Rhythm(math.ceil(surroundings.tick_rate / spec.costmap.update_frequency), latency)
+        self._near = _Rhythm(math.ceil(surroundings.tick_rate / near.update_frequency), latency)
         self._zones = Zones(surroundings.keepout, (), surroundings.masks)
         self._odom_from_map: Pose2 | None = None
         self._painted = False
@@ -59,12 +60,12 @@ class Costmaps:
         self.wide.set_zones(zones)
 
     def update(self, tick: int, frames: Frames, odometry: OdometryHistory) -> None:
-        """Feed the newest scan of each sensor to the costmaps that are due, seen from where it was taken."""
-        for seen in self._wide.take(tick):
-            self.wide.update(odometry.then(frames.pose, seen.tick), seen)
-        for seen in self._near.take(tick):
-            self._paint_zones(frames)
-            self.near.update(odometry.then(frames.odometry, seen.tick), seen)
+        """Feed the newest reading of each sensor to the costmaps that are due, seen from where it was taken."""
+        for base, seen, _ in self._wide.take(tick, frames, frames.pose, odometry):
+            self.wide.update(base, seen)
+        for base, seen, then in self._near.take(tick, frames, frames.odometry, odometry):
+            self._paint_zones(then)
+            self.near.update(base, seen)
 
     def clear(self) -> None:
         """Forget every live obstacle but those that the newest scans show (Nav2's ClearEntireCostmap of both)."""
@@ -88,18 +89,24 @@ class Costmaps:
 class _Rhythm:
     """When a costmap is updated, and the readings that it has not taken in yet."""
 
-    def __init__(self, period: int) -> None:
-        self._period, self._updated = period, -period
+    def __init__(self, period: int, latency: int) -> None:
+        self._period, self._updated = max(period, latency), -period
+        self._underway = Underway[_View](latency)
         self.seen: dict[str, Scan | Image] = {}
 
     def due(self, tick: int) -> bool:
         return tick - self._updated >= self._period
 
-    def take(self, tick: int) -> list[Scan | Image]:
-        """The readings to take in now; without any the update waits for one."""
-        if not self.seen or not self.due(tick):
-            return []
-        self._updated = tick
-        seen = [one for one in self.seen.values() if isinstance(one, Image) or not np.isnan(one.ranges).all()]
-        self.seen.clear()
-        return seen
+    def take(self, tick: int, frames: Frames, base: Pose2, odometry: OdometryHistory) -> list["_View"]:
+        """What has been taken in by now; without any reading an update waits for one. The robot is at `base` now."""
+        if self.seen and self.due(tick):
+            self._updated = tick
+            for one in self.seen.values():
+                if isinstance(one, Image) or not np.isnan(one.ranges).all():
+                    self._underway.put(tick, (odometry.then(base, one.tick), one, frames))
+            self.seen.clear()
+        return self._underway.take(tick)
+
+
+_View = tuple[Pose2, Scan | Image, Frames]
+"""Where the robot was at a reading, the reading, and where it was when the update began."""

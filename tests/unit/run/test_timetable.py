@@ -12,3 +12,16 @@ def test_every_tick_at_which_something_is_due_is_visited_and_no_other(periods):
         visited.append(tick)
     due = [t for t in range(1, visited[-1] + 1) if any(t % period == 0 for period in periods)]
     assert visited == due
+
+
+@given(st.lists(st.tuples(st.sampled_from([3, 4, 6, 12, 24]), st.integers(0, 60)), min_size=1, max_size=4))
+def test_what_comes_later_than_a_multiple_of_its_period_is_visited_when_it_comes(later):
+    table, tick, visited = Timetable([24], later), 0, []
+    while tick < 300:
+        tick += table.until_next(tick)
+        visited.append(tick)
+    beats = [(24, 0), *later]
+    assert visited == [
+        t for t in range(1, visited[-1] + 1) if any((t - ticks) % period == 0 for period, ticks in beats)
+    ]
+    assert all(table.due(t) for t in visited)

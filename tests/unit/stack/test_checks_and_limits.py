@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from simscen.core.events import Event
 from simscen.core.filtermasks import FilterMasks, SpeedLimits
 from simscen.core.geometry import Pose2
 from simscen.core.grid import OccupancyGrid
@@ -262,18 +261,15 @@ def test_the_lowest_limit_of_the_zones_one_is_in_counts() -> None:
 
 
 def test_a_task_says_how_it_ended_with_the_code_of_the_last_failure() -> None:
-    journal: list[Event] = []
-    task = Task(False, journal)
+    task = Task(False)
     task.start((Goal("a", Pose2(0, 0)), Goal("b", Pose2(1, 0))))
-    task.next(1)
-    task.failed(5, ErrorCode.GOAL_OCCUPIED, "in a wall")
-    task.next(6)
-    task.reached(9)
-    assert [(e.tick, e.kind, e.name) for e in journal] == [
+    failed = *task.next(1), *task.failed(5, ErrorCode.GOAL_OCCUPIED, "in a wall")
+    told = *failed, *task.next(6), *task.reached(9)
+    assert [(e.tick, e.kind, e.name) for e in told] == [
         (1, "goal.accepted", "a"),
         (5, "goal.failed", "a"),
         (6, "goal.accepted", "b"),
         (9, "goal.reached", "b"),
         (9, "navigation.ended", "FAILED"),
     ]
-    assert journal[-1].data == {"error_code": 206, "error_name": "GOAL_OCCUPIED"}
+    assert told[-1].data == {"error_code": 206, "error_name": "GOAL_OCCUPIED"}

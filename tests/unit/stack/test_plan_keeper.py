@@ -55,15 +55,13 @@ class Bench:
         self.costmap = Costmap(CostmapSpec(), Surroundings(round_robot(), grid, RATE))
         self.journal: list[Event] = []
         self.now = 0.0
-        self.keeper = PlanKeeper(
-            PlannerSpec(**options), self.script, self.costmap, lambda k: 100 + k, 0.22, self.journal
-        )
+        self.keeper = PlanKeeper(PlannerSpec(**options), self.script, self.costmap, lambda k: 100 + k, 0.22)
 
     def steps(self, count: int) -> list[object]:
         """Reasons of the plans made in so many steps of the navigator."""
         before = len(self.journal)
         for _ in range(count):
-            self.keeper.step(0, self.now, GOAL, HERE)
+            self.journal += self.keeper.step(0, self.now, GOAL, HERE)
             self.now += 0.05
         return [event.data["reason"] for event in self.journal[before:]]
 

@@ -13,11 +13,26 @@ A, B = Goal("a", Pose2(0, 0), via=True), Goal("b", Pose2(1, 0), via=True)
 C, D = Goal("c", Pose2(2, 0)), Goal("d", Pose2(3, 0))
 
 
-def task(*goals: Goal, stop: bool = True, mode="navigate_to_pose") -> tuple[Task, list[Event]]:
-    journal: list[Event] = []
-    begun = Task(stop, journal, Clock(100), mode)
+class Client:
+    """Does with a task what a stack does, and writes down what it hears."""
+
+    def __init__(self, task: Task) -> None:
+        self.task, self.journal = task, list[Event]()
+
+    def __getattr__(self, name: str):
+        what = getattr(self.task, name)
+        return (lambda *args: self._heard(what(*args))) if callable(what) else what
+
+    def _heard(self, events: tuple[Event, ...]) -> Goal | None:
+        self.journal += events
+        return self.task.goal
+
+
+def task(*goals: Goal, stop: bool = True, mode="navigate_to_pose") -> tuple[Client, list[Event]]:
+    begun = Task(stop, Clock(100), mode)
     begun.start(goals)
-    return begun, journal
+    client = Client(begun)
+    return client, client.journal
 
 
 def told(journal: list[Event]) -> list[tuple[int, str, str]]:

@@ -1,0 +1,72 @@
+"""From what the controller wants to what is sent to the base."""
+
+from simscen.core.geometry import Pose2
+from simscen.core.motion import STOP, Twist
+from simscen.stack.collision_monitor import CollisionMonitor
+from simscen.stack.underway import Underway
+from simscen.stack.velocity_smoother import VelocitySmoother
+
+CRAWL = 0.02
+"""m/s and rad/s (times five): what is slower does not count as driving."""
+HELD = 1.0
+"""Seconds for which the collision monitor may hold the robot before that counts as a failure: the controller cannot see
+what the monitor sees (an obstacle nearer than a cell), and would try the same until no progress is made."""
+
+
+class Commands:
+    """The velocity smoother, then the collision monitor; what each makes is there as late as it is slow."""
+
+    def __init__(
+        self, smoother: VelocitySmoother, monitor: CollisionMonitor, period: int, held: int, latency: tuple[int, int]
+    ) -> None:
+        """`period` of the controller and `held`, both in ticks; `latency` of controller and monitor in ticks."""
+        self._smoother, self._monitor, self._period, self._patience = smoother, monitor, period, held
+        self._wanted, self._allowed = Underway[tuple[Twist, int]](latency[0]), Underway[Twist](latency[1])
+        self._asked, self._free_at = 0, 0
+        self.sent = STOP
+        """What is sent to the base now."""
+
+    def busy(self, tick: int) -> bool:
+        """Whether the controller still works on its last command."""
+        return self._wanted.busy(tick)
+
+    def periods(self, tick: int) -> int:
+        """How many of its periods the controller has taken since it was last asked, or since the robot was stopped."""
+        return max(1, (tick - self._asked) // self._period)
+
+    def want(self, tick: int, wanted: Twist) -> None:
+        """What the controller makes of what it was told at this tick."""
+        self._wanted.put(tick, (wanted, self.periods(tick)))
+        self._asked = tick
+
+    def stop(self, tick: int) -> None:
+        """Stop at once; what is under way counts no more."""
+        self._wanted.clear()
+        self._allowed.clear()
+        self._smoother.reset(STOP)
+        self._asked = self._free_at = tick
+        self.sent = STOP
+
+    def step(self, tick: int, odometry: Pose2) -> None:
+        """Time has come to this tick, and the robot to this pose in the odom frame."""
+        for wanted, periods in self._wanted.take(tick):
+            self._allowed.put(tick, self._guarded(tick, wanted, periods, odometry))
+        for allowed in self._allowed.take(tick):
+            self.sent = allowed
+
+    def held(self, tick: int) -> bool:
+        """Whether the monitor has allowed nothing for HELD; once told, the waiting begins anew."""
+        held = tick - self._free_at >= self._patience
+        if held:
+            self._free_at = tick
+        return held
+
+    def _guarded(self, tick: int, wanted: Twist, periods: int, odometry: Pose2) -> Twist:
+        smooth = self._smoother.smooth(wanted, periods)
+        allowed = self._monitor.allow(smooth, odometry)
+        if allowed is not smooth:
+            self._smoother.reset(allowed)
+        crawls = abs(allowed.vx) + abs(allowed.vy) < CRAWL and abs(allowed.wz) < 5 * CRAWL
+        if not crawls or wanted == STOP:
+            self._free_at = tick
+        return allowed

@@ -1,0 +1,104 @@
+"""Late sensors and late computing in a run: what comes of what a robot's file and a scenario say."""
+
+from pathlib import Path
+
+import pytest
+
+from simscen.core.errors import InvalidInput
+from simscen.core.sensing import Odometry, Scan
+from simscen.loading.scenario import load_scenario
+from simscen.run.assemble import assemble
+from simscen.run.prepare import prepare
+from simscen.run.senses import Senses
+
+SCENARIO = """\
+simscen: 1
+world:
+  simscen: 1
+  walls: [{{name: outer wall, points: [[0, 0], [4, 0], [4, 4], [0, 4], [0, 0]]}}]
+robot: {{model: own.robot.yaml, pose: {{x: 1, y: 2}}}}
+stack: {{localizer: {{type: ground_truth}}{stack}}}
+goals: [{{pose: {{x: 3, y: 2}}, timeout: 30 s}}]
+time_limit: 30 s
+pass: [collisions: {{max: 0}}]
+"""
+ROBOT = """\
+simscen: 1
+name: own
+mass: 2 kg
+radius: 0.2 m
+body: [{{cylinder: [0.2, 0.2], z: 0.03}}]
+drive: {{type: differential, wheel_radius: 0.033, wheel_separation: 0.287}}
+limits: {{linear: 0.5, angular: 2, linear_acceleration: 1, angular_acceleration: 3.2}}
+sensors:
+  lidar: {{lidar: {{noise: 0{lidar}}}}}
+  odom: {{odometry: {{}}}}
+{latency}
+"""
+
+
+def moments(tmp_path: Path, beats: int, stack: str = "", lidar: str = "", latency: str = "") -> list:
+    (tmp_path / "own.robot.yaml").write_text(ROBOT.format(lidar=lidar, latency=latency))
+    file = tmp_path / "own.scenario.yaml"
+    file.write_text(SCENARIO.format(stack=stack))
+    prepared = prepare(load_scenario(file, tmp_path))
+    rig = assemble(prepared, 1)
+    (agent,) = rig.agents
+    agent.stack.start(prepared.estimate, prepared.case.goals)
+    taken = []
+    for _ in range(beats):
+        tick = rig.simulation.tick
+        agent.look(tick)
+        taken.append(agent.decide(tick))
+        agent.drive(taken[-1])
+        rig.simulation.step(agent.timetable.until_next(tick))
+    return taken
+
+
+def lateness(taken: list, kind: type) -> set[int]:
+    return {moment.tick - one.tick for moment in taken for one in moment.readings if type(one) is kind}
+
+
+def test_readings_of_a_late_sensor_come_when_they_come_and_say_when_they_were_taken(tmp_path: Path) -> None:
+    taken = moments(tmp_path, 60, lidar=", latency: 30 ms")
+    assert lateness(taken, Scan) == {7}
+    assert lateness(taken, Odometry) == {
+        0,
+    }
+
+
+def test_a_scenario_that_asks_for_it_has_the_latencies_of_its_robot(tmp_path: Path) -> None:
+    latency = "latency: {planner: 100 ms, controller: 10 ms, sensors: {lidar: 50 ms, odom: 10 ms}}"
+    taken = moments(tmp_path, 60, ", latency: robot", ", latency: 30 ms", latency)
+    assert lateness(taken, Scan) == {12}
+    assert lateness(taken, Odometry) == {0, 2}  # the truth of the localizer is never late
+    first = next(moment.tick for moment in taken if moment.decision.command.vx > 0)
+    assert first == 24 + 2
+    unasked = moments(tmp_path, 60, "", ", latency: 30 ms", latency)
+    assert lateness(unasked, Scan) == {7}
+    assert next(moment.tick for moment in unasked if moment.decision.command.vx > 0) == 0
+
+
+@pytest.mark.parametrize("said", [", latency: {}", ", latency: robot", ", latency: {planner: 0 s, controller: 1 ms}"])
+def test_no_latency_at_all_is_bit_identical_to_none_said(tmp_path: Path, said: str) -> None:
+    plain, zero = moments(tmp_path, 80), moments(tmp_path, 80, said, ", latency: 0 s")
+    for one, other in zip(plain, zero, strict=True):
+        assert (one.tick, one.truth, one.decision.command) == (other.tick, other.truth, other.decision.command)
+        assert one.decision.events == other.decision.events
+
+
+def test_a_latency_of_a_sensor_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInput, match="`latency` names `sonar`, which is none of its sensors"):
+        moments(tmp_path, 1, latency="latency: {sensors: {sonar: 1 ms}}")
+
+
+def test_a_late_sensor_keeps_the_order_of_its_readings() -> None:
+    class Sensor:
+        name, period = "s", 4
+
+        def read(self, tick: int) -> Odometry:
+            return Odometry("s", tick, None, None)
+
+    senses = Senses([Sensor()], {"s": 10})
+    assert senses.arrivals == ((4, 10),)
+    assert [one.tick for tick in range(30) for one in senses.read(tick)] == [0, 4, 8, 12, 16]

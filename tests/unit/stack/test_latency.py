@@ -1,0 +1,118 @@
+"""What computing takes: results come late, of what there was when it began, and nobody waits for anybody else."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from simscen.core.geometry import Pose2
+from simscen.core.motion import STOP
+from simscen.core.navigation import Goal
+from simscen.core.sensing import Scan
+from simscen.model.latency import Latency
+from simscen.model.stack import GroundTruth, StackSpec
+from simscen.stack.costmap.costmaps import Costmaps
+from simscen.stack.frames import Frames
+from simscen.stack.odometry_history import OdometryHistory
+from simscen.stack.protocols import Surroundings
+from simscen.stack.underway import Underway
+from simscen.testing.flatland import CONTROL, ODOMETRY, RATE, Drive, Flatland, drive, round_robot
+
+START, FAR = Pose2(1.0, 1.0), Goal("far", Pose2(9.0, 1.0), timeout=60.0)
+
+
+def start(world: Flatland | None = None, seed: int = 1, mapped: bool = True, **latency: float) -> Drive:
+    """A room of 10 x 3 m to drive through; what stands in `world` is not on the map."""
+    room = Flatland().room(10, 3)
+    here = Flatland([*room.boxes, *(world.boxes if world else [])], world.discs if world else [])
+    spec = StackSpec(localizer=GroundTruth(type="ground_truth"), latency=Latency(**latency))
+    return drive(here, START, FAR, grid=room.grid((-0.5, -0.5, 10.5, 3.5)) if mapped else None, spec=spec, seed=seed)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("zero", [{}, dict.fromkeys(Latency.model_fields, 0.0), {"planner": 0.001, "costmap": 0.002}])
+def test_no_latency_is_bit_identical_to_none_said(seed: int, zero: dict[str, float]) -> None:
+    """Less than half a tick is none."""
+    world = Flatland(discs=[(4.0 + 0.3 * seed, 1.0, 0.3), (6.5, 1.2, 0.2)])
+    said, unsaid = start(world, seed, **zero).run(12), start(world, seed)
+    unsaid.stack = drive(
+        unsaid.world, START, FAR, grid=Flatland().room(10, 3).grid((-0.5, -0.5, 10.5, 3.5)), seed=seed
+    ).stack  # of a specification that does not speak of it
+    unsaid.run(12)
+    assert said.log == unsaid.log
+    assert said.commands == unsaid.commands
+    assert said.track == unsaid.track
+    assert len(said.kinds("plan.made")) > 1
+
+
+def test_a_plan_is_there_when_its_planner_is_done_and_the_robot_stands_until_then() -> None:
+    d = start(planner=0.2).run(1.0)
+    made = d.kinds("plan.made")[0].tick
+    assert made - d.kinds("goal.accepted")[0].tick == 0.2 * RATE
+    assert set(d.commands[: made // ODOMETRY]) == {STOP}
+    assert d.commands[made // ODOMETRY] != STOP
+
+
+def test_a_planner_that_is_computing_does_not_stop_the_controller() -> None:
+    world = Flatland()
+    d = start(world, planner=1.0).run(2.0)
+    d.world.discs.append((5.0, 1.0, 0.25))
+    d.run(5.0)
+    blocked = next(event.tick for event in d.kinds("plan.made") if event.data["reason"] == "blocked")
+    before = d.commands[(blocked - RATE) // ODOMETRY : blocked // ODOMETRY]
+    assert all(command.vx > 0.3 for command in before)
+    assert d.run(40).result == "SUCCEEDED"
+    assert d.least > 0.02
+
+
+@pytest.mark.parametrize(("latency", "late"), [({"controller": 0.025}, 6), ({"collision_monitor": 0.05}, 12),
+                                               ({"controller": 0.025, "collision_monitor": 0.025}, 12)])  # fmt: skip
+def test_commands_come_as_late_as_controller_and_monitor_are_slow(latency: dict[str, float], late: int) -> None:
+    soon, later = start().run(3.0), start(**latency).run(3.0)
+    first = [next(k for k, c in enumerate(d.commands) if c != STOP) * ODOMETRY for d in (soon, later)]
+    assert first[1] - first[0] == late
+    assert later.run(30).result == "SUCCEEDED"
+
+
+def test_a_controller_that_takes_longer_than_its_period_is_asked_less_often_and_speeds_up_as_fast() -> None:
+    d = start(controller=0.12).run(2.5)
+    changes = [k for k, (a, b) in enumerate(pairwise(d.commands)) if a is not b]
+    assert min(b - a for a, b in pairwise(changes)) * ODOMETRY >= 2 * CONTROL
+    assert d.commands[-1].vx > 0.45
+    assert d.run(40).result == "SUCCEEDED"
+
+
+def test_costmaps_show_late_what_was_where_it_was_seen() -> None:
+    """The robot has moved on by half a metre when they are done."""
+    maps = Costmaps(StackSpec(), Surroundings(round_robot(), None, RATE), 0.5, latency=36)
+    odometry, ranges = OdometryHistory(), np.full(360, np.inf)
+    ranges[180] = 1.0
+    maps.see(Scan("lidar", 0, ranges, -math.pi, math.pi / 180, 0.05, 12.0))
+    for tick, x, shown in ((0, 0.0, 0), (24, 0.3, 0), (36, 0.5, 1), (48, 0.6, 1)):
+        pose = Pose2(x, 0.0)
+        odometry.add(tick, pose)
+        maps.update(tick, Frames(pose, pose), odometry)
+        for view in (maps.near.view, maps.wide.view):
+            cells = np.argwhere(view.costs == 254)
+            assert len(cells) == shown
+            assert cells[:, 1] * view.resolution + view.origin[0] == pytest.approx([1.0] * shown, abs=0.051)
+
+
+def test_a_localizer_is_handed_scans_when_it_would_be_done_with_them_with_the_tick_they_were_taken_at() -> None:
+    d = start(localizer=0.05)
+    heard: list[tuple[int, int]] = []
+    localizer = d.stack.inner._localizer
+    localizer.inner.on_scan = lambda scan: heard.append((d.tick, scan.tick))
+    d.run(0.5)
+    assert {now - then for now, then in heard} == {12}
+
+
+def test_what_is_under_way_is_there_after_its_time_and_in_order() -> None:
+    underway = Underway[str](5)
+    underway.put(0, "a")
+    underway.put(3, "b")
+    assert underway.take(4) == []
+    assert underway.busy(4)
+    assert underway.take(8) == ["a", "b"]
+    assert not underway.busy(8)
