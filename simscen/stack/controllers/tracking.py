@@ -84,7 +84,7 @@ class PathTracker:
         Interpolated between points, so that the carrot glides (RPP's circleSegmentIntersection). `beyond` prolongs
         the piece in the direction it ends in, so that the robot comes in straight (interpolate_curvature_after_goal).
         """
-        ahead = self.points[self.index : self._stop(2 * distance + 0.5)]
+        ahead = self.points[self.index : min(self._stop(2 * distance + 0.5), self._ends[0]) + 1]
         outside = np.hypot(ahead[:, 0] - pose.x, ahead[:, 1] - pose.y) >= distance
         first = int(outside.argmax())
         if not outside[first]:

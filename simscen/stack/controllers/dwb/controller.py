@@ -1,7 +1,6 @@
 """A dynamic-window controller (Fox, Burgard and Thrun 1997) with the critics of nav2_dwb_controller."""
 
 import numpy as np
-import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.motion import STOP, Twist
@@ -10,6 +9,7 @@ from simscen.model.controllers import DynamicWindow as DwbSpec
 from simscen.stack.controllers.dwb.critics import scores
 from simscen.stack.controllers.dwb.kinematics import kinematics_of, window
 from simscen.stack.controllers.dwb.oscillation import Oscillation
+from simscen.stack.controllers.dwb.room import Room
 from simscen.stack.controllers.dwb.rotate_to_goal import RotateToGoal
 from simscen.stack.controllers.dwb.trajectories import trajectories
 from simscen.stack.controllers.following import PathFollower
@@ -18,9 +18,6 @@ from simscen.stack.controllers.local_plan import local_plan
 from simscen.stack.protocols import CostmapView, NavigationFailure
 from simscen.stack.setting import Setting
 
-Mask = npt.NDArray[np.bool_]
-ROOM = 0.05
-"""Metres that trajectories keep off obstacles where any can."""
 FURTHER, BEYOND = 1.2, 0.5
 """The plan is looked at so much further than the robot gets in `sim_time` as it drives now, and metres more: what ends
 nearer holds it back, and from what lies beyond a bend of the plan the straight way leads into a wall."""
@@ -32,10 +29,11 @@ class DynamicWindowController(PathFollower):
     def __init__(self, spec: DwbSpec, setting: Setting) -> None:
         robot = setting.robot
         super().__init__(spec.max_vel_x, robot)
-        self._spec, self._robot, self._footprint = spec, robot, setting.footprint
+        self._spec, self._robot = spec, robot
         self._base = kinematics_of(spec, robot, self._fastest)
         self._samples = (spec.vx_samples, spec.vy_samples, spec.vtheta_samples)
         self._goal_pose = GoalPose(robot, spec.max_vel_theta, robot.angular_acceleration, setting.control_period)
+        self._room = Room(setting.footprint)
         self._rotate = RotateToGoal(spec.trans_stopped_velocity, spec.slowing_factor)
         self._oscillation = Oscillation(
             spec.oscillation_reset_dist, spec.oscillation_reset_angle, spec.x_only_threshold
@@ -72,31 +70,12 @@ class DynamicWindowController(PathFollower):
         if there and spec.rotate_to_goal_scale > 0.0:
             off, allowed = self._rotate.scores(twist, goal.pose.yaw, velocities, poses[:, -1, 2])
             legal, total = legal & allowed, total + spec.rotate_to_goal_scale * off
-        legal &= np.isfinite(total)
-        legal[legal] = self._free(costmap, pose, poses[legal])
-        return self._chosen(pose, velocities, poses, np.where(legal, total, np.inf))
-
-    def _chosen(self, pose: Pose2, velocities: Array, poses: Array, total: Array) -> Twist:
-        best = int(np.argmin(total)) if len(total) else 0
-        command = Twist(*velocities[best].tolist()) if len(total) and np.isfinite(total[best]) else STOP
+        order = np.argsort(np.where(legal, total, np.inf), kind="stable")
+        order = order[: int(np.count_nonzero(legal & np.isfinite(total)))]
+        best = self._room.first_free(costmap, pose, poses[order])
+        command = STOP if best is None else Twist(*velocities[order[best]].tolist())
         self._oscillation.debrief(pose, command)
-        if command == STOP:
+        if best is None:
             raise NavigationFailure(ErrorCode.NO_VALID_CONTROL, "no trajectory is legal")
-        self._best = poses[best]
+        self._best = poses[order[best]]
         return command
-
-    def _free(self, costmap: CostmapView, pose: Pose2, poses: Array) -> Mask:
-        """Which trajectories (n, steps, 3) hit nothing; from a collision those that lead out of it."""
-        if not len(poses):
-            return np.zeros(0, dtype=bool)
-        gap = self._footprint.discs.clearance(costmap, poses[..., 0], poses[..., 1], poses[..., 2])
-        for room in (ROOM, 0.0):
-            roomy: Mask = np.asarray((gap > room).all(axis=1))
-            if roomy.any():
-                return roomy
-        count, steps = poses.shape[:2]
-        exact = self._footprint.free(costmap, poses.reshape(-1, 3)).reshape(count, steps)
-        free: Mask = np.asarray(exact.all(axis=1))
-        if free.any() or self._footprint.clearance(costmap, np.array([pose]))[0] > 0:
-            return free
-        return np.asarray((gap[:, -1] > gap[:, 0] + 0.5 * costmap.resolution) & (gap.min(axis=1) >= gap[:, 0]))

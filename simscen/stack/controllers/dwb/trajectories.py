@@ -32,14 +32,18 @@ def trajectories(
     turned = np.cumsum(wz * lasts, axis=1)
     yaw = pose.yaw + np.concatenate((np.zeros_like(dt), turned), axis=1)
     cosine, sine = np.cos(yaw[:, :-1]) * lasts, np.sin(yaw[:, :-1]) * lasts
-    moved = np.stack((vx * cosine - vy * sine, vx * sine + vy * cosine), axis=-1)
+    dx, dy = vx * cosine, vx * sine
+    if vy.any():
+        dx, dy = dx - vy * sine, dy + vy * cosine
     poses = np.empty((*yaw.shape, 3))
     poses[:, 0, :2], poses[..., 2] = (pose.x, pose.y), yaw
-    poses[:, 1:, :2] = np.cumsum(moved, axis=1) + np.array((pose.x, pose.y))
+    poses[:, 1:, 0], poses[:, 1:, 1] = pose.x + np.cumsum(dx, axis=1), pose.y + np.cumsum(dy, axis=1)
     return poses
 
 
 def _changing(start: float, target: Array, up: Array, down: Array) -> Array:
     """The velocities (n, steps) on the way from `start` to the targets (n,), after changes of at most so much."""
+    if start == 0.0 and not target.any():
+        return np.zeros((1, 1))
     goal = target[:, None]
     return np.asarray(np.where(start < goal, np.minimum(goal, start + up), np.maximum(goal, start + down)))

@@ -1,0 +1,107 @@
+"""DWB's parts against numbers worked out by hand from Nav2's sources: golden/dwb.yaml."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from simscen.core.geometry import Pose2
+from simscen.core.motion import Twist
+from simscen.model.controllers import DynamicWindow as Spec
+from simscen.stack.controllers.dwb.critics import scores
+from simscen.stack.controllers.dwb.kinematics import Kinematics, samples, window
+from simscen.stack.controllers.dwb.oscillation import Oscillation
+from simscen.stack.controllers.dwb.rotate_to_goal import RotateToGoal
+from simscen.stack.controllers.dwb.trajectories import trajectories
+from simscen.stack.protocols import CostmapView
+
+ALL = yaml.safe_load((Path(__file__).parent / "golden/dwb.yaml").read_text(encoding="utf-8"))
+AT_ONCE = 1e9
+
+
+def of(kind: str) -> Any:
+    found = [case for case in ALL if case["kind"] == kind]
+    assert all(case["origin"] for case in found)
+    return pytest.mark.parametrize("case", found, ids=[case["name"] for case in found])
+
+
+def kinematics(acceleration: float = AT_ONCE, deceleration: float = -AT_ONCE, **given: Any) -> Kinematics:
+    low, high = (tuple(given.get(name, bound)) for name, bound in (("low", (-9,) * 3), ("high", (9,) * 3)))
+    slow = {name: given.get(name, 0.0) for name in ("min_speed_xy", "min_speed_theta")}
+    return Kinematics(
+        low, high, (acceleration,) * 3, (deceleration,) * 3, max_speed_xy=high[0], turning_radius=0, **slow
+    )
+
+
+@of("samples")
+def test_the_velocities_that_are_tried(case: dict[str, Any]) -> None:
+    assert samples(**case["given"]) == pytest.approx(case["expect"], abs=1e-9)
+
+
+@of("window")
+def test_the_combinations_that_are_tried(case: dict[str, Any]) -> None:
+    given = dict(case["given"])
+    found = window(kinematics(**given), Twist(), 1.7, given["counts"])
+    assert found == pytest.approx(np.array(case["expect"]), abs=1e-9)
+
+
+@of("trajectory")
+def test_where_a_velocity_leads(case: dict[str, Any]) -> None:
+    given = case["given"]
+    base = kinematics(given.get("acceleration", AT_ONCE), given.get("deceleration", -AT_ONCE))
+    pose, now = Pose2(*given.get("pose", (0, 0, 0))), Twist(*given.get("now", (0, 0, 0)))
+    velocities = np.array([given["velocity"]])
+    (found,) = trajectories(pose, now, velocities, base, given["seconds"], given["metres"], given["radians"])
+    assert found == pytest.approx(np.array(case["expect"]), abs=1e-9)
+
+
+@of("critics")
+def test_what_the_critics_say(case: dict[str, Any]) -> None:
+    given, expect = case["given"], dict(case["expect"])
+    costs = np.zeros((10, 10), np.uint8)
+    if "cost" in given:
+        row, column, cost = given["cost"]
+        costs[row, column] = cost
+    if "unknown_from" in given:
+        costs[:, given["unknown_from"] :] = 255
+    view = CostmapView(costs, np.full((10, 10), 9.0, np.float32), 0.1, (0.0, 0.0))
+    columns = np.arange(given.get("goal_column", 9) + 1)
+    plan = np.column_stack((0.05 + 0.1 * columns, np.full(len(columns), 0.05 + 0.1 * given["plan_row"])))
+    pose, goal = Pose2(*given.get("pose", (0.05, 0.55, 0.0))), Pose2(*plan[-1].tolist())
+    spec = Spec(type="dwb", **given.get("options", {}))
+    found = scores(spec, view, pose, goal, plan, np.array([given["velocity"]]), np.array([given["end"]]))
+    assert bool(found.legal[0]) is expect.pop("legal", True)
+    if "total" in expect:
+        assert found.total[0] == pytest.approx(expect.pop("total"), abs=1e-9)
+    assert {name: found.raw[name][0] for name in expect} == pytest.approx(expect, abs=1e-9)
+
+
+@of("rotate")
+def test_how_it_comes_to_rest_and_turns_at_the_goal(case: dict[str, Any]) -> None:
+    given, expect = case["given"], case["expect"]
+    critic = RotateToGoal(stopped=0.25, slowing=5.0)
+    found, legal = critic.scores(
+        Twist(*given["now"]), given["goal_yaw"], np.array(given["velocities"]), np.array(given["end_yaws"])
+    )
+    assert found == pytest.approx(expect["scores"], abs=1e-9)
+    assert legal.tolist() == expect["legal"]
+
+
+@of("oscillation")
+def test_what_may_not_turn_round_again(case: dict[str, Any]) -> None:
+    critic = Oscillation(0.05, 0.2, 0.05)
+    for command, moved in zip(case["given"]["commands"], case["given"]["moved"], strict=True):
+        critic.debrief(Pose2(moved, 0.0), Twist(*command))
+    tried = {"forward": (0.2, 0, 0), "backward": (-0.2, 0, 0), "left": (0, 0, 0.3), "right": (0, 0, -0.3)}
+    legal = dict(zip(tried, critic.legal(np.array(list(tried.values()))).tolist(), strict=True))
+    assert {name: legal[name] for name in case["expect"]} == case["expect"]
+
+
+def test_once_it_turns_at_the_goal_it_goes_on_turning_though_it_is_pushed() -> None:
+    critic = RotateToGoal(0.25, 5.0)
+    turn, drive = np.array([[0.0, 0.0, 0.5]]), np.array([[0.3, 0.0, 0.0]])
+    critic.scores(Twist(0.1), 0.0, turn, np.zeros(1))
+    assert critic.scores(Twist(0.5), 0.0, turn, np.zeros(1))[1].all()
+    assert not critic.scores(Twist(0.5), 0.0, drive, np.zeros(1))[1].any()

@@ -1,0 +1,61 @@
+"""Bases that drive sideways do so under the controllers that Nav2 lets: DWB and MPPI, not regulated pure pursuit."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from simscen.core.geometry import Pose2
+from simscen.core.navigation import Goal
+from simscen.model.stack import StackSpec
+from simscen.testing.flatland import Drive, Flatland, drive, round_robot
+
+BESIDE = Goal("beside", Pose2(3.3, 4.2, 0.0))
+DWB = {"type": "dwb", "vx_samples": 8, "vtheta_samples": 9}
+MPPI = {"type": "mppi", "batch_size": 400}
+
+
+def sideways(max_lateral: float, **controller: Any) -> Drive:
+    """A base that looks along x and is to go to a goal some way beside it, with the heading that it has."""
+    world, robot = Flatland().room(7, 7), round_robot(max_lateral=max_lateral)
+    spec = StackSpec.model_validate({"localizer": {"type": "ground_truth"}, "controller": controller})
+    return drive(world, Pose2(3.0, 3.0), BESIDE, robot=robot, grid=world.grid((-0.5, -0.5, 7.5, 7.5)), spec=spec).run(
+        30
+    )
+
+
+def strafed(driven: Drive) -> float:
+    return float(np.abs([command.vy for command in driven.commands]).max())
+
+
+@pytest.mark.parametrize("controller", [DWB, MPPI], ids=["dwb", "mppi"])
+def test_an_omnidirectional_base_strafes_no_faster_than_it_can(controller: dict[str, Any]) -> None:
+    driven = sideways(0.3, **controller)
+    assert driven.result == "SUCCEEDED"
+    assert 0.2 < strafed(driven) <= 0.3 + 1e-6
+
+
+def test_under_mppi_it_hardly_turns_on_the_way() -> None:
+    driven = sideways(0.5, **MPPI)
+    assert max(abs(pose.yaw) for pose in driven.track) < 0.8
+
+
+@pytest.mark.parametrize(
+    "controller", [{**DWB, "max_vel_y": 0.0}, {**MPPI, "motion_model": "DiffDrive"}, {**MPPI, "vy_max": 0.0}],
+    ids=["dwb", "mppi as a diff drive", "mppi without"],
+)  # fmt: skip
+def test_it_does_not_strafe_where_it_is_told_not_to(controller: dict[str, Any]) -> None:
+    driven = sideways(0.5, **controller)
+    assert driven.result == "SUCCEEDED"
+    assert strafed(driven) == 0.0
+
+
+def test_regulated_pure_pursuit_never_strafes_as_in_nav2() -> None:
+    driven = sideways(0.5)
+    assert driven.result == "SUCCEEDED"
+    assert strafed(driven) == 0.0
+
+
+@pytest.mark.parametrize("controller", [DWB, MPPI], ids=["dwb", "mppi"])
+def test_a_base_that_cannot_strafe_never_does(controller: dict[str, Any]) -> None:
+    assert strafed(sideways(0.0, **controller)) == 0.0
