@@ -115,6 +115,7 @@
   document.addEventListener("keydown", key);
   document.getElementById("all").addEventListener("click", () => { form.reset(); update(); field("find").focus(); });
   addEventListener("hashchange", () => location.hash.startsWith("#run-") && recall());
+  addEventListener("load", () => requestAnimationFrame(() => location.hash.startsWith("#run-") && recall())); // the browser takes the focus
   recall();
   update();
   if (document.documentElement.hasAttribute("data-live")) live();

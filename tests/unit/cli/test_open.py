@@ -1,0 +1,72 @@
+"""simscen run --open: the page is there before anything runs, follows what ends, and is the report in the end."""
+
+import webbrowser
+from pathlib import Path
+from urllib.parse import unquote, urlparse
+
+import pytest
+
+from simscen.cli import livepage
+from simscen.core.sessionevents import SessionEvent
+
+SCENARIO = """\
+simscen: 1
+tags: [smoke]
+world: {simscen: 1, walls: [{points: [[0, 0], [4, 0], [4, 3], [0, 3], [0, 0]]}]}
+robot: {pose: {x: 1, y: 1}}
+goals: [{pose: {x: 1.4, y: 1}}]
+time_limit: 20 s
+pass: [{goals_reached: {}}]
+"""
+
+
+@pytest.fixture
+def pages(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The pages that were opened, as they were then."""
+    opened: list[str] = []
+
+    def open_(uri: str) -> bool:
+        opened.append(Path(unquote(urlparse(uri).path)).read_text(encoding="utf-8"))
+        return True
+
+    monkeypatch.setattr(webbrowser, "open", open_)
+    return opened
+
+
+def test_the_page_opens_at_once_follows_the_runs_and_becomes_the_report(
+    simscen, pages: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
+    seen: list[str] = []
+
+    class Watched(livepage.LivePage):
+        def __call__(self, event: SessionEvent) -> None:
+            super().__call__(event)
+            seen.append((tmp_path / "out/report.html").read_text(encoding="utf-8"))
+
+    monkeypatch.setattr(livepage, "LEAST_PAUSE", 0.0)
+    monkeypatch.setattr(livepage, "SHARE", 0)
+    monkeypatch.setattr("simscen.cli.runsession.LivePage", Watched)
+    ended = simscen("run", "a.scenario.yaml", "--repeat", "2", "--out", "out", "--open", "-j", "1")
+    assert (ended.code, ended.err) == (0, "")
+    assert ["0 of 2 runs done" in page for page in pages] == [True]
+    assert any("1 of 2 runs done" in page for page in seen)
+    final = (tmp_path / "out/report.html").read_text(encoding="utf-8")
+    assert "<h1>✓ 2 passed</h1>" in final
+    assert "data-live" not in final.partition("<script>")[0]
+    assert 'data-tags="smoke"' in final
+
+
+def test_without_a_browser_it_says_where_the_page_is(simscen, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
+    monkeypatch.setattr(webbrowser, "open", lambda uri: False)
+    ended = simscen("run", "a.scenario.yaml", "--out", "out", "--open")
+    assert ended.code == 0
+    assert ended.err == "simscen: no browser was found; open out/report.html in one\n"
+
+
+def test_a_watched_folder_has_no_one_page_to_open(simscen, tmp_path: Path) -> None:
+    (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
+    ended = simscen("run", "a.scenario.yaml", "--watch", "--open")
+    assert ended.code == 2
+    assert "--watch and --open exclude each other" in ended.err
