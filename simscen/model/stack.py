@@ -2,7 +2,7 @@
 
 from typing import Annotated, ClassVar, Literal, get_args
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from simscen.core.navigation import RecoveryBehavior
 from simscen.model.controllers import Controller
@@ -242,15 +242,27 @@ class OmplPlanner(PlannerSpec):
     """A planner of OMPL on the costmap."""
 
     component: ClassVar[str] = "simscen.stack.planners.build:ompl_planner"
-    type: Literal["rrt_connect", "rrt_star", "informed_rrt_star", "bit_star", "aorrtc", "kpiece"] = "rrt_connect"
+    type: Literal["bit_star", "rrt_connect", "rrt_star", "informed_rrt_star", "aorrtc", "kpiece"] = "bit_star"
     allow_unknown: bool = True
-    """Taken from files of Nav2; means nothing here."""
-    max_iterations: Iterations = 20_000
-    """Iterations before NO_VALID_PATH; never seconds."""
+    """Whether plans may lead over what is not known, as dear as what is barely free."""
+    cost_travel_multiplier: Annotated[float, Field(ge=0, le=100)] = 2.0
+    """A metre of way costs 1 + this times its cost / 252 (nav2_smac_planner's name, meaning and default)."""
+    sampler: Literal["auto", "uniform", "medial_axis", "corridor"] = "auto"
+    """Where it searches; auto: medial_axis for bit_star, which alone can, else uniform."""
+    max_iterations: Iterations = 50_000
+    """Iterations of a search before it is given up; never seconds."""
+    improving_iterations: Iterations = 500
+    """Iterations of planners that improve their path, when they draw the samples themselves."""
     simplify: bool = True
-    """Whether plans are shortened and smoothed."""
+    """Whether the path that OMPL found is moved to where it costs least, and smoothed."""
     state_space: Literal["auto", "holonomic", "se2", "dubins", "reeds_shepp"] = "auto"
     """auto: Reeds-Shepp for an Ackermann drive, se2 for a long footprint, else holonomic."""
+
+    @model_validator(mode="after")
+    def _sampled(self) -> "OmplPlanner":
+        if self.sampler == "medial_axis" and self.type != "bit_star":
+            raise ValueError(f"`sampler: medial_axis` is for `bit_star`; `{self.type}` draws its samples itself")
+        return self
 
 
 Planner = Annotated[PlannerSpec, ByType("planner", OmplPlanner)]

@@ -13,8 +13,9 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from simscen.core.geometry import Array
-from simscen.stack.planners.field import Field
+from simscen.stack.planners.rates import Rates
 from simscen.stack.planners.search import Point
+from simscen.stack.protocols import CostmapView
 
 BLOCK = 0.2
 """Metres, about: the coarse grid's resolution."""
@@ -31,14 +32,14 @@ class InformedSet:
     Distances are those of king's and knight's moves, at most 2.8 % too long (8.2 % without the knight).
     """
 
-    def __init__(self, field: Field, start: Point, goal: Point, radius: float) -> None:
-        wanted = round(BLOCK / field.resolution)
-        self._factor = max(1, wanted, math.ceil(math.sqrt(field.height * field.width / MOST_BLOCKS)))
-        self._size = self._factor * field.resolution
-        self._origin = field.origin
-        self._height, self._width = -(-field.height // self._factor), -(-field.width // self._factor)
+    def __init__(self, rates: Rates, start: Point, goal: Point) -> None:
+        wanted = round(BLOCK / rates.resolution)
+        self._factor = max(1, wanted, math.ceil(math.sqrt(rates.height * rates.width / MOST_BLOCKS)))
+        self._size = self._factor * rates.resolution
+        self._origin = rates.origin
+        self._height, self._width = -(-rates.height // self._factor), -(-rates.width // self._factor)
         ends = [self._index(*start), self._index(*goal)]
-        graph = _graph(field.costmap.distance > radius, self._factor)
+        graph = _graph(rates.free, self._factor)
         through: Array = dijkstra(graph, directed=False, indices=ends) * self._size
         self._along, self._sum = through[0], through[0] + through[1]
         self.length = float(through[0][ends[1]])
@@ -56,26 +57,26 @@ class InformedSet:
             inside &= (self._along >= low - more) & (self._along <= high * (1.0 + slack) + more)
         self._inside = inside.tobytes()
 
-    def stops(self, field: Field) -> list[tuple[Point, float]]:
+    def stops(self, costmap: CostmapView) -> list[tuple[Point, float]]:
         """Points of a near-shortest way to search between, at most LEG metres apart, and how far along they are.
 
         A tree that fills 20 m in a hundred samples needs many thousands for 200 m with a door each ten.
         """
         legs = math.ceil(self.length / LEG) if math.isfinite(self.length) else 1
-        return [self._roomiest(field, self.length * leg / legs) for leg in range(1, legs)]
+        return [self._roomiest(costmap, self.length * leg / legs) for leg in range(1, legs)]
 
-    def _roomiest(self, field: Field, along: float) -> tuple[Point, float]:
+    def _roomiest(self, costmap: CostmapView, along: float) -> tuple[Point, float]:
         """The place with most room in the blocks of the shortest ways that are so far along."""
         on_way = self._sum <= self.length + 2 * self._size
         blocks = np.flatnonzero(on_way & (np.abs(self._along - along) <= self._size)).tolist()
-        cells = [self._best_cell(field, *divmod(block, self._width)) for block in blocks]
+        cells = [self._best_cell(costmap, *divmod(block, self._width)) for block in blocks]
         _, row, column = max(cells)
-        x = self._origin[0] + (column + 0.5) * field.resolution
-        return (x, self._origin[1] + (row + 0.5) * field.resolution), along
+        x = self._origin[0] + (column + 0.5) * costmap.resolution
+        return (x, self._origin[1] + (row + 0.5) * costmap.resolution), along
 
-    def _best_cell(self, field: Field, row: int, column: int) -> tuple[float, int, int]:
+    def _best_cell(self, costmap: CostmapView, row: int, column: int) -> tuple[float, int, int]:
         top, left = row * self._factor, column * self._factor
-        part = field.costmap.distance[top : top + self._factor, left : left + self._factor]
+        part = costmap.distance[top : top + self._factor, left : left + self._factor]
         best, width = int(part.argmax()), part.shape[1]
         return float(part.flat[best]), top + best // width, left + best % width
 

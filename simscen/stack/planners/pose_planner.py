@@ -13,6 +13,7 @@ from simscen.stack.planners.ends import find_ends
 from simscen.stack.planners.field import Field
 from simscen.stack.planners.informed_set import InformedSet
 from simscen.stack.planners.pose_search import Space, Valid, search_poses
+from simscen.stack.planners.rates import Rates
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
 
 TIGHTEST = 0.2
@@ -40,17 +41,20 @@ class PosePlanner:
     """Checks the whole hull at each pose, as a row of discs."""
 
     def __init__(self, spec: PlannerSpec, robot: RobotModel, footprint: Footprint, space: Space) -> None:
-        self._spec, self._inscribed, self._footprint, self._space = spec, robot.inscribed_radius, footprint, space
+        self._spec, self._robot, self._footprint, self._space = spec, robot, footprint, space
+        self._inscribed = robot.inscribed_radius
+        self._type = "rrt_connect" if spec.type == "bit_star" else spec.type
         self._turning_radius = max(ROOM_TO_STEER * robot.turning_radius, TIGHTEST)
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
         """A path of poses in the map frame, 5 cm apart; the easiest of a few searches."""
         field = Field(costmap)
-        ends = find_ends(field, start, goal, self._inscribed, self._spec.tolerance)
+        rates = Rates(costmap, self._robot, self._spec.cost_travel_multiplier, self._spec.allow_unknown)
+        ends = find_ends(rates, start, goal, self._spec.tolerance)
         self._hull_fits(costmap, start, ErrorCode.START_OCCUPIED, "start")
         goal = Pose2(*ends.goal, goal.yaw)
         self._hull_fits(costmap, goal, ErrorCode.GOAL_OCCUPIED, "goal")
-        informed = InformedSet(field, ends.start, ends.goal, self._inscribed)
+        informed = InformedSet(rates, ends.start, ends.goal)
         for slack, room, share in ATTEMPTS:
             informed.narrow(slack)
             valid = self._valid(field, informed, room, (start, goal))
@@ -59,7 +63,7 @@ class PosePlanner:
             while True:
                 seed += 1
                 poses = search_poses(
-                    self._spec.type, self._space, self._turning_radius, informed.bounds(), start, goal, valid, seed,
+                    self._type, self._space, self._turning_radius, informed.bounds(), start, goal, valid, seed,
                     iterations,
                 )  # fmt: skip
                 if poses is None:
@@ -68,8 +72,8 @@ class PosePlanner:
                 if len(found) == TRIES:
                     break
             if found:
-                return Path(min(found, key=_effort))
-        message = f"{self._spec.type}: no path in {self._spec.max_iterations} iterations"
+                return Path(min(found, key=lambda poses: _effort(rates, poses)))
+        message = f"{self._type}: no path in {self._spec.max_iterations} iterations"
         raise NavigationFailure(ErrorCode.NO_VALID_PATH, message)
 
     def _hull_fits(self, costmap: CostmapView, pose: Pose2, code: ErrorCode, what: str) -> None:
@@ -97,6 +101,8 @@ class PosePlanner:
         return valid
 
 
-def _effort(poses: Array) -> float:
-    """Metres to drive, and what stopping to change direction costs."""
-    return float(np.hypot(*np.diff(poses[:, :2], axis=0).T).sum()) + CUSP * int(cusps(poses).size)
+def _effort(rates: Rates, poses: Array) -> float:
+    """What the way costs, and what stopping to change direction does."""
+    steps = np.hypot(*np.diff(poses[:, :2], axis=0).T)
+    middles = 0.5 * (poses[1:, :2] + poses[:-1, :2])
+    return float((steps * rates.at(middles)).sum()) + CUSP * int(cusps(poses).size)

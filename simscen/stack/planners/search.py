@@ -1,18 +1,23 @@
-"""The search itself: OMPL's planners in the plane, limited by iterations and seeded.
+"""The search itself: OMPL's planners in the plane over a costmap's costs, limited by iterations and seeded.
 
 OMPL's generator is global to the process: it is seeded anew for each plan, before any other OMPL object is made.
 OMPL calls that a mistake in its log, yet it does what is wanted (measured; FACTS.md), hence the silenced log.
 """
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Any
 
 from ompl import base as ob
 from ompl import geometric as og
 from ompl import util as ou
 
-Segment = Callable[[float, float, float, float], bool]
+from simscen.core.geometry import Array
+
 Point = tuple[float, float]
+Motion = Callable[[float, float, float, float], float]
+"""The cost of going straight from (x, y) to (x, y), at least its length in metres; inf where the robot cannot."""
 
 PLANNERS: dict[str, Callable[[Any], Any]] = {
     "rrt_connect": og.RRTConnect,
@@ -22,61 +27,152 @@ PLANNERS: dict[str, Callable[[Any], Any]] = {
     "aorrtc": og.AORRTC,
     "kpiece": og.KPIECE1,
 }
+SATISFIED = frozenset(("rrt_connect", "kpiece"))
+"""These end with their first path; the others go on to improve it."""
 RANGE = 1.0
 """Metres that a tree grows at most in one step. OMPL's default, a fifth of the map, mostly ends in walls of a house."""
+BATCH = 200
+"""Samples that BIT* draws at a time where it draws them itself."""
 ou.setLogLevel(ou.LOG_NONE)
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """What is searched: `bounds` are (min x, min y, max x, max y), `samples` (n, 2) those to use, if not OMPL's own."""
+
+    start: Point
+    goal: Point
+    bounds: tuple[float, float, float, float]
+    motion: Motion
+    samples: Array | None = None
 
 
 class _Motions(ob.MotionValidator):  # type: ignore[misc] # ompl has no types
     """Answers OMPL's question about a motion with ours; one call in place of a call for each point on the way."""
 
-    def __init__(self, information: Any, free: Segment) -> None:
+    def __init__(self, information: Any, motion: Motion) -> None:
         super().__init__(information)
-        self._free = free
+        self._motion = motion
 
     def checkMotion(self, a: Any, b: Any) -> bool:
         """Whether the straight motion is free."""
-        return self._free(a[0], a[1], b[0], b[1])
+        return self._motion(a[0], a[1], b[0], b[1]) < math.inf
 
 
-def search(
-    kind: str,
-    bounds: tuple[float, float, float, float],
-    start: Point,
-    goal: Point,
-    free: Segment,
-    seed: int,
-    iterations: int,
-) -> list[Point] | None:
-    """Points from start to goal whose segments are all `free`; None when the iterations did not suffice.
+class _Dearer(ob.OptimizationObjective):  # type: ignore[misc] # ompl has no types
+    """What a motion costs beyond its length."""
 
-    `bounds` is (min x, min y, max x, max y). OMPL's "approximate solution" counts as none.
+    def __init__(self, information: Any, motion: Motion) -> None:
+        super().__init__(information)
+        self._motion = motion
+
+    def motionCost(self, a: Any, b: Any) -> Any:
+        """Its cost along the straight line, less its length."""
+        ax, ay, bx, by = a[0], a[1], b[0], b[1]
+        return ob.Cost(self._motion(ax, ay, bx, by) - math.hypot(bx - ax, by - ay))
+
+    def stateCost(self, _: Any) -> Any:
+        """Standing costs nothing."""
+        return ob.Cost(0.0)
+
+
+class _Priced(ob.PathLengthOptimizationObjective):  # type: ignore[misc] # ompl has no types
+    """The same in one: OMPL samples the ellipse of the informed set for an objective of length, and for no other."""
+
+    def __init__(self, information: Any, motion: Motion) -> None:
+        super().__init__(information)
+        self._motion = motion
+
+    def motionCost(self, a: Any, b: Any) -> Any:
+        """Its cost along the straight line."""
+        return ob.Cost(self._motion(a[0], a[1], b[0], b[1]))
+
+    def motionCostHeuristic(self, a: Any, b: Any) -> Any:
+        """Its length: no metre costs less than 1."""
+        return ob.Cost(math.hypot(b[0] - a[0], b[1] - a[1]))
+
+
+class _Validity:
+    """Answers whether a state is free. Given samples it also puts each that OMPL draws on the next of them.
+
+    OMPL's Python bindings have no way to give a planner a sampler of states (2.0.1); but BIT* asks for the validity of
+    each state that it has drawn before it looks at it, and goes on with it as it is then.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self._motion = problem.motion
+        self._ends = (problem.start, problem.goal)
+        self._left: Iterator[list[float]] | None = None if problem.samples is None else iter(problem.samples.tolist())
+
+    def __call__(self, state: Any) -> bool:
+        x, y = state[0], state[1]
+        if self._left is None or (x, y) in self._ends:
+            return self._motion(x, y, x, y) < math.inf
+        sample = next(self._left, None)
+        if sample is None:
+            return False
+        state[0], state[1] = sample
+        return True
+
+
+def search(kind: str, problem: Problem, seed: int, iterations: int, improving: int) -> list[Point] | None:
+    """Points from start to goal, of least cost as far as the planner cares; None when the iterations did not suffice.
+
+    A planner that improves its path does so for `improving` iterations, or until it has made the best of the samples
+    it was given. OMPL's "approximate solution" counts as none.
     """
     ou.RNG.setSeed(seed)
-    space = ob.RealVectorStateSpace(2)
-    limits = ob.RealVectorBounds(2)
-    for axis in (0, 1):
-        limits.setLow(axis, bounds[axis])
-        limits.setHigh(axis, bounds[axis + 2])
-    space.setBounds(limits)
-    information = ob.SpaceInformation(space)
-    information.setStateValidityChecker(lambda state: free(state[0], state[1], state[0], state[1]))
-    information.setMotionValidator(_Motions(information, free))
-    information.setup()
-    ends = _state(information, start), _state(information, goal)
+    information = _information(problem)
+    ends = _state(information, problem.start), _state(information, problem.goal)
     if not all(information.satisfiesBounds(end) and information.isValid(end) for end in ends):
         return None  # a planner would wait for a better goal, 5 ms an iteration
-    problem = ob.ProblemDefinition(information)
-    problem.setStartAndGoalStates(*ends)
+    definition = ob.ProblemDefinition(information)
+    definition.setStartAndGoalStates(*ends)
+    objective = _Priced if kind == "informed_rrt_star" else _objective
+    definition.setOptimizationObjective(objective(information, problem.motion))
     planner = PLANNERS[kind](information)
     if hasattr(planner, "setRange"):
         planner.setRange(RANGE)
-    planner.setProblemDefinition(problem)
+    if kind == "bit_star":
+        planner.setUseKNearest(False)
+        planner.setSamplesPerBatch(BATCH if problem.samples is None else len(problem.samples))
+    planner.setProblemDefinition(definition)
     planner.setup()
-    planner.solve(ob.PlannerTerminationCondition(after(iterations)))
-    if not problem.hasExactSolution():
+    planner.solve(ob.PlannerTerminationCondition(_over(kind, problem, planner, iterations, improving)))
+    if not definition.hasExactSolution():
         return None
-    return [(state[0], state[1]) for state in problem.getSolutionPath().getStates()]
+    return [(state[0], state[1]) for state in definition.getSolutionPath().getStates()]
+
+
+def _over(kind: str, problem: Problem, planner: Any, iterations: int, improving: int) -> Callable[[], bool]:
+    """When this planner has done enough."""
+    if problem.samples is not None:
+        return after(iterations, lambda: planner.numBatches() > 1)
+    if kind in SATISFIED:
+        return after(iterations)
+    return after(iterations, lambda: math.isfinite(planner.bestCost().value()), improving)  # told of in the end only
+
+
+def _information(problem: Problem) -> Any:
+    space = ob.RealVectorStateSpace(2)
+    limits = ob.RealVectorBounds(2)
+    for axis in (0, 1):
+        limits.setLow(axis, problem.bounds[axis])
+        limits.setHigh(axis, problem.bounds[axis + 2])
+    space.setBounds(limits)
+    information = ob.SpaceInformation(space)
+    information.setStateValidityChecker(_Validity(problem))
+    information.setMotionValidator(_Motions(information, problem.motion))
+    information.setup()
+    return information
+
+
+def _objective(information: Any, motion: Motion) -> Any:
+    """Length, and what is dearer than it: so OMPL's own length is the heuristic, worked out without Python."""
+    objective = ob.MultiOptimizationObjective(information)
+    objective.addObjective(ob.PathLengthOptimizationObjective(information), 1.0)
+    objective.addObjective(_Dearer(information, motion), 1.0)
+    return objective
 
 
 def _state(information: Any, point: Point) -> Any:
@@ -85,13 +181,13 @@ def _state(information: Any, point: Point) -> Any:
     return state
 
 
-def after(iterations: int) -> Callable[[], bool]:
-    """A termination condition that is asked once an iteration and says stop after so many."""
+def after(iterations: int, done: Callable[[], bool] = lambda: False, least: int = 0) -> Callable[[], bool]:
+    """A termination condition that is asked once an iteration: says stop after so many, or after `least` when done."""
     left = iterations
 
     def over() -> bool:
         nonlocal left
         left -= 1
-        return left < 0
+        return left < 0 or (iterations - left > least and done())
 
     return over

@@ -54,7 +54,7 @@ def shortest(view: CostmapView, start: Pose2, goal: Pose2, radius: float) -> flo
     return float(dijkstra(graph, directed=False, indices=ends[0])[ends[1]])
 
 
-def planner(kind: str = "rrt_connect", robot: RobotModel = ROBOT, **options: object) -> OmplPlanner:
+def planner(kind: str = "bit_star", robot: RobotModel = ROBOT, **options: object) -> OmplPlanner:
     return OmplPlanner(PlannerSpec(type=kind, **options), robot)
 
 

@@ -1,12 +1,23 @@
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
 import pytest
 
-from simscen.stack.planners.search import PLANNERS, search
+from simscen.stack.planners.search import PLANNERS, Problem, search
 
 BOUNDS = (0.0, 0.0, 4.0, 4.0)
 
 
-def left_half(ax: float, ay: float, bx: float, by: float) -> bool:
-    return max(ax, bx) < 2.0
+def left_half(ax: float, ay: float, bx: float, by: float) -> float:
+    return math.hypot(bx - ax, by - ay) if max(ax, bx) < 2.0 else math.inf
+
+
+def dear_below(ax: float, ay: float, bx: float, by: float) -> float:
+    """Ten times as dear below y = 2."""
+    price = 1.0 + 9.0 * float(np.mean(np.linspace(ay, by, 20) < 2.0))
+    return price * math.hypot(bx - ax, by - ay)
 
 
 @pytest.mark.parametrize("kind", sorted(PLANNERS))
@@ -17,4 +28,38 @@ def left_half(ax: float, ay: float, bx: float, by: float) -> bool:
 )
 def test_ends_that_cannot_be_are_told_before_any_iteration(kind: str, start, goal) -> None:
     """OMPL would sleep 5 ms an iteration in wait for better ones: for ever, with so many."""
-    assert search(kind, BOUNDS, start, goal, left_half, 1, 10**9) is None
+    assert search(kind, Problem(start, goal, BOUNDS, left_half), 1, 10**9, 1) is None
+
+
+PROBLEM = Problem((0.5, 1.9), (3.5, 1.9), BOUNDS, dear_below)
+
+
+def cost(points: list[tuple[float, float]]) -> float:
+    return sum(dear_below(*a, *b) for a, b in pairwise(points))
+
+
+@pytest.mark.parametrize("kind", ["rrt_star", "informed_rrt_star", "bit_star"])
+def test_planners_that_improve_their_path_leave_dear_ground_for_cheap(kind: str) -> None:
+    """Straight on costs 30, up to cheap ground and along it 4.9."""
+    points = search(kind, PROBLEM, 1, 9000, 400 if kind != "bit_star" else 3000)
+    assert points is not None
+    assert cost(points) < 8.0
+
+
+def test_planners_that_take_their_first_path_do_not_care_what_it_costs() -> None:
+    paths = [search("rrt_connect", PROBLEM, seed, 3000, 400) for seed in range(1, 6)]
+    assert max(cost(path) for path in paths if path is not None) > 15.0
+
+
+def test_bit_star_goes_by_the_samples_it_is_given_and_no_others() -> None:
+    samples = np.array([(0.7, 3.0), (2.0, 3.1), (3.3, 3.0), (2.0, 0.5)])
+    points = search("bit_star", replace(PROBLEM, samples=samples), 1, 3000, 400)
+    assert points is not None
+    assert {*points[1:-1]} <= {*map(tuple, samples.tolist())}
+    assert len(points) > 2
+
+
+@pytest.mark.parametrize("kind", sorted(PLANNERS))
+def test_the_same_seed_finds_the_same_way(kind: str) -> None:
+    one, other = (search(kind, PROBLEM, 7, 2000, 50) for _ in range(2))
+    assert one == other

@@ -1,0 +1,91 @@
+"""Samples where they tell most: along the middle of what is narrow, and thinly over what is wide.
+
+Sampling on the medial axis finds narrow passages that uniform samples miss (Wilmarth, Amato and Stiller 1999). The axis
+is where the distance to the nearest obstacle falls off to both sides.
+"""
+
+import math
+from functools import reduce
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.geometry import Array
+from simscen.stack.protocols import CostmapView
+
+BLOCK = 0.1
+"""Metres, about: cells are looked at in blocks of this size."""
+BESIDE = 0.2
+"""Metres to either side of the axis at which the distance has to be less."""
+ON_AXIS, IN_THE_OPEN = 0.8, 1.1
+"""Metres between samples."""
+Mask = npt.NDArray[np.bool_]
+
+
+def medial_axis_samples(costmap: CostmapView, free: Mask, seed: int, density: int = 1) -> Array:
+    """Centres of `free` cells (n, 2), another choice for each seed; `density` times as many to the metre."""
+    chance = np.random.default_rng(seed)
+    factor = max(1, round(BLOCK / costmap.resolution)) if density == 1 else 1
+    size = factor * costmap.resolution
+    room = np.where(free, costmap.distance, np.float32(0.0))
+    most = _pooled(room, factor)
+    open_ground = most >= room.max() - 1e-6
+    axis = _ridges(most, max(1, round(BESIDE / size)), 0.4 * size)
+    chosen = [
+        _thinned(axis, ON_AXIS / density / size, chance),
+        _thinned(open_ground, IN_THE_OPEN / density / size, chance),
+        _thinned((most > 0) & ~open_ground, IN_THE_OPEN / density / size, chance),
+    ]
+    rows, columns = _roomiest(room, np.concatenate(chosen), factor)
+    x = costmap.origin[0] + (columns + 0.5) * costmap.resolution
+    y = costmap.origin[1] + (rows + 0.5) * costmap.resolution
+    return np.column_stack((x, y))
+
+
+def _pooled(room: npt.NDArray[np.float32], factor: int) -> npt.NDArray[np.float32]:
+    """The most room in each block; the last ones are filled up with none."""
+    height, width = (-(-side // factor) * factor for side in room.shape)
+    padded = np.zeros((height, width), dtype=np.float32)
+    padded[: room.shape[0], : room.shape[1]] = room
+    parts = [padded[row::factor, column::factor] for row in range(factor) for column in range(factor)]
+    most: npt.NDArray[np.float32] = reduce(np.maximum, parts)
+    return most
+
+
+def _ridges(room: npt.NDArray[np.float32], reach: int, less: float) -> Mask:
+    """Blocks with room from which it gets less in two opposite directions."""
+    padded = np.pad(room, reach)
+    height, width = room.shape
+    below = room - np.float32(less)
+    ridges = np.zeros(room.shape, dtype=bool)
+    slant = max(1, round(reach / math.sqrt(2.0)))
+    for rows, columns in ((0, reach), (reach, 0), (slant, slant), (slant, -slant)):
+        sides = [padded[reach + side * rows :, reach + side * columns :][:height, :width] < below for side in (1, -1)]
+        ridges |= sides[0] & sides[1]
+    return ridges & (room > 0)
+
+
+def _thinned(mask: Mask, spacing: float, chance: np.random.Generator) -> npt.NDArray[np.int64]:
+    """One of the blocks (n, 2) of the mask in each square of a grid that is laid anyhow."""
+    cells = chance.permutation(np.flatnonzero(mask))
+    rows, columns = np.divmod(cells, mask.shape[1])
+    down, across = chance.uniform(0.0, spacing, 2)
+    row_of_squares = int(mask.shape[1] / spacing) + 2
+    square = ((rows + down) / spacing).astype(np.int64) * row_of_squares + ((columns + across) / spacing).astype(
+        np.int64
+    )
+    chosen = np.full(int(square.max(initial=0)) + 1, -1)
+    chosen[square] = cells  # the last one of each square
+    return np.column_stack(np.divmod(chosen[chosen >= 0], mask.shape[1]))
+
+
+def _roomiest(
+    room: npt.NDArray[np.float32], blocks: npt.NDArray[np.int64], factor: int
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """The cell with most room in each of the blocks (n, 2)."""
+    inner = np.arange(factor)
+    rows = np.minimum(blocks[:, 0, None] * factor + np.repeat(inner, factor), room.shape[0] - 1)
+    columns = np.minimum(blocks[:, 1, None] * factor + np.tile(inner, factor), room.shape[1] - 1)
+    best = room[rows, columns].argmax(axis=1)
+    which = np.arange(len(blocks))
+    return rows[which, best], columns[which, best]

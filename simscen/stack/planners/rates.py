@@ -1,0 +1,102 @@
+"""What a metre of way costs, wherever the robot can be: Nav2's costs as a planner counts them."""
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.geometry import Array
+from simscen.stack.protocols import CostmapView, RobotModel
+
+MAX_NON_OBSTACLE, NO_INFORMATION = 252, 255
+UNKNOWN_COSTS = 253
+"""nav2_navfn_planner: what is not known costs as much as what is barely free."""
+CRAMPED = 4.0
+"""Times that a metre costs more where a hull with corners fits, but could not turn in place: it may get stuck there."""
+STEP = 0.67
+"""Cells between two looks at what a path leads over."""
+STRIDE = 0.4
+"""Of the inscribed radius: between two looks at a motion of a search. Each obstacle blocks at least a disc of that
+radius, and between two looks no line comes deeper into one than 2 % of it."""
+
+
+class Rates:
+    """Costs of a metre on a costmap: 1 where it is free, 1 + `multiplier` beside obstacles, inf where none can be.
+
+    That is nav2_smac_planner's count, 1 + cost_travel_multiplier · cost / 252, taken along the way instead of from cell
+    to cell. A robot can be where its inscribed circle is (and where it is known, if `allow_unknown` is false).
+    """
+
+    def __init__(self, costmap: CostmapView, robot: RobotModel, multiplier: float, allow_unknown: bool) -> None:
+        self.costmap = costmap
+        self.height, self.width = costmap.costs.shape
+        self.resolution, self.origin = costmap.resolution, costmap.origin
+        counted = np.minimum(np.arange(256), UNKNOWN_COSTS) / MAX_NON_OBSTACLE
+        table = (1.0 + multiplier * counted).astype(np.float32)
+        if not allow_unknown:
+            table[NO_INFORMATION] = np.inf
+        rates = table[costmap.costs]
+        if robot.circumscribed_radius > robot.inscribed_radius:
+            rates[costmap.distance <= np.float32(robot.circumscribed_radius)] *= np.float32(CRAMPED)
+        rates[costmap.distance <= np.float32(robot.inscribed_radius)] = np.inf
+        self.rates: npt.NDArray[np.float32] = rates
+        self._per_metre = 1.0 / costmap.resolution
+        padded: Any = np.append(rates.reshape(-1), np.full(self.width + 1, np.inf, dtype=np.float32))
+        self._look: Any = memoryview(padded)  # answers in a tenth of numpy's time for a scalar
+        self.stride = max(STEP * costmap.resolution, STRIDE * robot.inscribed_radius)
+        self._asked: tuple[float, float, float, float] | None = None
+        self._answer = 0.0
+
+    @property
+    def free(self) -> npt.NDArray[np.bool_]:
+        """Where (height, width) the robot can be."""
+        return np.isfinite(self.rates)
+
+    def at(self, points: Array) -> npt.NDArray[np.float32]:
+        """Costs of a metre (…,) at points (…, 2); inf off the map."""
+        across = (points[..., 0] - self.origin[0]) * self._per_metre
+        up = (points[..., 1] - self.origin[1]) * self._per_metre
+        outside = (up < 0) | (across < 0) | (up >= self.height) | (across >= self.width)
+        columns = np.clip(across, 0, self.width - 1).astype(np.int32)
+        rates = self.rates[np.clip(up, 0, self.height - 1).astype(np.int32), columns]
+        rates[outside] = np.inf
+        return rates
+
+    def between(self, ax: float, ay: float, bx: float, by: float) -> float:
+        """The cost of going straight from a to b, both on the map; inf where the robot cannot.
+
+        OMPL asks for cost and validity of a motion one after the other: the second answer is the first.
+        """
+        asked = (ax, ay, bx, by)
+        if asked == self._asked:
+            return self._answer
+        dx, dy = bx - ax, by - ay
+        length = math.sqrt(dx * dx + dy * dy)
+        per_metre, look, width = self._per_metre, self._look, self.width
+        u, v = (ax - self.origin[0]) * per_metre, (ay - self.origin[1]) * per_metre
+        du, dv = dx * per_metre, dy * per_metre
+        total: float = look[int(v + 0.5 * dv) * width + int(u + 0.5 * du)]
+        if total < math.inf:
+            count = int(length / self.stride) + 1
+            du, dv = du / count, dv / count
+            u, v = u + 0.5 * du, v + 0.5 * dv
+            total = 0.0
+            for _ in range(count):
+                total += look[int(v) * width + int(u)]
+                u += du
+                v += dv
+            total *= length / count
+        self._asked, self._answer = asked, total
+        return total
+
+    def along(self, points: Array) -> float:
+        """The cost of a polyline (n, 2); inf where the robot cannot go."""
+        steps = np.diff(points, axis=0)
+        lengths = np.hypot(steps[:, 0], steps[:, 1])
+        counts = np.ceil(lengths * self._per_metre / STEP).astype(np.int64)
+        which = np.repeat(np.arange(len(steps)), counts)
+        number = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+        part = (number + 0.5) / counts[which]
+        rates = self.at(points[which] + part[:, None] * steps[which])
+        return float((rates * (lengths / np.maximum(counts, 1))[which]).sum())

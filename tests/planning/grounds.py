@@ -1,0 +1,132 @@
+"""Generated places to plan in, and what the cheapest way through them costs: brute force on a fine grid."""
+
+import math
+
+import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
+
+from simscen.core.geometry import Array, Pose2
+from simscen.model.stack import Costmap as CostmapSpec
+from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.planners.rates import Rates
+from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
+from simscen.testing.flatland import RATE, Flatland, round_robot
+
+ROBOT = round_robot()
+MOVES = [(a, b) for a in range(4) for b in range(-3, 4) if math.gcd(a, b) == 1 and (a > 0 or b > 0)]
+"""In 32 directions: at most 1.3 % longer than straight on."""
+
+
+def rooms(chance: np.random.Generator) -> tuple[Flatland, float, float]:
+    """Two to four rooms each way, every one with a door, and things that stand about."""
+    columns, rows = chance.integers(2, 5, 2).tolist()
+    width, height = chance.uniform(3.5, 5.0, 2).tolist()
+    world = Flatland().room(columns * width, rows * height)
+    for i in range(columns):
+        for j in range(rows):
+            if i + 1 < columns:
+                _wall(world, chance, True, (i + 1) * width, j * height, height, j == 0 or chance.random() < 0.5)
+            if j + 1 < rows:
+                _wall(world, chance, False, (j + 1) * height, i * width, width, chance.random() < 0.6)
+    for x, y in chance.uniform((0.3, 0.3), (columns * width - 0.9, rows * height - 0.9), (columns * rows * 2, 2)):
+        a, b = chance.uniform(0.2, 0.8, 2)
+        world.boxes.append((x, y, x + a, y + b))
+    return world, columns * width, rows * height
+
+
+def _wall(
+    world: Flatland, chance: np.random.Generator, upright: bool, at: float, low: float, size: float, door: bool
+) -> None:
+    gap = chance.uniform(0.8, 1.2)
+    begin = chance.uniform(0.3, size - gap - 0.3)
+    for a, b in ((low, low + begin), (low + begin + gap, low + size)) if door else ((low, low + size),):
+        world.boxes.append((at, a, at + 0.12, b) if upright else (a, at, b, at + 0.12))
+
+
+def forest(chance: np.random.Generator) -> tuple[Flatland, float, float]:
+    """Trunks anywhere."""
+    width, height = chance.uniform(8, 14, 2).tolist()
+    world = Flatland().room(width, height)
+    places = chance.uniform(
+        (0.5, 0.5), (width - 0.5, height - 0.5), (int(width * height * chance.uniform(0.2, 0.5)), 2)
+    )
+    world.discs = [(x, y, chance.uniform(0.08, 0.4)) for x, y in places.tolist()]
+    return world, width, height
+
+
+def maze(chance: np.random.Generator) -> tuple[Flatland, float, float]:
+    """A perfect maze with a few walls taken out."""
+    columns, rows = chance.integers(4, 7, 2).tolist()
+    size = chance.uniform(1.0, 1.6)
+    world = Flatland().room(columns * size, rows * size)
+    seen, stack, open_ = {(0, 0)}, [(0, 0)], set()
+    while stack:
+        x, y = stack[-1]
+        beside = [(x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)]
+        fresh = [c for c in beside if 0 <= c[0] < columns and 0 <= c[1] < rows and c not in seen]
+        if not fresh:
+            stack.pop()
+            continue
+        cell = fresh[chance.integers(len(fresh))]
+        seen.add(cell)
+        stack.append(cell)
+        open_.add(frozenset(((x, y), cell)))
+    for x in range(columns):
+        for y in range(rows):
+            right, up = (x + 1) * size, (y + 1) * size
+            if x + 1 < columns and frozenset(((x, y), (x + 1, y))) not in open_ and chance.random() > 0.1:
+                world.boxes.append((right - 0.05, y * size, right + 0.05, up))
+            if y + 1 < rows and frozenset(((x, y), (x, y + 1))) not in open_ and chance.random() > 0.1:
+                world.boxes.append((x * size, up - 0.05, right, up + 0.05))
+    return world, columns * size, rows * size
+
+
+def view_of(
+    world: Flatland, width: float, height: float, robot: RobotModel = ROBOT, resolution: float = 0.05, **options: object
+) -> CostmapView:
+    """The costmap of a world between (0, 0) and (width, height)."""
+    bounds = (-0.5, -0.5, math.ceil(width) + 0.5, math.ceil(height) + 0.5)
+    spec = CostmapSpec(resolution=resolution, **options)
+    return Costmap(spec, Surroundings(robot, world.grid(bounds, resolution), RATE)).view
+
+
+def pair(rates: Rates, reachable: Array, chance: np.random.Generator) -> tuple[Pose2, Pose2]:
+    """Two places that a way joins, at least 3 m apart."""
+    cells = np.argwhere(reachable)
+    while True:
+        ends = (cells[chance.integers(len(cells), size=2)][:, ::-1] + 0.5) * rates.resolution + rates.origin
+        if math.dist(*ends) > 3.0:
+            return Pose2(*ends[0].tolist()), Pose2(*ends[1].tolist())
+
+
+def cheapest(rates: Rates, start: Pose2, goal: Pose2) -> float:
+    """The cost of the cheapest way over the cells of a costmap: at most 1.3 % too high, seldom a cut corner too low."""
+    prices = rates.rates.astype(np.float64)
+    free, number = np.isfinite(prices), np.arange(prices.size).reshape(prices.shape)
+    prices = np.where(free, prices, 0.0)
+    height, width = prices.shape
+    a, b, w = [], [], []
+    for rows, columns in MOVES:
+        left = max(0, -columns)
+        tall, wide = height - rows, width - abs(columns)
+
+        def seen(row: int, column: int, left: int = left, tall: int = tall, wide: int = wide) -> tuple[slice, slice]:
+            return slice(row, row + tall), slice(left + column, left + column + wide)
+
+        steps = 2 * max(rows, abs(columns))
+        possible, price = np.ones((tall, wide), dtype=bool), np.zeros((tall, wide))
+        for k in range(steps):  # looked at in the middle of each half cell
+            part = (k + 0.5) / steps
+            cell = seen(math.floor(rows * part + 0.5), math.floor(columns * part + 0.5))
+            possible &= free[cell]
+            price += prices[cell] / steps
+        a.append(number[seen(0, 0)][possible])
+        b.append(number[seen(rows, columns)][possible])
+        w.append(price[possible] * math.hypot(rows, columns) * rates.resolution)
+    graph = csr_matrix((np.concatenate(w), (np.concatenate(a), np.concatenate(b))), shape=(number.size,) * 2)
+    cells = [
+        number[int((p.y - rates.origin[1]) / rates.resolution), int((p.x - rates.origin[0]) / rates.resolution)]
+        for p in (start, goal)
+    ]
+    return float(dijkstra(graph, directed=False, indices=cells[0])[cells[1]])

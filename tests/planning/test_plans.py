@@ -1,0 +1,129 @@
+"""Plans over generated grounds against brute force, and what the costs of a costmap do to them."""
+
+import math
+
+import numpy as np
+import pytest
+from grounds import ROBOT, cheapest, forest, maze, pair, rooms, view_of
+
+from simscen.core.geometry import Pose2
+from simscen.model.stack import OmplPlanner as Spec
+from simscen.stack.planners.ends import find_ends
+from simscen.stack.planners.ompl_planner import OmplPlanner
+from simscen.stack.planners.rates import Rates
+from simscen.testing.flatland import Flatland
+
+GROUNDS = {"rooms": rooms, "forest": forest, "maze": maze}
+
+
+def test_nearly_every_plan_of_the_default_planner_costs_at_most_five_percent_more_than_the_optimum() -> None:
+    ratios = []
+    for kind, ground in GROUNDS.items():
+        for seed in range(5):
+            chance = np.random.default_rng((seed, len(kind)))
+            view = view_of(*ground(chance))
+            rates = Rates(view, ROBOT, 2.0, True)
+            middle = np.argwhere(rates.free)[len(np.argwhere(rates.free)) // 2][::-1] * view.resolution + view.origin
+            inside = Pose2(*middle.tolist())
+            start, goal = pair(rates, find_ends(rates, inside, inside, 0.5).reachable, chance)
+            points = OmplPlanner(Spec(), ROBOT).plan(view, start, goal, 1 + seed).points
+            assert np.isfinite(rates.at(points[:, :2])).all()
+            ratios.append(rates.along(points[:, :2]) / cheapest(rates, start, goal))
+    assert np.mean(ratios) < 1.02
+    assert np.mean(np.array(ratios) > 1.05) <= 1 / 15
+
+
+def corridor_with_a_corner() -> Flatland:
+    world = Flatland().room(8, 8)
+    world.boxes.append((0.0, 0.0, 5.0, 5.0))
+    return world
+
+
+def least_room(points: np.ndarray) -> float:
+    view = view_of(corridor_with_a_corner(), 8, 8, inflation_radius=3.0, cost_scaling_factor=0.1)
+    columns, rows = ((points[:, i] - view.origin[i]) / view.resolution for i in (0, 1))
+    return float(view.distance[rows.astype(int), columns.astype(int)].min())
+
+
+def plan(**costmap: float) -> np.ndarray:
+    view = view_of(corridor_with_a_corner(), 8, 8, **costmap)
+    return OmplPlanner(Spec(), ROBOT).plan(view, Pose2(1, 6.5), Pose2(6.5, 1), 1).points
+
+
+def test_cost_scaling_factor_and_inflation_radius_shape_the_path() -> None:
+    """The slower costs fall and the further they reach, the more room is left around a corner."""
+    hardly = least_room(plan(cost_scaling_factor=100.0))
+    some = least_room(plan(cost_scaling_factor=3.0))
+    most = least_room(plan(cost_scaling_factor=1.0, inflation_radius=2.0))
+    assert hardly < 0.3 < some - 0.1
+    assert some + 0.1 < most
+    assert least_room(plan(inflation_radius=0.3)) < 0.35
+
+
+def test_the_dearer_costs_are_taken_the_more_room_is_left() -> None:
+    view = view_of(corridor_with_a_corner(), 8, 8)
+    ends = Pose2(1, 6.5), Pose2(6.5, 1)
+    rooms_left = [
+        least_room(OmplPlanner(Spec(cost_travel_multiplier=factor), ROBOT).plan(view, *ends, 1).points)
+        for factor in (0.0, 1.0, 5.0)
+    ]
+    assert rooms_left[0] + 0.1 < rooms_left[1] < rooms_left[2]
+
+
+def test_without_allow_unknown_a_plan_leads_round_what_is_not_known_and_with_it_across() -> None:
+    view = view_of(Flatland().room(8, 8), 8, 8)
+    view.costs[0:130, 80:120] = 255  # up to 2 m below the upper wall
+    ends = Pose2(1, 2), Pose2(7, 2)
+    across = OmplPlanner(Spec(cost_travel_multiplier=0.5), ROBOT).plan(view, *ends, 1)
+    around = OmplPlanner(Spec(cost_travel_multiplier=0.5, allow_unknown=False), ROBOT).plan(view, *ends, 1)
+    assert across.length() < 6.2
+    assert around.points[:, 1].max() > 5.9
+    columns, rows = ((around.points[:, i] - view.origin[i]) / view.resolution for i in (0, 1))
+    assert (view.costs[rows.astype(int), columns.astype(int)] != 255).all()
+
+
+def test_without_simplify_the_path_is_as_ompl_found_it() -> None:
+    view = view_of(*rooms(np.random.default_rng(3)))
+    rates = Rates(view, ROBOT, 2.0, True)
+    ends = pair(rates, find_ends(rates, Pose2(1.5, 1.5), Pose2(1.5, 1.5), 1.0).reachable, np.random.default_rng(4))
+    raw = OmplPlanner(Spec(simplify=False), ROBOT).plan(view, *ends, 1).points
+    eased = OmplPlanner(Spec(), ROBOT).plan(view, *ends, 1).points
+    turns = np.abs(np.diff(np.unwrap(raw[:-1, 2])))
+    assert np.count_nonzero(turns > 1e-6) < 40  # straight from sample to sample
+    assert rates.along(eased[:, :2]) < rates.along(raw[:, :2])
+
+
+@pytest.mark.parametrize("resolution", [0.1, 0.25])
+def test_coarse_maps_are_planned_on_as_well(resolution: float) -> None:
+    world, width, height = rooms(np.random.default_rng(11))
+    view = view_of(world, width, height, resolution=resolution)
+    rates = Rates(view, ROBOT, 2.0, True)
+    reachable = find_ends(rates, Pose2(1.5, 1.5), Pose2(1.5, 1.5), 1.0).reachable
+    start, goal = pair(rates, reachable, np.random.default_rng(5))
+    points = OmplPlanner(Spec(), ROBOT).plan(view, start, goal, 1).points
+    assert np.isfinite(rates.at(points[:, :2])).all()
+    assert rates.along(points[:, :2]) < 1.06 * cheapest(rates, start, goal)
+
+
+def test_a_passage_of_a_single_row_of_cells_is_found() -> None:
+    world = Flatland().room(16, 12)
+    world.boxes += [(8.0, 0.0, 8.6, 7.0), (8.0, 7.0 + 2 * ROBOT.inscribed_radius + 0.06, 8.6, 12.0)]
+    view = view_of(world, 16, 12)
+    for seed in range(1, 6):
+        points = OmplPlanner(Spec(), ROBOT).plan(view, Pose2(1, 1), Pose2(15, 1), seed).points
+        assert math.hypot(points[-1, 0] - 15, points[-1, 1] - 1) < 0.1
+
+
+def test_the_corridor_sampler_confines_a_tree_to_near_shortest_ways() -> None:
+    world = Flatland().room(12, 12)
+    world.boxes += [(3.0, 3.0, 9.0, 9.0)]
+    view = view_of(world, 12, 12)
+    ends = Pose2(1.5, 1.0), Pose2(10.5, 5.0)  # clockwise it is 8 m longer
+    ways = [
+        OmplPlanner(Spec(type="rrt_connect", sampler=sampler, simplify=False), ROBOT).plan(view, *ends, seed)
+        for sampler in ("corridor", "uniform")
+        for seed in range(1, 7)
+    ]
+    lengths = [way.length() for way in ways]
+    assert max(lengths[:6]) < 1.3 * 11.1
+    assert max(lengths[6:]) > max(lengths[:6])
