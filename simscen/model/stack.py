@@ -95,6 +95,20 @@ class Amcl(Ranged, LocalizerSpec):
     """Decay of the slow average of weights, by which random particles are added; 0 = never."""
     recovery_alpha_fast: Probability = 0.0
     """Decay of the fast average of weights, by which random particles are added; 0 = never."""
+    relocalization: Literal["scan_matching", "random"] = "scan_matching"
+    """How a robot is found that does not know where it is, or is wrong about it: the last metres' scans are matched
+    with the whole map; or only as Nav2 does, by particles anywhere at the start and by `recovery_alpha_*`."""
+    likelihood_exponent: Annotated[float, Field(gt=0, le=1)] = 1.0
+    """Of the product over the beams, which err together and so say less than as many would; `likelihood_field_prob`
+    only."""
+    beams_beyond_the_map: Literal["say_nothing", "miss"] = "say_nothing"
+    """What beams tell that end where the map ends, in unknown space next to free space or off it; in Nav2 they miss.
+    `likelihood_field_prob` only."""
+    distrust_outdated_map: bool = True
+    """A scan counts for less the fewer of its beams end near what the map shows, as long as the particles are one
+    narrow group."""
+    match_scans: bool = True
+    """Correct each step of odometry by how the scan fits those of the last metres, where these can tell."""
     selective_resampling: bool = False
     """Resample only when the effective number of particles is below half of them."""
     do_beamskip: bool = False

@@ -27,13 +27,16 @@ LONGEST_GAP = TICK_RATE
 class Localized:
     """What the localizer believed: `times` (n,) in s and `poses` (n, 3) in the map; `scans` were used.
 
-    `cpu` is the processor's time in s that all of it took, which no two runs share.
+    `covariances` (n, 3, 3) are those of the poses. `cpu` is the processor's time in s that all of it took, and
+    `slowest` that of the scan that took longest, which no two runs share.
     """
 
     times: Array
     poses: Array
+    covariances: Array
     scans: int
     cpu: float
+    slowest: float
 
 
 @dataclass(frozen=True)
@@ -72,8 +75,9 @@ def localize(sensed: Sensed, spec: StackSpec, surroundings: Surroundings, estima
     """
     localizer = InstalledLocalizer(spec.localizer, Setting(surroundings, "localizer", Streams(seed)))
     localizer.reset(estimate)
-    began, times, poses, scans = time.process_time(), [], [], 0
+    times, poses, covariances, scans, cpu, slowest = [], [], [], 0, 0.0, 0.0
     for reading in sensed.readings:
+        began = time.process_time()
         match reading:
             case Scan():
                 localizer.on_scan(reading)
@@ -82,8 +86,10 @@ def localize(sensed: Sensed, spec: StackSpec, surroundings: Surroundings, estima
                 localizer.on_odometry(reading)
                 times.append(reading.tick / TICK_RATE)
                 poses.append(tuple(localizer.belief.pose))
-    cpu = time.process_time() - began
-    return Localized(np.array(times), np.array(poses), scans, cpu)
+                covariances.append(localizer.belief.covariance)
+        took = time.process_time() - began
+        cpu, slowest = cpu + took, max(slowest, took)
+    return Localized(np.array(times), np.array(poses), np.array(covariances), scans, cpu, slowest)
 
 
 def errors_of(localized: Localized, sensed: Sensed, far: float) -> Errors | None:

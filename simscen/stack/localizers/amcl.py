@@ -11,9 +11,13 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.sensing import Imu, Odometry, Scan
 from simscen.model.stack import Amcl
 from simscen.stack.localizers.clusters import spread, summarise
+from simscen.stack.localizers.finder import Finder
+from simscen.stack.localizers.global_search import GlobalSearch
+from simscen.stack.localizers.map_trust import MapTrust
 from simscen.stack.localizers.motion_models import MotionModel
 from simscen.stack.localizers.odometry_track import OdometryTrack
 from simscen.stack.localizers.particle_filter import ParticleFilter
+from simscen.stack.localizers.scan_matcher import ScanMatcher, Step
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,21 +46,27 @@ class AmclLocalizer:
     """
 
     def __init__(
-        self, spec: Amcl, particle_filter: ParticleFilter, motion: MotionModel, estimate: Estimate, tick_rate: int
-    ) -> None:
+        self, spec: Amcl, particle_filter: ParticleFilter, motion: MotionModel, estimate: Estimate, tick_rate: int,
+        search: tuple[GlobalSearch, MapTrust] | None = None,
+    ) -> None:  # fmt: skip
+        """`search` is what finds a robot that is lost; without, that is left to random particles."""
         self._spec, self._filter, self._motion, self._tick_rate = spec, particle_filter, motion, tick_rate
+        self._search = search
         self.reset(estimate)
 
     def reset(self, estimate: Estimate) -> None:
         """Start over: particles around the estimate's pose, or over all free space when it has none."""
         self._track = OdometryTrack(10 * self._tick_rate)
         self._filter.begin(estimate)
+        self._finder = None if self._search is None else Finder(*self._search, estimate.pose is not None)
         if estimate.pose is None:
             pose, covariance = summarise(self._filter.particles)
         else:
             pose, covariance = estimate.pose, np.diag(np.square(estimate.std))
         self._correction = _Correction(pose, covariance, Pose2(0, 0, 0), 0)
         self._moved_to: Pose2 | None = None
+        self._matcher = ScanMatcher() if self._spec.match_scans else None
+        self._matched: tuple[str, Pose2] | None = None
         self._due: dict[str, bool] = {}
         self._waiting: dict[str, Scan] = {}
         self._belief: Belief | None = None
@@ -104,7 +114,10 @@ class AmclLocalizer:
             self._due = dict.fromkeys(self._due, True)
         if not self._due.get(scan.sensor, True):
             return
-        if delta is not None:
+        matched = None if self._matcher is None else self._matched_step(self._matcher, scan, odometry)
+        if matched is not None:
+            self._filter.follow(matched.delta, matched.covariance)
+        elif delta is not None:
             self._filter.move(delta)
         self._due[scan.sensor], self._moved_to, self._belief = False, odometry, None
         if (answer := self._filter.correct(scan)) is not None:
@@ -113,6 +126,27 @@ class AmclLocalizer:
             carried = self._correction.map_from_odom.compose(odometry)
             covariance = spread(self._filter.particles, carried)
             self._correction = _Correction(carried, covariance, odometry, self._correction.tick)
+        if self._finder is not None:
+            self._look_elsewhere(self._finder, scan, odometry)
+
+    def _matched_step(self, matcher: ScanMatcher, scan: Scan, odometry: Pose2) -> Step | None:
+        """The motion since the last correction as the first lidar saw it; None where it did not see it."""
+        sensor, before = self._matched or (scan.sensor, odometry)
+        if scan.sensor != sensor:
+            return None
+        step = matcher.step(scan, before.between(odometry))
+        self._matched = sensor, odometry
+        return step if before == self._moved_to else None
+
+    def _look_elsewhere(self, finder: Finder, scan: Scan, odometry: Pose2) -> None:
+        """Put the particles where the robot may be if it is not where it was thought to be."""
+        limits = self._spec.laser_min_range, self._spec.laser_max_range
+        base = odometry
+        if self._matcher is not None and self._matched is not None:
+            base = self._matcher.pose.compose(self._matched[1].between(odometry))
+        places = finder.places(scan, base, self._correction.pose, limits)
+        if places is not None:
+            self._correction = _Correction(*self._filter.put(*places), odometry, scan.tick)
 
     def _moved_enough(self, delta: Pose2) -> bool:
         return math.hypot(delta.x, delta.y) > self._spec.update_min_d or abs(delta.yaw) > self._spec.update_min_a

@@ -5,6 +5,8 @@ from simscen.model import stack as model
 from simscen.stack.localizers.amcl import AmclLocalizer
 from simscen.stack.localizers.beam_model import BeamModel, opaque_field
 from simscen.stack.localizers.dead_reckoning import DeadReckoning
+from simscen.stack.localizers.distance_field import beyond_the_map
+from simscen.stack.localizers.global_search import GlobalSearch
 from simscen.stack.localizers.ground_truth import GroundTruthLocalizer
 from simscen.stack.localizers.likelihood_field import (
     BeamSkipping,
@@ -13,6 +15,7 @@ from simscen.stack.localizers.likelihood_field import (
     SensorModel,
     obstacle_field,
 )
+from simscen.stack.localizers.map_trust import NEAR, MapTrust
 from simscen.stack.localizers.motion_models import Differential, MotionModel, Omni
 from simscen.stack.localizers.particle_filter import ParticleFilter
 from simscen.stack.localizers.particles import FreeSpace
@@ -26,8 +29,11 @@ def amcl(spec: model.Amcl, setting: Setting) -> Localizer:
         return DeadReckoning(setting.estimate)
     motion = _motion_model(spec, setting.robot.holonomic)
     sensor, anywhere = _sensor_model(spec, setting.map), FreeSpace(setting.map)
-    particles = ParticleFilter(spec, motion, sensor, anywhere, setting.chance)
-    return AmclLocalizer(spec, particles, motion, setting.estimate, setting.surroundings.tick_rate)
+    trust = _trust(setting.map)
+    doubted = trust if spec.distrust_outdated_map else None
+    particles = ParticleFilter(spec, motion, sensor, anywhere, setting.chance, doubted)
+    search = (GlobalSearch(setting.map), trust) if spec.relocalization == "scan_matching" else None
+    return AmclLocalizer(spec, particles, motion, setting.estimate, setting.surroundings.tick_rate, search)
 
 
 def ekf(spec: model.Ekf, setting: Setting) -> Localizer:
@@ -47,6 +53,10 @@ def odometry(_spec: model.OdometryOnly, setting: Setting) -> Localizer:
     return DeadReckoning(setting.estimate)
 
 
+def _trust(grid: OccupancyGrid) -> MapTrust:
+    return MapTrust(obstacle_field(grid, 2 * NEAR), beyond_the_map(grid).ravel())
+
+
 def _motion_model(spec: model.Amcl, holonomic: bool) -> MotionModel:
     alpha = (spec.alpha1, spec.alpha2, spec.alpha3, spec.alpha4)
     if (spec.robot_model or ("omni" if holonomic else "differential")) == "omni":
@@ -64,6 +74,8 @@ def _sensor_model(spec: model.Amcl, grid: OccupancyGrid) -> SensorModel:
     if spec.laser_model_type == "likelihood_field":
         return LikelihoodField(field, spec.z_hit, spec.z_rand, spec.sigma_hit)
     skipping = BeamSkipping(spec.beam_skip_distance, spec.beam_skip_threshold, spec.beam_skip_error_threshold)
+    beyond = beyond_the_map(grid).ravel() if spec.beams_beyond_the_map == "say_nothing" else None
     return LikelihoodFieldProb(
-        field, spec.z_hit, spec.z_rand, spec.sigma_hit, skipping if spec.do_beamskip else None
+        field, spec.z_hit, spec.z_rand, spec.sigma_hit, skipping if spec.do_beamskip else None,
+        spec.likelihood_exponent, beyond,
     )  # fmt: skip

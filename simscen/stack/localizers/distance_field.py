@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array
-from simscen.core.grid import OccupancyGrid
+from simscen.core.grid import FREE, UNKNOWN, OccupancyGrid
 from simscen.stack.nearest import squared_cells
 
 Float32 = npt.NDArray[np.float32]
@@ -21,6 +21,22 @@ BLOCK = 512
 def by_blocks(judge: Callable[[Array], Array], poses: Array) -> Array:
     """What `judge` says (n,) of `poses` (n, 3), asked in blocks."""
     return np.concatenate([judge(poses[begin : begin + BLOCK]) for begin in range(0, len(poses), BLOCK)])
+
+
+def beyond_the_map(grid: OccupancyGrid) -> npt.NDArray[np.bool_]:
+    """Unknown cells, bordered by one more all around, whose nearest known cell is free: there the map ends.
+
+    Behind a wall the nearest known cell is the wall: what lies there is unknown too, but no beam ends there.
+    """
+    from scipy.ndimage import distance_transform_edt
+
+    unknown = np.pad(grid.cells == UNKNOWN, 1, constant_values=True)
+    if unknown.all():
+        return unknown
+    row, column = distance_transform_edt(unknown, return_distances=False, return_indices=True)
+    free = np.pad(grid.cells == FREE, 1)
+    beyond: npt.NDArray[np.bool_] = unknown & free[row, column]
+    return beyond
 
 
 class DistanceField:

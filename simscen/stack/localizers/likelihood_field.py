@@ -21,6 +21,11 @@ STRAYS_OF_SUMS = 0.05
 """Of the same models: a particle anywhere weighs half as much as a good one, and outlives many scans."""
 
 
+SAYS_NOTHING = 0.4
+"""Of a hit's likelihood: what a beam has that ends where the map says nothing, about that of a beam of a robot that
+knows where it is, on geometric average."""
+
+
 class SensorModel(Protocol):
     """Judges particles by a scan."""
 
@@ -112,10 +117,17 @@ class LikelihoodFieldProb:
     peak, strays = 1.0, 1.0
 
     def __init__(
-        self, field: DistanceField, z_hit: float, z_rand: float, sigma_hit: float, skipping: BeamSkipping | None = None
-    ) -> None:
-        self._field, self._z_rand, self._skipping = field, np.float32(z_rand), skipping
+        self, field: DistanceField, z_hit: float, z_rand: float, sigma_hit: float, skipping: BeamSkipping | None = None,
+        exponent: float = 1.0, beyond: npt.NDArray[np.bool_] | None = None,
+    ) -> None:  # fmt: skip
+        """`exponent` is that of the product; beams that end `beyond` the map (flat, as the field's table) say nothing.
+
+        They count as SAYS_NOTHING of a hit, for to leave them out would favour places from which more of them do.
+        """
+        self._field, self._z_rand, self._skipping, self._exponent = field, np.float32(z_rand), skipping, exponent
         self._hit = _hit(field, z_hit, sigma_hit)
+        if beyond is not None:
+            self._hit[beyond] = np.maximum(self._hit[beyond], np.float32(SAYS_NOTHING * z_hit))
 
     def log_likelihood(self, poses: Array, beams: Beams, converged: bool) -> Array:
         """Logarithms (n,) of Π p."""
@@ -127,14 +139,14 @@ class LikelihoodFieldProb:
             p = self._hit.take(self._field.cells_seen(block, points))
             p += z_rand
             with np.errstate(divide="ignore"):
-                logarithm: Array = np.sum(np.log(p), axis=1, dtype=np.float64)
+                logarithm: Array = self._exponent * np.sum(np.log(p), axis=1, dtype=np.float64)
             return logarithm
 
         return by_blocks(judge, poses)
 
     def tempering(self, beams: Beams) -> float:
         """The geometric mean over the beams that hit something."""
-        return 1 / max(1, int(np.count_nonzero(beams.ranges < beams.range_max)))
+        return 1 / max(1, int(np.count_nonzero(beams.ranges < beams.range_max))) / self._exponent
 
     def _kept(self, poses: Array, points: Array, skipping: BeamSkipping) -> npt.NDArray[np.bool_] | slice:
         near = self._field.table.take(self._field.cells_seen(poses, points)) < skipping.distance

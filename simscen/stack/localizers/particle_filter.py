@@ -8,13 +8,15 @@ import math
 import numpy as np
 
 from simscen.core.belief import Estimate
-from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.core.sensing import Scan
 from simscen.model.stack import Amcl
 from simscen.stack.localizers.beams import Beams, select_beams
 from simscen.stack.localizers.clusters import summarise
+from simscen.stack.localizers.finder import around as around_places
 from simscen.stack.localizers.kld import KldBound
 from simscen.stack.localizers.likelihood_field import SensorModel
+from simscen.stack.localizers.map_trust import MapTrust
 from simscen.stack.localizers.motion_models import MotionModel
 from simscen.stack.localizers.particles import FreeSpace, Particles
 from simscen.stack.localizers.recovery import PROBES, Recovery
@@ -27,8 +29,11 @@ class ParticleFilter:
     """Particles that are moved by odometry and weighed by scans; it knows neither time nor frames but the map's."""
 
     def __init__(
-        self, spec: Amcl, motion: MotionModel, sensor: SensorModel, anywhere: FreeSpace, chance: np.random.Generator
-    ) -> None:
+        self, spec: Amcl, motion: MotionModel, sensor: SensorModel, anywhere: FreeSpace, chance: np.random.Generator,
+        trust: MapTrust | None = None,
+    ) -> None:  # fmt: skip
+        """`trust` says how much the map is worth where the robot is; without, it is right everywhere."""
+        self._trust = trust
         self._spec, self._motion, self._sensor, self._anywhere, self._chance = spec, motion, sensor, anywhere, chance
         self._bound = KldBound(spec.pf_err, spec.pf_z, spec.min_particles, spec.max_particles)
         self.begin(Estimate(None))
@@ -45,6 +50,24 @@ class ParticleFilter:
         poses = self._motion.sample(self.particles.poses, delta, self._chance)
         self.particles = Particles(poses, self.particles.weights)
 
+    def follow(self, delta: Pose2, covariance: Array) -> None:
+        """Move each particle by its own copy of a motion in the base frame that is known up to a covariance (3, 3)."""
+        before = self.particles.poses
+        steps = self._chance.standard_normal((len(before), 3)) @ np.linalg.cholesky(covariance).T + delta
+        c, s = np.cos(before[:, 2]), np.sin(before[:, 2])
+        poses = np.empty_like(before)
+        poses[:, 0] = before[:, 0] + c * steps[:, 0] - s * steps[:, 1]
+        poses[:, 1] = before[:, 1] + s * steps[:, 0] + c * steps[:, 1]
+        poses[:, 2] = wrap_array(before[:, 2] + steps[:, 2])
+        self.particles = Particles(poses, self.particles.weights)
+
+    def put(self, poses: Array, shares: Array) -> tuple[Pose2, Array]:
+        """Put all particles about `poses` (k, 3), each with its share (k,); and where they say the robot is then."""
+        drawn = around_places(poses, shares, self._bound.most, self._chance)
+        self.particles = Particles.equal(drawn)
+        self._put_anywhere = np.zeros(len(drawn), dtype=np.bool_)
+        return summarise(self.particles, self._sensor.peak)
+
     def correct(self, scan: Scan) -> tuple[Pose2, Array] | None:
         """Weigh the particles by a scan and draw new ones; where that says the robot is, with covariance (3, 3).
 
@@ -56,6 +79,8 @@ class ParticleFilter:
         beams = select_beams(scan, spec.max_beams, spec.laser_min_range, spec.laser_max_range)
         converged = spec.do_beamskip and self.particles.within(CONVERGED_WITHIN)
         logarithm = self._sensor.log_likelihood(poses, beams, converged)
+        if self._trust is not None and len(ends := beams.ends()):
+            logarithm = logarithm * self._trust.of(self.particles, ends)
         best = float(logarithm.max())
         if best == logarithm.min() and best > -np.inf:
             return None

@@ -1,0 +1,102 @@
+"""When a particle filter is lost, and where its robot may be instead."""
+
+from collections import deque
+
+import numpy as np
+
+from simscen.core.geometry import Array, Pose2, wrap_array
+from simscen.core.sensing import Scan
+from simscen.stack.localizers.global_search import GlobalSearch, View
+from simscen.stack.localizers.map_trust import MapTrust
+from simscen.stack.localizers.scan_memory import ScanMemory
+
+RECENT, DOUBTFUL = 6, 0.6
+"""Over so many scans the share of the beams that fit is averaged, and below this the robot may be lost."""
+TELLING = 0.3
+"""Share of the beams that must end where the map says anything, for a scan to count."""
+BETWEEN, MOST_BETWEEN = 1.0, 8.0
+"""m between two searches; doubled up to the most while the robot has a place and nothing better is found."""
+ENOUGH, PLAIN, BETTER, GOOD = 3.0, 0.05, 0.1, 0.75
+"""A place is where the robot is when scans of ENOUGH metres fit it by PLAIN better than any other; of a robot that had
+a place, when they fit the new one GOOD, and by BETTER better than the old one, in two searches that agree."""
+AGREE = 0.7, 0.3
+"""m, rad: two searches agree that find places so near to each other, the way between them taken off."""
+SHARPNESS = 0.02
+"""Of two places that fit so much better or worse, the better gets e times as many particles."""
+AROUND = (0.1, 0.1, 0.05)
+"""m, m, rad: standard deviations of particles around a place that was found."""
+
+
+class Finder:
+    """Watches how well scans fit where the robot is believed to be, and searches the whole map when they do not.
+
+    The search takes the scans of the last metres together, so that one room of many that look alike is told from the
+    others. Until it is plain where a robot is that was told nothing, its particles lie at all places that fit; a robot
+    that was told a place is moved only by what is plainly better.
+    """
+
+    def __init__(self, search: GlobalSearch, trust: MapTrust, known: bool) -> None:
+        self._search, self._trust, self._memory = search, trust, ScanMemory()
+        self._known = known
+        self._fits: deque[float] = deque(maxlen=RECENT)
+        self._wait, self._driven = 0.0, 0.0
+        self._last: Pose2 | None = None
+        self._suspected: tuple[Pose2, Pose2] | None = None
+
+    def places(
+        self, scan: Scan, base: Pose2, believed: Pose2, limits: tuple[float, float]
+    ) -> tuple[Array, Array] | None:
+        """Poses (k, 3) where the robot may be and the share of each (k,); None to leave it where it is believed to be.
+
+        `base` is where it was when it took the scan, in a frame that drifts; `limits` are the ranges that count.
+        """
+        view = self._memory.add(scan, base, *limits)
+        if self._last is not None:
+            self._driven += self._last.distance(base)
+        self._last = base
+        if not len(view.ends):
+            return None
+        here = np.array([believed])
+        if (fit := self._trust.fit(here, view.ends, TELLING)) is not None:
+            self._fits.append(fit)
+        if (self._known and not self._doubtful()) or self._driven < self._wait:
+            return None
+        return self._sought(self._memory.about(base), base, here)
+
+    def _doubtful(self) -> bool:
+        return len(self._fits) == RECENT and float(np.mean(self._fits)) < DOUBTFUL
+
+    def _sought(self, view: View, base: Pose2, here: Array) -> tuple[Array, Array] | None:
+        poses, fits = self._search.places(view)
+        waited, self._wait, self._driven = self._wait, BETWEEN, 0.0
+        if not len(poses):
+            return None
+        plain = self._memory.length >= ENOUGH and (len(fits) == 1 or fits[0] - fits[1] > PLAIN)
+        if not self._known:
+            self._known = plain
+            shares = np.exp((fits - fits[0]) / SHARPNESS)
+            return poses, shares / shares.sum()
+        if plain and fits[0] > GOOD and fits[0] > self._search.fit(here, view)[0] + BETTER:
+            found = Pose2(*poses[0].tolist())
+            agreed = self._suspected is not None and _agree(*self._suspected, found, base)
+            self._suspected = None if agreed else (found, base)
+            if agreed:
+                self._fits.clear()
+                return poses[:1], np.ones(1)
+        else:
+            self._suspected, self._wait = None, min(MOST_BETWEEN, 2 * max(waited, BETWEEN))
+        return None
+
+
+def _agree(first: Pose2, then: Pose2, second: Pose2, now: Pose2) -> bool:
+    """Whether a robot that was `first` when its base was at `then` is `second` when it is at `now`."""
+    off = first.compose(then.between(now)).between(second)
+    return float(np.hypot(off.x, off.y)) < AGREE[0] and abs(off.yaw) < AGREE[1]
+
+
+def around(poses: Array, shares: Array, count: int, chance: np.random.Generator) -> Array:
+    """Particles (count, 3) about `poses` (k, 3), each with its share."""
+    chosen = chance.choice(len(poses), count, p=shares)
+    drawn: Array = poses[chosen] + chance.normal(0.0, AROUND, (count, 3))
+    drawn[:, 2] = wrap_array(drawn[:, 2])
+    return drawn

@@ -1,0 +1,178 @@
+"""Finding a robot anywhere on its map: correlative scan matching, coarse to fine, over the likelihood field.
+
+Olson, Real-time correlative scan matching (ICRA 2009), section III: every place and heading of a coarse grid is scored
+by how many of the points seen fall near what the map shows; here also by how much of the way to them it shows as free.
+The best are refined. Nothing is drawn by chance, and the work is bounded by the size of the map.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.geometry import Array, Pose2, wrap_array
+from simscen.core.grid import FREE, OCCUPIED, OccupancyGrid
+from simscen.stack.localizers.distance_field import DistanceField
+from simscen.stack.localizers.likelihood_field import surfaces
+
+WIDTH = 0.2
+"""m: the standard deviation of a point from what it belongs to."""
+COARSE = 0.2
+"""m: the coarsest grid of places."""
+HEADINGS = 180
+"""Of the coarsest grid, in a full turn."""
+COARSE_POINTS, POINTS = 80, 240
+"""At most so many points are matched on the coarsest grid, and later."""
+REACH = 15.0
+"""m: points further off are left out; a coarse heading moves them too far."""
+KEPT, REFINED, ANSWERS = 3000, 250, 40
+"""How many places go from the coarsest grid to the next stage, and to the last; how many are told."""
+APART = (0.5, 0.2)
+"""m and rad: two places nearer than both are one."""
+WAYS = 0.5
+"""What it counts that the ways to all points are free, beside 1 for all points being where the map shows something."""
+
+Levels = npt.NDArray[np.uint8]
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """What was seen around a pose, in its frame: `ends` (n, 2) of beams, and points (m, 2) that they `passed`."""
+
+    ends: Array
+    passed: Array
+
+    def thinned(self, count: int) -> "View":
+        """At most `count` of each, evenly chosen."""
+        return View(_evenly(self.ends, count), _evenly(self.passed, count))
+
+
+def _evenly(points: Array, count: int) -> Array:
+    if len(points) <= count:
+        return points
+    return points[np.linspace(0, len(points) - 1, count).astype(np.int64)]
+
+
+class GlobalSearch:
+    """The most likely places of a map for what was seen."""
+
+    def __init__(self, grid: OccupancyGrid) -> None:
+        self._grid = grid
+
+    def places(self, view: View) -> tuple[Array, Array]:
+        """Poses (k, 3) in the map frame, and how well each fits (k,), 0 … 1, best first; k is at most ANSWERS."""
+        near = View(*(points[np.hypot(*points.T) < REACH] for points in (view.ends, view.passed)))
+        if not len(near.ends):
+            return np.empty((0, 3)), np.empty(0)
+        poses = self._coarsely(near.thinned(COARSE_POINTS))
+        fine = near.thinned(POINTS)
+        some = near.thinned(COARSE_POINTS)
+        poses, _ = distinct(poses, self.fit(poses, some), REFINED)
+        for metres, turn in ((0.1, 1.0), (0.05, 0.5)):
+            poses = self._climbed(poses, some, metres, np.radians(turn))
+        return distinct(poses, self.fit(poses, fine), ANSWERS)
+
+    def fit(self, poses: Array, view: View) -> Array:
+        """How well a view fits at each of `poses` (n, 3): (n,), 0 … 1."""
+        parts = [(self._near, view.ends, 1.0), (self._open, view.passed, WAYS)]
+        told = [(table, points, weight) for table, points, weight in parts if len(points)]
+        score = sum(weight * self._mean(table, poses, points) for table, points, weight in told)
+        fitting: Array = np.asarray(score) / sum(weight for _, _, weight in told)
+        return fitting
+
+    def hits(self, poses: Array, view: View) -> Array:
+        """The share of the ends of a view that fit at each of `poses` (n, 3): (n,), 0 … 1."""
+        return self._mean(self._near, poses, view.ends)
+
+    def _mean(self, table: Levels, poses: Array, points: Array) -> Array:
+        blocks = [
+            table.take(self._field.cells_seen(poses[begin : begin + 512], points)).mean(axis=1)
+            for begin in range(0, len(poses), 512)
+        ]
+        mean: Array = np.concatenate(blocks) / 255
+        return mean
+
+    @cached_property
+    def _field(self) -> DistanceField:
+        return DistanceField(self._grid, surfaces(self._grid.cells == OCCUPIED), 4 * WIDTH, walled=False)
+
+    @cached_property
+    def _near(self) -> Levels:
+        """How near each cell is to an obstacle, 0 … 255."""
+        levels: Levels = np.round(255 * np.exp(np.square(self._field.table) / (-2 * WIDTH**2))).astype(np.uint8)
+        return levels
+
+    @cached_property
+    def _open(self) -> Levels:
+        """Which cells are known to be free, 0 or 255."""
+        levels: Levels = np.pad(np.where(self._grid.cells == FREE, 255, 0).astype(np.uint8), 1).ravel()
+        return levels
+
+    @cached_property
+    def _coarse(self) -> tuple[int, Levels, Levels, npt.NDArray[np.bool_]]:
+        """Cells of the map for one coarse one, and what each coarse one has best of nearness, openness and room."""
+        each = max(1, round(COARSE / self._grid.resolution))
+        rows, columns = self._grid.shape
+        shape = rows + 2, columns + 2
+        near = _pooled(self._near.reshape(shape)[1:-1, 1:-1], each)
+        open_ = _pooled(self._open.reshape(shape)[1:-1, 1:-1], each)
+        return each, near, open_, open_ > 0
+
+    def _coarsely(self, view: View) -> Array:
+        """The best KEPT poses of the coarsest grid, in no order."""
+        each, near, open_, room = self._coarse
+        cell = each * self._grid.resolution
+        rows, columns = near.shape
+        border = int(REACH / cell) + 2
+        tables = [np.pad(near, border), np.pad(open_, border)]
+        weights = [4, max(1, round(4 * WAYS * len(view.ends) / max(1, len(view.passed))))]
+        scores = np.empty((HEADINGS, rows, columns), dtype=np.uint16)
+        turns = np.arange(HEADINGS) * (2 * np.pi / HEADINGS)
+        for turn, score in zip(turns.tolist(), scores, strict=True):
+            total = np.zeros((rows, columns), dtype=np.uint32)
+            for table, points, weight in zip(tables, (view.ends, view.passed), weights, strict=True):
+                moved = Pose2(0.0, 0.0, turn).apply(points) / cell
+                offsets = np.floor(moved + 0.5).astype(np.int64) + border
+                some = np.zeros((rows, columns), dtype=np.uint32 if len(points) > 257 else np.uint16)
+                for right, up in offsets.tolist():
+                    some += table[up : up + rows, right : right + columns]
+                total += np.uint32(weight) * some
+            score[:] = total >> 3
+        scores *= room
+        flat = scores.ravel()
+        best = np.argpartition(flat, -min(KEPT, flat.size))[-KEPT:]
+        heading, row, column = np.unravel_index(np.sort(best), scores.shape)
+        places = (np.column_stack((column, row)) + 0.5) * cell
+        return np.column_stack((self._grid.origin.apply(places), wrap_array(turns[heading] + self._grid.origin.yaw)))
+
+    def _climbed(self, poses: Array, view: View, metres: float, turn: float) -> Array:
+        """Each pose, or the better one of those around it."""
+        steps = np.array([(x, y, a) for x in (0, -1, 1) for y in (0, -1, 1) for a in (0, -1, 1)])
+        around = (poses[:, None] + steps * (metres, metres, turn)).reshape(-1, 3)
+        best = self.fit(around, view).reshape(len(poses), -1).argmax(axis=1)
+        climbed: Array = around.reshape(len(poses), -1, 3)[np.arange(len(poses)), best]
+        climbed[:, 2] = wrap_array(climbed[:, 2])
+        return climbed
+
+
+def _pooled(levels: Levels, each: int) -> Levels:
+    """The greatest of every `each` x `each` cells."""
+    rows, columns = (-(-size // each) for size in levels.shape)
+    padded = np.pad(levels, ((0, rows * each - levels.shape[0]), (0, columns * each - levels.shape[1])))
+    pooled: Levels = padded.reshape(rows, each, columns, each).max(axis=(1, 3))
+    return pooled
+
+
+def distinct(poses: Array, scores: Array, most: int) -> tuple[Array, Array]:
+    """The best of `poses` (n, 3) that are APART, best first, at most `most` of them, and their scores."""
+    order = np.argsort(-scores, kind="stable")
+    left, kept = poses[order], []
+    while len(order) and len(kept) < most:
+        kept.append(order[0])
+        off = np.abs(left - left[0])
+        off[:, 2] = np.abs(wrap_array(off[:, 2]))
+        other = (np.hypot(off[:, 0], off[:, 1]) > APART[0]) | (off[:, 2] > APART[1])
+        order, left = order[other], left[other]
+    chosen = np.array(kept, dtype=np.int64)
+    return poses[chosen], scores[chosen]

@@ -1,0 +1,50 @@
+"""How much a map is worth where the robot is: rooms are rebuilt, furniture is moved, and nobody draws it anew."""
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.geometry import Array
+from simscen.stack.localizers.distance_field import DistanceField
+from simscen.stack.localizers.particles import Particles
+
+NEAR = 0.3
+"""m: a beam fits that ends this near to what the map shows."""
+NOTHING, ALL = 0.45, 0.8
+"""Shares of the beams that fit up to which a scan counts for nothing, and from which it counts in full."""
+TOGETHER = 1.0
+"""m: particles all within this of their mean know where they are; others are not asked."""
+ASKED = 50
+"""Particles."""
+TELLING = 0.1
+"""Share of the beams that must end where the map says anything, for it to be doubted."""
+
+
+class MapTrust:
+    """The exponent of a scan's likelihood: small where the map does not show what is seen.
+
+    Particles that are one narrow group are right about where they are, or the whole map must be searched; then beams
+    that do not fit are the map's fault, and those that do may fit by chance and pull the group astray.
+    """
+
+    def __init__(self, field: DistanceField, beyond: npt.NDArray[np.bool_]) -> None:
+        """`beyond` (flat, as the field's table) are the places of which the map says nothing."""
+        self._field = field
+        self._near, self._told = field.table < NEAR, ~beyond
+
+    def of(self, particles: Particles, ends: Array) -> float:
+        """The exponent, 0 … 1, for beams that end at `ends` (b, 2) in the base frame."""
+        if not particles.within(TOGETHER):
+            return 1.0
+        share = self.fit(particles.poses[:: -(-len(particles.poses) // ASKED)], ends, TELLING)
+        return 1.0 if share is None else float(np.clip((share - NOTHING) / (ALL - NOTHING), 0.0, 1.0))
+
+    def fit(self, poses: Array, ends: Array, telling: float) -> float | None:
+        """The share of the beams that fit at `poses` (n, 3), of those that end where the map says anything.
+
+        None when these are less than the share `telling`.
+        """
+        cells = self._field.cells_seen(poses, ends)
+        told = self._told.take(cells)
+        if np.count_nonzero(told) < telling * told.size:
+            return None
+        return float(self._near.take(cells)[told].mean())

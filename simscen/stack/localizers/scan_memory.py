@@ -1,0 +1,84 @@
+"""What was seen on the last few metres, put together by odometry: far more telling than one scan."""
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from simscen.core.geometry import Pose2
+from simscen.core.sensing import Scan
+from simscen.stack.localizers.global_search import REACH, View
+
+REMEMBERED = 6.0
+"""m driven: what is older is forgotten, for by then raw odometry bends it."""
+EACH = 40
+"""Beams kept of a scan."""
+APART = 0.2
+"""m driven, or rad turned, between two scans that are kept."""
+SHARES = (0.3, 0.55, 0.8)
+"""Of a beam's length: where the points lie that it passed."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Kept:
+    """Seen from `odometry`, `driven` m after the first of all."""
+
+    odometry: Pose2
+    driven: float
+    view: View
+
+
+class ScanMemory:
+    """The scans of the last REMEMBERED metres."""
+
+    def __init__(self) -> None:
+        self._kept: deque[_Kept] = deque()
+
+    @property
+    def length(self) -> float:
+        """Metres driven between the oldest and the newest scan."""
+        return self._kept[-1].driven - self._kept[0].driven if self._kept else 0.0
+
+    def add(self, scan: Scan, odometry: Pose2, least: float, most: float) -> View:
+        """Take in a scan of which ranges between `least` and `most` count; and what it alone shows, about the base."""
+        view = seen(scan, least, most)
+        if self._kept:
+            last = self._kept[-1]
+            step = last.odometry.between(odometry)
+            driven = last.driven + last.odometry.distance(odometry)
+            if driven - last.driven < APART and abs(step.yaw) < APART:
+                return view
+        else:
+            driven = 0.0
+        self._kept.append(_Kept(odometry, driven, view))
+        while driven - self._kept[0].driven > REMEMBERED:
+            self._kept.popleft()
+        return view
+
+    def forget(self, but: int) -> None:
+        """Keep the newest scans only."""
+        while len(self._kept) > but:
+            self._kept.popleft()
+
+    def about(self, odometry: Pose2) -> View:
+        """All that was seen, about a base at `odometry`."""
+        placed = [(odometry.between(one.odometry), one.view) for one in self._kept]
+        return View(
+            np.concatenate([base.apply(view.ends) for base, view in placed]),
+            np.concatenate([base.apply(view.passed) for base, view in placed]),
+        )
+
+
+def seen(scan: Scan, least: float, most: float) -> View:
+    """What some beams of a scan, evenly chosen among those that hit something, show about the base."""
+    least, most = max(scan.range_min, least), min(scan.range_max, most, REACH)
+    with np.errstate(invalid="ignore"):
+        hit = np.flatnonzero((scan.ranges > least) & (scan.ranges < most))
+    if len(hit) > EACH:
+        hit = hit[np.linspace(0, len(hit) - 1, EACH).astype(np.int64)]
+    angles, ranges = scan.angles()[hit], scan.ranges[hit]
+    towards = np.column_stack((np.cos(angles), np.sin(angles)))
+    passed = [towards * (ranges * share)[:, None] for share in SHARES]
+    return View(scan.mount.apply(towards * ranges[:, None]), scan.mount.apply(np.concatenate(passed)))
+
+

@@ -1,0 +1,132 @@
+"""Logs of drives through buildings, each under one circumstance, with the map that the robot has."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from simscen.core.belief import Estimate
+from simscen.core.chance import Streams
+from simscen.core.geometry import Array, Pose2
+from simscen.core.grid import OccupancyGrid
+from simscen.core.motion import Twist
+from simscen.core.sensing import Odometry, Scan
+from simscen.model.robot import Lidar, WheelOdometry
+from simscen.record.foreign.sensed import Sensed
+from simscen.record.foreign.sensedrows import TICK_RATE
+from simscen.study.indoor.boxes import mesh_of
+from simscen.study.indoor.building import Building, building, lived_in
+from simscen.study.indoor.driving import STEP, ShutIn, drive, tour
+from simscen.study.indoor.mapping import drawn, first_half
+from simscen.study.indoor.seeing import Sight, angles_of, hidden_by, measured
+from simscen.study.indoor.walking import people_in
+from simscen.study.indoor.wheels import CLEAN, Wheels, reckoned
+
+LIDARS = ((181, 5.0), (361, 5.0), (181, 10.0), (361, 10.0))
+"""Beams over 180° and scans a second: what logs with a SICK LMS have."""
+MOUNT = Pose2(0.1, 0.0, 0.0)
+PEOPLE = 8
+"""On a floor."""
+SECONDS, KIDNAPPED_AT = 90.0, 30.0
+MAPPED_WITHIN = (0.02, 0.02, 0.004)
+"""Standard deviations (m, m, rad) of the poses that the map was drawn at."""
+CIRCUMSTANCES = {
+    "tracked": "the start is told",
+    "clean": "the start is told; wheels with random errors only, nobody walks, everything is where the map shows it",
+    "unknown": "the start is not told",
+    "outdated": "the start is told; right of the middle the floor was rebuilt since the map was made",
+    "half": "the start is told; of the half right of the middle there is no map",
+    "kidnapped": "the start is told; after 30 s the robot is carried elsewhere",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Log:
+    """A recorded drive: what `sensed` says, the robot's `map` and what it is told at the start.
+
+    `known` (left, bottom, right, top) is the part of the floor that the map shows as it is.
+    """
+
+    building: int
+    number: int
+    circumstance: str
+    sensed: Sensed
+    map: OccupancyGrid
+    estimate: Estimate
+    known: tuple[float, float, float, float]
+
+
+def log(number: int, which: int, circumstance: str, seconds: float = SECONDS) -> Log:
+    """Drive `which` through the building of a number under one of CIRCUMSTANCES: always the same."""
+    chance = Streams(number).generator(f"{circumstance} {which}")
+    beams, rate = LIDARS[which % len(LIDARS)]
+    lidar = Lidar(rate=rate, beams=beams, field_of_view=np.pi, min_range=0.0, max_range=80.0, noise=0.01, resolution=0.01)
+    floor = building(number, int(circumstance == "outdated"))
+    clean = circumstance == "clean"
+    truth, furniture = _driven(floor, circumstance, seconds, chance)
+    odometry = reckoned(truth, STEP, CLEAN if clean else Wheels(), WheelOdometry(), chance)
+    if circumstance == "kidnapped":
+        other, _ = _driven(floor, circumstance, seconds, chance, furniture)
+        row = int(KIDNAPPED_AT / STEP)
+        carried = reckoned(other, STEP, Wheels(), WheelOdometry(), chance)
+        there = Pose2(*odometry[row])
+        odometry = np.vstack((odometry[:row], [there.compose(Pose2(*pose)) for pose in carried[: len(truth) - row].tolist()]))
+        truth = np.vstack((truth[:row], other[: len(truth) - row]))
+    each = round(1 / rate / STEP)
+    poses = truth[::each]
+    seen_from = np.array([Pose2(*pose).compose(MOUNT) for pose in poses.tolist()])
+    angles = angles_of(lidar)
+    sight = Sight.of(mesh_of(floor.walls, furniture), mesh_of(floor.walls, floor.glass, furniture))
+    ranges = sight.distances(seen_from, angles, lidar.max_range, chance)
+    if not clean:
+        ranges = hidden_by(people_in(floor, len(poses), each * STEP, PEOPLE, chance), seen_from, angles, ranges)
+    ranges = measured(ranges, lidar, chance)
+    readings = _readings(odometry, ranges, each, lidar)
+    ticks = np.round(np.arange(len(truth)) * STEP * TICK_RATE).astype(np.int64)
+    whole = mapped(number)
+    width, depth = floor.size
+    known = (0.0, 0.0, floor.middle if circumstance in ("outdated", "half") else width, depth)
+    return Log(
+        number, which, circumstance, Sensed(readings, ticks, truth),
+        first_half(whole, floor.middle) if circumstance == "half" else whole,
+        Estimate(None if circumstance == "unknown" else Pose2(*truth[0].tolist())), known,
+    )  # fmt: skip
+
+
+def _driven(
+    floor: Building, circumstance: str, seconds: float, chance: np.random.Generator, furniture: Array | None = None
+) -> tuple[Array, Array]:
+    """The truth (k, 3) and the furniture (n, 4); drawn anew where furniture shuts the robot in."""
+    while True:
+        stands = furniture
+        if stands is None:
+            stands = floor.furniture if circumstance == "clean" else lived_in(floor, chance)
+        try:
+            return drive(floor, stands, seconds, chance, circumstance in ("outdated", "half")), stands
+        except ShutIn:
+            continue
+
+
+@lru_cache(maxsize=2)
+def mapped(number: int) -> OccupancyGrid:
+    """The map of a building, drawn from an earlier drive through all its rooms that nobody was in."""
+    floor, chance = building(number), Streams(number).generator("map")
+    poses = tour(floor)
+    angles = np.linspace(-np.pi, np.pi, 480, endpoint=False)
+    sight = Sight.of(mesh_of(floor.walls, floor.furniture), mesh_of(floor.walls, floor.glass, floor.furniture))
+    ranges = sight.distances(poses, angles, 80.0, chance)
+    return drawn(poses + chance.normal(0, MAPPED_WITHIN, poses.shape), angles, ranges, floor.size)
+
+
+def _readings(odometry: Array, ranges: Array, each: int, lidar: Lidar) -> list[Odometry | Scan]:
+    readings: list[Odometry | Scan] = []
+    increment = lidar.field_of_view / (lidar.beams - 1)
+    for row, pose in enumerate(odometry.tolist()):
+        tick = round(row * STEP * TICK_RATE)
+        readings.append(Odometry("odom", tick, Pose2(*pose), Twist()))
+        if row % each == 0:
+            readings.append(
+                Scan("lidar", tick, ranges[row // each], -lidar.field_of_view / 2, increment, lidar.min_range,
+                     lidar.max_range, MOUNT)
+            )  # fmt: skip
+    return readings
