@@ -1,6 +1,7 @@
 """The navigation stack's parameters, with Nav2's names and defaults."""
 
-from typing import Annotated, ClassVar, Literal, get_args
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal, get_args
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
@@ -38,11 +39,24 @@ class LocalizerSpec(Typed):
     """What knows where the robot is."""
 
 
+AMCL_PARAMETERS: Mapping[str, Mapping[str, object]] = {
+    "default": {},
+    "nav2": {
+        "laser_model_type": "likelihood_field", "likelihood_exponent": 1.0, "beams_beyond_the_map": "miss",
+        "distrust_outdated_map": False, "match_scans": False, "relocalization": "random",
+    },
+    "consistent": {"likelihood_exponent": 0.1},
+}  # fmt: skip
+"""What AMCL's parameters are by default under each name."""
+
+
 class Amcl(Ranged, LocalizerSpec):
     """Particle-filter localisation: nav2_amcl's parameters (Thrun et al., Probabilistic Robotics, ch. 8)."""
 
     component: ClassVar[str] = "simscen.stack.localizers.build:amcl"
     type: Literal["amcl"] = "amcl"
+    parameters: Literal["default", "nav2", "consistent"] = "default"
+    """What all else is where it is not said: as here; exactly as in nav2_amcl; or so that the covariance is true."""
     robot_model: Literal["differential", "omni"] | None = None
     """Motion model; default: as the robot's drive."""
     alpha1: Noise = 0.2
@@ -98,7 +112,7 @@ class Amcl(Ranged, LocalizerSpec):
     relocalization: Literal["scan_matching", "random"] = "scan_matching"
     """How a robot is found that does not know where it is, or is wrong about it: the last metres' scans are matched
     with the whole map; or only as Nav2 does, by particles anywhere at the start and by `recovery_alpha_*`."""
-    likelihood_exponent: Annotated[float, Field(gt=0, le=1)] = 1.0
+    likelihood_exponent: Annotated[float, Field(gt=0, le=1)] = 0.3
     """Of the product over the beams, which err together and so say less than as many would; `likelihood_field_prob`
     only."""
     beams_beyond_the_map: Literal["say_nothing", "miss"] = "say_nothing"
@@ -119,6 +133,14 @@ class Amcl(Ranged, LocalizerSpec):
     """Beams that fit a smaller share of the particles are left out."""
     beam_skip_error_threshold: Probability = 0.9
     """Where so great a share of the beams would be left out, none is: then it is the pose that is wrong."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _filled_in(cls, values: Any) -> Any:
+        """With what `parameters` names; what is said wins."""
+        named = values.get("parameters") if isinstance(values, Mapping) else None
+        chosen = AMCL_PARAMETERS.get(named) if isinstance(named, str) else None
+        return {**chosen, **values} if chosen else values
 
 
 class Ekf(LocalizerSpec):

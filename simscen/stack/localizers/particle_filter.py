@@ -80,7 +80,9 @@ class ParticleFilter:
         converged = spec.do_beamskip and self.particles.within(CONVERGED_WITHIN)
         logarithm = self._sensor.log_likelihood(poses, beams, converged)
         if self._trust is not None and len(ends := beams.ends()):
-            logarithm = logarithm * self._trust.of(self.particles, ends)
+            if (trusted := self._trust.of(self.particles, ends)) == 0:
+                return None
+            logarithm = logarithm * trusted
         best = float(logarithm.max())
         if best == logarithm.min() and best > -np.inf:
             return None
