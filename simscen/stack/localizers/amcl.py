@@ -115,8 +115,8 @@ class AmclLocalizer:
         if not self._due.get(scan.sensor, True):
             return
         matched = None if self._matcher is None else self._matched_step(self._matcher, scan, odometry)
-        if matched is not None:
-            self._filter.follow(matched.delta, matched.covariance)
+        if delta is not None and matched is not None:
+            self._filter.follow(matched, delta)
         elif delta is not None:
             self._filter.move(delta)
         self._due[scan.sensor], self._moved_to, self._belief = False, odometry, None

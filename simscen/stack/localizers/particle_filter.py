@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from simscen.core.belief import Estimate
-from simscen.core.geometry import Array, Pose2, wrap_array
+from simscen.core.geometry import Array, Pose2
 from simscen.core.sensing import Scan
 from simscen.model.stack import Amcl
 from simscen.stack.localizers.beams import Beams, select_beams
@@ -21,6 +21,7 @@ from simscen.stack.localizers.motion_models import MotionModel
 from simscen.stack.localizers.particles import FreeSpace, Particles
 from simscen.stack.localizers.recovery import PROBES, Recovery
 from simscen.stack.localizers.resampling import adaptive, systematic
+from simscen.stack.localizers.scan_matcher import Step, moved
 
 CONVERGED_WITHIN = 0.5  # nav2_amcl's pf.dist_threshold, in m
 
@@ -43,22 +44,23 @@ class ParticleFilter:
         self.particles = self._anywhere.begin(estimate, self._bound.most, self._chance)
         self._recovery = Recovery(self._spec.recovery_alpha_slow, self._spec.recovery_alpha_fast, self._sensor.strays)
         self._put_anywhere = np.zeros(len(self.particles.weights), dtype=np.bool_)
-        self._corrections = 0
+        self._corrections, self._trusted = 0, 1.0
 
     def move(self, delta: Pose2) -> None:
         """Move each particle by its own noisy copy of a motion that odometry reports in the base frame."""
         poses = self._motion.sample(self.particles.poses, delta, self._chance)
         self.particles = Particles(poses, self.particles.weights)
 
-    def follow(self, delta: Pose2, covariance: Array) -> None:
-        """Move each particle by its own copy of a motion in the base frame that is known up to a covariance (3, 3)."""
-        before = self.particles.poses
-        steps = self._chance.standard_normal((len(before), 3)) @ np.linalg.cholesky(covariance).T + delta
-        c, s = np.cos(before[:, 2]), np.sin(before[:, 2])
-        poses = np.empty_like(before)
-        poses[:, 0] = before[:, 0] + c * steps[:, 0] - s * steps[:, 1]
-        poses[:, 1] = before[:, 1] + s * steps[:, 0] + c * steps[:, 1]
-        poses[:, 2] = wrap_array(before[:, 2] + steps[:, 2])
+    def follow(self, seen: Step, delta: Pose2) -> None:
+        """Move each particle by its own copy of a motion that was seen; `delta` is what odometry reports of it.
+
+        Where the two differ wheels slip, or people walk along with the robot: then half of the particles believe
+        odometry, and the map decides, unless it does not show what is around.
+        """
+        poses = moved(self.particles.poses, seen, self._chance)
+        if self._trusted > 0 and not seen.agrees(delta):
+            half = self._chance.random(len(poses)) < 0.5
+            poses[half] = self._motion.sample(self.particles.poses[half], delta, self._chance)
         self.particles = Particles(poses, self.particles.weights)
 
     def put(self, poses: Array, shares: Array) -> tuple[Pose2, Array]:
@@ -80,9 +82,10 @@ class ParticleFilter:
         converged = spec.do_beamskip and self.particles.within(CONVERGED_WITHIN)
         logarithm = self._sensor.log_likelihood(poses, beams, converged)
         if self._trust is not None and len(ends := beams.ends()):
-            if (trusted := self._trust.of(self.particles, ends)) == 0:
+            self._trusted = self._trust.of(self.particles, ends)
+            if self._trusted == 0:
                 return None
-            logarithm = logarithm * trusted
+            logarithm = logarithm * self._trusted
         best = float(logarithm.max())
         if best == logarithm.min() and best > -np.inf:
             return None

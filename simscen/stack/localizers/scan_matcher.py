@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.core.sensing import Scan
 
 FRAMES = 6
@@ -31,6 +31,10 @@ LEAST = 12
 DOUBT = (0.15, 0.02, 0.15, 0.03)
 """Standard deviations of the guess: of each metre driven, and m; of each rad turned, and rad."""
 REACH = 20.0
+COARSEST = 0.04
+"""rad between two beams: of a lidar whose beams are further apart nobody can tell which points are of one surface."""
+AGREES = (0.03, 0.1, 0.03, 0.1)
+"""m, and of each metre; rad, and of each rad: within this the match and odometry say the same."""
 INFLATED, FLOOR = 2.0, (0.005, 0.005, 0.002)
 """Of the covariance that the match itself gives, and standard deviations in m, m, rad that are added: neighbouring
 frames share the errors of their surfaces."""
@@ -55,6 +59,23 @@ class Step:
     delta: Pose2
     covariance: Array
 
+    def agrees(self, odometry: Pose2) -> bool:
+        """Whether odometry says about the same of it."""
+        off = odometry.between(self.delta)
+        far, turned = float(np.hypot(odometry.x, odometry.y)), abs(odometry.yaw)
+        return float(np.hypot(off.x, off.y)) < AGREES[0] + AGREES[1] * far and abs(off.yaw) < AGREES[2] + AGREES[3] * turned
+
+
+def moved(poses: Array, step: Step, chance: np.random.Generator) -> Array:
+    """Each of `poses` (n, 3) moved by its own copy of a step."""
+    steps = chance.standard_normal(poses.shape) @ np.linalg.cholesky(step.covariance).T + step.delta
+    c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+    return np.column_stack((
+        poses[:, 0] + c * steps[:, 0] - s * steps[:, 1],
+        poses[:, 1] + s * steps[:, 0] + c * steps[:, 1],
+        wrap_array(poses[:, 2] + steps[:, 2]),
+    ))  # fmt: skip
+
 
 class ScanMatcher:
     """Follows one lidar; `pose` is the base's in a frame that begins at the first scan, and drifts slowly."""
@@ -65,6 +86,9 @@ class ScanMatcher:
 
     def step(self, scan: Scan, guess: Pose2) -> Step | None:
         """How the base moved since the last scan, where odometry says `guess`; None when the scans do not say."""
+        if abs(scan.angle_increment) > COARSEST:
+            self.pose = self.pose.compose(guess)
+            return None
         seen = surfaces_of(scan)
         found = self._matched(seen, guess) if self._frames and len(seen.points) else None
         pose, information = found or (self.pose.compose(guess), np.eye(3))

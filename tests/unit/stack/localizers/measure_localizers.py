@@ -19,12 +19,12 @@ from simscen.model.stack import Amcl, Ekf
 from simscen.model.stack import Localizer as Spec
 from simscen.testing.room import USUAL, Drive, Noise, drive, errors, localizer, nees, run, scan
 
-SUM = Amcl(laser_model_type="likelihood_field")
-PROB = Amcl(laser_model_type="likelihood_field_prob")
-BEAM = Amcl(laser_model_type="beam")
-MANY = Amcl(laser_model_type="likelihood_field", max_particles=5000)
+SUM = Amcl(parameters="nav2", laser_model_type="likelihood_field")
+PROB = Amcl(parameters="nav2", laser_model_type="likelihood_field_prob")
+BEAM = Amcl(parameters="nav2", laser_model_type="beam")
+MANY = Amcl(parameters="nav2", laser_model_type="likelihood_field", max_particles=5000)
 RECOVERING = Amcl(
-    laser_model_type="likelihood_field", max_particles=5000, recovery_alpha_slow=0.001, recovery_alpha_fast=0.1
+    parameters="nav2", laser_model_type="likelihood_field", max_particles=5000, recovery_alpha_slow=0.001, recovery_alpha_fast=0.1
 )
 RECOVERING_PROB = RECOVERING.model_copy(update={"laser_model_type": "likelihood_field_prob"})
 EXACT_EKF = Ekf(type="ekf", translation_noise=0.01, rotation_noise=0.01, gyro_noise=0.002)
