@@ -112,8 +112,13 @@ class AmclLocalizer:
         delta = None if self._moved_to is None else self._moved_to.between(odometry)
         if delta is not None and self._moved_enough(delta):
             self._due = dict.fromkeys(self._due, True)
-        if not self._due.get(scan.sensor, True):
-            return
+        if self._due.get(scan.sensor, True):
+            self._correct(scan, odometry, delta)
+        if self._finder is not None:
+            self._look_elsewhere(self._finder, scan, odometry)
+
+    def _correct(self, scan: Scan, odometry: Pose2, delta: Pose2 | None) -> None:
+        """Move the particles by what was driven since the last correction, and weigh them by a scan."""
         matched = None if self._matcher is None else self._matched_step(self._matcher, scan, odometry)
         if delta is not None and matched is not None:
             self._filter.follow(matched, delta)
@@ -126,8 +131,6 @@ class AmclLocalizer:
             carried = self._correction.map_from_odom.compose(odometry)
             covariance = spread(self._filter.particles, carried)
             self._correction = _Correction(carried, covariance, odometry, self._correction.tick)
-        if self._finder is not None:
-            self._look_elsewhere(self._finder, scan, odometry)
 
     def _matched_step(self, matcher: ScanMatcher, scan: Scan, odometry: Pose2) -> Step | None:
         """The motion since the last correction as the first lidar saw it; None where it did not see it."""
@@ -144,9 +147,10 @@ class AmclLocalizer:
         base = odometry
         if self._matcher is not None and self._matched is not None:
             base = self._matcher.pose.compose(self._matched[1].between(odometry))
-        places = finder.places(scan, base, self._correction.pose, limits)
-        if places is not None:
+        believed = self._correction.map_from_odom.compose(odometry)
+        if (places := finder.places(scan, base, believed, limits)) is not None:
             self._correction = _Correction(*self._filter.put(*places), odometry, scan.tick)
+            self._moved_to, self._belief = odometry, None
 
     def _moved_enough(self, delta: Pose2) -> bool:
         return math.hypot(delta.x, delta.y) > self._spec.update_min_d or abs(delta.yaw) > self._spec.update_min_a

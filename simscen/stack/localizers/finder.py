@@ -8,17 +8,19 @@ from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.core.sensing import Scan
 from simscen.stack.localizers.global_search import GlobalSearch, View
 from simscen.stack.localizers.map_trust import MapTrust
-from simscen.stack.localizers.scan_memory import ScanMemory
+from simscen.stack.localizers.scan_memory import ScanMemory, travelled
 
-RECENT, DOUBTFUL = 6, 0.6
+RECENT, DOUBTFUL = 10, 0.6
 """Over so many scans the share of the beams that fit is averaged, and below this the robot may be lost."""
 TELLING = 0.3
 """Share of the beams that must end where the map says anything, for a scan to count."""
-BETWEEN, MOST_BETWEEN = 1.0, 8.0
-"""m between two searches; doubled up to the most while the robot has a place and nothing better is found."""
-ENOUGH, PLAIN, BETTER, GOOD = 3.0, 0.05, 0.1, 0.75
-"""A place is where the robot is when scans of ENOUGH metres fit it by PLAIN better than any other; of a robot that had
-a place, when they fit the new one GOOD, and by BETTER better than the old one, in two searches that agree."""
+BETWEEN, MOST_BETWEEN = 0.7, 8.0
+"""m between two searches, turns included; doubled up to the most while the robot has a place and nothing better is
+found."""
+ENOUGH, PLAIN, BETTER, GOOD = 2.0, 0.05, 0.1, 0.75
+"""A robot that was told nothing is where scans of ENOUGH metres fit by PLAIN better than anywhere else; one that had a
+place is elsewhere when they fit there so, and GOOD, and by BETTER better than where it was, in two searches that agree.
+"""
 AGREE = 0.7, 0.3
 """m, rad: two searches agree that find places so near to each other, the way between them taken off."""
 SHARPNESS = 0.02
@@ -39,7 +41,7 @@ class Finder:
         self._search, self._trust, self._memory = search, trust, ScanMemory()
         self._known = known
         self._fits: deque[float] = deque(maxlen=RECENT)
-        self._wait, self._driven = 0.0, 0.0
+        self._wait, self._driven, self._doubted = 0.0, 0.0, False
         self._last: Pose2 | None = None
         self._suspected: tuple[Pose2, Pose2] | None = None
 
@@ -52,28 +54,35 @@ class Finder:
         """
         view = self._memory.add(scan, base, *limits)
         if self._last is not None:
-            self._driven += self._last.distance(base)
+            self._driven += travelled(self._last, base)
         self._last = base
         if not len(view.ends):
             return None
         here = np.array([believed])
         if (fit := self._trust.fit(here, view.ends, TELLING)) is not None:
             self._fits.append(fit)
-        if (self._known and not self._doubtful()) or self._driven < self._wait:
+        if self._known and not self._in_doubt():
+            return None
+        if self._driven < self._wait:
             return None
         return self._sought(self._memory.about(base), base, here)
 
-    def _doubtful(self) -> bool:
-        return len(self._fits) == RECENT and float(np.mean(self._fits)) < DOUBTFUL
+    def _in_doubt(self) -> bool:
+        """Whether recent scans do not fit. When that begins, what was seen before may be of another place."""
+        before, self._doubted = self._doubted, len(self._fits) == RECENT and float(np.mean(self._fits)) < DOUBTFUL
+        if self._doubted and not before:
+            self._memory.forget(1)
+            self._wait = 0.0
+        return self._doubted
 
     def _sought(self, view: View, base: Pose2, here: Array) -> tuple[Array, Array] | None:
         poses, fits = self._search.places(view)
         waited, self._wait, self._driven = self._wait, BETWEEN, 0.0
         if not len(poses):
             return None
-        plain = self._memory.length >= ENOUGH and (len(fits) == 1 or fits[0] - fits[1] > PLAIN)
+        plain = len(fits) == 1 or fits[0] - fits[1] > PLAIN
         if not self._known:
-            self._known = plain
+            self._known = plain and self._memory.length >= ENOUGH
             shares = np.exp((fits - fits[0]) / SHARPNESS)
             return poses, shares / shares.sum()
         if plain and fits[0] > GOOD and fits[0] > self._search.fit(here, view)[0] + BETTER:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simscen.core.geometry import Pose2
+from simscen.core.geometry import Pose2, wrap
 from simscen.core.sensing import Scan
 from simscen.stack.localizers.global_search import REACH, View
 
@@ -14,14 +14,16 @@ REMEMBERED = 6.0
 EACH = 40
 """Beams kept of a scan."""
 APART = 0.2
-"""m driven, or rad turned, between two scans that are kept."""
+"""m driven between two scans that are kept."""
+METRES_A_RAD = 0.5
+"""What a turn counts as: it shows a lidar something new, too."""
 SHARES = (0.3, 0.55, 0.8)
 """Of a beam's length: where the points lie that it passed."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Kept:
-    """Seen from `odometry`, `driven` m after the first of all."""
+    """Seen from `odometry`, after `driven` m since the first of all, turns included."""
 
     odometry: Pose2
     driven: float
@@ -36,7 +38,7 @@ class ScanMemory:
 
     @property
     def length(self) -> float:
-        """Metres driven between the oldest and the newest scan."""
+        """Metres driven between the oldest and the newest scan, turns included."""
         return self._kept[-1].driven - self._kept[0].driven if self._kept else 0.0
 
     def add(self, scan: Scan, odometry: Pose2, least: float, most: float) -> View:
@@ -44,9 +46,8 @@ class ScanMemory:
         view = seen(scan, least, most)
         if self._kept:
             last = self._kept[-1]
-            step = last.odometry.between(odometry)
-            driven = last.driven + last.odometry.distance(odometry)
-            if driven - last.driven < APART and abs(step.yaw) < APART:
+            driven = last.driven + travelled(last.odometry, odometry)
+            if driven - last.driven < APART:
                 return view
         else:
             driven = 0.0
@@ -67,6 +68,11 @@ class ScanMemory:
             np.concatenate([base.apply(view.ends) for base, view in placed]),
             np.concatenate([base.apply(view.passed) for base, view in placed]),
         )
+
+
+def travelled(before: Pose2, after: Pose2) -> float:
+    """Metres between two poses, turns included."""
+    return before.distance(after) + METRES_A_RAD * abs(wrap(after.yaw - before.yaw))
 
 
 def seen(scan: Scan, least: float, most: float) -> View:
