@@ -16,6 +16,8 @@ Cells = npt.NDArray[np.intp]
 # 512 x 60 beams fit the second-level cache. Larger tables also cost fresh pages from the system at every update:
 # 5000 particles at once took 8 to 100 ms, in blocks 3 ms.
 BLOCK = 512
+BEHIND = 1.0
+"""m: what is unknown behind a wall is at most so thick."""
 
 
 def by_blocks(judge: Callable[[Array], Array], poses: Array) -> Array:
@@ -24,18 +26,19 @@ def by_blocks(judge: Callable[[Array], Array], poses: Array) -> Array:
 
 
 def beyond_the_map(grid: OccupancyGrid) -> npt.NDArray[np.bool_]:
-    """Unknown cells, bordered by one more all around, whose nearest known cell is free: there the map ends.
+    """Unknown cells, bordered by one more all around, where the map ends: no beam would have been stopped before.
 
-    Behind a wall the nearest known cell is the wall: what lies there is unknown too, but no beam ends there.
+    These are the ones whose nearest known cell is free; where it is a wall no beam gets, but further off than BEHIND
+    there may be rooms that nobody mapped.
     """
     from scipy.ndimage import distance_transform_edt
 
     unknown = np.pad(grid.cells == UNKNOWN, 1, constant_values=True)
     if unknown.all():
         return unknown
-    row, column = distance_transform_edt(unknown, return_distances=False, return_indices=True)
+    distance, (row, column) = distance_transform_edt(unknown, return_indices=True)
     free = np.pad(grid.cells == FREE, 1)
-    beyond: npt.NDArray[np.bool_] = unknown & free[row, column]
+    beyond: npt.NDArray[np.bool_] = unknown & (free[row, column] | (distance * grid.resolution > BEHIND))
     return beyond
 
 

@@ -12,7 +12,7 @@ from simscen.stack.localizers.scan_memory import ScanMemory, travelled
 
 RECENT, DOUBTFUL = 10, 0.6
 """Over so many scans the share of the beams that fit is averaged, and below this the robot may be lost."""
-TELLING = 0.3
+TELLING = 0.6
 """Share of the beams that must end where the map says anything, for a scan to count."""
 BETWEEN, MOST_BETWEEN = 0.7, 8.0
 """m between two searches, turns included; doubled up to the most while the robot has a place and nothing better is

@@ -128,7 +128,7 @@ class GlobalSearch:
         tables = [np.pad(near, border), np.pad(open_, border)]
         weights = [4, max(1, round(4 * WAYS * len(view.ends) / max(1, len(view.passed))))]
         scores = np.empty((HEADINGS, rows, columns), dtype=np.uint16)
-        turns = np.arange(HEADINGS) * (2 * np.pi / HEADINGS)
+        turns = np.arange(HEADINGS, dtype=np.float64) * (2 * np.pi / HEADINGS)
         for turn, score in zip(turns.tolist(), scores, strict=True):
             total = np.zeros((rows, columns), dtype=np.uint32)
             for table, points, weight in zip(tables, (view.ends, view.passed), weights, strict=True):
@@ -143,8 +143,9 @@ class GlobalSearch:
         flat = scores.ravel()
         best = np.argpartition(flat, -min(KEPT, flat.size))[-KEPT:]
         heading, row, column = np.unravel_index(np.sort(best), scores.shape)
-        places = (np.column_stack((column, row)) + 0.5) * cell
-        return np.column_stack((self._grid.origin.apply(places), wrap_array(turns[heading] + self._grid.origin.yaw)))
+        places: Array = (np.column_stack((column, row)).astype(np.float64) + 0.5) * cell
+        yaw: Array = turns[heading] + self._grid.origin.yaw
+        return np.column_stack((self._grid.origin.apply(places), wrap_array(yaw)))
 
     def _climbed(self, poses: Array, view: View, metres: float, turn: float) -> Array:
         """Each pose, or the better one of those around it."""
@@ -167,9 +168,10 @@ def _pooled(levels: Levels, each: int) -> Levels:
 def distinct(poses: Array, scores: Array, most: int) -> tuple[Array, Array]:
     """The best of `poses` (n, 3) that are APART, best first, at most `most` of them, and their scores."""
     order = np.argsort(-scores, kind="stable")
-    left, kept = poses[order], []
+    left = poses[order]
+    kept: list[int] = []
     while len(order) and len(kept) < most:
-        kept.append(order[0])
+        kept.append(int(order[0]))
         off = np.abs(left - left[0])
         off[:, 2] = np.abs(wrap_array(off[:, 2]))
         other = (np.hypot(off[:, 0], off[:, 1]) > APART[0]) | (off[:, 2] > APART[1])

@@ -139,7 +139,8 @@ class LikelihoodFieldProb:
             p = self._hit.take(self._field.cells_seen(block, points))
             p += z_rand
             with np.errstate(divide="ignore"):
-                logarithm: Array = self._exponent * np.sum(np.log(p), axis=1, dtype=np.float64)
+                logarithm: Array = np.sum(np.log(p), axis=1, dtype=np.float64)
+            logarithm *= self._exponent
             return logarithm
 
         return by_blocks(judge, poses)

@@ -25,6 +25,9 @@ from simscen.stack.localizers.scan_matcher import Step, moved
 
 CONVERGED_WITHIN = 0.5  # nav2_amcl's pf.dist_threshold, in m
 
+BELIEVE_WHEELS = 0.2
+"""Share of the particles that follow odometry where the scans say otherwise."""
+
 
 class ParticleFilter:
     """Particles that are moved by odometry and weighed by scans; it knows neither time nor frames but the map's."""
@@ -54,13 +57,13 @@ class ParticleFilter:
     def follow(self, seen: Step, delta: Pose2) -> None:
         """Move each particle by its own copy of a motion that was seen; `delta` is what odometry reports of it.
 
-        Where the two differ wheels slip, or people walk along with the robot: then half of the particles believe
+        Where the two differ wheels slip, or people walk along with the robot: then some particles believe
         odometry, and the map decides, unless it does not show what is around.
         """
         poses = moved(self.particles.poses, seen, self._chance)
         if self._trusted > 0 and not seen.agrees(delta):
-            half = self._chance.random(len(poses)) < 0.5
-            poses[half] = self._motion.sample(self.particles.poses[half], delta, self._chance)
+            some = self._chance.random(len(poses)) < BELIEVE_WHEELS
+            poses[some] = self._motion.sample(self.particles.poses[some], delta, self._chance)
         self.particles = Particles(poses, self.particles.weights)
 
     def put(self, poses: Array, shares: Array) -> tuple[Pose2, Array]:

@@ -63,7 +63,10 @@ class Step:
         """Whether odometry says about the same of it."""
         off = odometry.between(self.delta)
         far, turned = float(np.hypot(odometry.x, odometry.y)), abs(odometry.yaw)
-        return float(np.hypot(off.x, off.y)) < AGREES[0] + AGREES[1] * far and abs(off.yaw) < AGREES[2] + AGREES[3] * turned
+        return (
+            float(np.hypot(off.x, off.y)) < AGREES[0] + AGREES[1] * far
+            and abs(off.yaw) < AGREES[2] + AGREES[3] * turned
+        )
 
 
 def moved(poses: Array, step: Step, chance: np.random.Generator) -> Array:
@@ -114,9 +117,9 @@ class ScanMatcher:
         trust = self._trust(guess)
         for gate in GATES:
             here = own.placed(pose)
-            distance, nearest = tree.query(here.points, distance_upper_bound=gate)
+            distance, closest = tree.query(here.points, distance_upper_bound=gate)
             matched = np.isfinite(distance)
-            nearest = nearest[matched]
+            nearest = np.asarray(closest)[matched]
             same = (here.normals[matched] * normals[nearest]).sum(axis=1) > 0.7
             if np.count_nonzero(same) < LEAST:
                 return None
@@ -147,16 +150,15 @@ def surfaces_of(scan: Scan) -> _Surface:
     points = ranges[hit, None] * np.column_stack((np.cos(angles), np.sin(angles)))
     if len(points) < 3:
         return _Surface(np.empty((0, 2)), np.empty((0, 2)))
-    spread = np.ceil(BASELINE / 2 / np.maximum(ranges[hit] * abs(scan.angle_increment), 1e-3)).astype(np.int64)
+    gaps: Array = ranges[hit] * abs(scan.angle_increment)
+    spread: npt.NDArray[np.int64] = np.ceil(BASELINE / 2 / np.maximum(gaps, 1e-3)).astype(np.int64)
     row = np.arange(len(points))
     before, after = points[np.maximum(row - spread, 0)], points[np.minimum(row + spread, len(points) - 1)]
     along = after - before
     length = np.hypot(*along.T)
     bent = np.abs((points - before)[:, 0] * along[:, 1] - (points - before)[:, 1] * along[:, 0])
     with np.errstate(invalid="ignore", divide="ignore"):
-        flat = (length > 0) & (length < np.maximum(TORN, 4 * ranges[hit] * abs(scan.angle_increment))) & (
-            bent / length < 0.05
-        )
+        flat = (length > 0) & (length < np.maximum(TORN, 4 * gaps)) & (bent / length < 0.05)
     points, along, length = points[flat], along[flat], length[flat]
     normals = np.column_stack((along[:, 1], -along[:, 0])) / length[:, None]
     return _Surface(scan.mount.apply(points), Pose2(0.0, 0.0, scan.mount.yaw).apply(normals))

@@ -86,5 +86,3 @@ def seen(scan: Scan, least: float, most: float) -> View:
     towards = np.column_stack((np.cos(angles), np.sin(angles)))
     passed = [towards * (ranges * share)[:, None] for share in SHARES]
     return View(scan.mount.apply(towards * ranges[:, None]), scan.mount.apply(np.concatenate(passed)))
-
-

@@ -33,9 +33,7 @@ def wall(
 def mesh_of(*parts: Array) -> TriangleMesh:
     """What stands on all these boxes (n, 4)."""
     rows = np.concatenate(parts).tolist()
-    return fuse(
-        Solid(Box((r - x, t - y, HEIGHT)), Pose3((x + r) / 2, (y + t) / 2, HEIGHT / 2)) for x, y, r, t in rows
-    )
+    return fuse(Solid(Box((r - x, t - y, HEIGHT)), Pose3((x + r) / 2, (y + t) / 2, HEIGHT / 2)) for x, y, r, t in rows)
 
 
 def distance_to(rows: Array, point: Sequence[float]) -> Array:

@@ -1,7 +1,8 @@
-"""Office floors of more than 40 m without symmetry: a corridor that is off the middle, rooms of all sizes, furniture."""
+"""Office floors of more than 40 m without symmetry: a corridor that is off the middle, rooms of all sizes."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -66,7 +67,7 @@ def _half(
     walls, glass, furniture, rooms, doors = ([np.empty((0, k))] for k in (4, 4, 4, 2, 2))
     for outer, inner in ((levels[0], levels[1]), (levels[3], levels[2])):
         cuts = _cuts(chance, *ends)
-        for a, b in zip(cuts, cuts[1:], strict=False):
+        for a, b in pairwise(cuts):
             back = outer + np.sign(inner - outer) * (chance.uniform(0.5, 1.5) if chance.random() < 0.4 else 0.0)
             if back != outer:
                 walls.append(wall((a, back), (b, back), thickness))

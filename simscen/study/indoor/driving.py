@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from simscen.core.geometry import Array, Pose2, wrap_array
+from simscen.core.geometry import Array, Pose2
 from simscen.study.indoor.boxes import mesh_of
 from simscen.study.indoor.building import Building
 from simscen.worlds.shortest import ShortestWays
@@ -30,12 +30,12 @@ def drive(floor: Building, furniture: Array, seconds: float, chance: np.random.G
 
     Such a drive begins in the left half.
     """
-    ways = ShortestWays(
-        mesh_of(floor.walls, floor.glass, furniture), (0.0, 0.0, *floor.size), CLEARANCE, finest=FINEST
-    )
+    ways = ShortestWays(mesh_of(floor.walls, floor.glass, furniture), (0.0, 0.0, *floor.size), CLEARANCE, finest=FINEST)
     corners = _corners(floor, ways, chance, alternate)
     before, goal = next(corners), next(corners)
-    pose, truth = Pose2(*before, float(np.arctan2(*(goal - before)[::-1]))), []
+    x, y = before.tolist()
+    pose = Pose2(x, y, float(np.arctan2(*(goal - before)[::-1])))
+    truth: list[Pose2] = []
     while len(truth) < seconds / STEP:
         truth.append(pose)
         if np.hypot(*(goal - pose[:2])) < 0.15:

@@ -60,7 +60,9 @@ def log(number: int, which: int, circumstance: str, seconds: float = SECONDS) ->
     """Drive `which` through the building of a number under one of CIRCUMSTANCES: always the same."""
     chance = Streams(number).generator(f"{circumstance} {which}")
     beams, rate = LIDARS[which % len(LIDARS)]
-    lidar = Lidar(rate=rate, beams=beams, field_of_view=np.pi, min_range=0.0, max_range=80.0, noise=0.01, resolution=0.01)
+    lidar = Lidar(
+        rate=rate, beams=beams, field_of_view=np.pi, min_range=0.0, max_range=80.0, noise=0.01, resolution=0.01
+    )
     floor = building(number, int(circumstance == "outdated"))
     clean = circumstance == "clean"
     truth, furniture = _driven(floor, circumstance, seconds, chance)
@@ -70,7 +72,9 @@ def log(number: int, which: int, circumstance: str, seconds: float = SECONDS) ->
         row = int(KIDNAPPED_AT / STEP)
         carried = reckoned(other, STEP, Wheels(), WheelOdometry(), chance)
         there = Pose2(*odometry[row])
-        odometry = np.vstack((odometry[:row], [there.compose(Pose2(*pose)) for pose in carried[: len(truth) - row].tolist()]))
+        odometry = np.vstack(
+            (odometry[:row], [there.compose(Pose2(*pose)) for pose in carried[: len(truth) - row].tolist()])
+        )
         truth = np.vstack((truth[:row], other[: len(truth) - row]))
     each = round(1 / rate / STEP)
     poses = truth[::each]

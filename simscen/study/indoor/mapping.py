@@ -1,6 +1,7 @@
 """The map that a robot has of a building: what an earlier drive saw, as SLAM would have drawn it."""
 
 import numpy as np
+import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
@@ -21,11 +22,11 @@ def drawn(poses: Array, angles: Array, ranges: Array, size: tuple[float, float])
     c, s = np.cos(heading), np.sin(heading)
     far = np.minimum(ranges, REACH)
 
-    def counted(along: Array, chosen: Array) -> Array:
+    def counted(along: Array, chosen: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
         x = ((poses[:, :1] + c * along)[chosen] + MARGIN) / CELL
         y = ((poses[:, 1:2] + s * along)[chosen] + MARGIN) / CELL
         column, row = np.clip(x.astype(np.int64), 0, width - 1), np.clip(y.astype(np.int64), 0, height - 1)
-        return np.bincount(row * width + column, minlength=height * width)
+        return np.bincount(row * width + column, minlength=height * width).astype(np.int64)
 
     ended = counted(far, np.isfinite(ranges) & (ranges < REACH))
     passed = np.zeros_like(ended)

@@ -45,7 +45,8 @@ def angles_of(spec: Lidar) -> Array:
     """Directions (b,) of the beams in the lidar's frame."""
     full = spec.field_of_view >= 2 * np.pi - 1e-9
     increment = spec.field_of_view / (spec.beams if full else spec.beams - 1)
-    return -spec.field_of_view / 2 + increment * np.arange(spec.beams)
+    angles: Array = -spec.field_of_view / 2 + increment * np.arange(spec.beams, dtype=np.float64)
+    return angles
 
 
 def hidden_by(people: Array, poses: Array, angles: Array, ranges: Array) -> Array:
@@ -54,7 +55,7 @@ def hidden_by(people: Array, poses: Array, angles: Array, ranges: Array) -> Arra
     legs = np.concatenate((people[..., :2] + aside, people[..., :2] - aside), axis=1) - poses[:, None, :2]
     heading = poses[:, 2:] + angles
     c, s = np.cos(heading), np.sin(heading)
-    seen = ranges.copy()
+    seen: Array = np.array(ranges)
     for leg in range(legs.shape[1]):
         x, y = legs[:, leg, :1], legs[:, leg, 1:]
         near = np.hypot(x, y)[:, 0] < 15.0
@@ -67,7 +68,9 @@ def hidden_by(people: Array, poses: Array, angles: Array, ranges: Array) -> Arra
 
 def measured(distances: Array, spec: Lidar, chance: np.random.Generator) -> Array:
     """What the electronics make of true distances: the simulator's lidar."""
-    ranges = np.round((distances + chance.normal(0, spec.noise, distances.shape)) / spec.resolution) * spec.resolution
+    ranges: Array = (
+        np.round((distances + chance.normal(0, spec.noise, distances.shape)) / spec.resolution) * spec.resolution
+    )
     ranges[ranges > spec.max_range] = np.inf
     ranges[ranges < spec.min_range] = np.nan
     return ranges

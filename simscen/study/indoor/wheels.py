@@ -36,7 +36,11 @@ def reckoned(truth: Array, seconds: float, wheels: Wheels, spec: WheelOdometry, 
     """Poses (k, 3) in the odom frame for true poses (k, 3), `seconds` apart."""
     steps = np.array([Pose2(0, 0, 0), *(a.between(b) for a, b in pairwise(Pose2(*row) for row in truth))])
     way = np.hypot(steps[:, 0], steps[:, 1])
-    scale, turn, bend = 1 + chance.normal(0, wheels.scale), 1 + chance.normal(0, wheels.turn), chance.normal(0, wheels.bend)
+    scale, turn, bend = (
+        1 + chance.normal(0, wheels.scale),
+        1 + chance.normal(0, wheels.turn),
+        chance.normal(0, wheels.bend),
+    )
     along, around = chance.standard_normal((2, len(steps)))
     stretch = scale * _slip(len(steps), seconds, wheels.slips, chance)
     stretch[way > 0] += spec.translation_noise * along[way > 0] / np.sqrt(way[way > 0])

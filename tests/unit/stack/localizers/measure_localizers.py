@@ -24,7 +24,11 @@ PROB = Amcl(parameters="nav2", laser_model_type="likelihood_field_prob")
 BEAM = Amcl(parameters="nav2", laser_model_type="beam")
 MANY = Amcl(parameters="nav2", laser_model_type="likelihood_field", max_particles=5000)
 RECOVERING = Amcl(
-    parameters="nav2", laser_model_type="likelihood_field", max_particles=5000, recovery_alpha_slow=0.001, recovery_alpha_fast=0.1
+    parameters="nav2",
+    laser_model_type="likelihood_field",
+    max_particles=5000,
+    recovery_alpha_slow=0.001,
+    recovery_alpha_fast=0.1,
 )
 RECOVERING_PROB = RECOVERING.model_copy(update={"laser_model_type": "likelihood_field_prob"})
 EXACT_EKF = Ekf(type="ekf", translation_noise=0.01, rotation_noise=0.01, gyro_noise=0.002)

@@ -1,0 +1,60 @@
+"""A robot is found anywhere on its map by what it saw."""
+
+import numpy as np
+import pytest
+
+from simscen.core.geometry import Pose2
+from simscen.stack.localizers.global_search import ANSWERS, GlobalSearch, View, distinct
+from simscen.stack.localizers.scan_memory import REMEMBERED, ScanMemory, seen
+from simscen.testing.room import BEAMS, cast, grid, scan
+
+PLACES = (Pose2(-2.5, -1.8, 0.6), Pose2(3.0, 1.8, -2.8), Pose2(-4.0, 2.9, 1.9))
+
+
+def scanned(pose: Pose2) -> View:
+    ranges = cast(np.array([pose]), -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS))[0]
+    return seen(scan(ranges), 0.0, 100.0)
+
+
+@pytest.mark.parametrize("pose", PLACES)
+def test_the_place_that_fits_best_is_where_the_scan_was_taken(pose: Pose2) -> None:
+    poses, fits = GlobalSearch(grid()).places(scanned(pose))
+    off = pose.between(Pose2(*poses[0].tolist()))
+    assert np.hypot(off.x, off.y) < 0.1
+    assert abs(off.yaw) < 0.03
+    assert fits[0] > fits[1] + 0.05
+    assert len(poses) <= ANSWERS
+    assert (np.diff(fits) <= 0).all()
+
+
+def test_the_same_view_gives_the_same_places_bit_for_bit() -> None:
+    view = scanned(PLACES[0])
+    first, again = (GlobalSearch(grid()).places(view) for _ in range(2))
+    assert np.array_equal(first[0], again[0])
+    assert np.array_equal(first[1], again[1])
+
+
+def test_nothing_seen_finds_nothing() -> None:
+    poses, fits = GlobalSearch(grid()).places(View(np.empty((0, 2)), np.empty((0, 2))))
+    assert poses.shape == (0, 3)
+    assert fits.shape == (0,)
+
+
+def test_places_that_are_near_to_each_other_are_one() -> None:
+    poses = np.array([[0, 0, 0.0], [0.3, 0, 0.1], [0.3, 0, 1.0], [2, 0, 0], [0.1, 0, 2 * np.pi - 0.05]])
+    kept, scores = distinct(poses, np.array([0.5, 0.9, 0.1, 0.2, 0.6]), 10)
+    assert kept[:, 0].tolist() == [0.3, 2.0, 0.3]
+    assert scores.tolist() == [0.9, 0.2, 0.1]
+
+
+def test_the_memory_holds_the_last_metres_about_where_the_base_is() -> None:
+    memory, view = ScanMemory(), scanned(PLACES[0])
+    for metre in np.arange(0.0, 20.0, 0.5):
+        memory.add(scan(np.full(8, 2.0)), Pose2(float(metre), 0.0, 0.0), 0.0, 100.0)
+    assert memory.length <= REMEMBERED
+    about = memory.about(Pose2(19.5, 0.0, 0.0))
+    assert about.ends[:, 0].min() == pytest.approx(-2.0 - memory.length)
+    assert len(view.passed) == 3 * len(view.ends)
+    memory.forget(1)
+    assert memory.length == 0
+    assert len(memory.about(Pose2(0, 0, 0)).ends) == 8

@@ -1,0 +1,54 @@
+"""How far a robot went is seen better than its wheels say, and left to them where nothing shows it."""
+
+import numpy as np
+import pytest
+
+from simscen.core.geometry import Pose2
+from simscen.core.sensing import Scan
+from simscen.stack.localizers.scan_matcher import ScanMatcher, Step, moved
+from simscen.testing.room import BEAMS, cast, scan
+
+ANGLES = -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS)
+START, STEP = Pose2(-2.5, -1.8, 0.6), Pose2(0.3, 0.02, 0.15)
+
+
+def view(pose: Pose2, boxes: np.ndarray | None = None) -> Scan:
+    told = (np.array([pose]), ANGLES) if boxes is None else (np.array([pose]), ANGLES, boxes)
+    return scan(cast(*told)[0])
+
+
+def stepped(guess: Pose2, before: Scan, after: Scan) -> Step | None:
+    matcher = ScanMatcher()
+    matcher.step(before, Pose2(0, 0, 0))
+    return matcher.step(after, guess)
+
+
+@pytest.mark.parametrize("guess", [STEP, Pose2(0.4, 0.0, 0.2), Pose2(0.2, 0.0, 0.05)])
+def test_a_step_is_seen_to_a_centimetre_although_wheels_slip(guess: Pose2) -> None:
+    step = stepped(guess, view(START), view(START.compose(STEP)))
+    assert step is not None
+    off = STEP.between(step.delta)
+    assert np.hypot(off.x, off.y) < 0.02
+    assert abs(off.yaw) < 0.006
+
+
+def test_along_a_corridor_without_an_end_odometry_has_its_way() -> None:
+    walls = np.array([(-100.0, 1.0, 100.0, 1.1), (-100.0, -1.1, 100.0, -1.0)])
+    step = stepped(Pose2(0.3, 0.1, 0.0), view(Pose2(0, 0, 0), walls), view(Pose2(0.25, 0, 0), walls))
+    assert step is not None
+    assert step.delta.x == pytest.approx(0.3, abs=0.01)
+    assert step.delta.y == pytest.approx(0.0, abs=0.01)
+    assert step.covariance[0, 0] > 10 * step.covariance[1, 1]
+
+
+@pytest.mark.parametrize("ranges", [np.full(BEAMS, np.inf), np.full(BEAMS, np.nan), np.full(40, 2.0), np.empty(0)])
+def test_scans_that_show_no_surface_say_nothing(ranges: np.ndarray) -> None:
+    assert stepped(STEP, scan(ranges), scan(ranges)) is None
+    assert stepped(STEP, view(START), scan(ranges)) is None
+
+
+def test_particles_follow_a_step_with_its_covariance() -> None:
+    step = Step(STEP, np.diag([0.01, 0.0004, 0.0001]))
+    poses = moved(np.tile((1.0, 2.0, np.pi / 2), (20_000, 1)), step, np.random.default_rng(1))
+    assert poses.mean(axis=0) == pytest.approx((1 - 0.02, 2.3, np.pi / 2 + 0.15), abs=0.003)
+    assert poses.std(axis=0) == pytest.approx((0.02, 0.1, 0.01), rel=0.03)
