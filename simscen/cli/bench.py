@@ -1,4 +1,6 @@
-"""`simscen bench`: how fast it is; `bench worlds`: also in large worlds; `bench nav`: how well the stack drives."""
+"""`simscen bench`: how fast it is; `bench worlds`: also in large worlds; `bench nav`: how well the stack drives;
+`bench localization`: how well it knows where it is.
+"""
 
 import json
 from dataclasses import asdict
@@ -7,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from simscen.cli import bench_nav, bench_worlds
+from simscen.cli import bench_localization, bench_nav, bench_worlds
 from simscen.cli.diagnostics import print_text
 
 if TYPE_CHECKING:
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer(rich_markup_mode=None, add_completion=False)
 app.command("nav")(bench_nav.command)
+app.command("localization")(bench_localization.command)
 app.command("worlds")(bench_worlds.command)
 
 

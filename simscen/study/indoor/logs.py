@@ -33,11 +33,14 @@ MAPPED_WITHIN = (0.02, 0.02, 0.004)
 CIRCUMSTANCES = {
     "tracked": "the start is told",
     "clean": "the start is told; wheels with random errors only, nobody walks, everything is where the map shows it",
+    "slipping": "the same, but for wheels as raw as in all others",
     "unknown": "the start is not told",
     "outdated": "the start is told; right of the middle the floor was rebuilt since the map was made",
     "half": "the start is told; of the half right of the middle there is no map",
     "kidnapped": "the start is told; after 30 s the robot is carried elsewhere",
 }
+ALONE = ("clean", "slipping")
+"""Where nobody walks and everything is where the map shows it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,9 +67,9 @@ def log(number: int, which: int, circumstance: str, seconds: float = SECONDS) ->
         rate=rate, beams=beams, field_of_view=np.pi, min_range=0.0, max_range=80.0, noise=0.01, resolution=0.01
     )
     floor = building(number, int(circumstance == "outdated"))
-    clean = circumstance == "clean"
+    alone = circumstance in ALONE
     truth, furniture = _driven(floor, circumstance, seconds, chance)
-    odometry = reckoned(truth, STEP, CLEAN if clean else Wheels(), WheelOdometry(), chance)
+    odometry = reckoned(truth, STEP, CLEAN if circumstance == "clean" else Wheels(), WheelOdometry(), chance)
     if circumstance == "kidnapped":
         other, _ = _driven(floor, circumstance, seconds, chance, furniture)
         row = int(KIDNAPPED_AT / STEP)
@@ -82,7 +85,7 @@ def log(number: int, which: int, circumstance: str, seconds: float = SECONDS) ->
     angles = angles_of(lidar)
     sight = Sight.of(mesh_of(floor.walls, furniture), mesh_of(floor.walls, floor.glass, furniture))
     ranges = sight.distances(seen_from, angles, lidar.max_range, chance)
-    if not clean:
+    if not alone:
         ranges = hidden_by(people_in(floor, len(poses), each * STEP, PEOPLE, chance), seen_from, angles, ranges)
     ranges = measured(ranges, lidar, chance)
     readings = _readings(odometry, ranges, each, lidar)
@@ -104,7 +107,7 @@ def _driven(
     while True:
         stands = furniture
         if stands is None:
-            stands = floor.furniture if circumstance == "clean" else lived_in(floor, chance)
+            stands = floor.furniture if circumstance in ALONE else lived_in(floor, chance)
         try:
             return drive(floor, stands, seconds, chance, circumstance in ("outdated", "half")), stands
         except ShutIn:

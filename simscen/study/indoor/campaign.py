@@ -1,0 +1,119 @@
+"""What `simscen bench localization` measures: parameters of AMCL on the same generated logs, building by building."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from multiprocessing import get_context
+
+import numpy as np
+
+from simscen.core.chance import Streams
+from simscen.core.paired import mean_interval
+from simscen.model.stack import Amcl
+from simscen.study.consistency import anees, bounds
+from simscen.study.indoor.logs import CIRCUMSTANCES, log
+from simscen.study.indoor.trial import MOMENTS, Trial, trial
+
+PARAMETERS: Mapping[str, Amcl] = {
+    "Nav2's": Amcl(parameters="nav2"),
+    "Nav2's, likelihood_field_prob": Amcl(parameters="nav2", laser_model_type="likelihood_field_prob"),
+    "default": Amcl(),
+    "consistent": Amcl(parameters="consistent"),
+}
+LOGS: Mapping[str, int] = {name: 5 if name == "tracked" else 1 for name in CIRCUMSTANCES}
+"""Logs of each building under each circumstance."""
+SURE = ("clean", "slipping", "tracked")
+"""Circumstances under which the error is compared with the covariance."""
+WITHIN = 60.0
+"""Seconds in which a robot must be found that was told nothing, or was carried elsewhere."""
+
+Interval = tuple[float, float] | None
+
+
+@dataclass(frozen=True)
+class Share:
+    """`count` of `of` logs, and between what bounds the share lies with 95 %, by bootstrap over buildings."""
+
+    count: int
+    of: int
+    interval: Interval
+
+
+@dataclass(frozen=True)
+class Row:
+    """One set of parameters. Errors in m: the median over the tracked logs of the median over a log.
+
+    `unknown` and `kidnapped` count logs on which the robot was found within WITHIN, all others those on which it was
+    never lost. `anees` are over logs at each of MOMENTS, and `anees_bounds` those of a consistent belief. `ms` is the
+    processor's time a scan, odometry included, and `slowest_ms` that of the scan that took longest.
+    """
+
+    parameters: str
+    shares: Mapping[str, Share]
+    median: float
+    median_interval: Interval
+    anees: Mapping[str, Sequence[float]]
+    anees_bounds: Mapping[str, tuple[float, float]]
+    ms: float
+    slowest_ms: float
+
+
+def drive(buildings: Sequence[int], names: Sequence[str], workers: int) -> Iterator[Mapping[str, Sequence[Trial]]]:
+    """The trials of each building in turn, by the name of the parameters. Deterministic but for processor times."""
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        yield from pool.map(of_building, buildings, [tuple(names)] * len(buildings))
+
+
+def of_building(number: int, names: Sequence[str]) -> Mapping[str, Sequence[Trial]]:
+    """All logs of a building through all these parameters."""
+    trials: dict[str, list[Trial]] = {name: [] for name in names}
+    for circumstance, count in LOGS.items():
+        for which in range(count):
+            made = log(number, number + which, circumstance)
+            for name in names:
+                trials[name].append(trial(made, PARAMETERS[name], seed=1 + which))
+    return trials
+
+
+def summed_up(name: str, trials: Sequence[Trial]) -> Row:
+    """The row of some parameters."""
+    under = {one: [trial for trial in trials if trial.circumstance == one] for one in CIRCUMSTANCES}
+    medians = _by_building(under["tracked"], [trial.median for trial in under["tracked"]])
+    sure = {one: under[one] for one in SURE}
+    return Row(
+        parameters=name,
+        shares={one: _share(some) for one, some in under.items()},
+        median=float(np.median([trial.median for trial in under["tracked"]])),
+        median_interval=_interval(medians),
+        anees={
+            one: [anees([trial.nees[k] for trial in some]) for k in range(len(MOMENTS))] for one, some in sure.items()
+        },
+        anees_bounds={one: bounds(len(some)) for one, some in sure.items()},
+        ms=float(np.mean([trial.ms for trial in trials])),
+        slowest_ms=max(trial.slowest_ms for trial in trials),
+    )
+
+
+def well(trial: Trial) -> bool:
+    """Whether the robot was found in time, or, where it knew its place, was never lost."""
+    if trial.circumstance in ("unknown", "kidnapped"):
+        return trial.found is not None and trial.found <= WITHIN
+    return trial.tracked
+
+
+def _share(trials: Sequence[Trial]) -> Share:
+    good = [well(trial) for trial in trials]
+    return Share(sum(good), len(good), _interval(_by_building(trials, [float(one) for one in good])))
+
+
+def _by_building(trials: Sequence[Trial], values: Sequence[float]) -> list[float]:
+    """The mean of each building's values."""
+    numbers = sorted({trial.building for trial in trials})
+    return [
+        float(np.mean([value for trial, value in zip(trials, values, strict=True) if trial.building == number]))
+        for number in numbers
+    ]
+
+
+def _interval(values: Sequence[float]) -> Interval:
+    return mean_interval(values, Streams(1).generator("bootstrap"))
