@@ -19,6 +19,8 @@ from simscen.report.plain import Reporter
 from simscen.run.outfolder import probe_writable
 
 STEP_SUMMARY = "GITHUB_STEP_SUMMARY"
+PICTURES_URL = "SIMSCEN_PICTURES_URL"
+"""Names the address at which the pictures of the output folder will be found by who reads the summary."""
 
 
 class Format(str, Enum):
@@ -102,7 +104,7 @@ def _printer(format_: Format, summary: TextIO | None, slow: int | None) -> Repor
         case Format.JSON:
             return json_reporter(sys.stdout)
         case Format.GITHUB:
-            return github_reporter(sys.stdout, summary, slow)
+            return github_reporter(sys.stdout, summary, slow, os.environ.get(PICTURES_URL, ""))
 
 
 def _step_summary() -> StringIO | None:

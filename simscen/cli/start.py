@@ -21,7 +21,7 @@ def start() -> None:
     try:
         from simscen.cli.main import is_light, main
     except ModuleNotFoundError as error:
-        _refuse([f"{error.name} is not installed: pip install simscen"])
+        _refuse([f"{error.name} is not installed; install simscen again, with what it needs"])
 
     if signal.getsignal(signal.SIGINT) is _leave_at_once:
         signal.signal(signal.SIGINT, signal.default_int_handler)

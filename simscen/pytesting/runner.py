@@ -14,7 +14,7 @@ from simscen.loading.plugins import plugins_of
 from simscen.pytesting.names import OUT
 from simscen.run.outfolder import DEFAULT, run_folder
 from simscen.run.process.answer import answer_to
-from simscen.run.process.jobs import Job
+from simscen.run.process.jobs import Job, Replays
 from simscen.run.process.standby import Standby
 from simscen.run.process.whereabouts import whereabouts
 
@@ -35,7 +35,7 @@ class Runner:
     def run(self, scenario: LoadedScenario, seed: int) -> RunFinished:
         """The answer to a run."""
         key = scenario.key(seed)
-        job = Job(next(self._numbers), scenario, key, run_folder(self.folder, key), WALL_LIMIT)
+        job = Job(next(self._numbers), scenario, key, run_folder(self.folder, key), WALL_LIMIT, Replays.FAILED)
         told = whereabouts(plugins_of(scenario))
         if told not in self._standbys:
             self._standbys[told] = self._closing.enter_context(Standby((*WARM_PROCESS, *told)))

@@ -2,6 +2,7 @@
 
 from types import TracebackType
 from typing import TextIO
+from urllib.parse import quote
 
 from simscen.core.result import Outcome
 from simscen.core.sessionevents import RunFinished, SessionEvent, SessionFinished
@@ -11,22 +12,27 @@ from simscen.report.comparedpage import as_markdown
 from simscen.report.complaints import broken, complaints, excused, label, scenario_file
 from simscen.report.console import text_reporter
 from simscen.report.plain import Reporter
+from simscen.report.results import relative
 from simscen.report.text import one_line
 
+MOST_PICTURES = 10
 _MEANINGFUL = {ord(sign): f"&#{ord(sign)};" for sign in "\\`*_[]|~#@&<>"}
 
 
-def github_reporter(out: TextIO, summary: TextIO | None = None, slow: int | None = None) -> Reporter:
+def github_reporter(
+    out: TextIO, summary: TextIO | None = None, slow: int | None = None, pictures: str = ""
+) -> Reporter:
     """The lines of a pipe, with annotations among them. `summary` is the file that $GITHUB_STEP_SUMMARY names.
 
-    `slow` is as for text_reporter.
+    `slow` is as for text_reporter. `pictures` is the address below which the output folder's pictures will be found:
+    a summary shows none that it does not get from somewhere.
     """
-    return _GitHub(out, summary, slow)
+    return _GitHub(out, summary, slow, pictures)
 
 
 class _GitHub:
-    def __init__(self, out: TextIO, summary: TextIO | None, slow: int | None) -> None:
-        self._out, self._summary = out, summary
+    def __init__(self, out: TextIO, summary: TextIO | None, slow: int | None, pictures: str) -> None:
+        self._out, self._summary, self._pictures = out, summary, pictures
         self._plain = text_reporter(out, live=False, slow=slow)
         self._runs: list[RunFinished] = []
 
@@ -48,7 +54,7 @@ class _GitHub:
                 self._out.write(f"{line}\n")
             self._out.flush()
         if isinstance(event, SessionFinished) and self._summary is not None:
-            self._summary.write(markdown(self._runs, event))
+            self._summary.write(markdown(self._runs, event, self._pictures))
             self._summary.flush()
 
 
@@ -69,8 +75,8 @@ def annotations(run: RunFinished) -> list[str]:
     return lines
 
 
-def markdown(runs: list[RunFinished], session: SessionFinished) -> str:
-    """A table of all runs, the ones that did not pass first."""
+def markdown(runs: list[RunFinished], session: SessionFinished, pictures: str = "") -> str:
+    """A table of all runs, the ones that did not pass first; then their pictures, where they have an address."""
     signs = {
         Outcome.ERROR: "⚠️",
         Outcome.FAILED: "❌",
@@ -89,7 +95,19 @@ def markdown(runs: list[RunFinished], session: SessionFinished) -> str:
         f"| {signs[run.outcome]} | {_cell(label(run.key))} | {run.result.simulated:.1f} s | {_cell(_why(run))} |"
         for run in ordered
     ]
-    return "\n".join([head, "", "| | scenario | simulated | |", "|---|---|---:|---|", *rows, *compared, "", ""])
+    shown = _shown(ordered, session.folder, pictures) if pictures else []
+    table = ["| | scenario | simulated | |", "|---|---|---:|---|", *rows]
+    return "\n".join([head, "", *table, *compared, "", *shown, ""])
+
+
+def _shown(runs: list[RunFinished], folder: str, pictures: str) -> list[str]:
+    """The pictures of the first runs that did not pass."""
+    bad = [run for run in runs if not run.outcome.good and run.artifacts.picture]
+    lines = []
+    for run in bad[:MOST_PICTURES]:
+        address = f"{pictures.rstrip('/')}/{quote(relative(run.artifacts.picture, folder))}"
+        lines += [f"**{_cell(label(run.key))}**", "", f"![map of the run]({address})", ""]
+    return lines
 
 
 def _why(run: RunFinished) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 from simscen.record.foreign.mcapfile import McapMessages, Raw
 from simscen.record.foreign.unusable import Unusable
 
-INSTALL = "pip install 'simscen[rosbags]'"
+INSTALL = "pip install 'rosbags>=0.10,<1'"
 
 
 class BagMessages:

@@ -295,7 +295,7 @@ def test_a_bag_without_rosbags_says_what_to_install(tmp_path: Path, monkeypatch:
     monkeypatch.setitem(sys.modules, "rosbags.rosbag2", None)
     with pytest.raises(InvalidInput) as raised:
         read_foreign(bag, MOCAP)
-    assert raised.value.problems[0].hint == "pip install 'simscen[rosbags]'"
+    assert raised.value.problems[0].hint == "pip install 'rosbags>=0.10,<1'"
 
 
 @pytest.mark.parametrize("spoil", ["cut", "empty", "no metadata", "not yaml"])

@@ -182,6 +182,16 @@ def test_the_summary_of_a_github_job_lists_what_did_not_pass_first_and_holds_no_
     assert row.count("|") == 5
 
 
+def test_the_summary_shows_the_pictures_of_failures_where_they_have_an_address(session, passed, failed):
+    here = replace(failed, artifacts=replace(failed.artifacts, picture="out/runs/a b)/seed-7/map.png"))
+    told = markdown([passed, here], session[-1], "https://example.org/raw/pictures/1/")
+    assert told.endswith(
+        "**faults/lidar&#95;off (seed 7)**\n\n"
+        "![map of the run](https://example.org/raw/pictures/1/runs/a%20b%29/seed-7/map.png)\n\n"
+    )
+    assert "![" not in markdown([passed, here], session[-1])
+
+
 def test_github_output_holds_the_plain_lines_too(session):
     out, summary = io.StringIO(), io.StringIO()
     told(github_reporter(utf8(out), summary), session)

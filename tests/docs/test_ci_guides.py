@@ -1,0 +1,121 @@
+"""What other systems read (hooks, pipelines, the action, the Dockerfile) is what they understand."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).parents[2]
+BIN = Path(sys.executable).parent
+GUIDES = ROOT / "docs/guides"
+GOOD = """\
+simscen: 1
+world: room.world.yaml
+robot: {pose: {x: 1, y: 1}}
+goals: [{pose: {x: 5, y: 3}}]
+pass: [{collisions: {max: 0}}]
+"""
+WORLD = "simscen: 1\nwalls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]\n"
+
+
+def blocks(page: str, language: str) -> list[str]:
+    text = (GUIDES / page).read_text(encoding="utf-8")
+    return re.findall(rf"^```{language}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+
+
+@pytest.fixture
+def repository(tmp_path: Path) -> Path:
+    """A repository whose scenario is right."""
+    subprocess.run(["git", "init", "--quiet", str(tmp_path)], check=True)
+    (tmp_path / "scenarios").mkdir()
+    (tmp_path / "scenarios/good.scenario.yaml").write_text(GOOD)
+    (tmp_path / "scenarios/room.world.yaml").write_text(WORLD)
+    return tmp_path
+
+
+def pre_commit(folder: Path, *arguments: str) -> tuple[int, str]:
+    environ = {**os.environ, "PRE_COMMIT_HOME": str(folder / ".home"), "PATH": f"{BIN}:{os.environ['PATH']}"}
+    subprocess.run(["git", "-C", str(folder), "add", "scenarios", "*.yaml"], check=True)
+    command = [str(BIN / "pre-commit"), *arguments]
+    done = subprocess.run(command, cwd=folder, env=environ, capture_output=True, text=True, check=False)
+    return done.returncode, done.stdout + done.stderr
+
+
+def test_pre_commit_takes_the_hooks_and_they_find_mistakes(repository: Path) -> None:
+    manifest = ROOT / ".pre-commit-hooks.yaml"
+    assert pre_commit(repository, "validate-manifest", str(manifest)) == (0, "")
+    hooks = [{**hook, "language": "system"} for hook in yaml.safe_load(manifest.read_text())]
+    config = repository / ".pre-commit-config.yaml"
+    config.write_text(yaml.safe_dump({"repos": [{"repo": "local", "hooks": hooks}]}))
+    code, told = pre_commit(repository, "run", "--all-files")
+    assert (code, told.count("Passed")) == (0, 2), told
+    (repository / "scenarios/room.world.yaml").write_text(WORLD.replace("walls", "wals"))
+    code, told = pre_commit(repository, "run", "--all-files")
+    assert (code, told.count("Failed")) == (1, 2), told
+    assert "scenarios/room.world.yaml:2:1: error[SC012]" in told
+
+
+def test_the_configurations_for_pre_commit_that_are_shown_are_valid(tmp_path: Path) -> None:
+    for number, block in enumerate(blocks("pre-commit.md", "yaml")):
+        (tmp_path / f"{number}.yaml").write_text(block)
+    files = sorted(map(str, tmp_path.iterdir()))
+    assert len(files) == 2
+    done = subprocess.run(
+        [BIN / "pre-commit", "validate-config", *files], capture_output=True, text=True, check=False, cwd=tmp_path
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize(
+    ("schema", "page", "count"),
+    [("vendor.gitlab-ci", "gitlab.md", 2), ("vendor.github-workflows", "github-actions.md", 4)],
+)
+def test_pipelines_that_are_shown_fit_the_schemas_of_their_systems(
+    tmp_path: Path, schema: str, page: str, count: int
+) -> None:
+    for number, block in enumerate(blocks(page, "yaml")):
+        (tmp_path / f"{number}.yml").write_text(block)
+    files = sorted(tmp_path.iterdir())
+    assert len(files) == count
+    _fits(schema, *files)
+
+
+def test_the_action_fits_githubs_schema() -> None:
+    _fits("vendor.github-actions", ROOT / "action.yml")
+
+
+def _fits(schema: str, *files: Path) -> None:
+    command = [BIN / "check-jsonschema", "--builtin-schema", schema, *files]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_pipeline_for_jenkins_has_its_brackets() -> None:
+    (block,) = blocks("jenkins.md", "groovy")
+    bare = re.sub(r"'[^']*'|\"[^\"]*\"", "", block)
+    for opened, closed in ("{}", "()"):
+        assert bare.count(opened) == bare.count(closed)
+    assert {"agent", "options", "environment", "stages", "post"} <= set(re.findall(r"^  (\w+) ", block, re.MULTILINE))
+
+
+def test_the_dockerfile_is_sound_and_copies_what_is_there() -> None:
+    done = subprocess.run([BIN / "hadolint", ROOT / "Dockerfile"], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (0, "")
+    kept = set(re.findall(r"^!(\S+)$", (ROOT / ".dockerignore").read_text(), re.MULTILINE))
+    copied = [
+        name
+        for line in re.findall(r"^COPY (?!--)(.*) \S+$", (ROOT / "Dockerfile").read_text(), re.MULTILINE)
+        for name in line.split()
+    ]
+    assert set(copied) == kept
+    assert all((ROOT / name).exists() for name in copied)
+
+
+def test_nobody_is_told_to_get_simscen_from_an_index_that_does_not_have_it() -> None:
+    pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md"), *(ROOT / "simscen").rglob("*.py")]
+    told = re.compile(r"pip3? install (?:-\S+ )*['\"]?simscen\b(?!/)")
+    assert [str(page) for page in pages if told.search(page.read_text(encoding="utf-8"))] == []
