@@ -15,6 +15,7 @@ import numpy as np
 from simscen.core.belief import Belief
 from simscen.core.events import Event, EventKind
 from simscen.core.geometry import Pose3
+from simscen.core.grid import OccupancyGrid
 from simscen.core.motion import Twist
 from simscen.core.navigation import Path
 from simscen.core.samples import Samples, Ticks
@@ -43,6 +44,14 @@ class LogLine(NamedTuple):
     text: str
 
 
+class CostGrid(NamedTuple):
+    """A costmap as a stack publishes it: "global" or "local", the frame it is in, and Nav2's costs as 0 … 100, -1."""
+
+    name: str
+    frame: str
+    grid: OccupancyGrid
+
+
 @dataclass(frozen=True, eq=False)
 class Decision:
     """What the stack made of a beat: its `command`, and what it would publish. None means: nothing new."""
@@ -53,6 +62,7 @@ class Decision:
     local_plan: Path | None = None
     events: tuple[Event, ...] = ()
     lines: tuple[LogLine, ...] = ()
+    costmaps: tuple[CostGrid, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,9 +1,9 @@
-"""What the stack made of it: /amcl_pose, /particle_cloud, /plan, /local_plan and /cmd_vel."""
+"""What the stack made of it: /amcl_pose, /particle_cloud, /plan, /local_plan, both costmaps and /cmd_vel."""
 
 from simscen.core.belief import Belief
 from simscen.core.geometry import Pose3
 from simscen.core.trace import Decision
-from simscen.record import frames, pack_rare, topics
+from simscen.record import frames, pack_many, pack_rare, topics
 from simscen.record.pack import PoseWithCovariancePacker, TwistPacker
 from simscen.record.pack_many import ParticleCloudPacker, PathPacker
 from simscen.record.simtime import SimTime
@@ -36,6 +36,10 @@ class StackTopics:
         if decision.local_plan is not None and self._local_plan_times.passes(tick):
             stamp = self._time.stamp(tick)
             self._out.publish(topics.LOCAL_PLAN, now, self._path(stamp, decision.local_plan.points))
+        for costmap in decision.costmaps:
+            topic = topics.GLOBAL_COSTMAP if costmap.name == "global" else topics.LOCAL_COSTMAP
+            stamp = self._time.stamp(tick)
+            self._out.publish(topic, now, pack_many.occupancy_grid(costmap.frame, stamp, costmap.grid))
         if self._thinning.keeps_command(tick, decision.command):
             self._out.publish(topics.COMMAND, now, self._command(decision.command))
         for line in decision.lines:

@@ -7,7 +7,7 @@ from simscen.core.events import Event
 from simscen.core.motion import STOP
 from simscen.core.navigation import ErrorCode, Goal, Path
 from simscen.core.sensing import Image, Imu, Odometry, Readings, Scan
-from simscen.core.trace import Decision
+from simscen.core.trace import CostGrid, Decision
 from simscen.core.zones import Zones
 from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.commands import Commands
@@ -110,13 +110,15 @@ class ReferenceStack:
         sent = self._commands.sent
         if not controls and not readings and not self._events and sent is self._nothing.command:
             return self._nothing
-        local_plan = None
+        local_plan: Path | None = None
+        costmaps: tuple[CostGrid, ...] = ()
         if controls:
             local_plan = self._publishing.local_plan(tick, self._navigator.plan is not None, self._frames)
+            costmaps = self._publishing.costmaps(tick, self._costmaps)
         self._nothing = Decision(sent)
         events, self._events = tuple(self._events), []
         belief, plan = self._publishing.belief(tick, scanned), self._publishing.plan(self.plan)
-        return Decision(sent, belief, plan, local_plan, events)
+        return Decision(sent, belief, plan, local_plan, events, costmaps=costmaps)
 
     def _take(self, readings: Readings) -> bool:
         """Hand the readings on; whether there was a scan among them."""

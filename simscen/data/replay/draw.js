@@ -1,5 +1,6 @@
 // A run at a tick, drawn on a canvas in metres.
 import { roundLength } from "./camera.js";
+import { layerOf } from "./layers.js";
 
 const UNKNOWN_RADIUS = 0.2;
 const images = new WeakMap();
@@ -11,7 +12,7 @@ export function drawRun(view, run, tick) {
   c.fillRect(0, 0, width, height);
   if (view.layers.has("map")) for (const robot of run.robots.slice(0, 1)) if (robot.map) drawGrid(view, robot.map, run.column, mapColour(colours));
   drawLines(view);
-  if (view.layers.has("costmap")) for (const robot of run.robots) drawCostmaps(view, robot, run, tick);
+  for (const robot of run.robots) drawCostmaps(view, robot, run, tick);
   if (view.layers.has("zones")) drawZones(view, run, tick);
   for (const robot of run.robots) {
     if (view.layers.has("plan")) drawPath(view, robot.planAt(tick), colours.plan, 3);
@@ -144,9 +145,20 @@ function label(view, text, x, y, colour, down = 0) {
 
 function drawCostmaps(view, robot, run, tick) {
   for (const costmap of robot.costmaps) {
-    const grid = costmapAt(costmap, run, tick);
-    if (grid) drawGrid(view, grid, run.column, costColour(view.colours), grid.whole);
+    const grid = view.layers.has(layerOf(costmap)) && costmapAt(costmap, run, tick);
+    if (!grid) continue;
+    drawGrid(view, grid, run.column, costColour(view.colours), grid.whole);
+    if (layerOf(costmap) === "near") drawEdge(view, grid);
   }
+}
+
+/** The edge of a window that rolls with the robot. */
+function drawEdge(view, { origin: [x, y, yaw], width, height, resolution }) {
+  const { context: c } = view, [across, along] = [width * resolution, height * resolution];
+  outline(view, [[0, 0], [across, 0], [across, along], [0, along]], { x, y, yaw });
+  c.strokeStyle = view.colours.belief;
+  c.lineWidth = 1;
+  c.stroke();
 }
 
 /** The newest grid of a costmap, whole: changes are put on what was before. */

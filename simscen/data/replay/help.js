@@ -12,7 +12,7 @@ export const KEYS = [
   ["+ − 0", "map nearer, further, all of it"],
   ["c", "map follows the robot"],
   ["[ ] \\", "timeline: shorter stretch, longer, all"],
-  ["1 … 9 0 with Alt", "layers on the map"],
+  ["1 … 9 0 l with Alt", "layers on the map"],
   ["s w e", "scenario, now, events"],
   ["d", "dark, light"],
   ["?", "this list"],

@@ -2,7 +2,8 @@
 
 export const LAYERS = [
   { id: "map", name: "Map of the robot", key: "1", sign: "area" },
-  { id: "costmap", name: "Costmap", key: "2", sign: "area", off: true },
+  { id: "global", name: "Global costmap", key: "2", sign: "area", off: true },
+  { id: "near", name: "Local costmap", key: "l", sign: "area", off: true },
   { id: "zones", name: "Zones and ground", key: "3", sign: "area" },
   { id: "goals", name: "Goals", key: "4", sign: "ring" },
   { id: "plan", name: "Plan", key: "5", sign: "line" },
@@ -12,6 +13,11 @@ export const LAYERS = [
   { id: "belief", name: "Belief, particles, 95 % ellipse", key: "9", sign: "dash" },
   { id: "truth", name: "Robot and its way (truth)", key: "0", sign: "line" },
 ];
+
+/** Which of the layers a costmap of the log is. */
+export function layerOf(costmap) {
+  return costmap.name.includes("local_costmap") ? "near" : "global";
+}
 
 const COLOURS = ["page", "ink", "faint", "rule", "free", "wall", "unknown", "zone", "goal", "plan", "local", "thing", "person", "scan",
   "belief", "truth", "other", "bad", "odd", "good", "fault", "select", "ground"];

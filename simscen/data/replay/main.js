@@ -4,7 +4,7 @@ import { Deck } from "./deck.js";
 import { clockText, el, fill } from "./dom.js";
 import { helpWindow } from "./help.js";
 import { icon } from "./icons.js";
-import { LAYERS, coloursNow } from "./layers.js";
+import { LAYERS, coloursNow, layerOf } from "./layers.js";
 import { isShown, told } from "./lanes.js";
 import { fromHash, toHash } from "./link.js";
 import { MapView } from "./mapview.js";
@@ -145,7 +145,7 @@ class Page {
 
   #tools() {
     this.boxes = new Map();
-    const boxes = LAYERS.filter((layer) => layer.id !== "costmap" || this.runs.some((run) => run.robots.some((robot) => robot.costmaps.length))).map((layer) => {
+    const boxes = LAYERS.filter((layer) => !["global", "near"].includes(layer.id) || this.runs.some((run) => run.robots.some((robot) => robot.costmaps.some((costmap) => layerOf(costmap) === layer.id)))).map((layer) => {
       const box = el("input", { type: "checkbox", checked: this.layers.has(layer.id), onchange: () => this.#layer(layer.id, box.checked) });
       this.boxes.set(layer.id, box);
       return el("label", { title: `Alt+${layer.key}` }, box, el("span", { class: `swatch ${layer.sign ?? ""} ${layer.id}`, "aria-hidden": "true" }), layer.name);
@@ -217,7 +217,7 @@ class Page {
 
   #key(event) {
     if (event.ctrlKey || event.metaKey || this.help.open || event.target.matches?.("input:not([type=range]):not([type=checkbox]), select, textarea")) return;
-    const act = this.#actions(), layer = event.altKey && LAYERS.find((one) => event.code === `Digit${one.key}`);
+    const act = this.#actions(), layer = event.altKey && LAYERS.find((one) => event.code === `Digit${one.key}` || event.code === `Key${one.key.toUpperCase()}`);
     if (layer) {
       event.preventDefault();
       this.#layer(layer.id, !this.layers.has(layer.id));

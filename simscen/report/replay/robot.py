@@ -39,7 +39,7 @@ def robot_of(
         "particles": particles_of(log.seen, columns),
         "plans": plans_of(trace.plans, columns),
         "local": local_plans_of(log.seen, columns),
-        "costmaps": costmaps_of(log.seen, columns),
+        "costmaps": costmaps_of(log.seen, trace, columns),
         "clock": columns.add(trace.truth.ticks),
         "strips": strips_of(trace, case, spec, columns),
         "limits": limits_of(verdicts, name),

@@ -5,12 +5,14 @@ from typing import Any
 
 import numpy as np
 
-from simscen.core.geometry import Array
+from simscen.core.geometry import Array, Pose2
 from simscen.core.grid import OccupancyGrid
 from simscen.core.navigation import Path
+from simscen.core.trace import Trace
+from simscen.record import frames
 from simscen.record.seen import Messages, Seen
 from simscen.report.replay.columns import Columns
-from simscen.report.replay.thin import evenly, times
+from simscen.report.replay.thin import evenly
 from simscen.report.text import one_line
 
 BEAMS, RANGES = 360, 300_000
@@ -109,26 +111,37 @@ def grid_of(grid: OccupancyGrid, columns: Columns) -> dict[str, Any]:
     }
 
 
-def costmaps_of(seen: Seen, columns: Columns) -> list[dict[str, Any]]:
-    """The costmaps as the log has them, as often as there is room for."""
-    return [_costmap(topic, messages, seen, columns) for topic, messages in sorted(seen.costmaps.items())]
+def costmaps_of(seen: Seen, trace: Trace, columns: Columns) -> list[dict[str, Any]]:
+    """The costmaps as the log has them, as often as there is room for; in the map frame, wherever they live."""
+    return [_costmap(topic, messages, seen, trace, columns) for topic, messages in sorted(seen.costmaps.items())]
 
 
-def _costmap(topic: str, messages: Messages, seen: Seen, columns: Columns) -> dict[str, Any]:
+def _costmap(topic: str, messages: Messages, seen: Seen, trace: Trace, columns: Columns) -> dict[str, Any]:
+    """Each grid whole, or its differences to the one before where that is of the same place."""
     _, first = seen.costmap(messages[0][1])
-    most = max(1, CELLS // max(1, first.cells.size))
-    kept = times([tick for tick, _ in messages], max(1, (messages[-1][0] - messages[0][0]) // most))
+    kept = evenly(len(messages), max(1, CELLS // max(1, first.cells.size))).tolist()
     columns.thinned(f"grids on {one_line(topic)}", len(kept), len(messages))
     grids = []
-    before = None
-    for k in kept:
-        frame, grid = seen.costmap(messages[k][1])
+    before: OccupancyGrid | None = None
+    for tick, data in (messages[k] for k in kept):
+        frame, grid = seen.costmap(data)
         same = before is not None and before.shape == grid.shape and before.origin == grid.origin
-        changes = grid.cells.astype(np.int64) - before.cells if same and before is not None else grid.cells
-        told = grid_of(OccupancyGrid(changes, grid.resolution, grid.origin), columns)
-        grids.append({"tick": messages[k][0], "frame": frame, "changes": same, **told})
+        cells = grid.cells.astype(np.int64) - before.cells if before is not None and same else grid.cells
+        origin = grid.origin if frame == frames.MAP else map_from_odom(trace, tick).compose(grid.origin)
+        told = grid_of(OccupancyGrid(cells, grid.resolution, origin), columns)
+        grids.append({"tick": tick, "changes": same, **told})
         before = grid
     return {"name": one_line(topic), "grids": grids}
+
+
+def map_from_odom(trace: Trace, tick: int) -> Pose2:
+    """The correction of the newest belief; none for a robot without belief or odometry."""
+    if not len(trace.belief) or not len(trace.odometry):
+        return Pose2(0.0, 0.0)
+    newest = trace.belief.ticks[max(int(np.searchsorted(trace.belief.ticks, tick, side="right")) - 1, 0)]
+    at = np.array([newest])
+    believed, rolled = Pose2(*trace.belief.at(at)[0, :3].tolist()), Pose2(*trace.odometry.at(at)[0, :3].tolist())
+    return believed.compose(rolled.inverse())
 
 
 def _rounded(pose: Sequence[float]) -> list[float]:

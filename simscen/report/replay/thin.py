@@ -1,7 +1,5 @@
 """Which samples a page keeps: all of a short run, fewer of a long one."""
 
-from collections.abc import Sequence
-
 import numpy as np
 import numpy.typing as npt
 
@@ -37,14 +35,3 @@ def with_extremes(values: Array, most: int) -> Chosen:
     stretches = np.array_split(np.arange(len(values)), max(1, most // 2))
     chosen = [(s[int(np.argmin(values[s]))], s[int(np.argmax(values[s]))]) for s in stretches]
     return np.unique(np.array(chosen).ravel())
-
-
-def times(ticks: Sequence[int], period: int) -> list[int]:
-    """The numbers of those of `ticks` that come at least `period` after the one kept before."""
-    kept: list[int] = []
-    due = None
-    for k, tick in enumerate(ticks):
-        if due is None or tick >= due:
-            kept.append(k)
-            due = tick + period
-    return kept

@@ -5,7 +5,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from simscen.record.replay import read_run
 
 SCENARIO = """\
 simscen: 1
@@ -95,3 +98,17 @@ def test_a_page_is_made_without_engines(out: Path, tmp_path: Path) -> None:
     )
     done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "imported:"
+
+
+def test_the_log_shows_both_costmaps_each_in_its_frame_and_no_faster_than_anybody_looks(out: Path) -> None:
+    log = read_run(out / "runs" / "bad" / "seed-1" / "run.mcap", looks=True)
+    assert sorted(log.seen.costmaps) == ["/global_costmap/costmap", "/local_costmap/costmap"]
+    for topic, period in (("/global_costmap/costmap", 480), ("/local_costmap/costmap", 240)):
+        messages = log.seen.costmaps[topic]
+        assert (np.diff([tick for tick, _ in messages]) >= period).all()
+        frame, grid = log.seen.costmap(messages[-1][1])
+        assert frame == ("map" if topic.startswith("/global") else "odom")
+        assert {0, 99, 100} <= set(np.unique(grid.cells).tolist()) <= {-1, *range(101)}
+    _, wide = log.seen.costmap(log.seen.costmaps["/global_costmap/costmap"][-1][1])
+    assert log.about.map is not None and wide.shape == log.about.map.shape
+    assert (wide.cells[log.about.map.cells == 100] == 100).all()

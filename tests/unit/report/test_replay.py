@@ -15,15 +15,21 @@ import pytest
 
 from simscen.core.case import Case
 from simscen.core.geometry import Pose2
+from simscen.core.grid import OccupancyGrid
 from simscen.core.navigation import Goal
 from simscen.core.result import Outcome, RunKey, RunResult
 from simscen.core.verdict import Finding, Status, Verdict
 from simscen.judge.sketch import sketch
 from simscen.record.header import LogHeader
+from simscen.record.pack_many import occupancy_grid
 from simscen.record.replay import Log
+from simscen.record.seen import Seen
+from simscen.record.simtime import SimTime
+from simscen.record.topics import GLOBAL_COSTMAP
 from simscen.report.replay import replay_page
 from simscen.report.replay.columns import Columns
 from simscen.report.replay.page import FOLDER, script
+from simscen.report.replay.sensed import costmaps_of, map_from_odom
 from simscen.report.replay.thin import evenly, paced, with_extremes
 
 TEXT = """\
@@ -178,3 +184,32 @@ def test_its_script_is_one_module_without_imports_and_never_makes_markup_of_text
     for module in FOLDER.glob("*.js"):
         for name in re.findall(r"^export (?:async )?(?:function|class|const) (\w+)", module.read_text(), re.MULTILINE):
             assert len(re.findall(rf"^(?:async )?(?:function|class|const) {name}\b", text, re.MULTILINE)) == 1
+
+
+def test_a_local_costmap_lies_where_the_robot_believes_that_its_odometry_began() -> None:
+    """The sketch's odometry is the truth; the belief is beside it and turned, and so is the odom frame in the map."""
+    log = log_of({"seconds": 2, "truth": [[0, 1, 0, 0], [2, 3, 0, 0]], "belief": {"offset": [0.5, 1.0, np.pi / 2]}})
+    correction = map_from_odom(log.trace, 240)
+    believed = log.trace.belief.at(np.array([240]))[0]
+    rolled = Pose2(*log.trace.odometry.at(np.array([240]))[0])
+    assert correction.compose(rolled) == pytest.approx(tuple(believed[:3]))
+
+
+def test_grids_of_one_place_are_kept_as_their_differences() -> None:
+    cells = np.zeros((3, 4), dtype=np.int8)
+    near = np.full((2, 2), 50, dtype=np.int8)
+    seen = Seen(SimTime(240))
+    packed = [(0, cells), (240, cells + 7), (480, cells)]
+    take = seen.taker(GLOBAL_COSTMAP.name, GLOBAL_COSTMAP.type)
+    assert take is not None
+    for tick, grid in packed:
+        take(tick, occupancy_grid("map", (tick // 240, 0), OccupancyGrid(grid, 0.05, Pose2(1.0, 2.0))))
+    take(720, occupancy_grid("map", (3, 0), OccupancyGrid(near, 0.05, Pose2(1.0, 2.0))))
+    columns = Columns()
+    log = log_of({"seconds": 4, "truth": [[0, 0, 0], [4, 0, 0]]})
+    (costmap,) = costmaps_of(seen, log.trace, columns)
+    read = Read.__new__(Read)
+    read._numbers = columns.data
+    grids = [(grid["tick"], grid["changes"], set(read.column(grid["cells"]))) for grid in costmap["grids"]]
+    assert grids == [(0, False, {0}), (240, True, {7}), (480, True, {-7}), (720, False, {50})]
+    assert costmap["grids"][0]["origin"] == [1.0, 2.0, 0.0]
