@@ -474,6 +474,23 @@ _LatencyOrRobots = Annotated[
 ]
 
 
+class Prediction(Ranged):
+    """Motion prediction: what moves is tracked from the lidars' scans and met where it will be."""
+
+    enabled: bool = True
+    """Whether it is there at all."""
+    max_range: PositiveLength = 12.0
+    """Nothing further off is tracked."""
+    max_radius: PositiveLength = 1.0
+    """Larger things are taken for walls."""
+    min_speed: PositiveSpeed = 0.25
+    """What is slower stands."""
+    acceleration: PositiveAcceleration = 1.5
+    """Standard deviation of how fast a tracked thing changes its velocity."""
+    margin: NonNegativeLength = 0.15
+    """Hits so near to the cylinder of a moving thing are its own, and not marked in costmaps."""
+
+
 class InProcessStack(StackBase, Typed):
     """A whole stack that lives in the process of its run: simscen's own, or one that an installed package adds."""
 
@@ -508,6 +525,8 @@ class StackSpec(InProcessStack):
     """What stops the robot, whatever it is told."""
     latency: _LatencyOrRobots = by_default()
     """What computing takes: durations, or `robot` for what the robot's file says, of its sensors, too."""
+    prediction: Prediction = by_default()
+    """What knows of things that move, and keeps out of their way."""
 
     @property
     def told_truth(self) -> bool:

@@ -19,6 +19,7 @@ from simscen.stack.installed.planner import InstalledPlanner
 from simscen.stack.installed.stack import InstalledStack
 from simscen.stack.navigator import Navigator
 from simscen.stack.plan_keeper import PlanKeeper
+from simscen.stack.prediction.motion_prediction import MotionPrediction
 from simscen.stack.progress_checker import ProgressChecker
 from simscen.stack.protocols import Behavior, Localizer, Surroundings
 from simscen.stack.recovery import RoundRobin
@@ -106,6 +107,7 @@ def reference_stack(spec: model.StackSpec, setting: Setting) -> ReferenceStack:
         Task(setting.stop_on_failure, clock, setting.mode),
         commands,
         monitor,
+        MotionPrediction(spec.prediction, robot, surroundings.lidars, surroundings.tick_rate, controller.full_speed),
         period,
         latency["localizer"],
     )

@@ -17,6 +17,7 @@ from simscen.stack.localizers.ground_truth import TRUTH
 from simscen.stack.localizers.odometry_track import believable
 from simscen.stack.navigator import Navigator
 from simscen.stack.odometry_history import OdometryHistory
+from simscen.stack.prediction.motion_prediction import MotionPrediction
 from simscen.stack.protocols import Controller, Localizer, NavigationFailure, Surroundings
 from simscen.stack.publishing import Publishing
 from simscen.stack.tasks import Task
@@ -37,12 +38,14 @@ class ReferenceStack:
         task: Task,
         commands: Commands,
         monitor: CollisionMonitor,
+        prediction: MotionPrediction,
         control_period: int,
         localizer_latency: int = 0,
     ) -> None:
         self._speed_filter = SpeedFilter(surroundings)
         self._localizer, self._costmaps, self._controller = localizer, costmaps, controller
         self._navigator, self._task, self._commands, self._monitor = navigator, task, commands, monitor
+        self._prediction = prediction
         self._tick_rate, self._lidars = surroundings.tick_rate, frozenset(surroundings.lidars)
         self._control_period = control_period
         self._publishing = Publishing(surroundings.tick_rate, localizer, controller)
@@ -70,6 +73,7 @@ class ReferenceStack:
         """Cancel the current goal and all after it."""
         self._events += self._task.cancel(tick)
         self._navigator.stop()
+        self._prediction.hold()
         self._commands.stop(tick)
         self._nothing = Decision(STOP)
 
@@ -96,6 +100,7 @@ class ReferenceStack:
             "planner": (self._navigator.planner, "plan"),
             "controller": (self._controller, "command", "set_path"),
             "collision monitor": (self._monitor, "allow", "on_scan"),
+            "prediction": (self._prediction, "on_scan", "steer", "stand"),
         }
 
     def decide(self, tick: int, readings: Readings) -> Decision:
@@ -131,6 +136,7 @@ class ReferenceStack:
                     self._dead_reckon(reading)
                 case Imu():
                     self._localizer.on_imu(reading)
+                    self._prediction.on_imu(reading)
                 case Scan():
                     if reading.sensor in self._lidars:  # echoes of a sonar show obstacles, but no walls to match
                         self._matched.put(self._tick, reading)
@@ -142,7 +148,8 @@ class ReferenceStack:
                     pass
         for scan in scans:  # after all odometry of this beat, wherever that stands among the readings
             self._monitor.on_scan(scan, self._odometry.at(scan.tick))
-            self._costmaps.see(scan)
+            self._prediction.on_scan(scan)
+            self._costmaps.see(self._prediction.marking(scan))
         return bool(scans)
 
     def _match(self) -> None:
@@ -159,6 +166,7 @@ class ReferenceStack:
         if believable(reading.pose) and believable(reading.twist):
             self._twist = reading.twist
             self._odometry.add(reading.tick, reading.pose)
+            self._prediction.on_odometry(reading.tick, reading.pose)
 
     @property
     def _frames(self) -> Frames:
@@ -180,8 +188,9 @@ class ReferenceStack:
         self._pass(tick)
         goal = self._task.goal
         if goal is None:
-            self._commands.stop(tick)
+            self._stand(tick)
             return
+        self._prediction.settle()
         last = (goal, *self._task.ahead)[-1]
         if self._navigator.goal is not last:
             self._navigator.pursue(last)
@@ -206,7 +215,17 @@ class ReferenceStack:
             self._events += self._task.reached(tick)
             self._stop(tick)
         else:
-            self._commands.want(tick, step.command)
+            pose, view = frames.pose, self._costmaps.wide.view
+            self._commands.want(tick, self._prediction.steer(tick, step.command, pose, self._twist, view, self.plan))
+
+    def _stand(self, tick: int) -> None:
+        """Nowhere to go; but out of the way of what comes at the robot, and back."""
+        pose, view = self._localizer.belief.pose, self._costmaps.wide.view
+        command = self._prediction.stand(tick, pose, self._twist, view)
+        if command == STOP or self._monitor.silent(tick):
+            self._commands.stop(tick)
+        elif not self._commands.busy(tick):
+            self._commands.want(tick, command)
 
     def _pass(self, tick: int) -> None:
         """Poses that the robot is near to are behind it.

@@ -5,6 +5,7 @@ which is the same question and a hundred times fewer cells.
 """
 
 import math
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -15,11 +16,20 @@ from simscen.model.stack import Costmap as CostmapSpec
 from simscen.stack.costmap.frame import Cells, Frame
 
 
+@dataclass(frozen=True, eq=False)
+class ScanAmongMoving(Scan):
+    """A scan of which some beams, `moving` (n,), hit what will be somewhere else: it clears as any, and marks less."""
+
+    moving: npt.NDArray[np.bool_] = field(kw_only=True)
+
+
 def hits(scan: Scan, base: Pose2, nearest: float, farthest: float) -> Array:
-    """Map points (n, 2) of the beams that hit something between `nearest` and `farthest` metres from the lidar."""
+    """Map points (n, 2) of the beams that hit something that stands, `nearest` to `farthest` metres from the lidar."""
     ranges = scan.ranges
     with np.errstate(invalid="ignore"):
         use = (ranges >= max(scan.range_min, nearest)) & (ranges <= min(scan.range_max, farthest))
+    if isinstance(scan, ScanAmongMoving):
+        use &= ~scan.moving
     lidar = base.compose(scan.mount)
     ranges, angles = ranges[use], scan.angles()[use] + lidar.yaw
     return np.column_stack((lidar.x + ranges * np.cos(angles), lidar.y + ranges * np.sin(angles)))

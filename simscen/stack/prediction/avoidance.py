@@ -1,0 +1,160 @@
+"""Keeps out of the way of what moves, whoever drives: ways through time, compared with where things will be then.
+
+As long as the way that the controller is on meets nothing, its command is left as it is. When something will come too
+near, a few hundred ways are compared that the base can go from here: the controller's own way slower, and pairs of
+velocities one after the other. The way that is least likely to be met costs least; among those that are safe, the one
+that gets on. So the robot slows early, passes behind, and where it stands it steps aside: as a person would.
+(Time-indexed rollouts as in Fox, Burgard, Thrun 1997 and, with moving things, Seder and Petrović 2007.)
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from simscen.core.geometry import Array, Pose2
+from simscen.core.motion import STOP, Twist
+from simscen.model.stack import Prediction
+from simscen.stack.footprint import Discs
+from simscen.stack.prediction.moving import Moving
+from simscen.stack.prediction.rollouts import HORIZON, TIMES, Repertoire, Rollouts, along_path, arc, joined
+from simscen.stack.protocols import CostmapView, RobotModel
+
+ROOM, SIGMAS, MOST_ROOM = 0.25, 1.0, 0.8
+"""Metres that the robot keeps off what moves, and standard deviations of where that will be, up to so many metres."""
+SOON = 1.2
+"""Seconds in which what may happen counts e times less."""
+NEAR, HIT, LASTING = 3.0, 10.0, 1.0
+"""Cost of coming too near at the worst moment, of being hit, and of being too near all the time."""
+WALL, WALL_ROOM = 8.0, 0.08
+"""Cost of a way into something that stands, and metres kept off it."""
+PROGRESS, BACKWARD, CHANGE, OWN = 1.0, 0.15, 0.08, 0.1
+"""Gain of a way that goes ahead at full speed; cost of going backward, of another command than the last one, and of any
+way but the controller's."""
+CALM = 0.02
+"""Risk below which the controller's way is left alone, …"""
+CALMER = 0.01
+"""… and below which it is given back to it."""
+SLOWER = (1.0, 0.75, 0.5, 0.25, 0.0)
+"""Parts of the controller's speed that are tried on its own way."""
+NEARLY_ROUND = 0.15
+"""Metres between its inscribed and its circumscribed radius up to which a robot is taken for round."""
+
+
+class Avoidance:
+    """Changes a command when something that moves will be in its way."""
+
+    def __init__(self, spec: Prediction, robot: RobotModel, full_speed: float) -> None:
+        self._spec, self._robot = spec, robot
+        self._speed = max(full_speed, 0.3)
+        round_enough = robot.circumscribed_radius - robot.inscribed_radius < NEARLY_ROUND
+        self._discs = Discs(replace(robot, radius=robot.circumscribed_radius) if round_enough else robot)
+        self._repertoire = Repertoire(robot, self._speed)
+        self._last: Twist | None = None
+
+    @property
+    def active(self) -> bool:
+        """Whether the last command was changed."""
+        return self._last is not None
+
+    def rest(self) -> None:
+        """Nothing moves."""
+        self._last = None
+
+    def steer(
+        self,
+        wanted: Twist,
+        pose: Pose2,
+        twist: Twist,
+        moving: Moving,
+        costmap: CostmapView,
+        path: Array | None,
+        home: Pose2 | None = None,
+    ) -> Twist:
+        """The command to give for the one that is wanted; the same object where nothing is in its way.
+
+        All in one frame. `path` (n, 2) is what is followed; a robot that follows none belongs at `home`.
+        """
+        near = self._near(moving, pose)
+        if not len(near):
+            self._last = None
+            return wanted
+        own = self._own(wanted, pose, twist, path)
+        risk = self._risk(own, near)
+        if risk[0] <= (CALM if self._last is None else CALMER):
+            self._last = None
+            return wanted
+        ways = joined(own, self._repertoire.roll(pose, twist))
+        cost = np.concatenate((risk, self._risk(self._part(ways, len(own.x)), near)))
+        cost += self._walls(ways, costmap) - PROGRESS * self._progress(ways, pose, path, home)
+        cost += BACKWARD * np.clip(-ways.vx / self._speed, 0.0, None).mean(axis=1)
+        cost[len(own.x) :] += OWN
+        if self._last is not None:
+            change = np.abs(ways.commands[:, 0] - self._last.vx) / self._speed
+            cost += CHANGE * (change + np.abs(ways.commands[:, 1] - self._last.wz) / 3.0)
+        best = int(cost.argmin())
+        self._last = Twist(float(ways.commands[best, 0]), 0.0, float(ways.commands[best, 1]))
+        return self._last
+
+    def _near(self, moving: Moving, pose: Pose2) -> Moving:
+        """Those that the robot could come near to within the horizon, if it drove towards them."""
+        if not len(moving):
+            return moving
+        places = moving.at(TIMES)
+        off = np.hypot(places[:, :, 0] - pose.x, places[:, :, 1] - pose.y) - moving.radii[:, None]
+        reach = self._robot.circumscribed_radius + MOST_ROOM + self._speed * TIMES
+        return moving.chosen(np.asarray((off < reach).any(axis=1)))
+
+    def _own(self, wanted: Twist, pose: Pose2, twist: Twist, path: Array | None) -> Rollouts:
+        if path is None or len(path) < 2 or wanted.vx == 0.0:
+            return arc(pose, wanted, SLOWER if wanted != STOP else (1.0,))
+        return along_path(pose, twist, path, wanted, SLOWER, self._robot)
+
+    @staticmethod
+    def _part(ways: Rollouts, first: int) -> Rollouts:
+        return Rollouts(ways.x[first:], ways.y[first:], ways.yaw[first:], ways.vx[first:], ways.commands[first:])
+
+    def _risk(self, ways: Rollouts, moving: Moving) -> Array:
+        """What each way (n,) costs for what it comes near to."""
+        places, deviation = moving.at(TIMES), moving.deviations(TIMES)
+        room = np.minimum(ROOM + SIGMAS * deviation, MOST_ROOM)
+        worst = np.zeros(ways.x.shape)
+        hit = np.zeros(ways.x.shape, dtype=bool)
+        for offset in self._discs.offsets.tolist():
+            x, y = ways.x + offset * np.cos(ways.yaw), ways.y + offset * np.sin(ways.yaw)
+            for number in range(len(moving)):
+                dx, dy = x - places[number, :, 0], y - places[number, :, 1]
+                gap = np.sqrt(dx * dx + dy * dy) - (moving.radii[number] + self._discs.radius)
+                worst = np.maximum(worst, (room[number] - gap) / room[number])
+                hit |= gap < 0.03
+        soon = np.exp(-TIMES / SOON)
+        near = np.clip(worst, 0.0, 2.0) ** 2 * soon
+        risk: Array = NEAR * near.max(axis=1) + LASTING * near.mean(axis=1) + HIT * (hit * soon).max(axis=1)
+        return risk
+
+    def _walls(self, ways: Rollouts, costmap: CostmapView) -> Array:
+        """What each way (n,) costs for what stands in it."""
+        some = slice(1, None, 2)
+        gap = self._discs.clearance(costmap, ways.x[:, some], ways.y[:, some], ways.yaw[:, some])
+        start = float(gap[:, 0].max(initial=-math.inf))
+        least = min(WALL_ROOM, start)
+        touched = (gap < least) * np.exp(-TIMES[some] / (2 * SOON))
+        cost: Array = WALL * touched.max(axis=1)
+        return cost
+
+    def _progress(self, ways: Rollouts, pose: Pose2, path: Array | None, home: Pose2 | None) -> Array:
+        """How far (n,) each way gets, as a part of what full speed would do."""
+        reach = self._speed * HORIZON
+        if path is not None and len(path):
+            dx, dy = path[:, 0] - pose.x, path[:, 1] - pose.y
+            here = int((dx * dx + dy * dy).argmin())
+            ahead = path[here:]
+            beyond = np.hypot(ahead[:, 0] - pose.x, ahead[:, 1] - pose.y) >= reach
+            x, y = ahead[int(beyond.argmax()) if beyond.any() else -1, :2].tolist()
+        elif home is not None:
+            x, y = home.x, home.y
+        else:
+            x, y = pose.x, pose.y
+        before = math.hypot(x - pose.x, y - pose.y)
+        gain: Array = (before - np.hypot(ways.x[:, -1] - x, ways.y[:, -1] - y)) / reach
+        return gain

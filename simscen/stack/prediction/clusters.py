@@ -1,0 +1,94 @@
+"""A scan in pieces: runs of neighbouring beams that hit the same thing, and the cylinder that would look like that."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.geometry import Array
+
+GAP, SPARSE = 0.15, 2.5
+"""Two hits belong together when they are no farther apart than this many metres, or times the spacing of beams."""
+MISSED = 2
+"""Beams that may miss within a piece."""
+FEWEST = 3
+"""Hits of a piece that is looked at."""
+STEPS = 4
+"""Of Gauss-Newton: from half a radius off, a circle is found to a millimetre."""
+
+Indices = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Clusters:
+    """Pieces of a scan, in the lidar's frame.
+
+    Piece k is the hits `first[k]` … `last[k]` of `points` (m, 2), which beam `beams` (m,) made. `centres` (n, 2) and
+    `radii` (n,) are of the cylinders that fill the same angle at the same distance. `whole` (n,): nothing nearer stands
+    at its edges, nor does the scan end there, so that all of it is seen.
+    """
+
+    points: Array
+    beams: Indices
+    first: Indices
+    last: Indices
+    centres: Array
+    radii: Array
+    whole: npt.NDArray[np.bool_]
+
+    def of(self, number: int) -> Array:
+        """The hits (k, 2) of a piece."""
+        return self.points[self.first[number] : self.last[number] + 1]
+
+
+def clusters(ranges: Array, angles: Array, least: float, most: float, largest: float, full_circle: bool) -> Clusters:
+    """The pieces of a scan of beams that answer between `least` and `most` metres, none with a radius over `largest`.
+
+    A circle's first and last piece are not joined: what lies behind the robot across the seam is two.
+    """
+    with np.errstate(invalid="ignore"):
+        beams = np.flatnonzero((ranges >= least) & (ranges <= most))
+    r, a = ranges[beams], angles[beams]
+    points = np.column_stack((r * np.cos(a), r * np.sin(a)))
+    step = abs(float(angles[1] - angles[0])) if len(angles) > 1 else 0.0
+    if len(beams) < FEWEST:
+        none = np.zeros(0, dtype=np.int64)
+        return Clusters(points, beams, none, none, np.zeros((0, 2)), np.zeros(0), np.zeros(0, dtype=bool))
+    apart = np.hypot(*np.diff(points, axis=0).T)
+    together = (apart <= np.maximum(GAP, SPARSE * step * np.minimum(r[1:], r[:-1]))) & (np.diff(beams) <= MISSED + 1)
+    breaks = np.flatnonzero(~together)
+    first, last = np.concatenate(([0], breaks + 1)), np.concatenate((breaks, [len(beams) - 1]))
+    long = last - first + 1 >= FEWEST
+    first, last = first[long], last[long]
+    half = (a[last] - a[first] + step) / 2
+    nearest = np.minimum.reduceat(r, np.column_stack((first, last + 1)).ravel().clip(max=len(r) - 1))[::2]
+    sine = np.sin(np.minimum(np.abs(half), math.radians(80.0)))
+    radii = nearest * sine / (1.0 - sine)
+    small = radii <= largest
+    first, last, half, nearest, radii = first[small], last[small], half[small], nearest[small], radii[small]
+    middle = (a[first] + a[last]) / 2
+    centres = (nearest + radii)[:, None] * np.column_stack((np.cos(middle), np.sin(middle)))
+    with np.errstate(invalid="ignore"):
+        seen = np.where(ranges >= least, ranges, 0.0)
+    whole = _clear(seen, beams[first] - 1, r[first], full_circle) & _clear(seen, beams[last] + 1, r[last], full_circle)
+    return Clusters(points, beams, first, last, centres, radii, whole)
+
+
+def _clear(seen: Array, beam: Indices, edge: Array, full_circle: bool) -> npt.NDArray[np.bool_]:
+    """Whether the beam beside an edge goes on beyond it."""
+    inside = (beam >= 0) & (beam < len(seen))
+    return np.asarray((inside | full_circle) & (seen[beam % len(seen)] > edge))
+
+
+def fitted(points: Array, centre: Array, radius: float) -> Array:
+    """The centre (2,) of the circle of this radius that fits points (n, 2) of its arc best, from a first guess."""
+    for _ in range(STEPS):
+        off = centre - points
+        distance = np.maximum(np.hypot(off[:, 0], off[:, 1]), 1e-6)
+        towards = off / distance[:, None]
+        normal = towards.T @ towards
+        # A short arc says little of how the circle lies across: there, stay.
+        normal += np.eye(2) * (0.02 * len(points))
+        centre = centre - np.linalg.solve(normal, towards.T @ (distance - radius))
+    return centre

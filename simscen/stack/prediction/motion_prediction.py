@@ -1,0 +1,128 @@
+"""Motion prediction as the reference stack has it: trackers of its lidars, and what keeps it out of the way."""
+
+import math
+
+import numpy as np
+
+from simscen.core.geometry import Pose2
+from simscen.core.motion import STOP, Twist
+from simscen.core.navigation import Path
+from simscen.core.sensing import Imu, Scan
+from simscen.model.stack import Prediction
+from simscen.stack.costmap.obstacle_layer import ScanAmongMoving
+from simscen.stack.prediction.avoidance import Avoidance
+from simscen.stack.prediction.moving import Moving, nothing
+from simscen.stack.prediction.rolled import Rolled
+from simscen.stack.prediction.standing import Standing
+from simscen.stack.prediction.tracker import Tracker
+from simscen.stack.protocols import CostmapView, RobotModel
+
+LOOKS, LOOKING = 0.7, 0.5
+"""Seconds after its first scan in which a robot does not yet know what moves, and m/s that it drives at most till then:
+Nav2's usual speed, at which it can still stop for what it has not made out."""
+
+
+class MotionPrediction:
+    """What moves around the robot, and the commands that keep out of its way. Tracks are in the frame of `Rolled`."""
+
+    def __init__(
+        self, spec: Prediction, robot: RobotModel, lidars: tuple[str, ...], tick_rate: int, full_speed: float
+    ) -> None:
+        self._spec, self._rate = spec, tick_rate
+        self._trackers = {name: Tracker(spec, tick_rate) for name in lidars} if spec.enabled else {}
+        self._avoidance = Avoidance(spec, robot, full_speed)
+        self._standing = Standing(robot, full_speed)
+        self._looked, self._held = 0, False
+        self._rolled = Rolled(tick_rate)
+
+    def on_odometry(self, tick: int, pose: Pose2) -> None:
+        """Take the wheels' odometry in."""
+        self._rolled.on_odometry(tick, pose)
+
+    def on_imu(self, imu: Imu) -> None:
+        """Take a turn rate in."""
+        self._rolled.on_imu(imu)
+
+    def on_scan(self, scan: Scan) -> None:
+        """Take a scan in."""
+        tracker = self._trackers.get(scan.sensor)
+        if tracker is not None:
+            tracker.on_scan(scan, self._rolled.at(scan.tick))
+
+    def marking(self, scan: Scan) -> Scan:
+        """The scan as costmaps should take it in: what it shows of things that move is not to be marked."""
+        tracker = self._trackers.get(scan.sensor)
+        if tracker is None or tracker.hits is None or tracker.tick != scan.tick:
+            return scan
+        return ScanAmongMoving(**vars(scan), moving=tracker.hits)
+
+    def moving(self, tick: int) -> Moving:
+        """What moves at a tick, in the frame of `Rolled`; with several lidars, as each of them sees it."""
+        seen = [
+            tracker.moving.after((tick - tracker.tick) / self._rate)
+            for tracker in self._trackers.values()
+            if tracker.has_moving
+        ]
+        if not seen:
+            return nothing(self._spec.acceleration)
+        if len(seen) == 1:
+            return seen[0]
+        return Moving(
+            np.concatenate([each.centres for each in seen]),
+            np.concatenate([each.velocities for each in seen]),
+            np.concatenate([each.radii for each in seen]),
+            np.concatenate([each.covariances for each in seen]),
+            self._spec.acceleration,
+        )
+
+    @property
+    def evading(self) -> bool:
+        """Whether the last command was not the one that was wanted."""
+        return self._avoidance.active
+
+    def steer(
+        self, tick: int, wanted: Twist, pose: Pose2, twist: Twist, costmap: CostmapView, plan: Path | None
+    ) -> Twist:
+        """The command to give for the one that is wanted; `pose`, `costmap` and `plan` are in one frame."""
+        wanted = self._cautious(tick, wanted)
+        moving = self.moving(tick)
+        if not len(moving):
+            self._avoidance.rest()
+            return wanted
+        moving = moving.seen_from(self._rolled.now.compose(pose.inverse()))
+        path = None if plan is None else plan.points[:, :2]
+        return self._avoidance.steer(wanted, pose, twist, moving, costmap, path)
+
+    def _cautious(self, tick: int, wanted: Twist) -> Twist:
+        """The command, slowed down as long as nothing can be known yet of what moves."""
+        speed = math.hypot(wanted.vx, wanted.vy)
+        if not self._trackers or speed <= LOOKING or self._looked >= LOOKS * self._rate:
+            return wanted
+        began = [tracker.began for tracker in self._trackers.values() if tracker.began is not None]
+        self._looked = tick - max(began) if len(began) == len(self._trackers) else 0
+        scale = LOOKING / speed
+        return Twist(scale * wanted.vx, scale * wanted.vy, scale * wanted.wz)
+
+    def settle(self) -> None:
+        """The robot drives: where it stands next is where it belongs."""
+        self._standing.leave()
+        self._held = False
+
+    def hold(self) -> None:
+        """Somebody has told the robot to stop: it stays where it is, come what may, until it is told to drive."""
+        self._held = True
+
+    def stand(self, tick: int, pose: Pose2, twist: Twist, costmap: CostmapView) -> Twist:
+        """The command to give to a robot that is to stand: to get out of the way, and to come back."""
+        if self._held:
+            return STOP
+        moving = self.moving(tick)
+        home = self._standing.home(pose, bool(len(moving)))
+        if home is None:
+            return STOP
+        wanted = self._standing.back(pose)
+        if not len(moving):
+            self._avoidance.rest()
+            return wanted
+        moving = moving.seen_from(self._rolled.now.compose(pose.inverse()))
+        return self._avoidance.steer(wanted, pose, twist, moving, costmap, None, home)

@@ -1,0 +1,266 @@
+"""Follows what moves from scan to scan.
+
+What has come where an earlier scan saw through begins a track; a piece of a later scan near where a track should be
+continues it; a track that keeps its speed for some updates, by more than noise would make it, is told as moving. What
+nothing continues ends: soon where the lidar sees through the place, later where something hides it.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.geometry import Array, Pose2
+from simscen.core.sensing import Scan
+from simscen.model.stack import Prediction
+from simscen.stack.prediction.clusters import Clusters, clusters, fitted
+from simscen.stack.prediction.kalman import corrected, predicted
+from simscen.stack.prediction.moving import Moving, nothing
+from simscen.stack.prediction.seen_through import SeenThrough
+
+CHECKED = 120
+"""Beams of a scan that are looked at while nothing moves."""
+SUSPICIOUS = 2
+"""Of those, how many must have appeared before the scan is looked at whole."""
+APPEARED, FEW = 0.3, 3
+"""Share of a piece's hits, and how many at least, that must have appeared to begin a track."""
+NOISE, RELATIVE, HALF_SEEN = 0.02, 0.004, 0.10
+"""Standard deviation in m of a measured centre: near by, for each metre of range, and more where a piece is hidden."""
+GATE, GATE_SIGMAS = 0.25, 3.0
+"""Metres, and standard deviations, beyond which a piece is no continuation of a track."""
+FIRST_SPEED = 1.5
+"""m/s: standard deviation of the velocity of what has just been seen."""
+SURE, TRAVELLED, HITS = 3.0, 0.15, 3
+"""A track moves when its speed is so many standard deviations, and it has come so far in m, and in so many updates
+stood where it had been free."""
+ENDS_UNSEEN, ENDS_HIDDEN, ENDS_UNSURE = 0.35, 2.5, 0.8
+"""Seconds without a hit after which a track ends: where the lidar sees through; where it cannot see; and for one that
+was not moving. All end when their place is known worse than this many metres."""
+UNSURE_PLACE = 1.2
+MOSTLY = 0.6
+"""Share of the updates of a track that moves in which it stands where it had been free; what hops along a row of posts
+does not."""
+RESTED = 0.5
+"""Seconds for which something that moved stands until it is a thing like any other."""
+RADIUS_GAIN = 0.3
+"""How much a new look at a whole piece changes the radius of a track."""
+
+
+@dataclass
+class Track:
+    """What is known of a track besides its state; in `came` of its `hits` it stood where it had been free."""
+
+    radius: float
+    born: Array
+    hits: int = 1
+    came: int = 1
+    moving: bool = False
+    hit_at: int = 0
+    fast_at: int = 0
+
+
+class Tracker:
+    """The tracks of one lidar, in the odom frame."""
+
+    def __init__(self, spec: Prediction, tick_rate: int) -> None:
+        self._spec, self._rate = spec, tick_rate
+        self._memory = SeenThrough(tick_rate)
+        self._angles: Array = np.zeros(0)
+        self._tracks: list[Track] = []
+        self._states, self._covariances = np.zeros((0, 4)), np.zeros((0, 4, 4))
+        self._tick = 0
+        self.began: int | None = None
+        """When the first scan was taken."""
+        self._belongs: npt.NDArray[np.bool_] | None = None
+
+    @property
+    def moving(self) -> Moving:
+        """What moves, at the tick of the newest scan."""
+        which = [number for number, track in enumerate(self._tracks) if track.moving]
+        if not which:
+            return nothing(self._spec.acceleration)
+        states = self._states[which]
+        radii = np.array([self._tracks[number].radius for number in which])
+        return Moving(
+            states[:, :2].copy(), states[:, 2:].copy(), radii, self._covariances[which], self._spec.acceleration
+        )
+
+    @property
+    def has_moving(self) -> bool:
+        """Whether anything moves."""
+        return any(track.moving for track in self._tracks)
+
+    @property
+    def tick(self) -> int:
+        """When the newest scan was taken."""
+        return self._tick
+
+    @property
+    def hits(self) -> npt.NDArray[np.bool_] | None:
+        """Which beams of the newest scan hit something that moves; None when none does."""
+        return self._belongs
+
+    def on_scan(self, scan: Scan, odometry: Pose2) -> None:
+        """Take a scan in that was taken with the base at `odometry`."""
+        lidar = odometry.compose(scan.mount)
+        if len(self._angles) != len(scan.ranges):
+            self._angles = scan.angles()
+        if self.began is None:
+            self.began = scan.tick
+        self._forecast(scan.tick)
+        self._belongs = None
+        if self._tracks or self._suspicious(scan, lidar):
+            self._follow(scan, lidar)
+        self._memory.remember(scan, lidar)
+
+    def _suspicious(self, scan: Scan, lidar: Pose2) -> bool:
+        """Whether a look at some of the beams shows that something has appeared."""
+        every = max(1, len(scan.ranges) // CHECKED)
+        ranges, angles = scan.ranges[::every], self._angles[::every]
+        with np.errstate(invalid="ignore"):
+            use = (ranges >= scan.range_min) & (ranges <= self._farthest(scan))
+        r, a = ranges[use], angles[use]
+        points = lidar.apply(np.column_stack((r * np.cos(a), r * np.sin(a))))
+        return int(np.count_nonzero(self._memory.appeared(scan.tick, points))) >= SUSPICIOUS
+
+    def _farthest(self, scan: Scan) -> float:
+        return min(scan.range_max, self._spec.max_range)
+
+    def _forecast(self, tick: int) -> None:
+        seconds, self._tick = (tick - self._tick) / self._rate, tick
+        if self._tracks and seconds > 0:
+            self._states, self._covariances = predicted(
+                self._states, self._covariances, seconds, self._spec.acceleration
+            )
+
+    def _follow(self, scan: Scan, lidar: Pose2) -> None:
+        step = scan.angle_increment
+        full = abs(len(scan.ranges) * abs(step) - 2 * math.pi) < abs(step)
+        pieces = clusters(scan.ranges, self._angles, scan.range_min, self._farthest(scan), self._spec.max_radius, full)
+        centres = lidar.apply(pieces.centres)
+        came = self._came(pieces, scan.tick, lidar)
+        taken = self._associate(pieces, centres, came, lidar)
+        self._begin(pieces, centres, came, taken, scan.tick)
+        self._judge(scan, lidar)
+        self._mark(scan, lidar)
+
+    def _came(self, pieces: Clusters, tick: int, lidar: Pose2) -> npt.NDArray[np.bool_]:
+        """Which pieces (n,) stand where it was free."""
+        appeared = self._memory.appeared(tick, lidar.apply(pieces.points)).astype(np.int64)
+        total = np.concatenate(([0], np.cumsum(appeared)))
+        count = total[pieces.last + 1] - total[pieces.first]
+        return np.asarray((count >= FEW) & (count >= APPEARED * (pieces.last - pieces.first + 1)))
+
+    def _associate(self, pieces: Clusters, centres: Array, came: npt.NDArray[np.bool_], lidar: Pose2) -> set[int]:
+        """Give each track the piece nearest to where it should be, nearest pairs first."""
+        taken: set[int] = set()
+        if not self._tracks or not len(centres):
+            return taken
+        off = np.hypot(centres[None, :, 0] - self._states[:, None, 0], centres[None, :, 1] - self._states[:, None, 1])
+        spread = np.sqrt(np.maximum(self._covariances[:, 0, 0], self._covariances[:, 1, 1]))
+        radii = np.array([track.radius for track in self._tracks])
+        # Of what is half hidden, the middle of the visible part may be a radius off.
+        gate = GATE + GATE_SIGMAS * spread[:, None] + np.where(pieces.whole[None, :], 0.0, radii[:, None])
+        pairs = np.argwhere(off <= gate)
+        numbers, places, deviations = list[int](), list[Array](), list[float]()
+        for track, piece in sorted(pairs.tolist(), key=lambda pair: (off[pair[0], pair[1]], pair)):
+            if track in numbers or piece in taken:
+                continue
+            taken.add(piece)
+            numbers.append(track)
+            place, deviation = self._measured(self._tracks[track], pieces, piece, self._states[track], lidar)
+            places.append(place)
+            deviations.append(deviation)
+            self._tracks[track].came += bool(came[piece])
+        if numbers:
+            self._states[numbers], self._covariances[numbers] = corrected(
+                self._states[numbers], self._covariances[numbers], np.array(places), np.array(deviations)
+            )
+            for number in numbers:
+                self._tracks[number].hits += 1
+                self._tracks[number].hit_at = self._tick
+        return taken
+
+    def _measured(self, track: Track, pieces: Clusters, piece: int, state: Array, lidar: Pose2) -> tuple[Array, float]:
+        """Where the middle of a track is seen, in the odom frame, and the standard deviation of that."""
+        whole = bool(pieces.whole[piece])
+        if whole:
+            track.radius += RADIUS_GAIN * (float(pieces.radii[piece]) - track.radius)
+        first = pieces.centres[piece] if whole else lidar.inverse().apply(state[None, :2])[0]
+        centre = fitted(pieces.of(piece), first, track.radius)
+        deviation = NOISE + RELATIVE * float(np.hypot(*centre)) + (0.0 if whole else HALF_SEEN)
+        return lidar.apply(centre[None])[0], deviation
+
+    def _begin(self, pieces: Clusters, centres: Array, came: npt.NDArray[np.bool_], taken: set[int], tick: int) -> None:
+        """Tracks of pieces that no track has taken and that stand where it was free."""
+        new = [piece for piece in np.flatnonzero(came & pieces.whole).tolist() if piece not in taken]
+        if not new:
+            return
+        states = np.zeros((len(new), 4))
+        states[:, :2] = centres[new]
+        place = NOISE + RELATIVE * np.hypot(*pieces.centres[new].T) + 0.1
+        covariances = np.zeros((len(new), 4, 4))
+        covariances[:, 0, 0] = covariances[:, 1, 1] = place**2
+        covariances[:, 2, 2] = covariances[:, 3, 3] = FIRST_SPEED**2
+        self._states = np.concatenate((self._states, states))
+        self._covariances = np.concatenate((self._covariances, covariances))
+        self._tracks += [
+            Track(float(pieces.radii[piece]), centres[piece].copy(), hit_at=tick, fast_at=tick) for piece in new
+        ]
+
+    def _judge(self, scan: Scan, lidar: Pose2) -> None:
+        """Which tracks move, and which end."""
+        keep = []
+        for number, track in enumerate(self._tracks):
+            self._settle(number, track)
+            unseen = (self._tick - track.hit_at) / self._rate
+            spread = math.sqrt(max(self._covariances[number, 0, 0], self._covariances[number, 1, 1]))
+            if unseen == 0.0:
+                limit = math.inf
+            elif not track.moving:
+                limit = ENDS_UNSURE
+            elif self._visible(number, scan, lidar):
+                limit = ENDS_UNSEEN
+            else:
+                limit = ENDS_HIDDEN
+            rested = not track.moving and (self._tick - track.fast_at) / self._rate > RESTED
+            if unseen <= limit and spread <= UNSURE_PLACE and not rested:
+                keep.append(number)
+        if len(keep) < len(self._tracks):
+            self._tracks = [self._tracks[number] for number in keep]
+            self._states, self._covariances = self._states[keep], self._covariances[keep]
+
+    def _settle(self, number: int, track: Track) -> None:
+        vx, vy = self._states[number, 2:].tolist()
+        speed = math.hypot(vx, vy)
+        noise = math.sqrt(max(self._covariances[number, 2, 2], self._covariances[number, 3, 3]))
+        if speed > self._spec.min_speed:
+            track.fast_at = self._tick
+        if track.moving:
+            track.moving = (self._tick - track.fast_at) / self._rate <= RESTED
+        elif track.came >= max(HITS, MOSTLY * track.hits) and speed > self._spec.min_speed and speed > SURE * noise:
+            x, y = (self._states[number, :2] - track.born).tolist()
+            track.moving = math.hypot(x, y) > TRAVELLED and x * vx + y * vy > 0.0
+
+    def _visible(self, number: int, scan: Scan, lidar: Pose2) -> bool:
+        """Whether the lidar sees past the place where the middle of a track should be."""
+        x, y = lidar.inverse().apply(self._states[number : number + 1, :2])[0].tolist()
+        turn = (math.atan2(y, x) - scan.angle_min) % (2 * math.pi)
+        beam = round(turn / scan.angle_increment)
+        return 0 <= beam < len(scan.ranges) and bool(scan.ranges[beam] > math.hypot(x, y))
+
+    def _mark(self, scan: Scan, lidar: Pose2) -> None:
+        """Note which beams hit what moves."""
+        moving = self.moving
+        if not len(moving):
+            return
+        with np.errstate(invalid="ignore"):
+            use = np.flatnonzero((scan.ranges >= scan.range_min) & (scan.ranges <= scan.range_max))
+        r, a = scan.ranges[use], self._angles[use]
+        points = lidar.apply(np.column_stack((r * np.cos(a), r * np.sin(a))))
+        off = np.hypot(points[:, None, 0] - moving.centres[None, :, 0], points[:, None, 1] - moving.centres[None, :, 1])
+        room = self._spec.margin + moving.radii
+        belongs = np.zeros(len(scan.ranges), dtype=bool)
+        belongs[use] = (off <= room[None, :]).any(axis=1)
+        self._belongs = belongs

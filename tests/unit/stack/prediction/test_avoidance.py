@@ -1,0 +1,119 @@
+"""Whole drives among things that move: met as a person would."""
+
+import math
+from collections.abc import Callable
+
+import pytest
+
+from simscen.core.geometry import Pose2
+from simscen.core.motion import STOP
+from simscen.core.navigation import Goal
+from simscen.model.stack import (
+    ControllerSpec,
+    Costmap,
+    DynamicWindow,
+    GroundTruth,
+    Mppi,
+    Prediction,
+    RegulatedPurePursuit,
+    StackSpec,
+)
+from simscen.testing.flatland import RATE, Drive, Flatland, box_robot, drive
+
+Disc = tuple[float, float, float]
+FAR = Goal("far", Pose2(10.0, 0.0), xy_tolerance=0.3)
+CONTROLLERS = [
+    RegulatedPurePursuit(desired_linear_vel=1.0),
+    Mppi(type="mppi", vx_max=1.0, batch_size=300),
+    DynamicWindow(type="dwb", max_vel_x=1.0),
+]
+
+
+def start(
+    *goals: Goal, controller: ControllerSpec | None = None, enabled: bool = True, world: Flatland | None = None
+) -> Drive:
+    spec = StackSpec(
+        localizer=GroundTruth(type="ground_truth"),
+        costmap=Costmap(obstacle_max_range=8.0, raytrace_max_range=10.0, update_frequency=10.0),
+        controller=controller or CONTROLLERS[0],
+        prediction=Prediction(enabled=enabled),
+    )
+    return drive(world or Flatland(), Pose2(0.0, 0.0), *goals, robot=box_robot(), spec=spec, range_max=20.0)
+
+
+def among(d: Drive, discs: Callable[[float], list[Disc]], seconds: float, until: str = "navigation.ended") -> Drive:
+    """Drive on while these move."""
+    end = d.tick + round(seconds * RATE)
+    while d.tick < end:
+        d.world.discs = discs(d.tick / RATE)
+        if any(event.kind == until for event in d.step()):
+            break
+    return d
+
+
+def oncoming(t: float) -> list[Disc]:
+    return [(11.0 - 1.2 * t, 0.05, 0.4)]
+
+
+def crossing(t: float) -> list[Disc]:
+    """Would meet a robot of 1 m/s in the middle of its way, and another one a little later."""
+    return [(4.0, -5.0 + 1.2 * t, 0.4), (7.0, 9.0 - 1.2 * t, 0.4)]
+
+
+@pytest.mark.parametrize("controller", CONTROLLERS, ids=lambda spec: str(spec.type))
+@pytest.mark.parametrize("discs", [oncoming, crossing])
+def test_every_controller_of_ours_passes_what_comes_towards_it_or_across(
+    controller: ControllerSpec, discs: Callable[[float], list[Disc]]
+) -> None:
+    d = among(start(FAR, controller=controller), discs, 30.0)
+    assert d.result == "SUCCEEDED"
+    assert d.least > 0.1
+
+
+def test_without_prediction_it_would_have_been_met() -> None:
+    d = among(start(FAR, enabled=False), oncoming, 30.0)
+    assert d.least < 0.1
+
+
+def test_a_robot_that_has_arrived_steps_aside_and_comes_back() -> None:
+    goal = Goal("here", Pose2(1.0, 0.0), xy_tolerance=0.25)
+    d = among(start(goal), lambda _: [], 10.0)
+    assert d.result == "SUCCEEDED"
+    stood, began = d.pose, d.tick / RATE
+
+    def through(t: float) -> list[Disc]:
+        return [(stood.x + 0.05, stood.y - 6.0 + 1.0 * (t - began), 0.4)]
+
+    d.least = math.inf
+    farthest = 0.0
+    for _ in range(20):
+        among(d, through, 1.0)
+        farthest = max(farthest, d.pose.distance(stood))
+    assert d.least > 0.05
+    assert farthest > 0.4
+    assert d.pose.distance(goal.pose) < goal.xy_tolerance
+    assert abs(d.pose.yaw - stood.yaw) < 0.25
+    assert d.commands[-1] == STOP
+
+
+def test_a_robot_that_was_told_to_stop_stays_where_it_is() -> None:
+    d = among(start(FAR), lambda _: [], 1.0)
+    d.stack.cancel(d.tick)
+    told = len(d.commands)
+    among(d, lambda t: [(d.pose.x, 6.0 - 1.0 * t, 0.4)], 3.0, until="never")
+    assert set(d.commands[told:]) == {STOP}
+
+
+def test_what_passes_by_leaves_no_trace_on_the_costmap() -> None:
+    d = among(start(FAR), lambda t: [(3.0 + 0.9 * t, -3.0 + 0.8 * t, 0.4)], 6.0)
+    assert d.kinds("plan.made")[0].data["reason"] == "goal"
+    assert len(d.kinds("plan.made")) == 1
+
+
+def test_where_nothing_moves_switching_it_off_changes_nothing() -> None:
+    """But for the first moments, in which a fast robot cannot know yet."""
+    world = Flatland(discs=[(2.0, 0.3, 0.3), (4.0, -0.3, 0.2), (2.5, 3.0, 0.05)])
+    slow, near = RegulatedPurePursuit(desired_linear_vel=0.5), Goal("near", Pose2(3.5, 0.5), xy_tolerance=0.3)
+    with_it, without = (start(near, controller=slow, enabled=on, world=world).run(15.0) for on in (True, False))
+    assert with_it.result == "SUCCEEDED"
+    assert with_it.commands == without.commands

@@ -1,0 +1,159 @@
+"""What the tracker makes of scans whose truth is a closed form."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from simscen.core.geometry import Pose2
+from simscen.core.sensing import Scan
+from simscen.model.stack import Prediction
+from simscen.stack.prediction.tracker import Tracker
+from simscen.testing.flatland import RATE, Flatland
+
+Disc = tuple[float, float, float]
+FULL, FRONT = 2 * math.pi, math.radians(270.0)
+
+
+class Watch:
+    """A lidar of 10 Hz at `base(t)` among discs at `discs(t)`; `told(t)` is where odometry says that it is."""
+
+    def __init__(
+        self,
+        discs: Callable[[float], list[Disc]],
+        base: Callable[[float], Pose2] = lambda _: Pose2(0.0, 0.0),
+        told: Callable[[float], Pose2] | None = None,
+        walls: Flatland | None = None,
+        view: float = FRONT,
+        beams: int = 720,
+    ) -> None:
+        self.discs, self.base, self.told = discs, base, told or base
+        self.walls, self.view, self.beams = walls or Flatland(), view, beams
+        self.tracker, self.chance, self.time = Tracker(Prediction(), RATE), np.random.default_rng(1), 0.0
+
+    def run(self, seconds: float, each: Callable[["Watch"], None] = lambda _: None) -> "Watch":
+        for _ in range(round(seconds * 10)):
+            self.time = round(self.time + 0.1, 6)
+            here = self.base(self.time)
+            world = Flatland(self.walls.boxes, [*self.walls.discs, *self.discs(self.time)])
+            step = self.view / (self.beams if self.view == FULL else self.beams - 1)
+            angles = -self.view / 2 + step * np.arange(self.beams)
+            ranges = world.cast((here.x, here.y), angles + here.yaw) + self.chance.normal(0, 0.01, self.beams)
+            ranges = np.round(np.where(ranges > 30.0, np.inf, ranges), 3)
+            scan = Scan("lidar", round(self.time * RATE), ranges, -self.view / 2, step, 0.1, 30.0)
+            self.tracker.on_scan(scan, self.told(self.time))
+            each(self)
+        return self
+
+
+def crossing(t: float) -> list[Disc]:
+    return [(4.0, -3.0 + 1.2 * t, 0.5)]
+
+
+def oncoming(t: float) -> list[Disc]:
+    return [(9.0 - 1.5 * t, 0.3, 0.3)]
+
+
+def room() -> Flatland:
+    """A room with pillars of all sizes, a doorway and a box."""
+    world = Flatland().room(12, 8)
+    world.boxes += [(5.0, 0.0, 5.1, 3.0), (5.0, 4.0, 5.1, 8.0), (8.0, 2.0, 8.6, 2.6)]
+    world.discs += [(2.0 + 0.9 * k, 6.0, 0.05 + 0.03 * k) for k in range(8)]
+    return world
+
+
+@pytest.mark.parametrize("discs", [crossing, oncoming])
+@pytest.mark.parametrize("view, beams", [(FRONT, 720), (FULL, 360)])
+def test_a_moving_cylinder_is_found_within_a_second_and_known_to_centimetres(
+    discs: Callable[[float], list[Disc]], view: float, beams: int
+) -> None:
+    watch = Watch(discs, view=view, beams=beams).run(1.2)
+    assert len(watch.tracker.moving) == 1
+    places, speeds = [], []
+
+    def compare(watch: Watch) -> None:
+        x, y, radius = discs(watch.time)[0]
+        later = discs(watch.time + 1.0)[0]
+        moving = watch.tracker.moving
+        assert len(moving) == 1
+        places.append(math.dist(moving.centres[0], (x, y)))
+        speeds.append(math.dist(moving.velocities[0], (later[0] - x, later[1] - y)))
+        assert moving.radii[0] == pytest.approx(radius, abs=0.08)
+
+    watch.run(2.0, compare)
+    assert np.median(places) < 0.04 and max(places) < 0.12
+    assert np.median(speeds) < 0.12 and max(speeds) < 0.45
+
+
+def test_the_covariance_covers_the_error() -> None:
+    """NEES of the place, 2 on average for a consistent filter; ours is made for things that turn, and so lower."""
+    watch, values = Watch(crossing).run(1.5), list[float]()
+
+    def compare(watch: Watch) -> None:
+        moving = watch.tracker.moving
+        error = moving.centres[0] - np.array(crossing(watch.time)[0][:2])
+        values.append(float(error @ np.linalg.solve(moving.covariances[0, :2, :2], error)))
+        assert math.sqrt(moving.covariances[0, 0, 0]) < 0.05
+
+    watch.run(2.5, compare)
+    assert np.mean(values) < 3.0
+
+
+def test_what_goes_behind_a_pillar_comes_out_as_the_same_and_what_is_gone_is_forgotten() -> None:
+    pillar = Flatland(discs=[(2.0, 0.0, 0.35)])
+    watch = Watch(crossing, walls=pillar).run(1.5)
+    assert len(watch.tracker.moving) == 1
+    seen = list[int]()
+    watch.run(2.5, lambda watch: seen.append(len(watch.tracker.moving)))
+    assert min(seen) == max(seen) == 1
+    assert watch.tracker.moving.velocities[0] == pytest.approx([0.0, 1.2], abs=0.2)
+    watch.discs = lambda _: []
+    watch.run(1.0)
+    assert len(watch.tracker.moving) == 0
+
+
+def test_what_stops_is_a_thing_like_any_other_a_moment_later() -> None:
+    watch = Watch(lambda t: [(4.0, -3.0 + 1.2 * min(t, 2.0), 0.5)]).run(1.8)
+    assert len(watch.tracker.moving) == 1
+    watch.run(2.0)
+    assert len(watch.tracker.moving) == 0
+
+
+def claims(watch: Watch, seconds: float) -> int:
+    """In how many scans something is said to move."""
+    told = list[bool]()
+    watch.run(seconds, lambda watch: told.append(len(watch.tracker.moving) > 0))
+    return sum(told)
+
+
+def tour(t: float) -> Pose2:
+    """Through the room, swinging by 70° to either side at up to 2 rad/s."""
+    return Pose2(1.5 + 0.6 * t, 3.5 + 0.4 * math.sin(t), 1.2 * math.sin(1.7 * t))
+
+
+@pytest.mark.parametrize("view, beams", [(FRONT, 720), (FULL, 360)])
+def test_nothing_moves_in_a_room_that_stands_while_the_robot_drives_and_turns(view: float, beams: int) -> None:
+    assert claims(Watch(lambda _: [], tour, walls=room(), view=view, beams=beams), 12.0) == 0
+
+
+def test_nothing_moves_while_odometry_drifts() -> None:
+    """By 5 % of the way and 1 % of each turn, at 2 rad/s: more than wheels with a gyroscope do."""
+
+    def drifted(t: float) -> Pose2:
+        pose = tour(t)
+        return Pose2(1.05 * pose.x, 1.05 * pose.y, 1.01 * pose.yaw)
+
+    assert claims(Watch(lambda _: [], tour, drifted, walls=room()), 12.0) == 0
+
+
+def test_a_scan_that_is_garbage_moves_nothing_and_breaks_nothing() -> None:
+    tracker = Tracker(Prediction(), RATE)
+    chance = np.random.default_rng(1)
+    for k in range(20):
+        ranges = chance.uniform(-5, 40, 360)
+        ranges[chance.random(360) < 0.3] = np.nan
+        tracker.on_scan(
+            Scan("lidar", k * 24, ranges[: 360 if k % 3 else k // 3], -3.14, 0.0175, 0.1, 30.0), Pose2(0, 0)
+        )
+    assert np.isfinite(tracker.moving.centres).all()
