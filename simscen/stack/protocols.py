@@ -220,8 +220,8 @@ class SwitchesZones(Protocol):
 class Stack(Protocol):
     """A whole navigation stack: readings in, one command out, each beat.
 
-    *Given* no goal *then* it commands zero. *Given* a task that has ended *then* it commands zero from that beat on. (But
-    for stepping aside, and coming back, where something that moves would run into it: whoever canceled told it to stay.)
+    *Given* no goal *then* it commands zero. *Given* a task that has ended *then* it commands zero from that beat on.
+    (But for stepping aside, and coming back, where something that moves would run into it. After a cancel it stays.)
     """
 
     def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:

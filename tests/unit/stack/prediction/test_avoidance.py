@@ -8,16 +8,10 @@ import pytest
 from simscen.core.geometry import Pose2
 from simscen.core.motion import STOP
 from simscen.core.navigation import Goal
-from simscen.model.stack import (
-    ControllerSpec,
-    Costmap,
-    DynamicWindow,
-    GroundTruth,
-    Mppi,
-    Prediction,
-    RegulatedPurePursuit,
-    StackSpec,
-)
+from simscen.model.controllers import DynamicWindow, RegulatedPurePursuit
+from simscen.model.controllerspec import ControllerSpec
+from simscen.model.mppi import Mppi
+from simscen.model.stack import Costmap, GroundTruth, Prediction, StackSpec
 from simscen.testing.flatland import RATE, Drive, Flatland, box_robot, drive
 
 Disc = tuple[float, float, float]
