@@ -31,6 +31,16 @@ from simscen.spec.quantities import (
 )
 
 Patience = Annotated[float, Field(ge=-1, le=86400), Quantity("duration")]
+PlannerCode = Literal[
+    "PLANNER_UNKNOWN",
+    "START_OUTSIDE_MAP",
+    "GOAL_OUTSIDE_MAP",
+    "START_OCCUPIED",
+    "GOAL_OCCUPIED",
+    "PLANNER_TIMEOUT",
+    "NO_VALID_PATH",
+]
+"""Codes with which a planner fails."""
 Noise = Annotated[float, Field(ge=0, le=100)]
 Iterations = Annotated[int, Field(ge=1, le=1_000_000)]
 
@@ -214,6 +224,8 @@ class Costmap(Ranged):
     """Of what a camera sees, lower things are the ground. Lidars see at their own height, whatever this says."""
     max_obstacle_height: NonNegativeLength = 2.0
     """Of what a camera sees, higher things are not in the way."""
+    inf_is_valid: bool = True
+    """Whether beams that meet nothing clear what they pass through. Nav2's default is that they say nothing."""
     denoise_layer: DenoiseLayer = by_default()
     """What is done about single cells."""
     track_unknown_space: bool = True
@@ -252,6 +264,8 @@ class LocalCostmap(Spec):
     """Of what a camera sees, lower things are the ground."""
     max_obstacle_height: NonNegativeLength | None = None
     """Of what a camera sees, higher things are not in the way."""
+    inf_is_valid: bool | None = None
+    """Whether beams that meet nothing clear what they pass through."""
     denoise_layer: DenoiseLayer | None = None
     """What is done about single cells."""
     track_unknown_space: bool = False
@@ -270,8 +284,10 @@ class PlannerSpec(Typed):
     """How far from an unreachable goal the plan may end."""
     replanning: Literal["on_invalid", "rate"] = "on_invalid"
     """Replan when the plan is blocked or clearly worse than a new one, or at a rate."""
-    replanning_rate: Frequency = 1.0
-    """How often, with `replanning: rate`."""
+    replanning_rate: Frequency | None = None
+    """How often, with `replanning: rate`; default: 1 Hz, through poses 0.333 Hz, as in Nav2's trees."""
+    cautious: bool = True
+    """Whether, once a plan could not be followed, roomier ways are taken where there are some. Nav2 does not."""
 
 
 class OmplPlanner(PlannerSpec):
@@ -315,6 +331,8 @@ class SimpleGoalChecker(GoalCheckerSpec):
     type: Literal["simple"] = "simple"
     stateful: bool = True
     """Once the position was reached only the heading counts."""
+    well_inside: Annotated[float, Field(gt=0, le=1), Quantity("ratio")] = 0.5
+    """While it moves, the robot has arrived within this share of the tolerances; at rest, anywhere inside. Nav2: 1."""
 
 
 GoalChecker = Annotated[GoalCheckerSpec, ByType("goal_checker", SimpleGoalChecker)]
@@ -372,6 +390,8 @@ class BackUp(BehaviorSpec):
     """How fast it backs up."""
     simulate_ahead_time: PositiveDuration = 2.0
     """How far ahead it looks for collisions."""
+    partial: bool = True
+    """Whether it backs up as far as there is room, where that is less; often it is enough to turn. Nav2 does not."""
 
 
 class ClearCostmap(BehaviorSpec):
@@ -400,6 +420,16 @@ class Recovery(Spec):
 
     number_of_retries: Annotated[int, Field(ge=0, le=100)] = 6
     """How often a goal is tried again before it fails."""
+    planner_codes: Annotated[list[PlannerCode], Field(max_length=20)] = [
+        "PLANNER_UNKNOWN",
+        "START_OUTSIDE_MAP",
+        "START_OCCUPIED",
+        "GOAL_OCCUPIED",
+        "PLANNER_TIMEOUT",
+        "NO_VALID_PATH",
+    ]
+    """After which failures to plan that is done (WouldAPlannerRecoveryHelp); after others the goal fails at once.
+    Nav2 gives up where start or goal are occupied, though what occupies them may go."""
     behaviors: Annotated[list[Behavior], Field(max_length=20)] = [
         "clear_costmap",
         "spin",
@@ -453,6 +483,12 @@ class VelocitySmoother(Spec):
     """Default: the robot's own limit."""
     max_angular_accel: PositiveAngularAcceleration | None = None
     """Default: the robot's own limit."""
+    max_decel: PositiveAcceleration | None = None
+    """Default: the robot's own limit."""
+    max_velocity: PositiveSpeed | None = None
+    """Of each component of its velocity; default: what the controller commands."""
+    max_angular_velocity: PositiveAngularSpeed | None = None
+    """Of its turn rate; default: what the controller commands."""
 
 
 class CollisionMonitor(Spec):
@@ -465,7 +501,12 @@ class CollisionMonitor(Spec):
     time_before_collision: PositiveDuration = 0.5
     """APPROACH: slow down so that a collision is at least this far off."""
     stop_margin: NonNegativeLength = 0.02
-    """STOP: nothing may be nearer to the footprint than this, in the direction of travel."""
+    """STOP: nothing may be nearer to the footprint than this, in the direction of travel. Nav2 has no such margin."""
+    min_points: Annotated[int, Field(ge=1, le=1000)] = 1
+    """How many points of a scan there must be in the way. Nav2's default is 4: a chair's leg may be fewer."""
+    hold_timeout: PositiveDuration | None = 1.0
+    """How long it may hold the robot until that counts as a failure, for the controller cannot see what it sees; none:
+    until the progress checker says so, as in Nav2."""
 
 
 _LatencyOrRobots = Annotated[

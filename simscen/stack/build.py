@@ -9,7 +9,7 @@ from simscen.core.time import Clock
 from simscen.model import stack as model
 from simscen.model.latency import Latency
 from simscen.stack.collision_monitor import CollisionMonitor
-from simscen.stack.commands import HELD, Commands
+from simscen.stack.commands import Commands
 from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.installed.behavior import InstalledBehavior
 from simscen.stack.installed.controller import InstalledController
@@ -83,7 +83,7 @@ def reference_stack(spec: model.StackSpec, setting: Setting) -> ReferenceStack:
     navigator = Navigator(
         plans,
         controller,
-        RoundRobin(_behaviors(spec.recovery, driving), spec.recovery.number_of_retries),
+        RoundRobin(_behaviors(spec.recovery, driving), spec.recovery),
         InstalledGoalChecker(spec.goal_checker, driving.named("goal_checker")),
         ProgressChecker(spec.progress_checker),
         costmaps,
@@ -95,7 +95,6 @@ def reference_stack(spec: model.StackSpec, setting: Setting) -> ReferenceStack:
         VelocitySmoother(spec.velocity_smoother, robot, setting.control_period),
         monitor,
         period,
-        clock.ticks(HELD),
         (latency["controller"], latency["collision_monitor"]),
     )
     return ReferenceStack(

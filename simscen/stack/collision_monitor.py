@@ -31,6 +31,8 @@ class CollisionMonitor:
     def __init__(self, spec: MonitorSpec, robot: RobotModel, lidars: tuple[str, ...], tick_rate: int) -> None:
         self._spec, self._robot = spec, robot
         self._timeout = round(spec.source_timeout * tick_rate)
+        self.hold_ticks = math.inf if spec.hold_timeout is None else spec.hold_timeout * tick_rate
+        """For how long it may allow nothing until that is a failure."""
         self._seen = dict.fromkeys(lidars, 0)
         self._scans: dict[str, Seen] = {}
         corners = np.array(robot.footprint, dtype=np.float64)
@@ -82,7 +84,7 @@ class CollisionMonitor:
         gap = self._gaps(points, poses_along(Pose2(0.0, 0.0), wanted, times))
         now, least = gap[0], self._spec.stop_margin
         touched = (gap[1:] < least) & (gap[1:] < now - 1e-4)
-        when = touched.any(axis=1)
+        when = touched.sum(axis=1) >= self._spec.min_points
         return float(times[int(when.argmax())]) if when.any() else horizon
 
     def _gaps(self, points: Array, poses: Array) -> Array:

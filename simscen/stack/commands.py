@@ -8,19 +8,16 @@ from simscen.stack.velocity_smoother import VelocitySmoother
 
 CRAWL = 0.02
 """m/s and rad/s (times five): what is slower does not count as driving."""
-HELD = 1.0
-"""Seconds for which the collision monitor may hold the robot before that counts as a failure: the controller cannot see
-what the monitor sees (an obstacle nearer than a cell), and would try the same until no progress is made."""
 
 
 class Commands:
     """The velocity smoother, then the collision monitor; what each makes is there as late as it is slow."""
 
     def __init__(
-        self, smoother: VelocitySmoother, monitor: CollisionMonitor, period: int, held: int, latency: tuple[int, int]
+        self, smoother: VelocitySmoother, monitor: CollisionMonitor, period: int, latency: tuple[int, int]
     ) -> None:
-        """`period` of the controller and `held`, both in ticks; `latency` of controller and monitor in ticks."""
-        self._smoother, self._monitor, self._period, self._patience = smoother, monitor, period, held
+        """`period` of the controller in ticks; `latency` of controller and monitor in ticks."""
+        self._smoother, self._monitor, self._period = smoother, monitor, period
         self._wanted, self._allowed = Underway[tuple[Twist, int]](latency[0]), Underway[Twist](latency[1])
         self._asked, self._free_at = 0, 0
         self.sent = STOP
@@ -55,8 +52,8 @@ class Commands:
             self.sent = allowed
 
     def held(self, tick: int) -> bool:
-        """Whether the monitor has allowed nothing for HELD; once told, the waiting begins anew."""
-        held = tick - self._free_at >= self._patience
+        """Whether the monitor has allowed nothing for its `hold_timeout`; once told, the waiting begins anew."""
+        held = tick - self._free_at >= self._monitor.hold_ticks
         if held:
             self._free_at = tick
         return held

@@ -1,4 +1,8 @@
-"""When a goal is reached: nav2_controller::SimpleGoalChecker, a little stricter."""
+"""When a goal is reached: nav2_controller::SimpleGoalChecker, a little stricter.
+
+Nav2 accepts at the very edge of the tolerance, which turns a localisation error of a centimetre into a false success.
+Here the robot goes on until it is well inside, or until it stands anywhere inside.
+"""
 
 from simscen.core.geometry import Pose2, wrap
 from simscen.core.motion import Twist
@@ -6,12 +10,6 @@ from simscen.core.navigation import Goal
 from simscen.model.stack import SimpleGoalChecker as Spec
 from simscen.stack.setting import Setting
 
-WELL_INSIDE = 0.5
-"""Part of the tolerance at which the goal counts as reached while still moving.
-
-Nav2 accepts at the very edge of the tolerance, which turns a localisation error of a centimetre into a false success.
-Here the robot goes on until it is well inside, or until it stands anywhere inside.
-"""
 STANDING = 0.02
 """m/s and rad/s (times five) under which a robot stands."""
 AT_REST = 10
@@ -23,7 +21,7 @@ class SimpleGoalChecker:
     """Position first, heading then; a position once reached stays reached (`stateful`) while the robot turns."""
 
     def __init__(self, spec: Spec, setting: Setting) -> None:
-        self._stateful = spec.stateful
+        self._stateful, self._well_inside = spec.stateful, spec.well_inside
         self._there, self._stood = False, 0
 
     def reset(self) -> None:
@@ -34,7 +32,7 @@ class SimpleGoalChecker:
         """Whether the robot, believed at `pose`, has reached the goal."""
         standing = abs(twist.vx) + abs(twist.vy) < STANDING and abs(twist.wz) < 5 * STANDING
         self._stood = self._stood + 1 if standing else 0
-        part = 1.0 if self._stood >= AT_REST else WELL_INSIDE
+        part = 1.0 if self._stood >= AT_REST else self._well_inside
         there = goal.pose.distance(pose) <= part * goal.xy_tolerance
         self._there = there or (self._stateful and self._there and goal.pose.distance(pose) <= goal.xy_tolerance)
         return self._there and abs(wrap(goal.pose.yaw - pose.yaw)) <= part * goal.yaw_tolerance

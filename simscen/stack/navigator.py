@@ -135,6 +135,8 @@ class Navigator:
         planning, events = 200 <= failure.code < 300, tuple[Event, ...]()
         if planning:
             events = (Event(tick, EventKind.PLAN_FAILED, "", _described(failure)),)
+            if not self._recovery.helps(failure):
+                return Step(failure=failure, events=events)
             retry, self._replanned = not self._replanned, True
         else:
             if failure.code != ErrorCode.FAILED_TO_MAKE_PROGRESS:
@@ -173,8 +175,6 @@ class Navigator:
         return NavigationFailure(ErrorCode.PATIENCE_EXCEEDED, f"for {self._failure_tolerance:g} s: {failure}")
 
     def _hopeless(self, goal: Goal, failure: NavigationFailure) -> bool:
-        if failure.code == ErrorCode.GOAL_OUTSIDE_MAP:
-            return True
         return failure.code == ErrorCode.GOAL_OCCUPIED and not all(
             self._costmaps.wide.fits_static(each.pose, each.xy_tolerance) for each in (*self.via, goal)
         )

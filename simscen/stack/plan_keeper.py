@@ -22,6 +22,8 @@ BETTER_PERIOD = 2.0
 """Seconds between two looks for a shorter way after obstacles have gone."""
 RECONSIDER = 2
 """Every which step the plan is looked at: 10 Hz at the default rate, twice as often as Nav2's costmap is updated."""
+USUAL_RATE, THROUGH_POSES_RATE = 1.0, 0.333
+"""Hz at which Nav2's default trees plan anew."""
 CAUTION = (0.10, 0.05)
 """Metres of room beyond what is needed that plans keep, if they can, once the robot could not follow one: where it is
 as tight as belief, map and scan are uncertain, the same way would end the same again."""
@@ -66,7 +68,7 @@ class PlanKeeper:
 
     def not_followed(self) -> None:
         """The plan could not be followed: until the next goal, take a roomier way where there is one."""
-        self._cautious = True
+        self._cautious = self._spec.cautious
 
     def step(self, tick: int, now: float, goal: Goal, pose: Pose2, via: tuple[Goal, ...] = ()) -> tuple[Event, ...]:
         """See to it that there is a plan that can be followed; there is none while the first one is being worked out.
@@ -85,6 +87,10 @@ class PlanKeeper:
         if self._asked is None:
             self._reconsider(tick, now, goal, pose, self.plan)
         return self._hear(tick, now)
+
+    @property
+    def _rate(self) -> float:
+        return self._spec.replanning_rate or (THROUGH_POSES_RATE if self._via else USUAL_RATE)
 
     def _reconsider(self, tick: int, now: float, goal: Goal, pose: Pose2, plan: PlanInForce) -> None:
         """Ask for another plan when this one is blocked, outdated, or may be clearly longer than need be."""
@@ -126,7 +132,7 @@ class PlanKeeper:
         if self._via and not self._partial and plan.remaining() < AT_ITS_END:
             return "missed"
         if self._spec.replanning == "rate":
-            return "rate" if now - self._looked >= 1.0 / self._spec.replanning_rate else ""
+            return "rate" if now - self._looked >= 1.0 / self._rate else ""
         view = self._costmap.view
         if view.revision == self._checked:
             return ""

@@ -1,16 +1,25 @@
 """The recovery branch of Nav2's default tree: a round robin of behaviours, a limited number of times."""
 
 from collections.abc import Sequence
+from typing import get_args
 
-from simscen.stack.protocols import Behavior
+from simscen.model.stack import PlannerCode, Recovery
+from simscen.stack.protocols import Behavior, NavigationFailure
+
+PLANNER_CODES = frozenset(get_args(PlannerCode))
 
 
 class RoundRobin:
-    """Hands out behaviours in turn until `retries` have been used; a new goal gets a full number again."""
+    """Hands out behaviours in turn until the retries have been used; a new goal gets a full number again."""
 
-    def __init__(self, behaviors: Sequence[Behavior], retries: int) -> None:
-        self._behaviors, self._retries = tuple(behaviors), retries
+    def __init__(self, behaviors: Sequence[Behavior], spec: Recovery) -> None:
+        self._behaviors, self._retries = tuple(behaviors), spec.number_of_retries
+        self._incurable = PLANNER_CODES.difference(spec.planner_codes)
         self._next, self._used = 0, 0
+
+    def helps(self, failure: NavigationFailure) -> bool:
+        """Whether clearing and behaviours may help after such a failure."""
+        return getattr(failure.code, "name", "") not in self._incurable
 
     def reset(self) -> None:
         """A new goal; the turn goes on where it was, as in Nav2."""

@@ -1,5 +1,7 @@
 """Accelerations the base can follow: nav2_velocity_smoother, open loop."""
 
+import math
+
 from simscen.core.motion import Twist
 from simscen.model.stack import VelocitySmoother as SmootherSpec
 from simscen.stack.protocols import RobotModel
@@ -11,9 +13,11 @@ class VelocitySmoother:
     def __init__(self, spec: SmootherSpec, robot: RobotModel, period: float) -> None:
         self._enabled = spec.enabled
         faster = min(spec.max_accel or robot.linear_acceleration, robot.linear_acceleration)
-        self._faster, self._slower = faster * period, robot.linear_deceleration * period
+        slower = min(spec.max_decel or robot.linear_deceleration, robot.linear_deceleration)
+        self._faster, self._slower = faster * period, slower * period
         turn = min(spec.max_angular_accel or robot.angular_acceleration, robot.angular_acceleration)
         self._turn = turn * period
+        self._most, self._most_turn = spec.max_velocity or math.inf, spec.max_angular_velocity or math.inf
         self._steered = robot.turning_radius > 0.0
         self._last = Twist()
 
@@ -25,6 +29,7 @@ class VelocitySmoother:
         """The velocity to send now, so many periods after the last one."""
         if not self._enabled:
             return wanted
+        wanted = self._within(wanted)
         last = self._last
         vx = self._towards(last.vx, wanted.vx, periods)
         if self._steered and wanted.vx != 0.0:
@@ -33,6 +38,17 @@ class VelocitySmoother:
             turn = self._turned(last.wz, wanted.wz, periods)
         self._last = Twist(vx, self._towards(last.vy, wanted.vy, periods), turn)
         return self._last
+
+    def _within(self, wanted: Twist) -> Twist:
+        """No faster than it may be; a base that steers keeps to its curve."""
+        if max(abs(wanted.vx), abs(wanted.vy)) <= self._most and abs(wanted.wz) <= self._most_turn:
+            return wanted
+        vx, vy = (min(max(part, -self._most), self._most) for part in (wanted.vx, wanted.vy))
+        wz = min(max(wanted.wz, -self._most_turn), self._most_turn)
+        if self._steered and wanted.vx != 0.0:
+            share = min(abs(vx / wanted.vx), abs(wz / wanted.wz) if wanted.wz else 1.0)
+            return Twist(wanted.vx * share, vy, wanted.wz * share)
+        return Twist(vx, vy, wz)
 
     def _towards(self, now: float, wanted: float, periods: int) -> float:
         if now * wanted < 0.0:

@@ -36,10 +36,13 @@ def hits(scan: Scan, base: Pose2, nearest: float, farthest: float) -> Array:
 
 
 def free_lengths(scan: Scan, spec: CostmapSpec) -> Array:
-    """How far each beam (n,) shows free space: to its hit, or to raytrace_max_range; nan and too near beams show 0."""
+    """How far each beam (n,) shows free space: to its hit, or to raytrace_max_range; nan and too near beams show 0.
+
+    So do beams that meet nothing, unless `inf_is_valid`.
+    """
     ranges = scan.ranges
     with np.errstate(invalid="ignore"):
-        seen = np.where(ranges > scan.range_max, np.inf, ranges)
+        seen = np.where(ranges > scan.range_max, np.inf if spec.inf_is_valid else 0.0, ranges)
         return np.where(seen >= scan.range_min, np.minimum(seen, spec.raytrace_max_range), 0.0)
 
 

@@ -1,6 +1,7 @@
 """Goal, progress, speed and retries: small rules with exact answers."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from simscen.core.sensing import Scan
 from simscen.model.stack import CollisionMonitor as MonitorSpec
 from simscen.model.stack import Costmap as CostmapSpec
 from simscen.model.stack import ProgressChecker as ProgressSpec
+from simscen.model.stack import Recovery
 from simscen.model.stack import SimpleGoalChecker as CheckerSpec
 from simscen.model.stack import VelocitySmoother as SmootherSpec
 from simscen.stack.arcs import poses_along
@@ -24,7 +26,7 @@ from simscen.stack.footprint import Footprint
 from simscen.stack.goal_checker import AT_REST, SimpleGoalChecker
 from simscen.stack.lookahead import time_free
 from simscen.stack.progress_checker import ProgressChecker
-from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
+from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel, Surroundings
 from simscen.stack.recovery import RoundRobin
 from simscen.stack.replanning import PlanInForce
 from simscen.stack.tasks import Task
@@ -61,6 +63,12 @@ def test_a_goal_is_reached_well_inside_its_tolerance_or_standing_anywhere_inside
 ) -> None:
     checker = checker_that(stateful=True)
     assert [checker.reached(GOAL, pose, twist) for _ in range(AT_REST)][-1] == reached
+
+
+def test_nav2s_goal_checker_takes_the_edge_of_the_tolerance_for_there_while_the_robot_moves() -> None:
+    checker = SimpleGoalChecker(CheckerSpec(well_inside=1.0), setting(round_robot()))
+    assert checker.reached(GOAL, Pose2(0.81, 0.0, 0.19), DRIVING)
+    assert not checker.reached(GOAL, Pose2(0.81, 0.0, 0.21), DRIVING)
 
 
 def test_a_robot_that_stands_for_a_moment_between_driving_and_turning_is_not_there_yet() -> None:
@@ -104,6 +112,22 @@ def test_the_smoother_passes_zero_before_it_reverses() -> None:
     smoother.reset(Twist(0.05))
     assert smoother.smooth(Twist(-0.5)).vx == 0.0
     assert smoother.smooth(Twist(-0.5)).vx == pytest.approx(-0.125)
+
+
+def test_the_smoother_keeps_to_the_limits_that_it_is_given() -> None:
+    spec = SmootherSpec(max_decel=2.0, max_velocity=0.3, max_angular_velocity=0.5)
+    smoother = VelocitySmoother(spec, round_robot(linear_deceleration=4.0), 0.1)
+    smoother.reset(Twist(0.5))
+    assert [round(smoother.smooth(Twist(0.5, 0.0, 2.0)).vx, 6) for _ in range(3)] == [0.3, 0.3, 0.3]
+    assert smoother.smooth(Twist(0.5, 0.0, 2.0)).wz == 0.5
+    assert smoother.smooth(Twist()).vx == pytest.approx(0.1)
+
+
+def test_a_car_keeps_to_its_curve_when_the_smoother_slows_it_down() -> None:
+    robot = replace(round_robot(), turning_radius=0.5)
+    smoother = VelocitySmoother(SmootherSpec(max_velocity=0.2), robot, 0.1)
+    smoother.reset(Twist(0.2, 0.0, 0.1))
+    assert smoother.smooth(Twist(0.4, 0.0, 0.2)) == Twist(0.2, 0.0, pytest.approx(0.1))
 
 
 def test_a_disabled_smoother_changes_nothing() -> None:
@@ -152,6 +176,14 @@ def test_the_monitor_sees_the_corner_of_a_long_hull_swing() -> None:
     guard.on_scan(scan((0.15, 0.19)), Pose2(0, 0))
     assert guard.allow(Twist(wz=1.0), Pose2(0, 0)).wz < 0.5
     assert guard.allow(Twist(0.3), Pose2(0, 0)).vx == 0.3
+
+
+def test_the_monitor_may_want_more_points_than_one() -> None:
+    guard = monitor(min_points=3)
+    guard.on_scan(scan((0.3, 0.0), (0.3, 0.01)), Pose2(0, 0))
+    assert guard.allow(Twist(0.5), Pose2(0, 0)) == Twist(0.5)
+    guard.on_scan(scan((0.3, 0.0), (0.3, 0.01), (0.3, -0.01)), Pose2(0, 0))
+    assert guard.allow(Twist(0.5), Pose2(0, 0)).vx < 0.5
 
 
 def test_silence_is_a_lidar_unheard_for_the_timeout_or_blind() -> None:
@@ -216,11 +248,30 @@ def test_recoveries_are_handed_out_in_turn_until_the_retries_are_used_up() -> No
         def __init__(self, name: str) -> None:
             self.name = name
 
-    robin = RoundRobin([Named("a"), Named("b"), Named("c")], 4)
+    robin = RoundRobin([Named("a"), Named("b"), Named("c")], Recovery(number_of_retries=4))
     assert [b.name for b in iter(robin.next, None)] == ["a", "b", "c", "a"]
     robin.reset()
     assert robin.next().name == "b"
-    assert RoundRobin([], 3).next() is None
+    assert RoundRobin([], Recovery(number_of_retries=3)).next() is None
+
+
+@pytest.mark.parametrize(
+    ("code", "ours", "nav2s"),
+    [
+        (ErrorCode.NO_VALID_PATH, True, True),
+        (ErrorCode.START_OCCUPIED, True, False),
+        (ErrorCode.GOAL_OUTSIDE_MAP, False, False),
+        (ErrorCode.FAILED_TO_MAKE_PROGRESS, True, True),
+        (299, True, True),
+    ],
+)
+def test_recoveries_help_after_the_codes_that_are_named_and_after_codes_that_nobody_knows(
+    code: int, ours: bool, nav2s: bool
+) -> None:
+    failure = NavigationFailure(code, "")
+    assert RoundRobin([], Recovery()).helps(failure) == ours
+    only = Recovery(planner_codes=["PLANNER_UNKNOWN", "PLANNER_TIMEOUT", "NO_VALID_PATH"])
+    assert RoundRobin([], only).helps(failure) == nav2s
 
 
 def test_a_plan_is_blocked_by_what_comes_to_lie_ahead_on_it_but_not_behind() -> None:

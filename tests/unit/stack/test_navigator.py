@@ -260,6 +260,13 @@ def test_replanning_at_a_rate_replans_at_that_rate() -> None:
     assert reasons(d).count("rate") == pytest.approx(d.tick / 480, abs=2)
 
 
+def test_nav2_replans_through_poses_at_a_third_of_its_usual_rate() -> None:
+    spec = StackSpec(localizer=TRUTH, planner=OmplPlanner(replanning="rate"))
+    through = [Goal("by", Pose2(3.0, 5.0), via=True, xy_tolerance=0.7), FAR]
+    assert reasons(start(rooms(), spec=spec).run(6.5)).count("rate") == 6
+    assert reasons(start(rooms(), *through, spec=spec).run(6.5)).count("rate") == 2
+
+
 def test_it_drives_without_a_map() -> None:
     world = Flatland(discs=[(3.0, 0.1, 0.3), (5.0, -0.4, 0.4), (4.0, 1.0, 0.3)])
     d = drive(world, Pose2(0, 0), Goal("g", Pose2(8.0, 0.0)), grid=None).run(60)

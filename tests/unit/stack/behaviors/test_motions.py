@@ -94,6 +94,12 @@ def test_backup_uses_what_room_there_is() -> None:
     assert -0.2 < pose.x < -0.05
 
 
+def test_nav2s_backup_wants_all_the_room_it_may_need() -> None:
+    with pytest.raises(NavigationFailure) as failed:
+        run(BackUp(model.BackUp(partial=False), setting(ROUND)), view_of(ROUND, (-0.6, -1.0, -0.4, 1.0)))
+    assert failed.value.code == ErrorCode.BACKUP_COLLISION_AHEAD
+
+
 def test_a_long_robot_does_not_spin_beside_a_wall_but_a_round_one_does() -> None:
     wall = (-3.0, 0.24, 3.0, 0.4)
     with pytest.raises(NavigationFailure) as failed:

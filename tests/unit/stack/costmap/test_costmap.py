@@ -107,10 +107,21 @@ def test_walls_of_the_map_are_never_cleared() -> None:
     assert np.array_equal(map_.view.costs, before)
 
 
-@pytest.mark.parametrize(("ranges", "cleared"), [(np.inf, True), (np.nan, False), (0.01, False), (13.0, True)])
-def test_only_beams_that_say_something_clear(ranges: float, cleared: bool) -> None:
+@pytest.mark.parametrize(
+    ("ranges", "inf_is_valid", "cleared"),
+    [
+        (np.inf, True, True),
+        (np.inf, False, False),
+        (np.nan, True, False),
+        (0.01, True, False),
+        (13.0, True, True),
+        (13.0, False, False),
+        (4.0, False, True),
+    ],
+)
+def test_only_beams_that_say_something_clear(ranges: float, inf_is_valid: bool, cleared: bool) -> None:
     world = Flatland().room(8, 6)
-    map_ = costmap(world)
+    map_ = costmap(world, Spec(inf_is_valid=inf_is_valid))
     world.discs.append((4.0, 3.0, 0.1))
     seen = scan_of(world, Pose2(2.0, 3.0))
     map_.update(Pose2(2.0, 3.0), seen)
