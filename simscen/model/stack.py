@@ -164,6 +164,12 @@ class Ekf(LocalizerSpec):
     """Standard deviation of the heading after one rad or one metre."""
     gyro_noise: NonNegativeAngularSpeed = 0.005
     """Standard deviation of the turn rate."""
+    gyro_bias: NonNegativeAngularSpeed | None = None
+    """Standard deviation of the gyroscope's bias at the start; default: as `gyro_noise`."""
+    gyro_bias_walk: NonNegativeAngularSpeed = 0.0001
+    """Standard deviation of how far the bias has wandered after a second."""
+    wheel_slip: Probability = 0.0
+    """Standard deviation of the share of its way by which a robot slips; a slip lasts about a second."""
 
 
 class GroundTruth(LocalizerSpec):

@@ -1,4 +1,4 @@
-"""Odometry and a gyroscope in an extended Kalman filter: dead reckoning that notices its wheels slip in a turn.
+"""Odometry and a gyroscope in an extended Kalman filter: dead reckoning that notices when its wheels slip in a turn.
 
 Probabilistic Robotics, section 3.3, with filterpy's ExtendedKalmanFilter (Labbe). As robot_localization does, the
 turn rate is a state that both sensors measure; the gyroscope's bias is one too, and shows while the robot stands.
@@ -14,33 +14,46 @@ from simscen.core.sensing import Imu, Odometry, Scan
 from simscen.model.stack import Ekf
 from simscen.stack.localizers.dead_reckoning import start_of
 from simscen.stack.localizers.odometry_track import believable
+from simscen.stack.localizers.slip_model import AHEAD, BIAS, LEVER, RATE, Model, Step, motion, moved, rates
 
-X, Y, YAW, RATE, BIAS = range(5)
 # No robot turns faster than this, in rad/s: a gyroscope that says so is broken.
 _FASTEST = 100.0
-# Wheels that stand still and a perfect gyroscope would make the innovation's variance zero.
-_LEAST_VARIANCE = 1e-12
+# rad/s. Encoders that say "nothing" have seen less than a tick of theirs, not nothing: without this floor wheels that
+# are locked, or stand on a turntable, would be believed whatever the gyroscope says.
+_LEAST_RATE_NOISE = 0.002
+# Of the squared innovation over its variance: a wheel that fits no worse by chance once in 10 000 steps.
+_GATE = 15.1
+# It measures the turn rate and its own bias.
+_GYRO = np.zeros((1, 7))
+_GYRO[0, [RATE, BIAS]] = 1.0
 
 
 class EkfLocalizer:
-    """Adds up odometry's translations along a heading that odometry and gyroscope agree on. No map: it drifts."""
+    """Adds up odometry's translations along a heading that odometry and gyroscope agree on. No map: it drifts.
+
+    Where they disagree by more than their noise the wheels slip: the step turns as the gyroscope says, and how far the
+    robot got is as uncertain as it was fast.
+    """
 
     def __init__(self, spec: Ekf, estimate: Estimate, tick_rate: int) -> None:
         self._spec, self._tick_rate = spec, tick_rate
         self.reset(estimate)
 
     def reset(self, estimate: Estimate) -> None:
-        """Start over at an estimate, with a bias of which nothing more is known than gyro_noise."""
+        """Start over at an estimate, with a bias of which nothing more is known than how large it may be."""
         from filterpy.kalman import ExtendedKalmanFilter
 
         pose, covariance = start_of(estimate)
-        self._filter = ExtendedKalmanFilter(dim_x=5, dim_z=1)
-        self._filter.x = np.array([*pose, 0.0, 0.0])
-        self._filter.P = np.zeros((5, 5))
+        bias = self._spec.gyro_noise if self._spec.gyro_bias is None else self._spec.gyro_bias
+        self._filter = ExtendedKalmanFilter(dim_x=7, dim_z=1)
+        self._filter.predict_x = self._advance
+        self._filter.x = np.array([*pose, 0.0, 0.0, 0.0, 0.0])
+        self._filter.P = np.zeros((7, 7))
         self._filter.P[:RATE, :RATE] = covariance
-        self._filter.P[BIAS, BIAS] = self._spec.gyro_noise**2
+        self._filter.P[BIAS, BIAS], self._filter.P[AHEAD, AHEAD] = bias**2, self._spec.wheel_slip**2
         self._last: Odometry | None = None
-        self._rates: list[float] = []
+        self._readings: list[float] = []
+        self._speed, self._slipped = 0.0, False
         self._map_from_odom = pose
 
     def on_odometry(self, odometry: Odometry) -> None:
@@ -50,10 +63,10 @@ class EkfLocalizer:
             return
         self._last = odometry
         if last is not None:
-            step, seconds = last.pose.between(odometry.pose), (odometry.tick - last.tick) / self._tick_rate
-            self._measure_rate(step, seconds)
-            self._move(step, seconds)
-        self._rates.clear()
+            step = self._judged(last.pose.between(odometry.pose), (odometry.tick - last.tick) / self._tick_rate)
+            self._measure(step)
+            self._predict(motion(self._spec, self._filter.x, step), moved(self._filter.x, step))
+        self._readings.clear()
         self._map_from_odom = self._pose.compose(odometry.pose.inverse())
 
     def on_scan(self, scan: Scan) -> None:
@@ -63,7 +76,7 @@ class EkfLocalizer:
         """Keep the turn rate until the next odometry."""
         rate = imu.angular_velocity[2]
         if abs(rate) < _FASTEST:
-            self._rates.append(rate)
+            self._readings.append(rate)
 
     @property
     def belief(self) -> Belief:
@@ -77,29 +90,53 @@ class EkfLocalizer:
         x, y, yaw = self._filter.x[:RATE].tolist()
         return Pose2(x, y, wrap(yaw))
 
-    def _measure_rate(self, step: Pose2, seconds: float) -> None:
-        """The turn rate of this step, out of odometry's turn and the mean of the gyroscope's readings."""
-        state, covariance = self._filter.x, self._filter.P
-        # Nothing is known of the new turn rate, so that the first measurement of it is taken as it is.
-        turned = math.hypot(step.x, step.y) + abs(step.yaw)
-        state[RATE], covariance[RATE, :], covariance[:, RATE] = step.yaw / seconds, 0.0, 0.0
-        covariance[RATE, RATE] = self._spec.rotation_noise**2 * turned / seconds**2
-        if self._rates:
-            mean, row = sum(self._rates) / len(self._rates), np.array([[0.0, 0, 0, 1, 1]])
-            noise = np.array([[self._spec.gyro_noise**2 / len(self._rates) + _LEAST_VARIANCE]])
-            self._filter.update(np.array([mean]), lambda _: row, lambda state: row @ state, R=noise)
+    def _judged(self, pose: Pose2, seconds: float) -> Step:
+        """The step, and whether the gyroscope disagrees with the wheels about it by more than their noise."""
+        speed = math.hypot(pose.x, pose.y) / seconds
+        held = Step(pose, seconds, speed)
+        if not self._readings:
+            return held
+        disagreement = self._turning - float(self._filter.x[BIAS]) - pose.yaw / seconds
+        variance = self._wheel_noise(held) + self._gyro_noise + float(self._filter.P[BIAS, BIAS])
+        if disagreement**2 <= _GATE * variance:
+            return held
+        return Step(pose, seconds, max(self._speed, speed, LEVER * abs(disagreement)), slips=True)
 
-    def _move(self, step: Pose2, seconds: float) -> None:
-        """Drive the step; a turn other than odometry's turns its chord by half the difference."""
-        x, y, yaw, rate, bias = self._filter.x.tolist()
-        along = yaw + (rate * seconds - step.yaw) / 2
-        c, s = math.cos(along), math.sin(along)
-        dx, dy, length = c * step.x - s * step.y, s * step.x + c * step.y, math.hypot(step.x, step.y)
-        self._filter.F = np.eye(5)
-        self._filter.F[:2, YAW] = -dy, dx
-        self._filter.F[:3, RATE] = -dy * seconds / 2, dx * seconds / 2, seconds
-        self._filter.Q = np.zeros((5, 5))
-        if length > 0:
-            self._filter.Q[:2, :2] = self._spec.translation_noise**2 / length * np.outer((dx, dy), (dx, dy))
-        self._filter.predict()
-        self._filter.x = np.array([x + dx, y + dy, wrap(yaw + rate * seconds), rate, bias])
+    def _measure(self, step: Step) -> None:
+        """The turn rate of this step, out of odometry's turn, where the wheels hold, and the gyroscope's readings."""
+        model = rates(self._spec, step, self._wheel_noise(step), self._slipped)
+        after = model.f @ self._filter.x
+        after[RATE] = step.pose.yaw / step.seconds
+        self._predict(model, after)
+        if self._readings:
+            self._filter.update(
+                np.array([self._turning]),
+                lambda _: _GYRO,
+                lambda state: _GYRO @ state,
+                R=np.array([[self._gyro_noise]]),
+            )
+        self._slipped = step.slips
+        if not step.slips:
+            self._speed = step.fast
+
+    def _wheel_noise(self, step: Step) -> float:
+        """Variance of the turn rate by the wheels."""
+        turned = step.length + abs(step.pose.yaw)
+        return self._spec.rotation_noise**2 * turned / step.seconds**2 + _LEAST_RATE_NOISE**2
+
+    @property
+    def _turning(self) -> float:
+        """What the gyroscope says of this step."""
+        return sum(self._readings) / len(self._readings)
+
+    @property
+    def _gyro_noise(self) -> float:
+        return self._spec.gyro_noise**2 / len(self._readings)
+
+    def _predict(self, model: Model, after: Array) -> None:
+        self._filter.F, self._filter.Q = model.f, model.q
+        self._filter.predict(after)
+
+    def _advance(self, after: Array) -> None:
+        """The place that filterpy leaves for a motion that is not linear."""
+        self._filter.x = after

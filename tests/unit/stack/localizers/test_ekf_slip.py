@@ -1,0 +1,145 @@
+"""Wheels that lock, spin and slip: the EKF is never surer than it is right."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from simscen.core.belief import Belief, Estimate
+from simscen.core.geometry import Array, Pose2
+from simscen.core.motion import Twist
+from simscen.core.sensing import Imu, Odometry
+from simscen.model.stack import Ekf
+from simscen.testing.room import localizer, nees
+
+RATE, EVERY = 40, 6
+
+
+def replayed(spec: Ekf, twists: Array, wheels: Array, gyro: Array, start: Pose2 | None = None) -> tuple[Belief, Array]:
+    """What the EKF believes at the end, and how wrong that is.
+
+    `twists` (n, 3) are the true velocities at 40 Hz, `wheels` (n, 3) those that the wheels claim, `gyro` (n,) readings.
+    """
+    subject = localizer(spec, Estimate(start or Pose2(0, 0, 0), (0.0, 0.0, 0.0)), 1)
+    true = claimed = Pose2(0, 0, 0)
+    subject.on_odometry(Odometry("odom", 0, claimed, Twist()))
+    for k in range(len(twists)):
+        true, claimed = true.compose(_step(twists[k])), claimed.compose(_step(wheels[k]))
+        subject.on_imu(Imu("imu", EVERY * (k + 1), (0.0, 0.0, float(gyro[k])), (0.0, 0.0, 9.81)))
+        subject.on_odometry(Odometry("odom", EVERY * (k + 1), claimed, Twist()))
+    error = np.array(subject.belief.pose) - np.array(true)
+    return subject.belief, np.array([error[0], error[1], math.remainder(error[2], 2 * math.pi)])
+
+
+def _step(twist: Array) -> Pose2:
+    vx, vy, wz = (twist / RATE).tolist()
+    c, s = math.cos(wz / 2), math.sin(wz / 2)
+    return Pose2(c * vx - s * vy, s * vx + c * vy, wz)
+
+
+def turning(seconds: float = 4.0) -> Array:
+    """0.4 m/s and 1 rad/s."""
+    return np.tile([0.4, 0.0, 1.0], (round(seconds * RATE), 1))
+
+
+def test_wheels_that_lock_in_a_turn_are_not_believed() -> None:
+    """They stand for a second in which the robot slides on: its heading stays right, and it knows of the slide."""
+    truth = turning()
+    claimed = truth.copy()
+    claimed[60:100] = 0.0
+    spec = Ekf(type="ekf", gyro_noise=0.005)
+    belief, error = replayed(spec, truth, claimed, truth[:, 2] + np.random.default_rng(1).normal(0, 0.005, len(truth)))
+    assert abs(error[2]) < 0.02
+    assert nees(belief, error) < stats.chi2.ppf(0.999, 3)
+    assert math.hypot(*error[:2]) > 0.2  # nobody could know how far it slid, …
+    assert np.sqrt(np.trace(belief.covariance[:2, :2])) > 0.2  # … and the filter says so
+
+
+def test_wheels_that_spin_on_the_spot_are_not_believed_to_turn_the_robot() -> None:
+    claimed = turning()
+    truth = np.zeros_like(claimed)
+    belief, error = replayed(Ekf(type="ekf"), truth, claimed, np.random.default_rng(2).normal(0, 0.005, len(truth)))
+    assert abs(error[2]) < 0.02
+    assert nees(belief, error) < stats.chi2.ppf(0.999, 3)
+
+
+def test_a_lock_does_not_pass_for_the_gyroscopes_bias() -> None:
+    """After it, wheels and gyroscope agree as before."""
+    truth = turning(8.0)
+    claimed = truth.copy()
+    claimed[100:140] = 0.0
+    bias = 0.004
+    belief, error = replayed(Ekf(type="ekf"), truth, claimed, truth[:, 2] + bias)
+    assert abs(error[2]) < 0.04
+    assert abs(error[2]) < 4 * math.sqrt(belief.covariance[2, 2])
+
+
+def test_what_no_wheel_sees_is_forgotten_when_the_wheels_hold_again() -> None:
+    """The variance of the place grows while they slip, and hardly afterwards."""
+
+    def spread(seconds: float) -> float:
+        truth = turning(seconds)
+        claimed = truth.copy()
+        claimed[60:100] = 0.0
+        belief, _ = replayed(Ekf(type="ekf"), truth, claimed, truth[:, 2])
+        return float(np.sqrt(np.trace(belief.covariance[:2, :2])))
+
+    before, after, later = spread(1.5), spread(2.5), spread(5.0)
+    assert after > 10 * before
+    assert later < 1.5 * after
+
+
+def test_a_long_stand_leaves_some_doubt_about_the_bias() -> None:
+    """Variance floor: after ten minutes at rest a bias that wanders off is still noticed."""
+    n = 600 * RATE // 10  # at 4 Hz, to be quick
+    subject = localizer(Ekf(type="ekf"), Estimate(Pose2(0, 0, 0), (0.0, 0.0, 0.0)), 1)
+    for k in range(n):
+        subject.on_imu(Imu("imu", 60 * k, (0.0, 0.0, 0.003), (0.0, 0.0, 9.81)))
+        subject.on_odometry(Odometry("odom", 60 * k, Pose2(0, 0, 0), Twist()))
+    assert abs(subject.belief.pose.yaw) < 3 * math.sqrt(subject.belief.covariance[2, 2])
+    state, variance = subject._filter.x, subject._filter.P
+    assert state[4] == pytest.approx(0.003, abs=1e-3)
+    assert variance[4, 4] > 1e-9
+
+
+CASES = [  # a tidy robot, a rough one with a good gyroscope, a fast one with a poor gyroscope
+    {"speed": 0.5, "translation": 0.01, "rotation": 0.01, "gyro": 0.002, "bias": 0.002},
+    {"speed": 0.8, "translation": 0.05, "rotation": 0.1, "gyro": 0.002, "bias": 0.002},
+    {"speed": 2.0, "translation": 0.02, "rotation": 0.03, "gyro": 0.02, "bias": 0.01},
+]
+RUNS, SECONDS = 25, 5.0
+
+
+def sampled(case: dict[str, float], slip: float, seed: int) -> tuple[Belief, Array]:
+    """A drive in bends with noise as its specification says, and slips that last about a second."""
+    chance = np.random.default_rng((seed, round(1000 * slip)))
+    n, dt = round(SECONDS * RATE), 1 / RATE
+    t = np.arange(n) * dt
+    phase, often = chance.uniform(0, 6.3), chance.uniform(0.3, 1.0)
+    truth = np.column_stack((np.full(n, case["speed"]), np.zeros(n), 1.2 * np.sin(often * t * 2 + phase)))
+    way, turn = np.abs(truth[:, 0]) * dt, np.abs(truth[:, 2]) * dt
+    claimed = truth.copy()
+    claimed[:, 0] += chance.normal(0, case["translation"] * np.sqrt(way)) / dt
+    claimed[:, 2] += chance.normal(0, case["rotation"] * np.sqrt(way + turn)) / dt
+    share = chance.normal(0, slip)
+    for k in range(n):
+        truth[k, 0] *= 1 + share
+        share = share * math.exp(-dt) + chance.normal(0, slip * math.sqrt(1 - math.exp(-2 * dt)))
+    bias = chance.normal(0, case["bias"])
+    spec = Ekf(
+        type="ekf", translation_noise=case["translation"], rotation_noise=case["rotation"], gyro_noise=case["gyro"],
+        gyro_bias=case["bias"], gyro_bias_walk=0.0, wheel_slip=slip,
+    )  # fmt: skip
+    return replayed(spec, truth, claimed, truth[:, 2] + bias + chance.normal(0, case["gyro"], n))
+
+
+@pytest.mark.parametrize("slip", [0.0, 0.2])
+@pytest.mark.parametrize("case", CASES, ids=["tidy", "rough", "fast"])
+def test_its_covariance_is_consistent_with_its_errors_on_clean_and_on_slipping_drives(
+    case: dict[str, float], slip: float
+) -> None:
+    """NEES of 3 degrees of freedom add up to chi-square; all but one of 1000 such tests pass by chance."""
+    values = [nees(*sampled(case, slip, seed)) for seed in range(1000, 1000 + RUNS)]
+    low, high = stats.chi2.ppf([0.0005, 0.9995], 3 * RUNS)
+    assert low <= np.sum(values) <= high
