@@ -9,8 +9,8 @@ from simscen.core.geometry import Array, Pose2
 from simscen.model.stack import Ekf
 
 X, Y, YAW, RATE, BIAS, AHEAD, ASIDE = range(7)
-"""The state: pose in the map, turn rate, the gyroscope's bias, and slip: the speed ahead and aside that no wheel sees, as
-a share of how fast the robot may be."""
+"""The state: pose in the map, turn rate, the gyroscope's bias, and slip: the speed ahead and aside that no wheel sees,
+as a share of how fast the robot may be."""
 SLIP_LASTS = 1.0
 """Seconds after which a slip has mostly become another one."""
 UNKNOWN_RATE = 10.0
