@@ -83,8 +83,9 @@ docs: setup  ## Write schemas/ and docs/reference/ anew
 mutation: setup  ## Change what decides verdicts, a little at a time: some test must fail each time (long)
 	@nice -n 10 $(BIN)/python tests/mutation/run.py --write
 
-screenshots: setup  ## Take the pictures of the replay page for the docs (needs Chromium)
+screenshots: setup  ## Take the pictures of pages and runs for the docs (needs Chromium)
 	@$(BIN)/python tests/browser/screenshots.py
+	@$(BIN)/python tests/browser/suite_screenshots.py
 
 bench: setup  ## Measure speed (simscen bench)
 	@$(BIN)/simscen bench

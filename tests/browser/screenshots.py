@@ -7,6 +7,8 @@ import os
 import shutil
 import sys
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -28,21 +30,33 @@ SEEDS = range(2, 12)
 
 def main() -> None:
     """Run, make the pages, and take their pictures."""
-    browser = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-    if browser is None:
-        sys.exit("there is no Chromium to take pictures with")
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, browser() as running:
         failed, passed = _runs(Path(folder))
         pages = {"replay-failure": [failed], "replay-against": [failed, passed]}
-        with sync_playwright() as playwright:
-            arguments = ["--no-sandbox"] if os.geteuid() == 0 else []
-            running = playwright.chromium.launch(executable_path=browser, args=arguments)
-            for name, logs in pages.items():
-                page = Path(folder) / f"{name}.html"
-                read = [read_run(log, looks=True) for log in logs]
-                write_replay(page, [(log, from_json(log.result)) for log in read])
-                _shoot(running, page, name, "#t=20" if len(logs) > 1 else "")
-            running.close()
+        for name, logs in pages.items():
+            page = Path(folder) / f"{name}.html"
+            read = [read_run(log, looks=True) for log in logs]
+            write_replay(page, [(log, from_json(log.result)) for log in read])
+            _shoot(running, page, name, "#t=20" if len(logs) > 1 else "")
+
+
+@contextmanager
+def browser() -> Iterator[Any]:
+    """A Chromium to take pictures with."""
+    found = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if found is None:
+        sys.exit("there is no Chromium to take pictures with")
+    with sync_playwright() as playwright:
+        arguments = ["--no-sandbox"] if os.geteuid() == 0 else []
+        running = playwright.chromium.launch(executable_path=found, args=arguments)
+        yield running
+        running.close()
+
+
+def save(picture: "Image.Image | bytes", file: Path) -> None:
+    """In 256 colours, which nobody sees and a third of the bytes hold."""
+    image = Image.open(BytesIO(picture)) if isinstance(picture, bytes) else picture
+    image.quantize(256, dither=Image.Dither.NONE).save(file, optimize=True)
 
 
 def _runs(folder: Path) -> tuple[Path, Path]:
@@ -71,7 +85,7 @@ def _shoot(browser: Any, page: Path, name: str, where: str) -> None:
         shown.wait_for_selector("html[data-ready]", state="attached")
         shown.wait_for_timeout(300)
         file = IMAGES / f"{name}{'-dark' if scheme == 'dark' else ''}.png"
-        Image.open(BytesIO(shown.screenshot())).quantize(256, dither=Image.Dither.NONE).save(file, optimize=True)
+        save(shown.screenshot(), file)
         context.close()
 
 

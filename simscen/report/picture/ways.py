@@ -76,7 +76,7 @@ def draw_truth(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 def draw_carried(canvas: Canvas, scene: Scene) -> Iterator[Label]:
     """An arrow up where the robot was lifted, and one down where it was set down."""
     for before, after in pairwise(driven(scene)):
-        when = f"{scene.trace.seconds(int(after.ticks[0])):.1f} s"
+        when = f"{scene.trace.seconds(int(before.ticks[-1])):.1f} s"
         for place, sign, told in ((before.values[-1], _LIFTED, "lifted"), (after.values[0], _SET_DOWN, "set down")):
             x, y = place[:2].tolist()
             canvas.disc(x, y, 12, (255, 255, 255, 225), palette.AMBER, 1.6, busy=True)

@@ -1,0 +1,75 @@
+"""Takes the pictures of the suite page and of runs that the docs show: `make screenshots`.
+
+Some shipped scenarios run in two sessions; in the second one of them is made harder, so that it fails.
+"""
+
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from PIL import Image
+from screenshots import IMAGES, ROOT, browser, save
+
+SCENARIOS = (
+    "localization/kidnapped",
+    "localization/wrong_initial_estimate",
+    "navigation/patrol",
+    "navigation/speeds",
+    "obstacles/door_closes",
+    "people/person_crosses",
+    "zones/keepout_lifted",
+    "zones/slow_zone_begins",
+)
+PATIENT = "timeout: 150 s"
+WIDE, NARROW = {"width": 1280, "height": 900}, {"width": 390, "height": 844}
+
+
+def main() -> None:
+    """Run, and take the pictures."""
+    with tempfile.TemporaryDirectory() as folder, browser() as running:
+        home = Path(folder)
+        _scenarios(home)
+        _run(home, "20260101T080000Z-1a2b")
+        harder = home / "scenarios/obstacles/door_closes.scenario.yaml"
+        assert PATIENT in harder.read_text()
+        harder.write_text(harder.read_text().replace(PATIENT, "timeout: 30 s"))
+        _run(home, "20260102T080000Z-3c4d")
+        last = home / "simscen-out/20260102T080000Z-3c4d"
+        for name, run in (("patrol", "navigation/patrol"), ("picture-failure", "obstacles/door_closes")):
+            (picture,) = last.glob(f"runs/scenarios/{run}/seed-*/map.png")
+            save(Image.open(picture).convert("RGB"), IMAGES / f"{name}.png")
+        for name, size, scheme in (
+            ("suite", WIDE, "light"),
+            ("suite-dark", WIDE, "dark"),
+            ("suite-phone", NARROW, "light"),
+        ):
+            _shoot(running, last / "report.html", name, size, scheme)
+
+
+def _scenarios(home: Path) -> None:
+    shutil.copytree(ROOT / "worlds", home / "worlds")
+    for name in SCENARIOS:
+        file = home / f"scenarios/{name}.scenario.yaml"
+        file.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / f"scenarios/{name}.scenario.yaml", file)
+
+
+def _run(home: Path, session: str) -> None:
+    command = [sys.executable, "-m", "simscen", "run", "scenarios", "--out", f"simscen-out/{session}"]
+    subprocess.run(command, cwd=home, check=False, stdout=subprocess.DEVNULL)
+
+
+def _shoot(running: Any, page: Path, name: str, size: dict[str, int], scheme: str) -> None:
+    context = running.new_context(viewport=size, color_scheme=scheme)
+    shown = context.new_page()
+    shown.goto(page.as_uri())
+    shown.locator(".history").evaluate("one => one.open = true")
+    save(shown.screenshot(), IMAGES / f"{name}.png")
+    context.close()
+
+
+if __name__ == "__main__":
+    main()
