@@ -92,7 +92,7 @@ def markdown(runs: list[RunFinished], session: SessionFinished, pictures: str = 
     head = f"### simscen: {session.passed} passed, {session.failed} failed, {session.errors} {errors}{more}"
     compared = [] if session.comparison is None else as_markdown(session.comparison, _cell)
     rows = [
-        f"| {signs[run.outcome]} | {_cell(label(run.key))} | {run.result.simulated:.1f} s | {_cell(_why(run))} |"
+        f"| {signs[run.outcome]} | {_cell(label(run.key))} | {run.result.simulated:.1f} s | {_why(run)} |"
         for run in ordered
     ]
     shown = _shown(ordered, session.folder, pictures) if pictures else []
@@ -111,12 +111,14 @@ def _shown(runs: list[RunFinished], folder: str, pictures: str) -> list[str]:
 
 
 def _why(run: RunFinished) -> str:
+    """A cell: every criterion that failed in a line of its own, or what the run came nearest to."""
     if run.outcome is Outcome.ERROR:
-        return broken(run)
+        return _cell(broken(run))
     if excuse := excused(run):
-        return excuse
-    told = [complaint.message for complaint in complaints(run)]
-    return "; ".join(told) if told else f"tightest: {tightest(run.result.verdicts)}"
+        return _cell(excuse)
+    told = [_cell(complaint.message) for complaint in complaints(run)]
+    nearest = tightest(run.result.verdicts)
+    return "<br>".join(told) if told or not nearest else f"tightest: {_cell(nearest)}"
 
 
 def _command(level: str, run: RunFinished, line: int, title: str, message: str) -> str:

@@ -81,17 +81,24 @@ def test_where_the_configuration_names_folders_scenarios_are_collected_there_and
     run, project: Path
 ) -> None:
     (project / "pytest.ini").write_text("[pytest]\nsimscen_paths = scenarios\nsimscen_seed = 9\n")
-    (project / "elsewhere.scenario.yaml").write_text(ROOM)
-    code, told = run("--collect-only", "-q", "-k", "good or elsewhere or test_own")
+    (project / "other").mkdir()
+    (project / "other/elsewhere.scenario.yaml").write_text(ROOM)
+    (project / "named.scenario.yaml").write_text(ROOM)
+    asked = ("scenarios", "other", "test_own.py", "named.scenario.yaml")
+    code, told = run("--collect-only", "-q", "-k", "good or elsewhere or named or test_own", *asked)
     assert code == 0, told
-    assert collected(told) == ["scenarios/good.scenario.yaml::good", "test_own.py::test_own"]
-    code, told = run("--collect-only", "-q", "elsewhere.scenario.yaml")  # named, so asked for
-    assert collected(told) == ["elsewhere.scenario.yaml::elsewhere"]
+    assert sorted(collected(told)) == [
+        "named.scenario.yaml::named", "scenarios/good.scenario.yaml::good", "test_own.py::test_own"
+    ]  # fmt: skip
 
 
-def test_every_run_is_an_item_with_the_name_of_the_command_line_and_its_tags(run) -> None:
+def test_every_run_is_an_item_with_its_name_and_tags_and_a_wrong_file_an_error_with_line_and_hint(
+    run, project: Path
+) -> None:
+    (project / "scenarios/wrong.scenario.yaml").write_text(ROOM.replace("goals", "gaols"))
     code, told = run("--simscen", "--collect-only", "-q", "scenarios", "--simscen-repeat", "2", "-m", "smoke")
-    assert code == 0, told
+    assert code == 2, told
+    assert "wrong.scenario.yaml:5:1: error[SC012]" in told and "Traceback" not in told
     names = [line.partition("::")[2] for line in collected(told)]
     assert names == [
         "good (seed 1)", "good (seed 2)", "held (seed 1)", "held (seed 2)", "later (seed 1)", "later (seed 2)",
@@ -119,30 +126,27 @@ def test_runs_pass_fail_with_simscens_own_words_are_skipped_and_expected_to_fail
     assert {one.get("name") for one in cases["good"].iter("property")} >= {"seed", "log", "again"}
 
 
-def test_workers_share_a_folder_and_what_failed_runs_again(run, project: Path) -> None:
+def test_workers_leave_all_in_one_folder_and_what_failed_is_known(run, project: Path) -> None:
     code, told = run("--simscen", "-n2", "scenarios", "-k", "good or bad")
     assert code == 1, told
     assert "1 failed, 1 passed" in told
     assert re.search(r"^clearance: 0\.\d\d m < 2.00 m, at t = ", told, re.MULTILINE)
     assert len(list((project / "simscen-out").iterdir())) == 1
-    code, told = run("--simscen", "-p", "no:xdist", "scenarios", "--lf")
-    assert "1 failed" in told and "passed" not in told.splitlines()[-1]
+    _, told = run("--simscen", "-p", "no:xdist", "scenarios", "--lf", "--collect-only", "-q")
+    assert collected(told) == ["scenarios/bad.scenario.yaml::bad"]
 
 
-def test_a_wrong_file_is_an_error_of_the_collection_with_line_and_hint(run, project: Path) -> None:
-    (project / "scenarios/wrong.scenario.yaml").write_text(ROOM.replace("goals", "gaols"))
-    code, told = run("--simscen", "-p", "no:xdist", "scenarios")
-    assert code == 2
-    assert "wrong.scenario.yaml:5:1: error[SC012]" in told
-    assert "Traceback" not in told
-
-
-def test_a_stack_and_a_seed_that_cannot_be_are_told_in_words(run, project: Path) -> None:
-    code, told = run("--simscen", "-p", "no:xdist", "scenarios/good.scenario.yaml", "--simscen-stack", "nothing")
-    assert code == 2 and "cannot read --stack nothing" in told and "Traceback" not in told
-    (project / "pytest.ini").write_text("[pytest]\nsimscen_seed = seven\n")
-    code, told = run("--simscen", "-p", "no:xdist", "scenarios/good.scenario.yaml")
-    assert code == 2 and "simscen_seed: 'seven' is not a whole number" in told
+@pytest.mark.parametrize(
+    ("ini", "arguments", "why"),
+    [
+        ("", ("--simscen-stack", "nothing"), "cannot read --stack nothing"),
+        pytest.param("simscen_seed = seven", (), "simscen_seed: 'seven' is not a whole", marks=pytest.mark.long),
+    ],
+)
+def test_a_stack_and_a_seed_that_cannot_be_are_told_in_words(run, project: Path, ini: str, arguments, why: str) -> None:
+    (project / "pytest.ini").write_text(f"[pytest]\nsimscen_paths = scenarios\n{ini}\n")
+    code, told = run("-p", "no:xdist", "scenarios/good.scenario.yaml", *arguments)
+    assert code == 2 and why in told and "Traceback" not in told
 
 
 def test_the_fixture_runs_a_scenario_in_a_test_and_says_why_it_did_not_pass(run, project: Path) -> None:

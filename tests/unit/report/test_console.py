@@ -182,6 +182,12 @@ def test_the_summary_of_a_github_job_lists_what_did_not_pass_first_and_holds_no_
     assert row.count("|") == 5
 
 
+def test_in_the_summary_every_criterion_has_its_own_line(session, failed):
+    (row,) = markdown([failed], session[-1]).splitlines()[4:5]
+    stopped, fast = row.rsplit("|", 2)[1].split("<br>")
+    assert stopped.startswith(" stopped&#95;within: 0.84 s &#62; 0.50 s") and fast.startswith("speed: 0.60 m/s")
+
+
 def test_the_summary_shows_the_pictures_of_failures_where_they_have_an_address(session, passed, failed):
     here = replace(failed, artifacts=replace(failed.artifacts, picture="out/runs/a b)/seed-7/map.png"))
     told = markdown([passed, here], session[-1], "https://example.org/raw/pictures/1/")
