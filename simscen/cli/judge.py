@@ -70,9 +70,7 @@ def command(
     Exit code 0: all hold; 1: one fails or is inconclusive; 2: not a usable log or scenario; 3: one could not be judged,
     or one of several logs cannot be used; 5: no logs found.
     """
-    clock: Clock = "log" if time is Time.LOG else "header"
-    wanted = Wanted(truth, _topics(topic or []), tick_rate, clock, same_frame)
-    _check_truth(wanted)
+    wanted = wanted_of(truth, topic or [], time, tick_rate, same_frame)
     files = logs_of(logs)
     judging = Judging(wanted, scenario, root, world_path or [])
     lost = runs_without_log(logs)
@@ -87,6 +85,14 @@ def command(
     else:
         _print(runs, scenario is not None)
     sys.exit(verdict([run for _, run in runs]))
+
+
+def wanted_of(truth: str | None, topic: list[str], time: Time, tick_rate: int, same_frame: bool) -> Wanted:
+    """How to read a log of others, from the options that say so. Raises UsageError."""
+    clock: Clock = "log" if time is Time.LOG else "header"
+    wanted = Wanted(truth, _topics(topic), tick_rate, clock, same_frame)
+    _check_truth(wanted)
+    return wanted
 
 
 def _print(runs: list[tuple[str, RunFinished]], one_scenario: bool) -> None:

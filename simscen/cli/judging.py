@@ -7,12 +7,14 @@ from pathlib import Path
 
 from simscen.cli.diagnostics import from_here
 from simscen.cli.logs import BROKEN_OFF, WHOLE
+from simscen.cli.recorded import said_of
 from simscen.core.case import Case
 from simscen.core.errors import InvalidInput
 from simscen.core.evidence import Coverage, Evidence
+from simscen.core.geometry import Pose2
 from simscen.core.maskcells import MaskCells
 from simscen.core.problems import Problem
-from simscen.core.result import Outcome, RunFailure, RunKey, unfinished
+from simscen.core.result import Outcome, RunFailure, RunKey, RunResult, skipped, unfinished
 from simscen.core.sessionevents import Artifacts, RunFinished
 from simscen.core.trace import Trace
 from simscen.judge.result import result_of
@@ -22,8 +24,9 @@ from simscen.loading.discovery import default_root
 from simscen.loading.resolved import criteria_of_text
 from simscen.model.criteria_file import expectation_of
 from simscen.record.foreign.mcapfile import is_own
-from simscen.record.foreign.read import read_foreign
+from simscen.record.foreign.read import ForeignLog, read_foreign
 from simscen.record.foreign.wanted import Wanted
+from simscen.record.header import LogHeader
 from simscen.record.replay import Log, read_run
 from simscen.report.journaldata import NAME
 from simscen.report.rebuild import read_journal
@@ -61,6 +64,27 @@ class Judging:
             result = unfinished(RunKey(log.stem, 0), str(log), RunFailure("invalid", told))
             return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=str(log))
 
+    def shown(self, log: Path) -> tuple[Log, RunResult]:
+        """A log with all that there is to see in it, and what its criteria say, or those of the file.
+
+        Raises InvalidInput.
+        """
+        if _may_be_own(log) and is_own(log):
+            read = read_run(log, looks=True)
+            return read, said_of(read, log) if self._criteria is None else self._own(log).result
+        self.foreign += 1
+        if self._criteria is None:
+            told, case = read_foreign(log, self._wanted, looks=True), Case(Pose2(0.0, 0.0), ())
+            result = skipped(RunKey(log.stem, 0), "", "nothing was judged: --scenario says by what")
+            result = replace(result, simulated=told.trace.seconds(told.trace.end), tick_rate=told.trace.tick_rate)
+        else:
+            told, result = self._judged_foreign(log, looks=True)
+            case = self._foreign_case()
+        self.notes += [f"{log}: {note}" for note in told.notes]
+        text = "" if self._scenario is None else self._scenario.read_text(encoding="utf-8")
+        about = LogHeader(log.stem, 0, case, text, told.map)
+        return Log(about, told.trace, "", complete=True, seen=told.seen), result
+
     def _own(self, log: Path) -> RunFinished:
         read = read_run(log)
         if not read.robots:
@@ -93,17 +117,23 @@ class Judging:
         if self._criteria is None:
             hint = "say with --scenario what must hold; a file with `pass:` is enough"
             raise InvalidInput([Problem(str(log), 0, 0, "SC801", "not a log of simscen", hint)])
+        read, result = self._judged_foreign(log)
+        self.notes += [f"{log}: {note}" for note in read.notes]
+        return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=str(self._scenario))
+
+    def _judged_foreign(self, log: Path, looks: bool = False) -> tuple[ForeignLog, RunResult]:
+        """A log of others, and what the file of criteria says of it."""
+        assert self._criteria is not None
         with _told_from_here(self._criteria):
             criteria = self._criteria.of("")
         case = self._foreign_case()
-        read = read_foreign(log, replace(self._wanted, goals=tuple(goal.name for goal in case.goals if not goal.via)))
-        self.notes += [f"{log}: {note}" for note in read.notes]
+        goals = tuple(goal.name for goal in case.goals if not goal.via)
+        read = read_foreign(log, replace(self._wanted, goals=goals), looks)
         missing = dict(read.coverage.missing)
         if case.footprint:
             del missing[Evidence.FOOTPRINT]
-        return self._finished(
-            log, RunKey(log.stem, 0), read.trace, case, Coverage(missing, read.coverage.partial), criteria
-        )
+        coverage = Coverage(missing, read.coverage.partial)
+        return read, self._finished(log, RunKey(log.stem, 0), read.trace, case, coverage, criteria).result
 
     def _masks(self, criteria: LoadedCriteria) -> Mapping[str, MaskCells]:
         """The filter masks that criteria name; those of a file that is the same for all robots are read once."""

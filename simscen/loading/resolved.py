@@ -48,15 +48,15 @@ def spec_of_text(text: str, name: str) -> ScenarioSpec:
     return _checked(ScenarioSpec, _read(text, name))
 
 
-def parts_of_text(text: str, name: str, robot: str = "") -> tuple[ScenarioSpec, Fields]:
+def parts_of_text(text: str, name: str, robot: str = "") -> tuple[CriteriaSpec, Fields]:
     """The specification in a resolved text, of one of several robots if named, and the tree that says where it stands.
 
-    Raises InvalidInput.
+    A file of criteria will do. Raises InvalidInput.
     """
     tree = _read(text, name)
     if isinstance(tree, Fields) and robot:
         tree = each_of(tree).get(robot, tree)
-    spec = _checked(ScenarioSpec, tree)
+    spec = _checked(CriteriaSpec, tree)
     assert isinstance(tree, Fields)
     return spec, tree
 

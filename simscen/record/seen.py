@@ -21,7 +21,8 @@ Messages = list[tuple[int, bytes]]
 class Seen:
     """Messages as they are in the log: most of them are never looked at, and reading all would take long.
 
-    `scans` are by topic; `mounts` are where lidars sit, by their frames.
+    `scans` are by topic; `mounts` are where lidars sit, by their frames. Unless `stamped`, the ticks of the log are not
+    those of the messages' headers: a scan was measured when it was logged.
     """
 
     time: SimTime = field(default_factory=lambda: SimTime(1))
@@ -30,6 +31,7 @@ class Seen:
     local_plans: Messages = field(default_factory=list)
     costmaps: dict[str, Messages] = field(default_factory=dict)
     mounts: dict[str, Pose3] = field(default_factory=dict)
+    stamped: bool = True
 
     def taker(self, topic: str, kind: str) -> Callable[[int, bytes], None] | None:
         """What takes the messages of a topic; None for one that nobody looks at."""

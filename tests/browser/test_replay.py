@@ -3,8 +3,10 @@
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -12,6 +14,7 @@ from drive import drive
 from hostile import EVIL, hostile_log
 from rig import Opened, Opener
 
+from simscen.core.samples import Samples
 from simscen.judge.resultdata import from_json
 from simscen.record.replay import read_run
 from simscen.report.replay import write_replay
@@ -220,3 +223,18 @@ def test_the_maths_of_its_modules() -> None:
 
 def test_equal_logs_make_equal_pages(one: Path, logs: list[Path], tmp_path: Path) -> None:
     assert made(tmp_path / "again.html", logs[:1]).read_bytes() == one.read_bytes()
+
+
+def test_a_log_that_does_not_say_where_the_robot_was_shows_where_it_thought_to_be(
+    open_page: Opener, tmp_path: Path
+) -> None:
+    log, result = hostile_log()
+    nowhere = Samples(np.empty(0, dtype=np.int64), np.empty((0, 3)))
+    trace = replace(log.trace, truth=nowhere, velocity=nowhere, clearance=nowhere)
+    write_replay(tmp_path / "replay.html", [(replace(log, trace=trace), result)])
+    opened = ready(open_page(tmp_path / "replay.html", where="#t=2"))
+    assert opened.page.evaluate("simscen.runs[0].robots[0].truthAt(480)") is None
+    assert opened.page.evaluate("simscen.runs[0].robots[0].placeAt(480).x") == pytest.approx(1.0, abs=0.01)
+    for key in ("w", "n", "p", "c", ",", "f"):
+        opened.page.keyboard.press(key)
+    assert "not recorded" in opened.page.get_by_role("tabpanel", name="Now").inner_text()

@@ -32,9 +32,9 @@ function drawRobot(view, robot, number, tick, run) {
   if (layers.has("belief")) drawParticles(view, robot.particlesAt(tick));
   if (layers.has("scan")) for (const points of robot.scansAt(tick)) drawPoints(view, points, colours.scan);
   if (layers.has("local")) drawPath(view, robot.localAt(tick), colours.local, 2.5);
-  if (layers.has("truth")) drawHull(view, robot, true_, colour, true);
+  if (layers.has("truth") && true_) drawHull(view, robot, true_, colour, true);
   if (layers.has("belief") && believed) drawBelief(view, robot, believed);
-  if (run.robots.length > 1) label(view, robot.name, true_.x, true_.y, colour, 22);
+  if (run.robots.length > 1 && true_) label(view, robot.name, true_.x, true_.y, colour, 22);
 }
 
 /** Follow the points of a polygon in the frame of a pose. */
@@ -427,7 +427,7 @@ function drawMarks(view, run, tick) {
 }
 
 function spotOf(run, event) {
-  const robot = run.robots.find((one) => one.name === (event.robot ?? "")) ?? run.robots[0], pose = robot.truthAt(event.tick);
+  const robot = run.robots.find((one) => one.name === (event.robot ?? "")) ?? run.robots[0], pose = robot.placeAt(event.tick);
   return event.place ?? [pose.x, pose.y];
 }
 

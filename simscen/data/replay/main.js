@@ -111,7 +111,7 @@ class Page {
   #draw() {
     const { time, playing } = this.player;
     if (this.follows) {
-      const pose = this.runs[0].robots[0].truthAt(this.runs[0].tick(time));
+      const pose = this.runs[0].robots[0].placeAt(this.runs[0].tick(time));
       [this.camera.x, this.camera.y] = [pose.x, pose.y];
     }
     for (const map of this.maps) {

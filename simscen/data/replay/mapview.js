@@ -47,8 +47,10 @@ export class MapView {
   bounds() {
     const xs = [], ys = [];
     for (const robot of this.run.robots) {
-      xs.push(...minmax(robot.truth.x));
-      ys.push(...minmax(robot.truth.y));
+      for (const way of [robot.truth, robot.belief ?? robot.truth]) {
+        xs.push(...minmax(way.x));
+        ys.push(...minmax(way.y));
+      }
       for (const goal of robot.goals) {
         xs.push(goal.pose[0]);
         ys.push(goal.pose[1]);

@@ -150,7 +150,7 @@ export class Panel {
     const names = (lane) => run.going(lane, tick).filter(whose).map((event) => event.name).join(", ");
     const facts = [
       ["goal", goal?.name ?? "none"],
-      ["true pose", poseText(pose)],
+      ["true pose", pose ? poseText(pose) : "not recorded"],
       ["belief", belief ? poseText(belief) : "none yet"],
       ["off by", value("localization_error")],
       ["speed", value("speed")],

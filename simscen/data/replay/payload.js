@@ -9,8 +9,9 @@ export async function unpack(text) {
   const about = JSON.parse(new TextDecoder().decode(bytes.subarray(4, 4 + size)));
   const numbers = bytes.subarray(4 + size), kept = new Map();
   const column = (where) => {
-    if (!kept.has(where[0])) kept.set(where[0], readColumn(numbers, where));
-    return kept.get(where[0]);
+    const key = where.join(" "); // an empty column begins where the next one does
+    if (!kept.has(key)) kept.set(key, readColumn(numbers, where));
+    return kept.get(key);
   };
   return { about, column };
 }

@@ -92,8 +92,15 @@ class Robot {
     this.strips = new Map(data.strips.map((strip) => [strip.name, new Strip(strip, this, column)]));
   }
 
+  /** Where it truly is; null where the log does not say. */
   truthAt(tick) {
-    return poseAt(this.truth, tick, 3 * this.run.rate) ?? { x: this.start[0], y: this.start[1], yaw: this.start[2] };
+    if (!this.truth.ticks.length) return null;
+    return poseAt(this.truth, tick, 3 * this.run.rate) ?? { x: this.truth.x[0], y: this.truth.y[0], yaw: this.truth.yaw[0] };
+  }
+
+  /** Where it truly is, else where it thinks it is, else the origin. */
+  placeAt(tick) {
+    return this.truthAt(tick) ?? this.beliefAt(tick) ?? { x: 0, y: 0, yaw: 0 };
   }
 
   /** Where it thinks it is, its 95 % ellipse, and how old that is in seconds. */
@@ -119,7 +126,7 @@ class Robot {
     return this.scans.flatMap((lidar) => {
       const { column } = this.run, k = newest(column(lidar.ticks), tick);
       if (k < 0 || tick - column(lidar.ticks)[k] > Math.max(SCAN_AGE * this.run.rate, 1.5 * pace(column(lidar.ticks)))) return [];
-      const when = column(lidar.measured)[k], pose = this.beliefAt(when) ?? this.truthAt(when);
+      const when = column(lidar.measured)[k], pose = this.beliefAt(when) ?? this.placeAt(when);
       return [hits(lidar, column(lidar.ranges).subarray(k * lidar.beams, (k + 1) * lidar.beams), pose)];
     });
   }

@@ -49,7 +49,7 @@ def _lidar(topic: str, messages: Messages, seen: Seen, columns: Columns) -> dict
         "most": round(first.range_max, 4),
         "beams": beams,
         "ticks": columns.add([tick for tick, _ in scans]),
-        "measured": columns.add([scan.tick for _, scan in scans]),
+        "measured": columns.add([scan.tick if seen.stamped else tick for tick, scan in scans]),
         "ranges": columns.add(ranges, _CENTIMETRE),
     }
 

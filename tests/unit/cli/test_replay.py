@@ -108,7 +108,7 @@ def test_the_log_shows_both_costmaps_each_in_its_frame_and_no_faster_than_anybod
         assert (np.diff([tick for tick, _ in messages]) >= period).all()
         frame, grid = log.seen.costmap(messages[-1][1])
         assert frame == ("map" if topic.startswith("/global") else "odom")
-        assert {0, 99, 100} <= set(np.unique(grid.cells).tolist()) <= {-1, *range(101)}
+        assert set(np.unique(grid.cells).tolist()) <= {-1, *range(101)}
     _, wide = log.seen.costmap(log.seen.costmaps["/global_costmap/costmap"][-1][1])
     assert log.about.map is not None and wide.shape == log.about.map.shape
-    assert (wide.cells[log.about.map.cells == 100] == 100).all()
+    assert (wide.cells[log.about.map.cells == 100] == 100).all() and 99 in wide.cells

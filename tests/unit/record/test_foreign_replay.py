@@ -1,0 +1,77 @@
+"""A log of a real robot as a page: what it shows is there, and what it does not hold is not made up."""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+from foreign_logs import BEGIN, Said, T, drive, header, link, write_bag, write_mcap
+
+from simscen.cli.main import main
+from simscen.record.foreign.read import read_foreign
+from simscen.record.foreign.wanted import Wanted
+
+
+class Ended(NamedTuple):
+    code: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def simscen(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Callable[..., Ended]:
+    def call(*arguments: str) -> Ended:
+        monkeypatch.setattr(sys, "argv", ["simscen", *arguments])
+        code = 0
+        try:
+            main()
+        except SystemExit as end:
+            code = int(end.code or 0)
+        return Ended(code, *capsys.readouterr())
+
+    return call
+
+
+def a_map() -> Said:
+    info = T["nav_msgs/msg/MapMetaData"](
+        map_load_time=header(BEGIN, "").stamp,
+        resolution=0.1,
+        width=4,
+        height=3,
+        origin=T["geometry_msgs/msg/Pose"](
+            position=T["geometry_msgs/msg/Point"](x=-1.0, y=-2.0, z=0.0),
+            orientation=T["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0),
+        ),
+    )
+    cells = np.array([0, 100, -1] * 4, dtype=np.int8)
+    return Said("/map", BEGIN, T["nav_msgs/msg/OccupancyGrid"](header=header(BEGIN, "map"), info=info, data=cells))
+
+
+def mounted() -> Said:
+    return Said("/tf_static", BEGIN, link(BEGIN, "base_link", "laser", 0.2))
+
+
+@pytest.mark.parametrize("write", [write_mcap, write_bag])
+def test_scans_the_map_and_where_lidars_sit_are_read(tmp_path: Path, write: Callable[..., object]) -> None:
+    write(tmp_path / "log.mcap", [a_map(), mounted(), *drive(2.0)])
+    read = read_foreign(tmp_path / "log.mcap", Wanted("/mocap"), looks=True)
+    assert read.map is not None and read.map.shape == (3, 4) and read.map.origin[:2] == (-1.0, -2.0)
+    (messages,) = read.seen.scans.values()
+    assert [tick for tick, _ in messages] == sorted(tick for tick, _ in messages) and len(messages) == 5
+    assert read.seen.mounts["laser"].x == pytest.approx(0.2)
+
+
+def test_a_page_is_made_with_criteria_and_without(simscen, tmp_path: Path) -> None:
+    log = tmp_path / "monday.mcap"
+    write_mcap(log, [a_map(), mounted(), *drive(2.0)])
+    ended = simscen("replay", str(log), "--truth", "/mocap")
+    page = tmp_path / "monday.replay.html"
+    assert (ended.code, ended.out) == (0, f"{page}\n")
+    assert "<title>monday, seed 0, skipped</title>" in page.read_text()
+    (tmp_path / "limits.yaml").write_text("simscen: 1\npass: [{localization_error: {max: 0.01 m}}]\n")
+    ended = simscen("replay", str(log), "--truth", "/mocap", "--scenario", str(tmp_path / "limits.yaml"))
+    assert ended.code == 0 and "<title>monday, seed 0, failed</title>" in page.read_text()
