@@ -108,7 +108,7 @@ class Costmap:
         if self._static_squared[row, column] == 0:
             return False
         near = self._frame.window((row, column), (row, column), math.ceil(tolerance / self._frame.resolution))
-        fits = self._inflation.metres[self._static_squared[near]] > self._inscribed
+        fits = self._inflation.metres.take(self._static_squared[near]) > self._inscribed
         points = self._frame.centres(np.argwhere(fits) + np.array((near[0].start, near[1].start)))
         return bool((np.hypot(points[:, 0] - pose.x, points[:, 1] - pose.y) <= tolerance).any())
 
@@ -144,7 +144,7 @@ class Costmap:
         """Compute everything again."""
         squared = np.minimum(self._static_squared, squared_distances(self._obstacles(ALL)))
         self._costs = self._inflation.costs(squared, self._unknown)
-        self._distance = self._inflation.metres[squared]
+        self._distance = self._inflation.metres.take(squared)
         self._revision += 1
 
     def _obstacles(self, window: Window) -> Mask:
@@ -183,6 +183,6 @@ class Costmap:
             slice(inner[1].start - outer[1].start, inner[1].stop - outer[1].start),
         )
         squared = np.minimum(self._static_squared[inner], near[part])
-        self._distance[inner] = self._inflation.metres[squared]
+        self._distance[inner] = self._inflation.metres.take(squared)
         self._costs[inner] = self._inflation.costs(squared, self._unknown[inner])
         self._revision += 1

@@ -45,7 +45,7 @@ class Inflation:
 
     def costs(self, squared: Squared, unknown: npt.NDArray[np.bool_]) -> npt.NDArray[np.uint8]:
         """Costs of cells; unknown ones stay unknown unless an obstacle is within the inscribed radius."""
-        cost = self.cost[squared]
+        cost = self.cost.take(squared)
         cost[unknown & (cost < INSCRIBED)] = NO_INFORMATION
         return cost
 
