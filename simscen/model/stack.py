@@ -53,9 +53,12 @@ AMCL_PARAMETERS: Mapping[str, Mapping[str, object]] = {
     "default": {},
     "nav2": {
         "laser_model_type": "likelihood_field", "likelihood_exponent": 1.0, "beams_beyond_the_map": "miss",
-        "distrust_outdated_map": False, "match_scans": False, "relocalization": "random",
+        "map_trust_none": 0.0, "map_trust_full": 0.0, "match_scans": False, "relocalization": "random",
     },
-    "consistent": {"likelihood_exponent": 0.1},
+    "consistent": {
+        "alpha1": 0.0005, "alpha2": 0.0005, "alpha3": 0.0005, "alpha4": 0.0005, "alpha5": 0.0005, "sigma_hit": 0.1,
+        "likelihood_exponent": 1.0, "map_trust_none": 0.85, "map_trust_full": 1.0,
+    },
 }  # fmt: skip
 """What AMCL's parameters are by default under each name."""
 
@@ -128,9 +131,11 @@ class Amcl(Ranged, LocalizerSpec):
     beams_beyond_the_map: Literal["say_nothing", "miss"] = "say_nothing"
     """What beams tell that end where the map ends, in unknown space next to free space or off it; in Nav2 they miss.
     `likelihood_field_prob` only."""
-    distrust_outdated_map: bool = True
-    """A scan counts for less the fewer of its beams end near what the map shows, as long as the particles are one
-    narrow group."""
+    map_trust_none: Probability = 0.45
+    """Up to this share of its beams that end near what the map shows a scan counts for nothing, as long as the
+    particles are one narrow group: rooms are rebuilt, and nobody draws the map anew."""
+    map_trust_full: Probability = 0.8
+    """From this share on it counts in full, in between in proportion; 0 = it always does, as in Nav2."""
     match_scans: bool = True
     """Correct each step of odometry by how the scan fits those of the last metres, where these can tell."""
     selective_resampling: bool = False

@@ -29,8 +29,8 @@ def amcl(spec: model.Amcl, setting: Setting) -> Localizer:
         return DeadReckoning(setting.estimate)
     motion = _motion_model(spec, setting.robot.holonomic)
     sensor, anywhere = _sensor_model(spec, setting.map), FreeSpace(setting.map)
-    trust = _trust(setting.map)
-    doubted = trust if spec.distrust_outdated_map else None
+    trust = _trust(setting.map, spec)
+    doubted = trust if spec.map_trust_full > 0 else None
     particles = ParticleFilter(spec, motion, sensor, anywhere, setting.chance, doubted)
     search = (GlobalSearch(setting.map), trust) if spec.relocalization == "scan_matching" else None
     return AmclLocalizer(spec, particles, motion, setting.estimate, setting.surroundings.tick_rate, search)
@@ -53,8 +53,10 @@ def odometry(_spec: model.OdometryOnly, setting: Setting) -> Localizer:
     return DeadReckoning(setting.estimate)
 
 
-def _trust(grid: OccupancyGrid) -> MapTrust:
-    return MapTrust(obstacle_field(grid, 2 * NEAR), beyond_the_map(grid).ravel())
+def _trust(grid: OccupancyGrid, spec: model.Amcl) -> MapTrust:
+    return MapTrust(
+        obstacle_field(grid, 2 * NEAR), beyond_the_map(grid).ravel(), spec.map_trust_none, spec.map_trust_full
+    )
 
 
 def _motion_model(spec: model.Amcl, holonomic: bool) -> MotionModel:

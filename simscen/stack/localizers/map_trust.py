@@ -9,8 +9,6 @@ from simscen.stack.localizers.particles import Particles
 
 NEAR = 0.3
 """m: a beam fits that ends this near to what the map shows."""
-NOTHING, ALL = 0.45, 0.8
-"""Shares of the beams that fit up to which a scan counts for nothing, and from which it counts in full."""
 TOGETHER = 1.0
 """m: particles all within this of their mean know where they are; others are not asked."""
 ASKED = 50
@@ -26,9 +24,12 @@ class MapTrust:
     that do not fit are the map's fault, and those that do may fit by chance and pull the group astray.
     """
 
-    def __init__(self, field: DistanceField, beyond: npt.NDArray[np.bool_]) -> None:
-        """`beyond` (flat, as the field's table) are the places of which the map says nothing."""
-        self._field = field
+    def __init__(self, field: DistanceField, beyond: npt.NDArray[np.bool_], none: float, full: float) -> None:
+        """`beyond` (flat, as the field's table) are the places of which the map says nothing.
+
+        A scan counts for nothing up to the share `none` of beams that fit, and in full from the share `full` on.
+        """
+        self._field, self._none, self._full = field, none, full
         self._near, self._told = field.table < NEAR, ~beyond
 
     def of(self, particles: Particles, ends: Array) -> float:
@@ -36,7 +37,9 @@ class MapTrust:
         if not particles.within(TOGETHER):
             return 1.0
         share = self.fit(particles.poses[:: -(-len(particles.poses) // ASKED)], ends, TELLING)
-        return 1.0 if share is None else float(np.clip((share - NOTHING) / (ALL - NOTHING), 0.0, 1.0))
+        if share is None or share >= self._full:
+            return 1.0
+        return max(0.0, (share - self._none) / (self._full - self._none))
 
     def fit(self, poses: Array, ends: Array, telling: float) -> float | None:
         """The share of the beams that fit at `poses` (n, 3), of those that end where the map says anything.
