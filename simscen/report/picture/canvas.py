@@ -153,9 +153,10 @@ class Canvas:
             return
         way = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T)))) * self.scale / dash
         strokes = np.arange(0.0, way[-1], 2.0)
-        for begin in strokes.tolist():
-            at = np.array([begin, *way[(way > begin) & (way < begin + 1)], min(begin + 1, way[-1])])
-            self.line(np.column_stack([np.interp(at, way, points[:, axis]) for axis in (0, 1)]), colour, width)
+        ends = np.column_stack((strokes, np.minimum(strokes + 1, way[-1]))).ravel()
+        corners = self._corners(np.column_stack([np.interp(ends, way, points[:, axis]) for axis in (0, 1)]))
+        for here, there in zip(corners[::2], corners[1::2], strict=True):
+            self._draw.line((here, there), fill=colour, width=_wide(width))
 
     def disc(
         self,

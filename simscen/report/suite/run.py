@@ -3,12 +3,15 @@
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path
+from textwrap import dedent
 
 from simscen.core.result import Outcome, RunKey
 from simscen.core.sessionevents import RunFinished
 from simscen.core.verdict import Finding, Status, Verdict
 from simscen.judge.wording import comparison, spot, subject, tightest, when
 from simscen.report.complaints import broken, complaints, excused, failure, place
+from simscen.report.line import text_of
+from simscen.report.lines import complained
 from simscen.report.suite.bits import anchor, link, marks, pill, sparkline, text
 from simscen.report.suite.history import Before
 from simscen.report.text import command, visible
@@ -157,16 +160,22 @@ def _written(path: str) -> bool:
 
 
 def _more(run: RunFinished, before: Sequence[Before | None]) -> str:
-    """How to see it again, how long it took before, what it is tagged with, and its numbers."""
+    """How to see it again, how long it took before, what it is tagged with, its numbers, and what the console said."""
     again = f'<p class="again">again: <code>{escape(command(run.again))}</code></p>' if run.again else ""
     tags = "".join(f'<span class="tag">{text(tag)}</span> ' for tag in run.tags)
     known = [f"{name} {value:.4g}" for name, value in sorted(run.result.metrics.items()) if value is not None]
-    told = (
-        f'<details class="metrics"><summary>metrics</summary><p>{text(" · ".join(known))}</p></details>'
-        if known
-        else ""
-    )
-    return again + _durations(run, before) + (f"<p>{tags}</p>" if tags else "") + told
+    told = _folded("metrics", f"<p>{text(' · '.join(known))}</p>") if known else ""
+    return again + _durations(run, before) + (f"<p>{tags}</p>" if tags else "") + told + _console(run)
+
+
+def _console(run: RunFinished) -> str:
+    """What the console said of it, to be copied."""
+    said = "\n".join(text_of(line).rstrip() for line in complained(run))
+    return _folded("as the console told it", f'<pre tabindex="0">{escape(visible(dedent(said)))}</pre>') if said else ""
+
+
+def _folded(title: str, inside: str) -> str:
+    return f'<details class="metrics"><summary>{title}</summary>{inside}</details>'
 
 
 def _durations(run: RunFinished, before: Sequence[Before | None]) -> str:

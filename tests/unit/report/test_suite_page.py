@@ -74,6 +74,13 @@ def test_each_violated_criterion_has_a_line_with_its_reason_and_where_it_is_writ
     assert "<td>warning</td><td>speed</td>" in html
 
 
+def test_what_the_console_said_of_a_failure_is_there_to_be_copied(passed, failed):
+    assert "as the console told it" not in to_html(Session([passed]))
+    said = to_html(Session([failed])).partition("as the console told it")[2].partition("</pre>")[0]
+    assert "stopped_within: 0.84 s &gt; 0.50 s after lidar.off, at t = 10.84 s, (2.10, 3.41)\n" in said
+    assert "again     simscen run" in said
+
+
 def test_text_from_outside_makes_no_tag_no_attribute_and_no_link(passed, crashed):
     evil = '"><script>alert(1)</script><img src=x onerror=y>'
     bad = replace(
