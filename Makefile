@@ -14,7 +14,7 @@ LOWEST_TESTS := tests/diagnostics tests/cases $(addprefix tests/unit/,cli loadin
 
 ROS := .venv-ros
 
-.PHONY: help setup run test test-lowest test-long test-ros served library check lint types layers schemas docs mutation screenshots bench campaign fuzz build clean
+.PHONY: help setup run test test-lowest test-long test-ros served library planners check lint types layers schemas docs mutation screenshots bench campaign fuzz build clean
 
 help:  ## Print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -62,6 +62,9 @@ served: setup  ## Compare each shipped scenario with its stack behind the stack 
 
 library: setup  ## Run each shipped scenario with twenty seeds, and write what came of it into the docs (minutes)
 	@$(BIN)/python tests/scenarios/twenty_seeds.py
+
+planners: setup  ## Compare all planners on the same ways, and write the figures into the docs (minutes)
+	@$(BIN)/python tests/planning/compare.py
 
 check: lint types layers schemas  ## Lint, types, layers, drift of schemas and docs
 

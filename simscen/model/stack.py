@@ -309,7 +309,7 @@ class OmplPlanner(PlannerSpec):
     allow_unknown: bool = True
     """Whether plans may lead over what is not known, as dear as what is barely free."""
     cost_travel_multiplier: Annotated[float, Field(ge=0, le=100)] = 2.0
-    """A metre of way costs 1 + this times its cost / 252 (nav2_smac_planner's name, meaning and default)."""
+    """A metre of way costs 1 + this times its cost / 252 (nav2_smac_planner's name and meaning; its default is 1)."""
     sampler: Literal["auto", "uniform", "medial_axis", "corridor"] = "auto"
     """Where it searches; auto: medial_axis for bit_star, which alone can, else uniform."""
     max_iterations: Iterations = 50_000
@@ -328,7 +328,40 @@ class OmplPlanner(PlannerSpec):
         return self
 
 
-Planner = Annotated[PlannerSpec, ByType("planner", OmplPlanner)]
+class Navfn(PlannerSpec):
+    """nav2_navfn_planner: the cheapest way over the cells of the costmap, by Dijkstra."""
+
+    component: ClassVar[str] = "simscen.stack.planners.grid_planner:navfn"
+    type: Literal["navfn"]
+    allow_unknown: bool = True
+    """Whether plans may lead over what is not known, as dear as what is barely free."""
+
+
+class Smac2d(PlannerSpec):
+    """nav2_smac_planner::SmacPlanner2D: the cheapest way from cell to neighbouring cell."""
+
+    component: ClassVar[str] = "simscen.stack.planners.grid_planner:smac_2d"
+    type: Literal["smac_2d"]
+    tolerance: NonNegativeLength = 0.125
+    """How far from an unreachable goal the plan may end."""
+    allow_unknown: bool = True
+    """Whether plans may lead over what is not known, as dear as what is barely free."""
+    cost_travel_multiplier: Annotated[float, Field(ge=0, le=100)] = 1.0
+    """A metre of way costs 1 + this times its cost / 252."""
+    smooth_path: bool = True
+    """Whether the corners of the cells are taken out of the path."""
+
+
+def _planner(value: Any) -> str | None:
+    kind = value.get("type", "bit_star") if isinstance(value, dict) else getattr(value, "type", None)
+    return kind if kind in ("navfn", "smac_2d") else "ompl"
+
+
+_Planners = Annotated[
+    Annotated[OmplPlanner, Tag("ompl")] | Annotated[Navfn, Tag("navfn")] | Annotated[Smac2d, Tag("smac_2d")],
+    Discriminator(_planner),
+]
+Planner = Annotated[PlannerSpec, ByType("planner", _Planners)]
 
 
 class GoalCheckerSpec(GoalTolerances, Typed):
@@ -593,7 +626,11 @@ LOCALIZERS = {
     "ground_truth": _HERE + "GroundTruth",
     "odometry": _HERE + "OdometryOnly",
 }
-PLANNERS = dict.fromkeys(get_args(OmplPlanner.model_fields["type"].annotation), _HERE + "OmplPlanner")
+PLANNERS = {
+    **dict.fromkeys(get_args(OmplPlanner.model_fields["type"].annotation), _HERE + "OmplPlanner"),
+    "navfn": _HERE + "Navfn",
+    "smac_2d": _HERE + "Smac2d",
+}
 BEHAVIORS = {
     "clear_costmap": _HERE + "ClearCostmap",
     "spin": _HERE + "Spin",

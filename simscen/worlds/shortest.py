@@ -13,8 +13,8 @@ from simscen.core.navigation import Goal
 from simscen.core.passage import Passage
 from simscen.core.shapes import TriangleMesh
 from simscen.core.world import BuiltWorld
+from simscen.ways.lattice import Lattice, Numbers
 from simscen.worlds.clearance import HALF_DIAGONAL, clearance_field
-from simscen.worlds.lattice import Lattice, Numbers
 from simscen.worlds.narrowest import narrowest_of
 from simscen.worlds.passages import passage_of, passages
 from simscen.worlds.slicing import empty_grid

@@ -5,6 +5,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
+from simscen.model.stack import Navfn, Smac2d
 from simscen.model.stack import OmplPlanner as Spec
 from simscen.stack.protocols import RobotModel
 from simscen.testing import Promise
@@ -17,6 +18,8 @@ SPECS = {
         kind: (Spec(type=kind, max_iterations=5000), round_robot())
         for kind in get_args(Spec.model_fields["type"].annotation)
     },
+    "navfn": (Navfn(type="navfn"), round_robot()),
+    "smac_2d": (Smac2d(type="smac_2d"), round_robot()),
     "long robot": (Spec(), box_robot()),
     "se2": (Spec(state_space="se2"), box_robot(0.9, 0.3)),
     "reeds_shepp": (Spec(), CAR),

@@ -32,7 +32,7 @@ def eased(rates: Rates, points: Array) -> Array:
                 break
         if moved < cost:
             points, cost = other, moved
-    return _smoothed(rates, points, cost)
+    return smoothed(rates, points)
 
 
 def _cut_short(rates: Rates, points: Array) -> Array:
@@ -104,8 +104,9 @@ def _step_costs(rates: Rates, points: Array, stride: float) -> Costs:
     return costs
 
 
-def _smoothed(rates: Rates, points: Array, cost: float) -> Array:
-    """Corners rounded as long as that costs next to nothing."""
+def smoothed(rates: Rates, points: Array) -> Array:
+    """The path (n, 2) with its corners rounded, as long as that costs next to nothing."""
+    cost = rates.along(points)
     for _ in range(SMOOTHINGS):
         other = points.copy()
         other[1:-1] += 0.5 * (0.5 * (points[:-2] + points[2:]) - points[1:-1])

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from simscen.worlds.lattice import Lattice
+from simscen.ways.lattice import Lattice
 
 
 def blocked(shape, *cells):

@@ -6,17 +6,23 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from simscen.worlds.raster import Cells
-
-MOVES = [(a, b) for a in range(-2, 3) for b in range(-2, 3) if math.gcd(a, b) == 1]
-"""(rows, columns) to the neighbours and a knight's move away: at most 2.8 % longer than the straight line."""
+Cells = npt.NDArray[np.bool_]
 Numbers = npt.NDArray[np.int64]
+KING = tuple((a, b) for a in range(-1, 2) for b in range(-1, 2) if (a, b) != (0, 0))
+"""(rows, columns) to the eight neighbours: at most 8.2 % longer than the straight line."""
+MOVES = tuple((a, b) for a in range(-2, 3) for b in range(-2, 3) if math.gcd(a, b) == 1)
+"""These and a knight's move away: at most 2.8 % longer."""
 
 
 class Lattice:
-    """The free cells of a grid and the moves between them; the outermost two rows and columns are never free."""
+    """The free cells of a grid and the moves between them; the outermost two rows and columns are never free.
 
-    def __init__(self, free: Cells) -> None:
+    A move costs its length in cells, times the mean of the `prices` (rows, columns) of its two ends.
+    """
+
+    def __init__(
+        self, free: Cells, moves: Sequence[tuple[int, int]] = MOVES, prices: npt.NDArray[np.floating] | None = None
+    ) -> None:
         from scipy.sparse import csr_array
 
         inner = np.zeros_like(free)
@@ -26,13 +32,16 @@ class Lattice:
         self._cells = np.flatnonzero(flat)
         self._number: npt.NDArray[np.int32] = np.full(flat.size, -1, dtype=np.int32)
         self._number[self._cells] = np.arange(len(self._cells), dtype=np.int32)
-        possible = np.empty((len(self._cells), len(MOVES)), dtype=np.bool_)
-        for k, move in enumerate(MOVES):
+        possible = np.empty((len(self._cells), len(moves)), dtype=np.bool_)
+        for k, move in enumerate(moves):
             possible[:, k] = flat[self._cells + self._step(move)]
             for passed in _passed(move):
                 possible[:, k] &= flat[self._cells + self._step(passed)]
-        targets = self._number[self._cells[:, None] + np.array([self._step(move) for move in MOVES])]
-        lengths = np.array([math.hypot(*move) for move in MOVES])
+        targets = self._number[self._cells[:, None] + np.array([self._step(move) for move in moves])]
+        lengths: npt.NDArray[np.floating] = np.array([math.hypot(*move) for move in moves])
+        if prices is not None:
+            price = prices.ravel()[self._cells]
+            lengths = 0.5 * (price[:, None] + price[targets]) * lengths
         begins: npt.NDArray[np.int32] = np.zeros(len(self._cells) + 1, dtype=np.int32)
         np.cumsum(possible.sum(axis=1), out=begins[1:])
         data = np.broadcast_to(lengths, possible.shape)[possible]

@@ -1,0 +1,70 @@
+"""Nav2's planners over cells, beside those of OMPL: the cheapest way there is on the grid, for a disc."""
+
+import numpy as np
+
+from simscen.core.geometry import Array, Pose2
+from simscen.core.navigation import ErrorCode, Path
+from simscen.model.stack import Navfn, Smac2d
+from simscen.stack.planners.ends import Ends, find_ends
+from simscen.stack.planners.finish import SPACING, spaced, with_headings
+from simscen.stack.planners.rates import MAX_NON_OBSTACLE, Rates
+from simscen.stack.planners.tube import smoothed
+from simscen.stack.protocols import CostmapView, NavigationFailure, Planner, RobotModel
+from simscen.stack.setting import Setting
+from simscen.ways.lattice import KING, MOVES, Lattice
+
+COST_FACTOR, COST_NEUTRAL = 0.8, 50
+"""nav2_navfn_planner/navfn.hpp: a cell costs 50 + 0.8 times its cost."""
+BORDER = 2
+"""Cells at the edge of a lattice that no way leads over: so many are laid around the costmap."""
+
+
+def navfn(spec: Navfn, setting: Setting) -> Planner:
+    """Moves in 16 directions, in place of the descent along navfn's potential."""
+    multiplier = COST_FACTOR * MAX_NON_OBSTACLE / COST_NEUTRAL
+    return GridPlanner(spec.tolerance, multiplier, spec.allow_unknown, MOVES, True, setting.robot)
+
+
+def smac_2d(spec: Smac2d, setting: Setting) -> Planner:
+    """Moves to the eight neighbours, as SmacPlanner2D's Moore neighbourhood."""
+    return GridPlanner(
+        spec.tolerance, spec.cost_travel_multiplier, spec.allow_unknown, KING, spec.smooth_path, setting.robot
+    )
+
+
+class GridPlanner:
+    """Dijkstra over the cells: the same path whatever the seed."""
+
+    def __init__(
+        self,
+        tolerance: float,
+        multiplier: float,
+        allow_unknown: bool,
+        moves: tuple[tuple[int, int], ...],
+        smooth: bool,
+        robot: RobotModel,
+    ) -> None:
+        self._tolerance, self._multiplier, self._allow_unknown = tolerance, multiplier, allow_unknown
+        self._moves, self._smooth, self._robot = moves, smooth, robot
+
+    def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
+        """A path of poses in the map frame, 5 cm apart."""
+        rates = Rates(costmap, self._robot, self._multiplier, self._allow_unknown)
+        ends = find_ends(rates, start, goal, self._tolerance)
+        cells = self._over(rates, ends)
+        way = np.vstack((ends.start, cells[1:-1], ends.goal))
+        way = smoothed(rates, way) if self._smooth else way
+        return Path(with_headings(spaced(np.vstack(((start.x, start.y), way)), SPACING), goal))
+
+    def _over(self, rates: Rates, ends: Ends) -> Array:
+        """The middles (n, 2) of the cells of the cheapest way."""
+        lattice = Lattice(np.pad(ends.reachable, BORDER), self._moves, np.pad(rates.rates, BORDER))
+        first, last = (
+            tuple(int((point[axis] - rates.origin[axis]) / rates.resolution) + BORDER for axis in (1, 0))
+            for point in (ends.start, ends.goal)
+        )
+        cells = lattice.way((first[0], first[1]), (last[0], last[1]))
+        if cells is None:
+            raise NavigationFailure(ErrorCode.NO_VALID_PATH, "no way over the cells of the costmap")
+        middles: Array = (cells[:, ::-1] - BORDER + 0.5) * rates.resolution + np.array(rates.origin)
+        return middles
