@@ -24,7 +24,7 @@ class SessionStarted:
     """The first event: `total` runs of `scenarios` files will be spread over `workers` processes.
 
     `ids` are the scenarios' ids, each of its variations for itself where it has some; `stacks` are the NAME=VALUE of
-    those that take the place of the scenarios' own.
+    those that take the place of the scenarios' own. `twice` = each run has a second one that must be equal.
     """
 
     version: str
@@ -34,6 +34,7 @@ class SessionStarted:
     folder: str = ""
     ids: tuple[str, ...] = ()
     stacks: tuple[str, ...] = ()
+    twice: bool = False
 
 
 def started(
@@ -42,7 +43,8 @@ def started(
     """The first event of a session of these runs."""
     ids = tuple(sorted({key.test for key in runs}))
     scenarios = len({key.scenario for key in runs})
-    return SessionStarted(version, len(runs), scenarios, workers, str(folder), ids, stacks)
+    twice = any(key.repeats for key in runs)
+    return SessionStarted(version, len(runs), scenarios, workers, str(folder), ids, stacks, twice)
 
 
 @dataclass(frozen=True)

@@ -3,11 +3,12 @@
 import io
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 from simscen.core.result import Outcome, RunFailure, RunKey
-from simscen.core.sessionevents import SessionFinished, SessionStarted
+from simscen.core.sessionevents import SessionFinished, SessionStarted, started
 from simscen.core.verdict import Finding, Status, Verdict
 from simscen.report.console import text_reporter
 from simscen.report.line import text_of
@@ -129,6 +130,13 @@ def test_the_slowest_are_listed_by_wall_time(session, passed, failed, crashed):
     ]
     everything = told([passed, failed, crashed, session[-1]], slow=0)
     assert sum("s simulated" in line and line.startswith("    ") for line in everything) == 3
+
+
+def test_second_runs_stand_in_the_same_column(passed):
+    pair = [keyed(passed, 1, "navigation/goal"), keyed(passed, 1, "navigation/goal", again=True)]
+    key = pair[0].key
+    _, first, second = told([started("0.1.0", [key, key.twin], 1, Path("out"), ()), *pair])
+    assert first.index("18.2 s") == second.index("18.2 s")
 
 
 def test_equal_logs_are_said_to_be_equal(session, failed, passed):
