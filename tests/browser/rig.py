@@ -31,9 +31,15 @@ class Opened:
 
     def until(self, holds: str) -> None:
         """Wait until an expression holds; Playwright's own way needs `eval`, which a strict policy forbids."""
+        from playwright.sync_api import Error  # those who have no browser skip
+
         for _ in range(PATIENCE // 20):
-            if self.page.evaluate(holds):
-                return
+            try:
+                if self.page.evaluate(holds):
+                    return
+            except Error as error:
+                if "context was destroyed" not in str(error):  # a page that loads itself anew
+                    raise
             self.page.wait_for_timeout(20)
         raise AssertionError(f"never held: {holds}")
 

@@ -1,6 +1,6 @@
 // A map that can be moved: drag, wheel, pinch, keys. Maps side by side share their camera.
 import { drawRun } from "./draw.js";
-import { el } from "./dom.js";
+import { el, fill } from "./dom.js";
 
 const STEP = 60;
 
@@ -26,7 +26,8 @@ export class MapView {
       onkeydown: (event) => this.#key(event),
     });
     const letter = run.letter ? el("span", { class: `pill letter ${run.outcome}`, "aria-hidden": "true" }, run.letter) : null;
-    this.element = el("div", { class: "map" }, this.canvas, this.spot, ...(letter ? [letter] : []));
+    this.chips = el("div", { class: "chips" });
+    this.element = el("div", { class: "map" }, this.canvas, this.spot, el("div", { class: "corner" }, letter, this.chips));
   }
 
   /** Pixels of the page. */
@@ -40,7 +41,16 @@ export class MapView {
     if (this.canvas.width !== across || this.canvas.height !== along) [this.canvas.width, this.canvas.height] = [across, along];
     const context = this.canvas.getContext("2d");
     context.setTransform(dense, 0, 0, dense, 0, 0);
+    this.#tell(tick);
     drawRun({ context, width, height, camera: this.camera, colours, theme, layers, marked }, this.run, tick);
+  }
+
+  /** Faults at work and recoveries under way, in words. */
+  #tell(tick) {
+    const going = ["faults", "recoveries"].flatMap((lane) => this.run.going(lane, tick)), key = going.map((event) => event.number).join(" ");
+    if (key === this.told_) return;
+    this.told_ = key;
+    fill(this.chips, ...going.map((event) => el("span", { class: `chip ${event.lane}` }, [event.robot, event.name].filter(Boolean).join(": "))));
   }
 
   /** Everything worth seeing: the known part of the map, the ways, the goals. */
