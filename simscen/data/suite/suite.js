@@ -4,7 +4,11 @@
   const groups = [...list.children], runs = [...list.querySelectorAll(".run")];
   const field = name => form.elements[name];
   const statuses = [...form.querySelectorAll("[name=status]")];
-  const words = new Map(runs.map(run => [run, run.textContent.toLowerCase() + " " + run.id]));
+  const texts = new Map();
+  function words(run) { // gathered when somebody searches: thousands of runs open sooner
+    if (!texts.has(run)) texts.set(run, run.textContent.toLowerCase() + " " + run.id);
+    return texts.get(run);
+  }
   const place = new Map([...groups, ...runs].map((one, number) => [one, number]));
 
   function wanted() {
@@ -18,7 +22,7 @@
       return shown.has(data.status) && (!theme || data.theme === theme) && (!stack || data.stack === stack)
         && (!variation || data.variation === variation) && (!changed || data.changed)
         && (!tag || (data.tags || "").split(" ").includes(tag))
-        && find.every(word => words.get(run).includes(word));
+        && find.every(word => words(run).includes(word));
     };
   }
 
@@ -33,8 +37,8 @@
     const compare = (a, b) => (name ? a.id.localeCompare(b.id) : of(a) - of(b)) || place.get(a) - place.get(b);
     const first = new Map();
     for (const group of groups) {
-      const own = [...group.querySelectorAll(".run")].sort(compare);
-      group.append(...own);
+      const own = [...group.querySelectorAll(".run")];
+      if (own.length > 1) group.append(...own.sort(compare));
       first.set(group, order ? own.find(run => !run.hidden) || own[0] : group);
     }
     list.append(...[...groups].sort((a, b) => compare(first.get(a), first.get(b))));
