@@ -238,8 +238,6 @@ class Mppi(ControllerSpec):
     """Whether it takes its last command for the velocity that the robot has."""
     sgf_order: Annotated[int, Field(ge=1, le=2)] = 2
     """Of the Savitzky-Golay filter that smooths commands: 2 keeps their bends, 1 is a mean of nine."""
-    prune_distance: PositiveLength = 2.0
-    """How much of the plan ahead it looks at; no less than it can drive in its samples."""
     critics: Annotated[list[CriticName], Field(min_length=1, max_length=10)] | None = None
     """Which are asked; default: all but ObstaclesCritic, as in Nav2, and TwirlingCritic only with the Omni model."""
     ConstraintCritic: MppiConstraintCritic = by_default()

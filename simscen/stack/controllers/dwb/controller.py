@@ -59,6 +59,8 @@ class DynamicWindowController(PathFollower):
             return STOP
         spec, kinematics = self._spec, self._base.scaled(self._share)
         velocities = window(kinematics, twist, spec.sim_time, self._samples)
+        if not len(velocities):
+            raise NavigationFailure(ErrorCode.NO_VALID_CONTROL, "the limits leave no velocity")
         poses = trajectories(
             pose, twist, velocities, kinematics, spec.sim_time, spec.linear_granularity, spec.angular_granularity
         )

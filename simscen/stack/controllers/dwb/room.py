@@ -35,7 +35,6 @@ class Room:
         if not free.any():
             free = self._footprint.free(costmap, poses.reshape(-1, 3)).reshape(gaps.shape).all(axis=1)
         if not free.any() and self._footprint.clearance(costmap, np.array([pose]))[0] <= 0.0:
-            free = (gaps[:, -1] > gaps[:, 0] + 0.5 * costmap.resolution) & (
-                gaps.min(axis=1, initial=np.inf) >= gaps[:, 0]
-            )
+            no_nearer = (gaps >= gaps[:, :1]).all(axis=1)
+            free = no_nearer & (gaps[:, -1] > gaps[:, 0] + 0.5 * costmap.resolution)
         return int(free.argmax()) if free.any() else None

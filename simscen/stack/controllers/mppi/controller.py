@@ -29,8 +29,9 @@ from simscen.stack.setting import Setting
 Floats = npt.NDArray[np.float32]
 SURE = 0.5
 """Seconds that the command itself must be free of collisions for."""
-BEYOND = 1.0
-"""Metres of plan beyond what the rollouts reach, for the critics that look at points further on."""
+LEAST, BEYOND = 2.0, 1.0
+"""Metres of plan that it looks at, at least, which is Nav2's prune_distance; and beyond what the rollouts
+reach, for the critics that look at points further on."""
 SPREAD = 0.5
 """Standard deviation of the sampled speeds, of the greatest. What draws the speed up grows with its square, what holds
 it back (gamma) with the speed: Nav2's 0.2 m/s comes to rest at about 0.5 m/s, whatever the limit."""
@@ -54,7 +55,7 @@ class MppiController(PathFollower):
         self._period, self._shift = setting.control_period, setting.control_period / spec.model_dt
         self._goal_pose = GoalPose(robot, spec.wz_max, robot.angular_acceleration, setting.control_period)
         self._free_way = FreeWay(setting.footprint)
-        self._reach = max(spec.prune_distance, self._fastest * spec.time_steps * spec.model_dt + BEYOND)
+        self._reach = max(LEAST, self._fastest * spec.time_steps * spec.model_dt + BEYOND)
         self._forget()
 
     def _forget(self) -> None:
@@ -136,7 +137,8 @@ class MppiController(PathFollower):
         delay(velocities, self._sent, self._delays)
         costs, all_hit = self._judgement.costs(seen(integrated(velocities, self._pose.yaw, dt)))
         for axis, deviation in enumerate(self._std.tolist()):
-            costs += spec.gamma / deviation**2 * (self._sequence[axis] @ self._noise[axis])
+            if deviation > 0.0:
+                costs += spec.gamma / deviation**2 * (self._sequence[axis] @ self._noise[axis])
         weights = np.exp((costs.min() - costs) / spec.temperature)
         weights /= weights.sum()
         average = controls @ weights.astype(np.float32)
