@@ -52,11 +52,12 @@ class LocalizerSpec(Typed):
 AMCL_PARAMETERS: Mapping[str, Mapping[str, object]] = {
     "default": {},
     "nav2": {
-        "laser_model_type": "likelihood_field", "likelihood_exponent": 1.0, "beams_beyond_the_map": "miss",
-        "map_trust_none": 0.0, "map_trust_full": 0.0, "match_scans": False, "relocalization": "random",
+        "laser_model_type": "likelihood_field", "sigma_hit": 0.2, "likelihood_exponent": 1.0,
+        "beams_beyond_the_map": "miss", "map_trust_none": 0.0, "map_trust_full": 0.0,
+        "match_scans": False, "relocalization": "random",
     },
     "consistent": {
-        "alpha1": 0.0005, "alpha2": 0.0005, "alpha3": 0.0005, "alpha4": 0.0005, "alpha5": 0.0005, "sigma_hit": 0.1,
+        "alpha1": 0.0005, "alpha2": 0.0005, "alpha3": 0.0005, "alpha4": 0.0005, "alpha5": 0.0005,
         "likelihood_exponent": 1.0, "map_trust_none": 0.85, "map_trust_full": 1.0,
     },
 }  # fmt: skip
@@ -108,7 +109,7 @@ class Amcl(Ranged, LocalizerSpec):
     """Weight of beams without an answer; the `beam` model only."""
     z_rand: Probability = 0.5
     """Weight of beams that end anywhere."""
-    sigma_hit: PositiveLength = 0.2
+    sigma_hit: PositiveLength = 0.1
     """Standard deviation of the ends of beams that hit an obstacle of the map."""
     lambda_short: Annotated[float, Field(gt=0, le=100)] = 0.1
     """How fast short beams get rarer with their length, for each metre; the `beam` model only."""

@@ -50,9 +50,6 @@ pass:
 
 
 FINDS_ITSELF = """\
-stack:
-  localizer: {type: amcl, max_particles: 5000, recovery_alpha_slow: 0.001, recovery_alpha_fast: 0.1}
-  recovery: {number_of_retries: 20}
 goals:
   - {pose: kitchen, timeout: 200 s}
 time_limit: 210 s
@@ -61,8 +58,7 @@ pass:
   - localization_error: {final: 0.2 m}
   - collisions: {max: 0, caused_by_robot: true}
 """
-"""A stack set up for a robot that may be lost: augmented MCL with particles for a whole flat, and patience, for plans
-from where the robot is not fail, and it is the turning of the recoveries that shows it where it is."""
+"""With all defaults: it is the turning of the recoveries that shows a robot that stands where it is."""
 
 
 def start_unknown() -> str:
