@@ -1,4 +1,7 @@
-"""The last word before the base: nav2_collision_monitor on the raw scan, knowing nothing of map or costmap."""
+"""The last word before the base: nav2_collision_monitor on the raw scan, knowing nothing of map or costmap.
+
+What motion prediction tells of things that move is met where both will be: APPROACH by the relative velocity.
+"""
 
 import math
 from dataclasses import dataclass
@@ -10,6 +13,8 @@ from simscen.core.motion import STOP, Twist
 from simscen.core.sensing import Scan
 from simscen.model.stack import CollisionMonitor as MonitorSpec
 from simscen.stack.arcs import poses_along
+from simscen.stack.costmap.obstacle_layer import ScanAmongMoving
+from simscen.stack.prediction.moving import Moving, nothing
 from simscen.stack.protocols import RobotModel
 
 STEPS = 8
@@ -35,6 +40,7 @@ class CollisionMonitor:
         """For how long it may allow nothing until that is a failure."""
         self._seen = dict.fromkeys(lidars, 0)
         self._scans: dict[str, Seen] = {}
+        self._moving = nothing()
         corners = np.array(robot.footprint, dtype=np.float64)
         ends = np.roll(corners, -1, axis=0)
         normal = np.column_stack((ends[:, 1] - corners[:, 1], corners[:, 0] - ends[:, 0]))
@@ -54,6 +60,10 @@ class CollisionMonitor:
         nearest = float(scan.ranges.min(where=answers, initial=math.inf))
         self._scans[scan.sensor] = Seen(scan, odometry, nearest - math.hypot(scan.mount.x, scan.mount.y))
 
+    def on_moving(self, moving: Moving) -> None:
+        """What moves around the robot now, in its base frame; beams that hit it are left to this."""
+        self._moving = moving
+
     def silent(self, tick: int) -> bool:
         """Whether a lidar has not been heard for `source_timeout`."""
         return self._spec.enabled and any(tick - seen > self._timeout for seen in self._seen.values())
@@ -66,6 +76,8 @@ class CollisionMonitor:
         scale = 1.0
         for seen in self._scans.values():
             scale = min(scale, self._time_free(seen, wanted, odometry, horizon) / horizon)
+        if len(self._moving):
+            scale = min(scale, self._time_unmet(wanted, horizon) / horizon)
         if scale >= 1.0:
             return wanted
         return Twist(wanted.vx * scale, wanted.vy * scale, wanted.wz * scale) if scale > 0.0 else STOP
@@ -87,6 +99,21 @@ class CollisionMonitor:
         when = touched.sum(axis=1) >= self._spec.min_points
         return float(times[int(when.argmax())]) if when.any() else horizon
 
+    def _time_unmet(self, wanted: Twist, horizon: float) -> float:
+        """Seconds until something that moves would be within the stop margin of the hull, both on their ways.
+
+        The whole horizon where a robot that stood would be met as soon: to brake for that is no help.
+        """
+        times = np.linspace(0.0, horizon, STEPS + 1)
+        centres, least = self._moving.at(times), self._moving.radii + self._spec.stop_margin
+        met = []
+        for twist in (wanted, STOP):
+            poses = poses_along(Pose2(0.0, 0.0), twist, times)
+            gaps = np.stack([self._gaps(centres[:, k], poses[k : k + 1])[0] for k in range(len(times))]) - least
+            touched = ((gaps[1:] < 0.0) & (gaps[1:] < gaps[0] - 1e-4)).any(axis=1)
+            met.append(float(times[int(touched.argmax())]) if touched.any() else horizon)
+        return met[0] if met[0] < met[1] else horizon
+
     def _gaps(self, points: Array, poses: Array) -> Array:
         """Distance (poses, points) from the hull's edge at each pose to each point; negative inside.
 
@@ -105,6 +132,7 @@ class CollisionMonitor:
 def _points_within(scan: Scan, reach: float) -> Array:
     """The hits (n, 2) at most `reach` metres from the base, in its frame; few of a scan, so little to compute."""
     most = reach + math.hypot(scan.mount.x, scan.mount.y)
-    near = np.flatnonzero((scan.ranges >= scan.range_min) & (scan.ranges <= min(most, scan.range_max)))
+    hits = (scan.ranges >= scan.range_min) & (scan.ranges <= min(most, scan.range_max))
+    near = np.flatnonzero(hits & ~scan.moving if isinstance(scan, ScanAmongMoving) else hits)
     angles, ranges = scan.angle_min + scan.angle_increment * near, scan.ranges[near]
     return scan.mount.apply(np.column_stack((ranges * np.cos(angles), ranges * np.sin(angles))))

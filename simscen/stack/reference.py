@@ -110,6 +110,7 @@ class ReferenceStack:
         controls = tick % self._control_period == 0
         if controls:
             self._update_costmaps(tick)
+            self._monitor.on_moving(self._prediction.around(tick))
             self._control(tick)
         self._commands.step(tick, self._odometry.now)
         sent = self._commands.sent
@@ -147,9 +148,10 @@ class ReferenceStack:
                 case _:
                     pass
         for scan in scans:  # after all odometry of this beat, wherever that stands among the readings
-            self._monitor.on_scan(scan, self._odometry.at(scan.tick))
             self._prediction.on_scan(scan)
-            self._costmaps.see(self._prediction.marking(scan))
+            marking = self._prediction.marking(scan)
+            self._monitor.on_scan(marking, self._odometry.at(scan.tick))
+            self._costmaps.see(marking)
         return bool(scans)
 
     def _match(self) -> None:

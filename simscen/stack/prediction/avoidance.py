@@ -52,11 +52,6 @@ class Avoidance:
         self._repertoire = Repertoire(robot, self._speed)
         self._last: Twist | None = None
 
-    @property
-    def active(self) -> bool:
-        """Whether the last command was changed."""
-        return self._last is not None
-
     def rest(self) -> None:
         """Nothing moves."""
         self._last = None

@@ -75,10 +75,10 @@ class MotionPrediction:
             self._spec.acceleration,
         )
 
-    @property
-    def evading(self) -> bool:
-        """Whether the last command was not the one that was wanted."""
-        return self._avoidance.active
+    def around(self, tick: int) -> Moving:
+        """What moves at a tick, in the base frame."""
+        moving = self.moving(tick)
+        return moving.seen_from(self._rolled.now) if len(moving) else moving
 
     def steer(
         self, tick: int, wanted: Twist, pose: Pose2, twist: Twist, costmap: CostmapView, plan: Path | None

@@ -3,15 +3,19 @@
 import math
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.core.motion import STOP
+from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import Goal
 from simscen.model.controllers import DynamicWindow, RegulatedPurePursuit
 from simscen.model.controllerspec import ControllerSpec
 from simscen.model.mppi import Mppi
+from simscen.model.stack import CollisionMonitor as CollisionMonitorSpec
 from simscen.model.stack import Costmap, GroundTruth, Prediction, StackSpec
+from simscen.stack.collision_monitor import CollisionMonitor
+from simscen.stack.prediction.moving import Moving
 from simscen.testing.flatland import RATE, Drive, Flatland, box_robot, drive
 
 Disc = tuple[float, float, float]
@@ -111,3 +115,20 @@ def test_where_nothing_moves_switching_it_off_changes_nothing() -> None:
     with_it, without = (start(near, controller=slow, enabled=on, world=world).run(15.0) for on in (True, False))
     assert with_it.result == "SUCCEEDED"
     assert with_it.commands == without.commands
+
+
+def test_the_collision_monitor_brakes_by_the_relative_velocity_and_only_where_braking_helps() -> None:
+    robot = box_robot()
+    monitor = CollisionMonitor(CollisionMonitorSpec(), robot, (), RATE)
+    still = np.zeros((1, 4, 4))
+
+    def told(x: float, y: float, vx: float, vy: float) -> float:
+        monitor.on_moving(Moving(np.array([[x, y]]), np.array([[vx, vy]]), np.array([0.5]), still, 1.0))
+        return monitor.allow(Twist(1.0, 0.0, 0.0), Pose2(0.0, 0.0)).vx
+
+    assert told(1.0, 0.0, 1.0, 0.0) == 1.0  # it goes as fast as the robot
+    standing = told(1.0, 0.0, 0.0, 0.0)
+    assert standing == pytest.approx(0.27 / 0.5, abs=0.13)  # it stands, 0.27 s ahead
+    assert told(1.0, 0.0, -1.0, 0.0) < standing  # it comes
+    assert told(0.8, -1.2, 0.0, 1.2) < 1.0  # it crosses, and would be hit
+    assert told(-1.0, 0.0, 1.5, 0.0) == 1.0  # it comes from behind: standing would be worse
