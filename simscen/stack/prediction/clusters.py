@@ -12,6 +12,8 @@ GAP, SPARSE = 0.15, 2.5
 """Two hits belong together when they are no farther apart than this many metres, or times the spacing of beams."""
 MISSED = 2
 """Beams that may miss within a piece."""
+VALLEY = 0.1
+"""Metres by which the range must rise between two things that touch, as the scan sees them."""
 FEWEST = 3
 """Hits of a piece that is looked at."""
 STEPS = 4
@@ -59,6 +61,7 @@ def clusters(ranges: Array, angles: Array, least: float, most: float, largest: f
     together = (apart <= np.maximum(GAP, SPARSE * step * np.minimum(r[1:], r[:-1]))) & (np.diff(beams) <= MISSED + 1)
     breaks = np.flatnonzero(~together)
     first, last = np.concatenate(([0], breaks + 1)), np.concatenate((breaks, [len(beams) - 1]))
+    first, last = _parted(r, first, last)
     long = last - first + 1 >= FEWEST
     first, last = first[long], last[long]
     half = (a[last] - a[first] + step) / 2
@@ -73,6 +76,29 @@ def clusters(ranges: Array, angles: Array, least: float, most: float, largest: f
         seen = np.where(ranges >= least, ranges, 0.0)
     whole = _clear(seen, beams[first] - 1, r[first], full_circle) & _clear(seen, beams[last] + 1, r[last], full_circle)
     return Clusters(points, beams, first, last, centres, radii, whole)
+
+
+def _parted(ranges: Array, first: Indices, last: Indices) -> tuple[Indices, Indices]:
+    """Pieces cut where two things that touch meet: there the range is greater than somewhere to either side.
+
+    Along one convex thing it falls to its nearest point and then rises, whatever its shape.
+    """
+    edges = list(zip(first.tolist(), last.tolist(), strict=True))
+    parted: list[tuple[int, int]] = []
+    while edges:
+        begin, end = edges.pop()
+        if end - begin + 1 >= 2 * FEWEST:
+            piece = ranges[begin : end + 1]
+            before, after = np.minimum.accumulate(piece), np.minimum.accumulate(piece[::-1])[::-1]
+            rise = piece - np.maximum(before, after)
+            valley = int(rise.argmax())
+            if rise[valley] > VALLEY:
+                edges += [(begin, begin + valley), (begin + valley + 1, end)]
+                continue
+        parted.append((begin, end))
+    parted.sort()
+    cut: Indices = np.array(parted, dtype=np.int64).reshape(-1, 2)
+    return cut[:, 0], cut[:, 1]
 
 
 def _clear(seen: Array, beam: Indices, edge: Array, full_circle: bool) -> npt.NDArray[np.bool_]:

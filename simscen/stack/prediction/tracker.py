@@ -43,6 +43,8 @@ MOSTLY = 0.6
 does not."""
 RESTED = 0.5
 """Seconds for which something that moved stands until it is a thing like any other."""
+HALF_RADIUS = 0.3
+"""Metres: the least radius of what is half hidden when it is first seen: that of a person."""
 RADIUS_GAIN = 0.3
 """How much a new look at a whole piece changes the radius of a track."""
 
@@ -194,7 +196,7 @@ class Tracker:
 
     def _begin(self, pieces: Clusters, centres: Array, came: npt.NDArray[np.bool_], taken: set[int], tick: int) -> None:
         """Tracks of pieces that no track has taken and that stand where it was free."""
-        new = [piece for piece in np.flatnonzero(came & pieces.whole).tolist() if piece not in taken]
+        new = [piece for piece in np.flatnonzero(came).tolist() if piece not in taken]
         if not new:
             return
         states = np.zeros((len(new), 4))
@@ -206,8 +208,14 @@ class Tracker:
         self._states = np.concatenate((self._states, states))
         self._covariances = np.concatenate((self._covariances, covariances))
         self._tracks += [
-            Track(float(pieces.radii[piece]), centres[piece].copy(), hit_at=tick, fast_at=tick) for piece in new
+            Track(self._first_radius(pieces, piece), centres[piece].copy(), hit_at=tick, fast_at=tick) for piece in new
         ]
+
+    @staticmethod
+    def _first_radius(pieces: Clusters, piece: int) -> float:
+        """Of what is half hidden more may be there than is seen."""
+        radius = float(pieces.radii[piece])
+        return radius if pieces.whole[piece] else max(radius, HALF_RADIUS)
 
     def _judge(self, scan: Scan, lidar: Pose2) -> None:
         """Which tracks move, and which end."""
