@@ -38,6 +38,11 @@ ENDS_UNSEEN, ENDS_HIDDEN, ENDS_UNSURE = 0.35, 2.5, 0.8
 """Seconds without a hit after which a track ends: where the lidar sees through; where it cannot see; and for one that
 was not moving. All end when their place is known worse than this many metres."""
 UNSURE_PLACE = 1.2
+SEEN_WHOLE, FARTHER, TWICE = 5, 0.4, 1.6
+"""One that began beside something that moves has to be seen whole so often, to go so far in m, and to be so many times
+as fast as what moves at the least."""
+LEAST_RADIUS = 0.15
+"""Metres: of such a one."""
 MOSTLY = 0.6
 """Share of the updates of a track that moves in which it stands where it had been free; what hops along a row of posts
 does not."""
@@ -56,7 +61,8 @@ class Track:
     radius: float
     born: Array
     hits: int = 1
-    came: int = 1
+    came: int = 0
+    whole: int = 0
     moving: bool = False
     hit_at: int = 0
     fast_at: int = 0
@@ -175,6 +181,7 @@ class Tracker:
             places.append(place)
             deviations.append(deviation)
             self._tracks[track].came += bool(came[piece])
+            self._tracks[track].whole += bool(pieces.whole[piece])
         if numbers:
             self._states[numbers], self._covariances[numbers] = corrected(
                 self._states[numbers], self._covariances[numbers], np.array(places), np.array(deviations)
@@ -196,7 +203,9 @@ class Tracker:
 
     def _begin(self, pieces: Clusters, centres: Array, came: npt.NDArray[np.bool_], taken: set[int], tick: int) -> None:
         """Tracks of pieces that no track has taken and that stand where it was free."""
-        new = [piece for piece in np.flatnonzero(came).tolist() if piece not in taken]
+        # Among moving things others may, of which a thing that passed hid that they were not there before.
+        also = pieces.radii >= LEAST_RADIUS if self.has_moving else np.zeros(len(came), dtype=bool)
+        new = [piece for piece in np.flatnonzero(came | also).tolist() if piece not in taken]
         if not new:
             return
         states = np.zeros((len(new), 4))
@@ -208,7 +217,14 @@ class Tracker:
         self._states = np.concatenate((self._states, states))
         self._covariances = np.concatenate((self._covariances, covariances))
         self._tracks += [
-            Track(self._first_radius(pieces, piece), centres[piece].copy(), hit_at=tick, fast_at=tick) for piece in new
+            Track(
+                self._first_radius(pieces, piece),
+                centres[piece].copy(),
+                came=int(came[piece]),
+                hit_at=tick,
+                fast_at=tick,
+            )
+            for piece in new
         ]
 
     @staticmethod
@@ -247,9 +263,12 @@ class Tracker:
             track.fast_at = self._tick
         if track.moving:
             track.moving = (self._tick - track.fast_at) / self._rate <= RESTED
-        elif track.came >= max(HITS, MOSTLY * track.hits) and speed > self._spec.min_speed and speed > SURE * noise:
+        elif speed > self._spec.min_speed and speed > SURE * noise:
             x, y = (self._states[number, :2] - track.born).tolist()
-            track.moving = math.hypot(x, y) > TRAVELLED and x * vx + y * vy > 0.0
+            came = track.came >= max(HITS, MOSTLY * track.hits)
+            seen = track.whole >= SEEN_WHOLE and speed > TWICE * self._spec.min_speed
+            travelled = TRAVELLED if came else FARTHER
+            track.moving = (came or seen) and math.hypot(x, y) > travelled and x * vx + y * vy > 0.0
 
     def _visible(self, number: int, scan: Scan, lidar: Pose2) -> bool:
         """Whether the lidar sees past the place where the middle of a track should be."""
