@@ -46,8 +46,9 @@ LEAST_RADIUS = 0.15
 MOSTLY = 0.6
 """Share of the updates of a track that moves in which it stands where it had been free; what hops along a row of posts
 does not."""
-RESTED = 0.5
-"""Seconds for which something that moved stands until it is a thing like any other."""
+RESTED, REMEMBERED = 0.5, 10.0
+"""Seconds for which something that moved stands until it is a thing like any other, and until nobody expects any more
+that it may set off again."""
 HALF_RADIUS = 0.3
 """Metres: the least radius of what is half hidden when it is first seen: that of a person."""
 RADIUS_GAIN = 0.3
@@ -64,6 +65,7 @@ class Track:
     came: int = 0
     whole: int = 0
     moving: bool = False
+    moved: bool = False
     hit_at: int = 0
     fast_at: int = 0
 
@@ -248,7 +250,8 @@ class Tracker:
                 limit = ENDS_UNSEEN
             else:
                 limit = ENDS_HIDDEN
-            rested = not track.moving and (self._tick - track.fast_at) / self._rate > RESTED
+            rests = REMEMBERED if track.moved else RESTED
+            rested = not track.moving and (self._tick - track.fast_at) / self._rate > rests
             if unseen <= limit and spread <= UNSURE_PLACE and not rested:
                 keep.append(number)
         if len(keep) < len(self._tracks):
@@ -263,12 +266,15 @@ class Tracker:
             track.fast_at = self._tick
         if track.moving:
             track.moving = (self._tick - track.fast_at) / self._rate <= RESTED
+        elif speed > self._spec.min_speed and speed > SURE * noise and track.moved:
+            track.moving = True  # it comes back over ground where it has just been
         elif speed > self._spec.min_speed and speed > SURE * noise:
             x, y = (self._states[number, :2] - track.born).tolist()
             came = track.came >= max(HITS, MOSTLY * track.hits)
             seen = track.whole >= SEEN_WHOLE and speed > TWICE * self._spec.min_speed
             travelled = TRAVELLED if came else FARTHER
             track.moving = (came or seen) and math.hypot(x, y) > travelled and x * vx + y * vy > 0.0
+            track.moved = track.moving
 
     def _visible(self, number: int, scan: Scan, lidar: Pose2) -> bool:
         """Whether the lidar sees past the place where the middle of a track should be."""
