@@ -6,7 +6,7 @@ OMPL calls that a mistake in its log, yet it does what is wanted (measured; FACT
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ompl import base as ob
@@ -45,6 +45,21 @@ class Problem:
     bounds: tuple[float, float, float, float]
     motion: Motion
     samples: Array | None = None
+
+
+class _Asked:
+    """Passes questions on until it is told to forget whom it asked: OMPL's bindings leak what is given to them."""
+
+    def __init__(self, motion: Motion) -> None:
+        self._motion: Motion | None = motion
+
+    def __call__(self, ax: float, ay: float, bx: float, by: float) -> float:
+        assert self._motion is not None
+        return self._motion(ax, ay, bx, by)
+
+    def forget(self) -> None:
+        """Let go of the costmap."""
+        self._motion = None
 
 
 class _Motions(ob.MotionValidator):  # type: ignore[misc] # ompl has no types
@@ -121,6 +136,14 @@ def search(kind: str, problem: Problem, seed: int, iterations: int, improving: i
     A planner that improves its path does so for `improving` iterations, or until it has made the best of the samples
     it was given. OMPL's "approximate solution" counts as none.
     """
+    asked = _Asked(problem.motion)
+    try:
+        return _searched(kind, replace(problem, motion=asked), seed, iterations, improving)
+    finally:
+        asked.forget()
+
+
+def _searched(kind: str, problem: Problem, seed: int, iterations: int, improving: int) -> list[Point] | None:
     ou.RNG.setSeed(seed)
     information = _information(problem)
     ends = _state(information, problem.start), _state(information, problem.goal)
