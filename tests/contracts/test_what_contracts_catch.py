@@ -24,13 +24,13 @@ from simscen.core.verdict import Finding, Status
 from simscen.criteria.base import Criterion
 from simscen.criteria.measure import Measure
 from simscen.faults.base import Disturbance, Fault
+from simscen.model.controllers import RegulatedPurePursuit
 from simscen.model.robot import Bumper, Lidar
 from simscen.model.stack import (
     BackUp,
     GroundTruth,
     OdometryOnly,
     OmplPlanner,
-    RegulatedPurePursuit,
     SimpleGoalChecker,
     Spin,
     StackSpec,

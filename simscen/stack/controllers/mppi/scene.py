@@ -58,11 +58,6 @@ class Scene:
         costs = self.costs(*self.path[:2])
         return np.asarray((costs < INSCRIBED) | (costs == UNKNOWN))
 
-    @cached_property
-    def _here(self) -> float:
-        """The clearance of the whole hull now."""
-        return float(self.footprint.clearance(self.costmap, np.array([self.pose]))[0])
-
     def costs(self, x: Floats, y: Floats) -> npt.NDArray[np.uint8]:
         """Costs (…,) at points (…,); 0 off the costmap."""
         rows, columns, on_map = self._cells(x, y)
@@ -72,11 +67,12 @@ class Scene:
     def hit(self, x: Floats, y: Floats, yaw: Floats, whole: bool) -> Mask:
         """Which poses (…,) touch something: with the whole hull, or with its inscribed circle.
 
-        What lies off the costmap is taken for free. A robot that is in collision already may go anywhere but further
-        into it, or it could never get out.
+        What lies off the costmap is taken for free. A robot that is in collision already, or whose discs are as they
+        reach a little beyond its hull, may go anywhere but further into it, or it could never get out.
         """
-        gap = self.gap(x, y, yaw, whole)
-        return np.asarray(gap <= min(0.0, self._here - ESCAPE))
+        origin = np.zeros((1, 1), np.float32)
+        here = float(self.gap(origin, origin, np.full((1, 1), self.pose.yaw, np.float32), whole)[0, 0])
+        return np.asarray(self.gap(x, y, yaw, whole) <= min(0.0, here - ESCAPE))
 
     def gap(self, x: Floats, y: Floats, yaw: Floats, whole: bool) -> Floats:
         """Metres (…,) between the hull, or its inscribed circle, and the nearest obstacle."""

@@ -1,6 +1,7 @@
 """MPPI: the speeds that it reaches, and its parts against numbers worked out by hand from nav2_mppi_controller."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from simscen.stack.controllers.mppi.sequence import later, smoothed, within_limi
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.footprint import Footprint
 from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
-from simscen.testing.flatland import RATE, Flatland, round_robot, setting
+from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot, setting
 
 PERIOD = 0.05
 LIMITS = Limits(0.5, -0.35, 0.5, 1.9, 3.0, -3.0, 3.0, -3.0, 3.5, 0.0)
@@ -187,6 +188,17 @@ def test_a_robot_in_collision_may_go_out_of_it_and_not_further_in() -> None:
     view = view_of((0.15, -3.0, 1.0, 3.0))
     _, hit = critics.cost(model.MppiCostCritic(), scene(along(0.4, -0.4), view))
     assert hit.tolist() == [True, False]
+
+
+def test_a_robot_that_stands_so_near_that_its_discs_touch_may_drive_along() -> None:
+    robot = box_robot()
+    everywhere = np.full((60, 60), 0.16, np.float32)
+    view = CostmapView(np.zeros((60, 60), np.uint8), everywhere, 0.05, (-1.5, -1.5))
+    seen = replace(scene(along(0.3), view), footprint=Footprint(robot, 0.05))
+    gap = seen.gap(seen.rolled.x, seen.rolled.y, seen.rolled.yaw, whole=True)
+    assert gap.max() < 0.0 < Footprint(robot, 0.05).clearance(view, np.array([seen.pose]))[0]
+    _, hit = critics.cost(model.MppiCostCritic(), seen)
+    assert not hit.any()
 
 
 def test_goal_critic_is_the_mean_distance_to_the_end_of_the_plan() -> None:
