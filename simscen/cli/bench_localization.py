@@ -114,7 +114,7 @@ def _belief(row: "Row") -> list[str]:
         low, high = row.anees_bounds[name]
         told = ", ".join(f"{value:.2f} at {when:g} s" for when, value in zip(MOMENTS, row.anees[name], strict=True))
         return (
-            f"  ANEES {'clean' if name == 'clean' else 'slipping'}: {told}; consistent: {low:.2f} … {high:.2f} (95 %)"
+            f"  ANEES {name}: {told}; consistent: {low:.2f} … {high:.2f} (95 %)"
         )
 
     return [row.parameters, *(moments(name) for name in SURE)]
