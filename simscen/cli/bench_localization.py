@@ -113,8 +113,6 @@ def _belief(row: "Row") -> list[str]:
     def moments(name: str) -> str:
         low, high = row.anees_bounds[name]
         told = ", ".join(f"{value:.2f} at {when:g} s" for when, value in zip(MOMENTS, row.anees[name], strict=True))
-        return (
-            f"  ANEES {name}: {told}; consistent: {low:.2f} … {high:.2f} (95 %)"
-        )
+        return f"  ANEES {name}: {told}; consistent: {low:.2f} … {high:.2f} (95 %)"
 
     return [row.parameters, *(moments(name) for name in SURE)]
