@@ -46,9 +46,10 @@ LEAST_RADIUS = 0.15
 MOSTLY = 0.6
 """Share of the updates of a track that moves in which it stands where it had been free; what hops along a row of posts
 does not."""
-RESTED, REMEMBERED = 0.5, 10.0
-"""Seconds for which something that moved stands until it is a thing like any other, and until nobody expects any more
-that it may set off again."""
+RESTED, STOOD, REMEMBERED = 0.5, 1.5, 10.0
+"""Seconds for which something stands until it is no longer followed, if it has not moved; until what moved is a thing
+like any other, for who turns round stands a moment, too; and until nobody expects any more that it may set off again.
+"""
 HALF_RADIUS = 0.3
 """Metres: the least radius of what is half hidden when it is first seen: that of a person."""
 RADIUS_GAIN = 0.3
@@ -265,8 +266,8 @@ class Tracker:
         if speed > self._spec.min_speed:
             track.fast_at = self._tick
         if track.moving:
-            track.moving = (self._tick - track.fast_at) / self._rate <= RESTED
-        elif speed > self._spec.min_speed and speed > SURE * noise and track.moved:
+            track.moving = (self._tick - track.fast_at) / self._rate <= STOOD
+        elif track.moved and speed > self._spec.min_speed and speed > noise:
             track.moving = True  # it comes back over ground where it has just been
         elif speed > self._spec.min_speed and speed > SURE * noise:
             x, y = (self._states[number, :2] - track.born).tolist()

@@ -116,7 +116,7 @@ def test_what_goes_behind_a_pillar_comes_out_as_the_same_and_what_is_gone_is_for
 def test_what_stops_is_a_thing_like_any_other_a_moment_later() -> None:
     watch = Watch(lambda t: [(4.0, -3.0 + 1.2 * min(t, 2.0), 0.5)]).run(1.8)
     assert len(watch.tracker.moving) == 1
-    watch.run(2.0)
+    watch.run(3.0)
     assert len(watch.tracker.moving) == 0
 
 
