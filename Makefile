@@ -14,7 +14,7 @@ LOWEST_TESTS := tests/diagnostics tests/cases $(addprefix tests/unit/,cli loadin
 
 ROS := .venv-ros
 
-.PHONY: help setup run test test-lowest test-long test-ros served library planners check lint types layers schemas docs mutation screenshots bench campaign fuzz build clean
+.PHONY: help setup run test test-lowest test-long test-ros served library planners check lint types layers schemas docs site mutation screenshots bench campaign fuzz build clean
 
 help:  ## Print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -82,6 +82,9 @@ schemas: setup  ## Check that schemas/ and docs/reference/ are what the code say
 
 docs: setup  ## Write schemas/ and docs/reference/ anew
 	@$(BIN)/python -m simscen.cli.generate
+
+site: setup  ## Build the documentation as a site into build/site: a dead link is an error
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 
 mutation: setup  ## Change what decides verdicts, a little at a time: some test must fail each time (long)
 	@nice -n 10 $(BIN)/python tests/mutation/run.py --write

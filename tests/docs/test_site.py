@@ -1,0 +1,54 @@
+"""The site of the documentation: links and anchors lead somewhere, pages are in the nav, nothing asks others."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+LINK = re.compile(r"(?<!!)\[[^\]]*\]\((?!https?:|#)([^)\s#]+)[^)]*\)|!\[[^\]]*\]\((?!https?:)([^)\s]+)\)")
+ASKS = re.compile(
+    r"<(?:script|img|iframe)[^>]*\ssrc=\"?(https?:[^\"> ]*)|<link[^>]*rel=\"?(?:stylesheet|preload)[^>]*(https?:)"
+)
+FRONT = sorted(path.name for path in ROOT.glob("*.md"))
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Built as `make site` builds it: strictly."""
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(folder)]
+    env = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}
+    done = subprocess.run(command, cwd=ROOT, env=env, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder
+
+
+def test_each_page_is_built_and_asks_nobody_for_anything(site: Path) -> None:
+    for page in (ROOT / "docs").rglob("*.md"):
+        place = site / page.relative_to(ROOT / "docs")
+        html = place.parent / "index.html" if page.stem == "index" else place.with_suffix("") / "index.html"
+        text = html.read_text(encoding="utf-8")
+        assert ASKS.findall(text) == []
+        assert 'data-md-component="source"' not in text, "the theme asks api.github.com for what it shows there"
+
+
+def test_what_lies_outside_the_docs_is_linked_in_the_repository(site: Path) -> None:
+    page = (site / "reference/scenarios/index.html").read_text(encoding="utf-8")
+    assert 'href="https://github.com/simscen/simscen/blob/main/scenarios/faults/lidar_off.scenario.yaml"' in page
+    page = (site / "tutorials/own-planner-and-stack/index.html").read_text(encoding="utf-8")
+    assert 'href="https://github.com/simscen/simscen/tree/main/tests/plugins/theta_star"' in page
+
+
+def test_a_search_finds_words_of_every_kind_of_page(site: Path) -> None:
+    index = (site / "search/search_index.json").read_text(encoding="utf-8")
+    assert all(f'"location":"{part}/' in index for part in ("guides/people", "reference/language", "design/lockstep"))
+
+
+@pytest.mark.parametrize("name", FRONT)
+def test_a_link_on_the_front_of_the_repository_leads_somewhere(name: str) -> None:
+    links = ["".join(match.groups("")) for match in LINK.finditer((ROOT / name).read_text(encoding="utf-8"))]
+    assert [link for link in links if not (ROOT / link).exists()] == []
