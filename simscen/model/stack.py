@@ -8,6 +8,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from simscen.core.navigation import RecoveryBehavior
 from simscen.model.controllers import Controller
 from simscen.model.latency import Latency
+from simscen.model.profiles import PROFILES, Profile, with_profile
 from simscen.model.stackbase import GoalTolerances, StackBase
 from simscen.spec.base import Ranged, Spec, by_default, type_or
 from simscen.spec.bytype import ByType
@@ -41,6 +42,7 @@ PlannerCode = Literal[
     "NO_VALID_PATH",
 ]
 """Codes with which a planner fails."""
+ParameterFile = Annotated[str, Field(min_length=1, max_length=4096)]
 Noise = Annotated[float, Field(ge=0, le=100)]
 Iterations = Annotated[int, Field(ge=1, le=1_000_000)]
 
@@ -435,7 +437,7 @@ class BackUp(BehaviorSpec):
     """How fast it backs up."""
     simulate_ahead_time: PositiveDuration = 2.0
     """How far ahead it looks for collisions."""
-    partial: bool = True
+    backup_partial: bool = True
     """Whether it backs up as far as there is room, where that is less; often it is enough to turn. Nav2 does not."""
 
 
@@ -490,6 +492,8 @@ class Recovery(Spec):
     """How far it backs up."""
     backup_speed: PositiveSpeed = 0.15
     """How fast it backs up."""
+    backup_partial: bool = True
+    """Whether it backs up as far as there is room, where that is less; often it is enough to turn. Nav2 does not."""
     simulate_ahead_time: PositiveDuration = 2.0
     """How far ahead it looks for collisions."""
     max_rotational_vel: PositiveAngularSpeed = 1.0
@@ -549,9 +553,9 @@ class CollisionMonitor(Spec):
     """STOP: nothing may be nearer to the footprint than this, in the direction of travel. Nav2 has no such margin."""
     min_points: Annotated[int, Field(ge=1, le=1000)] = 1
     """How many points of a scan there must be in the way. Nav2's default is 4: a chair's leg may be fewer."""
-    hold_timeout: PositiveDuration | None = 1.0
-    """How long it may hold the robot until that counts as a failure, for the controller cannot see what it sees; none:
-    until the progress checker says so, as in Nav2."""
+    hold_timeout: Duration = 1.0
+    """How long it may hold the robot until that counts as a failure, for the controller may not see what it sees; 0:
+    never, as in Nav2, where the progress checker says so in the end."""
 
 
 _LatencyOrRobots = Annotated[
@@ -586,6 +590,10 @@ class StackSpec(InProcessStack):
 
     component: ClassVar[str] = "simscen.stack.build:reference_stack"
     type: Literal["reference"] = "reference"
+    profile: Profile = "simscen"
+    """Where parameters have their values from that nobody says: our own defaults, or exactly Nav2's."""
+    nav2_params: ParameterFile | None = None
+    """A parameter file of Nav2, such as nav2_params.yaml: what it says of parameters that are here, too."""
     localizer: Localizer = by_default()
     """What knows where the robot is."""
     costmap: Costmap = by_default()
@@ -613,6 +621,11 @@ class StackSpec(InProcessStack):
     """What computing takes: durations, or `robot` for what the robot's file says, of its sensors, too."""
     prediction: Prediction = by_default()
     """What knows of things that move, and keeps out of their way."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _by_profile(cls, said: Any) -> Any:
+        return with_profile(said) if isinstance(said, Mapping) and said.get("profile") in PROFILES else said
 
     @property
     def told_truth(self) -> bool:

@@ -36,7 +36,7 @@ class CollisionMonitor:
     def __init__(self, spec: MonitorSpec, robot: RobotModel, lidars: tuple[str, ...], tick_rate: int) -> None:
         self._spec, self._robot = spec, robot
         self._timeout = round(spec.source_timeout * tick_rate)
-        self.hold_ticks = math.inf if spec.hold_timeout is None else spec.hold_timeout * tick_rate
+        self.hold_ticks = spec.hold_timeout * tick_rate or math.inf
         """For how long it may allow nothing until that is a failure."""
         self._seen = dict.fromkeys(lidars, 0)
         self._scans: dict[str, Seen] = {}

@@ -50,7 +50,7 @@ class Spin:
 class BackUp:
     """Drive straight back by `backup_dist`, or as far as there is room.
 
-    Nav2's fails unless there is room for simulate_ahead_time, as it does here without `partial`; but a few centimetres
+    Nav2's fails unless there is room for simulate_ahead_time, as it does here without `backup_partial`; but a few centimetres
     are often what it takes to turn.
     """
 
@@ -80,9 +80,9 @@ class BackUp:
         command = Twist(-speed, 0.0, 0.0)
         horizon = min(self._spec.simulate_ahead_time, left / speed)
         free = time_free(self._footprint, costmap, pose, command, horizon)
-        if free >= horizon or (self._spec.partial and free * speed >= costmap.resolution):
+        if free >= horizon or (self._spec.backup_partial and free * speed >= costmap.resolution):
             return command
-        if self._spec.partial and self._from.distance(pose) >= costmap.resolution:
+        if self._spec.backup_partial and self._from.distance(pose) >= costmap.resolution:
             return None
         raise NavigationFailure(ErrorCode.BACKUP_COLLISION_AHEAD, "no room behind")
 

@@ -96,7 +96,7 @@ def test_backup_uses_what_room_there_is() -> None:
 
 def test_nav2s_backup_wants_all_the_room_it_may_need() -> None:
     with pytest.raises(NavigationFailure) as failed:
-        run(BackUp(model.BackUp(partial=False), setting(ROUND)), view_of(ROUND, (-0.6, -1.0, -0.4, 1.0)))
+        run(BackUp(model.BackUp(backup_partial=False), setting(ROUND)), view_of(ROUND, (-0.6, -1.0, -0.4, 1.0)))
     assert failed.value.code == ErrorCode.BACKUP_COLLISION_AHEAD
 
 

@@ -1,0 +1,125 @@
+"""`stack: {nav2_params: FILE}`: what a parameter file of Nav2 says, as if it stood in the scenario."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from pydantic import BaseModel
+
+from simscen.core.problems import Problem
+from simscen.loading.document import Library, merge
+from simscen.loading.nav2names import Found, found, strangers
+from simscen.loading.nav2params import Nav2Parameters, nav2_parameters
+from simscen.loading.paths import Refusal
+from simscen.loading.tree import Entry, Fields, Items, Leaf, Node, Place, child, key_place, value_place
+
+KEY, STACK, ROBOTS = "nav2_params", "stack", "robots"
+
+
+@dataclass
+class Taken:
+    """A tree with what its parameter files say, what is wrong with them, and what of them means nothing here."""
+
+    tree: Fields
+    problems: list[Problem] = field(default_factory=list)
+    notes: list[Problem] = field(default_factory=list)
+
+
+def with_nav2_parameters(tree: Fields, library: Library) -> Taken:
+    """A scenario, or one of several robots, with the parameters that its stacks take from files of Nav2."""
+    taken = Taken(tree)
+    robots = child(tree, ROBOTS)
+    if isinstance(robots, Fields):
+        own = {name: Entry(said.key, _filled(said.value, library, taken)) for name, said in robots.entries.items()}
+        tree = Fields(tree.place, {**tree.entries, ROBOTS: Entry(tree.entries[ROBOTS].key, Fields(robots.place, own))})
+    taken.tree = _filled(tree, library, taken)
+    return taken
+
+
+def _filled(said: Node, library: Library, taken: Taken) -> Any:
+    stack = child(said, STACK)
+    if not isinstance(said, Fields) or not isinstance(stack, Fields) or KEY not in stack.entries:
+        return said
+    filled = with_parameters(stack, library, taken)
+    return Fields(said.place, {**said.entries, STACK: Entry(said.entries[STACK].key, filled)})
+
+
+def with_parameters(stack: Fields, library: Library, taken: Taken) -> Fields:
+    """A `stack:` section over what its parameter file says, and that over Nav2's own defaults."""
+    written, place = stack.entries[KEY].value, value_place(stack, (KEY,))
+    if not isinstance(written, Leaf) or not isinstance(written.value, str):
+        return stack  # which the model tells
+    file = library.fence.find(written.value, library.folder_of(place))
+    if isinstance(file, Refusal):
+        taken.problems.append(Problem(*place, file.code, file.message, file.hint))
+        return stack
+    shown = library.fence.shown(file)
+    parameters = nav2_parameters(file, shown)
+    if not isinstance(parameters, Nav2Parameters):
+        taken.problems += parameters
+        return stack
+    library.add({shown: parameters.text}, {shown: file})
+    profile = Fields(place, {"profile": Entry(place, Leaf(place, "nav2"))})
+    found_here = list(found(parameters.nodes, _known()))
+    below = profile
+    for one in found_here:
+        if one.path:
+            below = merge(below, _nested(one, parameters))
+    taken.notes += sorted(_notes(found_here, parameters))
+    return merge(stack, below)
+
+
+def _nested(one: Found, parameters: Nav2Parameters) -> Fields:
+    place = parameters.places[one.node, one.parameter]
+    node: Node = _node(one.value, place)
+    for key in reversed(one.path):
+        node = Fields(place, {key: Entry(place, node)})
+    assert isinstance(node, Fields)
+    return node
+
+
+def _node(value: Any, place: Place) -> Node:
+    if isinstance(value, list):
+        return Items(place, tuple(_node(item, place) for item in value))
+    return Leaf(place, value)
+
+
+def _notes(found_here: Sequence[Found], parameters: Nav2Parameters) -> Iterator[Problem]:
+    for one in found_here:
+        if one.why:
+            place = parameters.places[one.node, one.parameter]
+            message = f"{one.node}: `{one.parameter}`: {one.why}"
+            yield Problem(*place, code="SC341", message=message, severity="warning")
+    for node in strangers(parameters.nodes):
+        place = next((place for (name, _), place in parameters.places.items() if name == node), None)
+        if place is not None:
+            message = f"nothing here is like the node {node}: its parameters are left out"
+            yield Problem(*place, code="SC341", message=message, severity="warning")
+
+
+def _known() -> Mapping[str, Sequence[str]]:
+    """Our parameters, by the section that they are in, or by the type of what is in it; `a.b` is `b` in `a`."""
+    from simscen.model import controllers, mppi, stack
+
+    models: dict[str, type[BaseModel]] = {
+        "amcl": stack.Amcl,
+        "progress_checker": stack.ProgressChecker,
+        "simple": stack.SimpleGoalChecker,
+        "regulated_pure_pursuit": controllers.RegulatedPurePursuit,
+        "dwb": controllers.DynamicWindow,
+        "mppi": mppi.Mppi,
+        "navfn": stack.Navfn,
+        "smac_2d": stack.Smac2d,
+        "costmap": stack.Costmap,
+        "local_costmap": stack.LocalCostmap,
+        "denoise_layer": stack.DenoiseLayer,
+        "recovery": stack.Recovery,
+    }
+    return {name: tuple(_names(model)) for name, model in models.items()}
+
+
+def _names(model: type[BaseModel]) -> Iterator[str]:
+    for name, about in model.model_fields.items():
+        yield name
+        if isinstance(about.annotation, type) and issubclass(about.annotation, BaseModel):
+            yield from (f"{name}.{part}" for part in about.annotation.model_fields)

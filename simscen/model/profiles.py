@@ -1,0 +1,87 @@
+"""Parameters of the reference stack by the name of a profile: `nav2` is nav2_bringup's own file, and Nav2's meanings.
+
+Read from navigation2 of August 2026: nav2_bringup/params/nav2_params.yaml, the default behaviour trees, and for plugins
+that the file does not use the defaults of their code. What is said in a scenario wins.
+"""
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+Profile = Literal["simscen", "nav2"]
+Values = Mapping[str, Any]
+
+BY_TYPE = ("localizer", "planner", "controller", "goal_checker")
+"""The sections whose `type` says which parameters there are; below, the first type is the one that is left out."""
+_SEEN: Values = {
+    "obstacle_max_range": 2.5, "obstacle_min_range": 0.0, "raytrace_max_range": 3.0, "raytrace_min_range": 0.0,
+    "max_obstacle_height": 2.0, "min_obstacle_height": 0.0, "inf_is_valid": False,
+    "inflation_radius": 0.70, "cost_scaling_factor": 3.0, "resolution": 0.05,
+}  # fmt: skip
+_PLANNING: Values = {"tolerance": 0.5, "allow_unknown": True, "replanning": "rate", "cautious": False}
+_CIRCLE: Values = {"consider_footprint": False}
+NAV2: Values = {
+    "controller_frequency": 20.0,
+    "failure_tolerance": 0.3,
+    "localizer": {"amcl": {"parameters": "nav2"}},
+    "costmap": {**_SEEN, "update_frequency": 1.0, "track_unknown_space": True},
+    "local_costmap": {**_SEEN, "update_frequency": 5.0, "width": 3.0, "height": 3.0, "track_unknown_space": False},
+    "planner": {"navfn": _PLANNING, "smac_2d": _PLANNING},
+    "controller": {
+        "mppi": {
+            "batch_size": 2000, "time_steps": 56, "model_dt": 0.05, "iteration_count": 1, "vx_max": 0.5, "vx_min": -0.35,
+            "vy_max": 0.5, "wz_max": 1.9, "vx_std": 0.2, "vy_std": 0.2, "wz_std": 0.4, "ax_max": 3.0, "ax_min": -3.0,
+            "ay_max": 3.0, "ay_min": -3.0, "az_max": 3.5, "temperature": 0.3, "gamma": 0.015, "prune_distance": 2.0,
+            "regenerate_noises": True, "open_loop": False, "CostCritic": _CIRCLE, "ObstaclesCritic": _CIRCLE,
+            "TrajectoryValidator": _CIRCLE,
+        },
+        "regulated_pure_pursuit": {"desired_linear_vel": 0.5},
+        "dwb": {"max_vel_x": 0.5, "max_vel_y": 0.0, "min_vel_y": 0.0, "prune_distance": 2.0},
+    },
+    "goal_checker": {
+        "simple": {"xy_goal_tolerance": 0.25, "yaw_goal_tolerance": 0.25, "stateful": True, "well_inside": 1.0}
+    },
+    "progress_checker": {"required_movement_radius": 0.5, "movement_time_allowance": 10.0},
+    "recovery": {
+        "number_of_retries": 6,
+        "planner_codes": ["PLANNER_UNKNOWN", "PLANNER_TIMEOUT", "NO_VALID_PATH"],
+        "backup_partial": False, "spin_dist": 1.57, "wait_duration": 5.0, "backup_dist": 0.30, "backup_speed": 0.15,
+        "simulate_ahead_time": 2.0, "max_rotational_vel": 1.0,
+    },
+    "velocity_smoother": {
+        "max_accel": 3.0, "max_decel": 3.0, "max_angular_accel": 3.5, "max_velocity": 0.5, "max_angular_velocity": 2.0,
+    },
+    "collision_monitor": {
+        "source_timeout": 1.0, "time_before_collision": 1.2, "stop_margin": 0.0, "min_points": 6, "hold_timeout": 0.0,
+    },
+}  # fmt: skip
+PROFILES: Mapping[str, Values] = {"simscen": {}, "nav2": NAV2}
+
+
+def with_profile(said: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The parameters of a stack with those of the profile that it names; what is said wins."""
+    chosen = PROFILES.get(str(said.get("profile", "simscen")), {})
+    return {**said, **{section: _with(section, values, said.get(section)) for section, values in chosen.items()}}
+
+
+def _with(section: str, values: Any, said: Any) -> Any:
+    """What the profile and the scenario make of a section; a specification that is already made stays as it is."""
+    if said is None:
+        if section not in BY_TYPE:
+            return values
+        kind = next(iter(values))
+        return {"type": kind, **values[kind]}
+    if not isinstance(said, Mapping) or not isinstance(values, Mapping):
+        return said
+    if section not in BY_TYPE:
+        return over(values, said)
+    kind = str(said.get("type", next(iter(values))))
+    return over({"type": kind, **values.get(kind, {})}, said)
+
+
+def over(values: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, Any]:
+    """What is said over what holds otherwise; mappings on both sides are merged."""
+    both = {
+        key: over(values[key], value) if isinstance(values.get(key), Mapping) and isinstance(value, Mapping) else value
+        for key, value in said.items()
+    }
+    return {**values, **both}
