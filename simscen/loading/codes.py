@@ -59,6 +59,7 @@ CODES = {
     "SC330": "A map would have too many cells.",
     "SC331": "A map would become too many walls.",
     "SC340": "A parameter of Nav2 does not fit what simscen publishes.",
+    "SC341": "A parameter in a file of Nav2 (`nav2_params`) is none of ours, and is left out.",
     "SC400": "A URDF or xacro file cannot be read or holds what cannot be used.",
     "SC401": "A part of a robot's body reaches the ground, so that it would drag instead of roll.",
     "SC402": "A robot is larger than any that can be simulated.",

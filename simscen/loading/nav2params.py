@@ -38,9 +38,9 @@ class Nav2Parameters:
         return [replace(problem, source=lines[problem.line - 1]) for problem in sorted(found)]
 
 
-def read_nav2_parameters(path: Path) -> Nav2Parameters | list[Problem]:
-    """The parameters in `path`, or what is wrong with the file."""
-    shown = str(path)
+def read_nav2_parameters(path: Path, shown: str = "") -> Nav2Parameters | list[Problem]:
+    """The parameters in `path`, or what is wrong with the file; `shown` is how problems name it, default: as it is."""
+    shown = shown or str(path)
     text = read_text(path, shown)
     if isinstance(text, Problem):
         return [text]

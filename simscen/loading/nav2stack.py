@@ -1,6 +1,6 @@
 """`stack: {nav2_params: FILE}`: what a parameter file of Nav2 says, as if it stood in the scenario."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -8,10 +8,10 @@ from pydantic import BaseModel
 
 from simscen.core.problems import Problem
 from simscen.loading.document import Library, merge
-from simscen.loading.nav2names import Found, found, strangers
-from simscen.loading.nav2params import Nav2Parameters, nav2_parameters
+from simscen.loading.nav2nodes import Found, Known, found, strangers
+from simscen.loading.nav2params import Nav2Parameters, read_nav2_parameters
 from simscen.loading.paths import Refusal
-from simscen.loading.tree import Entry, Fields, Items, Leaf, Node, Place, child, key_place, value_place
+from simscen.loading.tree import Entry, Fields, Items, Leaf, Node, Place, child, value_place
 
 KEY, STACK, ROBOTS = "nav2_params", "stack", "robots"
 
@@ -54,7 +54,7 @@ def with_parameters(stack: Fields, library: Library, taken: Taken) -> Fields:
         taken.problems.append(Problem(*place, file.code, file.message, file.hint))
         return stack
     shown = library.fence.shown(file)
-    parameters = nav2_parameters(file, shown)
+    parameters = read_nav2_parameters(file, shown)
     if not isinstance(parameters, Nav2Parameters):
         taken.problems += parameters
         return stack
@@ -85,19 +85,25 @@ def _node(value: Any, place: Place) -> Node:
 
 
 def _notes(found_here: Sequence[Found], parameters: Nav2Parameters) -> Iterator[Problem]:
+    """What of the file means nothing here: each with its reason, or all of a node at its first."""
     for one in found_here:
         if one.why:
-            place = parameters.places[one.node, one.parameter]
-            message = f"{one.node}: `{one.parameter}`: {one.why}"
-            yield Problem(*place, code="SC341", message=message, severity="warning")
+            yield _note(parameters.places[one.node, one.parameter], f"{one.node}: `{one.parameter}`: {one.why}")
+    for node in parameters.nodes:
+        names = [one.parameter for one in found_here if one.node == node and not one.path and not one.why]
+        if names:
+            told = f"{node}: nothing here is like {', '.join(names)}"
+            yield _note(parameters.places[node, names[0]], told)
     for node in strangers(parameters.nodes):
-        place = next((place for (name, _), place in parameters.places.items() if name == node), None)
-        if place is not None:
-            message = f"nothing here is like the node {node}: its parameters are left out"
-            yield Problem(*place, code="SC341", message=message, severity="warning")
+        places = [place for (name, _), place in parameters.places.items() if name == node]
+        yield from (_note(place, f"nothing here is like the node {node}") for place in places[:1])
 
 
-def _known() -> Mapping[str, Sequence[str]]:
+def _note(place: Place, message: str) -> Problem:
+    return Problem(*place, code="SC341", message=message, hint="it is left out", severity="warning")
+
+
+def _known() -> Known:
     """Our parameters, by the section that they are in, or by the type of what is in it; `a.b` is `b` in `a`."""
     from simscen.model import controllers, mppi, stack
 

@@ -14,6 +14,7 @@ from simscen.loading.document import Library
 from simscen.loading.loaded import LoadedMap, LoadedScenario, LoadedWorld
 from simscen.loading.masks import judged_masks
 from simscen.loading.messages import quoted, suggestion
+from simscen.loading.nav2stack import with_nav2_parameters
 from simscen.loading.paths import Fence
 from simscen.loading.placing import placed, places_of, unknown_places
 from simscen.loading.sense.whose import whose
@@ -98,6 +99,10 @@ def _with_choice(
     tree = one.tree if choice is None else robots.with_chosen(one.tree, choice)
     if choice is not None and (lost := list(_without_effect(one, tree, choice))):
         return library.with_source(lost)
+    taken = with_nav2_parameters(tree, library)
+    if taken.problems:
+        return library.with_source(sorted(taken.problems))
+    tree = taken.tree
     spec = check(ScenarioSpec, tree, robots.lacking)
     if isinstance(spec, list):
         return library.with_source(sorted([*spec, *_problems_of_world(tree, library)]))
@@ -106,7 +111,8 @@ def _with_choice(
     loaded = _several(spec, tree, library, file) if spec.robots else _one(spec, tree, library, file)
     if isinstance(loaded, list):
         return loaded
-    return loaded.having(choice=choice, variation=one.name, set_by=one.set_by)
+    notes = (*loaded.notes, *library.with_source(taken.notes))
+    return replace(loaded, notes=notes).having(choice=choice, variation=one.name, set_by=one.set_by)
 
 
 def _without_effect(one: Variation, tree: Fields, choice: StackChoice) -> Iterator[Problem]:

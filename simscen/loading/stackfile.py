@@ -6,6 +6,7 @@ from pathlib import Path
 from simscen.core.errors import InvalidInput
 from simscen.core.problems import Problem
 from simscen.loading.document import Library
+from simscen.loading.nav2stack import with_nav2_parameters
 from simscen.loading.paths import Fence
 from simscen.loading.stackchoice import OF_THE_SCENARIO, StackChoice
 from simscen.loading.tree import Fields, child, key_place
@@ -33,6 +34,11 @@ def stack_file(path: Path, library: Library) -> Fields | list[Problem]:
     tree, problems = library.read(file)
     if problems or tree is None:
         return library.with_source(problems)
+    if isinstance(tree, Fields):
+        taken = with_nav2_parameters(tree, library)
+        if taken.problems:
+            return library.with_source(sorted(taken.problems))
+        tree = taken.tree
     spec = check(StackFileSpec, tree)
     section = child(tree, "stack")
     misplaced = _misplaced(section) if isinstance(section, Fields) else []

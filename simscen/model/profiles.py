@@ -28,8 +28,9 @@ NAV2: Values = {
     "planner": {"navfn": _PLANNING, "smac_2d": _PLANNING},
     "controller": {
         "mppi": {
-            "batch_size": 2000, "time_steps": 56, "model_dt": 0.05, "iteration_count": 1, "vx_max": 0.5, "vx_min": -0.35,
-            "vy_max": 0.5, "wz_max": 1.9, "vx_std": 0.2, "vy_std": 0.2, "wz_std": 0.4, "ax_max": 3.0, "ax_min": -3.0,
+            "batch_size": 2000, "time_steps": 56, "model_dt": 0.05, "iteration_count": 1, "vx_max": 0.5,
+            "vx_min": -0.35, "vy_max": 0.5, "wz_max": 1.9, "vx_std": 0.2, "vy_std": 0.2, "wz_std": 0.4,
+            "ax_max": 3.0, "ax_min": -3.0,
             "ay_max": 3.0, "ay_min": -3.0, "az_max": 3.5, "temperature": 0.3, "gamma": 0.015, "prune_distance": 2.0,
             "regenerate_noises": True, "open_loop": False, "CostCritic": _CIRCLE, "ObstaclesCritic": _CIRCLE,
             "TrajectoryValidator": _CIRCLE,

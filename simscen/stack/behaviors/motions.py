@@ -50,8 +50,8 @@ class Spin:
 class BackUp:
     """Drive straight back by `backup_dist`, or as far as there is room.
 
-    Nav2's fails unless there is room for simulate_ahead_time, as it does here without `backup_partial`; but a few centimetres
-    are often what it takes to turn.
+    Nav2's fails unless there is room for simulate_ahead_time, as it does here without `backup_partial`; but a few
+    centimetres are often what it takes to turn.
     """
 
     name = "backup"

@@ -1,0 +1,175 @@
+"""`stack: {nav2_params: FILE}`: a user's own parameter file of Nav2."""
+
+from pathlib import Path
+
+import pytest
+
+from simscen.core.errors import InvalidInput
+from simscen.loading.loaded import LoadedScenario
+from simscen.loading.scenario import load_scenario
+from simscen.loading.stackfile import load_stack_file
+
+SCENARIO = """\
+simscen: 1
+world: {simscen: 1, walls: [{name: room, points: [[0, 0], [6, 0], [6, 6], [0, 6], [0, 0]]}]}
+robot: {pose: {x: 1, y: 1}}
+goals: [{pose: {x: 5, y: 5}}]
+pass: [{goals_reached: {}}]
+"""
+PARAMS = """\
+amcl:
+  ros__parameters:
+    robot_model_type: "nav2_amcl::OmniMotionModel"
+    alpha1: 0.11
+    scan_topic: scan
+    save_pose_rate: 0.5
+controller_server:
+  ros__parameters:
+    controller_frequency: 30.0
+    controller_plugins: ["FollowPath"]
+    goal_checker_plugins: ["precise"]
+    precise: {plugin: "nav2_controller::SimpleGoalChecker", xy_goal_tolerance: 0.1, path_length_tolerance: 1.0}
+    FollowPath:
+      plugin: "nav2_regulated_pure_pursuit_controller::RegulatedPurePursuitController"
+      max_linear_vel: 0.4
+      lookahead_dist: 0.7
+      min_distance_to_obstacle: 0.1
+planner_server:
+  ros__parameters:
+    planner_plugins: ["GridBased"]
+    GridBased: {plugin: "nav2_smac_planner::SmacPlanner2D", tolerance: 0.3}
+global_costmap:
+  global_costmap:
+    ros__parameters:
+      update_frequency: 2.0
+      plugins: ["static_layer", "front", "inflation_layer"]
+      front: {plugin: "nav2_costmap_2d::ObstacleLayer", scan: {obstacle_max_range: 4.0, topic: /scan}}
+      inflation_layer: {plugin: "nav2_costmap_2d::InflationLayer", inflation_radius: 0.4}
+local_costmap:
+  local_costmap:
+    ros__parameters: {width: 5, height: 4}
+velocity_smoother:
+  ros__parameters: {max_velocity: [0.3, 0.0, 1.0], max_decel: [-2.0, 0.0, -3.0]}
+collision_monitor:
+  ros__parameters:
+    polygons: [Stop, Approach]
+    Stop: {action_type: stop}
+    Approach: {action_type: approach, time_before_collision: 0.9, min_points: 3}
+behavior_server:
+  ros__parameters: {simulate_ahead_time: 1.5, cycle_frequency: 10.0}
+docking_server:
+  ros__parameters: {controller_frequency: 50.0}
+"""
+
+
+def loaded(folder: Path, stack: str, params: str = PARAMS, rest: str = "") -> LoadedScenario:
+    (folder / "nav2.yaml").write_text(params)
+    file = folder / "a.scenario.yaml"
+    file.write_text(f"{SCENARIO}{stack}\n{rest}")
+    return load_scenario(file, folder)
+
+
+def test_what_is_here_too_is_taken_and_what_the_file_leaves_out_is_nav2s(tmp_path: Path) -> None:
+    stack = loaded(tmp_path, "stack: {nav2_params: nav2.yaml}").spec.stack
+    assert (stack.localizer.robot_model, stack.localizer.alpha1, stack.localizer.alpha2) == ("omni", 0.11, 0.2)
+    assert stack.localizer.laser_model_type == "likelihood_field"
+    assert (stack.controller_frequency, stack.goal_checker.xy_goal_tolerance) == (30.0, 0.1)
+    assert stack.controller.type == "regulated_pure_pursuit"
+    assert (stack.controller.desired_linear_vel, stack.controller.lookahead_dist) == (0.4, 0.7)
+    assert (stack.planner.type, stack.planner.tolerance, stack.planner.replanning) == ("smac_2d", 0.3, "rate")
+    assert (stack.costmap.update_frequency, stack.costmap.obstacle_max_range) == (2.0, 4.0)
+    assert (stack.costmap.inflation_radius, stack.local_costmap.inflation_radius) == (0.4, 0.7)
+    assert (stack.local_costmap.width, stack.local_costmap.height) == (5.0, 4.0)
+    smoother, monitor = stack.velocity_smoother, stack.collision_monitor
+    assert (smoother.max_velocity, smoother.max_angular_velocity, smoother.max_decel) == (0.3, 1.0, 2.0)
+    assert (monitor.time_before_collision, monitor.min_points, monitor.source_timeout) == (0.9, 3, 1.0)
+    assert stack.recovery.simulate_ahead_time == 1.5
+
+
+def test_what_the_scenario_says_wins(tmp_path: Path) -> None:
+    said = (
+        "stack: {nav2_params: nav2.yaml, profile: simscen, controller: {lookahead_dist: 0.5}, failure_tolerance: 1 s}"
+    )
+    stack = loaded(tmp_path, said).spec.stack
+    assert (stack.controller.desired_linear_vel, stack.controller.lookahead_dist) == (0.4, 0.5)
+    assert stack.failure_tolerance == 1.0
+    assert stack.collision_monitor.source_timeout != 1.0  # of our own profile
+    other = loaded(tmp_path, "stack: {nav2_params: nav2.yaml, controller: {type: dwb}}").spec.stack
+    assert other.controller.type == "dwb"
+
+
+NOT_OURS = ("precise.path_length_tolerance", "FollowPath.min_distance_to_obstacle")
+
+
+def test_what_has_no_counterpart_is_named_where_it_stands(tmp_path: Path) -> None:
+    notes = [str(note) for note in loaded(tmp_path, "stack: {nav2_params: nav2.yaml}").notes]
+    told = [(note.line, note.message) for note in loaded(tmp_path, "stack: {nav2_params: nav2.yaml}").notes]
+    assert all("SC341" in note for note in notes)
+    assert told == [
+        (12, f"controller_server: nothing here is like {', '.join(NOT_OURS)}"),
+        (41, "collision_monitor: `Stop.action_type`: there is no polygon that does stop here"),
+        (44, "behavior_server: nothing here is like cycle_frequency"),
+        (46, "nothing here is like the node docking_server"),
+    ]
+
+
+def test_a_value_that_cannot_be_is_told_where_it_stands_in_the_file_of_nav2(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInput) as wrong:
+        loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", PARAMS.replace("alpha1: 0.11", "alpha1: -1"))
+    assert [(p.path, p.line, p.col) for p in wrong.value.problems] == [("nav2.yaml", 4, 13)]
+
+
+@pytest.mark.parametrize(
+    ("named", "code", "line"), [("none.yaml", "SC001", 6), ("../out.yaml", "SC020", 6), ("a.scenario.yaml", "SC340", 0)]
+)
+def test_a_file_that_is_not_there_not_allowed_or_of_another_kind_is_told(
+    tmp_path: Path, named: str, code: str, line: int
+) -> None:
+    with pytest.raises(InvalidInput) as wrong:
+        loaded(tmp_path, f"stack: {{nav2_params: {named}}}")
+    assert [(p.code, p.line) for p in wrong.value.problems] == [(code, line)]
+
+
+def test_a_controller_that_is_not_here_leaves_the_usual_one_and_says_so(tmp_path: Path) -> None:
+    params = PARAMS.replace("nav2_regulated_pure_pursuit_controller::RegulatedPurePursuitController", "mine::Graceful")
+    found = loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", params)
+    assert found.spec.stack.controller.type == "mppi"
+    assert "there is no mine::Graceful here: the usual one is used" in "".join(note.message for note in found.notes)
+
+
+def test_mppis_motion_model_is_found_by_the_name_of_its_plugin(tmp_path: Path) -> None:
+    params = """\
+controller_server:
+  ros__parameters:
+    controller_plugins: ["FollowPath"]
+    FollowPath:
+      plugin: "nav2_mppi_controller::MPPIController"
+      motion_model: "any"
+      any: {plugin: "mppi::OmniMotionModel"}
+      CostCritic: {cost_weight: 2.5}
+"""
+    stack = loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", params).spec.stack
+    assert (stack.controller.motion_model, stack.controller.CostCritic.cost_weight) == ("Omni", 2.5)
+    assert stack.controller.CostCritic.consider_footprint is False
+
+
+def test_each_of_several_robots_may_have_a_file_of_its_own(tmp_path: Path) -> None:
+    (tmp_path / "nav2.yaml").write_text(PARAMS)
+    file = tmp_path / "two.scenario.yaml"
+    file.write_text(
+        SCENARIO.replace(
+            "robot: {pose: {x: 1, y: 1}}\ngoals: [{pose: {x: 5, y: 5}}]\n",
+            "robots:\n  a: {pose: {x: 1, y: 1}, goals: [{pose: {x: 5, y: 5}}], stack: {nav2_params: nav2.yaml}}\n"
+            "  b: {pose: {x: 1, y: 5}, goals: [{pose: {x: 5, y: 1}}]}\n",
+        )
+    )
+    found = load_scenario(file, tmp_path)
+    assert [found.robots[name].spec.stack.localizer.alpha1 for name in "ab"] == [0.11, 0.2]
+
+
+def test_a_stack_file_may_take_its_parameters_from_one(tmp_path: Path) -> None:
+    (tmp_path / "nav2.yaml").write_text(PARAMS)
+    (tmp_path / "ours.stack.yaml").write_text("simscen: 1\nstack: {nav2_params: nav2.yaml}\n")
+    choice = load_stack_file("ours", "ours.stack.yaml", tmp_path / "ours.stack.yaml", tmp_path)
+    assert choice.section is not None
+    assert choice.section.plain["controller"]["desired_linear_vel"] == 0.4
