@@ -32,7 +32,7 @@ def found(nodes: Mapping[str, Parameters], known: Known) -> Iterator[Found]:
     """What becomes of each parameter. `known` are our parameters by section, or by type of what is in it."""
     for node, parameters in nodes.items():
         for one in NODES[node](node, parameters, known) if node in NODES else ():
-            if one.path or not _of_no_matter(one.parameter):
+            if one.path or one.why or not _of_no_matter(one.parameter):
                 yield one
 
 
@@ -84,9 +84,7 @@ def _plugin(
     kind = types.get(_class(plugin))
     if kind is None:
         if plugin:
-            yield Found(
-                node, f"{name}.plugin", (), plugin, f"there is no {plugin} here; the profile's {section} is used"
-            )
+            yield Found(node, f"{name}.plugin", (), plugin, f"there is no {plugin} here: the usual one is used")
         return
     if f"{name}.primary_controller" in parameters:
         shim = parameters.get(f"{name}.plugin")

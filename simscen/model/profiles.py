@@ -31,11 +31,11 @@ NAV2: Values = {
             "batch_size": 2000, "time_steps": 56, "model_dt": 0.05, "iteration_count": 1, "vx_max": 0.5,
             "vx_min": -0.35, "vy_max": 0.5, "wz_max": 1.9, "vx_std": 0.2, "vy_std": 0.2, "wz_std": 0.4,
             "ax_max": 3.0, "ax_min": -3.0,
-            "ay_max": 3.0, "ay_min": -3.0, "az_max": 3.5, "temperature": 0.3, "gamma": 0.015, "prune_distance": 2.0,
+            "ay_max": 3.0, "ay_min": -3.0, "az_max": 3.5, "temperature": 0.3, "gamma": 0.015,
             "regenerate_noises": True, "open_loop": False, "CostCritic": _CIRCLE, "ObstaclesCritic": _CIRCLE,
             "TrajectoryValidator": _CIRCLE,
         },
-        "regulated_pure_pursuit": {"desired_linear_vel": 0.5},
+        "regulated_pure_pursuit": {"desired_linear_vel": 0.5, "use_velocity_scaled_lookahead_dist": False},
         "dwb": {"max_vel_x": 0.5, "max_vel_y": 0.0, "min_vel_y": 0.0, "prune_distance": 2.0},
     },
     "goal_checker": {
@@ -51,6 +51,7 @@ NAV2: Values = {
     "velocity_smoother": {
         "max_accel": 3.0, "max_decel": 3.0, "max_angular_accel": 3.5, "max_velocity": 0.5, "max_angular_velocity": 2.0,
     },
+    "prediction": {"enabled": False},
     "collision_monitor": {
         "source_timeout": 1.0, "time_before_collision": 1.2, "stop_margin": 0.0, "min_points": 6, "hold_timeout": 0.0,
     },

@@ -107,9 +107,9 @@ def test_what_has_no_counterpart_is_named_where_it_stands(tmp_path: Path) -> Non
     assert all("SC341" in note for note in notes)
     assert told == [
         (12, f"controller_server: nothing here is like {', '.join(NOT_OURS)}"),
-        (41, "collision_monitor: `Stop.action_type`: there is no polygon that does stop here"),
-        (44, "behavior_server: nothing here is like cycle_frequency"),
-        (46, "nothing here is like the node docking_server"),
+        (37, "collision_monitor: `Stop.action_type`: there is no polygon that does stop here"),
+        (40, "behavior_server: nothing here is like cycle_frequency"),
+        (42, "nothing here is like the node docking_server"),
     ]
 
 
@@ -120,7 +120,7 @@ def test_a_value_that_cannot_be_is_told_where_it_stands_in_the_file_of_nav2(tmp_
 
 
 @pytest.mark.parametrize(
-    ("named", "code", "line"), [("none.yaml", "SC001", 6), ("../out.yaml", "SC020", 6), ("a.scenario.yaml", "SC340", 0)]
+    ("named", "code", "line"), [("none.yaml", "SC023", 6), ("../out.yaml", "SC020", 6), ("a.scenario.yaml", "SC340", 0)]
 )
 def test_a_file_that_is_not_there_not_allowed_or_of_another_kind_is_told(
     tmp_path: Path, named: str, code: str, line: int
