@@ -14,9 +14,8 @@ from simscen.stack.commands import Commands
 from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.frames import Frames
 from simscen.stack.localizers.ground_truth import TRUTH
-from simscen.stack.localizers.odometry_track import believable
 from simscen.stack.navigator import Navigator
-from simscen.stack.odometry_history import OdometryHistory
+from simscen.stack.odometry_history import OdometryHistory, believable
 from simscen.stack.prediction.motion_prediction import MotionPrediction
 from simscen.stack.protocols import Controller, Localizer, NavigationFailure, Surroundings
 from simscen.stack.publishing import Publishing
@@ -53,7 +52,7 @@ class ReferenceStack:
         self._events: list[Event] = []
         self._tick = 0
         self._twist = STOP
-        self._odometry, self._wheels = OdometryHistory(), False
+        self._odometry, self._wheels = OdometryHistory(surroundings.tick_rate), False
         self._zones: Zones | None = None
         self._nothing = Decision(STOP)
 
@@ -150,7 +149,7 @@ class ReferenceStack:
         for scan in scans:  # after all odometry of this beat, wherever that stands among the readings
             self._prediction.on_scan(scan)
             marking = self._prediction.marking(scan)
-            self._monitor.on_scan(marking, self._odometry.at(scan.tick))
+            self._monitor.on_scan(marking, self._odometry.held(scan.tick))
             self._costmaps.see(marking)
         return bool(scans)
 
@@ -164,7 +163,7 @@ class ReferenceStack:
         if reading.sensor == TRUTH and self._wheels:
             return
         if reading.sensor != TRUTH and not self._wheels:
-            self._wheels, self._odometry = True, OdometryHistory()
+            self._wheels, self._odometry = True, OdometryHistory(self._tick_rate)
         if believable(reading.pose) and believable(reading.twist):
             self._twist = reading.twist
             self._odometry.add(reading.tick, reading.pose)

@@ -15,9 +15,9 @@ from simscen.stack.localizers.finder import Finder
 from simscen.stack.localizers.global_search import GlobalSearch
 from simscen.stack.localizers.map_trust import MapTrust
 from simscen.stack.localizers.motion_models import MotionModel
-from simscen.stack.localizers.odometry_track import OdometryTrack
 from simscen.stack.localizers.particle_filter import ParticleFilter
 from simscen.stack.localizers.scan_matcher import ScanMatcher, Step
+from simscen.stack.odometry_history import OdometryHistory
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ class AmclLocalizer:
 
     def reset(self, estimate: Estimate) -> None:
         """Start over: particles around the estimate's pose, or over all free space when it has none."""
-        self._track = OdometryTrack(10 * self._tick_rate)
+        self._odometry = OdometryHistory(self._tick_rate)
         self._filter.begin(estimate)
         self._finder = None if self._search is None else Finder(*self._search, estimate.pose is not None)
         if estimate.pose is None:
@@ -73,20 +73,20 @@ class AmclLocalizer:
 
     def on_odometry(self, odometry: Odometry) -> None:
         """Carry the pose on, and use scans that waited for this odometry."""
-        first = self._track.newest is None
-        if not self._track.add(odometry):
+        first = not self._odometry
+        if not self._odometry.add(odometry.tick, odometry.pose):
             return
         if first:
             start = self._correction
             self._correction = _Correction(start.pose, start.covariance, odometry.pose, start.tick)
         self._belief = None
-        ready = [name for name, scan in self._waiting.items() if self._track.reaches(scan.tick)]
+        ready = [name for name, scan in self._waiting.items() if self._odometry.reaches(scan.tick)]
         for name in ready:
             self._use(self._waiting.pop(name))
 
     def on_scan(self, scan: Scan) -> None:
         """Correct with a scan, at once or when the odometry of its tick is there."""
-        if self._track.reaches(scan.tick):
+        if self._odometry.reaches(scan.tick):
             self._use(scan)
         else:
             self._waiting[scan.sensor] = replace(scan, ranges=scan.ranges.copy())
@@ -98,7 +98,7 @@ class AmclLocalizer:
     def belief(self) -> Belief:
         """The last correction, carried on by odometry."""
         if self._belief is None:
-            last, now = self._correction, self._track.newest or self._correction.odometry
+            last, now = self._correction, self._odometry.now if self._odometry else self._correction.odometry
             covariance = self._motion.carry(last.covariance, last.pose.yaw, last.odometry.between(now))
             pose = last.map_from_odom.compose(now)
             self._belief = Belief(pose, covariance, last.map_from_odom, self._filter.particles.table, last.tick)
@@ -106,7 +106,7 @@ class AmclLocalizer:
 
     def _use(self, scan: Scan) -> None:
         """Correct with a scan if its lidar is due; after enough motion all lidars are due once."""
-        odometry = self._track.at(scan.tick)
+        odometry = self._odometry.at(scan.tick)
         if odometry is None or not scan.range_max > 0:
             return
         delta = None if self._moved_to is None else self._moved_to.between(odometry)

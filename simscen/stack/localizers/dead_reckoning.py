@@ -6,8 +6,8 @@ from simscen.core.belief import Belief, Estimate
 from simscen.core.geometry import Array, Pose2
 from simscen.core.sensing import Imu, Odometry, Scan
 from simscen.model.stack import Ekf
-from simscen.stack.localizers.odometry_track import believable
 from simscen.stack.localizers.planar_motion import grown
+from simscen.stack.odometry_history import believable
 
 # A place that nobody has told: 100 m and any heading.
 _UNKNOWN_STD = (100.0, 100.0, np.pi / np.sqrt(3))

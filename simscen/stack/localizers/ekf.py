@@ -13,8 +13,8 @@ from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.sensing import Imu, Odometry, Scan
 from simscen.model.stack import Ekf
 from simscen.stack.localizers.dead_reckoning import start_of
-from simscen.stack.localizers.odometry_track import believable
 from simscen.stack.localizers.slip_model import AHEAD, BIAS, LEVER, RATE, Model, Step, motion, moved, rates
+from simscen.stack.odometry_history import believable
 
 # No robot turns faster than this, in rad/s: a gyroscope that says so is broken.
 _FASTEST = 100.0

@@ -6,7 +6,7 @@ from simscen.core.belief import Belief, Estimate
 from simscen.core.geometry import Pose2
 from simscen.core.sensing import Imu, Odometry, Scan
 from simscen.stack.localizers.dead_reckoning import start_of
-from simscen.stack.localizers.odometry_track import believable
+from simscen.stack.odometry_history import believable
 
 TRUTH = "ground_truth"
 """The name of the sensor whose odometry readings are true poses in the map frame."""

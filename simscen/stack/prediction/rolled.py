@@ -22,7 +22,7 @@ class Rolled:
         self._rate = tick_rate
         self._last: tuple[int, Pose2] | None = None
         self._turns: list[float] = []
-        self._history = OdometryHistory()
+        self._history = OdometryHistory(tick_rate)
 
     @property
     def now(self) -> Pose2:
@@ -31,7 +31,7 @@ class Rolled:
 
     def at(self, tick: int) -> Pose2:
         """The pose at a tick."""
-        return self._history.at(tick)
+        return self._history.held(tick)
 
     def on_imu(self, imu: Imu) -> None:
         """Keep a turn rate until the next odometry."""

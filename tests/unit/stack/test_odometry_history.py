@@ -3,33 +3,72 @@ import pytest
 from simscen.core.geometry import Pose2
 from simscen.stack.odometry_history import KEPT, OdometryHistory
 
+RATE = 10
 
-def history(*ticks: int) -> OdometryHistory:
-    """A robot that drives 0.1 m along x each tick."""
-    kept = OdometryHistory()
-    for tick in ticks:
-        kept.add(tick, Pose2(0.1 * tick, 0.0, 0.0))
+
+def history(*readings: tuple[int, Pose2]) -> OdometryHistory:
+    kept = OdometryHistory(RATE)
+    for tick, pose in readings:
+        kept.add(tick, pose)
     return kept
 
 
-def test_the_pose_at_a_tick_is_the_newest_up_to_then() -> None:
-    kept = history(0, 6, 12)
-    assert [kept.at(tick).x for tick in (-5, 0, 5, 6, 11, 12, 99)] == pytest.approx([0, 0, 0, 0.6, 0.6, 1.2, 1.2])
+def straight(*ticks: int) -> OdometryHistory:
+    """A robot that drives 0.1 m along x each tick."""
+    return history(*((tick, Pose2(0.1 * tick, 0.0, 0.0)) for tick in ticks))
+
+
+def test_the_held_pose_at_a_tick_is_the_newest_up_to_then() -> None:
+    kept = straight(0, 6, 12)
+    assert [kept.held(tick).x for tick in (-5, 0, 5, 6, 11, 12, 99)] == pytest.approx([0, 0, 0, 0.6, 0.6, 1.2, 1.2])
+
+
+def test_between_two_readings_it_is_interpolated_across_the_cut_of_the_circle() -> None:
+    both = history((10, Pose2(1, 1, 3.0)), (20, Pose2(2, 1, -3.0)))
+    assert both.at(10) == Pose2(1, 1, 3.0)
+    assert both.at(20) == Pose2(2, 1, -3.0)
+    assert both.at(15) == pytest.approx((1.5, 1, 3.14159265))
+
+
+def test_outside_of_the_readings_there_is_nothing_to_interpolate() -> None:
+    both = straight(10, 20)
+    assert both.at(9) is None
+    assert both.at(21) is None
+    assert both.reaches(20)
+    assert not both.reaches(21)
 
 
 def test_where_the_robot_was_is_told_in_the_frame_in_which_it_is_told_where_it_is() -> None:
-    before = history(0, 6, 12).then(Pose2(5.0, 5.0, 1.5707963267948966), 6)
+    before = straight(0, 6, 12).then(Pose2(5.0, 5.0, 1.5707963267948966), 6)
     assert before == pytest.approx((5.0, 4.4, 1.5707963267948966))
 
 
-def test_readings_out_of_order_are_passed_over_and_old_ones_forgotten() -> None:
-    kept = history(0, 12, 6)
-    assert kept.now.x == pytest.approx(1.2)
-    many = history(*range(10 * KEPT))
-    assert many.at(0).x > 0.0
-    assert many.at(10 * KEPT - KEPT).x == pytest.approx(0.1 * (10 * KEPT - KEPT))
-
-
 def test_before_any_reading_it_is_at_the_origin() -> None:
-    assert OdometryHistory().at(5) == Pose2(0.0, 0.0)
-    assert OdometryHistory().then(Pose2(1, 2, 0.3), 5) == pytest.approx(Pose2(1, 2, 0.3))
+    nothing = history()
+    assert not nothing
+    assert nothing.held(5) == nothing.now == Pose2(0.0, 0.0)
+    assert nothing.then(Pose2(1, 2, 0.3), 5) == pytest.approx(Pose2(1, 2, 0.3))
+    assert nothing.at(0) is None
+    assert not nothing.reaches(0)
+
+
+def test_what_is_older_than_tf_keeps_is_forgotten() -> None:
+    long = straight(*range(0, 1000, 10))
+    oldest = 990 - KEPT * RATE
+    assert long.at(oldest - 1) is None
+    assert long.at(oldest + 1) == pytest.approx((0.1 * (oldest + 1), 0, 0))
+    assert long.held(0).x == pytest.approx(0.1 * oldest)
+
+
+@pytest.mark.parametrize("tick", [10, 5])
+def test_a_reading_that_is_not_newer_is_refused(tick: int) -> None:
+    given = history((10, Pose2(1, 1, 0)))
+    assert not given.add(tick, Pose2(9, 9, 9))
+    assert given.now == given.held(99) == Pose2(1, 1, 0)
+
+
+@pytest.mark.parametrize("bad", [float("nan"), float("inf"), -float("inf"), 1e200])
+@pytest.mark.parametrize("part", [0, 1, 2])
+def test_a_reading_that_is_not_a_place_is_refused(bad: float, part: int) -> None:
+    given = history((10, Pose2(1, 1, 0)))
+    assert not given.add(20, Pose2(*(bad if part == k else 0.0 for k in range(3))))
