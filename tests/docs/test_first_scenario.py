@@ -1,0 +1,71 @@
+"""The first tutorial, and the examples in Python, done as a new user does them."""
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from simscen.cli.main import app
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs/tutorials/first-scenario.md").read_text(encoding="utf-8")
+FIRST, HARDER = re.findall(r"^```yaml\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
+PARTS = dict(re.findall(r"^## (\d)[^\n]*\n(.*?)(?=^## |\Z)", PAGE, re.MULTILINE | re.DOTALL))
+
+
+@pytest.fixture
+def clone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """What of a clone the page needs."""
+    shutil.copytree(ROOT / "worlds", tmp_path / "worlds")
+    (tmp_path / "scenarios").mkdir()
+    (tmp_path / ".git").mkdir()
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def called(*words: str) -> tuple[int, str]:
+    done = CliRunner().invoke(app, list(words))
+    return done.exit_code, done.output
+
+
+def test_its_scenario_is_valid_and_passes(clone: Path) -> None:
+    assert called("new", "scenarios/my_first")[0] == 0
+    (clone / "scenarios/my_first.scenario.yaml").write_text(FIRST, encoding="utf-8")
+    assert called("validate", "scenarios/my_first.scenario.yaml") == (0, "1 scenario is valid\n")
+    code, told = called("run", "scenarios/my_first.scenario.yaml")
+    assert code == 0, told
+
+
+def test_the_harder_one_fails_by_the_tight_bound_alone_and_leaves_all_that_the_page_names(clone: Path) -> None:
+    before, after = "stopped_within: {time: 1 s, after: lidar.off}", "stopped_within: {time: 0.1 s, after: lidar.off}"
+    assert before in HARDER and after in PARTS["4"]
+    file = clone / "scenarios/my_first.scenario.yaml"
+    file.write_text(HARDER.replace(before, after), encoding="utf-8")
+    code, told = called("run", "scenarios/my_first.scenario.yaml")
+    assert code == 1
+    assert "stopped_within: " in told and "again" in told and "scenarios/my_first.scenario.yaml:16" in told
+    session = clone / "simscen-out/latest"
+    (run,) = json.loads((session / "results.json").read_text())["runs"]
+    assert run["outcome"] == "failed"
+    left = {path.name for path in session.rglob("*") if path.is_file()}
+    named = set(re.findall(r"`(\w+\.(?:html|png|mcap))`", PARTS["4"]))
+    assert {"replay.html", "report.html", "map.png", "run.mcap"} == named <= left
+    log = next(session.rglob("run.mcap"))
+    file.write_text(HARDER, encoding="utf-8")
+    assert called("judge", str(log), "--scenario", str(file))[0] == 0
+
+
+@pytest.mark.parametrize("page", ["python", pytest.param("several-robots", marks=pytest.mark.long)])
+def test_the_example_in_python_runs(page: str, clone: Path) -> None:
+    shutil.copytree(ROOT / "scenarios", "scenarios", dirs_exist_ok=True)
+    text = (ROOT / f"docs/guides/{page}.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    done = subprocess.run(
+        [sys.executable, "-c", f"import simscen\n{code}"], capture_output=True, text=True, check=False, cwd=clone
+    )
+    assert done.returncode == 0, done.stderr
