@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from simscen.assets.folders import Folders, Trouble
 from simscen.core.errors import InvalidInput
 from simscen.core.geometry import Pose3
 from simscen.core.problems import Problem
@@ -17,7 +18,7 @@ from simscen.sim.outline import extremes
 from simscen.sim.robot_body import RobotBody, assemble
 from simscen.sim.undercarriage import Wheel, wheel_inertia
 from simscen.sim.urdf.elements import Meshes, MeshReader
-from simscen.sim.urdf.files import Folders, Found, Trouble, read_xml
+from simscen.sim.urdf.files import Found, read_xml
 from simscen.sim.urdf.markup import CODE
 from simscen.sim.urdf.tree import Tree, tree_of
 from simscen.sim.urdf.wheels import WheelJoint, chosen
@@ -42,7 +43,7 @@ def tree_of_spec(
     folder = (file or Path()).resolve().parent
     folders = Folders.of(roots or (folder,), found.packages if found else None)
     try:
-        path = found.urdf if found else folders.locate(spec.urdf, folder)
+        path = found.urdf if found else folders.find(spec.urdf, folder)
     except Trouble as trouble:
         shown = folders.shown(file.resolve()) if file else ""
         raise InvalidInput([Problem(shown, 0, 0, CODE, f"urdf {spec.urdf[:200]!r}: {trouble}")]) from trouble
@@ -53,6 +54,7 @@ def read_tree(
     path: Path, folders: Folders, read_mesh: MeshReader | None, arguments: Mapping[str, str] | None = None
 ) -> Tree:
     """The links and joints of a URDF or xacro file. Raises InvalidInput."""
+    path = folders.named(path)
     robot = read_xml(path, folders)
     expanded = path.suffix == ".xacro" or "xmlns:xacro" in robot.attributes
     if expanded:

@@ -7,10 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
+from simscen.assets.addresses import PACKAGES
+from simscen.assets.folders import Absent, Folders, Trouble
+from simscen.assets.markup import Source
 from simscen.core.geometry import Pose3
 from simscen.core.shapes import Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere
 from simscen.sim.inertia import MassProperties
-from simscen.sim.urdf.files import MESH_BYTES, Folders, Trouble, check_regular
+from simscen.sim.urdf.files import MESH_BYTES
 from simscen.sim.urdf.markup import Element, Unusable
 
 MESH_REACH = 20.0
@@ -60,8 +63,7 @@ class Meshes:
         written = element.text("filename")
         scale = element.numbers("scale", 3, (1.0, 1.0, 1.0))
         try:
-            path = self.folders.locate(written, self.folder, self.expanded)
-            check_regular(path, MESH_BYTES)
+            path = self.folders.check(self._found(written), MESH_BYTES)
             if self.read is None:
                 raise Trouble("meshes cannot be read here")
             mesh = self.read(path)
@@ -78,6 +80,14 @@ class Meshes:
             )
         return Mesh(vertices, mesh.faces)
 
+    def _found(self, written: str) -> Path:
+        try:
+            return self.folders.find(written, self.folder, absolute=self.expanded)
+        except Absent:
+            if written.startswith(PACKAGES):  # perhaps there is no such package, which tells more
+                self.folders.package(written.partition("://")[2].partition("/")[0], self.folder)
+            raise
+
 
 def link_of(element: Element, meshes: Meshes) -> Link:
     """A `<link>`; raises Unusable."""
@@ -91,7 +101,7 @@ def link_of(element: Element, meshes: Meshes) -> Link:
 
 def joint_of(element: Element) -> Joint:
     """A `<joint>`; raises Unusable."""
-    axis = (element.child("axis") or Element("axis", {}, "", 0, 0, "")).numbers("xyz", 3, (1.0, 0.0, 0.0))
+    axis = (element.child("axis") or Element("axis", {}, Source(""), 0, 0)).numbers("xyz", 3, (1.0, 0.0, 0.0))
     length = math.hypot(*axis)
     if length == 0:
         raise Unusable(element, f"joint {element.name!r} turns about an axis of length 0")

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from simscen.assets.folders import Folders
 from simscen.core.errors import InvalidInput
 from simscen.model.robot import (
     Ackermann,
@@ -22,7 +23,6 @@ from simscen.model.robot import (
 from simscen.sim.outline import extremes
 from simscen.sim.urdf.body import body_of_tree, read_tree, refuse_rear_steering
 from simscen.sim.urdf.elements import MeshReader
-from simscen.sim.urdf.files import Folders
 from simscen.sim.urdf.tree import Tree
 from simscen.sim.urdf.wheels import WheelJoint, found
 

@@ -1,15 +1,14 @@
-"""XML with the places of its elements, and nothing of XML that reaches outside the file."""
+"""The elements of a URDF, which say what is wrong with them at their line."""
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, field
-from xml.parsers import expat
+from dataclasses import dataclass
 
+from typing_extensions import Self
+
+from simscen.assets import markup
 from simscen.core.errors import InvalidInput
 from simscen.core.problems import Problem
 
-DEEPEST = 100
-MOST_ELEMENTS = 100_000
 CODE = "SC400"
 """The stable code of every problem with a robot's URDF; the message tells them apart."""
 
@@ -23,31 +22,10 @@ class Unusable(Exception):
 
 
 @dataclass(eq=False, slots=True)
-class Element:
-    """An element and where it stands; `children` in document order."""
+class Element(markup.Element):
+    """An element of a URDF or xacro file."""
 
-    tag: str
-    attributes: dict[str, str]
-    file: str
-    line: int
-    col: int
-    source: str
-    children: "list[Element]" = field(default_factory=list)
-
-    @property
-    def name(self) -> str:
-        """Its name attribute, or nothing."""
-        return self.attributes.get("name", "")
-
-    def child(self, tag: str) -> "Element | None":
-        """The first child of that kind."""
-        return next(self.all(tag), None)
-
-    def all(self, tag: str) -> "Iterator[Element]":
-        """The children of that kind."""
-        return (child for child in self.children if child.tag == tag)
-
-    def needed(self, tag: str) -> "Element":
+    def needed(self, tag: str) -> Self:
         """The first child of that kind; raises Unusable when there is none."""
         found = self.child(tag)
         if found is None:
@@ -84,48 +62,14 @@ class Element:
 
     def problem(self, message: str, hint: str = "") -> Problem:
         """What is wrong with it."""
-        return Problem(self.file, self.line, self.col, CODE, message, hint, source=self.source)
+        source = self.source.line(self.line)
+        return Problem(self.source.name, self.line, self.col, CODE, message, hint, source=source)
 
 
 def parse(data: bytes, file: str) -> Element:
-    """The root of an XML text. Raises InvalidInput, with the line, for a DOCTYPE or what is not well-formed.
-
-    A document type declaration is refused because it can name other files and bombs (CWE-611, CWE-776).
-    """
-    parser = expat.ParserCreate()
-    lines = data.split(b"\n")
-    roots: list[Element] = []
-    opened: list[Element] = []
-    count = 0
-
-    def here(number: int) -> str:
-        text = lines[number - 1] if 0 < number <= len(lines) else b""
-        return text.decode("utf-8", "replace").rstrip("\r") if len(text) <= 300 else ""
-
-    def fail(line: int, col: int, message: str, hint: str = "") -> InvalidInput:
-        return InvalidInput([Problem(file, line, col, CODE, message, hint, source=here(line))])
-
-    def start(tag: str, attributes: dict[str, str]) -> None:
-        nonlocal count
-        count += 1
-        line, col = parser.CurrentLineNumber, parser.CurrentColumnNumber + 1
-        if len(opened) >= DEEPEST or count > MOST_ELEMENTS:
-            raise fail(line, col, f"nested deeper than {DEEPEST}, or more than {MOST_ELEMENTS} elements")
-        element = Element(tag, attributes, file, line, col, here(line))
-        (opened[-1].children if opened else roots).append(element)
-        opened.append(element)
-
-    def doctype(*_: object) -> None:
-        raise fail(parser.CurrentLineNumber, parser.CurrentColumnNumber + 1, "DOCTYPE not allowed", "remove it")
-
-    parser.StartElementHandler = start
-    parser.EndElementHandler = lambda _: opened.pop()
-    parser.StartDoctypeDeclHandler = doctype
+    """The root of an XML text. Raises InvalidInput, with the line, for what is not read."""
     try:
-        parser.Parse(data, True)
-    except expat.ExpatError as error:
-        message = f"not well-formed XML: {expat.ErrorString(error.code)}"
-        raise fail(error.lineno, error.offset + 1, message) from error
-    except (ValueError, LookupError) as error:  # an encoding that Python's codecs do not know
-        raise fail(1, 1, f"cannot be read as XML: {error}") from error
-    return roots[0]
+        return markup.parse(data, markup.Source.of(data, file), Element)
+    except markup.Broken as error:
+        problem = Problem(file, error.line, error.col, CODE, error.message, error.hint, source=error.source)
+        raise InvalidInput([problem]) from error

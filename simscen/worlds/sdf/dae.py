@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from simscen.assets import markup
 from simscen.core.geometry import Array
-from simscen.worlds.sdf import markup
 from simscen.worlds.sdf.meshpart import Part, UnusableMesh, limit
-from simscen.worlds.sdf.report import Unusable
 from simscen.worlds.sdf.values import FARTHEST
 
 if TYPE_CHECKING:
@@ -21,14 +20,14 @@ LOOKS = {"library_materials", "library_effects", "library_images", "bind_materia
 UNREAD = {"tristrips", "trifans", "convex_mesh", "spline", "instance_controller"}
 
 
-def read_dae(data: bytes, file: str) -> Iterator[Part]:
+def read_dae(data: bytes, _: str) -> Iterator[Part]:
     """The parts of a COLLADA scene in metres; raises UnusableMesh."""
     import collada
 
     try:
-        markup.refuse_doctype(data, file)
-    except Unusable as error:
-        raise UnusableMesh(f"line {error.place.line}: {error.message}") from error
+        markup.refuse_doctype(data)
+    except markup.Broken as error:
+        raise UnusableMesh(f"line {error.line}: {error.message}") from error
     try:
         bare = _without_looks(data)
         document = collada.Collada(io.BytesIO(bare), ignore=[collada.DaeError])

@@ -3,8 +3,8 @@
 import os
 from pathlib import Path
 
+from simscen.assets.addresses import standard
 from simscen.worlds.sdf import markup
-from simscen.worlds.sdf.addresses import standard
 from simscen.worlds.sdf.files import WORLD_BYTES, Library
 from simscen.worlds.sdf.markup import Element
 from simscen.worlds.sdf.report import Report, Unusable

@@ -38,7 +38,7 @@ def load_sdf(path: Path, *, search: Sequence[Path] = (), root: Path, lenient: bo
     Raises InvalidInput with everything that would change the geometry and cannot be used; with `lenient` that is
     left out and told in the world's `notes`, and only a world file that cannot be read at all is an error.
     """
-    report, library = Report(lenient=lenient), Library(root, search)
+    report, library = Report(lenient=lenient), Library.of([root, *search])
     try:
         world = _read(path, library, report)
     except Unusable as error:

@@ -10,11 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
+from simscen.assets.folders import Trouble
 from simscen.core.errors import InvalidInput
 from simscen.core.problems import Problem
 from simscen.core.shapes import Mesh
 from simscen.worlds.sdf import values
-from simscen.worlds.sdf.files import MESH_BYTES, Library, Trouble
+from simscen.worlds.sdf.files import MESH_BYTES, Library
 from simscen.worlds.sdf.markup import Element
 from simscen.worlds.sdf.meshcache import READ
 from simscen.worlds.sdf.meshpart import Part, UnusableMesh
@@ -93,7 +94,7 @@ def read_mesh(path: Path) -> Mesh:
     """
     real = path.resolve()
     try:
-        data = Library(real.parent, ()).open(real, MESH_BYTES)[1]
+        data = Library.of([real.parent]).open(real, MESH_BYTES)[1]
         parts = READ.read(data, path.suffix.lower(), path.name)
     except (Trouble, UnusableMesh) as error:
         raise InvalidInput([Problem(str(path), 0, 0, CODE, str(error))]) from error

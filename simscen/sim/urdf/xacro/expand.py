@@ -7,10 +7,11 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from simscen.assets.folders import Absent, Folders, Trouble
 from simscen.core.errors import InvalidInput
 from simscen.core.problems import Problem
-from simscen.sim.urdf.files import URDF_BYTES, Folders, Trouble, check_regular
-from simscen.sim.urdf.markup import MOST_ELEMENTS, Element
+from simscen.sim.urdf.files import URDF_BYTES
+from simscen.sim.urdf.markup import Element
 from simscen.sim.urdf.xacro.budget import Budget, Missing, Refused
 from simscen.sim.urdf.xacro.calls import bind, called
 from simscen.sim.urdf.xacro.macros import Macro, Macros, macro_of
@@ -21,6 +22,7 @@ from simscen.sim.urdf.xacro.values import truth
 
 MOST_FILES = 200
 """Files that one robot is made of; each is at most as large as a URDF."""
+MOST_ELEMENTS = 100_000
 
 FileReader = Callable[[Path], Element]
 """Reads a file inside the allowed folders; raises InvalidInput."""
@@ -95,7 +97,7 @@ class _Expansion:
                 other = self._call if source.tag.startswith("xacro:") else self._plain
                 self._meanings.get(source.tag, other)(source, into, scope, macros)
         except Refused as refused:
-            calls = [f"in macro {m.name!r}, called at {e.file}:{e.line}" for m, e in self._calls[-1:]]
+            calls = [f"in macro {m.name!r}, called at {e.source.name}:{e.line}" for m, e in self._calls[-1:]]
             hint = "; ".join(filter(None, [refused.hint, *calls]))
             raise InvalidInput([source.problem(refused.message, hint)]) from refused
 
@@ -173,11 +175,11 @@ class _Expansion:
             around.held[space] = scope
             macros.spaces[space] = macros = Macros()
         try:
-            path = self._folders.locate(written, self._texts.file.parent, expanded=True)
-            if truth(source.attributes.get("optional", "false")) and not path.exists():
-                return
-            check_regular(path, URDF_BYTES)
+            found = self._folders.find(written, self._texts.file.parent, absolute=True)
+            path = self._folders.check(found, URDF_BYTES)
         except Trouble as trouble:
+            if isinstance(trouble, Absent) and truth(source.attributes.get("optional", "false")):
+                return
             raise Missing(f"include {written[:200]!r}: {trouble}", trouble.hint) from trouble
         before, self._texts.file = self._texts.file, path
         self._children(self._parsed(path), into, scope, macros)

@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
-from simscen.sim.urdf.files import Folders, Trouble
+from simscen.assets.folders import Folders, Trouble
 from simscen.sim.urdf.markup import Element
 from simscen.sim.urdf.xacro.budget import LONGEST, Budget, Missing, Refused
 from simscen.sim.urdf.xacro.expression import evaluate

@@ -167,7 +167,7 @@ def test_37_a_missing_mesh_is_named_with_its_line(refusal):
         ("package://robot/base.stl", "there is no package 'robot'"),
         ("model://robot/base.stl", "there is no package 'robot'"),
         ("file:///etc/passwd", "absolute paths are not read"),
-        ("http://example.org/base.stl", "only URLs of package://, model:// and file:// are read"),
+        ("http://example.org/base.stl", "only model://, package://, file://, Fuel and relative paths are read"),
     ],
 )
 def test_38_meshes_outside_are_not_opened(refusal, written, why):

@@ -4,8 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from simscen.assets import markup
 from simscen.core.errors import InvalidInput
-from simscen.worlds.sdf import load_sdf, markup
+from simscen.worlds.sdf import load_sdf
 
 BOX = "<collision name='c'><geometry><box><size>1 1 1</size></box></geometry></collision>"
 LINK = f"<link name='a'>{BOX}</link>"

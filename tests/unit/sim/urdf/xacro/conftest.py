@@ -2,8 +2,9 @@
 
 import pytest
 
+from simscen.assets.folders import Folders
 from simscen.core.errors import InvalidInput
-from simscen.sim.urdf.files import Folders, read_xml
+from simscen.sim.urdf.files import read_xml
 from simscen.sim.urdf.xacro.expand import expand as expand_xacro
 
 

@@ -98,7 +98,7 @@ def test_an_include_outside_the_root_is_not_read(refusal, tmp_path, written):
 def test_whether_an_optional_file_outside_exists_is_not_told(refusal):
     for written in ("/etc/passwd", "/etc/no-such-file"):
         problem = refusal(f'<xacro:include filename="{written}" optional="true"/>')
-        assert problem.message == f"include '{written}': outside the scenario root"
+        assert problem.message == f"include '{written}': outside the scenario root and the world paths"
 
 
 def test_a_link_out_of_the_root_is_no_package(refusal, tmp_path):

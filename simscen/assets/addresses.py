@@ -1,12 +1,16 @@
-"""What the uris of Gazebo mean: which names to look for in which folders."""
+"""What the uris of Gazebo and ROS mean: which names to look for in which folders."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote
 
-SCHEMES = ("model://", "package://", "file://")
+from simscen.assets.packages import is_package_name, places_of
+
+PACKAGES = ("package://", "model://")
+"""ROS and Gazebo name the same folder so."""
+SCHEMES = (*PACKAGES, "file://")
 _FUEL = re.compile(
     r"https?://(?P<server>(?:fuel|app|api)\.(?:gazebosim|ignitionrobotics)\.org)/(?:\d+\.\d+/)?"
     r"(?P<owner>[^/]+)/(?P<kind>models|worlds)/(?P<name>[^/]+)(?:/(?P<version>\d+|tip))?(?:/(?:files/)?(?P<rest>.*))?"
@@ -64,25 +68,39 @@ def standard(uri: str) -> str | None:
     return name if name in _STANDARD else None
 
 
-def places(uri: str, beside: Path, search: tuple[Path, ...]) -> Iterator[tuple[Path, Path]]:
+def places(uri: str, beside: Path, roots: Sequence[Path], packages: Mapping[str, Path]) -> Iterator[tuple[Path, Path]]:
     """Pairs of an allowed folder and a path in it, in the order in which a uri is looked up.
 
-    model:// and package:// start at the search folders; file:// and bare paths beside the file that names them, then
-    at the search folders, whose own name may stand first (`file://models/crate` in a folder called `models`).
+    model:// and package:// mean one of `packages`; else they start at the `roots` but the first, and then at what may
+    be a package of this name around `beside` or below the roots. file:// and bare paths start beside the file that
+    names them, then at the roots but the first, whose own name may stand first (`file://models/crate` in a folder
+    called `models`).
     """
-    address = fuel(uri)
+    address, search = fuel(uri), roots[1:]
     if address is not None:
         for folder in search:
             yield from ((folder, place) for place in address.places(folder))
         return
     scheme = next((scheme for scheme in SCHEMES if uri.startswith(scheme)), "")
     rest = uri.removeprefix(scheme)
-    if scheme in ("", "file://"):
-        yield beside, beside / rest
-    else:
-        rest = rest.lstrip("/")
+    if scheme in PACKAGES:
+        yield from _in_packages(rest.lstrip("/"), beside, roots, packages)
+        return
+    yield beside, beside / rest
     first, _, below = rest.partition("/")
     for folder in search:
         yield folder, folder / rest
-        if scheme == "file://" and below and folder.name == first:
+        if scheme and below and folder.name == first:
             yield folder, folder / below
+
+
+def _in_packages(
+    path: str, beside: Path, roots: Sequence[Path], packages: Mapping[str, Path]
+) -> Iterator[tuple[Path, Path]]:
+    name, _, below = path.partition("/")
+    if name in packages:
+        yield packages[name], packages[name] / below.lstrip("/")
+        return
+    yield from ((folder, folder / path) for folder in roots[1:])
+    if is_package_name(name):
+        yield from ((folder, folder / below.lstrip("/")) for folder in places_of(name, beside, roots))

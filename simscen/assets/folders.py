@@ -1,0 +1,167 @@
+"""The only door to the disk for what a world or a robot names: all of it lies in the folders that the user allowed."""
+
+import errno
+import os
+import stat
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
+
+from typing_extensions import Self
+
+from simscen.assets.addresses import PACKAGES, SCHEMES, fuel, places
+from simscen.assets.neighbours import neighbour
+from simscen.assets.packages import is_package_name, places_of
+from simscen.core.filesread import note_read
+
+LONGEST_PATH = 1000
+
+
+class Trouble(Exception):
+    """Why a file cannot be had, and what helps; never says anything about its content."""
+
+    def __init__(self, message: str, hint: str = "") -> None:
+        self.hint = hint
+        super().__init__(message)
+
+
+class Absent(Trouble):
+    """There is nothing in the folders that it could mean."""
+
+
+@dataclass(frozen=True)
+class Folders:
+    """The folders that files must lie in, absolute and with links followed: the scenarios' root, and others.
+
+    `packages` are ROS packages by name that need not be looked for.
+    """
+
+    roots: tuple[Path, ...]
+    packages: Mapping[str, Path] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, roots: Sequence[Path], packages: Mapping[str, Path] | None = None) -> Self:
+        """As given by the caller."""
+        return cls(tuple(Path(os.path.realpath(root)) for root in roots), packages or {})
+
+    @property
+    def search(self) -> tuple[Path, ...]:
+        """The folders besides the root: what is not beside the file that names it is looked for in them."""
+        return self.roots[1:]
+
+    def shown(self, path: Path) -> str:
+        """The name of a file for users: relative to the root, elsewhere absolute."""
+        return path.relative_to(self.roots[0]).as_posix() if path.is_relative_to(self.roots[0]) else str(path)
+
+    def find(self, uri: str, beside: Path, *, absolute: bool = False) -> Path:
+        """The real path of what a uri or a path means in a file in the folder `beside`, see addresses.places.
+
+        `absolute` paths are read only where they need not be the author's own: what xacro made of `$(find package)`,
+        and in worlds, which Gazebo saves with them. Raises Trouble, and Absent of it.
+        """
+        if not uri or not uri.isprintable():
+            raise Trouble("control character in the uri" if uri else "the uri is empty")
+        if len(uri) > LONGEST_PATH:
+            raise Trouble("not a usable path")
+        if "://" in uri and not uri.startswith(SCHEMES) and fuel(uri) is None:
+            raise Trouble("only model://, package://, file://, Fuel and relative paths are read",
+                          "download it and name its folder with --world-path")  # fmt: skip
+        if uri in SCHEMES or (uri.startswith(PACKAGES) and not uri.partition("://")[2].strip("/")):
+            raise Trouble("the name of a model is missing")
+        if not absolute and PurePosixPath(uri.removeprefix("file://")).is_absolute():
+            raise Trouble("absolute paths are not read", "write it relative to this file")
+        here, tried = Path(os.path.realpath(beside)), []
+        for folder, candidate in places(uri, here, self.roots, self.packages):
+            if folder in (here, *self.search):  # others may be links to where nobody is to be told what there is
+                tried.append((folder, candidate))
+            try:
+                return self.resolve(candidate)
+            except Absent:
+                continue
+        raise Absent(_ABSENT, self._hint(uri, tried))
+
+    @staticmethod
+    def named(path: Path) -> Path:
+        """A file as the user named it: links in its folder are the user's, only the file itself must not lead out."""
+        return Path(os.path.realpath(path.parent)) / path.name
+
+    def package(self, name: str, near: Path) -> Path:
+        """The folder of a ROS package for a file in the folder `near`; raises Trouble, and Absent of it."""
+        if name in self.packages:
+            return self.packages[name]
+        if not is_package_name(name):
+            raise Trouble(f"{name[:60]!r} is not the name of a package")
+        for folder in (*(folder / name for folder in self.search), *places_of(name, near, self.roots)):
+            real = Path(os.path.realpath(folder))
+            if self._holds(real) and real.is_dir():
+                return real
+        hint = f"put a folder {name} beside the robot's package, name the one that holds it with --world-path, or say "
+        raise Absent(f"there is no package {name!r}", hint + f"`packages: {{{name}: path}}` in the *.robot.yaml")
+
+    def resolve(self, path: Path) -> Path:
+        """The real path of something that exists inside the folders; raises Trouble, and Absent of it."""
+        if len(str(path)) > LONGEST_PATH or "\0" in str(path):
+            raise Trouble("not a usable path")
+        # First by the letters alone, so that nothing outside is even asked whether it exists.
+        self._contain(Path(os.path.normpath(path)))
+        try:
+            real = Path(os.path.realpath(path, strict=True))
+        except OSError as error:
+            raise _trouble(error) from error
+        self._contain(real)
+        return real
+
+    def check(self, path: Path, limit: int) -> Path:
+        """The real path of a regular file of at most `limit` bytes; raises Trouble.
+
+        Bullet aborts on a folder and waits forever for a pipe.
+        """
+        real = self.resolve(path)
+        try:
+            status = real.stat()
+        except OSError as error:
+            raise _trouble(error) from error
+        if not stat.S_ISREG(status.st_mode):
+            raise Trouble("not a regular file")
+        if status.st_size > limit:
+            raise Trouble(f"larger than {limit // 2**20} MiB")
+        return real
+
+    def open(self, path: Path, limit: int) -> tuple[Path, bytes]:
+        """The real path and the bytes of a regular file of at most `limit` bytes; raises Trouble."""
+        real = self.check(path, limit)
+        note_read(real)
+        try:
+            return real, real.read_bytes()
+        except OSError as error:
+            raise _trouble(error) from error
+
+    def _holds(self, path: Path) -> bool:
+        return any(path.is_relative_to(folder) for folder in self.roots)
+
+    def _contain(self, path: Path) -> None:
+        if not self._holds(path):
+            raise Trouble("outside the scenario root and the world paths")
+
+    def _hint(self, uri: str, tried: list[tuple[Path, Path]]) -> str:
+        near = next((found for folder, path in tried if (found := neighbour(folder, path))), None)
+        if near:
+            return f"did you mean `{near}`?"
+        if fuel(uri) and not self.search:
+            return "allow Fuel's cache with --world-path ~/.gz/fuel, or a folder that holds the downloaded model"
+        looked = ", ".join(dict.fromkeys(self.shown(folder) or "." for folder, _ in tried)) or "no folder"
+        return f"looked in {looked}; allow its folder with --world-path"
+
+
+_ABSENT = "no such file or directory"
+
+
+def _trouble(error: OSError) -> Trouble:
+    if error.errno in (errno.ENOENT, errno.ENOTDIR):
+        return Absent(_ABSENT)
+    reasons = {
+        errno.ELOOP: "symbolic link loop",
+        errno.EACCES: "permission denied",
+        errno.ENAMETOOLONG: "not a usable path",
+    }
+    return Trouble(reasons.get(error.errno or 0, error.strerror or "cannot be read"))

@@ -1,0 +1,99 @@
+"""What worlds and robots name is found in one way, and never outside of what the user allowed."""
+
+from pathlib import Path
+
+import pytest
+
+from simscen.assets.folders import Absent, Folders, Trouble
+
+
+def put(path: Path) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("x")
+    return path
+
+
+@pytest.fixture
+def folders(tmp_path: Path) -> Folders:
+    """A root called `root`, and a folder called `models` that the command line allows."""
+    for name in ("root", "models"):
+        (tmp_path / name).mkdir()
+    return Folders.of([tmp_path / "root", tmp_path / "models"])
+
+
+@pytest.mark.parametrize("scheme", ["package://", "model://"])
+def test_a_package_is_one_of_the_command_line_else_one_around_else_one_below(folders: Folders, scheme: str) -> None:
+    root, models = folders.roots
+    beside = root / "shop" / "worlds"
+    found = []
+    for holder in (root / "vendor" / "ros", root / "shop", models):
+        put(holder / "cart" / "base.stl")
+        found.append(folders.find(f"{scheme}cart/base.stl", beside).parents[1])
+    assert found == [root / "vendor" / "ros", root / "shop", models]
+
+
+def test_a_package_that_is_given_is_not_looked_for(folders: Folders, tmp_path: Path) -> None:
+    root, models = folders.roots
+    put(models / "cart" / "base.stl")
+    own = put(root / "vendor" / "base.stl")
+    given = Folders(folders.roots, {"cart": root / "vendor"})
+    assert given.find("package://cart/base.stl", root) == own
+    with pytest.raises(Absent, match="no such file"):
+        given.find("package://cart/wheel.stl", root)
+
+
+@pytest.mark.parametrize("written", ["base.stl", "file://base.stl", "./base.stl"])
+def test_a_path_means_what_is_beside_the_file_else_what_the_command_line_allows(folders: Folders, written: str) -> None:
+    root, models = folders.roots
+    there = put(models / "base.stl")
+    assert folders.find(written, root) == there
+    near = put(root / "base.stl")
+    assert folders.find(written, root) == near
+
+
+@pytest.mark.parametrize(
+    ("written", "why"),
+    [
+        ("", "the uri is empty"),
+        ("a\nb", "control character in the uri"),
+        ("a" * 1001, "not a usable path"),
+        ("https://example.org/a.stl", "only model://, package://, file://, Fuel and relative paths are read"),
+        ("package://", "the name of a model is missing"),
+        ("model:///", "the name of a model is missing"),
+        ("/etc/passwd", "absolute paths are not read"),
+        ("file:///etc/passwd", "absolute paths are not read"),
+        ("../secret.stl", "outside the scenario root and the world paths"),
+        ("../nothing.stl", "outside the scenario root and the world paths"),
+        ("model://../secret.stl", "outside the scenario root and the world paths"),
+        ("link.stl", "outside the scenario root and the world paths"),
+        ("round.stl", "symbolic link loop"),
+    ],
+)
+def test_what_is_not_found_says_why_and_nothing_of_what_is_outside(
+    folders: Folders, tmp_path: Path, written: str, why: str
+) -> None:
+    root, _ = folders.roots
+    put(tmp_path / "secret.stl")
+    (root / "link.stl").symlink_to(tmp_path / "secret.stl")
+    (root / "round.stl").symlink_to(root / "round.stl")
+    with pytest.raises(Trouble) as caught:
+        folders.find(written, root)
+    assert str(caught.value) == why
+
+
+def test_an_absolute_path_is_read_inside_where_it_may_be_absolute(folders: Folders) -> None:
+    there = put(folders.roots[0] / "base.stl")
+    assert folders.find(str(there), folders.roots[1], absolute=True) == there
+    with pytest.raises(Trouble, match="outside"):
+        folders.find("/etc/passwd", folders.roots[1], absolute=True)
+
+
+def test_a_missing_file_is_told_with_what_lies_where_it_was_looked_for(folders: Folders) -> None:
+    root, models = folders.roots
+    put(models / "cart" / "Base.stl")
+    with pytest.raises(Absent) as caught:
+        folders.find("package://cart/base.stl", root)
+    assert caught.value.hint == "did you mean `cart/Base.stl`?"
+    with pytest.raises(Absent) as caught:
+        folders.find("hull.stl", root)
+    assert caught.value.hint == f"looked in ., {models}; allow its folder with --world-path"

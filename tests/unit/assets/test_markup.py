@@ -1,0 +1,44 @@
+"""One reader for worlds and robots: what one refuses, the other does, in the same words and at the same place."""
+
+import pytest
+
+from simscen.assets import markup
+from simscen.core.errors import InvalidInput
+from simscen.sim.urdf.markup import parse as parse_urdf
+from simscen.worlds.sdf.markup import parse as parse_sdf
+from simscen.worlds.sdf.report import Unusable
+
+BOMB = b'<?xml version="1.0"?>\n<!DOCTYPE a [<!ENTITY b "ha"><!ENTITY c "&b;&b;&b;">]>\n<a>&c;</a>'
+
+
+@pytest.mark.parametrize(
+    ("data", "line", "col", "message"),
+    [
+        (BOMB, 2, 13, "DOCTYPE not allowed"),
+        (b'<!DOCTYPE a SYSTEM "file:///etc/passwd">\n<a/>', 1, 40, "DOCTYPE not allowed"),
+        (b"<a>\n  <b></c></a>", 2, 8, "not well-formed XML: mismatched tag"),
+        (b"", 1, 1, "not well-formed XML: no element found"),
+        (b"<a>" * 101, 1, 301, "nested deeper than 100"),
+        (b"<a>\n" + b"<b/>" * 20 + b"</a>", 2, 37, "more than 10 elements"),
+        (b"<?xml version='1.0' encoding='klingon'?><a/>", 1, 1, "cannot be read as XML: unknown encoding: klingon"),
+    ],
+)
+def test_worlds_and_robots_refuse_alike(
+    monkeypatch: pytest.MonkeyPatch, data: bytes, line: int, col: int, message: str
+) -> None:
+    if "elements" in message:
+        monkeypatch.setattr(markup, "MOST_ELEMENTS", 10)
+    with pytest.raises(Unusable) as world:
+        parse_sdf(data, "x.sdf", "")
+    with pytest.raises(InvalidInput) as robot:
+        parse_urdf(data, "x.urdf")
+    place, problem = world.value.place, robot.value.problems[0]
+    assert (place.line, place.col, world.value.message) == (line, col, message)
+    assert (problem.line, problem.col, problem.message) == (line, col, message)
+    assert (place.source, world.value.hint) == (problem.source, problem.hint)
+
+
+def test_elements_know_where_they_stand_and_their_text() -> None:
+    root = parse_sdf(b"<a>\n  x<b name='n'/>y\n</a>", "x.sdf", "")
+    b = root.children[0]
+    assert (b.line, b.col, b.name, b.parent, root.text) == (2, 4, "n", root, "xy")
