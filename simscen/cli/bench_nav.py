@@ -13,8 +13,6 @@ from simscen.core.errors import Exit, NothingSelected
 if TYPE_CHECKING:
     from simscen.study.experiment import Experiment
 
-DATA = Path("../shared/data")
-
 
 class Format(str, Enum):
     """What is printed."""
@@ -24,8 +22,12 @@ class Format(str, Enum):
 
 
 def command(
-    barn: Annotated[Path, typer.Option(help="BARN's worlds, with their scenarios.csv.")] = DATA / "barn_sample",
-    nav2: Annotated[Path, typer.Option(help="Nav2's TurtleBot3 sandbox.")] = DATA / "nav2_tb3_sandbox",
+    barn: Annotated[
+        Path | None, typer.Option(help="Folder with worlds of BARN and their scenarios.csv; none: skipped.")
+    ] = None,
+    nav2: Annotated[
+        Path | None, typer.Option(help="Folder with Nav2's TurtleBot3 sandbox: worlds, map, models; none: skipped.")
+    ] = None,
     project: Annotated[Path, typer.Option(help="Folder with simscen's scenarios/ and worlds/.")] = Path(),
     only: Annotated[list[str] | None, typer.Option(help="Part of the name of experiments; repeatable.")] = None,
     seeds: Annotated[
@@ -53,9 +55,9 @@ def command(
 
     BARN and fields like it, narrow fields, fields of moving cylinders, random goals in shipped worlds and generated
     buildings, sensors that fail, ramps, two robots in a corridor, Nav2's own system test, corner cases and
-    localisation. Intervals are by bootstrap over worlds. What cannot be found is skipped, which is said on standard
-    error, as is every run that did not come out well, with the command that repeats it. Exit code 0, or 3 when a run
-    could not be completed.
+    localisation. Intervals are by bootstrap over worlds. Worlds of BARN and Nav2 are no part of simscen: say where you
+    have them. What is not there is skipped, which is said on standard error, as is every run that did not come out
+    well, with the command that repeats it. Exit code 0, or 3 when a run could not be completed.
     """
     from simscen.cli.bench_offers import Sizes, offers
     from simscen.cli.bench_run import drive, measured
@@ -71,8 +73,8 @@ def command(
         whole = _named(offer.name, only)
         if not whole and not any(offer.name.casefold() in part.casefold() for part in only or ()):
             continue
-        if not offer.needs.is_dir():
-            print(f"{offer.name}: skipped, there is no folder {offer.needs}", file=sys.stderr)
+        if offer.missing:
+            print(f"{offer.name}: skipped, {offer.missing}", file=sys.stderr)
             continue
         experiments += [each for each in offer.make() if whole or _named(each.name, only)]
     if not experiments:

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from simscen.core.world import BuiltWorld
 
 SHIPPED = ("house", "office", "warehouse")
+BARN = "--barn names a folder with its worlds: https://www.cs.utexas.edu/~xiao/BARN/BARN.html"
+NAV2 = "--nav2 names a folder with it: https://github.com/ros-navigation/nav2_minimal_turtlebot_simulation"
 LIDAR_HEIGHT = 0.2
 """Metres: at which the maps of worlds are made that drives are drawn from."""
 
@@ -36,18 +38,29 @@ class Sizes:
 
 @dataclass(frozen=True)
 class Offer:
-    """Experiments that come together: what they are called, the folder that they need, and how to get them."""
+    """Experiments that come together: what they are called, the folder that they need, and how to get them.
+
+    Without a folder `source` says which option names it, and where its data comes from.
+    """
 
     name: str
-    needs: Path
+    needs: Path | None
     make: Callable[[], Sequence[Experiment]]
+    source: str = ""
+
+    @property
+    def missing(self) -> str:
+        """Why they cannot be driven; "" where nothing is missing."""
+        if self.needs is None:
+            return self.source
+        return "" if self.needs.is_dir() else f"there is no folder {self.needs}"
 
 
-def offers(data: Path, nav2: Path, project: Path, made: Path, sizes: Sizes) -> list[Offer]:
+def offers(data: Path | None, nav2: Path | None, project: Path, made: Path, sizes: Sizes) -> list[Offer]:
     """All of them, in the order of the table; what is generated goes to `made`."""
     worlds, scenarios = project / "worlds", project / "scenarios"
     return [
-        Offer("BARN", data, lambda: list(_barn(made, data, sizes))),
+        Offer("BARN", data, lambda: list(_barn(made, data or Path(), sizes)), BARN),
         Offer("generated fields", made, lambda: [experiments.generated_fields(made, sizes.fields)]),
         Offer("narrow fields", made, lambda: experiments.narrow_fields(made, sizes.fields // 2)),
         Offer("dynamic fields", made, lambda: experiments.dynamic_fields(made, sizes.dynamic)),
@@ -55,7 +68,7 @@ def offers(data: Path, nav2: Path, project: Path, made: Path, sizes: Sizes) -> l
         Offer("degraded sensing", worlds, lambda: _degraded(made, worlds, sizes)),
         Offer("ramps", made, lambda: [corridors.ramps(made / "ramps", sizes.goals)]),
         Offer("two robots", made, lambda: [corridors.two_robots(made / "corridors", sizes.goals)]),
-        Offer("tb3_sandbox", nav2, lambda: experiments.sandbox(made, nav2, sizes.seeded(20))),
+        Offer("tb3_sandbox", nav2, lambda: experiments.sandbox(made, nav2 or Path(), sizes.seeded(20)), NAV2),
         Offer("corner cases", scenarios, lambda: experiments.corner_cases(scenarios, project, sizes.seeded(20))),
         Offer("localization", worlds, lambda: experiments.localizations(made, worlds, sizes.seeded(20), sizes.lost)),
     ]

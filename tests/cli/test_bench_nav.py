@@ -22,6 +22,9 @@ def test_it_drives_an_experiment_and_prints_its_numbers(tmp_path: Path) -> None:
 
 
 def test_data_that_is_not_here_is_skipped_aloud_and_an_unknown_experiment_is_an_error(tmp_path: Path) -> None:
-    done = bench("--only", "nothing", "--barn", str(tmp_path / "none"), "--out", str(tmp_path / "out"))
+    named = ("nothing", "BARN", "sandbox")
+    only = [word for name in named for word in ("--only", name)]
+    done = bench(*only, "--barn", str(tmp_path / "none"), "--out", str(tmp_path / "out"))
     assert done.returncode == 5
     assert f"BARN: skipped, there is no folder {tmp_path / 'none'}" in done.stderr
+    assert "tb3_sandbox: skipped, --nav2 names a folder with it: " in done.stderr

@@ -1,7 +1,7 @@
 """The search itself: OMPL's planners in the plane over a costmap's costs, limited by iterations and seeded.
 
 OMPL's generator is global to the process: it is seeded anew for each plan, before any other OMPL object is made.
-OMPL calls that a mistake in its log, yet it does what is wanted (measured; FACTS.md), hence the silenced log.
+OMPL calls that a mistake in its log, yet it does what is wanted (measured), hence the silenced log.
 """
 
 import math

@@ -23,7 +23,7 @@ def test_an_unusable_list_of_worlds_is_named(tmp_path: Path) -> None:
         barn_worlds(tmp_path)
 
 
-@pytest.mark.skipif(not DATA.is_dir(), reason="the worlds of BARN are not beside the project")
+@pytest.mark.skipif(not DATA.is_dir(), reason="the worlds of others are not here: see CONTRIBUTING.md")
 def test_the_worlds_of_the_dataset_are_there_with_their_reference_lengths() -> None:
     worlds = {world.file.stem: world for world in barn_worlds(DATA)}
     assert len(worlds) == 6

@@ -49,7 +49,7 @@ def test_every_corner_case_that_ships_is_an_experiment() -> None:
         loads(case)
 
 
-@pytest.mark.skipif(not SANDBOX.is_dir(), reason="Nav2's sandbox is not beside the project")
+@pytest.mark.skipif(not SANDBOX.is_dir(), reason="the worlds of others are not here: see CONTRIBUTING.md")
 def test_the_sandbox_loads_with_and_without_the_box(tmp_path: Path) -> None:
     for experiment in sandbox(tmp_path, SANDBOX, [1]):
         loads(experiment)

@@ -19,7 +19,7 @@ from simscen.worlds.sdf import load_sdf
 from simscen.worlds.shortest import shortest_legs
 
 DATA = Path(__file__).parents[3].parent / "shared" / "data"
-needs_data = pytest.mark.skipif(not DATA.is_dir(), reason=f"needs {DATA.name}, which is not part of the project")
+needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="the worlds of others are not here: see CONTRIBUTING.md")
 LIDAR = 0.18
 
 

@@ -66,7 +66,7 @@ def test_a_robot_without_wheels_is_not_guessed(infer):
         infer(describe(robot_body(shipped("omni"))))
 
 
-@pytest.mark.skipif(not JACKAL.exists(), reason="shared/data/jackal_urdf is not here")
+@pytest.mark.skipif(not JACKAL.exists(), reason="the Jackal of others is not here: see CONTRIBUTING.md")
 def test_the_jackal_is_skid_steered():
     spec = spec_of_urdf(JACKAL)
     assert spec.drive.type == "skid_steer"

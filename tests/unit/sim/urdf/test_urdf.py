@@ -314,7 +314,7 @@ def test_xacro_files_are_expanded(tmp_path):
 @pytest.fixture
 def jackal():
     if not JACKAL.is_dir():
-        pytest.skip("shared/data/jackal_urdf is not here")
+        pytest.skip("the Jackal of others is not here: see CONTRIBUTING.md")
     drive = {"type": "skid_steer", "wheel_radius": 0.098, "wheel_separation": 0.37559, "wheel_base": 0.262,
              "turning_scale": 1.6}  # fmt: skip
     limits = {"linear": 2.0, "angular": 4.0, "linear_acceleration": 3.0, "angular_acceleration": 8.0}

@@ -19,7 +19,7 @@ Refuse = Callable[..., list[Problem]]
 def data() -> Path:
     folder = Path(__file__).parents[5] / "shared" / "data"
     if not folder.is_dir():
-        pytest.skip("the shared data folder is not here")
+        pytest.skip("the worlds of others are not here: see CONTRIBUTING.md")
     return folder
 
 
