@@ -1,0 +1,62 @@
+"""docs/references.bib has an entry for everything that docstrings and docs cite, and for nothing else."""
+
+import calendar
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+SOURCES = [
+    path
+    for folder in ("simscen", "docs")
+    for path in sorted((ROOT / folder).rglob("*"))
+    if path.suffix in (".py", ".md") and path.name != "language.md"  # which is made of docstrings
+]
+ENTRY = re.compile(r"^@\w+\{(\w+),\n(.*?)^\}", re.MULTILINE | re.DOTALL)
+FIELD = re.compile(r"^  (\w+) = \{(.*)\},$", re.MULTILINE)
+NAME, YEAR = r"((?:van )?[A-ZÉŞÖ][\w'’-]+)", r"((?:19|20)\d\d)\b"
+OTHERS = r"(?:(?:, [A-ZÉŞ][\w-]+)* (?:and|&) [A-ZÉŞ][\w-]+| et\s?al\.)"
+CITED = (
+    re.compile(rf"(?<![\w*]){NAME}{OTHERS}?,? \(?{YEAR}"),  # Fox et al. 1997, Hall (1966)
+    re.compile(rf"(?<![\w*]){NAME}{OTHERS},[^.;|]{{3,110}}?\b{YEAR}"),  # Walsh & Karaman, CDDT (ICRA 2018)
+    re.compile(
+        rf"(?<![\w*]){NAME}, \*?[A-Z][^.;|()]{{8,110}}?\(?(?:[A-Z][\w-]* )*\d*,? ?\(?{YEAR}"
+    ),  # Olson, A title, 2009
+)
+NO_AUTHORS = {*calendar.month_name, "REP"}
+"""Stand before a number that looks like a year: months, and ROS enhancement proposals."""
+ENTRIES = {key: dict(FIELD.findall(body)) for key, body in ENTRY.findall((ROOT / "docs/references.bib").read_text())}
+
+
+def citations() -> Iterator[tuple[str, str, str]]:
+    """File, name (or a word of the title or venue before the year) and year."""
+    for path in SOURCES:
+        text = re.sub(r"\s+", " ", path.read_text(encoding="utf-8"))
+        for pattern in CITED:
+            for name, year in pattern.findall(text):
+                if name not in NO_AUTHORS:
+                    yield path.relative_to(ROOT).as_posix(), name, year
+
+
+def test_each_citation_has_an_entry() -> None:
+    known = {(word, entry["year"]) for entry in ENTRIES.values() for word in words(entry)}
+    assert sorted({cited for cited in citations() if cited[1:] not in known}) == []
+    assert len(set(citations())) > 100
+
+
+def words(entry: dict[str, str]) -> set[str]:
+    """What may stand before the year: an author, the last word of a title, a venue in short."""
+    text = " ".join(entry.values())
+    return {*re.findall(r"[^\W\d_][\w'’-]+", text), *re.findall(r"van \w+", text)}
+
+
+def test_each_entry_is_cited_and_says_where_to_find_it() -> None:
+    text = " ".join(path.read_text(encoding="utf-8") for path in SOURCES)
+    first = {key: entry["author"].partition(",")[0] for key, entry in ENTRIES.items()}
+    assert [key for key, name in first.items() if not re.search(rf"\b{re.escape(name)}\b", text)] == []
+    for key, entry in ENTRIES.items():
+        assert {"journal", "booktitle", "publisher", "school", "institution", "eprint", "howpublished"} & set(entry), (
+            key
+        )
+        assert key.endswith(entry["year"])
+    assert list(ENTRIES) == sorted(ENTRIES, key=lambda key: (re.sub(r"\d", "", key), key))
