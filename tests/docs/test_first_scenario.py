@@ -49,6 +49,8 @@ def test_the_harder_one_fails_by_the_tight_bound_alone_and_leaves_all_that_the_p
     code, told = called("run", "scenarios/my_first.scenario.yaml")
     assert code == 1
     assert "stopped_within: " in told and "again" in told and "scenarios/my_first.scenario.yaml:16" in told
+    (shown,) = re.findall(r"^```text\n(.*?)^```", PARTS["4"], re.MULTILINE | re.DOTALL)
+    assert words(shown) == words(told.partition("\n")[2])[: len(words(shown))]
     session = clone / "simscen-out/latest"
     (run,) = json.loads((session / "results.json").read_text())["runs"]
     assert run["outcome"] == "failed"
@@ -69,3 +71,8 @@ def test_the_example_in_python_runs(page: str, clone: Path) -> None:
         [sys.executable, "-c", f"import simscen\n{code}"], capture_output=True, text=True, check=False, cwd=clone
     )
     assert done.returncode == 0, done.stderr
+
+
+def words(text: str) -> list[list[str]]:
+    """Each line without its numbers, whose last digits may differ between processors."""
+    return [re.findall(r"[a-z_]{2,}", line) for line in text.strip("\n").splitlines()]
