@@ -24,7 +24,7 @@ COMMANDS = {
     "plot": "Draw a recorded run.",
     "replay": "Make a page that plays a recorded run, or two side by side.",
     "localize": "Run a recorded drive through the localizer alone.",
-    "log": "Mend the logs of runs that broke off.",
+    "log": "Mend logs, and lay out what viewers show of them.",
     "new": "Write a commented scenario to start from.",
     "explain": "Explain a word of the language, a key, a signal, a metric, a component or a code.",
     "schema": "Print or write the JSON Schemas that editors use.",

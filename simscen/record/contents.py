@@ -116,6 +116,7 @@ class Contents:
         self._time = self._seen.time = SimTime(int(facts["tick_rate"]))
         for name in json.loads(facts.get(header.ROBOTS, "[]")):
             contents = self.robots[name] = Contents(self._looks)
+            contents._seen.names = frames.RobotFrames(name)
             contents._begin({**header.facts_of(facts, name), header.ROBOTS: "[]"})
 
     def _attached(self, file: records.Attachment) -> None:
@@ -190,7 +191,9 @@ class Contents:
                 self._rows.object(name).add(tick, link.pose)
 
     def _mounts(self, _: int, data: bytes) -> None:
-        self._frames = self._seen.mounts = {link.child: Pose3(*link.pose) for link in unpack.transforms(data)}
+        self._frames = self._seen.mounts = {
+            self._seen.names.own(link.child): Pose3(*link.pose) for link in unpack.transforms(data)
+        }
 
     def _grid(self, _: int, data: bytes) -> None:
         origin = Pose2(*json.loads(self._facts["map.origin"]))

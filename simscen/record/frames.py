@@ -4,6 +4,30 @@ MAP, ODOM, BASE, TRUTH = "map", "odom", "base_link", "base_link_truth"
 _OBJECT = "object/"
 
 
+class RobotFrames:
+    """The frames of a robot. Each of several has its name in front of its own, so that all are in one tree.
+
+    `map` and the frames of moving things are of all.
+    """
+
+    def __init__(self, robot: str = "") -> None:
+        # What begins with object/ is a moving thing's.
+        self._front = f"{robot}{'_' if f'{robot}/' == _OBJECT else ''}/" if robot else ""
+        self.odom, self.base, self.truth = self.of(ODOM), self.of(BASE), self.of(TRUTH)
+
+    def of(self, frame: str) -> str:
+        """What the log calls a frame of the robot's stack."""
+        return frame if frame == MAP else f"{self._front}{frame}"
+
+    def of_sensor(self, name: str) -> str:
+        """What the log calls the frame of a sensor."""
+        return self.of(of_sensor(name))
+
+    def own(self, frame: str) -> str:
+        """What the robot's stack calls a frame of the log; older logs call it so, too."""
+        return frame.removeprefix(self._front)
+
+
 def of_sensor(name: str) -> str:
     """The frame of a sensor: its own name, unless that would close a loop in the tree."""
     return f"{name}_link" if name in (MAP, ODOM, BASE, TRUTH) else name

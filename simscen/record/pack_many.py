@@ -155,3 +155,13 @@ def occupancy_grid(frame: str, stamp: Stamp, grid: OccupancyGrid) -> bytes:
     message.put("7d", *Pose3.planar(grid.origin))
     message.put("I", grid.cells.size)
     return bytes(message.buffer) + grid.cells.astype(np.int8).tobytes()
+
+
+def pose_array(frame: str, stamp: Stamp, points: Array) -> bytes:
+    """geometry_msgs/msg/PoseArray of points (n, 3 or more) x, y, yaw, rounded to 32 bits, which packs well; n > 0."""
+    message = Template()
+    message.put("iI", *stamp)
+    message.string(frame)
+    message.put("I", len(points))
+    message.align(8)
+    return bytes(message.buffer) + ground_poses(points).astype("<f4").astype("<f8").tobytes()

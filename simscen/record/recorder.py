@@ -12,6 +12,7 @@ from simscen.record import header
 from simscen.record.header import LogHeader
 from simscen.record.logfile import LogFile
 from simscen.record.robot_topics import RobotTopics
+from simscen.record.sceneryfile import scenery_of
 from simscen.record.simtime import SimTime
 from simscen.record.topics import Namespaced, Publisher
 from simscen.record.writer import McapWriter, Sink
@@ -35,9 +36,10 @@ class Recorder:
         self._writer.note("simscen", header.facts(about, clock))
         for name, data in header.attachments(about).items():
             self._writer.attach(name, header.media_type(name), data)
-        each = about.robots or {"": about}
+        each, scenery = about.robots or {"": about}, scenery_of(about)
         self.robots = {
-            name: RobotTopics(Namespaced(out, name) if about.robots else out, time, one) for name, one in each.items()
+            name: RobotTopics(Namespaced(out, name) if about.robots else out, time, one, scenery, name)
+            for name, one in each.items()
         }
         """What takes the moments of each robot, by name; the only one has none."""
 

@@ -1,10 +1,12 @@
 """All that a log says of one robot."""
 
 from simscen.core.geometry import Pose3
+from simscen.core.scenery import Scenery
 from simscen.core.trace import Moment
 from simscen.record import frames, pack_many, pack_rare, topics
 from simscen.record.event_topics import EventTopics
 from simscen.record.header import LogHeader
+from simscen.record.scene_topics import SceneTopics
 from simscen.record.sensor_topics import SensorTopics
 from simscen.record.simtime import SimTime
 from simscen.record.stack_topics import StackTopics
@@ -16,16 +18,17 @@ from simscen.record.truth_topics import TruthTopics
 class RobotTopics:
     """Eats the moments of a robot in the order of their ticks, and writes them to `out`."""
 
-    def __init__(self, out: Out, time: SimTime, about: LogHeader) -> None:
-        self._time, thinning = time, Thinning(time.rate)
+    def __init__(self, out: Out, time: SimTime, about: LogHeader, scenery: Scenery, robot: str = "") -> None:
+        self._time, thinning, names = time, Thinning(time.rate), frames.RobotFrames(robot)
         if about.map is not None:
             out.publish(topics.MAP, 0, pack_many.occupancy_grid(frames.MAP, (0, 0), about.map))
         if about.robot_description:
             out.publish(topics.ROBOT_DESCRIPTION, 0, pack_rare.string(about.robot_description))
-        self._truth = TruthTopics(out, time, thinning)
-        self._sensors = SensorTopics(out, time, thinning, about.frames, about.sensors)
-        self._stack = StackTopics(out, time, thinning)
+        self._truth = TruthTopics(out, time, thinning, names)
+        self._sensors = SensorTopics(out, time, thinning, about.frames, about.sensors, names)
+        self._stack = StackTopics(out, time, thinning, names)
         self._events = EventTopics(out, time, about.case)
+        self._scene = SceneTopics(out, about.case, scenery, names, robot)
 
     def append(self, moment: Moment) -> None:
         """Write one beat; every message of it carries the beat's simulated time."""
@@ -37,5 +40,6 @@ class RobotTopics:
             self._sensors.correct(Pose3.planar(decision.belief.map_from_odom))
         self._sensors.write(now, moment.readings)
         self._stack.write(now, tick, decision)
+        self._scene.write(now, moment.events)
         for event in (*moment.events, *decision.events):
             self._events.write(now, event)

@@ -10,6 +10,7 @@ from simscen.core.grid import OccupancyGrid
 from simscen.core.sensing import Scan
 from simscen.record import topics
 from simscen.record.cdr import Cursor
+from simscen.record.frames import RobotFrames
 from simscen.record.rows import on_the_ground
 from simscen.record.simtime import SECOND, SimTime
 
@@ -22,7 +23,7 @@ class Seen:
     """Messages as they are in the log: most of them are never looked at, and reading all would take long.
 
     `scans` are by topic; `mounts` are where lidars sit, by their frames. Unless `stamped`, the ticks of the log are not
-    those of the messages' headers: a scan was measured when it was logged.
+    those of the messages' headers: a scan was measured when it was logged. `names` are the robot's frames.
     """
 
     time: SimTime = field(default_factory=lambda: SimTime(1))
@@ -32,6 +33,7 @@ class Seen:
     costmaps: dict[str, Messages] = field(default_factory=dict)
     mounts: dict[str, Pose3] = field(default_factory=dict)
     stamped: bool = True
+    names: RobotFrames = field(default_factory=RobotFrames)
 
     def taker(self, topic: str, kind: str) -> Callable[[int, bytes], None] | None:
         """What takes the messages of a topic; None for one that nobody looks at."""
@@ -74,7 +76,7 @@ class Seen:
         """The frame and the cells of a nav_msgs/msg/OccupancyGrid."""
         cursor = Cursor(data)
         cursor.take("iI")
-        frame = cursor.string()
+        frame = self.names.own(cursor.string())
         cursor.take("iI")
         (resolution,) = cursor.take("f")
         width, height = (int(n) for n in cursor.take("2I"))
@@ -85,7 +87,7 @@ class Seen:
 
     def _header(self, cursor: Cursor) -> tuple[int, str]:
         sec, nanosec = cursor.take("iI")
-        return self.time.tick(int(sec) * SECOND + int(nanosec)), cursor.string()
+        return self.time.tick(int(sec) * SECOND + int(nanosec)), self.names.own(cursor.string())
 
 
 def _into(messages: Messages) -> Callable[[int, bytes], None]:

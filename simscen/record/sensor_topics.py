@@ -40,13 +40,15 @@ class SensorTopics:
         thinning: Thinning,
         mounts: Mapping[str, Pose3],
         sensors: Mapping[str, str] | None = None,
+        names: frames.RobotFrames | None = None,
     ) -> None:
         self._out, self._time, self._thinning = out, time, thinning
         self._topics: dict[tuple[str, str], Topic] = {}
         self._plain: set[str] = set()
         self._scans: dict[str, LaserScanPacker] = {}
-        self._odometry = OdometryPacker(frames.ODOM, frames.BASE)
-        self._imu = ImuPacker(frames.BASE)
+        self._names = names or frames.RobotFrames()
+        self._odometry = OdometryPacker(self._names.odom, self._names.base)
+        self._imu = ImuPacker(self._names.base)
         self._transforms = TransformsPacker()
         self._mounts = dict(mounts)
         self._correction: Pose3 | None = None
@@ -91,22 +93,22 @@ class SensorTopics:
         self._out.publish(self.topic_of(odometry), now, self._odometry(stamp, pose, odometry.twist))
         if not self._thinning.keeps_odometry(odometry):
             return
-        links = [(frames.ODOM, frames.BASE, stamp, pose)]
+        links = [(self._names.odom, self._names.base, stamp, pose)]
         if self._correction is not None:
-            links.append((frames.MAP, frames.ODOM, stamp, self._correction))
+            links.append((frames.MAP, self._names.odom, stamp, self._correction))
         self._out.publish(topics.TF, now, self._transforms(links))
 
     def _write_scan(self, now: int, scan: Scan) -> None:
         packer = self._scans.get(scan.sensor)
         if packer is None:
-            packer = self._scans[scan.sensor] = LaserScanPacker(frames.of_sensor(scan.sensor))
+            packer = self._scans[scan.sensor] = LaserScanPacker(self._names.of_sensor(scan.sensor))
         if scan.sensor not in self._mounts:
             self._mounts[scan.sensor] = Pose3.planar(scan.mount)
             self._publish_mounts(now)
         self._out.publish(self.topic_of(scan), now, packer(self._time.stamp(scan.tick), scan))
 
     def _write_image(self, now: int, image: Image) -> None:
-        frame, stamp = frames.of_sensor(image.sensor), self._time.stamp(image.tick)
+        frame, stamp = self._names.of_sensor(image.sensor), self._time.stamp(image.tick)
         for topic, depth in _images(image.sensor):
             pixels = image.depth if depth else image.rgb
             if pixels.size:
@@ -114,7 +116,8 @@ class SensorTopics:
 
     def _publish_mounts(self, now: int) -> None:
         """All static frames at once: a late subscriber gets only the last message."""
-        links = [(frames.BASE, frames.of_sensor(name), _START, pose) for name, pose in self._mounts.items()]
+        base = self._names.base
+        links = [(base, self._names.of_sensor(name), _START, pose) for name, pose in self._mounts.items()]
         if links:
             self._out.publish(topics.TF_STATIC, now, self._transforms(links))
 

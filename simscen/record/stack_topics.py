@@ -1,9 +1,10 @@
-"""What the stack made of it: /amcl_pose, /particle_cloud, /plan, /local_plan, both costmaps and /cmd_vel."""
+"""What the stack made of it: /amcl_pose, its particles, /plan, /local_plan, both costmaps and /cmd_vel."""
 
 from simscen.core.belief import Belief
 from simscen.core.geometry import Pose3
 from simscen.core.trace import Decision
 from simscen.record import frames, pack_many, pack_rare, topics
+from simscen.record.frames import RobotFrames
 from simscen.record.pack import PoseWithCovariancePacker, TwistPacker
 from simscen.record.pack_many import ParticleCloudPacker, PathPacker
 from simscen.record.simtime import SimTime
@@ -11,19 +12,21 @@ from simscen.record.thinning import Thinning, Throttle
 from simscen.record.topics import Out
 
 PARTICLE_RATE = 2  # a cloud of 2000 is 128 kB, as much as all other topics say in a second
+POSES_RATE, MOST_POSES = 1, 200  # the same for the eye, to which 32-bit numbers are enough
 LOCAL_PLAN_RATE = 5  # only for the eye
 
 
 class StackTopics:
     """Writes decisions."""
 
-    def __init__(self, out: Out, time: SimTime, thinning: Thinning) -> None:
-        self._out, self._time, self._thinning = out, time, thinning
+    def __init__(self, out: Out, time: SimTime, thinning: Thinning, names: RobotFrames) -> None:
+        self._out, self._time, self._thinning, self._names = out, time, thinning, names
         self._belief = PoseWithCovariancePacker(frames.MAP)
         self._particles = ParticleCloudPacker(frames.MAP)
         self._path = PathPacker(frames.MAP)
         self._command = TwistPacker()
         self._particle_times = Throttle(time.rate, PARTICLE_RATE)
+        self._poses_times = Throttle(time.rate, POSES_RATE)
         self._local_plan_times = Throttle(time.rate, LOCAL_PLAN_RATE)
 
     def write(self, now: int, tick: int, decision: Decision) -> None:
@@ -39,7 +42,7 @@ class StackTopics:
         for costmap in decision.costmaps:
             topic = topics.GLOBAL_COSTMAP if costmap.name == "global" else topics.LOCAL_COSTMAP
             stamp = self._time.stamp(tick)
-            self._out.publish(topic, now, pack_many.occupancy_grid(costmap.frame, stamp, costmap.grid))
+            self._out.publish(topic, now, pack_many.occupancy_grid(self._names.of(costmap.frame), stamp, costmap.grid))
         if self._thinning.keeps_command(tick, decision.command):
             self._out.publish(topics.COMMAND, now, self._command(decision.command))
         for line in decision.lines:
@@ -51,3 +54,6 @@ class StackTopics:
         self._out.publish(topics.BELIEF, now, self._belief(stamp, pose, belief.covariance))
         if len(belief.particles) and self._particle_times.passes(tick):
             self._out.publish(topics.PARTICLES, now, self._particles(stamp, belief.particles))
+        if len(belief.particles) and self._poses_times.passes(tick):
+            some = belief.particles[:: -(-len(belief.particles) // MOST_POSES)]
+            self._out.publish(topics.PARTICLE_POSES, now, pack_many.pose_array(frames.MAP, stamp, some))

@@ -1,4 +1,4 @@
-"""What really happened: /clock, /ground_truth/odom, /simscen/clearance and moving things on /tf."""
+"""What really happened: /clock, /ground_truth/odom, /simscen/clearance, and on /tf the robot and moving things."""
 
 from simscen.core.trace import Truth
 from simscen.record import frames, topics
@@ -12,10 +12,10 @@ from simscen.record.topics import Out
 class TruthTopics:
     """Writes truth samples, and the clock with them."""
 
-    def __init__(self, out: Out, time: SimTime, thinning: Thinning) -> None:
-        self._out, self._time, self._thinning = out, time, thinning
+    def __init__(self, out: Out, time: SimTime, thinning: Thinning, names: frames.RobotFrames) -> None:
+        self._out, self._time, self._thinning, self._frame = out, time, thinning, names.truth
         self._clock = ClockPacker()
-        self._odometry = OdometryPacker(frames.MAP, frames.TRUTH)
+        self._odometry = OdometryPacker(frames.MAP, names.truth)
         self._clearance = Float64Packer()
         self._transforms = TransformsPacker()
 
@@ -25,7 +25,8 @@ class TruthTopics:
         out.publish(topics.CLOCK, now, self._clock(stamp))
         out.publish(topics.TRUTH, now, self._odometry(stamp, truth.pose, truth.twist))
         out.publish(topics.CLEARANCE, now, self._clearance(truth.clearance))
-        moved = self._thinning.moved(tick, truth) if truth.objects else None
-        if moved:
-            links = [(frames.MAP, frames.of_object(name), stamp, pose) for name, pose in moved]
-            out.publish(topics.TF, now, self._transforms(links))
+        links = [(frames.MAP, self._frame, stamp, truth.pose)]
+        if truth.objects:
+            moved = self._thinning.moved(tick, truth)
+            links += [(frames.MAP, frames.of_object(name), stamp, pose) for name, pose in moved]
+        out.publish(topics.TF, now, self._transforms(links))

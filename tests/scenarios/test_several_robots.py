@@ -132,7 +132,7 @@ def test_a_log_is_what_ros_2_tools_read_in_the_namespaces_of_its_robots(run):
         frames = set()
         for connection, _, data in bag.messages([c for c in bag.connections if c.topic == "/a/tf"]):
             frames |= {link.child_frame_id for link in bag.deserialize(data, connection.msgtype).transforms}
-        assert frames == {"base_link", "odom", "object/b"}
+        assert frames == {"a/base_link", "a/odom", "a/base_link_truth", "object/b"}
         times = [time for _, time, _ in bag.messages([c for c in bag.connections if c.topic == "/clock"])]
         assert len(times) == len(set(times)), "one clock for all"
 

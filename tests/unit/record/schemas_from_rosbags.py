@@ -13,6 +13,7 @@ from rosbags.typesys.store import Typestore
 SCHEMAS = Path(__file__).parents[3] / "simscen" / "record" / "schemas.json"
 
 TYPES = (
+    "geometry_msgs/msg/PoseArray",
     "geometry_msgs/msg/PoseStamped",
     "geometry_msgs/msg/PoseWithCovarianceStamped",
     "geometry_msgs/msg/Twist",
@@ -29,6 +30,7 @@ TYPES = (
     "std_msgs/msg/Float64",
     "std_msgs/msg/String",
     "tf2_msgs/msg/TFMessage",
+    "visualization_msgs/msg/MarkerArray",
 )
 
 # rosbags has no nav2_msgs; these are the files of navigation2's humble branch, without their comments.

@@ -27,9 +27,10 @@ from simscen.record.recorder import Recorder
 
 HERE = Path(__file__).parent
 RUN = list(moments(2.0))
-LATCHED = {"/map", "/tf_static", "/robot_description"}
+LATCHED = {"/map", "/tf_static", "/robot_description", "/simscen/things", "/simscen/scene"}
 TOPICS = LATCHED | {
     *("/clock", "/tf", "/scan", "/odom", "/imu", "/bumper", "/amcl_pose", "/particle_cloud", "/plan", "/local_plan"),
+    "/particlecloud",
     *("/cmd_vel", "/goal_pose", "/ground_truth/odom", "/rosout", "/simscen/events", "/simscen/clearance"),
     *("/visual/odom", "/rear_lidar/scan", "/camera/image_raw", "/camera/depth/image_raw"),
 }
@@ -118,6 +119,7 @@ def test_the_frames_form_one_tree_under_map(read: dict[str, list[tuple[int, Any]
     assert parents == {
         "odom": "map",
         "base_link": "odom",
+        "base_link_truth": "map",
         **dict.fromkeys(("camera", "lidar", "rear lidar"), "base_link"),
         **dict.fromkeys(("object/cart", "object/a box"), "map"),
     }

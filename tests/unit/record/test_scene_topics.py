@@ -1,0 +1,139 @@
+"""What there is to see is said when it changes, each time whole: whoever comes late needs the last message only."""
+
+import io
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from moments import CLOCK, about, moments
+
+from simscen.core.events import Event, EventKind
+from simscen.core.geometry import Pose2
+from simscen.core.maskcells import MaskCells
+from simscen.core.motion import STOP
+from simscen.core.scenery import Ground, Scenery, Thing, Zone
+from simscen.core.trace import Decision, Moment
+from simscen.record.recorder import Recorder
+from simscen.record.replay import read_log
+from simscen.record.sceneryfile import NAME, scenery_to_json
+
+SQUARE = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
+SCENERY = Scenery(
+    places={"dock": Pose2(4.0, 2.0, 0.0)},
+    things=(Thing("gate", Pose2(0.0, 0.0, 0.0), (SQUARE,), Pose2(0.0, 0.0, 0.0), Pose2(0.0, 0.0, 1.5)),),
+    ground=(Ground("ramp", SQUARE, 0.25),),
+    zones=(
+        Zone("speed", "ward", SQUARE, 0.25),
+        Zone("keepout", cells=MaskCells(0.5, Pose2(1.0, 1.0, 0.0), ((0, 0, 4, 2, 100),))),
+        Zone("keepout", "of another", SQUARE, robot="other"),
+    ),
+)
+
+
+def said(topic: str, *beats: tuple[int, list[Event]]) -> list[tuple[float, list[Any]]]:
+    """The markers on a topic, each time with the seconds at which they were said."""
+    stream = io.BytesIO()
+    files = {NAME: scenery_to_json(SCENERY)}
+    recorder = Recorder(stream, CLOCK, replace(about(), files=files))
+    for tick, events in beats:
+        recorder.append(Moment(tick, None, (), Decision(STOP), tuple(events)))
+    recorder.close(480, "{}")
+    stream.seek(0)
+    reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+    return [(m.log_time / 1e9, said.markers) for _, _, m, said in reader.iter_decoded_messages([topic])]
+
+
+def spawned(name: str, parts: Any, **about: Any) -> Event:
+    return Event(0, EventKind.OBJECT_SPAWNED, name, {"parts": parts, **about})
+
+
+def several(folder: Path) -> Path:
+    """The log of two robots, one of them with a name that could be taken for a moving thing's frame."""
+    path = folder / "run.mcap"
+    recorder = Recorder(path, CLOCK, replace(about(), robots={"a": about(), "object": about()}))
+    for moment in moments(1.0):
+        for robot in recorder.robots.values():
+            robot.append(moment)
+    recorder.close(240, "{}")
+    return path
+
+
+def groups(markers: list[Any]) -> set[tuple[str, str]]:
+    return {(marker.ns, marker.text) for marker in markers[1:]}
+
+
+def test_things_are_said_once_and_again_when_one_comes_or_goes() -> None:
+    square = [list(corner) for corner in SQUARE]
+    here = [spawned("gate", [square]), spawned("anna", [square], person=True)]
+    box, gone = spawned("box", [square, square[:3]]), Event(0, EventKind.OBJECT_REMOVED, "anna")
+    told = said("/simscen/things", (0, here), (24, []), (240, [box]), (480, [gone, Event(0, EventKind.MARK, "box")]))
+    assert [time for time, _ in told] == [0.0, 1.0, 2.0]
+    assert [{marker.header.frame_id for marker in markers[1:]} for _, markers in told] == [
+        {"object/gate", "object/anna"},
+        {"object/gate", "object/anna", "object/box"},
+        {"object/gate", "object/box"},
+    ]
+    assert all(
+        markers[0].action == 3 and all(m.action == 0 and m.frame_locked for m in markers[1:]) for _, markers in told
+    )
+    assert {ns for ns, _ in groups(told[1][1])} == {"doors", "people", "things", "names"}
+    (outline,) = (marker for marker in told[-1][1] if marker.ns == "things")
+    assert len(outline.points) == 2 * (4 + 3)
+    assert (outline.points[1].x, outline.points[1].y) == (1.0, 0.0)
+
+
+@pytest.mark.parametrize("parts", [None, "round", [3, []], [[["x", "y"]] * 3], [[[1.0, 2.0]]]])
+def test_a_thing_whose_outline_a_plugin_tells_wrongly_has_its_name_only(parts: Any) -> None:
+    ((_, markers),) = said("/simscen/things", (0, [spawned("odd", parts)]))
+    assert [(marker.ns, len(marker.points)) for marker in markers[1:]] == [("names", 0)]
+
+
+def test_zones_are_those_of_the_robot_and_are_said_again_when_one_is_switched() -> None:
+    def switch(region: str, what: str, enabled: bool, **more: float) -> Event:
+        return Event(0, EventKind.ZONE_SWITCHED, region, {"filter": what, "enabled": enabled, **more})
+
+    told = said(
+        "/simscen/scene",
+        (0, []),
+        (240, [switch("ward", "speed", False), switch("aisle", "keepout", True)]),
+        (480, [switch("ward", "speed", True, speed_limit=0.5)]),
+    )
+    assert [time for time, _ in told] == [0.0, 1.0, 2.0]
+    first, second, third = (groups(markers) for _, markers in told)
+    assert first == {
+        ("footprint", ""), ("believed footprint", ""), ("ramps", ""), ("places", ""), ("places", "dock"),
+        ("speed zones", ""), ("speed zones", "ward: 0.25 m/s"), ("keepout zones", ""),
+    }  # fmt: skip
+    speed = {("speed zones", ""), ("speed zones", "ward: 0.25 m/s")}
+    assert second == first - speed | {("keepout zones", "aisle")}
+    assert third - second == {("speed zones", ""), ("speed zones", "ward: 0.5 m/s")}
+
+
+def test_a_mask_is_drawn_as_triangles_where_its_cells_are() -> None:
+    ((_, markers),) = said("/simscen/scene", (0, []))
+    (mask,) = (marker for marker in markers if marker.type == 11)
+    assert (mask.pose.position.x, mask.pose.position.y) == (1.0, 1.0)
+    assert {(point.x, point.y) for point in mask.points} == {(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0)}
+    assert len(mask.points) == 6
+
+
+def test_frames_of_several_robots_are_in_one_tree(tmp_path: Path) -> None:
+    stream = io.BytesIO(several(tmp_path).read_bytes())
+    parents = {}
+    reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+    for _, _, _, message in reader.iter_decoded_messages(["/a/tf", "/a/tf_static", "/object/tf", "/object/tf_static"]):
+        parents |= {link.child_frame_id: link.header.frame_id for link in message.transforms}
+    for front in ("a/", "object_/"):
+        assert parents[f"{front}odom"] == parents[f"{front}base_link_truth"] == "map"
+        assert parents[f"{front}lidar"] == parents[f"{front}camera"] == f"{front}base_link"
+
+
+def test_mounts_and_scans_of_several_robots_are_called_as_their_stacks_call_them(tmp_path: Path) -> None:
+    for log in read_log(several(tmp_path), looks=True).robots.values():
+        assert set(log.about.frames) == {"camera", "lidar", "rear lidar"}
+        assert set(log.trace.objects) == {"cart", "a box"}
+        _, scan = log.seen.scans["/scan"][0]
+        assert log.seen.scan(scan).mount == Pose2(0.1, 0.0, 0.0)

@@ -1,0 +1,158 @@
+"""Logs and the layout for them, as the readers that Foxglove and Lichtblick are made of see them."""
+
+import json
+import math
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from simscen.core.events import EventKind
+from simscen.record.replay import Log, read_run
+from simscen.report.viewers import foxglove_layout, rviz_config
+from simscen.run.simulate import simulate_file
+
+SCENARIO = """\
+simscen: 1
+time_limit: 6 s
+world:
+  simscen: 1
+  walls: [{points: [[0, 0], [8, 0], [8, 6], [0, 6], [0, 0]]}]
+  doors: [{name: gate, points: [[6, 0], [6, 1]]}]
+  objects: [{name: crate, pose: {x: 5, y: 5}, box: [0.4, 0.6, 0.5]}]
+  regions: {corner: [[0, 4], [2, 4], [2, 6], [0, 6]]}
+  places: {desk: {x: 4, y: 2}}
+"""
+ONE = """\
+robot: {pose: {x: 1, y: 1}}
+stack: {keepout: [corner]}
+goals: [desk]
+events:
+  - {when: {time: 0 s}, do: {pedestrian: {name: walker, pose: {x: 2.5, y: 5}, goals: [[5, 5.5]]}}}
+  - {when: {time: 1 s}, do: {spawn: {name: late, pose: {x: 1, y: 3.3}, cylinder: [0.2, 1.0]}}}
+  - {when: {time: 2 s}, do: {move: {name: crate, through: [[5, 4]], speed: 0.5 m/s}}}
+  - {when: {time: 3 s}, do: {remove: {name: late}}}
+pass: [{collisions: {max: 0}}]
+"""
+SEVERAL = """\
+robots:
+  object: {pose: {x: 1, y: 1}, goals: [desk], pass: [{collisions: {max: 0}}]}
+  b: {pose: {x: 2, y: 5}, goals: [{pose: {x: 3, y: 5}}], pass: [{collisions: {max: 0}}]}
+"""
+Seen = Callable[[Path], dict[str, Any]]
+
+
+@pytest.fixture(scope="module", params=["one", "several"])
+def log(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    home = tmp_path_factory.mktemp(request.param)
+    file, log = home / "seen.scenario.yaml", home / "run.mcap"
+    file.write_text(SCENARIO + (ONE if request.param == "one" else SEVERAL))
+    simulate_file(file, None, log, None)
+    return log
+
+
+def test_a_viewer_reads_every_message_and_shows_truth_and_things_where_they_were(
+    log: Path, seen_by_viewers: Seen
+) -> None:
+    seen, read = seen_by_viewers(log), read_run(log)
+    assert all(topic["count"] for topic in seen["topics"].values())
+    assert set(_topics_of(json.loads(foxglove_layout(read)))) <= set(seen["topics"])
+    one_tree(seen["links"])
+    for name, robot in (read.robots or {"": read}).items():
+        base = {"": "base_link", "object": "object_/base_link"}.get(name, f"{name}/base_link")
+        footprint = {"footprint": f"{base}_truth", "believed footprint": base}
+        scene = [array for array in seen["arrays"] if array["topic"] == _within(name, "/simscen/scene")]
+        assert footprint.items() <= {m["ns"]: m["frame"] for m in scene[-1]["markers"]}.items()
+        drawn_where_it_was(seen["links"], robot, f"{base}_truth", robot.trace.truth)
+        things = [array for array in seen["arrays"] if array["topic"] == _within(name, "/simscen/things")]
+        drawn_as_it_was(things, robot)
+        for thing, samples in robot.trace.objects.items():
+            drawn_where_it_was(seen["links"], robot, f"object/{thing}", samples)
+
+
+def test_what_changes_is_shown_from_then_on(log: Path, seen_by_viewers: Seen) -> None:
+    seen = seen_by_viewers(log)
+    if log.parent.name.startswith("several"):
+        assert {link["child"] for link in seen["links"]} >= {"b/base_link", "object_/base_link", "object/b"}
+        return
+    things = [(array["time"] / 1e9, groups(array)) for array in seen["arrays"] if array["topic"] == "/simscen/things"]
+    assert [sorted({**now}) for _, now in things] == [
+        ["crate", "gate", "walker"], ["crate", "gate", "late", "walker"], ["crate", "gate", "walker"]
+    ]  # fmt: skip
+    assert things[0][1] == {"crate": "things", "gate": "doors", "walker": "people"}
+    assert [round(time, 1) for time, _ in things] == [0.0, 1.0, 3.0]
+    (scene,) = [array for array in seen["arrays"] if array["topic"] == "/simscen/scene"]
+    assert {"corner", "desk"} <= {marker["text"] for marker in scene["markers"]}
+    assert {"keepout zones", "places", "footprint"} <= {marker["ns"] for marker in scene["markers"]}
+    assert all(array["count"] <= 200 for array in seen["poses"])
+
+
+def test_the_layout_of_most_logs_is_that_of_a_log_with_one_lidar(log: Path) -> None:
+    if log.parent.name.startswith("one"):
+        assert foxglove_layout() == foxglove_layout(read_run(log, looks=True))
+
+
+def test_rviz_is_shown_topics_that_the_layout_shows(log: Path) -> None:
+    shown = {f"/{name}" for name in re.findall(r"^        Value: (\w[\w/]*)$", rviz_config(), re.MULTILINE)}
+    layout = json.loads(foxglove_layout())
+    assert shown - {"/false"} == {
+        *layout["configById"]["3D!scene"]["topics"],
+        "/robot_description",
+        "/ground_truth/odom",
+    }
+
+
+def _within(robot: str, topic: str) -> str:
+    return f"/{robot}{topic}" if robot else topic
+
+
+def _topics_of(layout: Any) -> Iterator[str]:
+    """All topics that a layout names, wherever it does."""
+    for panel in layout["configById"].values():
+        yield from panel.get("topics", {})
+        yield from (layer["topic"] for layer in panel.get("layers", {}).values() if "topic" in layer)
+        yield from (path["value"].partition(".")[0] for path in panel.get("paths", []))
+        yield from (panel[key] for key in ("topicToRender", "topicPath") if key in panel)
+
+
+def one_tree(links: list[dict[str, Any]]) -> None:
+    """Each frame has one parent, and all hang from the map."""
+    parents: dict[str, str] = {}
+    for link in links:
+        assert parents.setdefault(link["child"], link["frame"]) == link["frame"]
+    assert {frame for frame in parents.values() if frame not in parents} == {"map"}
+
+
+def drawn_where_it_was(links: list[dict[str, Any]], log: Log, frame: str, samples: Any) -> None:
+    """What is locked to a frame is where the trace says, within a millimetre."""
+    told = {link["time"]: link["pose"] for link in links if link["child"] == frame and link["frame"] == "map"}
+    assert len(samples)
+    for tick, (x, y, yaw) in zip(samples.ticks.tolist(), samples.values.tolist(), strict=True):
+        pose = told[tick * 10**9 // log.trace.tick_rate]
+        assert math.hypot(pose[0] - x, pose[1] - y) < 1e-3
+        assert abs(math.remainder(2 * math.atan2(pose[5], pose[6]) - yaw, 2 * math.pi)) < 1e-2
+
+
+def drawn_as_it_was(things: list[dict[str, Any]], log: Log) -> None:
+    """Each thing has its outline, in its own frame and locked to it; what came before is deleted."""
+    spawned = {event.name: event for event in log.trace.of_kind(EventKind.OBJECT_SPAWNED)}
+    for array in things:
+        assert (array["markers"][0]["action"], {m["action"] for m in array["markers"][1:]}) == (3, {0})
+        for marker in array["markers"][1:]:
+            assert marker["locked"] and marker["pose"][3:] == [0, 0, 0, 1] and marker["opacity"] == 1
+            if marker["text"]:
+                continue
+            parts: Any = spawned[marker["frame"].removeprefix("object/")].data["parts"]
+            corners = np.array([corner for part in parts for corner in part])
+            points = np.array(marker["points"])[::2, :2]
+            assert points.shape == corners.shape
+            assert np.abs(points - corners).max() < 1e-3
+
+
+def groups(array: dict[str, Any]) -> dict[str, str]:
+    """The group of each thing that is drawn."""
+    shapes = [marker for marker in array["markers"][1:] if not marker["text"]]
+    return {marker["frame"].removeprefix("object/"): marker["ns"] for marker in shapes}
