@@ -1,5 +1,6 @@
 """The navigation stack's parameters, with Nav2's names and defaults."""
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal, get_args
 
@@ -111,7 +112,7 @@ class Amcl(Ranged, LocalizerSpec):
     """Weight of beams without an answer; the `beam` model only."""
     z_rand: Probability = 0.5
     """Weight of beams that end anywhere."""
-    sigma_hit: PositiveLength = 0.1
+    sigma_hit: Annotated[Length, Field(ge=0.001)] = 0.1
     """Standard deviation of the ends of beams that hit an obstacle of the map."""
     lambda_short: Annotated[float, Field(gt=0, le=100)] = 0.1
     """How fast short beams get rarer with their length, for each metre; the `beam` model only."""
@@ -120,7 +121,7 @@ class Amcl(Ranged, LocalizerSpec):
     laser_min_range: Length = -1.0
     """-1 = the lidar's own."""
     laser_max_range: Length = 100.0
-    """Ranges are cut here, and at the lidar's own greatest one."""
+    """Ranges are cut here, and at the lidar's own greatest one; -1 = at the lidar's own."""
     recovery_alpha_slow: Probability = 0.0
     """Decay of the slow average of weights, by which random particles are added; 0 = never."""
     recovery_alpha_fast: Probability = 0.0
@@ -159,6 +160,11 @@ class Amcl(Ranged, LocalizerSpec):
         named = values.get("parameters") if isinstance(values, Mapping) else None
         chosen = AMCL_PARAMETERS.get(named) if isinstance(named, str) else None
         return {**chosen, **values} if chosen else values
+
+    @property
+    def farthest(self) -> float:
+        """Where ranges are cut, if the lidar's own greatest one is not less; nothing above zero is the lidar's own."""
+        return self.laser_max_range if self.laser_max_range > 0.0 else math.inf
 
 
 class Ekf(LocalizerSpec):

@@ -143,7 +143,7 @@ class AmclLocalizer:
 
     def _look_elsewhere(self, finder: Finder, scan: Scan, odometry: Pose2) -> None:
         """Put the particles where the robot may be if it is not where it was thought to be."""
-        limits = self._spec.laser_min_range, self._spec.laser_max_range
+        limits = self._spec.laser_min_range, self._spec.farthest
         base = odometry
         if self._matcher is not None and self._matched is not None:
             base = self._matcher.pose.compose(self._matched[1].between(odometry))

@@ -68,7 +68,7 @@ def _motion_model(spec: model.Amcl, holonomic: bool) -> MotionModel:
 
 def _sensor_model(spec: model.Amcl, grid: OccupancyGrid) -> SensorModel:
     if spec.laser_model_type == "beam":
-        field = opaque_field(grid, spec.laser_max_range)
+        field = opaque_field(grid, spec.farthest)
         return BeamModel(
             field, spec.z_hit, spec.z_short, spec.z_max, spec.z_rand, spec.sigma_hit, spec.lambda_short
         )  # fmt: skip

@@ -81,7 +81,7 @@ class ParticleFilter:
         summed up before new ones are drawn, which would only add noise (Probabilistic Robotics, section 4.3.4).
         """
         spec, poses = self._spec, self.particles.poses
-        beams = select_beams(scan, spec.max_beams, spec.laser_min_range, spec.laser_max_range)
+        beams = select_beams(scan, spec.max_beams, spec.laser_min_range, spec.farthest)
         converged = spec.do_beamskip and self.particles.within(CONVERGED_WITHIN)
         logarithm = self._sensor.log_likelihood(poses, beams, converged)
         if self._trust is not None and len(ends := beams.ends()):

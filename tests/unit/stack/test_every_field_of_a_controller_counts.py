@@ -4,10 +4,10 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
-from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
+from typing import Any, NamedTuple
 
 import numpy as np
+import othervalues
 import pytest
 from pydantic import BaseModel, ValidationError
 
@@ -163,33 +163,6 @@ def answers(spec: ControllerSpec, probe: Probe) -> list[Any]:
     return said
 
 
-def alternatives(kind: Any, default: Any) -> Iterator[Any]:
-    """The other values that a field of this type might have, but for numbers; not all need be valid."""
-    if get_origin(kind) is Annotated:
-        yield from alternatives(get_args(kind)[0], default)
-    elif get_origin(kind) in (Union, UnionType):
-        for member in get_args(kind):
-            if member is not NoneType:
-                yield from alternatives(member, default)
-    elif get_origin(kind) is Literal:
-        yield from (each for each in get_args(kind) if each != default)
-    elif get_origin(kind) is list:
-        yield from ([each] for each in get_args(get_args(kind)[0]))
-    elif kind is bool:
-        yield from ([not default] if default is not None else [False])
-
-
-def numbers(kind: Any, default: Any) -> list[float]:
-    """Other numbers that a field of this type might have; not all need be valid."""
-    if get_origin(kind) in (Annotated, Union, UnionType):
-        return [each for member in get_args(kind) for each in numbers(member, default)]
-    if kind is int:
-        return [default - 2, default - 1, default + 1, 3 * default, 8 * default]
-    if kind is float:
-        return [0.4 * default, 0.0, 1.8 * default, 30.0 * default] if default else [-0.2, 0.1, 0.3, -1.0, 3.0]
-    return []
-
-
 class Other(NamedTuple):
     """A field, by the way to it, with another value; of a number there are several to try."""
 
@@ -209,9 +182,9 @@ def fields(spec: type[ControllerSpec], model: type[BaseModel], way: tuple[str, .
         if isinstance(kind, type) and issubclass(kind, BaseModel):
             yield from fields(spec, kind, (*way, name))
         elif name != "type":
-            yield from (Other(spec, (*way, name), [value]) for value in alternatives(kind, default))
-            if values := [value for value in numbers(kind, default) if valid(model, name, value)]:
-                yield Other(spec, (*way, name), values)
+            for group in othervalues.others(kind, default):
+                if values := [value for value in group if valid(model, name, value)]:
+                    yield Other(spec, (*way, name), values)
 
 
 def valid(model: type[BaseModel], name: str, value: Any) -> bool:
@@ -246,9 +219,14 @@ def changed(other: Other) -> Iterator[tuple[int, ControllerSpec]]:
 
 
 OTHERS = [other for spec in STARTS for other in fields(spec, spec)]
+CASES = [
+    pytest.param(other, id=str(other), marks=[pytest.mark.long] if number % 3 else [])
+    for number, other in enumerate(OTHERS)
+]
+"""Every third is tried by `make test`, the others by `make test-long`."""
 
 
-@pytest.mark.parametrize("other", OTHERS, ids=str)
+@pytest.mark.parametrize("other", CASES)
 def test_another_value_changes_a_command(other: Other) -> None:
     probes = [*enumerate(PROBES[other.spec])][::-1]
     assert any(

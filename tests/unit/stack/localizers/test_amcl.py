@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from simscen.core.belief import Belief, Estimate
 from simscen.core.chance import Streams
@@ -204,3 +205,21 @@ def test_a_map_that_is_turned_changes_nothing() -> None:
     subject.on_scan(seen(START, 0))
     error = turn.compose(START).between(subject.belief.pose)
     assert np.hypot(error.x, error.y) < 0.1
+
+
+@pytest.mark.parametrize("kind", ["likelihood_field", "likelihood_field_prob", "beam"])
+@pytest.mark.parametrize("farthest", [-1.0, 0.0])
+def test_no_greatest_range_is_the_lidars_own(kind: str, farthest: float) -> None:
+    """As in nav2_amcl, where only what is above zero cuts ranges."""
+    usual, subject = (
+        started(Amcl.model_validate({"laser_model_type": kind, "max_particles": 100, "min_particles": 20, **said}))
+        for said in ({}, {"laser_max_range": farthest})
+    )
+    assert subject.belief.pose == usual.belief.pose
+    assert moved(subject, 24, Pose2(0.3, 0, 0)).pose == moved(usual, 24, Pose2(0.3, 0, 0)).pose
+
+
+def test_a_standard_deviation_of_nothing_is_not_accepted() -> None:
+    """Its square would be zero."""
+    with pytest.raises(ValidationError, match="sigma_hit"):
+        Amcl(sigma_hit=1e-30)

@@ -1,0 +1,270 @@
+"""No parameter of the stack is read by nobody: each other value of it changes what is decided in some scene.
+
+Those of controllers are tried in test_every_field_of_a_controller_counts.py, command by command.
+"""
+
+from collections.abc import Iterator
+from itertools import zip_longest
+from types import UnionType
+from typing import Annotated, Any, NamedTuple, Union, get_args, get_origin
+
+import othervalues
+import pytest
+import scenes
+from pydantic import BaseModel, ValidationError
+from scenes import Scene
+
+from simscen.model import stack as model
+from simscen.model.controllerspec import ControllerSpec
+from simscen.model.latency import Latency
+from simscen.model.stack import StackSpec
+from simscen.model.stackbase import SpeedZone
+from simscen.spec.speedmask import SpeedMask
+
+Said = dict[str, Any]
+TRUTH: Said = {"localizer": {"type": "ground_truth"}, "planner": {"type": "navfn"}}
+BLIND: Said = {**TRUTH, "costmap": {"obstacle_max_range": 0.05}}
+"""A planner and a controller that do not see what is in the way."""
+
+
+class Part(NamedTuple):
+    """A part of the stack: where it is, and what to begin with in which scenes."""
+
+    way: tuple[str | int, ...]
+    kind: type[BaseModel]
+    tries: tuple[tuple[Said, Scene], ...]
+    special: dict[str, tuple[tuple[Said, Scene], ...]] = {}
+    """Other beginnings and scenes, for fields that show in no usual one."""
+    values: dict[str, list[Any]] = {}
+    """Other values for fields of which the usual ones do not fit."""
+
+
+def amcl(**said: Any) -> Said:
+    return {"localizer": {"type": "amcl", "max_particles": 120, "min_particles": 40, **said}}
+
+
+def planner(**said: Any) -> Said:
+    return {**TRUTH, "planner": said}
+
+
+def recovery(*behaviors: str | Said, **said: Any) -> Said:
+    return {**TRUTH, "recovery": {"behaviors": list(behaviors), "wait_duration": 0.4, **said}}
+
+
+def of_planner(kind: str) -> dict[str, tuple[tuple[Said, Scene], ...]]:
+    """Where the fields show that all planners have."""
+    said = {"type": kind}
+    impatient = {**planner(**said), "progress_checker": {"movement_time_allowance": 0.3}}
+    return {
+        "tolerance": ((planner(**said), scenes.at_a_wall),),
+        "replanning": ((planner(**said), scenes.long_way),),
+        "replanning_rate": ((planner(**said, replanning="rate"), scenes.long_way),),
+        "cautious": ((impatient, scenes.two_ways),),
+        "allow_unknown": ((planner(**said), scenes.half_known),),
+    }
+
+
+LOST: Said = {"parameters": "nav2", "laser_model_type": "likelihood_field_prob", "update_min_d": 0.05}
+SMALL: Said = {**TRUTH, "costmap": {"rolling_size": 8.0}}
+SEEN = ((TRUTH, scenes.through), (SMALL, scenes.no_map), (TRUTH, scenes.seen_by_a_camera))
+DENOISE = {"enabled": True, "minimal_group_size": 6}
+PARTS = [
+    Part(("localizer",), model.Amcl, ((amcl(), scenes.moved), (amcl(match_scans=False), scenes.moved)), {
+        "alpha5": ((amcl(robot_model="omni", match_scans=False), scenes.moved),),
+        "min_particles": ((amcl(min_particles=20), scenes.moved),),
+        "selective_resampling": ((amcl(max_beams=5, likelihood_exponent=0.1), scenes.moved),),
+        "recovery_alpha_slow": ((amcl(**LOST, recovery_alpha_fast=0.9), scenes.kidnapped),),
+        "recovery_alpha_fast": ((amcl(**LOST, recovery_alpha_slow=0.01), scenes.kidnapped),),
+        "relocalization": ((amcl(), scenes.unknown),),
+        "match_scans": ((amcl(), scenes.slipped),),
+        **dict.fromkeys(("z_short", "z_max", "lambda_short"), ((amcl(laser_model_type="beam"), scenes.moved),)),
+        **dict.fromkeys(
+            ("beam_skip_distance", "beam_skip_threshold", "beam_skip_error_threshold"),
+            ((amcl(do_beamskip=True, beam_skip_threshold=0.9), scenes.moved),),
+        ),
+    }, {"laser_min_range": [0.5, 1.5], "laser_max_range": [0.5, 1.5], "min_particles": [100],
+        "laser_likelihood_max_dist": [0.2]}),
+    Part(("localizer",), model.Ekf, (({"localizer": {"type": "ekf"}}, scenes.slipped),)),
+    Part(("costmap",), model.Costmap, SEEN, {
+        "rolling_size": ((SMALL, scenes.no_map),),
+        **dict.fromkeys(("min_obstacle_height", "max_obstacle_height"), ((TRUTH, scenes.seen_by_a_camera),)),
+        **dict.fromkeys(("raytrace_min_range", "inf_is_valid", "track_unknown_space"), ((SMALL, scenes.no_map),)),
+    }, {"min_obstacle_height": [0.3], "obstacle_min_range": [1.0], "raytrace_min_range": [2.0]}),
+    Part(("costmap", "denoise_layer"), model.DenoiseLayer, (
+        ({**TRUTH, "costmap": {"denoise_layer": {"enabled": True}}}, scenes.through),
+        ({**TRUTH, "costmap": {"denoise_layer": DENOISE}}, scenes.through)), {
+        "enabled": (({**TRUTH, "costmap": {"denoise_layer": {"minimal_group_size": 20}}}, scenes.through),)}),
+    Part(("local_costmap",), model.LocalCostmap, SEEN, {
+        **dict.fromkeys(("raytrace_min_range", "inf_is_valid"), ((SMALL, scenes.no_map),)),
+        **dict.fromkeys(("min_obstacle_height", "max_obstacle_height"), ((TRUTH, scenes.seen_by_a_camera),)),
+    }, {
+        "denoise_layer": [{"enabled": True, "minimal_group_size": 20}], "obstacle_min_range": [1.0],
+        "raytrace_min_range": [2.0],
+    }),
+    Part(("goal_checker",), model.SimpleGoalChecker, ((TRUTH, scenes.arriving), (TRUTH, scenes.drifting_past))),
+    Part(("progress_checker",), model.ProgressChecker, (
+        ({**TRUTH, "progress_checker": {"movement_time_allowance": 0.5}}, scenes.stuck),
+        ({**TRUTH, "progress_checker": {"movement_time_allowance": 1.0}}, scenes.stuck),
+    )),
+    Part(("recovery",), model.Recovery, ((recovery("backup", "spin", "wait"), scenes.shut),), {
+        "number_of_retries": ((recovery("clear_costmap"), scenes.shut),),
+        "planner_codes": ((TRUTH, scenes.walled_in), (TRUTH, scenes.shut)),
+        "wait_duration": ((recovery("wait"), scenes.shut),),
+        **dict.fromkeys(("spin_dist", "max_rotational_vel"), ((recovery("spin"), scenes.shut),)),
+        "simulate_ahead_time": ((recovery("backup", backup_partial=False), scenes.shut),),
+        "backup_partial": ((recovery("backup"), scenes.shut),),
+    }, {"behaviors": [["wait"], ["spin"], ["backup"], ["clear_costmap"]]}),
+    Part(("recovery", "behaviors", 0), model.Spin, (
+        (recovery({"type": "spin"}), scenes.shut),), {
+        "simulate_ahead_time": ((recovery({"type": "spin"}), scenes.wedged),)}, {"simulate_ahead_time": [0.3]}),
+    Part(("recovery", "behaviors", 0), model.Wait, ((recovery({"type": "wait"}), scenes.shut),)),
+    Part(("recovery", "behaviors", 0), model.BackUp, (
+        (recovery({"type": "backup"}), scenes.shut),
+        (recovery({"type": "backup", "backup_partial": False}), scenes.shut),
+    )),
+    Part(("velocity_smoother",), model.VelocitySmoother, ((TRUTH, scenes.through), (TRUTH, scenes.arriving))),
+    Part(("collision_monitor",), model.CollisionMonitor, (
+        (TRUTH, scenes.silent), (BLIND, scenes.seen_by_one), (BLIND, scenes.through))),
+    Part(("prediction",), model.Prediction, ((TRUTH, scenes.crossed),), values={
+        "max_range": [1.0], "max_radius": [0.1], "min_speed": [1.0]}),
+    Part(("latency",), Latency, ((TRUTH, scenes.seen_by_one), (amcl(), scenes.moved))),
+    Part((), StackSpec, ((TRUTH, scenes.through),), {"failure_tolerance": (
+        ({**BLIND, "local_costmap": {"obstacle_max_range": 2.5}}, scenes.seen_by_one),)}),
+    Part(("planner",), model.OmplPlanner, ((planner(), scenes.planned), (planner(sampler="uniform"), scenes.planned)), {
+        **of_planner("bit_star"),
+        "max_iterations": ((planner(type="rrt_connect"), scenes.planned),),
+        "improving_iterations": ((planner(type="rrt_star", improving_iterations=60), scenes.planned),),
+        "state_space": ((planner(), scenes.planned), (planner(state_space="se2"), scenes.planned)),
+    }, {"max_iterations": [1, 3], "improving_iterations": [5, 30]}),
+    Part(("planner",), model.Navfn, ((planner(type="navfn"), scenes.planned),), of_planner("navfn")),
+    Part(("planner",), model.Smac2d, ((planner(type="smac_2d"), scenes.planned),), of_planner("smac_2d")),
+]  # fmt: skip
+ELSEWHERE = {
+    "type": "another type is another model",
+    "keepout": "tests/scenarios, in worlds with regions", "speed_zones": "the same",
+    "keepout_mask": "tests/unit/run/test_filters.py", "speed_mask": "the same",
+    "nav2_params": "tests/unit/loading/test_nav2_params.py",
+    "latency": "`robot` is what the robot's file says: tests/unit/run/test_latency.py",
+    "xy_goal_tolerance": "whoever makes goals reads it: tests/unit/run/test_goal_tolerances.py",
+    "yaw_goal_tolerance": "the same",
+}  # fmt: skip
+
+OTHERS_CARE = {model.PlannerSpec, ControllerSpec, SpeedZone, SpeedMask}
+"""What all planners have is tried with each; controllers and zones have tests of their own."""
+
+
+def models_in(kind: Any) -> Iterator[type[BaseModel]]:
+    """The specifications that a field of this type may hold, and those in them."""
+    if get_origin(kind) in (Annotated, Union, UnionType, list):
+        for member in get_args(kind):
+            yield from models_in(member)
+    elif isinstance(kind, type) and issubclass(kind, BaseModel):
+        yield kind
+        for field in kind.model_fields.values():
+            yield from models_in(field.annotation)
+
+
+class Other(NamedTuple):
+    """A field of a part with other values, of which one must count."""
+
+    part: Part
+    name: str
+    values: list[Any]
+
+    def __str__(self) -> str:
+        told = f"={self.values[0]}" if len(self.values) == 1 else ""
+        return f"{self.part.kind.__name__}.{self.name}{told}"
+
+
+def others() -> Iterator[Other]:
+    for part in PARTS:
+        for name, field in part.kind.model_fields.items():
+            if name in ELSEWHERE and not (name == "type" and part.kind is model.OmplPlanner):
+                continue
+            if name in part.values:
+                found = [part.values[name]]
+            else:
+                found = othervalues.others(field.annotation, field.default)
+            yield from (Other(part, name, values) for values in found)
+
+
+def with_value(start: Any, way: tuple[str | int, ...], name: str, value: Any) -> Any:
+    if not way:
+        return {**start, name: value}
+    first, *rest = way
+    if isinstance(first, int):
+        inner = with_value(start[first], tuple(rest), name, value)
+        return [inner if number == first else each for number, each in enumerate(start)]
+    return {**start, first: with_value(start.get(first, {}), tuple(rest), name, value)}
+
+
+class Usual:
+    """What is decided in a scene with what is said to begin with, as far as anybody asked."""
+
+    known: dict[tuple[str, str], "Usual"] = {}
+
+    def __init__(self, said: Said, scene: Scene) -> None:
+        self._told: list[object] = []
+        self._more = scene(StackSpec.model_validate(said))
+
+    @classmethod
+    def of(cls, said: Said, scene: Scene) -> "Usual":
+        key = (repr(said), scene.__name__)
+        if key not in cls.known:
+            cls.known[key] = cls(said, scene)
+        return cls.known[key]
+
+    def __iter__(self) -> Iterator[object]:
+        number = 0
+        while True:
+            if number == len(self._told):
+                try:
+                    self._told.append(hash(next(self._more)))
+                except StopIteration:
+                    return
+            yield self._told[number]
+            number += 1
+
+
+def counts(other: Other, value: Any) -> bool:
+    """Whether something else is decided with this value, anywhere."""
+    for said, scene in other.part.special.get(other.name, other.part.tries):
+        try:
+            spec = StackSpec.model_validate(with_value(said, other.part.way, other.name, value))
+        except ValidationError:
+            continue
+        if spec == StackSpec.model_validate(said):
+            continue
+        told = (hash(each) for each in scene(spec))
+        if any(one != another for one, another in zip_longest(told, Usual.of(said, scene))):
+            return True
+    return False
+
+
+OTHERS = list(others())
+
+
+@pytest.mark.parametrize("other", OTHERS, ids=str)
+def test_another_value_changes_a_decision(other: Other) -> None:
+    assert any(counts(other, value) for value in other.values)
+
+
+def test_the_same_values_change_none() -> None:
+    """Else nothing is told by a change."""
+    scene = scenes.seen_by_one
+    assert [*scene(StackSpec.model_validate(amcl()))] == [*scene(StackSpec.model_validate(amcl()))]
+
+
+@pytest.mark.parametrize("part", PARTS, ids=lambda part: part.kind.__name__)
+def test_every_field_is_tried(part: Part) -> None:
+    tried = {other.name for other in OTHERS if other.part is part}
+    holding = {name for name, field in part.kind.model_fields.items() if any(models_in(field.annotation))}
+    assert part.kind.model_fields.keys() <= tried | ELSEWHERE.keys() | holding
+
+
+def test_every_model_is_tried() -> None:
+    """Those that a stack holds, and those of the shipped components."""
+    registries = (model.LOCALIZERS, model.PLANNERS, model.BEHAVIORS, model.GOAL_CHECKERS)
+    roots = [StackSpec, *(getattr(model, where.split(":")[1]) for each in registries for where in each.values())]
+    holding = {kind for root in roots for kind in models_in(root) if kind.model_fields.keys() - ELSEWHERE.keys()}
+    assert holding - OTHERS_CARE == {part.kind for part in PARTS}
