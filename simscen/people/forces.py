@@ -18,8 +18,6 @@ Numbers = npt.NDArray[np.int64]
 
 RELAXATION_TIME = 0.54
 """τ in s [M09: 0.54 ± 0.05]."""
-DESIRED_SPEED, SPREAD = 1.29, 0.19
-"""Mean and standard deviation in m/s of how fast people like to walk [M09]."""
 MOST_OF_SPEED = 1.3
 """Nobody walks faster than this many times the speed they like [HM95]."""
 

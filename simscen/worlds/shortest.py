@@ -160,14 +160,6 @@ def ways_in(
     return ShortestWays(built.mesh, _around(built, stops), radius, z_range, finest)
 
 
-def shortest_legs(
-    built: BuiltWorld, start: Pose2, goals: Sequence[Goal], radius: float, z_range: tuple[float, float] = Z_RANGE
-) -> list[Leg]:
-    """The shortest way of a disc from each goal's predecessor (the start for the first) to that goal."""
-    stops = [start, *(goal.pose for goal in goals)]
-    return legs_between(built, list(zip(stops, goals, strict=False)), radius, z_range)
-
-
 def legs_between(
     built: BuiltWorld, ends: Sequence[tuple[Pose2, Goal]], radius: float, z_range: tuple[float, float] = Z_RANGE
 ) -> list[Leg]:

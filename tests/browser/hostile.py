@@ -6,9 +6,9 @@ from simscen.core.navigation import Goal
 from simscen.core.result import RunKey, RunResult
 from simscen.core.verdict import Finding, Status, Verdict
 from simscen.judge.judge import outcome
-from simscen.judge.sketch import sketch
 from simscen.record.header import LogHeader
 from simscen.record.replay import Log
+from simscen.testing.sketch import sketch
 
 EVIL = "</script><img src=x onerror=pwned()>\u202eevil\u2066 \x1b[31m{{data}}"
 TEXT = f'simscen: 1\nname: "{EVIL}"\n# --> ]]> <!-- <script>pwned()</script>\n'

@@ -50,8 +50,8 @@ CONCERNED = {
     "criteria/temporal": [CONDITIONS, ["tests/unit/criteria/test_temporal.py"]],
 }
 """Of what many others use: the tests of what it is, not of all that is made of it."""
-IDLE = {"__init__.py", "sketch.py"}
-"""What decides nothing: sketches make the traces of tests."""
+IDLE = {"__init__.py"}
+"""What decides nothing."""
 
 
 def modules() -> list[Path]:

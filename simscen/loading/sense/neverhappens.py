@@ -226,7 +226,7 @@ class _Run:
     def _recovery(self, recovery: Any) -> str | None:
         return no_recovery(self.loaded, recovery.name) if self.sent(None) else "the robot has no goal to fail at"
 
-    def _pedestrian(self, pedestrian: Any) -> str | None:
+    def _pedestrian(self, _: Any) -> str | None:
         return None if self.does("pedestrian", "crowd") else "no event lets a pedestrian come"
 
     def _event(self, event: Any) -> str | None:

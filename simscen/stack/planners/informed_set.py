@@ -3,6 +3,9 @@
 Their ellipse is the set of points x with |start x| + |x goal| ≤ c. Between walls straight distances say little, so both
 are measured along a coarse grid here. OMPL's planners then search only where a path at most `slack` longer than the
 coarse one can pass: a tree planner cannot lose itself in a wrong room, and finds that way sooner as well.
+
+The grid is no `ways.Lattice`: that one steps between free cells, while a block here is passed where free cells touch
+across its borders, so that a gap narrower than a block stays open and a wall thinner than one stays shut.
 """
 
 import math

@@ -11,9 +11,9 @@ from simscen.core.case import Case
 from simscen.core.trace import Trace
 from simscen.core.verdict import Finding, Status
 from simscen.criteria.base import Criterion
-from simscen.judge.sketch import sketch, sketch_case
 from simscen.testing.contracts.component import heard
 from simscen.testing.promise import Contract, demand, promise
+from simscen.testing.sketch import sketch, sketch_case
 
 CASE: dict[str, Any] = {"goals": [{"name": "shelf", "pose": [2.5, 0.5, 0]}], "shortest": {"shelf": 2.5}}
 DRIVE: dict[str, Any] = {

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from simscen.core.evidence import Evidence
-from simscen.judge.sketch import sketch, sketch_case
 from simscen.testing.contracts.component import heard
 from simscen.testing.contracts.criterion import CASE, DRIVE, STANDS, TRACES
 from simscen.testing.promise import Contract, demand, promise
+from simscen.testing.sketch import sketch, sketch_case
 
 
 @dataclass(frozen=True, eq=False)

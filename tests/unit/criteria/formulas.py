@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from simscen.core.samples import Samples
 from simscen.criteria.condition import Condition
-from simscen.judge.sketch import sketch, sketch_case
+from simscen.testing.sketch import sketch, sketch_case
 
 CASE = sketch_case({"clearance_range": math.inf})
 SIGNALS = {"clearance": "p", "yaw_rate": "q"}

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from simscen.criteria.bounds import at_least, at_most, counted, missed, quantity
-from simscen.judge.sketch import sketch
+from simscen.testing.sketch import sketch
 
 
 @pytest.mark.parametrize(

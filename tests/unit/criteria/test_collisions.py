@@ -9,7 +9,7 @@ from simscen.core.samples import Samples
 from simscen.core.verdict import Status
 from simscen.criteria.criterion import AnyCriterion
 from simscen.judge.judge import judge
-from simscen.judge.sketch import sketch, sketch_case
+from simscen.testing.sketch import sketch, sketch_case
 
 HIT = [[4.5, "collision.started", "cart", {"x": 1.0, "impulse": 2.0}]]
 NOTHING = Samples(np.empty(0, dtype=np.int64), np.empty((0, 3)))

@@ -15,7 +15,7 @@ from simscen.core.maskcells import cells_of
 from simscen.core.verdict import Status
 from simscen.criteria.criterion import AnyCriterion
 from simscen.judge.judge import judge
-from simscen.judge.sketch import sketch, sketch_case
+from simscen.testing.sketch import sketch, sketch_case
 
 SEEDS = st.integers(0, 2**32 - 1)
 LONG = [[-0.4, -0.1], [0.3, -0.2], [0.5, 0.0], [0.3, 0.2], [-0.4, 0.1]]

@@ -1,7 +1,7 @@
 import pytest
 
 from simscen.criteria.moments import Span, spans
-from simscen.judge.sketch import sketch
+from simscen.testing.sketch import sketch
 
 SECOND = 240
 

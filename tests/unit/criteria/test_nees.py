@@ -9,7 +9,7 @@ import pytest
 from simscen.core.samples import Samples
 from simscen.criteria.bounds import BrokenTrace
 from simscen.criteria.nees import DIMENSIONS, nees, nees_samples
-from simscen.judge.sketch import sketch
+from simscen.testing.sketch import sketch
 
 APART = [0.25, 0.0, 0.0, 0.04, 0.0, 0.01]
 """Variances of x, y and yaw: deviations of 0.5 m, 0.2 m and 0.1 rad."""

@@ -9,7 +9,7 @@ from simscen.core.samples import Samples
 from simscen.core.verdict import Status
 from simscen.criteria.criterion import AnyCriterion
 from simscen.judge.judge import judge
-from simscen.judge.sketch import sketch, sketch_case
+from simscen.testing.sketch import sketch, sketch_case
 
 CASE = {"goals": [{"name": "a", "pose": [4, 0]}], "shortest": {"a": 4.0}}
 REACHED = [[0, "goal.accepted", "a"], [4, "goal.reached", "a"]]

@@ -15,8 +15,8 @@ from simscen.core.verdict import Status
 from simscen.criteria.bounds import BrokenTrace, at_least, at_most, counted
 from simscen.criteria.criterion import AnyCriterion
 from simscen.judge.judge import judge
-from simscen.judge.sketch import sketch, sketch_case
 from simscen.spec.ondemand import type_of
+from simscen.testing.sketch import sketch, sketch_case
 
 CHOICES = AnyCriterion.choices()
 HEADINGS = ["What is measured:", "When it fails:", "Why this:", "Source:", "Example:"]

@@ -15,7 +15,7 @@ from simscen.core.trace import Trace
 from simscen.criteria.bounds import BrokenTrace
 from simscen.criteria.signal_table import SIGNALS, SignalName, read
 from simscen.criteria.signal_values import Unavailable, inside
-from simscen.judge.sketch import sketch, sketch_case
+from simscen.testing.sketch import sketch, sketch_case
 
 STEP = 6 / 240
 

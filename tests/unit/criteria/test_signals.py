@@ -20,7 +20,7 @@ from simscen.criteria.signals import (
     true_pose,
     turn_rate,
 )
-from simscen.judge.sketch import sketch
+from simscen.testing.sketch import sketch
 
 
 def test_a_circle_is_as_long_as_its_circumference():

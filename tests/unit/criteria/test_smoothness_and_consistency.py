@@ -11,7 +11,7 @@ from simscen.core.verdict import Status
 from simscen.criteria.localization_consistency import LocalizationConsistency
 from simscen.criteria.smooth import sparc
 from simscen.criteria.smoothness import Smoothness
-from simscen.judge.sketch import sketch, sketch_case
+from simscen.testing.sketch import sketch, sketch_case
 
 CASE = sketch_case({})
 

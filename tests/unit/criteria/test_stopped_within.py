@@ -9,7 +9,7 @@ from simscen.core.samples import Samples
 from simscen.core.verdict import Status
 from simscen.criteria.criterion import AnyCriterion
 from simscen.judge.judge import judge
-from simscen.judge.sketch import sketch, sketch_case
+from simscen.testing.sketch import sketch, sketch_case
 
 MOVING, STILL = 0.5, 0.0
 

@@ -9,7 +9,7 @@ from simscen.criteria.criterion import AnyCriterion
 from simscen.judge.disturbances import happenings
 from simscen.judge.result import result_of
 from simscen.judge.resultdata import from_json, to_json
-from simscen.judge.sketch import sketch, sketch_case
+from simscen.testing.sketch import sketch, sketch_case
 
 WORDS = {"seconds": 10, "truth": [[0, 0, 0], [10, 5, 0]]}
 EVENT = {"name": "pallet falls", "kind": "event", "when": "time: 3 s", "line": 7}

@@ -8,7 +8,7 @@ import yaml
 from simscen.core.verdict import Finding, Status
 from simscen.criteria.criterion import AnyCriterion
 from simscen.judge.judge import judge
-from simscen.judge.sketch import sketch, sketch_case
+from simscen.testing.sketch import sketch, sketch_case
 
 FILES = sorted((Path(__file__).parents[2] / "cases").glob("*.yaml"))
 CASES = [(file.stem, case) for file in FILES for case in yaml.load(file.read_text(encoding="utf-8"), yaml.CSafeLoader)]

@@ -10,7 +10,7 @@ from simscen.core.verdict import Finding, Status, Verdict
 from simscen.criteria.clearance import Clearance
 from simscen.criteria.criterion import AnyCriterion
 from simscen.judge.judge import judge, outcome
-from simscen.judge.sketch import sketch, sketch_case
+from simscen.testing.sketch import sketch, sketch_case
 
 TRACE = sketch({"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]], "clearance": 0.5})
 CASE = sketch_case({})

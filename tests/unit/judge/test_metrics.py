@@ -13,7 +13,7 @@ from simscen.criteria.bounds import BrokenTrace
 from simscen.criteria.smooth import ldlj, sparc
 from simscen.judge.measure.metrics import barn_score, measure
 from simscen.judge.measure.table import METRICS
-from simscen.judge.sketch import sketch, sketch_case
+from simscen.testing.sketch import sketch, sketch_case
 
 NEES = getattr(stats, "NEES", None) or stats.NESS  # as filterpy 1.4.5 misspells it
 GOAL = {"goals": [{"name": "a", "pose": [3, 4, 0]}], "shortest": {"a": 5.0}}

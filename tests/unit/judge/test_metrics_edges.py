@@ -8,7 +8,7 @@ import pytest
 from simscen.core.samples import Samples
 from simscen.criteria.smooth import sparc
 from simscen.judge.measure.metrics import barn_score, measure
-from simscen.judge.sketch import sketch, sketch_case
+from simscen.testing.sketch import sketch, sketch_case
 
 NAMES = "abc"
 GOALS = {

@@ -10,7 +10,7 @@ from simscen.judge.judge import judge
 from simscen.judge.measure.metrics import measure
 from simscen.judge.measure.table import METRICS
 from simscen.judge.needs import known, needs
-from simscen.judge.sketch import sketch, sketch_case
+from simscen.testing.sketch import sketch, sketch_case
 
 DRIVE = {"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]]}
 

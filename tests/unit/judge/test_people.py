@@ -3,7 +3,7 @@
 import pytest
 
 from simscen.judge.measure.people import person_metrics
-from simscen.judge.sketch import sketch, sketch_case
+from simscen.testing.sketch import sketch, sketch_case
 
 ANNA = [0, "object.spawned", "anna", {"person": True, "size": [0.25, 1.7]}]
 

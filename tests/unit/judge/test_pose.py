@@ -7,7 +7,7 @@ import pytest
 
 from simscen.core.samples import Samples
 from simscen.judge.measure.pose import pose_metrics
-from simscen.judge.sketch import sketch
+from simscen.testing.sketch import sketch
 
 
 def located(ticks, true, told, believed):

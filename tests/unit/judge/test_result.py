@@ -8,7 +8,7 @@ from simscen.criteria.clearance import Clearance
 from simscen.criteria.criterion import AnyCriterion
 from simscen.judge.result import result_of
 from simscen.judge.resultdata import from_json, read_result, to_json
-from simscen.judge.sketch import sketch, sketch_case
+from simscen.testing.sketch import sketch, sketch_case
 
 TRACE = {"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]], "clearance": 0.5, "events": [[1, "plan.made", "", {}]]}
 

@@ -10,7 +10,7 @@ from simscen.core.navigation import Path
 from simscen.core.samples import Samples
 from simscen.criteria.signals import drive
 from simscen.judge.measure.way import legs_of, way_metrics
-from simscen.judge.sketch import sketch
+from simscen.testing.sketch import sketch
 
 TICKS = 6
 CORNER = [(5, 7), (6, 7), (6, 8)]

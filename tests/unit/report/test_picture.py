@@ -10,7 +10,6 @@ from simscen.core.result import RunKey
 from simscen.core.scenery import Scenery, Thing
 from simscen.criteria.criterion import AnyCriterion
 from simscen.judge.result import result_of
-from simscen.judge.sketch import sketch, sketch_case
 from simscen.report.picture import grid, palette
 from simscen.report.picture.canvas import Canvas
 from simscen.report.picture.compose import _EDGE, HEADER, LARGEST, draw, parts, write_picture
@@ -18,6 +17,7 @@ from simscen.report.picture.ground import MARGIN, extent, lay
 from simscen.report.picture.outline import of_event, outlines
 from simscen.report.picture.scene import Scene
 from simscen.report.picture.ways import round_step
+from simscen.testing.sketch import sketch, sketch_case
 
 WIDE, TALL, RESOLUTION = 200, 120, 0.05
 

@@ -13,7 +13,6 @@ from simscen.core.result import RunKey
 from simscen.core.scenery import Floor, Ground, Scenery, Thing, Zone
 from simscen.criteria.criterion import AnyCriterion
 from simscen.judge.result import result_of
-from simscen.judge.sketch import sketch, sketch_case
 from simscen.loading.scenario import load_scenario
 from simscen.record.replay import read_log
 from simscen.record.sceneryfile import scenery_of
@@ -24,6 +23,7 @@ from simscen.report.picture.scene import Scene, with_robots
 from simscen.run.prepare import prepare
 from simscen.run.scenery import scenery_of as scenery_in
 from simscen.run.simulate import simulate
+from simscen.testing.sketch import sketch, sketch_case
 
 GOLDEN = Path(__file__).parent / "everything.parts.txt"
 PANEL = ((0.0, -0.05), (1.0, -0.05), (1.0, 0.05), (0.0, 0.05))

@@ -19,7 +19,6 @@ from simscen.core.grid import OccupancyGrid
 from simscen.core.navigation import Goal
 from simscen.core.result import Outcome, RunKey, RunResult
 from simscen.core.verdict import Finding, Status, Verdict
-from simscen.judge.sketch import sketch
 from simscen.record.header import LogHeader
 from simscen.record.pack_many import occupancy_grid
 from simscen.record.replay import Log
@@ -31,6 +30,7 @@ from simscen.report.replay.columns import Columns
 from simscen.report.replay.page import FOLDER, script
 from simscen.report.replay.sensed import costmaps_of, map_from_odom
 from simscen.report.replay.thin import evenly, paced, with_extremes
+from simscen.testing.sketch import sketch
 
 TEXT = """\
 simscen: 1

@@ -10,8 +10,8 @@ from simscen.core.trace import Decision
 from simscen.core.verdict import Status
 from simscen.criteria.criterion import AnyCriterion
 from simscen.judge.judge import judge
-from simscen.judge.sketch import sketch_case
 from simscen.run.ending import Ending
+from simscen.testing.sketch import sketch_case
 
 RATES = [
     (240, 40, 20),

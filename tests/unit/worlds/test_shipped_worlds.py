@@ -16,7 +16,7 @@ from simscen.worlds.meshing import fuse
 from simscen.worlds.rays import RayScene
 from simscen.worlds.rosmap import load_grid
 from simscen.worlds.sdf import load_sdf
-from simscen.worlds.shortest import shortest_legs
+from simscen.worlds.shortest import legs_between
 
 DATA = Path(__file__).parents[3].parent / "shared" / "data"
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="the worlds of others are not here: see CONTRIBUTING.md")
@@ -81,5 +81,5 @@ def test_every_barn_world_admits_a_disc_of_37_cm_and_its_shortest_way_is_no_long
     for number, reference in ((row[0], float(row[9])) for row in rows):
         world = load_sdf(DATA / "barn_sample" / f"world_{number}.world", root=DATA, lenient=True)
         built = build(world, 0.3)
-        (leg,) = shortest_legs(built, Pose2(-2.25, 3.0), [Goal("end", Pose2(-2.25, 13.0))], 0.37)
+        (leg,) = legs_between(built, [(Pose2(-2.25, 3.0), Goal("end", Pose2(-2.25, 13.0)))], 0.37)
         assert 9.99 < leg.length < 1.3 * reference

@@ -13,7 +13,7 @@ from simscen.core.shapes import Box, Cylinder, Extrusion, Solid, Sphere
 from simscen.core.world import World
 from simscen.worlds.build import build
 from simscen.worlds.meshing import fuse
-from simscen.worlds.shortest import ShortestWays, shortest_legs
+from simscen.worlds.shortest import ShortestWays, legs_between
 
 R = 0.25
 
@@ -134,8 +134,8 @@ def test_a_point_cannot_pass_through_a_sheet():
 
 def test_lengths_are_given_from_stop_to_stop_also_beyond_the_bounds():
     built = build(World("w", (Solid(Extrusion(((0, 0), (1, 0), (1, 1)), 1.0)),)), 0.2)
-    goals = [Goal(str(place), place) for place in (Pose2(-3, 8), Pose2(6, 8), Pose2(0.7, 0.3))]
-    legs = shortest_legs(built, Pose2(-3, 3), goals, R)
+    stops = [Pose2(-3, 3), Pose2(-3, 8), Pose2(6, 8), Pose2(0.7, 0.3)]
+    legs = legs_between(built, [(start, Goal("g", goal)) for start, goal in itertools.pairwise(stops)], R)
     assert [leg.length for leg in legs] == pytest.approx([5.0, 9.0, math.inf])
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from whys import CASE, DOOR, STANDS, box, by, why
 
-from simscen.judge.sketch import sketch, sketch_case
 from simscen.judge.why.blocked import blocked
 from simscen.judge.why.things import Thing, things
+from simscen.testing.sketch import sketch, sketch_case
 
 CLOSES = (
     "why: crate (spawned by event `crate falls` at t = 1.00 s) closes the passage of 1.00 m between `west wall` and "

@@ -3,8 +3,8 @@
 from whys import STANDS, by, why
 
 from simscen.core.verdict import Finding, Status, Verdict
-from simscen.judge.sketch import sketch, sketch_case
 from simscen.judge.why.cause import explained
+from simscen.testing.sketch import sketch, sketch_case
 
 
 def test_only_failures_are_explained_and_before_their_own_details():

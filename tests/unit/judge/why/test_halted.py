@@ -3,8 +3,8 @@
 import pytest
 from whys import CASE, STANDS, box, why
 
-from simscen.judge.sketch import sketch, sketch_case
 from simscen.judge.why.cause import causes
+from simscen.testing.sketch import sketch, sketch_case
 
 
 def test_a_thing_on_the_goal_is_named_once():

@@ -1,7 +1,7 @@
 """Sketched failures: a robot that does not reach the study, and what happened on the way."""
 
-from simscen.judge.sketch import sketch, sketch_case
 from simscen.judge.why.cause import causes
+from simscen.testing.sketch import sketch, sketch_case
 
 GOAL = {"name": "study", "pose": [8, 0, 0]}
 DOOR = ["study", [5, 0.5], [5, -0.5], "west wall", "east wall"]
