@@ -45,10 +45,7 @@ ALONE = ("clean", "slipping")
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """A recorded drive: what `sensed` says, the robot's `map` and what it is told at the start.
-
-    `known` (left, bottom, right, top) is the part of the floor that the map shows as it is.
-    """
+    """A recorded drive: what `sensed` says, the robot's `map` and what it is told at the start."""
 
     building: int
     number: int
@@ -56,7 +53,6 @@ class Log:
     sensed: Sensed
     map: OccupancyGrid
     estimate: Estimate
-    known: tuple[float, float, float, float]
 
 
 def log(number: int, which: int, circumstance: str, seconds: float = SECONDS) -> Log:
@@ -91,12 +87,10 @@ def log(number: int, which: int, circumstance: str, seconds: float = SECONDS) ->
     readings = _readings(odometry, ranges, each, lidar)
     ticks = np.round(np.arange(len(truth)) * STEP * TICK_RATE).astype(np.int64)
     whole = mapped(number)
-    width, depth = floor.size
-    known = (0.0, 0.0, floor.middle if circumstance in ("outdated", "half") else width, depth)
     return Log(
         number, which, circumstance, Sensed(readings, ticks, truth),
         first_half(whole, floor.middle) if circumstance == "half" else whole,
-        Estimate(None if circumstance == "unknown" else Pose2(*truth[0].tolist())), known,
+        Estimate(None if circumstance == "unknown" else Pose2(*truth[0].tolist())),
     )  # fmt: skip
 
 
