@@ -13,7 +13,7 @@ from simscen.worlds.rosmap import cell_values, load_grid, save_map
 
 GOLD = Path(__file__).parents[3].parent / "shared" / "data" / "nav2_map_loader_gold"
 needs_gold = pytest.mark.skipif(
-    not GOLD.is_dir(), reason=f"needs the maps in {GOLD.name}, which are not in the project"
+    not GOLD.is_dir(), reason="the maps of others are not here: see CONTRIBUTING.md"
 )
 
 
