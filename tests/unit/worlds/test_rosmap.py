@@ -12,9 +12,7 @@ from simscen.model.rosmap import RosMapSpec
 from simscen.worlds.rosmap import cell_values, load_grid, save_map
 
 GOLD = Path(__file__).parents[3].parent / "shared" / "data" / "nav2_map_loader_gold"
-needs_gold = pytest.mark.skipif(
-    not GOLD.is_dir(), reason="the maps of others are not here: see CONTRIBUTING.md"
-)
+needs_gold = pytest.mark.skipif(not GOLD.is_dir(), reason="the maps of others are not here: see CONTRIBUTING.md")
 
 
 def spec(**changes):
