@@ -45,8 +45,8 @@ NAV2: Values = {
     "recovery": {
         "number_of_retries": 6,
         "planner_codes": ["PLANNER_UNKNOWN", "PLANNER_TIMEOUT", "NO_VALID_PATH"],
-        "backup_partial": False, "spin_dist": 1.57, "wait_duration": 5.0, "backup_dist": 0.30, "backup_speed": 0.15,
-        "simulate_ahead_time": 2.0, "max_rotational_vel": 1.0,
+        "clear_entirely": True, "backup_partial": False, "spin_dist": 1.57, "wait_duration": 5.0, "backup_dist": 0.30,
+        "backup_speed": 0.15, "simulate_ahead_time": 2.0, "max_rotational_vel": 1.0,
     },
     "velocity_smoother": {
         "max_accel": 3.0, "max_decel": 3.0, "max_angular_accel": 3.5, "max_velocity": 0.5, "max_angular_velocity": 2.0,

@@ -452,6 +452,8 @@ class ClearCostmap(BehaviorSpec):
 
     component: ClassVar[str] = "simscen.stack.behaviors.motions:ClearCostmap"
     type: Literal["clear_costmap"] = "clear_costmap"
+    clear_entirely: bool = False
+    """Whether all of the global costmap is cleared, as in Nav2, or as much as the local one reaches."""
 
 
 _Behaviors = Annotated[
@@ -490,6 +492,9 @@ class Recovery(Spec):
         "backup",
     ]
     """What is done in turn, by name or with parameters of its own."""
+    clear_entirely: bool = False
+    """Whether all of the global costmap is cleared, as in Nav2, or as much as the local one reaches: a dead end that is
+    forgotten is driven into again."""
     spin_dist: Angle = 1.57
     """How far it turns."""
     wait_duration: Duration = 5.0

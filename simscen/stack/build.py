@@ -69,7 +69,7 @@ def reference_stack(spec: model.StackSpec, setting: Setting) -> ReferenceStack:
     )
     controller = InstalledController(spec.controller, driving)
     costmaps = Costmaps(spec, surroundings, controller.full_speed * spec.controller.looks_ahead, latency["costmap"])
-    driving = replace(driving, clear_costmap=costmaps.clear)
+    driving = replace(driving, clear_costmap=costmaps.clear, clear_around=costmaps.clear_around)
     planning = replace(driving, name="planner", resolution=costmaps.wide.view.resolution)
     plans = PlanKeeper(
         spec.planner,

@@ -1,11 +1,11 @@
 """Drives to a goal, past poses on the way: the replanning and recovery of Nav2's trees as a state machine.
 
-Without errors one step is: check the goal, check the plan, ask the controller. When planning or control fails, first
-the costmap is cleared and the same is tried again (the per-context recovery of Nav2's tree); when it fails again, the
-next behaviour of the round robin is run. A plan that is found makes good a failure to plan; control has one retry until
-the next recovery, for its action goes on until the goal. After `number_of_retries` behaviours the goal has failed with
-the code of the last failure. A goal outside the map or inside a mapped wall fails after the first retry: no recovery
-changes that.
+Without errors one step is: check the goal, check the plan, ask the controller. When planning fails, first the global
+costmap is cleared, and when control fails the local one, and the same is tried again (the per-context recoveries of
+Nav2's tree); when it fails again, the next behaviour of the round robin is run. A plan that is found makes good a
+failure to plan; control has one retry until the next recovery, for its action goes on until the goal. After
+`number_of_retries` behaviours the goal has failed with the code of the last failure. A goal outside the map or inside a
+mapped wall fails after the first retry: no recovery changes that.
 """
 
 from dataclasses import dataclass, replace
@@ -147,7 +147,7 @@ class Navigator:
             retry, self._controlled_again = not self._controlled_again, True
         if retry:
             self._trouble_since = None
-            self._costmaps.clear()
+            (self._costmaps.wide if planning else self._costmaps.near).clear()
             self._plans.drop("recovery")
             return Step(events=events)
         if self._hopeless(goal, failure):

@@ -32,6 +32,7 @@ class Setting:
     stop_on_failure:  whether a goal that fails ends the task (for a whole stack)
     mode:             Nav2's action that takes the goals; what it means stands in the goals, as `via` and `wait`
     clear_costmap:    forgets live obstacles that are not seen any more (for a behaviour)
+    clear_around:     the same, as far from the robot as the local costmap reaches
     heard:            what stands between the localizer and all who ask it; here, nothing (for the reference stack)
     """
 
@@ -44,6 +45,7 @@ class Setting:
     stop_on_failure: bool = True
     mode: Mode = "navigate_to_pose"
     clear_costmap: Callable[[], None] = lambda: None
+    clear_around: Callable[[], None] = lambda: None
     heard: Callable[[Localizer], Localizer] = lambda localizer: localizer
 
     def named(self, name: str) -> "Setting":

@@ -104,12 +104,16 @@ class Wait:
 
 
 class ClearCostmap:
-    """Forget live obstacles that are not seen any more."""
+    """Forget live obstacles that are not seen any more: around the robot, or, with `clear_entirely`, everywhere.
+
+    Far from the robot nothing keeps a controller from driving, and a planner that fails has had all of the global
+    costmap cleared already.
+    """
 
     name = "clear_costmap"
 
     def __init__(self, spec: model.ClearCostmap, setting: Setting) -> None:
-        self._clear = setting.clear_costmap
+        self._clear = setting.clear_costmap if spec.clear_entirely else setting.clear_around
 
     def start(self, pose: Pose2) -> None:
         """Clear."""

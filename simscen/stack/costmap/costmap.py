@@ -84,11 +84,18 @@ class Costmap:
         self._refresh(self._live.on_scan(base, seen, self._static_squared))
         self._learn(base, seen)
 
-    def clear(self) -> None:
-        """Forget every live obstacle but those that the newest readings show."""
-        self._live.forget(self._frame)
+    def clear(self, within: float = math.inf) -> None:
+        """Forget every live obstacle `within` so many metres of the robot along x and y, but those that it sees now.
+
+        Nav2's ClearEntireCostmap, or ClearCostmapAroundRobot.
+        """
+        newest = list(self._newest.values())
+        if newest and math.isfinite(within):
+            self._live.forget_around(newest[-1][0], within)
+        else:
+            self._live.forget(self._frame)
         self._show()
-        for base, seen in list(self._newest.values()):
+        for base, seen in newest:
             self.update(base, seen)
 
     def set_zones(self, zones: Zones) -> None:

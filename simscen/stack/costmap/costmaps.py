@@ -72,6 +72,14 @@ class Costmaps:
         self.wide.clear()
         self.near.clear()
 
+    def clear_around(self) -> None:
+        """The same as far from the robot as the local costmap reaches (Nav2's ClearCostmapAroundRobot).
+
+        What lies farther off is in no controller's way, and who forgets a dead end drives into it again.
+        """
+        self.wide.clear(self._reach)
+        self.near.clear()
+
     def _paint_zones(self, frames: Frames) -> None:
         """Keepout zones where they belong in the odom frame by now."""
         mask, known = self._zones.masks.keepout, self._odom_from_map

@@ -33,6 +33,14 @@ class LiveLayer:
         self._scanned: Mask = np.zeros(frame.shape, dtype=bool)
         self._heights: Heights | None = None
 
+    def forget_around(self, base: Pose2, metres: float) -> None:
+        """Forget what lies so near to the robot along x and y."""
+        row, column = self._frame.cells(np.array([[base.x, base.y]]))[0].tolist()
+        window = self._frame.window((row, column), (row, column), math.ceil(metres / self._frame.resolution))
+        self._scanned[window] = False
+        if self._heights is not None:
+            self._heights[window] = np.nan
+
     def roll(self, frame: Frame) -> None:
         """Go on in another window, with what lies in both."""
         before, self._frame = self._frame, frame

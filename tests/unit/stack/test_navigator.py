@@ -344,3 +344,41 @@ def test_a_lidar_that_is_late_marks_obstacles_where_they_are() -> None:
     assert len(x)
     assert x.min() > 2.6  # the disc begins at 2.7; 0.3 s at 0.5 m/s would have put it at 2.85 and later
     assert x.min() < 2.75
+
+
+@pytest.mark.parametrize("seconds", [0.4, 0.8])
+def test_a_dead_end_that_was_seen_is_not_forgotten_when_control_fails_out_of_its_sight(seconds: float) -> None:
+    """Control fails for so long that it is tried again after clearing; then that a recovery clears, too."""
+    mapped = Flatland().room(8, 8)
+    mapped.boxes += [(3.9, 0.0, 4.0, 1.0), (3.9, 2.0, 4.0, 7.0)]  # a door, and a long way round by the top
+    world = Flatland([*mapped.boxes, (3.9, 1.0, 4.0, 2.0)])
+    goal, grid = Goal("g", Pose2(6.0, 2.5), timeout=90.0), mapped.grid((-0.5, -0.5, 8.5, 8.5))
+    d = drive(world, Pose2(2.0, 1.5), goal, grid=grid)
+    while d.pose.y < 4.8:
+        d.run(0.1)
+    controller, shut = d.stack.inner._navigator._controller, len(d.kinds("plan.made"))
+    command, steps = controller.command, round(seconds * 20)
+
+    def failing(*asked: object) -> Twist:
+        nonlocal steps
+        steps -= 1
+        return command(*asked) if steps < 0 else no_command()
+
+    controller.command = failing
+    before = len(d.track)
+    d.run(60)
+    assert d.result == "SUCCEEDED"
+    assert len(d.kinds("plan.made")) > shut
+    assert len(d.kinds("recovery.started")) == (seconds > 0.6)
+    assert min(pose.y for pose in d.track[before:] if pose.x < 3.5) > 4.3
+
+
+@pytest.mark.parametrize("off", [0.04, -0.04])
+def test_it_gets_round_the_end_of_a_wall_that_stands_a_few_centimetres_off_the_map(off: float) -> None:
+    """As for a robot whose belief is off by as much; it has been told to take the shortest way, not the roomiest."""
+    mapped, world = (Flatland([(2.5 + x, 2.7, 9.5, 2.8)]).room(12, 5) for x in (0.0, off))
+    spec = StackSpec(localizer=TRUTH, planner=OmplPlanner(cost_travel_multiplier=0.2))
+    goal = Goal("g", Pose2(4.0, 1.8), timeout=60.0)
+    d = drive(world, Pose2(3.5, 3.2, math.pi), goal, grid=mapped.grid((-0.5, -0.5, 12.5, 5.5)), spec=spec).run(61)
+    assert d.result == "SUCCEEDED"
+    assert len(d.kinds("recovery.started")) <= 2

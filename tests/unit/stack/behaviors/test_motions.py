@@ -56,16 +56,17 @@ def test_wait_stands_still_for_its_time() -> None:
     assert set(commands) == {STOP}
 
 
-def test_clear_costmap_clears_once_and_is_done() -> None:
-    calls: list[int] = []
-    assert (
-        run(
-            ClearCostmap(model.ClearCostmap(), replace(setting(ROUND), clear_costmap=lambda: calls.append(1))),
-            view_of(ROUND),
-        )[2]
-        == []
+@pytest.mark.parametrize(("entirely", "cleared"), [(False, "around the robot"), (True, "everywhere")])
+def test_clear_costmap_clears_once_around_the_robot_or_everywhere_and_is_done(entirely: bool, cleared: str) -> None:
+    calls: list[str] = []
+    installed = replace(
+        setting(ROUND),
+        clear_costmap=lambda: calls.append("everywhere"),
+        clear_around=lambda: calls.append("around the robot"),
     )
-    assert calls == [1]
+    behavior = ClearCostmap(model.ClearCostmap(clear_entirely=entirely), installed)
+    assert run(behavior, view_of(ROUND))[2] == []
+    assert calls == [cleared]
 
 
 def test_backup_fails_where_there_is_something_behind() -> None:

@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -185,6 +186,18 @@ def test_clearing_forgets_what_is_not_seen_any_more_and_keeps_what_is() -> None:
     map_.clear()
     assert at(map_, 3.92, 3.0)[0] != 254
     assert at(map_, 1.42, 3.0)[0] == 254
+
+
+def test_clearing_around_the_robot_keeps_what_was_seen_farther_off() -> None:
+    world = Flatland([], [(4.0, 3.0, 0.1), (2.0, 4.2, 0.1)]).room(8, 6)
+    map_ = costmap(Flatland().room(8, 6))
+    map_.update(Pose2(2.0, 3.0), scan_of(world, Pose2(2.0, 3.0)))
+    blind = scan_of(world, Pose2(2.0, 3.0))
+    map_.update(Pose2(2.0, 3.0), replace(blind, ranges=np.full_like(blind.ranges, np.nan)))
+    assert (at(map_, 3.92, 3.0)[0], at(map_, 2.0, 4.12)[0]) == (254, 254)
+    map_.clear(1.5)
+    assert at(map_, 3.92, 3.0)[0] == 254
+    assert at(map_, 2.0, 4.12)[0] != 254
 
 
 def test_cells_under_the_robot_are_free() -> None:
