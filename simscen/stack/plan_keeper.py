@@ -27,6 +27,9 @@ USUAL_RATE, THROUGH_POSES_RATE = 1.0, 0.333
 CAUTION = (0.10, 0.05)
 """Metres of room beyond what is needed that plans keep, if they can, once the robot could not follow one: where it is
 as tight as belief, map and scan are uncertain, the same way would end the same again."""
+ROOMIER, LITTLE_LONGER = 0.15, 1.15
+"""Metres that they keep where that makes the way no longer than by this factor: a belief that is off by a cell, a
+controller that cuts a bend and the collision monitor's margin add up to more than any of them."""
 AT_ITS_END = 0.1
 """Metres from the end of a plan at which something that was to be passed has been missed."""
 GONE = 8
@@ -181,8 +184,17 @@ class PlanKeeper:
     def _planned(self, view: CostmapView, pose: Pose2, aim: Pose2, seed: int) -> Path:
         for room in CAUTION if self._cautious else ():
             with contextlib.suppress(NavigationFailure):  # no roomier way
-                return self.planner.plan(view.with_less_room(room), pose, aim, seed)
+                path = self.planner.plan(view.with_less_room(room), pose, aim, seed)
+                return self._roomier(path, view, pose, aim, seed)
         return self.planner.plan(view, pose, aim, seed)
+
+    def _roomier(self, path: Path, view: CostmapView, pose: Pose2, aim: Pose2, seed: int) -> Path:
+        """One that is hardly longer and keeps more room, if there is one."""
+        with contextlib.suppress(NavigationFailure):
+            other = self.planner.plan(view.with_less_room(ROOMIER), pose, aim, seed)
+            if other.length() <= LITTLE_LONGER * path.length():
+                return other
+        return path
 
     def _adopt(self, tick: int, now: float, path: Path, reason: str) -> Event:
         view = self._costmap.view

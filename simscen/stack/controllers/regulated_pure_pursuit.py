@@ -25,6 +25,8 @@ NO_CHORD = 0.001
 BEND = 0.4
 """Of its turning radius a car looks ahead at most: its plans go from full left to full right, and what a chord cuts off
 there it cannot make good again."""
+ASIDE = 0.1
+"""rad. Carrots that lie less to the side than that are straight ahead: to turn to them changes nothing."""
 NEARER = (1.0, 0.7, 0.5, 0.35)
 """Parts of the look-ahead distance that are tried until the arc is free: an arc to a far carrot cuts the path's bends,
 shorter ones keep to it. nav2_graceful_controller goes through its targets likewise."""
@@ -68,6 +70,7 @@ class RegulatedPurePursuit(PathFollower):
         reach = self._lookahead(twist.vx)
         arcs: list[tuple[float, float, Twist]] = []
         turn: float | None = None
+        aside: float | None = None
         for part in NEARER:
             if part < 1.0 and part * reach < self._spec.min_lookahead_dist:
                 break
@@ -82,11 +85,34 @@ class RegulatedPurePursuit(PathFollower):
             if free >= horizon:
                 return command
             arcs.append((free, horizon, command))
+            if aside is None and self._straight_is_free(carrot, backward, command, pose, costmap):
+                aside = _bearing(carrot, backward)
         if turn is not None:
             return self._turn(turn, pose, twist, costmap)
         free, horizon, command = max(arcs, key=lambda arc: arc[0])
         demanded = self._spec.max_allowed_time_to_collision_up_to_carrot
-        return self._free_way.within(command, free, horizon, demanded)
+        try:
+            return self._free_way.within(command, free, horizon, demanded)
+        except NavigationFailure:
+            if aside is None:
+                raise
+            return self._turn(aside, pose, twist, costmap)
+
+    def _straight_is_free(
+        self, carrot: tuple[float, float], backward: bool, arc: Twist, pose: Pose2, costmap: CostmapView
+    ) -> bool:
+        """Whether the robot, turned to the carrot first, could drive to it, where the arc there swings into something.
+
+        Out of a tight place that is often the only way; nav2_regulated_pure_pursuit fails there. A hull that is not
+        round would come nearer to what it stands beside by turning.
+        """
+        angle = _bearing(carrot, backward)
+        if not self._spec.use_rotate_to_heading or self._robot.radius is None or abs(angle) < ASIDE:
+            return False
+        free, horizon = self._time_free(
+            Twist(arc.vx, 0.0, 0.0), Pose2(pose.x, pose.y, pose.yaw + angle), costmap, math.hypot(*carrot)
+        )
+        return free >= horizon
 
     def _bend(self, track: PathTracker, pose: Pose2) -> tuple[float, float]:
         """The point that the curvature is taken from, where that is not the carrot (use_fixed_curvature_lookahead)."""

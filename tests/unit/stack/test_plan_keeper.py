@@ -156,7 +156,24 @@ def test_after_a_plan_that_could_not_be_followed_plans_keep_more_room_until_the_
     bench.steps(2)
     bench.keeper.reset(bench.now)
     bench.steps(2)
-    assert asked == pytest.approx([0.0, 0.1, 0.0])
+    assert asked == pytest.approx([0.0, 0.1, 0.15, 0.0])
+
+
+@pytest.mark.parametrize(("bulge", "kept"), [(0.3, True), (2.5, False)])
+def test_still_more_room_is_kept_where_the_way_is_hardly_longer_for_it(bulge: float, kept: bool) -> None:
+    bench = Bench()
+    bench.steps(2)
+    bench.keeper.not_followed()
+    bench.keeper.drop("recovery")
+    plan, bulges = bench.script.plan, iter([0.0, bulge])
+
+    def roomier(*asked: object) -> Path:
+        bench.script.bulge = next(bulges)
+        return plan(*asked)
+
+    bench.script.plan = roomier
+    bench.steps(2)
+    assert (bench.keeper.plan.path.points[:, 1].max() > 3.2) == kept
 
 
 def test_where_there_is_no_roomier_way_the_tight_one_is_tried_again() -> None:
