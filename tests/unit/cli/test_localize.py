@@ -121,18 +121,21 @@ def test_the_log_of_a_run_on_slipping_wheels_among_people_gives_the_figures_of_i
     assert found["lost"] == []
 
 
-def test_a_kidnapped_robot_is_lost_from_then_on_and_with_recovery_until_it_is_found(simscen, tmp_path: Path) -> None:
+NAV2S = "stack: {localizer: {parameters: nav2}}\n"
+
+
+def test_a_kidnapped_robot_is_lost_until_it_is_found_and_as_nav2s_amcl_from_then_on(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
     lines = [f"{word},{t / 10},{value}" for t, word, value in kidnapped()]
     Path("drive.csv").write_text("\n".join(lines) + "\n")
-    for name, recovery in (("plain", ""), ("recovering", RECOVERY)):
+    for name, recovery in (("nav2", NAV2S), ("ours", ""), ("recovering", RECOVERY)):
         Path(f"{name}.yaml").write_text(recovery + "pass: [{goals_reached: {}}]\n")
         ended = simscen("localize", "drive.csv", *GIVEN, "--scenario", f"{name}.yaml", "--json")
         assert ended.code == 0, ended.err
         found = json.loads(ended.out)
         assert found["lost"][0]["since"] == pytest.approx(5.0, abs=0.11)
-        assert (found["error"]["final"] < 0.3) == (name == "recovering")
-        assert (found["lost"][-1]["until"] is None) == (name == "plain")
+        assert (found["error"]["final"] < 0.3) == (name != "nav2")
+        assert (found["lost"][-1]["until"] is None) == (name == "nav2")
 
 
 def kidnapped() -> list[tuple[int, str, str]]:
