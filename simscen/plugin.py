@@ -71,6 +71,7 @@ if TYPE_CHECKING:
     )
     from simscen.spec.references import GoalName, MaskFile, MovableName, ObjectName, RegionName
     from simscen.stack.footprint import Footprint, distances
+    from simscen.stack.journal import Task
     from simscen.stack.protocols import (
         Behavior,
         Controller,
@@ -85,7 +86,6 @@ if TYPE_CHECKING:
         SwitchesZones,
     )
     from simscen.stack.setting import Setting
-    from simscen.stack.tasks import Task
     from simscen.triggers.base import Condition
 
 __all__ = [
@@ -294,7 +294,7 @@ _WHERE = {
         "Footprint",
         "distances",
     ),
-    "simscen.stack.tasks": ("Task",),
+    "simscen.stack.journal": ("Task",),
     "simscen.sensors.sensor": (
         "Sensor",
         "SensorSetting",
