@@ -71,7 +71,7 @@ def command(
     experiments: list[Experiment] = []
     for offer in offers(barn, nav2, project, made, Sizes(seeds, fields, dynamic, goals, lost)):
         whole = _named(offer.name, only)
-        if not whole and not any(offer.name.casefold() in part.casefold() for part in only or ()):
+        if not whole and not any(_named(name, only) for name in offer.parts):
             continue
         if offer.missing:
             print(f"{offer.name}: skipped, {offer.missing}", file=sys.stderr)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from simscen.study import barn, corridors, experiments, random_goals
+from simscen.study import barn, corridors, dynamic_fields, experiments, random_goals
 from simscen.study.buildings import write_building
 from simscen.study.experiment import Experiment
 
@@ -40,13 +40,15 @@ class Sizes:
 class Offer:
     """Experiments that come together: what they are called, the folder that they need, and how to get them.
 
-    Without a folder `source` says which option names it, and where its data comes from.
+    `parts` are the names of those that are not called as the offer is: to make them all may take a while. Without a
+    folder `source` says which option names it, and where its data comes from.
     """
 
     name: str
     needs: Path | None
     make: Callable[[], Sequence[Experiment]]
     source: str = ""
+    parts: Sequence[str] = ()
 
     @property
     def missing(self) -> str:
@@ -60,6 +62,40 @@ def offers(data: Path | None, nav2: Path | None, project: Path, made: Path, size
     """All of them, in the order of the table; what is generated goes to `made`."""
     worlds, scenarios = project / "worlds", project / "scenarios"
     return [
+        replace(offer, parts=_parts(offer.name, scenarios))
+        for offer in _offers(data, nav2, worlds, scenarios, made, sizes)
+    ]
+
+
+def _parts(name: str, scenarios: Path) -> list[str]:
+    """What the experiments of an offer are called that are not called as it is."""
+    match name:
+        case "BARN":
+            return [f"BARN, {variant}" for variant in ("default parameters", *barn.CONTROLLERS)]
+        case "narrow fields":
+            return [experiments.narrow_name(room) for room in experiments.NARROW]
+        case "dynamic fields":
+            return [experiments.dynamic_name(speed) for speed in dynamic_fields.SPEEDS]
+        case "random goals":
+            return ["random goals, ROS maps"]
+        case "degraded sensing":
+            return [f"degraded sensing, {strength}" for strength in random_goals.STRENGTHS]
+        case "two robots":
+            return ["two robots in a corridor"]
+        case "tb3_sandbox":
+            return ["tb3_sandbox, unmapped box"]
+        case "corner cases":
+            return [experiments.case_name(file) for file in experiments.case_files(scenarios)]
+        case "localization":
+            return [f"localization, {name}" for name in experiments.LOCALIZATIONS]
+        case _:
+            return []
+
+
+def _offers(
+    data: Path | None, nav2: Path | None, worlds: Path, scenarios: Path, made: Path, sizes: Sizes
+) -> list[Offer]:
+    return [
         Offer("BARN", data, lambda: list(_barn(made, data or Path(), sizes)), BARN),
         Offer("generated fields", made, lambda: [experiments.generated_fields(made, sizes.fields)]),
         Offer("narrow fields", made, lambda: experiments.narrow_fields(made, sizes.fields // 2)),
@@ -69,7 +105,9 @@ def offers(data: Path | None, nav2: Path | None, project: Path, made: Path, size
         Offer("ramps", made, lambda: [corridors.ramps(made / "ramps", sizes.goals)]),
         Offer("two robots", made, lambda: [corridors.two_robots(made / "corridors", sizes.goals)]),
         Offer("tb3_sandbox", nav2, lambda: experiments.sandbox(made, nav2 or Path(), sizes.seeded(20)), NAV2),
-        Offer("corner cases", scenarios, lambda: experiments.corner_cases(scenarios, project, sizes.seeded(20))),
+        Offer(
+            "corner cases", scenarios, lambda: experiments.corner_cases(scenarios, scenarios.parent, sizes.seeded(20))
+        ),
         Offer("localization", worlds, lambda: experiments.localizations(made, worlds, sizes.seeded(20), sizes.lost)),
     ]
 

@@ -19,6 +19,8 @@ NARROW = (0.30, 0.20, 0.10)
 """Metres that the widest way through a narrow field is wider than the robot."""
 WIDTH = 0.42
 """Metres from wheel to wheel of the robot that drives there."""
+LOCALIZATIONS = ("tour", "told 0.5 m and 20° off", "start unknown", "kidnapped")
+"""What the experiments on localisation are called."""
 
 
 def barn_challenge(
@@ -47,9 +49,13 @@ def narrow_fields(folder: Path, count: int) -> list[Experiment]:
         gap, too_wide = (WIDTH + room) / 2, (WIDTH + room + 0.1) / 2
         to = folder / f"narrow/{round(100 * room)}_cm"
         drives = [_field(to, obstacle_field(number, gap, too_wide)) for number in range(1, count + 1)]
-        name = f"narrow fields, robot + {100 * room:.0f} cm"
-        experiments.append(Experiment(name, tuple(drives), folder, mapless=True))
+        experiments.append(Experiment(narrow_name(room), tuple(drives), folder, mapless=True))
     return experiments
+
+
+def narrow_name(room: float) -> str:
+    """What the experiment is called with this much room in metres."""
+    return f"narrow fields, robot + {100 * room:.0f} cm"
 
 
 def _field(folder: Path, field: ObstacleField) -> Drive:
@@ -70,8 +76,13 @@ def dynamic_fields(folder: Path, count: int) -> list[Experiment]:
             text = barn.scenario(f"dynamic field {number}", world.name, movers.START, movers.GOAL)
             length = movers.START.distance(movers.GOAL)
             drives.append(Drive(written(folder / f"{stem}.scenario.yaml", text), [number], length))
-        experiments.append(Experiment(f"dynamic fields, {speed:.2f} m/s", tuple(drives), folder, mapless=True))
+        experiments.append(Experiment(dynamic_name(speed), tuple(drives), folder, mapless=True))
     return experiments
+
+
+def dynamic_name(speed: float) -> str:
+    """What the experiment is called with this mean speed in m/s."""
+    return f"dynamic fields, {speed:.2f} m/s"
 
 
 def sandbox(folder: Path, nav2: Path, seeds: Sequence[int]) -> list[Experiment]:
@@ -89,8 +100,17 @@ def sandbox(folder: Path, nav2: Path, seeds: Sequence[int]) -> list[Experiment]:
 
 def corner_cases(scenarios: Path, root: Path, seeds: Sequence[int]) -> list[Experiment]:
     """The shipped corner cases, each an experiment of its own."""
-    files = sorted(scenarios.glob("corner_cases/*.scenario.yaml"))
-    return [Experiment(f.name.split(".")[0].replace("_", " "), (Drive(f, seeds),), root) for f in files]
+    return [Experiment(case_name(file), (Drive(file, seeds),), root) for file in case_files(scenarios)]
+
+
+def case_files(scenarios: Path) -> list[Path]:
+    """The shipped corner cases."""
+    return sorted(scenarios.glob("corner_cases/*.scenario.yaml"))
+
+
+def case_name(file: Path) -> str:
+    """What the experiment with this corner case is called."""
+    return file.name.split(".")[0].replace("_", " ")
 
 
 def localizations(folder: Path, worlds: Path, seeds: Sequence[int], lost: int) -> list[Experiment]:
@@ -107,14 +127,14 @@ def localizations(folder: Path, worlds: Path, seeds: Sequence[int], lost: int) -
     numbers = range(1, lost + 1)
     directions = {seed: float(Streams(seed).generator("direction").uniform(-np.pi, np.pi)) for seed in numbers}
     misled = [one(f"misled_{n}", localization.misled(directions[n], n % 2 == 0), [n]) for n in numbers]
-    tour = experiment("tour", one("tour", localization.tour(), seeds), known=True)
+    tour = experiment(LOCALIZATIONS[0], one("tour", localization.tour(), seeds), known=True)
     if not lost:
         return [tour]
     return [
         tour,
-        experiment("told 0.5 m and 20° off", *misled, known=True),
-        experiment("start unknown", one("start_unknown", localization.start_unknown(), numbers)),
-        experiment("kidnapped", one("kidnapped", localization.kidnapped(), numbers)),
+        experiment(LOCALIZATIONS[1], *misled, known=True),
+        experiment(LOCALIZATIONS[2], one("start_unknown", localization.start_unknown(), numbers)),
+        experiment(LOCALIZATIONS[3], one("kidnapped", localization.kidnapped(), numbers)),
     ]
 
 

@@ -1,0 +1,30 @@
+"""What `simscen bench nav` offers is found by the names of its experiments, before any of them is made."""
+
+from pathlib import Path
+
+import pytest
+
+from simscen.cli.bench_offers import Sizes, offers
+
+PROJECT = Path(__file__).parents[3]
+MADE_QUICKLY = (
+    "generated fields",
+    "narrow fields",
+    "dynamic fields",
+    "ramps",
+    "two robots",
+    "corner cases",
+    "localization",
+)
+HERE = ("BARN", "random goals", "degraded sensing", "tb3_sandbox", *MADE_QUICKLY)
+
+
+def test_there_are_these_offers(tmp_path: Path) -> None:
+    assert {offer.name for offer in offers(None, None, PROJECT, tmp_path, Sizes())} == set(HERE)
+
+
+@pytest.mark.parametrize("name", MADE_QUICKLY)
+def test_an_offer_knows_what_its_experiments_are_called(tmp_path: Path, name: str) -> None:
+    small = Sizes(seeds=1, fields=2, dynamic=1, goals=1, lost=1)
+    (offer,) = (offer for offer in offers(None, None, PROJECT, tmp_path, small) if offer.name == name)
+    assert [made.name for made in offer.make()] == (list(offer.parts) or [name])
