@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from simscen.core.shapes import Body, MotionPath
     from simscen.core.stage import Effect, Situation, Stage
     from simscen.core.time import Clock
-    from simscen.core.trace import Decision, Trace
+    from simscen.core.trace import CostGrid, Decision, Trace
     from simscen.core.verdict import Finding, Status
     from simscen.core.zones import Zones, ZoneSwitch
     from simscen.criteria.base import Criterion
@@ -105,6 +105,7 @@ __all__ = [
     "Condition",
     "Controller",
     "ControllerSpec",
+    "CostGrid",
     "CostmapView",
     "Criterion",
     "Decision",
@@ -368,6 +369,7 @@ _WHERE = {
     ),
     "simscen.core.time": ("Clock",),
     "simscen.core.trace": (
+        "CostGrid",
         "Decision",
         "Trace",
     ),

@@ -1,10 +1,13 @@
 """A whole stack behind its door."""
 
+import numpy as np
+
 from simscen.core.belief import Estimate
 from simscen.core.events import Event, EventKind
+from simscen.core.grid import OccupancyGrid
 from simscen.core.navigation import Goal, Path
 from simscen.core.sensing import Readings
-from simscen.core.trace import Decision
+from simscen.core.trace import CostGrid, Decision
 from simscen.core.zones import Zones
 from simscen.model.stack import InProcessStack
 from simscen.stack.installed.localizer import checked_belief
@@ -73,9 +76,21 @@ class InstalledStack(Watched):
         for path, what in ((decision.plan, "planned"), (decision.local_plan, "expects to drive")):
             if path is not None:
                 self.checked_path(path, what)
+        for costmap in decision.costmaps:
+            self._look_at(costmap)
         for event in decision.events:
             if not isinstance(event, Event) or not isinstance(event.kind, EventKind):
                 self.broke(f"told of {event!r}, which is no Event")
             if event.tick != tick:
                 self.broke(f"told at tick {tick} of `{event.kind}` at tick {event.tick}")
         return decision
+
+    def _look_at(self, costmap: object) -> None:
+        """A log takes a costmap of a known name in a known frame, whose cells are bytes."""
+        if not isinstance(costmap, CostGrid) or not isinstance(costmap.grid, OccupancyGrid):
+            self.broke(f"published {type(costmap).__name__} instead of a CostGrid")
+        if costmap.name not in ("global", "local") or costmap.frame not in ("map", "odom"):
+            self.broke(f"published a costmap {costmap.name!r} in frame {costmap.frame!r}")
+        cells = costmap.grid.cells
+        if not isinstance(cells, np.ndarray) or cells.dtype != np.int8 or cells.ndim != 2:
+            self.broke(f"published a {costmap.name} costmap whose cells are no (height, width) of int8")
