@@ -18,7 +18,7 @@ app = typer.Typer(rich_markup_mode=None, add_completion=False, no_args_is_help=T
 
 @app.callback()
 def _log() -> None:
-    """Mend the logs of runs that broke off, and lay out what viewers show of logs."""
+    """Mend logs, and lay out what viewers show of them."""
 
 
 @app.command()
