@@ -126,6 +126,7 @@ def test_runs_pass_fail_with_simscens_own_words_are_skipped_and_expected_to_fail
     assert {one.get("name") for one in cases["good"].iter("property")} >= {"seed", "log", "again"}
 
 
+@pytest.mark.long
 def test_workers_leave_all_in_one_folder_and_what_failed_is_known(run, project: Path) -> None:
     code, told = run("--simscen", "-n2", "scenarios", "-k", "good or bad")
     assert code == 1, told
