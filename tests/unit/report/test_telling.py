@@ -205,6 +205,12 @@ def test_what_a_ci_might_obey_has_no_colours_that_could_hide_it(session):
     assert not re.search(r"^\s*::|##\[", text, re.MULTILINE)
 
 
+@pytest.fixture(autouse=True)
+def a_terminal_that_can(monkeypatch):
+    """Rich asks TERM whether a terminal can move its cursor; whoever runs these tests may have a dumb one."""
+    monkeypatch.setenv("TERM", "xterm")
+
+
 def test_a_terminal_without_colours_is_live_all_the_same(session):
     text = shown(session, Look(colour=False, live=True, terminal=True), LiveReporter)
     assert "\x1b[?25l" in text
