@@ -37,15 +37,13 @@ if TYPE_CHECKING:
     from simscen.criteria.measure import Measure
     from simscen.criteria.signals import clearance, drive, pose_error, speed, truth, turn_rate
     from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance, Sight, Wheels
+    from simscen.model.checkers import GoalCheckerSpec
     from simscen.model.controllerspec import ControllerSpec
+    from simscen.model.localizers import LocalizerSpec
+    from simscen.model.planners import PlannerSpec
+    from simscen.model.recovery import BehaviorSpec
     from simscen.model.robot import Mount, SensorSpec
-    from simscen.model.stack import (
-        BehaviorSpec,
-        GoalCheckerSpec,
-        InProcessStack,
-        LocalizerSpec,
-        PlannerSpec,
-    )
+    from simscen.model.stack import InProcessStack
     from simscen.sensors.sensor import Sensor, SensorSetting, SensorView
     from simscen.spec.base import Ranged, Spec, Value, by_default
     from simscen.spec.choice import Choice
@@ -252,13 +250,11 @@ _WHERE = {
         "RegionName",
     ),
     # What a specification is: one base for each kind.
-    "simscen.model.stack": (
-        "BehaviorSpec",
-        "GoalCheckerSpec",
-        "InProcessStack",
-        "LocalizerSpec",
-        "PlannerSpec",
-    ),
+    "simscen.model.stack": ("InProcessStack",),
+    "simscen.model.recovery": ("BehaviorSpec",),
+    "simscen.model.checkers": ("GoalCheckerSpec",),
+    "simscen.model.localizers": ("LocalizerSpec",),
+    "simscen.model.planners": ("PlannerSpec",),
     "simscen.model.controllerspec": ("ControllerSpec",),
     "simscen.model.robot": (
         "Mount",

@@ -105,21 +105,21 @@ def _note(place: Place, message: str) -> Problem:
 
 def _known() -> Known:
     """Our parameters, by the section that they are in, or by the type of what is in it; `a.b` is `b` in `a`."""
-    from simscen.model import controllers, mppi, stack
+    from simscen.model import checkers, controllers, costmaps, localizers, mppi, planners, recovery
 
     models: dict[str, type[BaseModel]] = {
-        "amcl": stack.Amcl,
-        "progress_checker": stack.ProgressChecker,
-        "simple": stack.SimpleGoalChecker,
+        "amcl": localizers.Amcl,
+        "progress_checker": checkers.ProgressChecker,
+        "simple": checkers.SimpleGoalChecker,
         "regulated_pure_pursuit": controllers.RegulatedPurePursuit,
         "dwb": controllers.DynamicWindow,
         "mppi": mppi.Mppi,
-        "navfn": stack.Navfn,
-        "smac_2d": stack.Smac2d,
-        "costmap": stack.Costmap,
-        "local_costmap": stack.LocalCostmap,
-        "denoise_layer": stack.DenoiseLayer,
-        "recovery": stack.Recovery,
+        "navfn": planners.Navfn,
+        "smac_2d": planners.Smac2d,
+        "costmap": costmaps.Costmap,
+        "local_costmap": costmaps.LocalCostmap,
+        "denoise_layer": costmaps.DenoiseLayer,
+        "recovery": recovery.Recovery,
     }
     return {name: tuple(_names(model)) for name, model in models.items()}
 

@@ -17,9 +17,10 @@ from simscen.criteria.base import Criterion
 from simscen.loading.disturbances import disturbances_of
 from simscen.loading.loaded import LoadedScenario
 from simscen.model.anystack import AnyStack
+from simscen.model.localizers import Amcl, OdometryOnly
 from simscen.model.robot import RobotSpec
 from simscen.model.scenario import ScenarioSpec, estimate_of
-from simscen.model.stack import Amcl, OdometryOnly, StackSpec
+from simscen.model.stack import StackSpec
 from simscen.run.goals import expected_of, goals_of, sent_goals
 from simscen.run.masks import load_judged_masks, load_masks
 from simscen.run.robotsize import inscribed_radius

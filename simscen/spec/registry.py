@@ -50,11 +50,11 @@ class Group:
 
 GROUPS: dict[str, Group] = {
     "stack": Group("simscen.model.stack:InProcessStack", "simscen.model.stack:STACKS", ("external",)),
-    "localizer": Group("simscen.model.stack:LocalizerSpec", "simscen.model.stack:LOCALIZERS"),
-    "planner": Group("simscen.model.stack:PlannerSpec", "simscen.model.stack:PLANNERS"),
+    "localizer": Group("simscen.model.localizers:LocalizerSpec", "simscen.model.localizers:LOCALIZERS"),
+    "planner": Group("simscen.model.planners:PlannerSpec", "simscen.model.planners:PLANNERS"),
     "controller": Group("simscen.model.controllers:ControllerSpec", "simscen.model.controllers:CONTROLLERS"),
-    "behavior": Group("simscen.model.stack:BehaviorSpec", "simscen.model.stack:BEHAVIORS"),
-    "goal_checker": Group("simscen.model.stack:GoalCheckerSpec", "simscen.model.stack:GOAL_CHECKERS"),
+    "behavior": Group("simscen.model.recovery:BehaviorSpec", "simscen.model.recovery:BEHAVIORS"),
+    "goal_checker": Group("simscen.model.checkers:GoalCheckerSpec", "simscen.model.checkers:GOAL_CHECKERS"),
     "criterion": Group(
         "simscen.criteria.base:Criterion", "simscen.criteria.criterion:AnyCriterion", ("id", "severity", "then")
     ),

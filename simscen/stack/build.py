@@ -6,8 +6,9 @@ from dataclasses import replace
 from simscen.core.chance import Streams
 from simscen.core.goalnames import Mode
 from simscen.core.time import Clock
-from simscen.model import stack as model
 from simscen.model.latency import Latency
+from simscen.model.recovery import Recovery
+from simscen.model.stack import InProcessStack, StackSpec
 from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.commands import Commands
 from simscen.stack.costmap.costmaps import Costmaps
@@ -30,7 +31,7 @@ from simscen.stack.velocity_smoother import VelocitySmoother
 
 
 def build_stack(
-    spec: model.InProcessStack,
+    spec: InProcessStack,
     surroundings: Surroundings,
     streams: Streams,
     clock: Clock,
@@ -50,7 +51,7 @@ def build_stack(
     return InstalledStack(spec, setting)
 
 
-def reference_stack(spec: model.StackSpec, setting: Setting) -> ReferenceStack:
+def reference_stack(spec: StackSpec, setting: Setting) -> ReferenceStack:
     """Nav2 in miniature. It works on its map in cells no larger than the costmap's.
 
     Its random streams are "localizer", "controller" and "planner#1", "planner#2", … for the plans of a run; components
@@ -112,13 +113,13 @@ def reference_stack(spec: model.StackSpec, setting: Setting) -> ReferenceStack:
     )
 
 
-def _ticks(spec: model.StackSpec, clock: Clock) -> dict[str, int]:
+def _ticks(spec: StackSpec, clock: Clock) -> dict[str, int]:
     """What each part takes in whole ticks; the robot's own values have been put in by whoever knows its file."""
     latency = spec.latency if isinstance(spec.latency, Latency) else Latency()
     return {part: clock.ticks(getattr(latency, part)) for part in Latency.model_fields}
 
 
-def _behaviors(spec: model.Recovery, shared: Setting) -> list[Behavior]:
+def _behaviors(spec: Recovery, shared: Setting) -> list[Behavior]:
     """The recovery behaviours that the robot can do, each with a random stream of its own."""
     possible = [each for each in spec.chosen() if shared.robot.turning_radius == 0.0 or not each.turns_in_place]
     return [

@@ -11,7 +11,7 @@ import numpy as np
 from simscen.core.geometry import Array, Pose2
 from simscen.core.motion import STOP, Twist
 from simscen.core.sensing import Scan
-from simscen.model.stack import CollisionMonitor as MonitorSpec
+from simscen.model.guards import CollisionMonitor as MonitorSpec
 from simscen.stack.arcs import poses_along
 from simscen.stack.costmap.obstacle_layer import ScanAmongMoving
 from simscen.stack.prediction.moving import Moving, nothing

@@ -7,7 +7,7 @@ Here the robot goes on until it is well inside, or until it stands anywhere insi
 from simscen.core.geometry import Pose2, wrap
 from simscen.core.motion import Twist
 from simscen.core.navigation import Goal
-from simscen.model.stack import SimpleGoalChecker as Spec
+from simscen.model.checkers import SimpleGoalChecker as Spec
 from simscen.stack.setting import Setting
 
 STANDING = 0.02

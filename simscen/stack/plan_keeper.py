@@ -9,7 +9,7 @@ import numpy as np
 from simscen.core.events import Event, EventKind, Value
 from simscen.core.geometry import Array, Pose2
 from simscen.core.navigation import ErrorCode, Goal, Path
-from simscen.model.stack import PlannerSpec
+from simscen.model.planners import PlannerSpec
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner
 from simscen.stack.replanning import PlanInForce

@@ -1,7 +1,7 @@
 """Whether the robot gets anywhere: nav2_controller's Simple- and PoseProgressChecker."""
 
 from simscen.core.geometry import Pose2, wrap
-from simscen.model.stack import ProgressChecker as ProgressSpec
+from simscen.model.checkers import ProgressChecker as ProgressSpec
 
 
 class ProgressChecker:

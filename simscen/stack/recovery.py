@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import get_args
 
-from simscen.model.stack import PlannerCode, Recovery
+from simscen.model.recovery import PlannerCode, Recovery
 from simscen.stack.protocols import Behavior, NavigationFailure
 
 PLANNER_CODES = frozenset(get_args(PlannerCode))

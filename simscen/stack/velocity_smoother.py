@@ -3,7 +3,7 @@
 import math
 
 from simscen.core.motion import Twist
-from simscen.model.stack import VelocitySmoother as SmootherSpec
+from simscen.model.guards import VelocitySmoother as SmootherSpec
 from simscen.stack.protocols import RobotModel
 
 

@@ -18,7 +18,8 @@ from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import Goal, Path
 from simscen.core.sensing import Odometry, Reading, Scan
 from simscen.core.time import Clock
-from simscen.model.stack import GroundTruth, StackSpec
+from simscen.model.localizers import GroundTruth
+from simscen.model.stack import StackSpec
 from simscen.stack.protocols import RobotModel, Stack, Surroundings
 from simscen.stack.setting import Setting
 

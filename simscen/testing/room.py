@@ -15,7 +15,7 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.grid import FREE, OCCUPIED, OccupancyGrid
 from simscen.core.motion import Twist
 from simscen.core.sensing import Imu, Odometry, Scan
-from simscen.model.stack import LocalizerSpec
+from simscen.model.localizers import LocalizerSpec
 from simscen.stack.protocols import Localizer, RobotModel, Surroundings
 from simscen.stack.setting import Setting
 

@@ -14,9 +14,12 @@ from simscen.actions.base import Action
 from simscen.criteria.base import Criterion
 from simscen.criteria.measure import Measure
 from simscen.faults.base import Fault
+from simscen.model.checkers import GoalCheckerSpec
 from simscen.model.controllerspec import ControllerSpec
+from simscen.model.localizers import LocalizerSpec
+from simscen.model.planners import PlannerSpec
+from simscen.model.recovery import BehaviorSpec
 from simscen.model.robot import SensorSpec
-from simscen.model.stack import BehaviorSpec, GoalCheckerSpec, LocalizerSpec, PlannerSpec
 from simscen.model.stackbase import StackBase
 from simscen.spec.registry import GROUPS, BrokenPlugin, Entry, find
 from simscen.stack.protocols import RobotModel

@@ -2,7 +2,8 @@
 
 import pytest
 
-from simscen.model.stack import BackUp, ClearCostmap, SimpleGoalChecker, Spin, Wait
+from simscen.model.checkers import SimpleGoalChecker
+from simscen.model.recovery import BackUp, ClearCostmap, Spin, Wait
 from simscen.testing import Promise, promises_of
 
 SPECS = {

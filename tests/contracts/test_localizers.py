@@ -7,7 +7,7 @@ from simscen.core.belief import Estimate
 from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
 from simscen.core.sensing import Odometry
-from simscen.model.stack import Amcl, Ekf, GroundTruth, LocalizerSpec, OdometryOnly
+from simscen.model.localizers import Amcl, Ekf, GroundTruth, LocalizerSpec, OdometryOnly
 from simscen.testing import Promise, promises_of
 from simscen.testing.contracts.localizer import here, short
 from simscen.testing.room import Drive, localizer, run

@@ -5,8 +5,8 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from simscen.model.stack import Navfn, Smac2d
-from simscen.model.stack import OmplPlanner as Spec
+from simscen.model.planners import Navfn, Smac2d
+from simscen.model.planners import OmplPlanner as Spec
 from simscen.stack.protocols import RobotModel
 from simscen.testing import Promise
 from simscen.testing.contracts.planner import PlannerContract

@@ -5,7 +5,8 @@ import pytest
 from simscen.core.geometry import Pose2
 from simscen.core.navigation import Goal
 from simscen.model.controllers import DynamicWindow, Mppi, RegulatedPurePursuit
-from simscen.model.stack import GroundTruth, StackSpec
+from simscen.model.localizers import GroundTruth
+from simscen.model.stack import StackSpec
 from simscen.testing import Promise, promises_of
 from simscen.testing.flatland import Drive, Flatland, drive
 

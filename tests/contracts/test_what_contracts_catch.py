@@ -24,17 +24,13 @@ from simscen.core.verdict import Finding, Status
 from simscen.criteria.base import Criterion
 from simscen.criteria.measure import Measure
 from simscen.faults.base import Disturbance, Fault
+from simscen.model.checkers import SimpleGoalChecker
 from simscen.model.controllers import RegulatedPurePursuit
+from simscen.model.localizers import GroundTruth, OdometryOnly
+from simscen.model.planners import OmplPlanner
+from simscen.model.recovery import BackUp, Spin
 from simscen.model.robot import Bumper, Lidar
-from simscen.model.stack import (
-    BackUp,
-    GroundTruth,
-    OdometryOnly,
-    OmplPlanner,
-    SimpleGoalChecker,
-    Spin,
-    StackSpec,
-)
+from simscen.model.stack import StackSpec
 from simscen.spec.base import Spec
 from simscen.stack.protocols import NavigationFailure
 from simscen.testing import PromiseBroken, promises_of

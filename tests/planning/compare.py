@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.navigation import Path
-from simscen.model.stack import Navfn, OmplPlanner, PlannerSpec, Smac2d
+from simscen.model.planners import Navfn, OmplPlanner, PlannerSpec, Smac2d
 from simscen.stack.planners import build, grid_planner
 from simscen.stack.planners.ends import find_ends
 from simscen.stack.planners.rates import Rates

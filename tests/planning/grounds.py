@@ -7,7 +7,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from simscen.core.geometry import Array, Pose2
-from simscen.model.stack import Costmap as CostmapSpec
+from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.planners.rates import Rates
 from simscen.stack.protocols import CostmapView, RobotModel, Surroundings

@@ -7,7 +7,7 @@ import pytest
 from grounds import ROBOT, cheapest, forest, maze, pair, rooms, view_of
 
 from simscen.core.geometry import Pose2
-from simscen.model.stack import OmplPlanner as Spec
+from simscen.model.planners import OmplPlanner as Spec
 from simscen.stack.planners.ends import find_ends
 from simscen.stack.planners.ompl_planner import OmplPlanner
 from simscen.stack.planners.rates import Rates

@@ -8,7 +8,7 @@ import numpy as np
 from simscen.core.geometry import Pose2
 from simscen.core.sensing import Image, Scan
 from simscen.core.zones import Zones
-from simscen.model.stack import Costmap as CostmapSpec
+from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.costmap.denoise_layer import without_specks
 from simscen.stack.costmap.frame import Cells, Frame
 from simscen.stack.costmap.inflation_layer import FAR, Inflation, squared_distances

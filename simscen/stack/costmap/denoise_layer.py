@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from simscen.model.stack import DenoiseLayer
+from simscen.model.costmaps import DenoiseLayer
 from simscen.stack.costmap.static_layer import Mask
 
 

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.sensing import Image
-from simscen.model.stack import Costmap as CostmapSpec
+from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.costmap.frame import Cells, Frame
 from simscen.stack.costmap.static_layer import Mask
 

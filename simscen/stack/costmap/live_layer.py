@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Pose2
 from simscen.core.sensing import Image, Scan
-from simscen.model.stack import Costmap as CostmapSpec
+from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.costmap.depth_layer import Heights, heights_seen, seen_through
 from simscen.stack.costmap.frame import Cells, Frame
 from simscen.stack.costmap.inflation_layer import Squared

@@ -2,7 +2,7 @@
 
 from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
-from simscen.model.stack import BehaviorSpec
+from simscen.model.recovery import BehaviorSpec
 from simscen.stack.installed.watched import Watched
 from simscen.stack.protocols import Behavior, CostmapView
 from simscen.stack.setting import Setting

@@ -4,7 +4,7 @@ import numpy as np
 
 from simscen.core.belief import Belief, Estimate
 from simscen.core.sensing import Imu, Odometry, Scan
-from simscen.model.stack import LocalizerSpec
+from simscen.model.localizers import LocalizerSpec
 from simscen.stack.installed.watched import Watched
 from simscen.stack.protocols import Localizer
 from simscen.stack.setting import Setting

@@ -9,7 +9,7 @@ import numpy as np
 from simscen.core.belief import Belief, Estimate
 from simscen.core.geometry import Array, Pose2
 from simscen.core.sensing import Imu, Odometry, Scan
-from simscen.model.stack import Amcl
+from simscen.model.localizers import Amcl
 from simscen.stack.localizers.clusters import spread, summarise
 from simscen.stack.localizers.finder import Finder
 from simscen.stack.localizers.global_search import GlobalSearch

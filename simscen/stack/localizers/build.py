@@ -1,7 +1,7 @@
 """From the specifications of the shipped localizers to localizers."""
 
 from simscen.core.grid import OccupancyGrid
-from simscen.model import stack as model
+from simscen.model import localizers as model
 from simscen.stack.localizers.amcl import AmclLocalizer
 from simscen.stack.localizers.beam_model import BeamModel, opaque_field
 from simscen.stack.localizers.dead_reckoning import DeadReckoning

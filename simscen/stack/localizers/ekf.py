@@ -11,7 +11,7 @@ import numpy as np
 from simscen.core.belief import Belief, Estimate
 from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.sensing import Imu, Odometry, Scan
-from simscen.model.stack import Ekf
+from simscen.model.localizers import Ekf
 from simscen.stack.localizers.dead_reckoning import start_of
 from simscen.stack.localizers.slip_model import AHEAD, BIAS, LEVER, RATE, Model, Step, motion, moved, rates
 from simscen.stack.odometry_history import believable

@@ -10,7 +10,7 @@ import numpy as np
 from simscen.core.belief import Estimate
 from simscen.core.geometry import Array, Pose2
 from simscen.core.sensing import Scan
-from simscen.model.stack import Amcl
+from simscen.model.localizers import Amcl
 from simscen.stack.localizers.beams import Beams, select_beams
 from simscen.stack.localizers.clusters import summarise
 from simscen.stack.localizers.finder import around as around_places

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
-from simscen.model.stack import Ekf
+from simscen.model.localizers import Ekf
 
 X, Y, YAW, RATE, BIAS, AHEAD, ASIDE = range(7)
 """The state: pose in the map, turn rate, the gyroscope's bias, and slip: the speed ahead and aside that no wheel sees,

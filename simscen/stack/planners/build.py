@@ -1,6 +1,6 @@
 """From a specification to a planner of OMPL."""
 
-from simscen.model.stack import OmplPlanner as PlannerSpec
+from simscen.model.planners import OmplPlanner as PlannerSpec
 from simscen.stack.planners.ompl_planner import OmplPlanner
 from simscen.stack.planners.pose_planner import PosePlanner
 from simscen.stack.protocols import Planner

@@ -4,7 +4,7 @@ import numpy as np
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.navigation import ErrorCode, Path
-from simscen.model.stack import OmplPlanner as PlannerSpec
+from simscen.model.planners import OmplPlanner as PlannerSpec
 from simscen.stack.planners.ends import Ends, find_ends
 from simscen.stack.planners.finish import SPACING, spaced, with_headings
 from simscen.stack.planners.rates import Rates

@@ -6,7 +6,7 @@ import numpy as np
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.navigation import ErrorCode, Path
-from simscen.model.stack import OmplPlanner as PlannerSpec
+from simscen.model.planners import OmplPlanner as PlannerSpec
 from simscen.stack.cusps import cusps
 from simscen.stack.footprint import Footprint
 from simscen.stack.planners.ends import find_ends

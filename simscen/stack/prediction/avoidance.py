@@ -14,7 +14,7 @@ import numpy as np
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.motion import STOP, Twist
-from simscen.model.stack import Prediction
+from simscen.model.guards import Prediction
 from simscen.stack.footprint import Discs
 from simscen.stack.prediction.moving import Moving
 from simscen.stack.prediction.rollouts import HORIZON, TIMES, Repertoire, Rollouts, along_path, arc, joined

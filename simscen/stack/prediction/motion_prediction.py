@@ -8,7 +8,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import Path
 from simscen.core.sensing import Imu, Scan
-from simscen.model.stack import Prediction
+from simscen.model.guards import Prediction
 from simscen.stack.costmap.obstacle_layer import ScanAmongMoving
 from simscen.stack.prediction.avoidance import Avoidance
 from simscen.stack.prediction.moving import Moving, nothing

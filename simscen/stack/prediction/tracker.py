@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.sensing import Scan
-from simscen.model.stack import Prediction
+from simscen.model.guards import Prediction
 from simscen.stack.prediction.clusters import Clusters, clusters, fitted
 from simscen.stack.prediction.kalman import corrected, predicted
 from simscen.stack.prediction.moving import Moving, nothing

@@ -9,7 +9,7 @@ import numpy as np
 
 from simscen.core.chance import Streams
 from simscen.core.paired import mean_interval
-from simscen.model.stack import Amcl
+from simscen.model.localizers import Amcl
 from simscen.study.consistency import anees, bounds
 from simscen.study.indoor.logs import CIRCUMSTANCES, log
 from simscen.study.indoor.trial import MOMENTS, Trial, trial

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simscen.model.stack import Localizer, StackSpec
+from simscen.model.localizers import Localizer
+from simscen.model.stack import StackSpec
 from simscen.record.foreign.sensedrows import TICK_RATE
 from simscen.stack.protocols import RobotModel, Surroundings
 from simscen.study.consistency import nees

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from simscen.core.navigation import ErrorCode
-from simscen.model.stack import Costmap as CostmapSpec
+from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.spec.component import Component
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel, Surroundings

@@ -1,5 +1,6 @@
 """Every word of the language is documented, and its example is valid."""
 
+from importlib import import_module
 from typing import Any
 
 import pytest
@@ -9,8 +10,17 @@ from simscen.actions.action import AnyAction
 from simscen.cli.catalogue import Topic, fields_of, kind_of, topics
 from simscen.criteria.criterion import AnyCriterion
 from simscen.loading.compose import compose
+from simscen.model.checkers import GoalCheckerSpec
+from simscen.model.controllerspec import ControllerSpec
+from simscen.model.costmaps import Costmap
 from simscen.model.disturbance import FaultEntry
-from simscen.model.stack import Amcl
+from simscen.model.latency import Latency
+from simscen.model.localizers import Amcl, LocalizerSpec
+from simscen.model.planners import PlannerSpec
+from simscen.model.stack import StackSpec
+from simscen.model.stackbase import GoalTolerances
+from simscen.spec import registry
+from simscen.spec.base import Spec
 from simscen.spec.quantities import Angle, Probability
 from simscen.triggers import trigger
 
@@ -87,3 +97,20 @@ def test_modifiers_are_listed_apart_from_the_choices() -> None:
 def test_every_key_of_the_language_says_what_it_means() -> None:
     silent = [f"{topic.name}.{field.key}" for topic in topics() for field in topic.fields if not field.text]
     assert silent == []
+
+
+def test_every_section_of_a_stack_and_every_shipped_component_is_a_topic() -> None:
+    told = {topic.model for topic in TOPICS}
+    sections = {
+        field.annotation
+        for model in (StackSpec, Costmap)
+        for field in model.model_fields.values()
+        if isinstance(field.annotation, type) and issubclass(field.annotation, Spec)
+    }
+    shipped = {
+        getattr(import_module(module), name)
+        for group in ("localizer", "planner", "controller", "goal_checker", "behavior")
+        for module, name in (entry.address.split(":") for entry in registry.shipped(group))
+    }
+    bases = {LocalizerSpec, PlannerSpec, ControllerSpec, GoalCheckerSpec, GoalTolerances}
+    assert (sections | shipped | {Latency}) - bases <= told

@@ -2,8 +2,9 @@
 
 import pytest
 
+from simscen.model.localizers import GroundTruth
 from simscen.model.profiles import NAV2, over, with_profile
-from simscen.model.stack import GroundTruth, StackSpec
+from simscen.model.stack import StackSpec
 
 NAV2_PARAMS = {
     # nav2_bringup/params/nav2_params.yaml, August 2026, by our names

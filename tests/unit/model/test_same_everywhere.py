@@ -10,9 +10,9 @@ from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from simscen.cli.everyfield import Written, every_value
 from simscen.model.controllers import DynamicWindow
+from simscen.model.localizers import Amcl
 from simscen.model.robot import InertialUnit, SkidSteer
 from simscen.model.scenario import Physics, ScenarioSpec
-from simscen.model.stack import Amcl
 from simscen.spec.orplace import OrPlace
 from simscen.spec.places import PoseSpec
 from simscen.spec.quantities import AnyQuantity, Quantity

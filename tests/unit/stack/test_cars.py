@@ -6,7 +6,7 @@ import pytest
 from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
 from simscen.core.navigation import Path
-from simscen.model.stack import VelocitySmoother as SmootherSpec
+from simscen.model.guards import VelocitySmoother as SmootherSpec
 from simscen.stack.costmap.costmap import CostmapView
 from simscen.stack.cusps import cusps
 from simscen.stack.protocols import RobotModel

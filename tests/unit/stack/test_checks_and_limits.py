@@ -12,12 +12,12 @@ from simscen.core.grid import OccupancyGrid
 from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import ErrorCode, Goal, Path
 from simscen.core.sensing import Scan
-from simscen.model.stack import CollisionMonitor as MonitorSpec
-from simscen.model.stack import Costmap as CostmapSpec
-from simscen.model.stack import ProgressChecker as ProgressSpec
-from simscen.model.stack import Recovery
-from simscen.model.stack import SimpleGoalChecker as CheckerSpec
-from simscen.model.stack import VelocitySmoother as SmootherSpec
+from simscen.model.checkers import ProgressChecker as ProgressSpec
+from simscen.model.checkers import SimpleGoalChecker as CheckerSpec
+from simscen.model.costmaps import Costmap as CostmapSpec
+from simscen.model.guards import CollisionMonitor as MonitorSpec
+from simscen.model.guards import VelocitySmoother as SmootherSpec
+from simscen.model.recovery import Recovery
 from simscen.stack.arcs import poses_along
 from simscen.stack.behaviors.motions import Wait
 from simscen.stack.collision_monitor import CollisionMonitor

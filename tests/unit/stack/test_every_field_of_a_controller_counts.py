@@ -15,8 +15,8 @@ from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
 from simscen.core.navigation import Goal, Path
 from simscen.model.controllers import ControllerSpec, DynamicWindow, RegulatedPurePursuit
+from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.mppi import Mppi
-from simscen.model.stack import Costmap as CostmapSpec
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel, Surroundings
 from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot, setting

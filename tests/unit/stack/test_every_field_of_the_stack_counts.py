@@ -4,6 +4,7 @@ Those of controllers are tried in test_every_field_of_a_controller_counts.py, co
 """
 
 from collections.abc import Iterator
+from importlib import import_module
 from itertools import zip_longest
 from types import UnionType
 from typing import Annotated, Any, NamedTuple, Union, get_args, get_origin
@@ -14,7 +15,8 @@ import scenes
 from pydantic import BaseModel, ValidationError
 from scenes import Scene
 
-from simscen.model import stack as model
+from simscen.model import checkers, costmaps, guards, localizers, planners
+from simscen.model import recovery as behaviors
 from simscen.model.controllerspec import ControllerSpec
 from simscen.model.latency import Latency
 from simscen.model.stack import StackSpec
@@ -69,7 +71,7 @@ SMALL: Said = {**TRUTH, "costmap": {"rolling_size": 8.0}}
 SEEN = ((TRUTH, scenes.through), (SMALL, scenes.no_map), (TRUTH, scenes.seen_by_a_camera))
 DENOISE = {"enabled": True, "minimal_group_size": 6}
 PARTS = [
-    Part(("localizer",), model.Amcl, ((amcl(), scenes.moved), (amcl(match_scans=False), scenes.moved)), {
+    Part(("localizer",), localizers.Amcl, ((amcl(), scenes.moved), (amcl(match_scans=False), scenes.moved)), {
         "alpha5": ((amcl(robot_model="omni", match_scans=False), scenes.moved),),
         "min_particles": ((amcl(min_particles=20), scenes.moved),),
         "selective_resampling": ((amcl(max_beams=5, likelihood_exponent=0.1), scenes.moved),),
@@ -84,29 +86,29 @@ PARTS = [
         ),
     }, {"laser_min_range": [0.5, 1.5], "laser_max_range": [0.5, 1.5], "min_particles": [100],
         "laser_likelihood_max_dist": [0.2]}),
-    Part(("localizer",), model.Ekf, (({"localizer": {"type": "ekf"}}, scenes.slipped),)),
-    Part(("costmap",), model.Costmap, SEEN, {
+    Part(("localizer",), localizers.Ekf, (({"localizer": {"type": "ekf"}}, scenes.slipped),)),
+    Part(("costmap",), costmaps.Costmap, SEEN, {
         "rolling_size": ((SMALL, scenes.no_map),),
         **dict.fromkeys(("min_obstacle_height", "max_obstacle_height"), ((TRUTH, scenes.seen_by_a_camera),)),
         **dict.fromkeys(("raytrace_min_range", "inf_is_valid", "track_unknown_space"), ((SMALL, scenes.no_map),)),
     }, {"min_obstacle_height": [0.3], "obstacle_min_range": [1.0], "raytrace_min_range": [2.0]}),
-    Part(("costmap", "denoise_layer"), model.DenoiseLayer, (
+    Part(("costmap", "denoise_layer"), costmaps.DenoiseLayer, (
         ({**TRUTH, "costmap": {"denoise_layer": {"enabled": True}}}, scenes.through),
         ({**TRUTH, "costmap": {"denoise_layer": DENOISE}}, scenes.through)), {
         "enabled": (({**TRUTH, "costmap": {"denoise_layer": {"minimal_group_size": 20}}}, scenes.through),)}),
-    Part(("local_costmap",), model.LocalCostmap, SEEN, {
+    Part(("local_costmap",), costmaps.LocalCostmap, SEEN, {
         **dict.fromkeys(("raytrace_min_range", "inf_is_valid"), ((SMALL, scenes.no_map),)),
         **dict.fromkeys(("min_obstacle_height", "max_obstacle_height"), ((TRUTH, scenes.seen_by_a_camera),)),
     }, {
         "denoise_layer": [{"enabled": True, "minimal_group_size": 20}], "obstacle_min_range": [1.0],
         "raytrace_min_range": [2.0],
     }),
-    Part(("goal_checker",), model.SimpleGoalChecker, ((TRUTH, scenes.arriving), (TRUTH, scenes.drifting_past))),
-    Part(("progress_checker",), model.ProgressChecker, (
+    Part(("goal_checker",), checkers.SimpleGoalChecker, ((TRUTH, scenes.arriving), (TRUTH, scenes.drifting_past))),
+    Part(("progress_checker",), checkers.ProgressChecker, (
         ({**TRUTH, "progress_checker": {"movement_time_allowance": 0.5}}, scenes.stuck),
         ({**TRUTH, "progress_checker": {"movement_time_allowance": 1.0}}, scenes.stuck),
     )),
-    Part(("recovery",), model.Recovery, ((recovery("backup", "spin", "wait"), scenes.shut),), {
+    Part(("recovery",), behaviors.Recovery, ((recovery("backup", "spin", "wait"), scenes.shut),), {
         "number_of_retries": ((recovery("clear_costmap"), scenes.shut),),
         "planner_codes": ((TRUTH, scenes.walled_in), (TRUTH, scenes.shut)),
         "wait_duration": ((recovery("wait"), scenes.shut),),
@@ -114,30 +116,31 @@ PARTS = [
         "simulate_ahead_time": ((recovery("backup", backup_partial=False), scenes.shut),),
         "backup_partial": ((recovery("backup"), scenes.shut),),
     }, {"behaviors": [["wait"], ["spin"], ["backup"], ["clear_costmap"]]}),
-    Part(("recovery", "behaviors", 0), model.Spin, (
+    Part(("recovery", "behaviors", 0), behaviors.Spin, (
         (recovery({"type": "spin"}), scenes.shut),), {
         "simulate_ahead_time": ((recovery({"type": "spin"}), scenes.wedged),)}, {"simulate_ahead_time": [0.3]}),
-    Part(("recovery", "behaviors", 0), model.Wait, ((recovery({"type": "wait"}), scenes.shut),)),
-    Part(("recovery", "behaviors", 0), model.BackUp, (
+    Part(("recovery", "behaviors", 0), behaviors.Wait, ((recovery({"type": "wait"}), scenes.shut),)),
+    Part(("recovery", "behaviors", 0), behaviors.BackUp, (
         (recovery({"type": "backup"}), scenes.shut),
         (recovery({"type": "backup", "backup_partial": False}), scenes.shut),
     )),
-    Part(("velocity_smoother",), model.VelocitySmoother, ((TRUTH, scenes.through), (TRUTH, scenes.arriving))),
-    Part(("collision_monitor",), model.CollisionMonitor, (
+    Part(("velocity_smoother",), guards.VelocitySmoother, ((TRUTH, scenes.through), (TRUTH, scenes.arriving))),
+    Part(("collision_monitor",), guards.CollisionMonitor, (
         (TRUTH, scenes.silent), (BLIND, scenes.seen_by_one), (BLIND, scenes.through))),
-    Part(("prediction",), model.Prediction, ((TRUTH, scenes.crossed),), values={
+    Part(("prediction",), guards.Prediction, ((TRUTH, scenes.crossed),), values={
         "max_range": [1.0], "max_radius": [0.1], "min_speed": [1.0]}),
     Part(("latency",), Latency, ((TRUTH, scenes.seen_by_one), (amcl(), scenes.moved))),
     Part((), StackSpec, ((TRUTH, scenes.through),), {"failure_tolerance": (
         ({**BLIND, "local_costmap": {"obstacle_max_range": 2.5}}, scenes.seen_by_one),)}),
-    Part(("planner",), model.OmplPlanner, ((planner(), scenes.planned), (planner(sampler="uniform"), scenes.planned)), {
+    Part(("planner",), planners.OmplPlanner, (
+        (planner(), scenes.planned), (planner(sampler="uniform"), scenes.planned)), {
         **of_planner("bit_star"),
         "max_iterations": ((planner(type="rrt_connect"), scenes.planned),),
         "improving_iterations": ((planner(type="rrt_star", improving_iterations=60), scenes.planned),),
         "state_space": ((planner(), scenes.planned), (planner(state_space="se2"), scenes.planned)),
     }, {"max_iterations": [1, 3], "improving_iterations": [5, 30]}),
-    Part(("planner",), model.Navfn, ((planner(type="navfn"), scenes.planned),), of_planner("navfn")),
-    Part(("planner",), model.Smac2d, ((planner(type="smac_2d"), scenes.planned),), of_planner("smac_2d")),
+    Part(("planner",), planners.Navfn, ((planner(type="navfn"), scenes.planned),), of_planner("navfn")),
+    Part(("planner",), planners.Smac2d, ((planner(type="smac_2d"), scenes.planned),), of_planner("smac_2d")),
 ]  # fmt: skip
 ELSEWHERE = {
     "type": "another type is another model",
@@ -150,7 +153,7 @@ ELSEWHERE = {
     "yaw_goal_tolerance": "the same",
 }  # fmt: skip
 
-OTHERS_CARE = {model.PlannerSpec, ControllerSpec, SpeedZone, SpeedMask}
+OTHERS_CARE = {planners.PlannerSpec, ControllerSpec, SpeedZone, SpeedMask}
 """What all planners have is tried with each; controllers and zones have tests of their own."""
 
 
@@ -180,7 +183,7 @@ class Other(NamedTuple):
 def others() -> Iterator[Other]:
     for part in PARTS:
         for name, field in part.kind.model_fields.items():
-            if name in ELSEWHERE and not (name == "type" and part.kind is model.OmplPlanner):
+            if name in ELSEWHERE and not (name == "type" and part.kind is planners.OmplPlanner):
                 continue
             if name in part.values:
                 found = [part.values[name]]
@@ -265,7 +268,8 @@ def test_every_field_is_tried(part: Part) -> None:
 
 def test_every_model_is_tried() -> None:
     """Those that a stack holds, and those of the shipped components."""
-    registries = (model.LOCALIZERS, model.PLANNERS, model.BEHAVIORS, model.GOAL_CHECKERS)
-    roots = [StackSpec, *(getattr(model, where.split(":")[1]) for each in registries for where in each.values())]
+    registries = (localizers.LOCALIZERS, planners.PLANNERS, behaviors.BEHAVIORS, checkers.GOAL_CHECKERS)
+    shipped = [where.split(":") for each in registries for where in each.values()]
+    roots = [StackSpec, *(getattr(import_module(module), name) for module, name in shipped)]
     holding = {kind for root in roots for kind in models_in(root) if kind.model_fields.keys() - ELSEWHERE.keys()}
     assert holding - OTHERS_CARE == {part.kind for part in PARTS}

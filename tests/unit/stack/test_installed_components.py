@@ -30,7 +30,11 @@ from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import Path
 from simscen.core.trace import Decision
 from simscen.model.controllers import ControllerSpec, RegulatedPurePursuit
-from simscen.model.stack import BehaviorSpec, GoalCheckerSpec, InProcessStack, LocalizerSpec, OmplPlanner, PlannerSpec
+from simscen.model.checkers import GoalCheckerSpec
+from simscen.model.localizers import LocalizerSpec
+from simscen.model.planners import OmplPlanner, PlannerSpec
+from simscen.model.recovery import BehaviorSpec
+from simscen.model.stack import InProcessStack
 from simscen.spec.quantities import PositiveLength
 from simscen.stack.planners.build import ompl_planner
 
@@ -364,7 +368,7 @@ def driven_setting():
 
 
 def test_a_failure_without_a_code_of_nav2_is_a_broken_promise(odd) -> None:
-    from simscen.model.stack import OmplPlanner
+    from simscen.model.planners import OmplPlanner
     from simscen.stack.installed.planner import InstalledPlanner
     from simscen.testing.flatland import setting
 

@@ -11,7 +11,8 @@ from simscen.core.motion import STOP
 from simscen.core.navigation import Goal
 from simscen.core.sensing import Scan
 from simscen.model.latency import Latency
-from simscen.model.stack import GroundTruth, StackSpec
+from simscen.model.localizers import GroundTruth
+from simscen.model.stack import StackSpec
 from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.frames import Frames
 from simscen.stack.odometry_history import OdometryHistory

@@ -11,7 +11,9 @@ from simscen.core.navigation import Goal
 from simscen.core.sensing import Odometry, Readings
 from simscen.core.trace import Decision
 from simscen.core.zones import Zones
-from simscen.model.stack import Costmap, GroundTruth, LocalCostmap, StackSpec
+from simscen.model.costmaps import Costmap, LocalCostmap
+from simscen.model.localizers import GroundTruth
+from simscen.model.stack import StackSpec
 from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.protocols import CostmapView
 from simscen.testing.flatland import CONTROL, RATE, Drive, Flatland, drive, round_robot

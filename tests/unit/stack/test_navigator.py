@@ -7,7 +7,12 @@ import pytest
 from simscen.core.geometry import Pose2
 from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import ErrorCode, Goal, Path
-from simscen.model.stack import Costmap, GroundTruth, OmplPlanner, ProgressChecker, Recovery, StackSpec
+from simscen.model.checkers import ProgressChecker
+from simscen.model.costmaps import Costmap
+from simscen.model.localizers import GroundTruth
+from simscen.model.planners import OmplPlanner
+from simscen.model.recovery import Recovery
+from simscen.model.stack import StackSpec
 from simscen.stack.protocols import NavigationFailure, RobotModel
 from simscen.testing.flatland import Drive, Flatland, box_robot, drive, round_robot
 

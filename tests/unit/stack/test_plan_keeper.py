@@ -8,8 +8,8 @@ from simscen.core.geometry import Pose2
 from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import ErrorCode, Goal, Path
 from simscen.core.sensing import Scan
-from simscen.model.stack import Costmap as CostmapSpec
-from simscen.model.stack import OmplPlanner as PlannerSpec
+from simscen.model.costmaps import Costmap as CostmapSpec
+from simscen.model.planners import OmplPlanner as PlannerSpec
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.plan_keeper import PlanKeeper
 from simscen.stack.protocols import CostmapView, NavigationFailure, Surroundings

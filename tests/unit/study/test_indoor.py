@@ -8,7 +8,8 @@ import pytest
 
 from simscen.core.grid import FREE, UNKNOWN
 from simscen.core.sensing import Odometry, Scan
-from simscen.model.stack import Amcl, StackSpec
+from simscen.model.localizers import Amcl
+from simscen.model.stack import StackSpec
 from simscen.record.foreign.sensedrows import TICK_RATE
 from simscen.stack.protocols import Surroundings
 from simscen.study.indoor.boxes import distance_to, wall

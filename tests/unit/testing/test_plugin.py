@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 OWN = """
-from simscen.model.stack import GoalCheckerSpec
+from simscen.model.checkers import GoalCheckerSpec
 from simscen.stack.setting import Setting
 
 

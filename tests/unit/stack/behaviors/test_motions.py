@@ -7,8 +7,8 @@ import pytest
 from simscen.core.geometry import Pose2
 from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import ErrorCode
-from simscen.model import stack as model
-from simscen.model.stack import Costmap as CostmapSpec
+from simscen.model import recovery as model
+from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.arcs import poses_along
 from simscen.stack.behaviors.motions import BackUp, ClearCostmap, Spin, Wait
 from simscen.stack.costmap.costmap import Costmap

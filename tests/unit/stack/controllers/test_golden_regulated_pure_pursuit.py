@@ -12,7 +12,7 @@ from simscen.core.motion import Twist
 from simscen.core.navigation import ErrorCode, Goal
 from simscen.core.navigation import Path as Plan
 from simscen.model.controllers import RegulatedPurePursuit as Spec
-from simscen.model.stack import Costmap as CostmapSpec
+from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.controllers.regulated_pure_pursuit import RegulatedPurePursuit
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.protocols import NavigationFailure, Surroundings

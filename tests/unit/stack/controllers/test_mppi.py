@@ -11,7 +11,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
 from simscen.core.navigation import Goal, Path
 from simscen.model import mppi as model
-from simscen.model.stack import Costmap as CostmapSpec
+from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.arcs import poses_along
 from simscen.stack.controllers.local_plan import LocalPlan
 from simscen.stack.controllers.mppi import critics, path_critics

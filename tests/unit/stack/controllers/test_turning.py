@@ -5,7 +5,7 @@ import math
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.model.stack import Costmap as CostmapSpec
+from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.controllers.turning import TurningRoom
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.footprint import Footprint

@@ -9,7 +9,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.grid import OccupancyGrid
 from simscen.core.sensing import Scan
 from simscen.core.zones import Zones
-from simscen.model.stack import Costmap as Spec
+from simscen.model.costmaps import Costmap as Spec
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.protocols import Surroundings
 from simscen.testing.flatland import RATE, Flatland, round_robot

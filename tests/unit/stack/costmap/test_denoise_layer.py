@@ -7,8 +7,8 @@ import pytest
 
 from simscen.core.geometry import Pose2
 from simscen.core.sensing import Scan
-from simscen.model.stack import Costmap as Spec
-from simscen.model.stack import DenoiseLayer
+from simscen.model.costmaps import Costmap as Spec
+from simscen.model.costmaps import DenoiseLayer
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.costmap.denoise_layer import without_specks
 from simscen.stack.protocols import Surroundings

@@ -7,7 +7,7 @@ import pytest
 
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.sensing import Image, Scan
-from simscen.model.stack import Costmap as Spec
+from simscen.model.costmaps import Costmap as Spec
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.protocols import Surroundings
 from simscen.testing.flatland import RATE, round_robot

@@ -5,7 +5,7 @@ import pytest
 
 from simscen.core.geometry import Pose2
 from simscen.core.sensing import Scan
-from simscen.model.stack import Costmap as Spec
+from simscen.model.costmaps import Costmap as Spec
 from simscen.stack.costmap.frame import Frame
 from simscen.stack.costmap.obstacle_layer import crossed, hits
 

@@ -16,7 +16,7 @@ from simscen.core.motion import Twist
 from simscen.core.sensing import Odometry, Scan
 from simscen.core.world import BuiltWorld
 from simscen.loading.worldfile import load_world_file
-from simscen.model.stack import Amcl
+from simscen.model.localizers import Amcl
 from simscen.model.world import WorldSpec
 from simscen.run.worldsource import world_of
 from simscen.stack.installed.localizer import InstalledLocalizer

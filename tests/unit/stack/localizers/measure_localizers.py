@@ -15,8 +15,8 @@ from simscen.core.belief import Estimate
 from simscen.core.geometry import Array, Pose2
 from simscen.core.motion import Twist
 from simscen.core.sensing import Odometry
-from simscen.model.stack import Amcl, Ekf
-from simscen.model.stack import Localizer as Spec
+from simscen.model.localizers import Amcl, Ekf
+from simscen.model.localizers import Localizer as Spec
 from simscen.testing.room import USUAL, Drive, Noise, drive, errors, localizer, nees, run, scan
 
 SUM = Amcl(parameters="nav2", laser_model_type="likelihood_field")

@@ -11,7 +11,7 @@ from simscen.core.chance import Streams
 from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
 from simscen.core.sensing import Odometry, Scan
-from simscen.model.stack import Amcl
+from simscen.model.localizers import Amcl
 from simscen.stack.localizers.build import amcl
 from simscen.stack.protocols import Localizer
 from simscen.stack.setting import Setting

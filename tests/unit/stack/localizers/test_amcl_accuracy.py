@@ -6,7 +6,7 @@ import pytest
 from estimate_drives import case
 from measure_recovery import drives, off
 
-from simscen.model.stack import Amcl
+from simscen.model.localizers import Amcl
 
 SEEDS = range(101, 105)
 SEEDS_AMONG_PEOPLE = (5, 7)

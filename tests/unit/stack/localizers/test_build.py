@@ -8,7 +8,7 @@ import pytest
 from simscen.core.belief import Estimate
 from simscen.core.chance import Streams
 from simscen.core.geometry import Pose2
-from simscen.model import stack as model
+from simscen.model import localizers as model
 from simscen.stack.localizers.amcl import AmclLocalizer
 from simscen.stack.localizers.dead_reckoning import DeadReckoning
 from simscen.stack.localizers.ekf import EkfLocalizer

@@ -7,7 +7,7 @@ from simscen.core.belief import Estimate
 from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
 from simscen.core.sensing import Odometry
-from simscen.model.stack import OdometryOnly
+from simscen.model.localizers import OdometryOnly
 from simscen.testing.room import Noise, drive, errors, localizer, run
 
 SPEC = OdometryOnly(type="odometry")

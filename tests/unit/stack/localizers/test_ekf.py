@@ -9,7 +9,7 @@ from simscen.core.belief import Estimate
 from simscen.core.geometry import Array, Pose2
 from simscen.core.motion import Twist
 from simscen.core.sensing import Imu, Odometry
-from simscen.model.stack import Ekf
+from simscen.model.localizers import Ekf
 from simscen.stack.protocols import Localizer
 from simscen.testing.room import Noise, drive, errors, localizer, nees, run
 

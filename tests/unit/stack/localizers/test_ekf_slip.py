@@ -10,7 +10,7 @@ from simscen.core.belief import Belief, Estimate
 from simscen.core.geometry import Array, Pose2
 from simscen.core.motion import Twist
 from simscen.core.sensing import Imu, Odometry
-from simscen.model.stack import Ekf
+from simscen.model.localizers import Ekf
 from simscen.testing.room import localizer, nees
 
 RATE, EVERY = 40, 6

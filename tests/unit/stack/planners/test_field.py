@@ -1,6 +1,6 @@
 import numpy as np
 
-from simscen.model.stack import Costmap as Spec
+from simscen.model.costmaps import Costmap as Spec
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.footprint import distances
 from simscen.stack.planners.field import Field

@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from simscen.model.stack import Costmap as Spec
+from simscen.model.costmaps import Costmap as Spec
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.planners.informed_set import InformedSet
 from simscen.stack.planners.rates import Rates

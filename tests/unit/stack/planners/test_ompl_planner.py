@@ -7,8 +7,8 @@ from scipy.sparse.csgraph import dijkstra
 
 from simscen.core.geometry import Pose2
 from simscen.core.navigation import ErrorCode
-from simscen.model.stack import Costmap as CostmapSpec
-from simscen.model.stack import OmplPlanner as PlannerSpec
+from simscen.model.costmaps import Costmap as CostmapSpec
+from simscen.model.planners import OmplPlanner as PlannerSpec
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.planners.ompl_planner import OmplPlanner
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel, Surroundings

@@ -11,9 +11,12 @@ from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import Goal
 from simscen.model.controllers import DynamicWindow, RegulatedPurePursuit
 from simscen.model.controllerspec import ControllerSpec
+from simscen.model.costmaps import Costmap
+from simscen.model.guards import CollisionMonitor as CollisionMonitorSpec
+from simscen.model.guards import Prediction
+from simscen.model.localizers import GroundTruth
 from simscen.model.mppi import Mppi
-from simscen.model.stack import CollisionMonitor as CollisionMonitorSpec
-from simscen.model.stack import Costmap, GroundTruth, Prediction, StackSpec
+from simscen.model.stack import StackSpec
 from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.prediction.moving import Moving
 from simscen.testing.flatland import RATE, Drive, Flatland, box_robot, drive

@@ -8,7 +8,7 @@ import pytest
 
 from simscen.core.geometry import Pose2
 from simscen.core.sensing import Scan
-from simscen.model.stack import Prediction
+from simscen.model.guards import Prediction
 from simscen.stack.prediction.tracker import Tracker
 from simscen.testing.flatland import RATE, Flatland
 
