@@ -264,7 +264,7 @@ def _unfit(entry: Entry, model: Any) -> str | None:
         return f"`{entry.value}` is no specification: neither a simscen.spec.base.Spec nor a Value"
     promise = _resolved(GROUPS[entry.group].promise)
     if not issubclass(model, promise):
-        return f"`{entry.value}` is no {promise.__module__}.{promise.__name__}"
+        return f"`{entry.value}` is no simscen.plugin.{promise.__name__}"
     if inspect.isabstract(model):
         missing = ", ".join(sorted(getattr(model, "__abstractmethods__", ())))
         return f"`{entry.value}` does not say what it does: {missing} is missing"

@@ -65,7 +65,7 @@ def test_it_survives_being_copied_and_sent_to_another_process(calm) -> None:
 def test_a_check_of_its_own_that_breaks_down_is_told_where_it_is_written(packages, kind, choice, before) -> None:
     text = (
         "from typing import ClassVar, Literal\nfrom pydantic import model_validator\n"
-        "from simscen.criteria.base import Criterion\nfrom simscen.model.stack import PlannerSpec\n"
+        "from simscen.criteria.base import Criterion\nfrom simscen.model.planners import PlannerSpec\n"
         "from simscen.spec.base import Spec\n\n\n"
         f"class {before}:\n    component: ClassVar[str] = 'calm:Device'\n    type: Literal['calm'] = 'calm'\n\n"
         "    @model_validator(mode='after')\n    def _checked(self):\n        return {}['nothing']\n\n"

@@ -3,6 +3,7 @@ import sys
 
 import pytest
 
+import simscen.plugin
 from simscen.model.disturbance import FaultEntry
 from simscen.model.robot import Sensor
 from simscen.spec.choice import Choice
@@ -43,14 +44,14 @@ def test_everything_shipped_keeps_the_promise_of_its_group(group: str) -> None:
         ("criterion", "calm", "nowhere:Calm", "ModuleNotFoundError: No module named 'nowhere'"),
         ("criterion", "calm", "calm:Clam", "`calm:Clam` is not there"),
         ("criterion", "calm", "calm:Lax", "neither a simscen.spec.base.Spec nor a Value"),
-        ("criterion", "calm", "calm:Stranger", "is no simscen.criteria.base.Criterion"),
+        ("criterion", "calm", "calm:Stranger", "is no simscen.plugin.Criterion"),
         ("criterion", "calm", "calm:Vague", "judge is missing"),
         ("criterion", "calm", "calm", "not of the form package.module:Class"),
         ("criterion", "Calm", "calm:Calm", "a name is a small letter"),
         ("criterion", "severity", "calm:Calm", "`severity` means something else there"),
         ("criterion", "speed", "calm:Calm", "simscen itself has one of that name"),
         ("trigger", "all", "calm:Calm", "`all` means something else there"),
-        ("fault", "calm", "calm:Calm", "is no simscen.faults.base.Fault"),
+        ("fault", "calm", "calm:Calm", "is no simscen.plugin.Fault"),
     ],
 )
 def test_what_cannot_be_used_says_why_and_whose_it_is(packages, group, name, value, why, calm_module) -> None:
@@ -131,3 +132,8 @@ def test_an_installation_that_broke_off_has_no_name_and_is_usable(packages, calm
     (site / "calm-1.0.dist-info" / "METADATA").unlink()
     (entry,) = installed("criterion")
     assert (entry.origin, entry.load().__name__) == ("an unnamed package", "Calm")
+
+
+@pytest.mark.parametrize("kind", GROUPS)
+def test_what_a_specification_must_be_is_to_be_had_where_authors_of_plugins_import(kind) -> None:
+    assert GROUPS[kind].promise.rpartition(":")[2] in simscen.plugin.__all__

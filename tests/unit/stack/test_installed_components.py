@@ -241,7 +241,7 @@ def test_a_planner_of_a_package_is_chosen_by_its_type_and_drives(odd) -> None:
         ("{planner: {type: straight, spacin: 1}}", "unknown key `spacin` in `stack.planner`"),
         ("{planner: {type: straight, spacing: -1}}", "must be greater than 0"),
         ("{planner: {type: gone}}", "planner `gone` of odd 1.2 cannot be used: `odd:Gone` is not there"),
-        ("{planner: {type: foreign}}", "is no simscen.model.stack.PlannerSpec"),
+        ("{planner: {type: foreign}}", "is no simscen.plugin.PlannerSpec"),
         ("{recovery: {behaviors: [nood]}}", "`nood` is not one of the choices"),
         ("{recovery: {behaviors: [{type: nood}]}}", "`nood` is not one of the choices"),
         ("{type: stil}", "`stil` is not one of the choices"),
@@ -261,9 +261,9 @@ def test_a_mistake_is_told_at_its_place(odd, tmp_path: Path, stack: str, told: s
 @pytest.mark.parametrize(
     ("does", "kind", "told"),
     [
-        ("raise", "crashed", "KeyError: 'no such key' (odd.py:37)"),
-        ("raise deep", "crashed", "LinAlgError: Singular matrix (odd.py:39)"),
-        ("not begin", "crashed", "OSError: no such model (odd.py:30)"),
+        ("raise", "crashed", "KeyError: 'no such key' (odd.py:41)"),
+        ("raise deep", "crashed", "LinAlgError: Singular matrix (odd.py:43)"),
+        ("not begin", "crashed", "OSError: no such model (odd.py:34)"),
         ("nan", "broken-component", "returned a path with points that are no finite numbers"),
         ("shape", "broken-component", "returned a path whose points are (31, 2) instead of (n, 3): x, y, yaw"),
         ("list", "broken-component", "returned list instead of a Path"),
