@@ -1,0 +1,118 @@
+"""Localizers that break a promise each."""
+
+import random
+from dataclasses import replace
+
+import numpy as np
+
+from simscen.core.belief import Belief
+from simscen.model.localizers import OdometryOnly
+from tests.contracts.broken.cases import Wrapper, breaks
+
+LOCALIZER = OdometryOnly(type="odometry")
+
+
+class Believing(Wrapper):
+    @property
+    def belief(self) -> Belief:
+        return self.changed(self.inner.belief)
+
+    def changed(self, belief: Belief) -> Belief:
+        return belief
+
+
+@breaks(LOCALIZER, "the same calls", "two runs differ in pose")
+class BelievesInChance(Believing):
+    def changed(self, belief):
+        return replace(belief, pose=belief.pose._replace(x=belief.pose.x + 1e-9 * random.random()))
+
+
+@breaks(LOCALIZER, "without motion", "wanders off")
+class Drifts(Believing):
+    off = 0.0
+
+    def changed(self, belief):
+        self.off += 1e-3
+        return replace(belief, pose=belief.pose._replace(x=belief.pose.x + self.off))
+
+
+@breaks(LOCALIZER, "a belief does not change", "covariance changes")
+class UsesOneArray(Believing):
+    def __init__(self, *made):
+        super().__init__(*made)
+        self.array = np.zeros((3, 3))
+
+    def changed(self, belief):
+        self.array[:] = belief.covariance
+        return replace(belief, covariance=self.array)
+
+    def on_scan(self, scan):
+        self.array += 1.0
+
+
+@breaks(LOCALIZER, "a scan is neither", "ranges of a scan are not what they were")
+class CleansTheScan(Wrapper):
+    def on_scan(self, scan):
+        scan.ranges[:] = 1.0
+
+
+@breaks(LOCALIZER, "a scan is neither", "shows in the belief")
+class KeepsTheScan(Believing):
+    scan = None
+
+    def on_scan(self, scan):
+        self.scan = scan
+
+    def changed(self, belief):
+        blind = self.scan is not None and np.isnan(self.scan.ranges).all()
+        return replace(belief, pose=belief.pose._replace(x=belief.pose.x + (1.0 if blind else 0.0)))
+
+
+@breaks(LOCALIZER, "a lidar that is blind", "believes to be at")
+class BelievesTheLidar(Believing):
+    last = 0.0
+
+    def on_scan(self, scan):
+        self.last = float(scan.ranges[0]) if len(scan.ranges) else 0.0
+
+    def changed(self, belief):
+        return replace(belief, pose=belief.pose._replace(x=self.last))
+
+
+@breaks(LOCALIZER, "odometry and gyroscope that lie", "with a covariance that is not")
+class BelievesTheGyroscope(Believing):
+    rate = 0.0
+
+    def on_imu(self, imu):
+        self.rate = imu.angular_velocity[2]
+
+    def changed(self, belief):
+        return replace(belief, covariance=belief.covariance + self.rate)
+
+
+@breaks(LOCALIZER, "odometry and gyroscope that lie", "not positive semidefinite")
+class IsTooSure(Believing):
+    def changed(self, belief):
+        return replace(belief, covariance=-belief.covariance)
+
+
+@breaks(LOCALIZER, "scans of any size", "raises IndexError when it takes a scan")
+class WantsAllBeams(Wrapper):
+    def on_scan(self, scan):
+        scan.ranges[359]
+
+
+@breaks(LOCALIZER, "scans of any size", "weights that add up to")
+class WeighsNothing(Believing):
+    def changed(self, belief):
+        return replace(belief, particles=np.zeros((3, 4)))
+
+
+@breaks(LOCALIZER, "a reset forgets", "after a reset")
+class NeverForgets(Wrapper):
+    told = 0
+
+    def reset(self, estimate):
+        self.told += 1
+        if self.told == 1:
+            self.inner.reset(estimate)

@@ -1,0 +1,49 @@
+"""Sensors that break a promise each."""
+
+import math
+import random
+from dataclasses import replace
+
+from simscen.core.geometry import Pose2
+from simscen.core.motion import Twist
+from simscen.core.sensing import Odometry
+from simscen.model.robot import Bumper, Lidar
+from tests.contracts.broken.cases import Wrapper, breaks
+
+SENSOR = Bumper()
+
+
+@breaks(SENSOR, "it says what it says", "signs a reading of tick")
+class SignsForAnother(Wrapper):
+    def read(self, tick):
+        return replace(self.inner.read(tick), sensor="other")
+
+
+@breaks(SENSOR, "it says what it says", "says Odometry, not Bump")
+class SaysSomethingElse(Wrapper):
+    def read(self, tick):
+        return Odometry(self.name, tick, Pose2(0, 0, 0), Twist())
+
+
+@breaks(Lidar(), "what it says are numbers", "says angle_min of nan")
+class KnowsNoAngles(Wrapper):
+    def read(self, tick):
+        return replace(self.inner.read(tick), angle_min=math.nan)
+
+
+@breaks(Lidar(), "the same world", "in two ways")
+class MeasuresByChance(Wrapper):
+    def read(self, tick):
+        scan = self.inner.read(tick)
+        return replace(scan, ranges=scan.ranges + random.random())
+
+
+@breaks(Lidar(), "a reading does not change", "changes when the next one is taken")
+class UsesItsArrayAgain(Wrapper):
+    kept = None
+
+    def read(self, tick):
+        scan = self.inner.read(tick)
+        self.kept = scan.ranges.copy() if self.kept is None else self.kept
+        self.kept[:] = scan.ranges
+        return replace(scan, ranges=self.kept)

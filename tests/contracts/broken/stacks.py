@@ -1,0 +1,113 @@
+"""Whole stacks that break a promise each."""
+
+import random
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from simscen.core.events import Event, EventKind
+from simscen.core.motion import Twist
+from simscen.core.trace import Decision
+from simscen.model.localizers import GroundTruth
+from simscen.model.stack import StackSpec
+from tests.contracts.broken.cases import Wrapper, breaks
+
+STACK = StackSpec(localizer=GroundTruth(type="ground_truth"))
+
+
+class Deciding(Wrapper):
+    tick = 0
+
+    def decide(self, tick, readings):
+        self.tick = tick
+        return self.changed(self.inner.decide(tick, readings))
+
+    def changed(self, decision: Decision) -> Any:
+        return decision
+
+
+@breaks(STACK, "it reaches a goal", "touches something")
+class RamsThings(Deciding):
+    def changed(self, decision):
+        near = self.tick < 1440
+        return replace(decision, command=Twist(0.5, 0.0, 0.0) if near else decision.command)
+
+
+@breaks(STACK, "it reaches a goal", "navigation ends with")
+class FallsAsleep(Deciding):
+    def changed(self, decision):
+        return replace(decision, command=Twist())
+
+
+@breaks(STACK, "without a goal", "commands a velocity without a goal")
+class CannotStandStill(Deciding):
+    def changed(self, decision):
+        return replace(decision, command=decision.command if any(decision.command) else Twist(0.0, 0.0, 0.01))
+
+
+@breaks(STACK, "once a task has ended", "after the end of its task")
+class GoesOn(Deciding):
+    ended = False
+
+    def changed(self, decision):
+        self.ended = self.ended or any(event.kind == EventKind.NAVIGATION_ENDED for event in decision.events)
+        return replace(decision, command=Twist(0.05)) if self.ended else decision
+
+
+@breaks(STACK, "a canceled task", "does not tell that its goal is canceled")
+class TellsNobody(Deciding):
+    def changed(self, decision):
+        kept = tuple(event for event in decision.events if event.kind != EventKind.GOAL_CANCELED)
+        return replace(decision, events=kept)
+
+
+@breaks(STACK, "a canceled task", "commands a velocity after it was canceled")
+class MindsNoCancel(Deciding):
+    def cancel(self, tick):
+        pass
+
+
+@breaks(STACK, "a goal that preempts", "drives to")
+class MindsNoOtherGoal(Deciding):
+    def preempt(self, tick, goal):
+        pass
+
+
+@breaks(STACK, "every goal is accepted once", "accepts")
+class AcceptsTwice(Deciding):
+    def changed(self, decision):
+        again = tuple(event for event in decision.events if event.kind == EventKind.GOAL_ACCEPTED)
+        return replace(decision, events=decision.events + again)
+
+
+@breaks(STACK, "the same seed", "differ in their commands")
+class DrivesByChance(Deciding):
+    def changed(self, decision):
+        vx, vy, wz = decision.command
+        return replace(decision, command=Twist(vx, vy, wz * (1 + 1e-12 * random.random()) + 1e-15 * random.random()))
+
+
+@breaks(STACK, "without a goal", "of goal.reached at tick -5")
+class TellsOfThePast(Deciding):
+    def changed(self, decision):
+        return replace(decision, events=(Event(-5, EventKind.GOAL_REACHED, "x"),))
+
+
+@breaks(STACK, "a blind lidar", "raises ValueError when it decides")
+class CannotBeBlind(Deciding):
+    def decide(self, tick, readings):
+        for reading in readings:
+            if hasattr(reading, "ranges") and np.isnan(reading.ranges).any():
+                raise ValueError("nan in the scan")
+        return self.inner.decide(tick, readings)
+
+
+@breaks(STACK, "it reaches a goal", "the ranges of a scan are not what they were")
+class CleansScans(Deciding):
+    def decide(self, tick, readings):
+        for reading in readings:
+            if hasattr(reading, "ranges"):
+                reading.ranges[np.isinf(reading.ranges)] = 100.0
+                reading.ranges[0] = 3.0
+        return self.inner.decide(tick, readings)
