@@ -30,6 +30,9 @@ def command(
     ] = None,
     project: Annotated[Path, typer.Option(help="Folder with simscen's scenarios/ and worlds/.")] = Path(),
     only: Annotated[list[str] | None, typer.Option(help="Part of the name of experiments; repeatable.")] = None,
+    first: Annotated[
+        int, typer.Option(min=1, max=1_000_000, help="The number of the first field, building, drive and seed.")
+    ] = 1,
     seeds: Annotated[
         int | None, typer.Option(min=1, max=1000, help="Seeds of each scenario; default: 5 for BARN, else 20.")
     ] = None,
@@ -69,7 +72,7 @@ def command(
     made = folder / "generated"
     made.mkdir()
     experiments: list[Experiment] = []
-    for offer in offers(barn, nav2, project, made, Sizes(seeds, fields, dynamic, goals, lost)):
+    for offer in offers(barn, nav2, project, made, Sizes(first, seeds, fields, dynamic, goals, lost)):
         whole = _named(offer.name, only)
         if not whole and not any(_named(name, only) for name in offer.parts):
             continue

@@ -23,8 +23,9 @@ LIDAR_HEIGHT = 0.2
 
 @dataclass(frozen=True)
 class Sizes:
-    """How many of what; `seeds` is None for each experiment's own number."""
+    """How many of what, and the number of the first of each; `seeds` is None for each experiment's own number."""
 
+    first: int = 1
     seeds: int | None = None
     fields: int = 50
     dynamic: int = 20
@@ -33,7 +34,11 @@ class Sizes:
 
     def seeded(self, usual: int) -> Sequence[int]:
         """The seeds of a scenario that is usually run with so many."""
-        return range(1, (self.seeds or usual) + 1)
+        return self.numbers(self.seeds or usual)
+
+    def numbers(self, count: int) -> Sequence[int]:
+        """So many, from the first on."""
+        return range(self.first, self.first + count)
 
 
 @dataclass(frozen=True)
@@ -97,18 +102,22 @@ def _offers(
 ) -> list[Offer]:
     return [
         Offer("BARN", data, lambda: list(_barn(made, data or Path(), sizes)), BARN),
-        Offer("generated fields", made, lambda: [experiments.generated_fields(made, sizes.fields)]),
-        Offer("narrow fields", made, lambda: experiments.narrow_fields(made, sizes.fields // 2)),
-        Offer("dynamic fields", made, lambda: experiments.dynamic_fields(made, sizes.dynamic)),
+        Offer("generated fields", made, lambda: [experiments.generated_fields(made, sizes.numbers(sizes.fields))]),
+        Offer("narrow fields", made, lambda: experiments.narrow_fields(made, sizes.numbers(sizes.fields // 2))),
+        Offer("dynamic fields", made, lambda: experiments.dynamic_fields(made, sizes.numbers(sizes.dynamic))),
         Offer("random goals", worlds, lambda: list(_random_goals(made, worlds, sizes))),
         Offer("degraded sensing", worlds, lambda: _degraded(made, worlds, sizes)),
-        Offer("ramps", made, lambda: [corridors.ramps(made / "ramps", sizes.goals)]),
-        Offer("two robots", made, lambda: [corridors.two_robots(made / "corridors", sizes.goals)]),
+        Offer("ramps", made, lambda: [corridors.ramps(made / "ramps", sizes.numbers(sizes.goals))]),
+        Offer("two robots", made, lambda: [corridors.two_robots(made / "corridors", sizes.numbers(sizes.goals))]),
         Offer("tb3_sandbox", nav2, lambda: experiments.sandbox(made, nav2 or Path(), sizes.seeded(20)), NAV2),
         Offer(
             "corner cases", scenarios, lambda: experiments.corner_cases(scenarios, scenarios.parent, sizes.seeded(20))
         ),
-        Offer("localization", worlds, lambda: experiments.localizations(made, worlds, sizes.seeded(20), sizes.lost)),
+        Offer(
+            "localization",
+            worlds,
+            lambda: experiments.localizations(made, worlds, sizes.seeded(20), sizes.numbers(sizes.lost)),
+        ),
     ]
 
 
@@ -122,18 +131,30 @@ def _barn(made: Path, data: Path, sizes: Sizes) -> Iterator[Experiment]:
 
 
 def _random_goals(made: Path, worlds: Path, sizes: Sizes) -> Iterator[Experiment]:
-    folder = made / "random_goals"
-    built = _built(folder, worlds, [f"{name}.world.yaml" for name in SHIPPED])
-    yield random_goals.random_goals("random goals", folder, built, sizes.goals, (worlds.absolute(),))
-    maps = made / "buildings"
-    files = [write_building(number, maps).name for number in range(1, sizes.goals + 1)]
-    yield random_goals.random_goals("random goals, ROS maps", maps, _built(maps, maps, files), 3)
+    folder, maps = made / "random_goals", made / "buildings"
+    yield random_goals.random_goals(
+        "random goals", folder, _shipped(folder, worlds), sizes.numbers(sizes.goals), (worlds.absolute(),)
+    )
+    buildings = _buildings(maps, sizes.numbers(sizes.goals))
+    yield random_goals.random_goals("random goals, ROS maps", maps, buildings, range(1, 4))
 
 
 def _degraded(made: Path, worlds: Path, sizes: Sizes) -> list[Experiment]:
-    folder = made / "degraded"
-    built = _built(folder, worlds, [f"{name}.world.yaml" for name in SHIPPED])
-    return random_goals.degraded(folder, built, max(1, sizes.goals // 4), (worlds.absolute(),))
+    """In a quarter as many worlds as there are random goals in each: the shipped ones, and generated buildings."""
+    folder, maps = made / "degraded", made / "degraded_buildings"
+    count = max(1, sizes.goals // 4)
+    buildings = _buildings(maps, sizes.numbers(max(0, count - len(SHIPPED))))
+    built = {**_shipped(folder, worlds), **buildings}
+    chosen = {name: built[name] for name in list(built)[:count]}
+    return random_goals.degraded(folder, chosen, sizes.first, (worlds.absolute(), maps.absolute()))
+
+
+def _shipped(folder: Path, worlds: Path) -> Mapping[str, BuiltWorld]:
+    return _built(folder, worlds, [f"{name}.world.yaml" for name in SHIPPED])
+
+
+def _buildings(folder: Path, numbers: Sequence[int]) -> Mapping[str, BuiltWorld]:
+    return _built(folder, folder, [write_building(number, folder).name for number in numbers])
 
 
 def _built(folder: Path, worlds: Path, files: Sequence[str]) -> Mapping[str, BuiltWorld]:

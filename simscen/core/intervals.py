@@ -6,11 +6,11 @@ Z_95 = 1.959963984540054
 """Two-sided 95 % quantile of the normal distribution."""
 
 
-def wilson(successes: int, runs: int, z: float = Z_95) -> tuple[float, float]:
+def wilson(successes: float, runs: int, z: float = Z_95) -> tuple[float, float]:
     """The score interval of a proportion: what the true rate may be after `successes` of `runs`.
 
     Right also at 0 and at all of the runs, where the usual interval has no width. (Wilson 1927, JASA 22(158).)
-    Raises ValueError without runs.
+    Half a success is one of two runs that count for one together. Raises ValueError without runs.
     """
     if runs < 1 or not 0 <= successes <= runs:
         raise ValueError(f"{successes} successes of {runs} runs")

@@ -17,8 +17,10 @@ _LN_2 = math.log(2.0)
 _AT_ONCE = 1 << 20
 
 
-def mean_interval(differences: Sequence[float], chance: np.random.Generator) -> tuple[float, float] | None:
-    """Between what bounds the mean difference lies with 95 %; None for fewer than FEWEST pairs.
+def mean_interval(
+    differences: Sequence[float], chance: np.random.Generator, weights: Sequence[float] | None = None
+) -> tuple[float, float] | None:
+    """Between what bounds the mean difference, or the weighted one, lies with 95 %; None for fewer than FEWEST pairs.
 
     The percentile interval of the bootstrap: pairs are drawn anew, with replacement, RESAMPLES times. (Efron and
     Tibshirani: An Introduction to the Bootstrap, 1993, chapter 13.)
@@ -26,14 +28,15 @@ def mean_interval(differences: Sequence[float], chance: np.random.Generator) -> 
     if len(differences) < FEWEST:
         return None
     values = np.asarray(differences, dtype=np.float64)
+    counts = np.ones(len(values)) if weights is None else np.asarray(weights, dtype=np.float64)
+    values = values * counts
     resamples = max(RESAMPLES // 10, min(RESAMPLES, DRAWS // len(values)))
     rows = max(1, _AT_ONCE // len(values))
-    means = np.concatenate(
-        [
-            values[chance.integers(0, len(values), (min(rows, resamples - done), len(values)))].mean(axis=1)
-            for done in range(0, resamples, rows)
-        ]
+    draws = (
+        chance.integers(0, len(values), (min(rows, resamples - done), len(values)))
+        for done in range(0, resamples, rows)
     )
+    means = np.concatenate([values[drawn].sum(axis=1) / counts[drawn].sum(axis=1) for drawn in draws])
     low, high = np.quantile(means, [(1 - COVERAGE) / 2, (1 + COVERAGE) / 2])
     return float(low), float(high)
 

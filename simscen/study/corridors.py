@@ -1,5 +1,6 @@
 """Two robots that meet in a corridor, and ramps in a hall: generated, each like nothing that ships."""
 
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
@@ -16,13 +17,23 @@ HALL = 2.4
 """Metres of the hall that they are in, from wall to wall."""
 
 
-def two_robots(folder: Path, count: int) -> Experiment:
+def two_robots(folder: Path, numbers: Iterable[int]) -> Experiment:
     """Two robots set out at the ends of a corridor, each to where the other began; a corridor for each number."""
+    return _numbered("two robots in a corridor", folder / "corridor", numbers, _meeting)
+
+
+def ramps(folder: Path, numbers: Iterable[int]) -> Experiment:
+    """Up a ramp, over a platform and down again; slopes, heights and where the robot comes from are drawn."""
+    return _numbered("ramps", folder / "ramp", numbers, _ramp)
+
+
+def _numbered(name: str, stem: Path, numbers: Iterable[int], text: Callable[[int], str]) -> Experiment:
+    """A scenario for each number, which is its seed as well."""
     drives = [
-        Drive(written(folder / f"corridor_{number}.scenario.yaml", _meeting(number)), [number])
-        for number in range(1, count + 1)
+        Drive(written(stem.with_name(f"{stem.name}_{number}.scenario.yaml"), text(number)), [number])
+        for number in numbers
     ]
-    return Experiment("two robots in a corridor", tuple(drives), folder)
+    return Experiment(name, tuple(drives), stem.parent)
 
 
 def _meeting(number: int) -> str:
@@ -49,15 +60,6 @@ pass:
   - goals_reached: {{}}
   - collisions: {{max: 0}}
 """
-
-
-def ramps(folder: Path, count: int) -> Experiment:
-    """Up a ramp, over a platform and down again; slopes, heights and where the robot comes from are drawn."""
-    drives = [
-        Drive(written(folder / f"ramp_{number}.scenario.yaml", _ramp(number)), [number])
-        for number in range(1, count + 1)
-    ]
-    return Experiment("ramps", tuple(drives), folder)
 
 
 def _ramp(number: int) -> str:

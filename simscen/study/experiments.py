@@ -4,7 +4,7 @@ Scenarios that are generated are written as files, so that everything goes throu
 can be repeated by hand.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -36,19 +36,19 @@ def barn_challenge(
     return Experiment(name, tuple(drives), folder, (dataset,), mapless=True)
 
 
-def generated_fields(folder: Path, count: int) -> Experiment:
+def generated_fields(folder: Path, numbers: Iterable[int]) -> Experiment:
     """Fields of the same kind and density, one seed each."""
-    drives = [_field(folder / "fields", obstacle_field(number)) for number in range(1, count + 1)]
+    drives = [_field(folder / "fields", obstacle_field(number)) for number in numbers]
     return Experiment("generated fields", tuple(drives), folder, mapless=True)
 
 
-def narrow_fields(folder: Path, count: int) -> list[Experiment]:
+def narrow_fields(folder: Path, numbers: Sequence[int]) -> list[Experiment]:
     """Fields whose widest way is little wider than the robot: an experiment for each of three widths."""
     experiments = []
     for room in NARROW:
         gap, too_wide = (WIDTH + room) / 2, (WIDTH + room + 0.1) / 2
         to = folder / f"narrow/{round(100 * room)}_cm"
-        drives = [_field(to, obstacle_field(number, gap, too_wide)) for number in range(1, count + 1)]
+        drives = [_field(to, obstacle_field(number, gap, too_wide)) for number in numbers]
         experiments.append(Experiment(narrow_name(room), tuple(drives), folder, mapless=True))
     return experiments
 
@@ -65,12 +65,12 @@ def _field(folder: Path, field: ObstacleField) -> Drive:
     return Drive(file, [field.number], field.shortest)
 
 
-def dynamic_fields(folder: Path, count: int) -> list[Experiment]:
+def dynamic_fields(folder: Path, numbers: Sequence[int]) -> list[Experiment]:
     """Fields of moving cylinders, an experiment for each mean speed; one seed each."""
     experiments = []
     for speed in movers.SPEEDS:
         drives = []
-        for number in range(1, count + 1):
+        for number in numbers:
             stem = f"dynamic/field_{number}_at_{speed:.2f}"
             world = written(folder / f"{stem}.world.yaml", _moving_world_text(movers.dynamic_field(number, speed)))
             text = barn.scenario(f"dynamic field {number}", world.name, movers.START, movers.GOAL)
@@ -113,9 +113,9 @@ def case_name(file: Path) -> str:
     return file.name.split(".")[0].replace("_", " ")
 
 
-def localizations(folder: Path, worlds: Path, seeds: Sequence[int], lost: int) -> list[Experiment]:
-    """A tour of the shipped house told where it starts; and `lost` times told a pose 0.5 m and 20 degrees off, told
-    nothing, and kidnapped.
+def localizations(folder: Path, worlds: Path, seeds: Sequence[int], lost: Sequence[int]) -> list[Experiment]:
+    """A tour of the shipped house told where it starts; and with the seeds `lost` told a pose 0.5 m and 20 degrees off,
+    told nothing, and kidnapped.
     """
 
     def experiment(name: str, *drives: Drive, known: bool = False) -> Experiment:
@@ -124,17 +124,16 @@ def localizations(folder: Path, worlds: Path, seeds: Sequence[int], lost: int) -
     def one(stem: str, text: str, seeds: Sequence[int]) -> Drive:
         return Drive(written(folder / f"localization/{stem}.scenario.yaml", text), seeds)
 
-    numbers = range(1, lost + 1)
-    directions = {seed: float(Streams(seed).generator("direction").uniform(-np.pi, np.pi)) for seed in numbers}
-    misled = [one(f"misled_{n}", localization.misled(directions[n], n % 2 == 0), [n]) for n in numbers]
+    directions = {seed: float(Streams(seed).generator("direction").uniform(-np.pi, np.pi)) for seed in lost}
+    misled = [one(f"misled_{n}", localization.misled(directions[n], n % 2 == 0), [n]) for n in lost]
     tour = experiment(LOCALIZATIONS[0], one("tour", localization.tour(), seeds), known=True)
     if not lost:
         return [tour]
     return [
         tour,
         experiment(LOCALIZATIONS[1], *misled, known=True),
-        experiment(LOCALIZATIONS[2], one("start_unknown", localization.start_unknown(), numbers)),
-        experiment(LOCALIZATIONS[3], one("kidnapped", localization.kidnapped(), numbers)),
+        experiment(LOCALIZATIONS[2], one("start_unknown", localization.start_unknown(), lost)),
+        experiment(LOCALIZATIONS[3], one("kidnapped", localization.kidnapped(), lost)),
     ]
 
 

@@ -1,7 +1,7 @@
 """Where a robot may start and where it may be sent: poses drawn from the free space of a world."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,34 +20,31 @@ TRIES = 2000
 
 @dataclass(frozen=True)
 class Errand:
-    """From where to where, and the length in metres of the shortest way of the robot between them."""
+    """A number, from where to where, and the length in metres of the shortest way of the robot between them."""
 
+    number: int
     start: Pose2
     goal: Pose2
     length: float
 
 
-def errands(built: BuiltWorld, radius: float, count: int, seed: int, least: float = 5.0) -> Iterator[Errand]:
-    """`count` drives of a disc of `radius` metres, none shorter than `least` metres; always the same for a seed.
-
-    Fewer where TRIES draws do not find as many.
+def errands(built: BuiltWorld, radius: float, numbers: Iterable[int], least: float = 5.0) -> Iterator[Errand]:
+    """A drive of a disc of `radius` metres for each number, none shorter than `least` metres; always the same for a
+    number; none for a number of which TRIES draws find none.
     """
-    chance = Streams(seed).generator("errands")
-    grid = built.map
     ways = ShortestWays(built.mesh, built.world.bounds, radius + ROOM)
-    free = np.argwhere(grid.cells == 0)
-    found = 0
-    for _ in range(TRIES if len(free) else 0):
-        if found == count:
-            return
-        ends = grid.centre_of(free[chance.integers(0, len(free), 2)]).tolist()
-        start, goal = (Pose2(x, y, float(chance.uniform(-math.pi, math.pi))) for x, y in ends)
-        if start.distance(goal) < least / 2 or any(_near(end, built) for end in (start, goal)):
-            continue
-        length = ways.length(start, goal)
-        if math.isfinite(length) and length >= least:
-            found += 1
-            yield Errand(start, goal, length)
+    free = np.argwhere(built.map.cells == 0)
+    for number in numbers if len(free) else ():
+        chance = Streams(number).generator("errand")
+        for _ in range(TRIES):
+            ends = built.map.centre_of(free[chance.integers(0, len(free), 2)]).tolist()
+            start, goal = (Pose2(x, y, float(chance.uniform(-math.pi, math.pi))) for x, y in ends)
+            if start.distance(goal) < least / 2 or any(_near(end, built) for end in (start, goal)):
+                continue
+            length = ways.length(start, goal)
+            if math.isfinite(length) and length >= least:
+                yield Errand(number, start, goal, length)
+                break
 
 
 def _near(pose: Pose2, built: BuiltWorld) -> bool:

@@ -24,6 +24,8 @@ FAULTS = {
 }
 """What a sensor or an actuator has during the whole drive: weak, medium and strong."""
 STRENGTHS = ("weak", "medium", "strong")
+OTHER_DRIVES = 1_000_000
+"""Where the numbers of drives with a fault begin, so that they are not those without."""
 
 
 def scenario(name: str, world: str, errand: Errand, faults: Sequence[str] = ()) -> str:
@@ -38,34 +40,36 @@ def scenario(name: str, world: str, errand: Errand, faults: Sequence[str] = ()) 
 
 
 def random_goals(
-    name: str, folder: Path, worlds: Mapping[str, BuiltWorld], count: int, world_path: tuple[Path, ...] = ()
+    name: str, folder: Path, worlds: Mapping[str, BuiltWorld], numbers: Sequence[int], world_path: tuple[Path, ...] = ()
 ) -> Experiment:
-    """`count` drives in each of the worlds, which are named as a scenario in `folder` names them."""
+    """The drives of these numbers in each of the worlds, which are named as a scenario in `folder` names them."""
     drives = []
     for world, built in worlds.items():
-        for number, errand in enumerate(errands(built, RADIUS, count, 1), start=1):
-            file = folder / f"{_stem(world)}_{number}.scenario.yaml"
-            drives.append(Drive(written(file, scenario(name, world, errand)), [number], world=world))
+        for errand in errands(built, RADIUS, numbers):
+            file = folder / f"{_stem(world)}_{errand.number}.scenario.yaml"
+            drives.append(Drive(written(file, scenario(name, world, errand)), [errand.number], world=world))
     return Experiment(name, tuple(drives), folder, world_path)
 
 
 def degraded(
-    folder: Path, worlds: Mapping[str, BuiltWorld], count: int, world_path: tuple[Path, ...] = ()
+    folder: Path, worlds: Mapping[str, BuiltWorld], first: int, world_path: tuple[Path, ...] = ()
 ) -> list[Experiment]:
-    """`count` such drives for each fault; an experiment for each of three strengths, with the same drives."""
-    errand_of = {world: list(errands(built, RADIUS, count * len(FAULTS), 2)) for world, built in worlds.items()}
-    names = list(errand_of)
+    """A drive in each world with each fault, its own; an experiment for each of three strengths, with the same drives.
+
+    `first` is the number of the first drives, and the seed.
+    """
+    faults = dict(enumerate(FAULTS, start=OTHER_DRIVES + first * len(FAULTS)))
+    errands_in = {world: list(errands(built, RADIUS, faults)) for world, built in worlds.items()}
     experiments = []
     for level, strength in enumerate(STRENGTHS):
         drives = []
-        for kind, fault in enumerate(FAULTS):
-            for number in range(1, count + 1):
-                world = names[number % len(names)]
-                errand = errand_of[world][(kind * count + number - 1) % len(errand_of[world])]
+        for world, found in errands_in.items():
+            for errand in found:
+                fault = faults[errand.number]
                 said, values = FAULTS[fault]
                 text = scenario(f"{fault}, {strength}", world, errand, [said.replace("…", values[level])])
-                file = folder / strength / f"{_stem(fault)}_{number}.scenario.yaml"
-                drives.append(Drive(written(file, text), [number], world=f"{fault} {number}"))
+                file = folder / strength / f"{_stem(fault)}_{_stem(world)}.scenario.yaml"
+                drives.append(Drive(written(file, text), [first], world=world))
         experiments.append(Experiment(f"degraded sensing, {strength}", tuple(drives), folder, world_path))
     return experiments
 

@@ -4,15 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
-import numpy as np
-
-from simscen.core.chance import Streams
-from simscen.core.intervals import wilson
-from simscen.core.paired import mean_interval
 from simscen.core.result import Outcome
 from simscen.core.sessionevents import RunFinished
 from simscen.core.verdict import Status
 from simscen.judge.measure.metrics import barn_score
+from simscen.study.worldwise import Worldwise
 
 TIME_IS_UP = "time limit"
 """What a run's `ended` says when nothing else ended it."""
@@ -102,18 +98,8 @@ def tally(case: str, trials: Sequence[Trial]) -> Row:
 
 
 def over_worlds(trials: Sequence[Trial]) -> tuple[float, float] | None:
-    """Between what bounds the success rate lies with 95 % in worlds like these; None of fewer than five worlds.
-
-    By bootstrap over worlds. Where all worlds say the same it has no width: there it is Wilson's, each world a trial.
-    """
-    worlds: dict[str, list[bool]] = {}
-    for trial in trials:
-        worlds.setdefault(trial.world, []).append(trial.fate is Fate.SUCCESS)
-    rates = [float(np.mean(fates)) for fates in worlds.values()]
-    interval = mean_interval(rates, Streams(1).generator("worlds"))
-    if interval is not None and min(rates) == max(rates) and rates[0] in (0.0, 1.0):
-        return wilson(round(sum(rates)), len(rates))
-    return interval
+    """Between what bounds the success rate lies with 95 % in worlds like these; None of fewer than five worlds."""
+    return Worldwise.of((trial.world, float(trial.fate is Fate.SUCCESS)) for trial in trials).interval_of_rates()
 
 
 def _rate(fates: Sequence[Fate], which: Fate) -> float:

@@ -3,18 +3,15 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from simscen.core.chance import Streams
-from simscen.core.paired import mean_interval
 from simscen.study.tally import Fate, Trial
+from simscen.study.worldwise import Worldwise
 
 Pair = tuple[Trial, Trial]
 
 
 @dataclass(frozen=True)
 class Difference:
-    """A mean over worlds of `other` less `reference`; its 95 % interval by bootstrap over worlds, None of too few."""
+    """The mean of `other` less `reference`; its 95 % interval by bootstrap over worlds, None of fewer than five."""
 
     mean: float
     interval: tuple[float, float] | None
@@ -42,7 +39,7 @@ def versus(case: str, reference: Sequence[Trial], other: Sequence[Trial]) -> Ver
     if any(one.world != two.world or one.run.key.seed != two.run.key.seed for one, two in pairs):
         raise ValueError(f"{case}: the runs are not of the same drives")
     decided = [pair for pair in pairs if Fate.ERROR not in (pair[0].fate, pair[1].fate)]
-    success = _difference(decided, lambda trial: float(trial.fate is Fate.SUCCESS))
+    success = _difference(decided, lambda trial: float(_won(trial)), rate=True)
     return Versus(
         case=case,
         pairs=len(decided),
@@ -58,14 +55,12 @@ def _won(trial: Trial) -> bool:
     return trial.fate is Fate.SUCCESS
 
 
-def _difference(pairs: Sequence[Pair], measure: Callable[[Trial], float | None]) -> Difference | None:
+def _difference(
+    pairs: Sequence[Pair], measure: Callable[[Trial], float | None], rate: bool = False
+) -> Difference | None:
     """None where no pair has the measure."""
-    worlds: dict[str, list[float]] = {}
-    for one, two in pairs:
-        before, after = measure(one), measure(two)
-        if before is not None and after is not None:
-            worlds.setdefault(one.world, []).append(after - before)
-    if not worlds:
+    both = ((one.world, measure(one), measure(two)) for one, two in pairs)
+    differences = Worldwise.of((world, b - a) for world, a, b in both if a is not None and b is not None)
+    if differences.mean is None:
         return None
-    means = [float(np.mean(values)) for values in worlds.values()]
-    return Difference(float(np.mean(means)), mean_interval(means, Streams(1).generator("worlds")))
+    return Difference(differences.mean, differences.interval_of_changes() if rate else differences.interval())

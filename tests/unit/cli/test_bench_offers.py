@@ -28,3 +28,19 @@ def test_an_offer_knows_what_its_experiments_are_called(tmp_path: Path, name: st
     small = Sizes(seeds=1, fields=2, dynamic=1, goals=1, lost=1)
     (offer,) = (offer for offer in offers(None, None, PROJECT, tmp_path, small) if offer.name == name)
     assert [made.name for made in offer.make()] == (list(offer.parts) or [name])
+
+
+def test_a_later_first_number_gives_other_drives_under_the_same_names(tmp_path: Path) -> None:
+    def names(first: int) -> list[str]:
+        small = Sizes(first, seeds=1, fields=2, dynamic=1, goals=1, lost=1)
+        return [
+            f"{made.name}: {drive.file.stem} {list(drive.seeds)}"
+            for offer in offers(None, None, PROJECT, tmp_path / str(first), small)
+            if offer.name in ("narrow fields", "dynamic fields", "ramps", "two robots", "localization", "corner cases")
+            for made in offer.make()
+            for drive in made.drives
+        ]
+
+    here, there = names(1), names(400)
+    assert len(here) == len(there)
+    assert not set(here) & set(there)

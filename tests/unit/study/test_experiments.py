@@ -17,13 +17,13 @@ def loads(experiment: Experiment) -> None:
 
 
 def test_generated_fields_load_and_carry_their_reference_length(tmp_path: Path) -> None:
-    fields = generated_fields(tmp_path, 1)
+    fields = generated_fields(tmp_path, (1,))
     loads(fields)
     assert (fields.drives[0].reference_length or 0.0) >= 10.0
 
 
 def test_dynamic_fields_load_at_three_speeds(tmp_path: Path) -> None:
-    experiments = dynamic_fields(tmp_path, 1)
+    experiments = dynamic_fields(tmp_path, (1,))
     assert [each.name for each in experiments] == [
         "dynamic fields, 0.74 m/s",
         "dynamic fields, 1.23 m/s",
@@ -34,7 +34,7 @@ def test_dynamic_fields_load_at_three_speeds(tmp_path: Path) -> None:
 
 
 def test_localization_loads_and_misleads_in_another_direction_each_time(tmp_path: Path) -> None:
-    experiments = localizations(tmp_path, PROJECT / "worlds", range(1, 21), 3)
+    experiments = localizations(tmp_path, PROJECT / "worlds", range(1, 21), range(1, 4))
     for experiment in experiments:
         loads(experiment)
     _, misled, unknown, _ = experiments
