@@ -14,6 +14,8 @@ MISSED = 2
 """Beams that may miss within a piece."""
 VALLEY = 0.1
 """Metres by which the range must rise between two things that touch, as the scan sees them."""
+STEP_APART = 1e3
+"""Metres: more than any beam sees."""
 FEWEST = 3
 """Hits of a piece that is looked at."""
 STEPS = 4
@@ -39,6 +41,11 @@ class Clusters:
     radii: Array
     whole: npt.NDArray[np.bool_]
 
+    @property
+    def places(self) -> npt.NDArray[np.complex128]:
+        """The hits (m,) as complex numbers."""
+        return self.points.view(np.complex128)[:, 0]
+
     def of(self, number: int) -> Array:
         """The hits (k, 2) of a piece."""
         return self.points[self.first[number] : self.last[number] + 1]
@@ -51,17 +58,21 @@ def clusters(ranges: Array, angles: Array, least: float, most: float, largest: f
     """
     with np.errstate(invalid="ignore"):
         beams = np.flatnonzero((ranges >= least) & (ranges <= most))
+        seen = np.where(ranges >= least, ranges, 0.0)
     r, a = ranges[beams], angles[beams]
-    points = np.column_stack((r * np.cos(a), r * np.sin(a)))
+    points = np.empty((len(r), 2))
+    points[:, 0], points[:, 1] = r * np.cos(a), r * np.sin(a)
     step = abs(float(angles[1] - angles[0])) if len(angles) > 1 else 0.0
     if len(beams) < FEWEST:
         none = np.zeros(0, dtype=np.int64)
         return Clusters(points, beams, none, none, np.zeros((0, 2)), np.zeros(0), np.zeros(0, dtype=bool))
-    apart = np.hypot(*np.diff(points, axis=0).T)
-    together = (apart <= np.maximum(GAP, SPARSE * step * np.minimum(r[1:], r[:-1]))) & (np.diff(beams) <= MISSED + 1)
+    off = points[1:] - points[:-1]
+    apart = np.hypot(off[:, 0], off[:, 1])
+    together = (apart <= np.maximum(GAP, SPARSE * step * np.minimum(r[1:], r[:-1]))) & (
+        beams[1:] - beams[:-1] <= MISSED + 1
+    )
     breaks = np.flatnonzero(~together)
-    first, last = np.concatenate(([0], breaks + 1)), np.concatenate((breaks, [len(beams) - 1]))
-    first, last = _parted(r, first, last)
+    first, last = _parted(r, np.concatenate(([0], breaks + 1)), np.concatenate((breaks, [len(beams) - 1])))
     long = last - first + 1 >= FEWEST
     first, last = first[long], last[long]
     half = (a[last] - a[first] + step) / 2
@@ -69,11 +80,9 @@ def clusters(ranges: Array, angles: Array, least: float, most: float, largest: f
     sine = np.sin(np.minimum(np.abs(half), math.radians(80.0)))
     radii = nearest * sine / (1.0 - sine)
     small = radii <= largest
-    first, last, half, nearest, radii = first[small], last[small], half[small], nearest[small], radii[small]
-    middle = (a[first] + a[last]) / 2
-    centres = (nearest + radii)[:, None] * np.column_stack((np.cos(middle), np.sin(middle)))
-    with np.errstate(invalid="ignore"):
-        seen = np.where(ranges >= least, ranges, 0.0)
+    first, last, nearest, radii = first[small], last[small], nearest[small], radii[small]
+    middle, away = (a[first] + a[last]) / 2, nearest + radii
+    centres = np.column_stack((away * np.cos(middle), away * np.sin(middle)))
     whole = _clear(seen, beams[first] - 1, r[first], full_circle) & _clear(seen, beams[last] + 1, r[last], full_circle)
     return Clusters(points, beams, first, last, centres, radii, whole)
 
@@ -83,8 +92,16 @@ def _parted(ranges: Array, first: Indices, last: Indices) -> tuple[Indices, Indi
 
     Along one convex thing it falls to its nearest point and then rises, whatever its shape.
     """
-    edges = list(zip(first.tolist(), last.tolist(), strict=True))
-    parted: list[tuple[int, int]] = []
+    # Of all pieces at once, each a step below or above the one before: so none knows of the others.
+    steps = np.repeat(STEP_APART * np.arange(len(first)), last - first + 1)
+    before = np.minimum.accumulate(ranges - steps) + steps
+    after = np.minimum.accumulate((ranges + steps)[::-1])[::-1] - steps
+    rise = np.maximum.reduceat(ranges - np.maximum(before, after), first)
+    cut = (rise > VALLEY) & (last - first + 1 >= 2 * FEWEST)
+    if not cut.any():
+        return first, last
+    parted = list(zip(first[~cut].tolist(), last[~cut].tolist(), strict=True))
+    edges = list(zip(first[cut].tolist(), last[cut].tolist(), strict=True))
     while edges:
         begin, end = edges.pop()
         if end - begin + 1 >= 2 * FEWEST:
@@ -97,8 +114,8 @@ def _parted(ranges: Array, first: Indices, last: Indices) -> tuple[Indices, Indi
                 continue
         parted.append((begin, end))
     parted.sort()
-    cut: Indices = np.array(parted, dtype=np.int64).reshape(-1, 2)
-    return cut[:, 0], cut[:, 1]
+    pieces: Indices = np.array(parted, dtype=np.int64)
+    return pieces[:, 0], pieces[:, 1]
 
 
 def _clear(seen: Array, beam: Indices, edge: Array, full_circle: bool) -> npt.NDArray[np.bool_]:

@@ -32,12 +32,15 @@ class MotionPrediction:
         self._trackers = {name: Tracker(spec, tick_rate) for name in lidars} if spec.enabled else {}
         self._avoidance = Avoidance(spec, robot, full_speed)
         self._standing = Standing(robot, full_speed)
-        self._looked, self._held = 0, False
+        self._looked, self._enough, self._held = 0, LOOKS * tick_rate if self._trackers else 0, False
         self._rolled = Rolled(tick_rate)
+        self._nothing = nothing(spec.acceleration)
+        self._seeing: list[Tracker] = []
 
     def on_odometry(self, tick: int, pose: Pose2) -> None:
         """Take the wheels' odometry in."""
-        self._rolled.on_odometry(tick, pose)
+        if self._trackers:
+            self._rolled.on_odometry(tick, pose)
 
     def on_imu(self, imu: Imu) -> None:
         """Take a turn rate in."""
@@ -48,6 +51,7 @@ class MotionPrediction:
         tracker = self._trackers.get(scan.sensor)
         if tracker is not None:
             tracker.on_scan(scan, self._rolled.at(scan.tick))
+            self._seeing = [each for each in self._trackers.values() if len(each.moving)]
 
     def marking(self, scan: Scan) -> Scan:
         """The scan as costmaps should take it in: what it shows of things that move is not to be marked."""
@@ -58,13 +62,9 @@ class MotionPrediction:
 
     def moving(self, tick: int) -> Moving:
         """What moves at a tick, in the frame of `Rolled`; with several lidars, as each of them sees it."""
-        seen = [
-            tracker.moving.after((tick - tracker.tick) / self._rate)
-            for tracker in self._trackers.values()
-            if tracker.has_moving
-        ]
-        if not seen:
-            return nothing(self._spec.acceleration)
+        if not self._seeing:
+            return self._nothing
+        seen = [tracker.moving.after((tick - tracker.tick) / self._rate) for tracker in self._seeing]
         if len(seen) == 1:
             return seen[0]
         return Moving(
@@ -95,8 +95,7 @@ class MotionPrediction:
 
     def _cautious(self, tick: int, wanted: Twist) -> Twist:
         """The command, slowed down as long as nothing can be known yet of what moves."""
-        speed = math.hypot(wanted.vx, wanted.vy)
-        if not self._trackers or speed <= LOOKING or self._looked >= LOOKS * self._rate:
+        if self._looked >= self._enough or (speed := math.hypot(wanted.vx, wanted.vy)) <= LOOKING:
             return wanted
         began = [tracker.began for tracker in self._trackers.values() if tracker.began is not None]
         self._looked = tick - max(began) if len(began) == len(self._trackers) else 0

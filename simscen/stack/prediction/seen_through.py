@@ -5,9 +5,11 @@ neither turning nor driving makes static things move, and what drift of the odom
 remembered is less than the margin.
 """
 
+import cmath
 import math
 from collections import deque
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -27,17 +29,79 @@ TURNED = 0.02
 and at an edge it is chance which beam hits."""
 KEPT = 64
 """Scans at most."""
+FARTHEST = 1e5
+"""Metres: how far a beam saw that met nothing."""
+
+Places = npt.NDArray[np.complex128]
+"""Points (n,) as complex numbers, x + iy: to turn them is one multiplication."""
+
+
+@dataclass(frozen=True)
+class View:
+    """Where the beams of a lidar go: `count` of them, `increment` rad apart, the first along `start`."""
+
+    count: int
+    start: float
+    increment: float
+
+    @cached_property
+    def full(self) -> bool:
+        """Whether it looks all around."""
+        return (self.count + 1.5) * self.increment > 2 * math.pi
+
+    @cached_property
+    def beside(self) -> int:
+        """Beams to either side of a point that must have gone farther than it, too."""
+        return max(1, math.ceil(TURNED / self.increment))
+
+    @cached_property
+    def more(self) -> int:
+        """Beams that are added at either end, so that every direction is one's."""
+        behind = 0 if self.full else max(0, math.ceil(math.pi / self.increment - self.count / 2))
+        return self.beside + 2 + behind
+
+    @cached_property
+    def middle(self) -> float:
+        """The direction in rad of its middle, …"""
+        return self.start + (self.count - 1) / 2 * self.increment
+
+    @cached_property
+    def centre(self) -> float:
+        """… and what that is in beams, once those beside each are done with."""
+        return self.more - self.beside + (self.count - 1) / 2
+
+    def free(self, scan: Scan) -> Array:
+        """How far away (n,) what appears later in each direction stands at most."""
+        lengths = np.zeros(self.count + 2 * self.more)
+        seen = lengths[self.more : -self.more]
+        np.fmin(np.fmax(scan.ranges, 0.0), FARTHEST, out=seen)
+        seen[seen < scan.range_min] = 0.0
+        if self.full:
+            lengths[: self.more], lengths[-self.more :] = seen[-self.more :], seen[: self.more]
+        lengths = _least(lengths, 2 * self.beside + 1)
+        lengths -= MARGIN
+        lengths *= 1.0 / (1.0 + RELATIVE)
+        return lengths
+
+
+def _least(values: Array, width: int) -> Array:
+    """The least of each so many neighbours: of two, of twice as many, …"""
+    done = 1
+    while done < width:
+        step = min(done, width - done)
+        values = np.minimum(values[:-step], values[step:])
+        done += step
+    return values
 
 
 @dataclass(frozen=True, eq=False)
 class Earlier:
-    """A scan, where its lidar was in the odom frame, and how far (n,) its beams saw."""
+    """What a scan saw through, and where its lidar was in the odom frame."""
 
     tick: int
     lidar: Pose2
-    lengths: Array
-    angle_min: float
-    angle_increment: float
+    view: View
+    free: Array
 
 
 class SeenThrough:
@@ -46,38 +110,35 @@ class SeenThrough:
     def __init__(self, tick_rate: int) -> None:
         self._ago, self._at_least = round(AGO * tick_rate), round(AT_LEAST * tick_rate)
         self._scans: deque[Earlier] = deque(maxlen=KEPT)
+        self._view = View(0, 0.0, 0.0)
 
     def remember(self, scan: Scan, lidar: Pose2) -> None:
         """Keep a scan; `lidar` is where it was taken."""
-        if len(scan.ranges) < FEWEST_BEAMS or scan.angle_increment <= 0.0:
+        view, count = self._view, len(scan.ranges)
+        if count < FEWEST_BEAMS or scan.angle_increment <= 0.0:
             return
-        while len(self._scans) > 1 and self._scans[1].tick <= scan.tick - self._ago:
-            self._scans.popleft()
-        self._scans.append(Earlier(scan.tick, lidar, _lengths(scan), scan.angle_min, scan.angle_increment))
+        if (view.count, view.start, view.increment) != (count, scan.angle_min, scan.angle_increment):
+            self._view = view = View(count, scan.angle_min, scan.angle_increment)
+        self._forget(scan.tick)
+        self._scans.append(Earlier(scan.tick, lidar, view, view.free(scan)))
 
-    def appeared(self, tick: int, points: Array) -> npt.NDArray[np.bool_]:
-        """Which of the points (n, 2) in the odom frame were free about AGO before `tick`."""
+    def appeared(self, tick: int, places: Places, lidar: Pose2) -> npt.NDArray[np.bool_]:
+        """Which of the places (n,), seen at `tick` and in the frame of a lidar at `lidar`, were free about AGO before.
+
+        What is farther away than FARTHEST never was.
+        """
+        self._forget(tick)
+        if not self._scans or self._scans[0].tick > tick - self._at_least:
+            return np.zeros(len(places), dtype=bool)
+        old = self._scans[0]
+        moved, view = old.lidar.between(lidar), old.view
+        into = places * cmath.rect(1.0, moved.yaw - view.middle)
+        into += complex(moved.x, moved.y) * cmath.rect(1.0, -view.middle)
+        beam = np.arctan2(into.imag, into.real)
+        beam *= 1.0 / view.increment
+        beam += view.centre + 0.5
+        return old.free[beam.astype(np.int64)] > np.abs(into)
+
+    def _forget(self, tick: int) -> None:
         while len(self._scans) > 1 and self._scans[1].tick <= tick - self._ago:
             self._scans.popleft()
-        if not self._scans or self._scans[0].tick > tick - self._at_least:
-            return np.zeros(len(points), dtype=bool)
-        old = self._scans[0]
-        dx, dy = points[:, 0] - old.lidar.x, points[:, 1] - old.lidar.y
-        distance = np.hypot(dx, dy)
-        bearing = np.arctan2(dy, dx)
-        bearing -= old.lidar.yaw + old.angle_min
-        beam = np.rint((bearing % (2 * math.pi)) / old.angle_increment).astype(np.int64)
-        count, beside = len(old.lengths), max(1, math.ceil(TURNED / old.angle_increment))
-        beams = beam[:, None] + np.arange(-beside, beside + 1)
-        if count * old.angle_increment > 2 * math.pi - 1.5 * old.angle_increment:
-            beams %= count
-        inside = (beams >= 0) & (beams < count)
-        least = np.where(inside, old.lengths[np.where(inside, beams, 0)], 0.0).min(axis=1)
-        return np.asarray(least > distance * (1.0 + RELATIVE) + MARGIN)
-
-
-def _lengths(scan: Scan) -> Array:
-    """How far each beam saw; one without an answer saw nothing."""
-    with np.errstate(invalid="ignore"):
-        lengths: Array = np.where(scan.ranges >= scan.range_min, scan.ranges, 0.0)
-    return lengths

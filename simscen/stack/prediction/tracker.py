@@ -17,7 +17,7 @@ from simscen.model.guards import Prediction
 from simscen.stack.prediction.clusters import Clusters, clusters, fitted
 from simscen.stack.prediction.kalman import corrected, predicted
 from simscen.stack.prediction.moving import Moving, nothing
-from simscen.stack.prediction.seen_through import SeenThrough
+from simscen.stack.prediction.seen_through import FARTHEST, SeenThrough
 
 CHECKED = 120
 """Beams of a scan that are looked at while nothing moves."""
@@ -78,29 +78,16 @@ class Tracker:
         self._spec, self._rate = spec, tick_rate
         self._memory = SeenThrough(tick_rate)
         self._angles: Array = np.zeros(0)
+        self._some, self._towards = slice(0, None), np.zeros(0, dtype=np.complex128)
         self._tracks: list[Track] = []
         self._states, self._covariances = np.zeros((0, 4)), np.zeros((0, 4, 4))
         self._tick = 0
         self.began: int | None = None
         """When the first scan was taken."""
         self._belongs: npt.NDArray[np.bool_] | None = None
-
-    @property
-    def moving(self) -> Moving:
+        self._nothing = nothing(spec.acceleration)
+        self.moving = self._nothing
         """What moves, at the tick of the newest scan."""
-        which = [number for number, track in enumerate(self._tracks) if track.moving]
-        if not which:
-            return nothing(self._spec.acceleration)
-        states = self._states[which]
-        radii = np.array([self._tracks[number].radius for number in which])
-        return Moving(
-            states[:, :2].copy(), states[:, 2:].copy(), radii, self._covariances[which], self._spec.acceleration
-        )
-
-    @property
-    def has_moving(self) -> bool:
-        """Whether anything moves."""
-        return any(track.moving for track in self._tracks)
 
     @property
     def tick(self) -> int:
@@ -116,24 +103,29 @@ class Tracker:
         """Take a scan in that was taken with the base at `odometry`."""
         lidar = odometry.compose(scan.mount)
         if len(self._angles) != len(scan.ranges):
-            self._angles = scan.angles()
+            self._look_along(scan.angles())
         if self.began is None:
             self.began = scan.tick
         self._forecast(scan.tick)
-        self._belongs = None
+        self._belongs, self.moving = None, self._nothing
         if self._tracks or self._suspicious(scan, lidar):
             self._follow(scan, lidar)
         self._memory.remember(scan, lidar)
 
+    def _look_along(self, angles: Array) -> None:
+        """Note where the beams go, and which are looked at while nothing moves."""
+        self._angles, self._some = angles, slice(0, None, max(1, len(angles) // CHECKED))
+        self._towards = np.exp(1j * angles[self._some])
+
     def _suspicious(self, scan: Scan, lidar: Pose2) -> bool:
         """Whether a look at some of the beams shows that something has appeared."""
-        every = max(1, len(scan.ranges) // CHECKED)
-        ranges, angles = scan.ranges[::every], self._angles[::every]
-        with np.errstate(invalid="ignore"):
-            use = (ranges >= scan.range_min) & (ranges <= self._farthest(scan))
-        r, a = ranges[use], angles[use]
-        points = lidar.apply(np.column_stack((r * np.cos(a), r * np.sin(a))))
-        return int(np.count_nonzero(self._memory.appeared(scan.tick, points))) >= SUSPICIOUS
+        ranges = scan.ranges[self._some]
+        # What a beam that met nothing shows is farther off than anything was seen; nan is taken for that.
+        places = np.fmin(np.fmax(ranges, 0.0), 2 * FARTHEST) * self._towards
+        appeared = ranges[self._memory.appeared(scan.tick, places, lidar)]
+        if len(appeared) < SUSPICIOUS:
+            return False
+        return int(np.count_nonzero((appeared >= scan.range_min) & (appeared <= self._farthest(scan)))) >= SUSPICIOUS
 
     def _farthest(self, scan: Scan) -> float:
         return min(scan.range_max, self._spec.max_range)
@@ -154,11 +146,12 @@ class Tracker:
         taken = self._associate(pieces, centres, came, lidar)
         self._begin(pieces, centres, came, taken, scan.tick)
         self._judge(scan, lidar)
+        self._tell()
         self._mark(scan, lidar)
 
     def _came(self, pieces: Clusters, tick: int, lidar: Pose2) -> npt.NDArray[np.bool_]:
         """Which pieces (n,) stand where it was free."""
-        appeared = self._memory.appeared(tick, lidar.apply(pieces.points)).astype(np.int64)
+        appeared = self._memory.appeared(tick, pieces.places, lidar)
         total = np.concatenate(([0], np.cumsum(appeared)))
         count = total[pieces.last + 1] - total[pieces.first]
         return np.asarray((count >= FEW) & (count >= APPEARED * (pieces.last - pieces.first + 1)))
@@ -207,7 +200,11 @@ class Tracker:
     def _begin(self, pieces: Clusters, centres: Array, came: npt.NDArray[np.bool_], taken: set[int], tick: int) -> None:
         """Tracks of pieces that no track has taken and that stand where it was free."""
         # Among moving things others may, of which a thing that passed hid that they were not there before.
-        also = pieces.radii >= LEAST_RADIUS if self.has_moving else np.zeros(len(came), dtype=bool)
+        also = (
+            pieces.radii >= LEAST_RADIUS
+            if any(track.moving for track in self._tracks)
+            else np.zeros(len(came), dtype=bool)
+        )
         new = [piece for piece in np.flatnonzero(came | also).tolist() if piece not in taken]
         if not new:
             return
@@ -283,6 +280,13 @@ class Tracker:
         turn = (math.atan2(y, x) - scan.angle_min) % (2 * math.pi)
         beam = round(turn / scan.angle_increment)
         return 0 <= beam < len(scan.ranges) and bool(scan.ranges[beam] > math.hypot(x, y))
+
+    def _tell(self) -> None:
+        """Note what moves."""
+        which = [number for number, track in enumerate(self._tracks) if track.moving]
+        if which:
+            states, radii = self._states[which], np.array([self._tracks[number].radius for number in which])
+            self.moving = Moving(states[:, :2], states[:, 2:], radii, self._covariances[which], self._spec.acceleration)
 
     def _mark(self, scan: Scan, lidar: Pose2) -> None:
         """Note which beams hit what moves."""
