@@ -20,4 +20,6 @@ def poses_along(pose: Pose2, twist: Twist, times: Array) -> Array:
     x = twist.vx * forward - twist.vy * left
     y = twist.vx * left + twist.vy * forward
     cosine, sine = np.cos(pose.yaw), np.sin(pose.yaw)
-    return np.column_stack((pose.x + cosine * x - sine * y, pose.y + sine * x + cosine * y, yaw))
+    poses = np.empty((len(times), 3))
+    poses[:, 0], poses[:, 1], poses[:, 2] = pose.x + cosine * x - sine * y, pose.y + sine * x + cosine * y, yaw
+    return poses

@@ -13,7 +13,11 @@ def forward_steps(poses: Array) -> npt.NDArray[np.bool_]:
     return forward
 
 
+def changes(forward: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
+    """The indices of the poses between two steps of which one goes forward and one backward."""
+    return np.flatnonzero(forward[1:] != forward[:-1]) + 1
+
+
 def cusps(poses: Array) -> npt.NDArray[np.int64]:
     """The indices of the poses (n, 3) at which the direction changes."""
-    forward = forward_steps(poses)
-    return np.flatnonzero(forward[1:] != forward[:-1]) + 1 if len(forward) else np.zeros(0, dtype=np.int64)
+    return changes(forward_steps(poses))

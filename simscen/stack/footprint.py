@@ -26,12 +26,11 @@ def distances(costmap: CostmapView, points: Reals) -> npt.NDArray[np.float32]:
 
 def distance_at(costmap: CostmapView, x: float, y: float) -> float:
     """The same for one point: a tenth of the time."""
-    row = math.floor((y - costmap.origin[1]) / costmap.resolution)
-    column = math.floor((x - costmap.origin[0]) / costmap.resolution)
-    height, width = costmap.distance.shape
-    if 0 <= row < height and 0 <= column < width:
-        return float(costmap.distance[row, column])
-    return 0.0
+    left, low = costmap.origin
+    distance, resolution = costmap.distance, costmap.resolution
+    row, column = math.floor((y - low) / resolution), math.floor((x - left) / resolution)
+    height, width = distance.shape
+    return distance.item(row, column) if 0 <= row < height and 0 <= column < width else 0.0
 
 
 class Footprint:

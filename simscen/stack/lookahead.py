@@ -41,26 +41,18 @@ def _clearly_free(radius: float, costmap: CostmapView, pose: Pose2, twist: Twist
     Half a cell's diagonal on both ends of a step is kept, as distances are known between cells. In the open this takes
     3 µs where checking all poses takes 60.
     """
-    speed = math.hypot(twist.vx, twist.vy)
+    vx, vy, wz = twist
+    speed, turns = math.hypot(vx, vy), abs(wz) >= NO_TURN
+    cosine, sine = math.cos(pose.yaw), math.sin(pose.yaw)
     slack = radius + 1.4143 * costmap.resolution
-    time = 0.0
+    time, at_x, at_y = 0.0, pose.x, pose.y
     while True:
-        x, y = _position(pose, twist, time)
-        room = distance_at(costmap, x, y) - slack
+        room = distance_at(costmap, at_x, at_y) - slack
         if room <= costmap.resolution and (room <= 0.0 or speed > 0.0):
             return False
         if time >= horizon or speed == 0.0:
             return True
         time = min(horizon, time + room / speed)
-
-
-def _position(pose: Pose2, twist: Twist, time: float) -> tuple[float, float]:
-    """Where the arc is after `time` seconds: `arcs.poses_along` for one moment."""
-    turn = twist.wz * time
-    if abs(twist.wz) < NO_TURN:
-        forward, left = time, 0.0
-    else:
-        forward, left = math.sin(turn) / twist.wz, (1.0 - math.cos(turn)) / twist.wz
-    x, y = twist.vx * forward - twist.vy * left, twist.vx * left + twist.vy * forward
-    cosine, sine = math.cos(pose.yaw), math.sin(pose.yaw)
-    return pose.x + cosine * x - sine * y, pose.y + sine * x + cosine * y
+        forward, left = (math.sin(wz * time) / wz, (1.0 - math.cos(wz * time)) / wz) if turns else (time, 0.0)
+        x, y = vx * forward - vy * left, vx * left + vy * forward
+        at_x, at_y = pose.x + cosine * x - sine * y, pose.y + sine * x + cosine * y

@@ -35,11 +35,14 @@ class GoalPose:
         distance = goal.pose.distance(pose)
         if not self._can_turn:
             return distance <= goal.xy_tolerance and remaining < AT_END
+        if distance > goal.xy_tolerance:
+            self._there = False
+            return False
         dx, dy = goal.pose.x - pose.x, goal.pose.y - pose.y
         behind = dx * math.cos(pose.yaw) + dy * math.sin(pose.yaw) <= 0.0
         near = distance <= ON_THE_SPOT * goal.xy_tolerance or (abs(twist.vx) < STANDING and remaining < 0.2)
         passed = distance <= PASSED * goal.xy_tolerance and behind and remaining < 0.1
-        self._there = distance <= goal.xy_tolerance and (self._there or near or passed)
+        self._there = self._there or near or passed
         return self._there
 
     def turn(self, angle: float, twist: Twist) -> Twist:

@@ -1,20 +1,20 @@
 """Where the robot is on its path, and what lies ahead."""
 
 import math
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.navigation import Path
-from simscen.stack.cusps import cusps, forward_steps
+from simscen.stack.cusps import changes, forward_steps
 
 SEARCH_AHEAD = 1.5
 """Metres of path beyond the last place that are searched for the nearest point, so that a path may cross itself."""
-
-
 AT_CUSP = 0.03
 """Metres before a change of direction at which it counts as reached."""
+ROUNDING = 1e-9
+"""Metres: sums of lengths are not exact."""
 
 
 class PathTracker:
@@ -22,6 +22,9 @@ class PathTracker:
 
     A path may change between forward and backward (Reeds-Shepp). It is followed piece by piece: nothing beyond the
     next such cusp is looked at until the robot is there.
+
+    Searches pass over what cannot be what they look for: so many metres along the path change the distance to the robot
+    by no more than that. A handful of points is looked at, in floats, which take less than arrays of thirty do.
     """
 
     def __init__(self, path: Path) -> None:
@@ -30,8 +33,10 @@ class PathTracker:
         lengths = np.hypot(steps[:, 0], steps[:, 1])
         self.along = np.concatenate(([0.0], np.cumsum(lengths)))
         self._metres: list[float] = self.along.tolist()
+        self._x: list[float] = self.points[:, 0].tolist()
+        self._y: list[float] = self.points[:, 1].tolist()
         ahead = forward_steps(self.points)
-        self._ends: list[int] = [*cusps(self.points).tolist(), len(self.points) - 1]
+        self._ends: list[int] = [*changes(ahead).tolist(), len(self.points) - 1]
         self._forward: list[bool] = [bool(ahead[max(0, end - 1)]) if len(ahead) else True for end in self._ends]
         self.index = 0
 
@@ -54,9 +59,17 @@ class PathTracker:
             self._nearest(pose)
 
     def _nearest(self, pose: Pose2) -> None:
-        ahead = self.points[self.index : self._stop(SEARCH_AHEAD)]
-        square = (ahead[:, 0] - pose.x) ** 2 + (ahead[:, 1] - pose.y) ** 2
-        self.index += int(square.argmin())
+        x, y, metres, stop = self._x, self._y, self._metres, self._stop(SEARCH_AHEAD)
+        index, least, near = self.index, math.inf, math.inf
+        while index < stop:
+            dx, dy = x[index] - pose.x, y[index] - pose.y
+            square = dx * dx + dy * dy
+            if square < least:
+                self.index, least, near = index, square, math.sqrt(square)
+                index += 1
+            else:
+                farther = math.sqrt(square) - near - ROUNDING
+                index = bisect_left(metres, metres[index] + farther, index + 1, stop)
 
     def ahead(self, metres: float) -> tuple[Array, Array]:
         """Points (n, 3) of this piece for so many metres, at least two where it has any, and metres (n,) to them."""
@@ -75,8 +88,8 @@ class PathTracker:
     @property
     def piece_end(self) -> tuple[float, float]:
         """Where this piece ends."""
-        x, y, _ = self.points[self._ends[0]].tolist()
-        return x, y
+        end = self._ends[0]
+        return self._x[end], self._y[end]
 
     def carrot(self, pose: Pose2, distance: float, beyond: bool = False) -> tuple[float, float]:
         """Where the piece leaves the circle of `distance` around the robot; its end if it does not leave.
@@ -84,11 +97,9 @@ class PathTracker:
         Interpolated between points, so that the carrot glides (RPP's circleSegmentIntersection). `beyond` prolongs
         the piece in the direction it ends in, so that the robot comes in straight (interpolate_curvature_after_goal).
         """
-        ahead = self.points[self.index : min(self._stop(2 * distance + 0.5), self._ends[0]) + 1]
-        outside = np.hypot(ahead[:, 0] - pose.x, ahead[:, 1] - pose.y) >= distance
-        first = int(outside.argmax())
-        if not outside[first]:
-            x, y, yaw = ahead[-1].tolist()
+        first = self._leaves(pose, distance)
+        if first is None:
+            x, y, yaw = self.points[self._stop(2 * distance + 0.5) - 1].tolist()
             if not beyond:
                 return x, y
             more = distance if self.forward else -distance
@@ -96,11 +107,22 @@ class PathTracker:
                 x - pose.x, y - pose.y, x + 2 * more * math.cos(yaw) - pose.x, y + 2 * more * math.sin(yaw) - pose.y,
                 distance, pose,
             )  # fmt: skip
-        x, y, _ = ahead[first].tolist()
-        if first == 0:
+        x, y = self._x[first], self._y[first]
+        if first == self.index:
             return x, y
-        ax, ay, _ = ahead[first - 1].tolist()
+        ax, ay = self._x[first - 1], self._y[first - 1]
         return _leaving(ax - pose.x, ay - pose.y, x - pose.x, y - pose.y, distance, pose)
+
+    def _leaves(self, pose: Pose2, distance: float) -> int | None:
+        """The first point ahead on this piece that is no nearer to the robot than this."""
+        x, y, metres, stop = self._x, self._y, self._metres, self._stop(2 * distance + 0.5)
+        index = self.index
+        while index < stop:
+            near = math.hypot(x[index] - pose.x, y[index] - pose.y)
+            if near >= distance:
+                return index
+            index = bisect_left(metres, metres[index] + distance - near - ROUNDING, index + 1, stop)
+        return None
 
     def _stop(self, metres: float) -> int:
         """One past the last point so far ahead, or of this piece."""
