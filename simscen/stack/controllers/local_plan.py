@@ -36,7 +36,8 @@ def local_plan(track: PathTracker, metres: float, spacing: float = SPACING) -> L
     points, along = track.ahead(metres)
     length = float(min(metres, along[-1]))
     steps = max(1, math.ceil(length / spacing - 1e-9))
-    at = np.linspace(0.0, length, steps + 1)
+    at = np.arange(steps + 1) * (length / steps)
+    at[-1] = length
     x, y = np.interp(at, along, points[:, 0]), np.interp(at, along, points[:, 1])
     yaw = points[np.minimum(np.searchsorted(along, at + 1e-9, side="right"), len(points)) - 1, 2]
-    return LocalPlan(np.column_stack((x, y, yaw)), length / steps, length)
+    return LocalPlan(np.stack((x, y, yaw), axis=-1), length / steps, length)

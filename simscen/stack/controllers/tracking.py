@@ -97,13 +97,14 @@ class PathTracker:
         Interpolated between points, so that the carrot glides (RPP's circleSegmentIntersection). `beyond` prolongs
         the piece in the direction it ends in, so that the robot comes in straight (interpolate_curvature_after_goal).
         """
-        first = self._leaves(pose, distance)
+        last = min(self._stop(2 * distance + 0.5), self._ends[0])
+        first = self._leaving(pose, distance, last)
         if first is None:
-            x, y, yaw = self.points[self._stop(2 * distance + 0.5) - 1].tolist()
+            x, y, yaw = self.points[last].tolist()
             if not beyond:
                 return x, y
             more = distance if self.forward else -distance
-            return _leaving(
+            return _on_circle(
                 x - pose.x, y - pose.y, x + 2 * more * math.cos(yaw) - pose.x, y + 2 * more * math.sin(yaw) - pose.y,
                 distance, pose,
             )  # fmt: skip
@@ -111,17 +112,16 @@ class PathTracker:
         if first == self.index:
             return x, y
         ax, ay = self._x[first - 1], self._y[first - 1]
-        return _leaving(ax - pose.x, ay - pose.y, x - pose.x, y - pose.y, distance, pose)
+        return _on_circle(ax - pose.x, ay - pose.y, x - pose.x, y - pose.y, distance, pose)
 
-    def _leaves(self, pose: Pose2, distance: float) -> int | None:
-        """The first point ahead on this piece that is no nearer to the robot than this."""
-        x, y, metres, stop = self._x, self._y, self._metres, self._stop(2 * distance + 0.5)
-        index = self.index
-        while index < stop:
+    def _leaving(self, pose: Pose2, distance: float, last: int) -> int | None:
+        """The first point ahead, up to the `last`, that is no nearer to the robot than this."""
+        x, y, metres, index = self._x, self._y, self._metres, self.index
+        while index <= last:
             near = math.hypot(x[index] - pose.x, y[index] - pose.y)
             if near >= distance:
                 return index
-            index = bisect_left(metres, metres[index] + distance - near - ROUNDING, index + 1, stop)
+            index = bisect_left(metres, metres[index] + distance - near - ROUNDING, index + 1, last + 1)
         return None
 
     def _stop(self, metres: float) -> int:
@@ -130,7 +130,7 @@ class PathTracker:
         return min(end, self._ends[0] + 1)
 
 
-def _leaving(ax: float, ay: float, bx: float, by: float, radius: float, centre: Pose2) -> tuple[float, float]:
+def _on_circle(ax: float, ay: float, bx: float, by: float, radius: float, centre: Pose2) -> tuple[float, float]:
     """The point between a (inside) and b (outside) on the circle around the origin, moved to `centre`."""
     dx, dy = bx - ax, by - ay
     a, b, c = dx * dx + dy * dy, ax * dx + ay * dy, ax * ax + ay * ay - radius * radius

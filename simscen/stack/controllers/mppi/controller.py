@@ -150,8 +150,9 @@ class MppiController(PathFollower):
         """nav2_mppi_controller's DefaultOptimalTrajectoryValidator."""
         spec, rolled = self._spec.TrajectoryValidator, scene.rolled
         steps = min(round(spec.collision_lookahead_time / scene.dt), len(rolled.x))
-        x, y, yaw = rolled.x[:steps], rolled.y[:steps], rolled.yaw[:steps]
-        return not scene.hit(x, y, yaw, spec.consider_footprint is not False).any()
+        whole = spec.consider_footprint is not False
+        gap = scene.gap(scene.spots(rolled.x[:steps], rolled.y[:steps]), rolled.yaw[:steps], whole)
+        return not scene.hit(gap, whole).any()
 
     def _next(self) -> Twist:
         """What the sequence says of the end of this period; then the sequence moves on by a period."""

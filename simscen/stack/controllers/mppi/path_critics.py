@@ -4,7 +4,8 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.model import mppi as model
-from simscen.stack.controllers.mppi.critics import wrapped
+from simscen.stack.controllers.mppi.critics import apart, wrapped
+from simscen.stack.controllers.mppi.rollouts import add_up
 from simscen.stack.controllers.mppi.scene import Scene
 
 Floats = npt.NDArray[np.float32]
@@ -25,15 +26,19 @@ def path_align(spec: model.MppiPathAlignCritic, scene: Scene) -> Floats | None:
         return None
     part = slice(None, None, spec.trajectory_point_step)
     x, y = scene.rolled.x[part], scene.rolled.y[part]
-    along = np.cumsum(np.hypot(np.diff(x, axis=0), np.diff(y, axis=0)), axis=0)
-    point = np.minimum((along / np.float32(scene.plan.spacing) + np.float32(0.5)).astype(np.int32), count - 1)
+    along = add_up(apart(x[1:] - x[:-1], y[1:] - y[:-1]))
+    along /= np.float32(scene.plan.spacing)
+    along += np.float32(0.5)
+    point = np.minimum(along.astype(np.int32), count - 1)
     px, py, yaw = scene.path
-    square = (px[point] - x[1:]) ** 2 + (py[point] - y[1:]) ** 2
+    off = apart(px.take(point) - x[1:], py.take(point) - y[1:])
     if spec.use_path_orientations:
-        square += wrapped(yaw[point] - scene.rolled.yaw[part][1:]) ** 2
-    looked_at = free[point]
+        off = apart(off, wrapped(yaw.take(point) - scene.rolled.yaw[part][1:]))
+    if not blocked:
+        return np.asarray(spec.cost_weight * off.mean(axis=0))
+    looked_at = free.take(point)
     counted = np.maximum(looked_at.sum(axis=0), 1)
-    return np.asarray(spec.cost_weight * (np.sqrt(square) * looked_at).sum(axis=0) / counted)
+    return np.asarray(spec.cost_weight * (off * looked_at).sum(axis=0) / counted)
 
 
 def path_follow(spec: model.MppiPathFollowCritic, scene: Scene) -> Floats:

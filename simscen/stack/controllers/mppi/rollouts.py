@@ -4,6 +4,7 @@ Controls and velocities are arrays (axes, steps, n) of float32, the axes being v
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -36,31 +37,59 @@ def predicted(now: Floats, controls: Floats, limits: Limits, dt: float) -> Float
 
     Bounded by the accelerations but, as in Nav2, not by the speeds: those are ConstraintCritic's.
     """
-    axes, steps = controls.shape[:2]
-    up = (limits.faster[:axes, None] * dt).astype(np.float32)
-    down = (limits.slower[:axes, None] * dt).astype(np.float32)
     velocities = np.empty_like(controls)
     velocities[:, 0] = now[:, None]
-    for step in range(1, steps):
-        last = velocities[:, step - 1]
-        forward = last > 0.0
-        least, most = last + np.where(forward, down, -up), last + np.where(forward, up, -down)
-        np.clip(controls[:, step - 1], least, most, out=velocities[:, step])
+    faster, slower = (limits.faster * dt).astype(np.float32), (limits.slower * dt).astype(np.float32)
+    for here, asked, up, down in zip(velocities, controls, faster, slower, strict=False):
+        if down == -up:
+            _followed(here, asked, up)
+        else:
+            _followed_braking(here, asked, up, down)
     return velocities
+
+
+def _followed(velocities: Floats, asked: Floats, change: np.float32) -> None:
+    """One axis (steps, n), in place, whose changes have one bound; no array is made on the way."""
+    bound = np.empty_like(velocities[0])
+    for (last, here), wanted in zip(pairwise(velocities), asked, strict=False):
+        np.maximum(wanted, np.subtract(last, change, out=bound), out=here)
+        np.minimum(here, np.add(last, change, out=bound), out=here)
+
+
+def _followed_braking(velocities: Floats, asked: Floats, up: np.float32, down: np.float32) -> None:
+    """The same where the base brakes otherwise than it speeds up: which bound holds is looked up by the sign."""
+    bound, forward = np.empty_like(velocities[0]), np.empty(velocities[0].shape, np.bool_)
+    at_least, at_most = np.array((-up, down)), np.array((-down, up))
+    for (last, here), wanted in zip(pairwise(velocities), asked, strict=False):
+        sign = np.greater(last, 0.0, out=forward).view(np.uint8)
+        np.add(at_least.take(sign, out=bound, mode="clip"), last, out=bound)
+        np.maximum(wanted, bound, out=here)
+        np.add(at_most.take(sign, out=bound, mode="clip"), last, out=bound)
+        np.minimum(here, bound, out=here)
 
 
 def integrated(velocities: Floats, yaw: float, dt: float) -> Rollouts:
     """Where these velocities lead from a heading; each step keeps the heading it begins with."""
-    step = np.float32(dt)
-    headings = np.cumsum(velocities[WZ] * step, axis=0, dtype=np.float32) + np.float32(yaw)
-    before = np.concatenate((np.full((1, headings.shape[1]), yaw, np.float32), headings[:-1]))
-    cosine, sine = np.cos(before), np.sin(before)
+    step, (steps, count) = np.float32(dt), velocities.shape[1:]
+    headings = np.empty((steps + 1, count), np.float32)
+    headings[0], turned = 0.0, headings[1:]
+    add_up(np.multiply(velocities[WZ], step, out=turned))
+    headings += np.float32(yaw)
+    cosine, sine = np.cos(headings[:-1]), np.sin(headings[:-1])
     dx, dy = velocities[VX] * cosine, velocities[VX] * sine
     if len(velocities) > VY:
         dx -= velocities[VY] * sine
         dy += velocities[VY] * cosine
-    x, y = np.cumsum(dx * step, axis=0, dtype=np.float32), np.cumsum(dy * step, axis=0, dtype=np.float32)
-    return Rollouts(x, y, headings, velocities)
+    dx *= step
+    dy *= step
+    return Rollouts(add_up(dx), add_up(dy), turned, velocities)
+
+
+def add_up(rows: Floats) -> Floats:
+    """Sums of the rows (m, n) so far, in place: row by row, for numpy's cumsum takes three to five times as long."""
+    for before, here in pairwise(rows):
+        np.add(before, here, out=here)
+    return rows
 
 
 def delay(velocities: Floats, sent: Floats, steps: tuple[int, ...]) -> None:

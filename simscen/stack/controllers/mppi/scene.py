@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +19,15 @@ Mask = npt.NDArray[np.bool_]
 INSCRIBED, UNKNOWN = 253, 255
 ESCAPE = 0.01
 """Metres: a robot in collision may go where it is no more than so much nearer to the obstacle."""
+
+
+class Spots(NamedTuple):
+    """Points (…,) with the number of the costmap's cell under each; which lie on it, where not all do."""
+
+    x: Floats
+    y: Floats
+    cell: npt.NDArray[np.int32]
+    on_map: Mask | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,59 +58,77 @@ class Scene:
         x, y, _ = self.path
         length = self.rolled.speed[1:].sum(axis=0) * np.float32(self.dt)
         reach = np.minimum(np.ceil(length / max(self.plan.spacing, 1e-9) - 1e-4), len(x) - 1)
-        square = (x[:, None] - self.rolled.x[-1]) ** 2 + (y[:, None] - self.rolled.y[-1]) ** 2
-        square[np.arange(len(x))[:, None] > reach] = np.inf
-        return int(square.argmin(axis=0).max())
+        square, up = np.subtract.outer(self.rolled.x[-1], x), np.subtract.outer(self.rolled.y[-1], y)
+        square *= square
+        up *= up
+        square += up
+        np.copyto(square, np.inf, where=np.arange(len(x)) > reach[:, None])
+        return int(square.argmin(axis=1).max())
 
     @cached_property
     def free_points(self) -> Mask:
         """Which points (m,) of the plan the middle of the robot can be at, as far as is known."""
-        costs = self.costs(*self.path[:2])
+        costs = self.costs(self.spots(*self.path[:2]))
         return np.asarray((costs < INSCRIBED) | (costs == UNKNOWN))
 
-    def costs(self, x: Floats, y: Floats) -> npt.NDArray[np.uint8]:
-        """Costs (…,) at points (…,); 0 off the costmap."""
-        rows, columns, on_map = self._cells(x, y)
-        costs = self.costmap.costs[rows, columns]
-        return costs if on_map.all() else np.where(on_map, costs, np.uint8(0))
+    @cached_property
+    def _costs(self) -> npt.NDArray[np.uint8]:
+        return self.costmap.costs.ravel()
 
-    def hit(self, x: Floats, y: Floats, yaw: Floats, whole: bool) -> Mask:
-        """Which poses (…,) touch something: with the whole hull, or with its inscribed circle.
+    @cached_property
+    def _distances(self) -> Floats:
+        return self.costmap.distance.ravel()
+
+    def spots(self, x: Floats, y: Floats) -> Spots:
+        """The cells under points (…,)."""
+        view = self.costmap
+        scale, (height, width) = np.float32(1.0 / view.resolution), view.costs.shape
+        across, up = x + np.float32(self.pose.x - view.origin[0]), y + np.float32(self.pose.y - view.origin[1])
+        across *= scale
+        up *= scale
+        on_map: Mask | None = None
+        if across.min() < 0 or up.min() < 0 or across.max() >= width or up.max() >= height:
+            on_map = np.asarray((up >= 0) & (across >= 0) & (up < height) & (across < width))
+            across, up = np.clip(across, 0, width - 1), np.clip(up, 0, height - 1)
+        cell = up.astype(np.int32)
+        cell *= width
+        cell += across.astype(np.int32)
+        return Spots(x, y, cell, on_map)
+
+    def costs(self, spots: Spots) -> npt.NDArray[np.uint8]:
+        """Costs (…,) there; 0 off the costmap."""
+        costs = self._costs.take(spots.cell)
+        return costs if spots.on_map is None else np.where(spots.on_map, costs, np.uint8(0))
+
+    def hit(self, gap: Floats, whole: bool) -> Mask:
+        """Which rollouts (n,) touch something where they keep such a `gap` (steps, n) to it.
 
         What lies off the costmap is taken for free. A robot that is in collision already, or whose discs are as they
         reach a little beyond its hull, may go anywhere but further into it, or it could never get out.
         """
-        origin = np.zeros((1, 1), np.float32)
-        here = float(self.gap(origin, origin, np.full((1, 1), self.pose.yaw, np.float32), whole)[0, 0])
-        return np.asarray(self.gap(x, y, yaw, whole) <= min(0.0, here - ESCAPE))
+        return np.asarray(gap.min(axis=0) <= min(0.0, self._here[whole] - ESCAPE))
 
-    def gap(self, x: Floats, y: Floats, yaw: Floats, whole: bool) -> Floats:
+    @cached_property
+    def _here(self) -> tuple[float, float]:
+        """Metres between what is nearest and the inscribed circle, and the hull, where the robot is."""
+        origin, yaw = np.zeros((1, 1), np.float32), np.full((1, 1), self.pose.yaw, np.float32)
+        spots = self.spots(origin, origin)
+        return float(self.gap(spots, yaw, False)[0, 0]), float(self.gap(spots, yaw, True)[0, 0])
+
+    def gap(self, spots: Spots, yaw: Floats, whole: bool) -> Floats:
         """Metres (…,) between the hull, or its inscribed circle, and the nearest obstacle."""
         discs: Discs = self.footprint.discs
         if not whole:
-            return np.asarray(self._distance(x, y) - np.float32(self.footprint.inscribed))
+            return np.asarray(self._distance(spots) - np.float32(self.footprint.inscribed))
         if len(discs.offsets) == 1 and discs.offsets[0] == 0.0:
-            return np.asarray(self._distance(x, y) - np.float32(discs.radius))
+            return np.asarray(self._distance(spots) - np.float32(discs.radius))
         cosine, sine = np.cos(yaw), np.sin(yaw)
-        least = np.full(x.shape, np.inf, np.float32)
+        least = np.full(spots.x.shape, np.inf, np.float32)
         for offset in discs.offsets.astype(np.float32):
-            np.minimum(least, self._distance(x + offset * cosine, y + offset * sine), out=least)
+            disc = self.spots(spots.x + offset * cosine, spots.y + offset * sine)
+            np.minimum(least, self._distance(disc), out=least)
         return np.asarray(least - np.float32(discs.radius))
 
-    def _distance(self, x: Floats, y: Floats) -> Floats:
-        rows, columns, on_map = self._cells(x, y)
-        near = self.costmap.distance[rows, columns]
-        return near if on_map.all() else np.where(on_map, near, np.float32(np.inf))
-
-    def _cells(self, x: Floats, y: Floats) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int32], Mask]:
-        """Rows and columns under points, those off the costmap moved to its edge, and which are on it."""
-        view = self.costmap
-        scale = np.float32(1.0 / view.resolution)
-        across = (x + np.float32(self.pose.x - view.origin[0])) * scale
-        up = (y + np.float32(self.pose.y - view.origin[1])) * scale
-        height, width = view.costs.shape
-        on_map = (up >= 0) & (across >= 0) & (up < height) & (across < width)
-        if on_map.all():
-            return up.astype(np.int32), across.astype(np.int32), on_map
-        rows = np.clip(up, 0, height - 1).astype(np.int32)
-        return rows, np.clip(across, 0, width - 1).astype(np.int32), on_map
+    def _distance(self, spots: Spots) -> Floats:
+        near = self._distances.take(spots.cell)
+        return near if spots.on_map is None else np.where(spots.on_map, near, np.float32(np.inf))

@@ -36,15 +36,25 @@ def within_limits(sequence: Floats, now: Floats, limits: Limits, dt: float) -> F
     _keep_to_curve(sequence, limits)
     result = np.empty_like(sequence)
     for axis in range(len(sequence)):
-        last = float(now[axis])
-        result[axis, 0] = last
-        for step, asked in enumerate(sequence[axis, 1:].tolist(), start=1):
-            wanted = min(max(asked, low[axis]), high[axis])
-            least, most = (slower[axis], faster[axis]) if last >= 0.0 else (-faster[axis], -slower[axis])
-            last = min(max(wanted, last + least), last + most)
-            result[axis, step] = last
+        result[axis] = _driveable(
+            sequence[axis].tolist(), float(now[axis]), (low[axis], high[axis]), (faster[axis], slower[axis])
+        )
     _keep_to_curve(result, limits)
     return result
+
+
+def _driveable(
+    asked: list[float], now: float, bounds: tuple[float, float], changes: tuple[float, float]
+) -> list[float]:
+    """One axis of it: within `bounds`, and changing by no more than so much a step, up and (negative) braking."""
+    (low, high), (up, down) = bounds, changes
+    found, last = [now], now
+    for wanted in asked[1:]:
+        wanted = low if wanted < low else high if wanted > high else wanted
+        least, most = (last + down, last + up) if last >= 0.0 else (last - up, last - down)
+        last = least if wanted < least else most if wanted > most else wanted
+        found.append(last)
+    return found
 
 
 def _keep_to_curve(sequence: Floats, limits: Limits) -> None:

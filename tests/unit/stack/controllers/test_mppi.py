@@ -161,7 +161,7 @@ def test_cost_critic_is_the_mean_cost_over_254_and_a_collision_costs_a_million()
     spec = model.MppiCostCritic(near_goal_distance=0.0, trajectory_point_step=1)
     seen = scene(along(0.0, 0.5, 1.5), view)
     said, hit = critics.cost(spec, seen)
-    costs = seen.costs(seen.rolled.x, seen.rolled.y)
+    costs = seen.costs(seen.spots(seen.rolled.x, seen.rolled.y))
     assert hit.tolist() == [False, False, True]
     assert said[1] == pytest.approx(3.81 / 254 * costs[:, 1].mean(), rel=1e-5)
     assert said[2] == pytest.approx(3.81 / 254 / 10 * 1e6, rel=1e-5)
@@ -178,7 +178,7 @@ def test_cost_critic_near_the_goal_counts_what_is_all_but_a_collision_and_no_mor
 def test_obstacles_critic_counts_nearness_within_its_margin() -> None:
     view = view_of((1.0, -3.0, 1.2, 3.0))
     seen = scene(along(0.7), view)
-    gap = seen.gap(seen.rolled.x, seen.rolled.y, seen.rolled.yaw, whole=True)[:, 0]
+    gap = seen.gap(seen.spots(seen.rolled.x, seen.rolled.y), seen.rolled.yaw, whole=True)[:, 0]
     said, hit = critics.obstacles(model.MppiObstaclesCritic(repulsion_weight=0.0), seen)
     assert not hit.any()
     assert said[0] == pytest.approx(20.0 * np.clip(0.1 - gap, 0, None).sum(), rel=1e-4)
@@ -195,7 +195,7 @@ def test_a_robot_that_stands_so_near_that_its_discs_touch_may_drive_along() -> N
     everywhere = np.full((60, 60), 0.16, np.float32)
     view = CostmapView(np.zeros((60, 60), np.uint8), everywhere, 0.05, (-1.5, -1.5))
     seen = replace(scene(along(0.3), view), footprint=Footprint(robot, 0.05))
-    gap = seen.gap(seen.rolled.x, seen.rolled.y, seen.rolled.yaw, whole=True)
+    gap = seen.gap(seen.spots(seen.rolled.x, seen.rolled.y), seen.rolled.yaw, whole=True)
     assert gap.max() < 0.0 < Footprint(robot, 0.05).clearance(view, np.array([seen.pose]))[0]
     _, hit = critics.cost(model.MppiCostCritic(), seen)
     assert not hit.any()
