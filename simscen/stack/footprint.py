@@ -103,6 +103,8 @@ class Discs:
 
     def clearance(self, costmap: CostmapView, x: Reals, y: Reals, yaw: Reals) -> npt.NDArray[np.float32]:
         """Distance (…,) from the discs to the nearest lethal cell at poses (…,); negative in collision."""
+        if len(self.offsets) == 1 and self.offsets[0] == 0.0:
+            return np.asarray(distances(costmap, np.stack((x, y), axis=-1)) - np.float32(self.radius))
         cosine, sine = np.cos(yaw), np.sin(yaw)
         least: npt.NDArray[np.float32] | None = None
         for offset in self.offsets.tolist():

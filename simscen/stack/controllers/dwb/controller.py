@@ -61,23 +61,24 @@ class DynamicWindowController(PathFollower):
         velocities = window(kinematics, twist, spec.sim_time, self._samples)
         if not len(velocities):
             raise NavigationFailure(ErrorCode.NO_VALID_CONTROL, "the limits leave no velocity")
-        poses = trajectories(
+        tried = trajectories(
             pose, twist, velocities, kinematics, spec.sim_time, spec.linear_granularity, spec.angular_granularity
         )
+        ends = tried.ends
         driven = (abs(twist.vx) + abs(twist.vy)) * spec.sim_time
         reach = max(spec.prune_distance, FURTHER * driven + BEYOND)
         plan = local_plan(track, reach, costmap.resolution).points[:, :2]
-        found = scores(spec, costmap, pose, goal.pose, plan, velocities, poses[:, -1])
+        found = scores(spec, costmap, pose, goal.pose, plan, velocities, ends)
         legal, total = self._oscillation.legal(velocities), found.total
         if there and spec.rotate_to_goal_scale > 0.0:
-            off, allowed = self._rotate.scores(twist, goal.pose.yaw, velocities, poses[:, -1, 2])
+            off, allowed = self._rotate.scores(twist, goal.pose.yaw, velocities, ends[:, 2])
             legal, total = legal & allowed, total + spec.rotate_to_goal_scale * off
         order = np.argsort(np.where(legal, total, np.inf), kind="stable")
         order = order[: int(np.count_nonzero(legal & np.isfinite(total)))]
-        best = self._room.first_free(costmap, pose, poses[order])
-        command = STOP if best is None else Twist(*velocities[order[best]].tolist())
+        best = self._room.first_free(costmap, pose, tried, order)
+        command = STOP if best is None else Twist(*velocities[best].tolist())
         self._oscillation.debrief(pose, command)
         if best is None:
             raise NavigationFailure(ErrorCode.NO_VALID_CONTROL, "no trajectory is legal")
-        self._best = poses[order[best]]
+        self._best = tried.poses(np.array([best]))[:, 0]
         return command

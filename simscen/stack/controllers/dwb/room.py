@@ -1,8 +1,10 @@
 """Whether a trajectory hits anything: dwb_critics' BaseObstacle and ObstacleFootprint as a veto."""
 
 import numpy as np
+import numpy.typing as npt
 
-from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry import Pose2
+from simscen.stack.controllers.dwb.trajectories import Trajectories
 from simscen.stack.footprint import Footprint
 from simscen.stack.protocols import CostmapView
 
@@ -18,23 +20,25 @@ class Room:
     def __init__(self, footprint: Footprint) -> None:
         self._footprint = footprint
 
-    def first_free(self, costmap: CostmapView, pose: Pose2, poses: Array) -> int | None:
-        """The first of the trajectories (n, steps, 3), the best coming first, that keeps ROOM; else that hits nothing.
+    def first_free(
+        self, costmap: CostmapView, pose: Pose2, tried: Trajectories, order: npt.NDArray[np.intp]
+    ) -> int | None:
+        """The first of the trajectories in this order, the best coming first, that keeps ROOM; else that hits nothing.
 
         From a collision, the first that leads out of it.
         """
-        gaps = np.empty(poses.shape[:2], np.float32)
-        for start in range(0, len(poses), AT_ONCE):
+        gaps = np.empty((len(tried.x), len(order)), np.float32)
+        for start in range(0, len(order), AT_ONCE):
             part = slice(start, start + AT_ONCE)
-            x, y, yaw = np.moveaxis(poses[part], -1, 0)
-            gaps[part] = self._footprint.discs.clearance(costmap, x, y, yaw)
-            roomy = (gaps[part] > ROOM).all(axis=1)
+            gaps[:, part] = self._footprint.discs.clearance(costmap, *np.moveaxis(tried.poses(order[part]), -1, 0))
+            roomy = (gaps[:, part] > ROOM).all(axis=0)
             if roomy.any():
-                return start + int(roomy.argmax())
-        free = (gaps > 0.0).all(axis=1)
+                return int(order[start + int(roomy.argmax())])
+        free = (gaps > 0.0).all(axis=0)
         if not free.any():
-            free = self._footprint.free(costmap, poses.reshape(-1, 3)).reshape(gaps.shape).all(axis=1)
+            poses = tried.poses(order).reshape(-1, 3)
+            free = self._footprint.free(costmap, poses).reshape(gaps.shape).all(axis=0)
         if not free.any() and self._footprint.clearance(costmap, np.array([pose]))[0] <= 0.0:
-            no_nearer = (gaps >= gaps[:, :1]).all(axis=1)
-            free = no_nearer & (gaps[:, -1] > gaps[:, 0] + 0.5 * costmap.resolution)
-        return int(free.argmax()) if free.any() else None
+            no_nearer = (gaps >= gaps[0]).all(axis=0)
+            free = no_nearer & (gaps[-1] > gaps[0] + 0.5 * costmap.resolution)
+        return int(order[int(free.argmax())]) if free.any() else None

@@ -1,49 +1,81 @@
 """Where the velocities that DWB tries lead: dwb_plugins' StandardTrajectoryGenerator."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.motion import Twist
 from simscen.stack.controllers.dwb.kinematics import Kinematics
+from simscen.stack.controllers.sums import add_up
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectories:
+    """Positions (steps, n) of trajectories that begin where the robot is, and headings (steps, m) of the few turns.
+
+    `turn` (n,) says which of the headings are each trajectory's: most share theirs with others, and sines are dear.
+    """
+
+    x: Array
+    y: Array
+    yaw: Array
+    turn: npt.NDArray[np.intp]
+
+    def __len__(self) -> int:
+        return len(self.turn)
+
+    @property
+    def ends(self) -> Array:
+        """The last poses (n, 3)."""
+        return np.column_stack((self.x[-1], self.y[-1], self.yaw[-1, self.turn]))
+
+    def poses(self, which: npt.NDArray[np.intp]) -> Array:
+        """All poses (steps, k, 3) of k of them."""
+        return np.stack((self.x[:, which], self.y[:, which], self.yaw[:, self.turn[which]]), axis=-1)
 
 
 def trajectories(
     pose: Pose2, now: Twist, velocities: Array, kinematics: Kinematics, seconds: float, metres: float, radians: float
-) -> Array:
-    """Poses (n, steps, 3), the first being `pose`, of a base that changes to each of the velocities (n, 3).
+) -> Trajectories:
+    """Of a base that changes to each of the velocities (n, 3).
 
     A trajectory has as many steps as it takes for none to be longer than `metres` or to turn by more than `radians`
     at its velocity; those with fewer than others stay at their end. Each step keeps the heading it begins with.
     """
     linear = np.hypot(velocities[:, 0], velocities[:, 1]) * seconds / metres
     counts = np.maximum(1.0, np.ceil(np.maximum(linear, np.abs(velocities[:, 2]) * seconds / radians)))
-    dt = (seconds / counts)[:, None]
-    number = np.arange(1, math.ceil(counts.max()) + 1)
-    passed = np.minimum(number, counts[:, None]) * dt
-    lasts = np.where(number <= counts[:, None], dt, 0.0)
-    vx, vy, wz = (
-        _changing(start, target, up * passed, down * passed)
-        for start, target, up, down in zip(
-            now, velocities.T, kinematics.acceleration, kinematics.deceleration, strict=True
-        )
-    )
-    turned = np.cumsum(wz * lasts, axis=1)
-    yaw = pose.yaw + np.concatenate((np.zeros_like(dt), turned), axis=1)
-    cosine, sine = np.cos(yaw[:, :-1]) * lasts, np.sin(yaw[:, :-1]) * lasts
+    _, one, turn = np.unique(velocities[:, 2] + 1j * counts, return_index=True, return_inverse=True)
+    count, dt = counts[one], seconds / counts[one]
+    number = np.arange(1, math.ceil(counts.max()) + 1)[:, None]
+    passed, lasts = np.minimum(number, count) * dt, np.where(number <= count, dt, 0.0)
+    bounds = list(zip(now, kinematics.acceleration, kinematics.deceleration, strict=True))
+    wz = _changing(velocities[one, 2], *bounds[2], passed)
+    yaw = _from(pose.yaw, wz * lasts)
+    cosine, sine = (each.take(turn, axis=1) for each in (np.cos(yaw[:-1]) * lasts, np.sin(yaw[:-1]) * lasts))
+    passed = passed.take(turn, axis=1)
+    vx = _changing(velocities[:, 0], *bounds[0], passed)
     dx, dy = vx * cosine, vx * sine
-    if vy.any():
+    if now.vy != 0.0 or velocities[:, 1].any():
+        vy = _changing(velocities[:, 1], *bounds[1], passed)
         dx, dy = dx - vy * sine, dy + vy * cosine
-    poses = np.empty((*yaw.shape, 3))
-    poses[:, 0, :2], poses[..., 2] = (pose.x, pose.y), yaw
-    poses[:, 1:, 0], poses[:, 1:, 1] = pose.x + np.cumsum(dx, axis=1), pose.y + np.cumsum(dy, axis=1)
-    return poses
+    return Trajectories(_from(pose.x, dx), _from(pose.y, dy), yaw, turn)
 
 
-def _changing(start: float, target: Array, up: Array, down: Array) -> Array:
-    """The velocities (n, steps) on the way from `start` to the targets (n,), after changes of at most so much."""
-    if start == 0.0 and not target.any():
-        return np.zeros((1, 1))
-    goal = target[:, None]
-    return np.asarray(np.where(start < goal, np.minimum(goal, start + up), np.maximum(goal, start + down)))
+def _changing(target: Array, start: float, up: float, down: float, passed: Array) -> Array:
+    """The velocities (steps, n) on the way from `start` to the targets (n,), after so many seconds."""
+    velocities = passed * np.where(start < target, up, down)
+    velocities += start
+    np.maximum(velocities, np.minimum(start, target), out=velocities)
+    return np.minimum(velocities, np.maximum(start, target), out=velocities)
+
+
+def _from(start: float, steps: Array) -> Array:
+    """Where steps (m, n) lead from a start: (m + 1, n)."""
+    places = np.empty((len(steps) + 1, steps.shape[1]))
+    places[0], places[1:] = 0.0, steps
+    add_up(places[1:])
+    places += start
+    return places

@@ -5,8 +5,8 @@ import numpy.typing as npt
 
 from simscen.model import mppi as model
 from simscen.stack.controllers.mppi.critics import apart, wrapped
-from simscen.stack.controllers.mppi.rollouts import add_up
 from simscen.stack.controllers.mppi.scene import Scene
+from simscen.stack.controllers.sums import add_up
 
 Floats = npt.NDArray[np.float32]
 HALF_TURN = np.float32(np.pi)

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.stack.controllers.mppi.limits import Limits
+from simscen.stack.controllers.sums import add_up
 
 Floats = npt.NDArray[np.float32]
 VX, WZ, VY = 0, 1, 2
@@ -83,13 +84,6 @@ def integrated(velocities: Floats, yaw: float, dt: float) -> Rollouts:
     dx *= step
     dy *= step
     return Rollouts(add_up(dx), add_up(dy), turned, velocities)
-
-
-def add_up(rows: Floats) -> Floats:
-    """Sums of the rows (m, n) so far, in place: row by row, for numpy's cumsum takes three to five times as long."""
-    for before, here in pairwise(rows):
-        np.add(before, here, out=here)
-    return rows
 
 
 def delay(velocities: Floats, sent: Floats, steps: tuple[int, ...]) -> None:
