@@ -10,7 +10,7 @@ Real = TypeVar("Real", np.float32, np.float64)
 
 
 def add_up(rows: npt.NDArray[Real]) -> npt.NDArray[Real]:
-    """The sums of the rows (m, n) so far, in place: row by row, for numpy's cumsum takes three to five times as long."""
+    """Sums of the rows (m, n) so far, in place: row by row, for numpy's cumsum takes three to five times as long."""
     for before, here in pairwise(rows):
         np.add(before, here, out=here)
     return rows

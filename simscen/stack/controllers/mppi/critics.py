@@ -33,9 +33,9 @@ def cost(spec: model.MppiCostCritic, scene: Scene) -> tuple[Floats, Mask]:
     """The mean cost of the costmap along each rollout; and which rollouts hit something."""
     part = slice(None, None, spec.trajectory_point_step)
     x, y, yaw = scene.rolled.x[part], scene.rolled.y[part], scene.rolled.yaw[part]
-    spots = scene.spots(x, y)
-    hit = scene.hit(scene.gap(spots, yaw, spec.consider_footprint is not False), spec.consider_footprint is not False)
-    price = np.arange(256, dtype=np.float32) if scene.plan.length >= spec.near_goal_distance else np.zeros(256, np.float32)
+    spots, whole = scene.spots(x, y), spec.consider_footprint is not False
+    hit = scene.hit(scene.gap(spots, yaw, whole), whole)
+    price = np.arange(256, dtype=np.float32) * np.float32(scene.plan.length >= spec.near_goal_distance)
     price[spec.near_collision_cost :] = spec.critical_cost
     paid = price.take(scene.costs(spots)).sum(axis=0)
     total = np.where(hit, np.float32(spec.collision_cost), paid)

@@ -49,8 +49,8 @@ def _driveable(
     """One axis of it: within `bounds`, and changing by no more than so much a step, up and (negative) braking."""
     (low, high), (up, down) = bounds, changes
     found, last = [now], now
-    for wanted in asked[1:]:
-        wanted = low if wanted < low else high if wanted > high else wanted
+    for each in asked[1:]:
+        wanted = low if each < low else min(each, high)
         least, most = (last + down, last + up) if last >= 0.0 else (last - up, last - down)
         last = least if wanted < least else most if wanted > most else wanted
         found.append(last)
