@@ -1,6 +1,7 @@
 """Whether there can be a plan at all: start and goal are checked before any search, with Nav2's codes."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ from scipy.ndimage import label
 
 from simscen.core.geometry import Pose2
 from simscen.core.navigation import ErrorCode
+from simscen.stack.planners.finish import spaced
 from simscen.stack.planners.rates import Rates
 from simscen.stack.protocols import NavigationFailure
 
@@ -31,21 +33,21 @@ class Ends:
 def find_ends(rates: Rates, start: Pose2, goal: Pose2, tolerance: float) -> Ends:
     """The ends of a search.
 
-    A start where the robot is too near an obstacle is moved to the nearest free place (it is there already). A goal
-    is moved to the nearest place within `tolerance` that can be reached. Raises NavigationFailure with
-    START_/GOAL_OUTSIDE_MAP, START_/GOAL_OCCUPIED or NO_VALID_PATH.
+    A start where the robot is too near an obstacle is moved to the nearest free place that nothing is in front of (it
+    is there already). A goal is moved to the nearest place within `tolerance` that can be reached. Raises
+    NavigationFailure with START_/GOAL_OUTSIDE_MAP, START_/GOAL_OCCUPIED or NO_VALID_PATH.
     """
     _possible(rates, start, ErrorCode.START_OUTSIDE_MAP, ErrorCode.START_OCCUPIED, "start")
     _possible(rates, goal, ErrorCode.GOAL_OUTSIDE_MAP, ErrorCode.GOAL_OCCUPIED, "goal")
     free = rates.free
-    begin = _nearest(rates, free, start, ESCAPE)
+    begin = next((place for place in _near(rates, free, start, ESCAPE) if _open(rates, start, place)), None)
     if begin is None:
         raise NavigationFailure(ErrorCode.START_OCCUPIED, f"no free place within {ESCAPE} m of the start")
-    if _nearest(rates, free, goal, tolerance) is None:
+    if next(_near(rates, free, goal, tolerance), None) is None:
         raise NavigationFailure(ErrorCode.GOAL_OCCUPIED, f"no room for the robot within {tolerance} m of the goal")
     pieces, _ = label(free)
     reachable = pieces == pieces[_cell(rates, begin)]
-    end = _nearest(rates, reachable, goal, tolerance)
+    end = next(_near(rates, reachable, goal, tolerance), None)
     if end is None:
         raise NavigationFailure(ErrorCode.NO_VALID_PATH, "start and goal are not connected")
     return Ends(begin, end, reachable)
@@ -66,18 +68,26 @@ def _cell(rates: Rates, point: tuple[float, float]) -> tuple[int, int]:
     )
 
 
-def _nearest(rates: Rates, free: npt.NDArray[np.bool_], pose: Pose2, within: float) -> tuple[float, float] | None:
-    """The point itself if its cell is free, else the centre of the nearest free cell, at most `within` away."""
+def _near(rates: Rates, free: npt.NDArray[np.bool_], pose: Pose2, within: float) -> Iterator[tuple[float, float]]:
+    """The point itself if its cell is free, else the centres of free cells at most `within` away, nearest first."""
     row, column = _cell(rates, (pose.x, pose.y))
     if free[row, column]:
-        return pose.x, pose.y
+        yield pose.x, pose.y
+        return
     reach = math.ceil(within / rates.resolution)
     top, left = max(0, row - reach), max(0, column - reach)
     cells = np.argwhere(free[top : row + reach + 1, left : column + reach + 1]) + np.array((top, left))
     x = rates.origin[0] + (cells[:, 1] + 0.5) * rates.resolution
     y = rates.origin[1] + (cells[:, 0] + 0.5) * rates.resolution
     distance = np.hypot(x - pose.x, y - pose.y)
-    if not len(cells) or distance.min() > within:
-        return None
-    best = int(np.argmin(distance))
-    return float(x[best]), float(y[best])
+    for best in np.argsort(distance, kind="stable").tolist():
+        if distance[best] > within:
+            return
+        yield float(x[best]), float(y[best])
+
+
+def _open(rates: Rates, start: Pose2, place: tuple[float, float]) -> bool:
+    """Whether no obstacle is between the start and this place."""
+    way = spaced(np.array([(start.x, start.y), place]), 0.5 * rates.resolution)
+    columns, rows = np.floor((way - rates.origin) / rates.resolution).astype(np.int64).T
+    return bool((rates.costmap.distance[rows, columns] > 0.0).all())

@@ -105,12 +105,16 @@ def _step_costs(rates: Rates, points: Array, stride: float) -> Costs:
 
 
 def smoothed(rates: Rates, points: Array) -> Array:
-    """The path (n, 2) with its corners rounded, as long as that costs next to nothing."""
+    """The path (n, 2) with its corners rounded, as long as that costs next to nothing.
+
+    One that is too tight by a hair costs more than can be said, and is only exchanged for one that is not.
+    """
     cost = rates.along(points)
     for _ in range(SMOOTHINGS):
         other = points.copy()
         other[1:-1] += 0.5 * (0.5 * (points[:-2] + points[2:]) - points[1:-1])
-        if rates.along(other) > MOST_RISE * cost:
+        costs = rates.along(other)
+        if math.isinf(costs) or costs > MOST_RISE * cost:
             break
-        points = other
+        points, cost = other, costs if math.isinf(cost) else cost
     return points

@@ -10,7 +10,10 @@ from simscen.core.navigation import ErrorCode
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.planners import OmplPlanner as PlannerSpec
 from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.planners.finish import SPACING, spaced
 from simscen.stack.planners.ompl_planner import OmplPlanner
+from simscen.stack.planners.rates import Rates
+from simscen.stack.planners.tube import eased, smoothed
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel, Surroundings
 from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot
 
@@ -140,3 +143,35 @@ def test_a_way_of_hundreds_of_metres_through_many_doors_is_found() -> None:
     path = planner().plan(view, start, goal, 1)
     assert path.length() > 200
     assert path.length() < 1.06 * shortest(view, start, goal, 0.22)
+
+
+def hall(*boxes: tuple[float, float, float, float]) -> CostmapView:
+    """A room with such walls in it."""
+    world = Flatland().room(14, 10)
+    world.boxes += boxes
+    return view_of(world)
+
+
+def struck(view: CostmapView, points: np.ndarray) -> bool:
+    """Whether a point (n, 2) lies on a lethal cell."""
+    columns, rows = np.floor((points - view.origin) / view.resolution).astype(int).T
+    return bool((view.distance[rows, columns] == 0.0).any())
+
+
+def test_a_way_that_is_too_tight_by_a_hair_is_not_smoothed_through_walls() -> None:
+    view = hall((4.0, 0.0, 4.1, 6.0))
+    rates = Rates(view, ROBOT, 2.0, True)
+    way = np.array([(2.0, 2.0), (2.0, 6.15), (4.05, 6.15), (6.0, 6.15), (6.0, 2.0)])  # for a radius of 22 cm
+    assert np.isinf(rates.along(way)) and not struck(view, spaced(way, SPACING))
+    for better in (smoothed(rates, way), eased(rates, way)):
+        assert not struck(view, spaced(better, SPACING))
+
+
+def test_who_stands_too_near_a_wall_is_not_sent_to_the_nearest_free_place_behind_it() -> None:
+    pocket = ((5.0, 3.0, 5.05, 7.0), (5.35, 3.0, 5.4, 7.0))
+    start, goal = Pose2(5.2, 6.75, 0.0), Pose2(12.0, 5.0, 0.0)
+    path = planner().plan(hall(*pocket), start, goal, 1)
+    assert not struck(hall(*pocket), path.points[:, :2])
+    with pytest.raises(NavigationFailure) as raised:
+        planner().plan(hall(*pocket, (5.0, 7.0, 5.4, 7.05)), start, goal, 1)
+    assert raised.value.code is ErrorCode.START_OCCUPIED
