@@ -120,7 +120,7 @@ class WorldSpec(Spec):
     """A Gazebo world to add things to."""
     walls: Annotated[list[Wall], Field(max_length=2000)] = []
     """Walls along polylines."""
-    obstacles: Annotated[list[Obstacle], Field(max_length=2000)] = []
+    obstacles: Annotated[list[Obstacle], Field(max_length=10_000)] = []
     """What stands and never moves."""
     objects: Annotated[list[Movable], Field(max_length=200)] = []
     """What can move, be pushed, or be moved by a scenario."""

@@ -23,6 +23,8 @@ from simscen.worlds.rosmap import save_map
 
 HOUSE = Path(__file__).parent.parent / "data" / "bench" / "house.scenario.yaml"
 MOVABLE = 40
+STANDING, MOVING = 4980, 20
+"""What the warehouse holds."""
 EDGE = 2000
 """Cells of 5 cm along each side of the map: 100 x 100 m."""
 SCENARIO = """\
@@ -39,7 +41,7 @@ pass:
 
 @dataclass(frozen=True)
 class Cost:
-    """A world of so many triangles that stay, and things that move: CPU ms for each simulated second.
+    """A world of so many triangles that stay, and things that can move: CPU ms for each simulated second.
 
     `preparing` is CPU seconds once for all runs; `memory` is the most that this process has used so far, in MB.
     """
@@ -54,10 +56,12 @@ class Cost:
 
 
 def measure_worlds(rounds: int) -> Iterator[Cost]:
-    """The house, a hall with movable meshes, and a map of 100 x 100 m: the median of several runs each."""
+    """The house, a hall with movable meshes, a warehouse, a map of 100 x 100 m: the median of several runs each."""
     with TemporaryDirectory() as folder:
         yield _measured("house, patrol of five rooms", HOUSE, rounds)
         yield _measured(f"hall, {MOVABLE} movable meshes", write_hall(Path(folder, "hall")), rounds)
+        objects = f"{STANDING + MOVING} objects, {MOVING} moving"
+        yield _measured(f"warehouse, {objects}", write_warehouse(Path(folder, "warehouse")), rounds)
         yield _measured("map of 100 x 100 m", write_arena(Path(folder, "arena")), rounds)
 
 
@@ -136,6 +140,38 @@ def _box_model(name: str, x: float, y: float, length: float, width: float) -> st
         f'<model name="{name}"><static>true</static><pose>{x} {y} 0.5 0 0 0</pose><link name="body">'
         f'<collision name="c"><geometry>{box}</geometry></collision></link></model>'
     )
+
+
+def write_warehouse(folder: Path) -> Path:
+    """A warehouse of 100 x 100 m: 4980 boxes and drums in rows, and 20 carts on the move; its scenario.
+
+    Aisles of 2.4 m between the rows and one of 8 m across them; half of the carts drive where the robot passes.
+    """
+    folder.mkdir()
+    chance = np.random.default_rng(12)
+    columns = [*np.arange(4.0, 46.0, 0.75).tolist(), *np.arange(54.5, 96.5, 0.75).tolist()]
+    bays = list(product(columns, (row + side for row in range(4, 97, 4) for side in (-0.4, 0.4))))
+    stock = [
+        f"  - {{name: unit {n}, {_unit(n)}, pose: {{x: {bays[bay][0]:.2f}, y: {bays[bay][1]:.2f}, yaw: {turn:.2f}}}}}"
+        for n, (bay, turn) in enumerate(
+            zip(chance.permutation(len(bays))[:STANDING].tolist(), chance.uniform(-0.2, 0.2, STANDING), strict=True)
+        )
+    ]
+    carts = [
+        f"  - {{name: cart {n}, box: [0.9, 0.6, 0.9], pose: {{x: {x}, y: {y + 0.8:.1f}}},"
+        f" move: {{through: [[{x + 20}, {y + 0.8:.1f}]], speed: 0.5 m/s, repeat: back_and_forth}}}}"
+        for n, (x, y) in enumerate(product((12, 60), (26, 30, 34, 38, 42, 62, 66, 70, 74, 78)))
+    ]
+    walls = "  - {name: outer wall, points: [[0, 0], [100, 0], [100, 100], [0, 100], [0, 0]]}"
+    lines = ["simscen: 1", "walls:", walls, "obstacles:", *stock, "objects:", *carts]
+    (folder / "warehouse.world.yaml").write_text("\n".join(lines) + "\n")
+    return _scenario(folder, "warehouse.world.yaml", ((8.0, 33.8), (48.0, 33.8), (50.0, 42.0)))
+
+
+def _unit(number: int) -> str:
+    """A box between 0.5 and 0.65 m wide; every fourth is a drum."""
+    width = 0.5 + 0.05 * (number % 4)
+    return f"cylinder: [{width / 2:.3f}, 1.0]" if number % 4 == 0 else f"box: [{width:.2f}, {width:.2f}, 1.2]"
 
 
 def write_arena(folder: Path) -> Path:
