@@ -52,7 +52,7 @@ class Costmap:
         reach = max(spec.inflation_radius, surroundings.robot.circumscribed_radius + BEYOND_HULL)
         scaling = spec.cost_scaling_factor
         self._inflation = Inflation(resolution, self._inscribed, spec.inflation_radius, scaling, reach)
-        self._margin = math.ceil(reach / resolution)
+        self._margin = max(2, math.ceil(reach / resolution))  # coarse cells beside a wall still know it
         self._speck = spec.denoise_layer.minimal_group_size if spec.denoise_layer.enabled else 0
         self._revision, self._zoned, self._scans = 0, 0, 0
         self._newest: dict[str, tuple[Pose2, Scan | Image]] = {}
@@ -145,11 +145,11 @@ class Costmap:
 
     def _lay(self, layer: StaticLayer) -> None:
         self._frame = layer.frame
-        self._static_squared = squared_distances(layer.lethal)
+        self._static_squared = squared_distances(layer.lethal, self._margin)
 
     def _show(self) -> None:
         """Compute everything again."""
-        squared = np.minimum(self._static_squared, squared_distances(self._obstacles(ALL)))
+        squared = np.minimum(self._static_squared, squared_distances(self._obstacles(ALL), self._margin))
         self._costs = self._inflation.costs(squared, self._unknown)
         self._distance = self._inflation.metres.take(squared)
         self._revision += 1

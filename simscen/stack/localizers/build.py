@@ -1,11 +1,14 @@
 """From the specifications of the shipped localizers to localizers."""
 
+import numpy as np
+import numpy.typing as npt
+
 from simscen.core.grid import OccupancyGrid
 from simscen.model import localizers as model
 from simscen.stack.localizers.amcl import AmclLocalizer
 from simscen.stack.localizers.beam_model import BeamModel, opaque_field
 from simscen.stack.localizers.dead_reckoning import DeadReckoning
-from simscen.stack.localizers.distance_field import beyond_the_map
+from simscen.stack.localizers.distance_field import DistanceField, beyond_the_map
 from simscen.stack.localizers.global_search import GlobalSearch
 from simscen.stack.localizers.ground_truth import GroundTruthLocalizer
 from simscen.stack.localizers.likelihood_field import (
@@ -28,8 +31,10 @@ def amcl(spec: model.Amcl, setting: Setting) -> Localizer:
     if setting.map is None:
         return DeadReckoning(setting.estimate)
     motion = _motion_model(spec, setting.robot.holonomic)
-    sensor, anywhere = _sensor_model(spec, setting.map), FreeSpace(setting.map)
-    trust = _trust(setting.map, spec)
+    field, beyond = obstacle_field(setting.map, spec.laser_likelihood_max_dist), beyond_the_map(setting.map).ravel()
+    sensor, anywhere = _sensor_model(spec, setting.map, field, beyond), FreeSpace(setting.map)
+    fits = field if spec.laser_likelihood_max_dist > NEAR else obstacle_field(setting.map, 2 * NEAR)
+    trust = MapTrust(fits, beyond, spec.map_trust_none, spec.map_trust_full)
     doubted = trust if spec.map_trust_full > 0 else None
     particles = ParticleFilter(spec, motion, sensor, anywhere, setting.chance, doubted)
     search = (GlobalSearch(setting.map), trust) if spec.relocalization == "scan_matching" else None
@@ -53,12 +58,6 @@ def odometry(_spec: model.OdometryOnly, setting: Setting) -> Localizer:
     return DeadReckoning(setting.estimate)
 
 
-def _trust(grid: OccupancyGrid, spec: model.Amcl) -> MapTrust:
-    return MapTrust(
-        obstacle_field(grid, 2 * NEAR), beyond_the_map(grid).ravel(), spec.map_trust_none, spec.map_trust_full
-    )
-
-
 def _motion_model(spec: model.Amcl, holonomic: bool) -> MotionModel:
     alpha = (spec.alpha1, spec.alpha2, spec.alpha3, spec.alpha4)
     if (spec.robot_model or ("omni" if holonomic else "differential")) == "omni":
@@ -66,18 +65,20 @@ def _motion_model(spec: model.Amcl, holonomic: bool) -> MotionModel:
     return Differential(alpha)
 
 
-def _sensor_model(spec: model.Amcl, grid: OccupancyGrid) -> SensorModel:
+def _sensor_model(
+    spec: model.Amcl, grid: OccupancyGrid, field: DistanceField, beyond: npt.NDArray[np.bool_]
+) -> SensorModel:
+    """`field` and what is `beyond` are of the same grid, for all models but that of beams."""
     if spec.laser_model_type == "beam":
-        field = opaque_field(grid, spec.farthest)
+        opaque = opaque_field(grid, spec.farthest)
         return BeamModel(
-            field, spec.z_hit, spec.z_short, spec.z_max, spec.z_rand, spec.sigma_hit, spec.lambda_short
+            opaque, spec.z_hit, spec.z_short, spec.z_max, spec.z_rand, spec.sigma_hit, spec.lambda_short
         )  # fmt: skip
-    field = obstacle_field(grid, spec.laser_likelihood_max_dist)
     if spec.laser_model_type == "likelihood_field":
         return LikelihoodField(field, spec.z_hit, spec.z_rand, spec.sigma_hit)
     skipping = BeamSkipping(spec.beam_skip_distance, spec.beam_skip_threshold, spec.beam_skip_error_threshold)
-    beyond = beyond_the_map(grid).ravel() if spec.beams_beyond_the_map == "say_nothing" else None
+    says_nothing = beyond if spec.beams_beyond_the_map == "say_nothing" else None
     return LikelihoodFieldProb(
         field, spec.z_hit, spec.z_rand, spec.sigma_hit, skipping if spec.do_beamskip else None,
-        spec.likelihood_exponent, beyond,
+        spec.likelihood_exponent, says_nothing,
     )  # fmt: skip

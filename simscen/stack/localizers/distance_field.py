@@ -1,5 +1,6 @@
 """How far each cell of a map is from the nearest obstacle: what likelihood fields and ray marching look up."""
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -7,7 +8,7 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array
 from simscen.core.grid import FREE, UNKNOWN, OccupancyGrid
-from simscen.stack.nearest import squared_cells
+from simscen.stack.nearest import BEYOND, FARTHEST, squared_cells, squared_within
 
 Float32 = npt.NDArray[np.float32]
 Cells = npt.NDArray[np.intp]
@@ -36,6 +37,9 @@ def beyond_the_map(grid: OccupancyGrid) -> npt.NDArray[np.bool_]:
     unknown = np.pad(grid.cells == UNKNOWN, 1, constant_values=True)
     if unknown.all():
         return unknown
+    if np.count_nonzero(unknown) == unknown.size - grid.cells.size and math.sqrt(2) * grid.resolution <= BEHIND:
+        beside: npt.NDArray[np.bool_] = np.pad(grid.cells == FREE, 1, mode="edge")
+        return unknown & beside  # all is known: the nearest known cell is the next one
     distance, (row, column) = distance_transform_edt(unknown, return_indices=True)
     free = np.pad(grid.cells == FREE, 1)
     beyond: npt.NDArray[np.bool_] = unknown & (free[row, column] | (distance * grid.resolution > BEHIND))
@@ -56,8 +60,13 @@ class DistanceField:
         bordered = np.pad(obstacles, 1, constant_values=walled)
         distance = np.full(bordered.shape, limit, dtype=np.float32)
         if bordered.any():
-            for rows, squared in squared_cells(bordered):
-                distance[rows] = np.minimum(np.sqrt(squared) * grid.resolution, limit)
+            if limit <= FARTHEST * grid.resolution:
+                metres = np.minimum(np.sqrt(np.arange(BEYOND + 1)) * grid.resolution, limit).astype(np.float32)
+                for rows, near in squared_within(bordered, math.ceil(limit / grid.resolution)):
+                    distance[rows] = metres.take(near)
+            else:
+                for rows, squared in squared_cells(bordered):
+                    distance[rows] = np.minimum(np.sqrt(squared) * grid.resolution, limit)
         if not walled:
             distance[[0, -1], :] = distance[:, [0, -1]] = limit
         self.table: Float32 = distance.ravel()

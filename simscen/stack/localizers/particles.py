@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from simscen.core.belief import Estimate
 from simscen.core.geometry import Array, Pose2, wrap_array
@@ -51,9 +52,13 @@ class FreeSpace:
     """Draws poses uniformly over the free cells of a map; over all cells if none is free."""
 
     def __init__(self, grid: OccupancyGrid) -> None:
-        free = np.flatnonzero(grid.cells == FREE)
-        self._cells = (free if len(free) else np.arange(grid.cells.size)).astype(np.int32)
         self._grid = grid
+
+    @cached_property
+    def _cells(self) -> npt.NDArray[np.int32]:
+        """All that it draws from: only who is lost does, and of a large map they are many."""
+        free = np.flatnonzero(self._grid.cells == FREE)
+        return (free if len(free) else np.arange(self._grid.cells.size)).astype(np.int32)
 
     def draw(self, count: int, chance: np.random.Generator) -> Array:
         """Poses (count, 3) in the map frame."""

@@ -7,6 +7,7 @@ from simscen.core.navigation import ErrorCode, Path
 from simscen.model.planners import Navfn, Smac2d
 from simscen.stack.planners.ends import Ends, find_ends
 from simscen.stack.planners.finish import SPACING, spaced, with_headings
+from simscen.stack.planners.nearby import nearby
 from simscen.stack.planners.rates import MAX_NON_OBSTACLE, Rates
 from simscen.stack.planners.tube import smoothed
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner, RobotModel
@@ -49,6 +50,9 @@ class GridPlanner:
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
         """A path of poses in the map frame, 5 cm apart."""
+        return nearby(self._plan, costmap, start, goal, seed)
+
+    def _plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, _: int) -> Path:
         rates = Rates(costmap, self._robot, self._multiplier, self._allow_unknown)
         ends = find_ends(rates, start, goal, self._tolerance)
         cells = self._over(rates, ends)

@@ -7,6 +7,7 @@ from simscen.core.navigation import ErrorCode, Path
 from simscen.model.planners import OmplPlanner as PlannerSpec
 from simscen.stack.planners.ends import Ends, find_ends
 from simscen.stack.planners.finish import SPACING, spaced, with_headings
+from simscen.stack.planners.nearby import nearby
 from simscen.stack.planners.rates import Rates
 from simscen.stack.planners.samplers import SAMPLERS, Legs
 from simscen.stack.planners.search import Point, search
@@ -24,6 +25,9 @@ class OmplPlanner:
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
         """A path of poses in the map frame, 5 cm apart."""
+        return nearby(self._plan, costmap, start, goal, seed)
+
+    def _plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
         rates = Rates(costmap, self._robot, self._spec.cost_travel_multiplier, self._spec.allow_unknown)
         ends = find_ends(rates, start, goal, self._spec.tolerance)
         way = np.array([ends.start]) if ends.start == ends.goal else self._way(rates, ends, seed)

@@ -1,0 +1,78 @@
+"""On a large map, a plan is looked for around its ends first: what lies beyond cannot make it shorter."""
+
+import contextlib
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+from simscen.core.geometry import Pose2
+from simscen.core.navigation import Path
+from simscen.stack.protocols import CostmapView, NavigationFailure
+
+LARGE = 1_000_000
+"""Cells of a costmap of which not all are looked at each time: 50 x 50 m at 5 cm."""
+MARGIN = 10.0
+"""Metres around both ends that are looked at first, …"""
+SHARE = 1 / 3
+"""… or so much of the straight way between them, if that is more: then a way may be a fifth longer than straight."""
+
+Plan = Callable[[CostmapView, Pose2, Pose2, int], Path]
+
+
+def nearby(plan: Plan, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
+    """What `plan` finds in a window around both ends, if no way that leaves the window can be shorter; else in larger
+    ones, at last on the whole costmap. Raises NavigationFailure when that fails.
+    """
+    margin = max(MARGIN, SHARE * start.distance(goal))
+    while costmap.costs.size > LARGE:
+        part = _window(costmap, start, goal, margin)
+        if part is None or 2 * part.costs.size > costmap.costs.size:
+            break
+        with contextlib.suppress(NavigationFailure):
+            path = plan(part, start, goal, seed)
+            if path.length() <= _around(costmap, part, start, goal):
+                return path
+        margin *= 2
+    return plan(costmap, start, goal, seed)
+
+
+def _window(costmap: CostmapView, start: Pose2, goal: Pose2, margin: float) -> CostmapView | None:
+    """The costmap within `margin` metres of both ends along x and y; None where an end is off the map."""
+    (rows, columns), size = costmap.costs.shape, costmap.resolution
+    low, high = [], []
+    for ends, corner, cells in (
+        ((start.y, goal.y), costmap.origin[1], rows),
+        ((start.x, goal.x), costmap.origin[0], columns),
+    ):
+        if min(ends) < corner or max(ends) >= corner + cells * size:
+            return None
+        low.append(max(0, math.floor((min(ends) - margin - corner) / size)))
+        high.append(min(cells, math.ceil((max(ends) + margin - corner) / size)))
+    window = slice(low[0], high[0]), slice(low[1], high[1])
+    origin = costmap.origin[0] + low[1] * size, costmap.origin[1] + low[0] * size
+    return replace(costmap, costs=costmap.costs[window], distance=costmap.distance[window], origin=origin)
+
+
+def _around(costmap: CostmapView, part: CostmapView, start: Pose2, goal: Pose2) -> float:
+    """The length in metres of the shortest way from start to goal that leaves a part of the costmap; inf without one.
+
+    It is that to the goal's image in one of the part's sides; those that are the map's own cannot be crossed.
+    """
+    least = math.inf
+    for axis, here, there, beside in (
+        (0, start.x, goal.x, goal.y - start.y),
+        (1, start.y, goal.y, goal.x - start.x),
+    ):
+        low, high = _sides(part, axis)
+        first, last = _sides(costmap, axis)
+        if low > first + part.resolution / 2:
+            least = min(least, math.hypot(here - low + there - low, beside))
+        if high < last - part.resolution / 2:
+            least = min(least, math.hypot(high - here + high - there, beside))
+    return least
+
+
+def _sides(costmap: CostmapView, axis: int) -> tuple[float, float]:
+    """The least and the greatest x (axis 0) or y (1) of a costmap, in metres."""
+    begin = costmap.origin[axis]
+    return begin, begin + costmap.costs.shape[1 - axis] * costmap.resolution
