@@ -50,6 +50,7 @@ class Footprint:
         corners = np.array(robot.footprint, dtype=np.float64)
         inner = _inner_points(corners, resolution, self.inscribed)
         self._hull = np.concatenate((_edge_points(corners, resolution), inner))
+        self._depth = _depths(corners, self._hull).astype(np.float32)
         self.discs = Discs(robot)
 
     def free(self, costmap: CostmapView, poses: Array) -> Mask:
@@ -64,12 +65,19 @@ class Footprint:
         return free
 
     def clearance(self, costmap: CostmapView, poses: Array) -> Array:
-        """About how far (n,) the hull's edge is from the nearest lethal cell in metres; negative in collision."""
-        if self._round:
-            gap: Array = distances(costmap, poses[:, :2]).astype(np.float64) - self.inscribed
-            return gap
-        edge = distances(costmap, self._placed(poses)).min(axis=1).astype(np.float64)
+        """About how far (n,) the hull's edge is from the nearest lethal cell in metres; negative in collision.
+
+        Then it is how far the deepest of the lethal cells under the hull is from its edge: whether a turn leads out of
+        a collision or further into it shows in nothing else.
+        """
         middle = distances(costmap, poses[:, :2]).astype(np.float64) - self.inscribed
+        if self._round:
+            return np.asarray(middle)
+        near = distances(costmap, self._placed(poses))
+        edge = near.min(axis=1).astype(np.float64)
+        touching = np.flatnonzero(edge <= 0.0)
+        if len(touching):
+            edge[touching] = (near[touching] - self._depth).min(axis=1)
         return np.asarray(np.minimum(edge, middle))
 
     def _hull_free(self, costmap: CostmapView, poses: Array) -> Mask:
@@ -126,6 +134,15 @@ def _inner_points(corners: Array, resolution: float, inscribed: float) -> Array:
             crosses = (ay > points[:, 1]) != (by > points[:, 1])
             inside ^= crosses & (points[:, 0] < ax + (points[:, 1] - ay) / (by - ay) * (bx - ax))
     return np.asarray(points[inside & (np.hypot(points[:, 0], points[:, 1]) > inscribed - resolution)])
+
+
+def _depths(corners: Array, points: Array) -> Array:
+    """How far (n,) points (n, 2) are from the nearest edge."""
+    depths: Array = np.full(len(points), np.inf)
+    for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        along = np.clip((points - a) @ (b - a) / float((b - a) @ (b - a)), 0.0, 1.0)
+        np.minimum(depths, np.hypot(*(points - a - along[:, None] * (b - a)).T), out=depths)
+    return depths
 
 
 def _edge_points(corners: Array, resolution: float) -> Array:

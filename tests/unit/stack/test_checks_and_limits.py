@@ -233,6 +233,28 @@ def test_a_footprint_collides_where_its_edge_or_its_inside_is_on_something() -> 
     assert footprint.free(view, poses).tolist() == [True, False, False, True, False]
 
 
+def with_a_post(x: float, y: float) -> CostmapView:
+    """Nothing but one lethal cell of 5 cm, its middle there."""
+    rows, columns = np.mgrid[0:80, 0:80]
+    row, column = math.floor((y + 2.0) / 0.05), math.floor((x + 2.0) / 0.05)
+    apart = (0.05 * np.hypot(rows - row, columns - column)).astype(np.float32)
+    return CostmapView(np.where(apart == 0.0, 254, 0).astype(np.uint8), apart, 0.05, (-2.0, -2.0))
+
+
+@pytest.mark.parametrize(("x", "y", "deep"), [(0.475, 0.125, 0.025), (0.375, -0.075, 0.125), (-0.325, 0.125, 0.075)])
+def test_the_clearance_of_a_long_hull_in_collision_is_how_deep_it_is_in_it(x: float, y: float, deep: float) -> None:
+    footprint = Footprint(box_robot(1.0, 0.4), 0.05)
+    clearance = footprint.clearance(with_a_post(x, y), np.array([[0.0, 0.0, 0.0]]))
+    assert clearance == pytest.approx([-deep], abs=0.036)
+
+
+def test_a_long_robot_that_touches_something_may_turn_out_of_it_but_not_further_in() -> None:
+    footprint, view = Footprint(box_robot(1.0, 0.4), 0.05), with_a_post(0.425, 0.19)
+    assert not footprint.free(view, np.array([[0.0, 0.0, 0.0]]))[0]
+    assert time_free(footprint, view, Pose2(0, 0), Twist(0.0, 0.0, -0.5), 1.0) == 1.0
+    assert time_free(footprint, view, Pose2(0, 0), Twist(0.0, 0.0, 0.5), 1.0) < 0.4
+
+
 def test_discs_cover_the_hull() -> None:
     robot = box_robot(0.9, 0.3)
     discs = Footprint(robot, 0.05).discs

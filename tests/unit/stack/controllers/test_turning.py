@@ -40,6 +40,12 @@ def test_a_short_turn_away_from_an_obstacle_is_allowed_beside_it() -> None:
     assert room_of(LONG).has_room(-0.3, HERE, beside_the_front_corner)
 
 
+def test_a_robot_that_touches_something_turns_away_from_it_and_not_into_it() -> None:
+    at_the_front_left = seen(Flatland(discs=[(0.34, 0.22, 0.05)]), LONG)
+    assert not room_of(LONG).has_room(0.5, HERE, at_the_front_left)
+    assert room_of(LONG).has_room(-0.3, HERE, at_the_front_left)
+
+
 def test_a_long_robot_in_a_slot_backs_out_of_it() -> None:
     turning, view = room_of(LONG), seen(SLOT, LONG)
     assert not turning.has_room(0.5 * math.pi, HERE, view)
