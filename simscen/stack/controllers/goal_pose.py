@@ -13,6 +13,10 @@ ON_THE_SPOT, PASSED = 0.45, 0.8
 STANDING = 0.01
 """m/s. A controller that has come to rest inside the tolerance is as near as it gets."""
 
+SETTLING = 2.0
+"""Periods that the last of a turn takes at least: what turns further in one period than is left goes to and fro for
+ever, and one that stands off the middle of its goal has to be at rest to have reached it."""
+
 AT_END = 0.03
 """Metres of path that a car may leave out: its last arc is what gives it its heading."""
 
@@ -48,7 +52,8 @@ class GoalPose:
     def turn(self, angle: float, twist: Twist) -> Twist:
         """Turn in place by `angle`, no faster than the base can stop at the end of it."""
         stopping = math.sqrt(1.6 * self._acceleration * abs(angle))
-        speed = math.copysign(min(self._fastest, stopping), angle)
+        settling = abs(angle) / (SETTLING * self._period)
+        speed = math.copysign(min(self._fastest, stopping, settling), angle)
         change = self._acceleration * self._period
         return Twist(0.0, 0.0, min(max(speed, twist.wz - change), twist.wz + change))
 
