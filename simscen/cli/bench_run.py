@@ -11,7 +11,9 @@ from simscen.cli.select import checked
 from simscen.core.errors import InvalidInput
 from simscen.core.result import Outcome, RunKey
 from simscen.core.sessionevents import RunFinished, SessionEvent
+from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import load_scenario
+from simscen.loading.sense.neverhappens import top_speed
 from simscen.record.replay import read_log
 from simscen.report.line import text_of
 from simscen.report.lines import Naming, finished
@@ -56,7 +58,8 @@ def drive(experiments: Sequence[Experiment], out: Path, workers: int) -> list[li
     trials: list[list[Trial]] = [[] for _ in experiments]
     for job in jobs:
         number, drive = owners[job.key]
-        trials[number].append(Trial(of[job.key], drive.reference_length, drive.world or str(drive.file)))
+        world, speed = drive.world or str(drive.file), _top_speed(job.scenario)
+        trials[number].append(Trial(of[job.key], drive.reference_length, world, speed))
     return trials
 
 
@@ -77,6 +80,12 @@ def _planned(experiments: Sequence[Experiment], out: Path) -> tuple[list[Job], d
                 jobs.append(Job(len(jobs), scenario, key, run_folder(out, key), Options().wall_limit))
                 owners[key] = number, planned
     return jobs, owners
+
+
+def _top_speed(scenario: LoadedScenario) -> float | None:
+    """Of the fastest of its robots; None where one is none of ours."""
+    robots = [view.robot.spec for view in scenario.each.values()]
+    return max(top_speed(robot) for robot in robots if robot) if all(robots) else None
 
 
 def repeat_command(job: Job) -> str:

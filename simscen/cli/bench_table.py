@@ -12,8 +12,20 @@ from simscen.study.versus import Difference, Versus
 PUBLISHED = "BARN's own figures for DWA at 0.5 m/s, in another simulator and all 50 worlds: " + ", ".join(
     f"{name} {value:.3f}" for name, value in DWA.items()
 )
-VERSUS = ("same drives, with and without", "pairs", "better", "worse", "success", "seconds", "score")
-HEAD = ("experiment", "runs", "success", "95 % interval", "collision", "timeout", "failed", "time", "score", "path")
+VERSUS = ("same drives, with and without", "pairs", "better", "worse", "success", "seconds", "SCT", "score")
+HEAD = (
+    "experiment",
+    "runs",
+    "success",
+    "95 % interval",
+    "collision",
+    "timeout",
+    "failed",
+    "time",
+    "path",
+    "SCT",
+    "score",
+)
 
 
 def as_text(rows: Sequence[Measured], pairs: Sequence[Versus] = ()) -> str:
@@ -43,7 +55,8 @@ def _versus(pairs: Sequence[Versus]) -> list[str]:
     """What the other stack changes in the same drives, pair by pair."""
     table: list[tuple[str, ...]] = [VERSUS]
     for pair in pairs:
-        changes = (_change(pair.success, ".3f"), _change(pair.seconds, ".1f"), _change(pair.score, ".3f"))
+        forms = ((pair.success, ".3f"), (pair.seconds, ".1f"), (pair.sct, ".3f"), (pair.score, ".3f"))
+        changes = (_change(difference, form) for difference, form in forms)
         table.append((pair.case, f"{pair.pairs}", f"{pair.better}", f"{pair.worse}", *changes))
     widths = [max(len(row[column]) for row in table) for column in range(len(VERSUS))]
     return [_aligned(row, widths) for row in table]
@@ -68,8 +81,9 @@ def _cells(row: Row) -> tuple[str, ...]:
         f"{row.timeouts:.3f}",
         f"{row.failed + row.errors:.3f}",
         _or_none(row.seconds, ".1f", " s"),
-        _or_none(row.score, ".3f"),
         _or_none(row.path_ratio, ".2f"),
+        _or_none(row.sct, ".3f"),
+        _or_none(row.score, ".3f"),
     )
 
 

@@ -26,11 +26,15 @@ class Fate(str, Enum):
 
 @dataclass(frozen=True)
 class Trial:
-    """A run, the reference length in metres that its score refers to (None = the case has no score), and its world."""
+    """A run, the reference length in metres that its score refers to (None = the case has no score), and its world.
+
+    `top_speed` is the robot's, in m/s.
+    """
 
     run: RunFinished
     reference_length: float | None = None
     world: str = ""
+    top_speed: float | None = None
 
     @property
     def fate(self) -> Fate:
@@ -51,17 +55,31 @@ class Trial:
         seconds = self.metric("time_to_goal")
         return barn_score(self.fate is Fate.SUCCESS and seconds is not None, seconds or 0.0, self.reference_length)
 
+    @property
+    def sct(self) -> float | None:
+        """Success weighted by completion time, for which the shortest way at top speed is the least; None where nobody
+        was to arrive. (Yokoyama et al. 2021.)
+        """
+        if self.fate is not Fate.SUCCESS:
+            return 0.0
+        seconds, way = self.metric("time_to_goal"), self.metric("shortest_length")
+        if seconds is None or way is None or self.top_speed is None:
+            return None
+        least = way / self.top_speed
+        return least / max(least, seconds)
+
     def metric(self, name: str) -> float | None:
-        """A number that the judge measured."""
-        return dict(self.run.result.metrics).get(name)
+        """A number that the judge measured; of several robots the mean."""
+        return mean([value for key, value in self.run.result.metrics.items() if key.split("/")[-1] == name])
 
 
 @dataclass(frozen=True)
 class Row:
     """One line of the table. Rates are of all runs; seconds and path ratio are means over those that arrived.
 
-    `path_ratio` is driven over shortest length. `success_interval` is the 95 % interval of the success rate in worlds
-    like these, None where there is but one: seeds tell of the noise in it, not of other worlds.
+    `path_ratio` is driven over shortest length; `sct` is None where nobody is to arrive. `success_interval` is the 95 %
+    interval of the success rate in worlds like these, None where there are too few: seeds tell of the noise in a world,
+    not of other worlds.
     """
 
     case: str
@@ -75,11 +93,13 @@ class Row:
     seconds: float | None
     score: float | None
     path_ratio: float | None
+    sct: float | None
 
 
 def tally(case: str, trials: Sequence[Trial]) -> Row:
     """Sum up the runs of a case. Raises ValueError without any."""
     fates = [trial.fate for trial in trials]
+    weighted = [trial.sct for trial in trials]
     good = [trial for trial in trials if trial.fate is Fate.SUCCESS]
     arrived = [trial for trial in good if trial.metric("time_to_goal") is not None]
     return Row(
@@ -94,6 +114,7 @@ def tally(case: str, trials: Sequence[Trial]) -> Row:
         seconds=mean([trial.metric("time_to_goal") for trial in arrived]),
         score=mean([trial.score for trial in trials]),
         path_ratio=mean([trial.metric("path_length_ratio") for trial in arrived]),
+        sct=None if None in weighted else mean(weighted),
     )
 
 

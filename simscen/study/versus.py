@@ -19,7 +19,7 @@ class Difference:
 
 @dataclass(frozen=True)
 class Versus:
-    """`other` less `reference`: success rate, seconds where both arrived, BARN's score where there is one.
+    """`other` less `reference`: success rate, seconds where both arrived, SCT, BARN's score where there is one.
 
     `better` and `worse` count the runs that only one of them succeeded in.
     """
@@ -30,6 +30,7 @@ class Versus:
     worse: int
     success: Difference
     seconds: Difference | None
+    sct: Difference | None
     score: Difference | None
 
 
@@ -47,6 +48,7 @@ def versus(case: str, reference: Sequence[Trial], other: Sequence[Trial]) -> Ver
         worse=sum(_won(two) < _won(one) for one, two in decided),
         success=success or Difference(0.0, None),
         seconds=_difference([pair for pair in decided if all(map(_won, pair))], lambda t: t.metric("time_to_goal")),
+        sct=_difference(decided, lambda trial: trial.sct),
         score=_difference(decided, lambda trial: trial.score),
     )
 

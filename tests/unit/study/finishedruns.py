@@ -5,11 +5,13 @@ from simscen.core.sessionevents import RunFinished
 from simscen.core.verdict import Finding, Status, Verdict
 
 
-def run(outcome: Outcome, collided: bool = False, ended: str = "navigation ended", seconds: float = 8.0) -> RunFinished:
+def run(
+    outcome: Outcome, collided: bool = False, ended: str = "navigation ended", seconds: float | None = 8.0
+) -> RunFinished:
     status = Status.FAIL if collided else Status.PASS
     verdict = Verdict("collisions", "collisions", "error", (Finding(status, "collisions", "", ""),))
     broken = RunFailure("crashed", "it crashed") if outcome is Outcome.ERROR else None
-    metrics = {"time_to_goal": seconds, "path_length_ratio": 1.1}
+    metrics = {"time_to_goal": seconds, "path_length_ratio": 1.1, "shortest_length": 10.0}
     key = RunKey("s", 1)
     return RunFinished(RunResult(key, "s.scenario.yaml", outcome, (verdict,), (), metrics, ended=ended, error=broken))
 

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import pytest
 from finishedruns import ARRIVED, GAVE_UP, HIT, LATE, run
 
@@ -34,3 +36,22 @@ def test_a_score_counts_failures_as_nothing() -> None:
 
 def test_a_case_without_reference_has_no_score() -> None:
     assert tally("doorway", [Trial(ARRIVED)]).score is None
+
+
+def test_success_is_weighted_by_how_long_the_shortest_way_takes_at_top_speed() -> None:
+    # 10 m at 2 m/s is 5 s; it took 8 s. Whoever fails has none of it, and nobody more than all.
+    assert tally("BARN", [Trial(ARRIVED, top_speed=2.0), Trial(HIT, top_speed=2.0)]).sct == pytest.approx(5 / 8 / 2)
+    assert tally("BARN", [Trial(ARRIVED, top_speed=1.0)]).sct == 1.0
+
+
+def test_where_nobody_is_to_arrive_no_time_weighs() -> None:
+    refused = run(Outcome.PASSED, seconds=None)
+    assert tally("blocked", [Trial(refused, top_speed=1.0), Trial(GAVE_UP, top_speed=1.0)]).sct is None
+
+
+def test_of_several_robots_the_mean_counts() -> None:
+    metrics = {"success": 1.0, "a/time_to_goal": 10.0, "b/time_to_goal": 14.0, "a/shortest_length": 6.0}
+    both = replace(ARRIVED, result=replace(ARRIVED.result, metrics=metrics))
+    assert Trial(both).metric("time_to_goal") == 12.0
+    assert Trial(both, top_speed=0.5).sct == 1.0
+    assert Trial(both, top_speed=1.0).sct == 0.5
