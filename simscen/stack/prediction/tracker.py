@@ -6,7 +6,8 @@ nothing continues ends: soon where the lidar sees through the place, later where
 """
 
 import math
-from dataclasses import dataclass
+from collections import deque
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -32,8 +33,10 @@ GATE, GATE_SIGMAS = 0.25, 3.0
 FIRST_SPEED = 1.5
 """m/s: standard deviation of the velocity of what has just been seen."""
 SURE, TRAVELLED, HITS = 3.0, 0.15, 3
-"""A track moves when its speed is so many standard deviations, and it has come so far in m, and in so many updates
-stood where it had been free."""
+"""A track moves when its speed is so many standard deviations, now or over its last updates, and it has come so far in
+m in these, and in so many of them stood where it had been free."""
+LATELY = 10
+"""Updates that are looked at: who turns round has not come far from where he was first seen."""
 ENDS_UNSEEN, ENDS_HIDDEN, ENDS_UNSURE = 0.35, 2.5, 0.8
 """Seconds without a hit after which a track ends: where the lidar sees through; where it cannot see; and for one that
 was not moving. All end when their place is known worse than this many metres."""
@@ -44,8 +47,11 @@ as fast as what moves at the least."""
 LEAST_RADIUS = 0.15
 """Metres: of such a one."""
 MOSTLY = 0.6
-"""Share of the updates of a track that moves in which it stands where it had been free; what hops along a row of posts
-does not."""
+"""Share of the last updates of a track that moves in which it stands where it had been free; what hops along a row of
+posts does not."""
+FAR = 0.5
+"""Metres beyond twice the largest radius: what has gone so far moves, though no beam was ever where it came from. What
+is seen of a wall, at the end of the field of view, grows by less."""
 RESTED, STOOD, REMEMBERED = 0.5, 1.5, 10.0
 """Seconds for which something stands until it is no longer followed, if it has not moved; until what moved is a thing
 like any other, for who turns round stands a moment, too; and until nobody expects any more that it may set off again.
@@ -58,17 +64,22 @@ RADIUS_GAIN = 0.3
 
 @dataclass
 class Track:
-    """What is known of a track besides its state; in `came` of its `hits` it stood where it had been free."""
+    """What is known of a track besides its state.
+
+    `lately`: when and where it was hit in its last updates, whether it stood where it had been free, was seen whole.
+    """
 
     radius: float
     born: Array
-    hits: int = 1
-    came: int = 0
-    whole: int = 0
+    lately: deque[tuple[int, float, float, bool, bool]] = field(default_factory=lambda: deque(maxlen=LATELY))
     moving: bool = False
     moved: bool = False
-    hit_at: int = 0
     fast_at: int = 0
+
+    @property
+    def hit_at(self) -> int:
+        """When it was last hit."""
+        return self.lately[-1][0]
 
 
 class Tracker:
@@ -167,24 +178,22 @@ class Tracker:
         # Of what is half hidden, the middle of the visible part may be a radius off.
         gate = GATE + GATE_SIGMAS * spread[:, None] + np.where(pieces.whole[None, :], 0.0, radii[:, None])
         pairs = np.argwhere(off <= gate)
-        numbers, places, deviations = list[int](), list[Array](), list[float]()
+        numbers, fits, places, deviations = list[int](), list[int](), list[Array](), list[float]()
         for track, piece in sorted(pairs.tolist(), key=lambda pair: (off[pair[0], pair[1]], pair)):
             if track in numbers or piece in taken:
                 continue
             taken.add(piece)
             numbers.append(track)
+            fits.append(piece)
             place, deviation = self._measured(self._tracks[track], pieces, piece, self._states[track], lidar)
             places.append(place)
             deviations.append(deviation)
-            self._tracks[track].came += bool(came[piece])
-            self._tracks[track].whole += bool(pieces.whole[piece])
         if numbers:
             self._states[numbers], self._covariances[numbers] = corrected(
                 self._states[numbers], self._covariances[numbers], np.array(places), np.array(deviations)
             )
-            for number in numbers:
-                self._tracks[number].hits += 1
-                self._tracks[number].hit_at = self._tick
+            for number, piece in zip(numbers, fits, strict=True):
+                self._note(number, bool(came[piece]), bool(pieces.whole[piece]))
         return taken
 
     def _measured(self, track: Track, pieces: Clusters, piece: int, state: Array, lidar: Pose2) -> tuple[Array, float]:
@@ -216,16 +225,15 @@ class Tracker:
         covariances[:, 2, 2] = covariances[:, 3, 3] = FIRST_SPEED**2
         self._states = np.concatenate((self._states, states))
         self._covariances = np.concatenate((self._covariances, covariances))
-        self._tracks += [
-            Track(
-                self._first_radius(pieces, piece),
-                centres[piece].copy(),
-                came=int(came[piece]),
-                hit_at=tick,
-                fast_at=tick,
-            )
-            for piece in new
-        ]
+        for piece in new:
+            track = Track(self._first_radius(pieces, piece), centres[piece].copy(), fast_at=tick)
+            self._tracks.append(track)
+            self._note(len(self._tracks) - 1, bool(came[piece]), False)
+
+    def _note(self, number: int, came: bool, whole: bool) -> None:
+        """Note that a track was hit."""
+        x, y = self._states[number, :2].tolist()
+        self._tracks[number].lately.append((self._tick, x, y, came, whole))
 
     @staticmethod
     def _first_radius(pieces: Clusters, piece: int) -> float:
@@ -266,13 +274,28 @@ class Tracker:
             track.moving = (self._tick - track.fast_at) / self._rate <= STOOD
         elif track.moved and speed > self._spec.min_speed and speed > noise:
             track.moving = True  # it comes back over ground where it has just been
-        elif speed > self._spec.min_speed and speed > SURE * noise:
-            x, y = (self._states[number, :2] - track.born).tolist()
-            came = track.came >= max(HITS, MOSTLY * track.hits)
-            seen = track.whole >= SEEN_WHOLE and speed > TWICE * self._spec.min_speed
-            travelled = TRAVELLED if came else FARTHER
-            track.moving = (came or seen) and math.hypot(x, y) > travelled and x * vx + y * vy > 0.0
-            track.moved = track.moving
+        elif speed > self._spec.min_speed:
+            track.moving = track.moved = self._goes(number, track, speed, noise)
+
+    def _goes(self, number: int, track: Track, speed: float, noise: float) -> bool:
+        """Whether what is that fast is not only noise, nor something that stands and of which more comes into view."""
+        x, y, vx, vy = self._states[number].tolist()
+        since, from_x, from_y = track.lately[0][:3]
+        dx, dy = x - from_x, y - from_y
+        way, seconds = math.hypot(dx, dy), (self._tick - since) / self._rate
+        spread = math.sqrt(max(self._covariances[number, 0, 0], self._covariances[number, 1, 1]))
+        if dx * vx + dy * vy <= 0.0:
+            return False
+        # Over the last updates, both ends may be off.
+        sure, lately = speed > SURE * noise, way > max(self._spec.min_speed * seconds, SURE * math.sqrt(2.0) * spread)
+        if (sure or lately) and sum(each[3] for each in track.lately) >= max(HITS, MOSTLY * len(track.lately)):
+            return way > TRAVELLED
+        # Without that, only beside something else that moves: it may have hidden the place.
+        if not sure or speed < TWICE * self._spec.min_speed or not any(each.moving for each in self._tracks):
+            return False
+        far = math.dist((x, y), track.born.tolist()) > 2 * self._spec.max_radius + FAR
+        whole = sum(each[4] for each in track.lately) >= SEEN_WHOLE
+        return (whole and way > FARTHER) or (far and len(track.lately) == LATELY)
 
     def _visible(self, number: int, scan: Scan, lidar: Pose2) -> bool:
         """Whether the lidar sees past the place where the middle of a track should be."""

@@ -120,6 +120,42 @@ def test_what_stops_is_a_thing_like_any_other_a_moment_later() -> None:
     assert len(watch.tracker.moving) == 0
 
 
+def test_what_comes_at_a_walk_is_told_before_it_is_a_metre_away() -> None:
+    """At 0.45 m/s, head on, as another robot does; seen to move by its way of a second rather than by its speed now."""
+    watch = Watch(lambda t: [(4.0 - 0.45 * t, 0.1, 0.22)], view=FULL, beams=360).run(2.5)
+    assert len(watch.tracker.moving) == 1
+    assert watch.tracker.moving.velocities[0] == pytest.approx([-0.45, 0.0], abs=0.15)
+
+
+def test_what_turns_round_is_told_though_it_comes_back_to_where_it_was_first_seen() -> None:
+    """It creeps away, and so is not told at first, and then comes back faster."""
+
+    def there_and_back(t: float) -> list[Disc]:
+        return [(4.0, 0.26 * t if t < 4.0 else 1.04 - 1.0 * (t - 4.0), 0.4)]
+
+    watch = Watch(there_and_back).run(4.8)
+    assert len(watch.tracker.moving) == 1
+    assert watch.tracker.moving.velocities[0, 1] < -0.5
+
+
+def test_what_is_only_ever_half_seen_at_the_edge_of_the_view_is_told_when_it_has_gone_far() -> None:
+    """It goes beside the robot, as fast as that: no beam ever was where it came from."""
+    base = lambda t: Pose2(1.5 * t, 0.0)  # noqa: E731
+    edge = math.radians(135.0)
+
+    def beside(t: float) -> Disc:
+        return (1.5 * t + 3.0 * math.cos(edge), -3.0 * math.sin(edge), 0.5)
+
+    watch = Watch(lambda t: [beside(t), (14.0, 6.0 - 1.2 * t, 0.5)], base).run(4.0)
+    assert any(math.dist(centre, beside(watch.time)[:2]) < 0.5 for centre, _ in told(watch))
+
+
+def told(watch: Watch) -> list[tuple[list[float], list[float]]]:
+    """Where what moves is said to be, and how fast."""
+    moving = watch.tracker.moving
+    return list(zip(moving.centres.tolist(), moving.velocities.tolist(), strict=True))
+
+
 def claims(watch: Watch, seconds: float) -> int:
     """In how many scans something is said to move."""
     told = list[bool]()
@@ -137,14 +173,15 @@ def test_nothing_moves_in_a_room_that_stands_while_the_robot_drives_and_turns(vi
     assert claims(Watch(lambda _: [], tour, walls=room(), view=view, beams=beams), 12.0) == 0
 
 
-def test_nothing_moves_while_odometry_drifts() -> None:
+@pytest.mark.parametrize("view, beams", [(FRONT, 720), (FULL, 360)])
+def test_nothing_moves_while_odometry_drifts(view: float, beams: int) -> None:
     """By 5 % of the way and 1 % of each turn, at 2 rad/s: more than wheels with a gyroscope do."""
 
     def drifted(t: float) -> Pose2:
         pose = tour(t)
         return Pose2(1.05 * pose.x, 1.05 * pose.y, 1.01 * pose.yaw)
 
-    assert claims(Watch(lambda _: [], tour, drifted, walls=room()), 12.0) == 0
+    assert claims(Watch(lambda _: [], tour, drifted, walls=room(), view=view, beams=beams), 12.0) == 0
 
 
 def test_a_scan_that_is_garbage_moves_nothing_and_breaks_nothing() -> None:
