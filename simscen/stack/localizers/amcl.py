@@ -80,9 +80,10 @@ class AmclLocalizer:
             start = self._correction
             self._correction = _Correction(start.pose, start.covariance, odometry.pose, start.tick)
         self._belief = None
-        ready = [name for name, scan in self._waiting.items() if self._odometry.reaches(scan.tick)]
-        for name in ready:
-            self._use(self._waiting.pop(name))
+        if self._waiting:
+            ready = [name for name, scan in self._waiting.items() if self._odometry.reaches(scan.tick)]
+            for name in ready:
+                self._use(self._waiting.pop(name))
 
     def on_scan(self, scan: Scan) -> None:
         """Correct with a scan, at once or when the odometry of its tick is there."""
@@ -114,8 +115,8 @@ class AmclLocalizer:
             self._due = dict.fromkeys(self._due, True)
         if self._due.get(scan.sensor, True):
             self._correct(scan, odometry, delta)
-        if self._finder is not None:
-            self._look_elsewhere(self._finder, scan, odometry)
+            if self._finder is not None:
+                self._look_elsewhere(self._finder, scan, odometry)
 
     def _correct(self, scan: Scan, odometry: Pose2, delta: Pose2 | None) -> None:
         """Move the particles by what was driven since the last correction, and weigh them by a scan."""

@@ -1,8 +1,10 @@
 """The beams of a scan that a particle filter looks at."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
+import numpy.typing as npt
 
 from simscen.core.geometry import Array
 from simscen.core.sensing import Scan
@@ -26,6 +28,28 @@ class Beams:
         hit = self.ranges < self.range_max
         ranges, bearings = self.ranges[hit], self.bearings[hit]
         return np.column_stack((ranges * np.cos(bearings), ranges * np.sin(bearings))) + self.origin
+
+
+def directions(scan: Scan) -> Array:
+    """Unit vectors (n, 2) along the beams of a scan, in the lidar's frame; not to be written to."""
+    return _directions(scan.angle_min, scan.angle_increment, len(scan.ranges))
+
+
+@lru_cache(maxsize=1024)
+def evenly(count: int, most: int) -> npt.NDArray[np.int64]:
+    """Indices (most,) of so many of `count` things, evenly chosen; not to be written to."""
+    chosen: npt.NDArray[np.int64] = np.linspace(0, count - 1, most).astype(np.int64)
+    chosen.flags.writeable = False
+    return chosen
+
+
+@lru_cache(maxsize=8)
+def _directions(first: float, increment: float, count: int) -> Array:
+    """Beams of a lidar point the same ways in all its scans."""
+    angles = first + increment * np.arange(count, dtype=np.float64)
+    towards = np.column_stack((np.cos(angles), np.sin(angles)))
+    towards.flags.writeable = False
+    return towards
 
 
 def select_beams(scan: Scan, count: int, least: float, most: float) -> Beams:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2, wrap, wrap_array
-from simscen.stack.localizers.kld import BINS_OF_YAW, Keys, bins, join, split
+from simscen.stack.localizers.kld import BIN_METRES, BINS_OF_YAW, Keys, bins, join, split
 from simscen.stack.localizers.particles import Particles
 
 _AROUND = np.array([(x, y, a) for x in (-1, 0, 1) for y in (-1, 0, 1) for a in (-1, 0, 1)])
@@ -45,15 +45,25 @@ def summarise(particles: Particles, peak: float = 1.0) -> tuple[Pose2, Array]:
     reported pose, which makes it the expected squared error of that pose, and it holds the products of place and
     heading too, which nav2_amcl leaves zero. Headings are averaged on the circle.
     """
-    labels = clusters(bins(particles.poses))
-    heaviest = labels == np.bincount(labels, weights=particles.weights).argmax()
-    poses, weights = particles.poses[heaviest], particles.weights[heaviest]
+    poses, weights = particles.poses, particles.weights
+    if not _in_touch(poses):
+        labels = clusters(bins(poses))
+        heaviest = labels == np.bincount(labels, weights=weights).argmax()
+        poses, weights = poses[heaviest], weights[heaviest]
     mean, width = _mean(poses, weights)
+    if peak == 1.0:
+        return mean, spread(particles, mean)
     best, narrower = _mean(poses, (weights / weights.max()) ** peak)
     towards = width / (width + narrower) if narrower > 0 else 1.0
     turned = mean.yaw + towards * wrap(best.yaw - mean.yaw)
     pose = Pose2(mean.x + towards * (best.x - mean.x), mean.y + towards * (best.y - mean.y), wrap(turned))
     return pose, spread(particles, pose)
+
+
+def _in_touch(poses: Array) -> bool:
+    """Whether poses (n, 3) are so near to each other that their bins touch, whichever they are."""
+    x, y, yaw = (poses.max(axis=0) - poses.min(axis=0)).tolist()
+    return bool(max(x, y) < BIN_METRES and yaw < 2 * math.pi / BINS_OF_YAW)
 
 
 def _mean(poses: Array, weights: Array) -> tuple[Pose2, float]:

@@ -11,7 +11,7 @@ from simscen.core.grid import FREE, UNKNOWN, OccupancyGrid
 from simscen.stack.nearest import BEYOND, FARTHEST, squared_cells, squared_within
 
 Float32 = npt.NDArray[np.float32]
-Cells = npt.NDArray[np.intp]
+Cells = npt.NDArray[np.int32]
 
 
 # 512 x 60 beams fit the second-level cache. Larger tables also cost fresh pages from the system at every update:
@@ -82,8 +82,8 @@ class DistanceField:
 
     def cells(self, x: Float32, y: Float32) -> Cells:
         """Indices into `table` of points given in cells; any finite point will do. Overwrites `x` and `y`."""
-        column = np.clip(x, 0, self._width + 1, out=x).astype(np.intp)
-        row = np.clip(y, 0, self._height + 1, out=y).astype(np.intp)
+        column = x.clip(0, self._width + 1, out=x).astype(np.int32)
+        row = y.clip(0, self._height + 1, out=y).astype(np.int32)
         row *= self._width + 2
         row += column
         return row
@@ -92,5 +92,9 @@ class DistanceField:
         """Indices (n, b) into `table` of `points` (b, 2) in the base frame as seen from each of `poses` (n, 3)."""
         x, y, heading = self.coordinates(poses)
         c, s = np.cos(heading), np.sin(heading)
-        ends = np.vstack((points.T / self.resolution, np.ones(len(points)))).astype(np.float32)
-        return self.cells(np.stack((c, -s, x), axis=1) @ ends, np.stack((s, c, y), axis=1) @ ends)
+        ends = np.ones((3, len(points)), dtype=np.float32)
+        ends[:2] = points.T / self.resolution
+        to_x, to_y = np.empty((2, len(x), 3), dtype=np.float32)
+        to_x[:, 0], to_x[:, 1], to_x[:, 2] = c, -s, x
+        to_y[:, 0], to_y[:, 1], to_y[:, 2] = s, c, y
+        return self.cells(to_x @ ends, to_y @ ends)

@@ -10,8 +10,9 @@ from simscen.stack.localizers.global_search import GlobalSearch, View
 from simscen.stack.localizers.map_trust import MapTrust
 from simscen.stack.localizers.scan_memory import ScanMemory, travelled
 
-RECENT, DOUBTFUL = 10, 0.6
-"""Over so many scans the share of the beams that fit is averaged, and below this the robot may be lost."""
+RECENT, DOUBTFUL = 5, 0.6
+"""Over so many scans that corrected the share of the beams that fit is averaged, and below this the robot may be lost.
+"""
 TELLING = 0.6
 """Share of the beams that must end where the map says anything, for a scan to count."""
 BETWEEN, MOST_BETWEEN = 0.7, 8.0

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.core.grid import FREE, OCCUPIED, OccupancyGrid
+from simscen.stack.localizers.beams import evenly
 from simscen.stack.localizers.distance_field import DistanceField
 from simscen.stack.localizers.likelihood_field import surfaces
 
@@ -51,7 +52,7 @@ class View:
 def _evenly(points: Array, count: int) -> Array:
     if len(points) <= count:
         return points
-    return points[np.linspace(0, len(points) - 1, count).astype(np.int64)]
+    return points[evenly(len(points), count)]
 
 
 class GlobalSearch:

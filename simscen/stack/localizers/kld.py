@@ -62,6 +62,8 @@ class KldBound:
 
     def enough(self, keys: Keys) -> int | None:
         """The first number of samples that is enough, given the bins (n,) they fell into in order; None if none is."""
+        if len(keys) == self.least:  # the bound is nowhere below
+            return self.least if self.least >= self.samples(len(np.unique(keys))) else None
         new = np.zeros(len(keys), dtype=np.int64)
         new[np.unique(keys, return_index=True)[1]] = 1
         counts = np.arange(1, len(keys) + 1)

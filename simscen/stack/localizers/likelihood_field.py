@@ -4,6 +4,7 @@ Likelihood fields: Thrun, Burgard & Fox, Probabilistic Robotics, section 6.4 and
 likelihood_field_model.cpp and likelihood_field_model_prob.cpp. Beams that hit nothing say nothing.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -126,24 +127,30 @@ class LikelihoodFieldProb:
         """
         self._field, self._z_rand, self._skipping, self._exponent = field, np.float32(z_rand), skipping, exponent
         self._hit = _hit(field, z_hit, sigma_hit)
+        self._range_max, self._logarithm = math.nan, self._hit
         if beyond is not None:
             self._hit[beyond] = np.maximum(self._hit[beyond], np.float32(SAYS_NOTHING * z_hit))
 
     def log_likelihood(self, poses: Array, beams: Beams, converged: bool) -> Array:
         """Logarithms (n,) of Π p."""
-        points, z_rand = beams.ends(), self._z_rand / np.float32(beams.range_max)
+        points, logarithms = beams.ends(), self._logarithms(beams.range_max)
         if self._skipping is not None and converged:
             points = points[self._kept(poses, points, self._skipping)]
 
         def judge(block: Array) -> Array:
-            p = self._hit.take(self._field.cells_seen(block, points))
-            p += z_rand
-            with np.errstate(divide="ignore"):
-                logarithm: Array = np.sum(np.log(p), axis=1, dtype=np.float64)
+            logarithm: Array = np.sum(logarithms.take(self._field.cells_seen(block, points)), axis=1, dtype=np.float64)
             logarithm *= self._exponent
             return logarithm
 
         return by_blocks(judge, poses)
+
+    def _logarithms(self, range_max: float) -> Float32:
+        """Those of the probability of a beam that ends in each cell of the field."""
+        if range_max != self._range_max:
+            with np.errstate(divide="ignore"):
+                self._logarithm = np.log(self._hit + self._z_rand / np.float32(range_max))
+            self._range_max = range_max
+        return self._logarithm
 
     def tempering(self, beams: Beams) -> float:
         """The geometric mean over the beams that hit something."""

@@ -50,9 +50,14 @@ class Differential:
         """The covariance (3, 3) to first order."""
         (turn, drive, _), (turn_std, drive_std, again_std) = self._steps(delta)
         c, s = math.cos(yaw + turn), math.sin(yaw + turn)
-        noise = np.array([[-drive * s * turn_std, c * drive_std, 0], [drive * c * turn_std, s * drive_std, 0],
-                          [turn_std, 0, again_std]])  # fmt: skip
-        carried: Array = swing(covariance, drive * c, drive * s) + noise @ noise.T
+        dx, dy, turned, driven = drive * c, drive * s, turn_std**2, drive_std**2
+        across = (driven - drive**2 * turned) * c * s
+        noise = np.array([
+            [dy**2 * turned + c**2 * driven, across, -dy * turned],
+            [across, dx**2 * turned + s**2 * driven, dx * turned],
+            [-dy * turned, dx * turned, turned + again_std**2],
+        ])  # fmt: skip
+        carried: Array = swing(covariance, dx, dy) + noise
         return carried
 
     def _steps(self, delta: Pose2) -> tuple[tuple[float, float, float], tuple[float, float, float]]:

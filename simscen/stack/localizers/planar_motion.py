@@ -12,9 +12,14 @@ from simscen.core.geometry import Array, Pose2
 
 def swing(covariance: Array, dx: float, dy: float) -> Array:
     """A covariance (3, 3) after an exact move by (dx, dy) in the map frame: an uncertain heading swings the place."""
-    lever = np.array([[1.0, 0.0, -dy], [0.0, 1.0, dx], [0.0, 0.0, 1.0]])
-    swung: Array = lever @ covariance @ lever.T
-    return swung
+    (xx, xy, xa), (_, yy, ya), (_, _, aa) = covariance.tolist()
+    xa_swung, ya_swung = xa - dy * aa, ya + dx * aa
+    xy_swung = xy + dx * xa - dy * ya_swung
+    return np.array([
+        [xx - dy * (xa + xa_swung), xy_swung, xa_swung],
+        [xy_swung, yy + dx * (ya + ya_swung), ya_swung],
+        [xa_swung, ya_swung, aa],
+    ])  # fmt: skip
 
 
 def grown(covariance: Array, yaw: float, step: Pose2, translation_noise: float, rotation_noise: float) -> Array:

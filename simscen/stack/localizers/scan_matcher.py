@@ -5,14 +5,18 @@ against the scans of the last metres; the guess counts as a measurement too, so 
 same everywhere, odometry has its way (Gauss and Newton with a prior).
 """
 
+import cmath
+import math
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.geometry import Array, Pose2, wrap_array
+from simscen.core.geometry import Array, Pose2, wrap, wrap_array
 from simscen.core.sensing import Scan
+from simscen.stack.localizers.beams import directions, evenly
 
 FRAMES = 6
 """Scans that a new one is matched with."""
@@ -20,12 +24,18 @@ REFERENCE, MATCHED = 180, 90
 """Beams kept of each of those, and of the new one."""
 BASELINE = 0.15
 """m between the points whose line is the surface at the point amid them."""
+STRAIGHT = 0.05
+"""m between the point amid them and that line, at most."""
 TORN = 0.5
 """m: points this far apart on both sides of one are not of one surface."""
-GATES = (0.5, 0.35, 0.25, 0.15, 0.1, 0.1)
-"""m: what is further from its nearest neighbour counts for nothing, in each of the iterations."""
+GATES, ITERATIONS = (0.5, 0.35, 0.25, 0.15, 0.1), 6
+"""m: what is further from its nearest neighbour counts for nothing, in one iteration after the other; and the most."""
+SETTLED, STILL = (0.02, 0.01), (0.002, 0.001)
+"""m, rad: after an iteration that moved the scan less the last gate comes next; after one that moved it less, none."""
 SIGMA = 0.03
 """m: the standard deviation of points from surfaces, correlations included."""
+ALIKE = 0.7
+"""The cosine between two normals that may be of one surface, at least."""
 LEAST = 12
 """Points that must be matched for an answer."""
 DOUBT = (0.15, 0.02, 0.15, 0.03)
@@ -40,16 +50,64 @@ INFLATED, FLOOR = 2.0, (0.005, 0.005, 0.002)
 frames share the errors of their surfaces."""
 
 
+Plane = npt.NDArray[np.complex128]
+"""Points or directions x + iy: turned by a product, placed by a sum."""
+
+
 @dataclass(frozen=True, eq=False)
 class _Surface:
-    """Points (n, 2) and the normals (n, 2) of the surfaces that they are on."""
+    """Points (n,) and the normals (n,) of the surfaces that they are on."""
 
-    points: Array
-    normals: Array
+    points: Plane
+    normals: Plane
 
     def placed(self, pose: Pose2) -> "_Surface":
         """The same in the parent frame of `pose`."""
-        return _Surface(pose.apply(self.points), Pose2(0.0, 0.0, pose.yaw).apply(self.normals))
+        turn = cmath.rect(1.0, pose.yaw)
+        return _Surface(self.points * turn + complex(pose.x, pose.y), self.normals * turn)
+
+    def thinned(self, count: int) -> "_Surface":
+        """At most `count` points, evenly chosen."""
+        if len(self.points) <= count:
+            return self
+        chosen = evenly(len(self.points), count)
+        return _Surface(self.points[chosen], self.normals[chosen])
+
+
+class _Reference:
+    """What earlier scans saw, to match a new one with."""
+
+    def __init__(self, frames: Iterable[_Surface]) -> None:
+        from scipy.spatial import cKDTree
+
+        points = np.concatenate([frame.points for frame in frames])
+        nowhere = [0.0]  # what a point without a neighbour is matched with faces nothing
+        self._normals = np.concatenate([*(frame.normals for frame in frames), nowhere])
+        self._along = np.append((points * self._normals[:-1].conj()).real, nowhere)
+        self._tree = cKDTree(_coordinates(points), balanced_tree=False, compact_nodes=False)
+
+    def pull(self, here: _Surface, pose: Pose2, gate: float) -> Array | None:
+        """How a scan that is placed at `pose` is drawn: the normal equations (4, 4), the right-hand side last.
+
+        None when too few points have a neighbour within `gate` m that faces as they do.
+        """
+        nearest = np.asarray(self._tree.query(_coordinates(here.points), distance_upper_bound=gate)[1])
+        normals = self._normals[nearest]
+        same = np.flatnonzero((here.normals * normals.conj()).real > ALIKE)
+        if len(same) < LEAST:
+            return None
+        ends, normals = here.points[same], normals[same]
+        slope = np.empty((4, len(same)))
+        slope[0], slope[1] = normals.real, normals.imag
+        slope[2] = ((ends - complex(pose.x, pose.y)).conj() * normals).imag
+        slope[3] = self._along[nearest[same]] - (ends * normals.conj()).real
+        equations: Array = slope @ slope.T / SIGMA**2
+        return equations
+
+
+def _coordinates(points: Plane) -> Array:
+    """Points (n,) as rows (n, 2)."""
+    return points.view(np.float64).reshape(-1, 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,45 +151,33 @@ class ScanMatcher:
             self.pose = self.pose.compose(guess)
             return None
         seen = surfaces_of(scan)
-        found = self._matched(seen, guess) if self._frames and len(seen.points) else None
+        found = self._matched(seen, guess) if len(seen.points) and any(len(f.points) for f in self._frames) else None
         pose, information = found or (self.pose.compose(guess), np.eye(3))
-        self._frames.append(_thinned(seen, REFERENCE).placed(pose))
+        self._frames.append(seen.thinned(REFERENCE).placed(pose))
         last, self.pose = self.pose, pose
         if found is None:
             return None
-        turned = np.eye(3)
-        turned[:2, :2] = Pose2(0.0, 0.0, -last.yaw).apply(np.eye(2)).T
+        c, s = math.cos(last.yaw), math.sin(last.yaw)
+        turned = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
         covariance = INFLATED * turned @ np.linalg.inv(information) @ turned.T + np.diag(np.square(FLOOR))
         return Step(last.between(pose), covariance)
 
     def _matched(self, seen: _Surface, guess: Pose2) -> tuple[Pose2, Array] | None:
         """The pose in the matcher's frame and its information (3, 3)."""
-        from scipy.spatial import cKDTree
-
-        points = np.concatenate([frame.points for frame in self._frames])
-        normals = np.concatenate([frame.normals for frame in self._frames])
+        reference, own = _Reference(self._frames), seen.thinned(MATCHED)
         guessed = pose = self.pose.compose(guess)
-        if not len(points):
-            return None
-        tree, own = cKDTree(points), _thinned(seen, MATCHED)
-        trust = self._trust(guess)
-        for gate in GATES:
-            here = own.placed(pose)
-            distance, closest = tree.query(here.points, distance_upper_bound=gate)
-            matched = np.isfinite(distance)
-            nearest = np.asarray(closest)[matched]
-            same = (here.normals[matched] * normals[nearest]).sum(axis=1) > 0.7
-            if np.count_nonzero(same) < LEAST:
+        trust, gate, last = self._trust(guess), 0, len(GATES) - 1
+        for _ in range(ITERATIONS):
+            if (normal_equations := reference.pull(own.placed(pose), pose, GATES[gate])) is None:
                 return None
-            ends, normal = here.points[matched][same], normals[nearest[same]]
-            off = ((points[nearest[same]] - ends) * normal).sum(axis=1)
-            lever = ends - pose[:2]
-            slope = np.column_stack((normal, normal[:, 1] * lever[:, 0] - normal[:, 0] * lever[:, 1])) / SIGMA
-            towards = np.array(guessed) - np.array(pose)
-            towards[2] = (towards[2] + np.pi) % (2 * np.pi) - np.pi
-            information = slope.T @ slope + trust
-            dx, dy, turn = np.linalg.solve(information, slope.T @ (off / SIGMA) + trust @ towards).tolist()
+            towards = (guessed.x - pose.x, guessed.y - pose.y, wrap(guessed.yaw - pose.yaw))
+            information = normal_equations[:3, :3] + trust
+            dx, dy, turn = np.linalg.solve(information, normal_equations[:3, 3] + trust @ towards).tolist()
             pose = Pose2(pose.x + dx, pose.y + dy, pose.yaw + turn)
+            step = math.hypot(dx, dy), abs(turn)
+            if gate == last and _within(step, STILL):
+                break
+            gate = last if _within(step, SETTLED) else min(gate + 1, last)
         return pose, information
 
     def _trust(self, guess: Pose2) -> Array:
@@ -141,32 +187,26 @@ class ScanMatcher:
         return np.diag([place**-2, place**-2, heading**-2])
 
 
+def _within(step: tuple[float, float], limits: tuple[float, float]) -> bool:
+    return step[0] < limits[0] and step[1] < limits[1]
+
+
 def surfaces_of(scan: Scan) -> _Surface:
     """What a scan hit, in the base frame; points at an edge, whose surface nobody can tell, are left out."""
     ranges = scan.ranges
     with np.errstate(invalid="ignore"):
         hit = np.flatnonzero((ranges > scan.range_min) & (ranges < min(scan.range_max, REACH)))
-    angles = scan.angles()[hit]
-    points = ranges[hit, None] * np.column_stack((np.cos(angles), np.sin(angles)))
-    if len(points) < 3:
-        return _Surface(np.empty((0, 2)), np.empty((0, 2)))
-    gaps: Array = ranges[hit] * abs(scan.angle_increment)
-    spread: npt.NDArray[np.int64] = np.ceil(BASELINE / 2 / np.maximum(gaps, 1e-3)).astype(np.int64)
+    if len(hit) < 3:
+        return _Surface(np.empty(0, dtype=np.complex128), np.empty(0, dtype=np.complex128))
+    ranges, gap = ranges[hit], abs(scan.angle_increment)
+    points: Plane = ranges * directions(scan).view(np.complex128)[hit, 0]
+    spread = np.ceil((BASELINE / 2 / gap) / np.maximum(ranges, 1e-3 / gap)).astype(np.int64)
     row = np.arange(len(points))
     before, after = points[np.maximum(row - spread, 0)], points[np.minimum(row + spread, len(points) - 1)]
     along = after - before
-    length = np.hypot(*along.T)
-    bent = np.abs((points - before)[:, 0] * along[:, 1] - (points - before)[:, 1] * along[:, 0])
-    with np.errstate(invalid="ignore", divide="ignore"):
-        flat = (length > 0) & (length < np.maximum(TORN, 4 * gaps)) & (bent / length < 0.05)
-    points, along, length = points[flat], along[flat], length[flat]
-    normals = np.column_stack((along[:, 1], -along[:, 0])) / length[:, None]
-    return _Surface(scan.mount.apply(points), Pose2(0.0, 0.0, scan.mount.yaw).apply(normals))
-
-
-def _thinned(surface: _Surface, count: int) -> _Surface:
-    """At most `count` points, evenly chosen."""
-    if len(surface.points) <= count:
-        return surface
-    chosen: npt.NDArray[np.int64] = np.linspace(0, len(surface.points) - 1, count).astype(np.int64)
-    return _Surface(surface.points[chosen], surface.normals[chosen])
+    length = np.abs(along)
+    bent = np.abs(((points - before).conj() * along).imag)
+    flat = np.flatnonzero((length > 0) & (length < np.maximum(TORN, 4 * gap * ranges)) & (bent < STRAIGHT * length))
+    turn = cmath.rect(1.0, scan.mount.yaw)
+    normals = along[flat] * (-1j * turn) / length[flat]
+    return _Surface(points[flat] * turn + complex(scan.mount.x, scan.mount.y), normals)

@@ -7,6 +7,7 @@ import numpy as np
 
 from simscen.core.geometry import Pose2, wrap
 from simscen.core.sensing import Scan
+from simscen.stack.localizers.beams import directions, evenly
 from simscen.stack.localizers.global_search import REACH, View
 
 REMEMBERED = 6.0
@@ -81,8 +82,6 @@ def seen(scan: Scan, least: float, most: float) -> View:
     with np.errstate(invalid="ignore"):
         hit = np.flatnonzero((scan.ranges > least) & (scan.ranges < most))
     if len(hit) > EACH:
-        hit = hit[np.linspace(0, len(hit) - 1, EACH).astype(np.int64)]
-    angles, ranges = scan.angles()[hit], scan.ranges[hit]
-    towards = np.column_stack((np.cos(angles), np.sin(angles)))
-    passed = [towards * (ranges * share)[:, None] for share in SHARES]
-    return View(scan.mount.apply(towards * ranges[:, None]), scan.mount.apply(np.concatenate(passed)))
+        hit = hit[evenly(len(hit), EACH)]
+    ends = scan.ranges[hit, None] * directions(scan)[hit]
+    return View(scan.mount.apply(ends), scan.mount.apply(np.concatenate([ends * share for share in SHARES])))
