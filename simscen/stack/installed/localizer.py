@@ -48,7 +48,7 @@ class InstalledLocalizer(Watched):
 
 
 def checked_belief(watched: Watched, belief: object, before: Belief | None = None) -> Belief:
-    """A belief of finite numbers in the right shapes, as the one `before` was; its particles are not looked at again."""
+    """A belief of finite numbers in the right shapes; particles of the one `before` are not looked at again."""
     if not isinstance(belief, Belief):
         watched.broke(f"believes {type(belief).__name__} instead of a Belief")
     watched.checked_pose(belief.pose, "believes to be at")
