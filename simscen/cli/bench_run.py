@@ -67,7 +67,7 @@ Owner = tuple[int, Drive]
 
 
 def _planned(experiments: Sequence[Experiment], out: Path) -> tuple[list[Job], dict[RunKey, Owner]]:
-    """A job for each run, and the experiment and the drive that it belongs to."""
+    """A job for each run, and the experiment and the drive that it belongs to. Raises ValueError for two of one key."""
     jobs: list[Job] = []
     owners: dict[RunKey, Owner] = {}
     for number, experiment in enumerate(experiments):
@@ -77,6 +77,8 @@ def _planned(experiments: Sequence[Experiment], out: Path) -> tuple[list[Job], d
                 raise InvalidInput(problems)
             for seed in planned.seeds:
                 key = RunKey(scenario.id, seed)
+                if key in owners:
+                    raise ValueError(f"two runs are called {key.scenario}, seed {seed}")
                 jobs.append(Job(len(jobs), scenario, key, run_folder(out, key), Options().wall_limit))
                 owners[key] = number, planned
     return jobs, owners

@@ -13,6 +13,7 @@ from simscen.study.experiment import Experiment, written
 def varied(experiment: Experiment, name: str, stack: Mapping[str, Any], folder: Path) -> Experiment:
     """The same drives with these parameters on top of their own, as files in `folder` that extend theirs.
 
+    The folder's name is part of theirs, as drives of two experiments may be called the same.
     Where there is no map the robot keeps the localizer that the drive has chosen for that.
     """
     drives = []
@@ -26,6 +27,6 @@ def varied(experiment: Experiment, name: str, stack: Mapping[str, Any], folder: 
         experiment,
         name=name,
         drives=tuple(drives),
-        root=folder,
+        root=folder.parent,
         world_path=(experiment.root, *experiment.world_path),
     )

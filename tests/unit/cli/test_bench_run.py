@@ -1,0 +1,29 @@
+"""The runs of `simscen bench nav`: each is its experiment's own."""
+
+from pathlib import Path
+
+import pytest
+
+from simscen.cli.bench_nav import _with_stack
+from simscen.cli.bench_run import _planned
+from simscen.study import corridors
+from simscen.study.experiment import Experiment
+
+
+def hall(folder: Path) -> Experiment:
+    return corridors.ramps(folder, (1, 2))
+
+
+def test_with_another_stack_no_run_of_an_experiment_is_taken_for_one_of_another(tmp_path: Path) -> None:
+    stack = tmp_path / "slow.stack.yaml"
+    stack.write_text("simscen: 1\nstack: {controller: {desired_linear_vel: 0.3}}\n", encoding="utf-8")
+    alike = [hall(tmp_path / "made/wide"), hall(tmp_path / "made/narrow")]
+    others = _with_stack(stack, alike, tmp_path / "made", tmp_path)
+    jobs, owners = _planned(others, tmp_path / "out")
+    assert [owners[job.key][0] for job in jobs] == [0, 0, 1, 1]
+    assert len({job.folder for job in jobs}) == 4
+
+
+def test_experiments_whose_runs_have_one_name_are_not_driven(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="ramp_1"):
+        _planned([hall(tmp_path / "wide"), hall(tmp_path / "narrow")], tmp_path / "out")
