@@ -87,13 +87,19 @@ class Costmap:
     def clear(self, within: float = math.inf) -> None:
         """Forget every live obstacle `within` so many metres of the robot along x and y, but those that it sees now.
 
-        Nav2's ClearEntireCostmap, or ClearCostmapAroundRobot.
+        Nav2's ClearEntireCostmap, or ClearCostmapAroundRobot. What is close to the hull where no lidar looks is kept:
+        that nobody sees it does not tell that it has gone, and the next thing a robot does may be to back up.
         """
         newest = list(self._newest.values())
+        scans = [(base, seen) for base, seen in newest if isinstance(seen, Scan)]
+        blind = self._surroundings.robot.circumscribed_radius + BEYOND_HULL
+        kept = self._live.out_of_view(scans[-1][0], blind, scans) if scans else None
         if newest and math.isfinite(within):
             self._live.forget_around(newest[-1][0], within)
         else:
             self._live.forget(self._frame)
+        if kept is not None:
+            self._live.mark(kept)
         self._show()
         for base, seen in newest:
             self.update(base, seen)

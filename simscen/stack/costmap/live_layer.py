@@ -11,7 +11,7 @@ from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.costmap.depth_layer import Heights, heights_seen, seen_through
 from simscen.stack.costmap.frame import Cells, Frame
 from simscen.stack.costmap.inflation_layer import Squared
-from simscen.stack.costmap.obstacle_layer import crossed, hits
+from simscen.stack.costmap.obstacle_layer import crossed, hits, in_view
 from simscen.stack.costmap.rolling import carried
 from simscen.stack.costmap.static_layer import Mask
 
@@ -40,6 +40,19 @@ class LiveLayer:
         self._scanned[window] = False
         if self._heights is not None:
             self._heights[window] = np.nan
+
+    def out_of_view(self, base: Pose2, metres: float, scans: list[tuple[Pose2, Scan]]) -> Cells:
+        """The cells so near to the robot that are marked by a lidar and that none looked at in these scans."""
+        row, column = self._frame.cells(np.array([[base.x, base.y]]))[0].tolist()
+        window = self._frame.window((row, column), (row, column), math.ceil(metres / self._frame.resolution))
+        cells: Cells = np.argwhere(self._scanned[window]) + np.array((window[0].start, window[1].start))
+        for place, scan in scans:
+            cells = cells[~in_view(cells, self._frame, scan, place)]
+        return cells
+
+    def mark(self, cells: Cells) -> None:
+        """A lidar has seen something here."""
+        _set(self._scanned, cells, True)
 
     def roll(self, frame: Frame) -> None:
         """Go on in another window, with what lies in both."""

@@ -46,6 +46,15 @@ def free_lengths(scan: Scan, spec: CostmapSpec) -> Array:
         return np.where(seen >= scan.range_min, np.minimum(seen, spec.raytrace_max_range), 0.0)
 
 
+def in_view(cells: Cells, frame: Frame, scan: Scan, base: Pose2) -> npt.NDArray[np.bool_]:
+    """Which of the cells (n, 2) lie where the lidar looks, whatever it sees there."""
+    lidar = base.compose(scan.mount)
+    offset = frame.centres(cells) - np.array([lidar.x, lidar.y])
+    bearing = np.arctan2(offset[:, 1], offset[:, 0])
+    turned = (bearing - lidar.yaw - scan.angle_min) % (2 * math.pi)
+    return np.asarray(turned <= abs(scan.angle_increment) * len(scan.ranges))
+
+
 def crossed(cells: Cells, frame: Frame, scan: Scan, base: Pose2, spec: CostmapSpec) -> npt.NDArray[np.bool_]:
     """Which of the cells (n, 2) a beam crosses before it hits anything.
 

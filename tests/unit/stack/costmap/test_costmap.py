@@ -188,6 +188,22 @@ def test_clearing_forgets_what_is_not_seen_any_more_and_keeps_what_is() -> None:
     assert at(map_, 1.42, 3.0)[0] == 254
 
 
+@pytest.mark.parametrize("within", [math.inf, 3.0])
+def test_clearing_keeps_what_stands_close_behind_the_robot_where_no_lidar_looks(within: float) -> None:
+    world = Flatland([], [(3.3, 3.0, 0.1), (1.4, 3.0, 0.1), (3.0, 3.6, 0.1)]).room(8, 6)
+    map_ = costmap(Flatland().room(8, 6))
+    map_.update(Pose2(2.0, 3.0), scan_of(world, Pose2(2.0, 3.0)))
+    full = scan_of(Flatland().room(8, 6), Pose2(3.9, 3.0))
+    ahead = replace(full, ranges=full.ranges[45:-45], angle_min=full.angle_min + 45 * full.angle_increment)
+    map_.update(Pose2(3.9, 3.0), ahead)
+    assert at(map_, 3.22, 3.0)[0] == at(map_, 1.48, 3.0)[0] == 254
+    map_.clear(within)
+    assert at(map_, 3.22, 3.0)[0] == 254
+    assert at(map_, 1.48, 3.0)[0] != 254
+    map_.update(Pose2(3.9, 3.0), full)
+    assert at(map_, 3.22, 3.0)[0] != 254
+
+
 def test_clearing_around_the_robot_keeps_what_was_seen_farther_off() -> None:
     world = Flatland([], [(4.0, 3.0, 0.1), (2.0, 4.2, 0.1)]).room(8, 6)
     map_ = costmap(Flatland().room(8, 6))
