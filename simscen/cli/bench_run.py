@@ -24,6 +24,8 @@ from simscen.study.consistency import anees, bounds, nees_at
 from simscen.study.experiment import Drive, Experiment
 from simscen.study.tally import Row, Trial, mean, tally
 
+PATIENCE = 1800.0
+"""Seconds of wall time that a run may take: on a machine that has other things to do none is to be counted as failed."""
 MOMENTS = (5.0, 10.0, 20.0, 30.0)
 """Seconds of a run at which ANEES is averaged over the runs."""
 
@@ -52,7 +54,7 @@ class Measured:
 def drive(experiments: Sequence[Experiment], out: Path, workers: int) -> list[list[Trial]]:
     """Do all runs of each experiment, and tell of progress and of what went wrong on stderr. Raises InvalidInput."""
     jobs, owners = _planned(experiments, out)
-    options = Options(workers=workers)
+    options = Options(workers=workers, wall_limit=PATIENCE)
     answers, _ = run_session(jobs, options, WARM_PROCESS, _Progress(len(jobs), {job.key: job for job in jobs}))
     of = {answer.key: answer for answer in answers}
     trials: list[list[Trial]] = [[] for _ in experiments]
@@ -79,7 +81,7 @@ def _planned(experiments: Sequence[Experiment], out: Path) -> tuple[list[Job], d
                 key = RunKey(scenario.id, seed)
                 if key in owners:
                     raise ValueError(f"two runs are called {key.scenario}, seed {seed}")
-                jobs.append(Job(len(jobs), scenario, key, run_folder(out, key), Options().wall_limit))
+                jobs.append(Job(len(jobs), scenario, key, run_folder(out, key), PATIENCE))
                 owners[key] = number, planned
     return jobs, owners
 

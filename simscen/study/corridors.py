@@ -11,8 +11,8 @@ from simscen.study.experiment import Drive, Experiment, written
 WIDTH = (1.4, 2.4)
 """Metres of a corridor: two robots of 0.44 m pass each other in the narrowest with 17 cm on each side."""
 LENGTH = 14.0
-SLOPE, HEIGHT = (2.0, 8.0), (0.03, 0.20)
-"""Degrees and metres of ramps."""
+SLOPE, HEIGHT = (2.0, 8.0), (0.03, 0.16)
+"""Degrees and metres of ramps; what is as high as the lidar is a wall on the map, and no way leads over it."""
 HALL = 2.4
 """Metres of the hall that they are in, from wall to wall."""
 

@@ -86,6 +86,14 @@ def test_corridors_and_ramps_load_and_are_not_all_alike(tmp_path: Path) -> None:
         assert len(names) == 3
 
 
+def test_no_ramp_is_a_wall_on_the_map_that_the_robots_lidar_would_make(tmp_path: Path) -> None:
+    for drive in corridors.ramps(tmp_path, range(1, 21)).drives:
+        loaded = load_scenario(drive.file, tmp_path)
+        (lidar,) = (sensor.lidar for sensor in loaded.robot.spec.sensors.values() if sensor.lidar)
+        (platform,) = loaded.world.spec.obstacles
+        assert platform.box[2] < lidar.mount.z - 0.01
+
+
 OTHER = {"controller": {"desired_linear_vel": 0.3}, "localizer": {"type": "odometry"}}
 
 
