@@ -25,7 +25,7 @@ from simscen.study.experiment import Drive, Experiment
 from simscen.study.tally import Row, Trial, mean, tally
 
 PATIENCE = 1800.0
-"""Seconds of wall time that a run may take: on a machine that has other things to do none is to be counted as failed."""
+"""Seconds of wall time that a run may take: a busy machine is no failure of the stack."""
 MOMENTS = (5.0, 10.0, 20.0, 30.0)
 """Seconds of a run at which ANEES is averaged over the runs."""
 
