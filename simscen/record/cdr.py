@@ -1,13 +1,14 @@
 """Common Data Representation as ROS 2 writes it: XCDR version 1, little endian (OMG DDSI-RTPS 10.5).
 
 Building messages field by field costs ten times what writing them does, so a message type is laid out once, as a
-Template, and only what moves is filled in for each message.
+Template, and each message is then packed in one call.
 """
 
 import math
 import struct
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Callable, Sequence
+from itertools import groupby
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -15,29 +16,39 @@ import numpy.typing as npt
 HEADER = b"\x00\x01\x00\x00"
 
 
+class Slot(NamedTuple):
+    """Room for a field of a message: the codes of its numbers, as in `struct`, and its name.
+
+    The name of a field of several numbers begins with a star: "*pose".
+    """
+
+    codes: str
+    field: str
+
+
 class Template:
-    """A message of fixed size: constants are in place, slots are filled in for each message.
+    """A message of fixed size: constants are in place, slots are for what each message fills in.
 
     Fields are appended in the order of the message definition and aligned to their own width, counted from `start`
     bytes before the first field. `prefix` is what precedes the fields without counting: the encapsulation header.
-    `buffer` is the message as filled in last.
+    `buffer` is the message with zeros in its slots.
     """
 
     def __init__(self, prefix: bytes = HEADER, start: int = 0) -> None:
         self.buffer = bytearray(prefix)
         self._shift = start - len(prefix)
+        self._slots: list[tuple[int, Slot]] = []
 
-    def slot(self, codes: str) -> Callable[..., None]:
-        """Append room for values of one width, e.g. "iI" or "7d"; returns the function that fills it."""
-        self.align(struct.calcsize("<" + codes[-1]))
-        offset = len(self.buffer)
-        layout = struct.Struct("<" + codes)
-        self.buffer += bytes(layout.size)
-        return partial(layout.pack_into, self.buffer, offset)
+    def slot(self, codes: str, field: str) -> None:
+        """Append room for numbers of one width, e.g. "iI" or "7d"; "8x" among them are eight bytes that stay zero."""
+        self.align(max(struct.calcsize("<" + code) for code in codes if code.isalpha()))
+        self._slots.append((len(self.buffer), Slot(codes, field)))
+        self.buffer += bytes(struct.calcsize("<" + codes))
 
     def put(self, codes: str, *values: float) -> None:
         """Append constants of one width."""
-        self.slot(codes)(*values)
+        self.align(struct.calcsize("<" + codes[-1]))
+        self.buffer += struct.pack("<" + codes, *values)
 
     def string(self, text: str) -> None:
         """Append a string: its length with the closing NUL, then its UTF-8 bytes."""
@@ -48,6 +59,49 @@ class Template:
     def align(self, width: int) -> None:
         """Pad to a multiple of `width` bytes."""
         self.buffer += bytes(-(len(self.buffer) + self._shift) % width)
+
+    @property
+    def parts(self) -> "list[bytes | Slot]":
+        """Constants and slots, in order."""
+        parts: list[bytes | Slot] = []
+        end = 0
+        for offset, slot in self._slots:
+            parts += (bytes(self.buffer[end:offset]), slot)
+            end = offset + struct.calcsize("<" + slot.codes)
+        return [*parts, bytes(self.buffer[end:])]
+
+    def packer(self) -> Callable[..., bytes]:
+        """What packs a message: it takes the fields of the slots, in their order."""
+        return packer_of(self.parts)
+
+
+def packer_of(parts: "Sequence[bytes | Slot]") -> Callable[..., bytes]:
+    """What packs constants and fields into bytes: it takes the fields in the order in which they come first.
+
+    It is made as Python's named tuples are, from text in which nothing but the names of fields varies: everything then
+    goes through a single call of `struct`.
+    """
+    codes, arguments, known = "<", [], dict[str, Any]()
+    for constant, group in groupby(parts, lambda part: isinstance(part, bytes)):
+        if constant:
+            data = b"".join(part for part in group if isinstance(part, bytes))
+            codes += f"{len(data)}{'s' if any(data) else 'x'}"
+            if any(data):
+                known[f"constant{len(known)}"] = data
+                arguments.append(f"constant{len(known) - 1}")
+        else:
+            slots = [part for part in group if isinstance(part, Slot)]
+            codes += "".join(slot.codes for slot in slots)
+            arguments += [slot.field for slot in slots]
+    fields = dict.fromkeys(field_names(parts))
+    text = f"lambda {', '.join(fields)}: pack({', '.join(arguments)})"
+    made: Callable[..., bytes] = eval(text, {**known, "pack": struct.Struct(codes).pack})
+    return made
+
+
+def field_names(parts: "Sequence[bytes | Slot]") -> list[str]:
+    """The names of the fields, in the order in which they come first."""
+    return list(dict.fromkeys(part.field.removeprefix("*") for part in parts if isinstance(part, Slot)))
 
 
 class Cursor:

@@ -1,57 +1,84 @@
-"""A chunk of an MCAP file in the making."""
+"""A chunk of an MCAP file in the making, and the channels that write into it."""
 
 import struct
+from collections.abc import Callable
 
 from mcap.opcode import Opcode
 
+from simscen.record.cdr import Slot, Template
+
+HEAD = 31
+"""Bytes of a record before its message."""
 _MESSAGE = int(Opcode.MESSAGE)
 _pack_head = struct.Struct("<BQHIQQ").pack
 
 
 class Chunk:
-    """Records that will be compressed together, in the order they came."""
+    """Records that will be compressed together, in the order they came. `full` is called when it has reached `limit`
+    bytes, and empties it.
+    """
 
-    def __init__(self) -> None:
+    def __init__(self, limit: int, full: Callable[[], None]) -> None:
+        self.limit, self.full = limit, full
         self.size = 0
-        self._parts: list[bytes] = []
-        self._index: dict[int, list[int]] = {}  # channel → time, offset, time, offset …
+        self.parts: list[bytes] = []
+        self.spoken: list[Channel] = []
+        """The channels that have a message in it, in the order of their first."""
 
     def put(self, record: bytes) -> None:
         """Add a schema or a channel."""
-        self._parts.append(record)
+        self.parts.append(record)
         self.size += len(record)
-
-    def message(self, channel: int, time: int, data: bytes) -> None:
-        """Add a message at `time` nanoseconds."""
-        entries = self._index.get(channel)
-        if entries is None:
-            entries = self._index[channel] = []
-        entries += (time, self.size)
-        self._parts += (_pack_head(_MESSAGE, 22 + len(data), channel, 0, time, time), data)
-        self.size += 31 + len(data)
 
     def __bool__(self) -> bool:
         """Whether it holds messages; a chunk without any says nothing that the summary does not."""
-        return bool(self._index)
+        return bool(self.spoken)
 
     def content(self) -> bytes:
         """All records."""
-        return b"".join(self._parts)
+        return b"".join(self.parts)
 
     def span(self) -> tuple[int, int]:
         """The times of the first and the last message; messages come in the order of their time."""
-        lists = self._index.values()
-        return min(entries[0] for entries in lists), max(entries[-2] for entries in lists)
+        return min(channel.entries[0] for channel in self.spoken), max(channel.entries[-2] for channel in self.spoken)
 
-    def counts(self) -> dict[int, int]:
-        """The number of messages of each channel."""
-        return {channel: len(entries) // 2 for channel, entries in self._index.items()}
-
-    def indices(self) -> dict[int, bytes]:
-        """A MessageIndex record for each channel."""
-        return {channel: _message_index(channel, entries) for channel, entries in self._index.items()}
+    def clear(self) -> None:
+        """Begin the next one."""
+        for channel in self.spoken:
+            channel.entries.clear()
+        self.size, self.parts, self.spoken = 0, [], []
 
 
-def _message_index(channel: int, entries: list[int]) -> bytes:
-    size = 8 * len(entries)
-    return struct.pack(f"<BQHI{len(entries)}Q", Opcode.MESSAGE_INDEX, 6 + size, channel, size, *entries)
+class Channel:
+    """Messages of one topic; `entries` are the times of those in the chunk, each followed by its offset there."""
+
+    def __init__(self, number: int, chunk: Chunk) -> None:
+        self.number, self.chunk = number, chunk
+        self.entries: list[int] = []
+
+    def write(self, time: int, data: bytes) -> None:
+        """Add a message at `time` nanoseconds."""
+        chunk, length = self.chunk, len(data)
+        if not self.entries:
+            chunk.spoken.append(self)
+        self.entries += (time, chunk.size)
+        chunk.parts += (_pack_head(_MESSAGE, 22 + length, self.number, 0, time, time), data)
+        chunk.size += HEAD + length
+        if chunk.size > chunk.limit:
+            chunk.full()
+
+    def record(self, message: Template) -> "list[bytes | Slot]":
+        """A message of fixed size as a record of the chunk; its field `time` comes first."""
+        head = struct.pack("<BQHI", _MESSAGE, 22 + len(message.buffer), self.number, 0)
+        return [head, Slot("Q", "time"), Slot("Q", "time"), *message.parts]
+
+    @property
+    def count(self) -> int:
+        """How many messages of it are in the chunk."""
+        return len(self.entries) // 2
+
+    def index(self) -> bytes:
+        """The MessageIndex record of the chunk for this channel."""
+        size = 8 * len(self.entries)
+        head = Opcode.MESSAGE_INDEX, 6 + size, self.number, size
+        return struct.pack(f"<BQHI{len(self.entries)}Q", *head, *self.entries)

@@ -3,10 +3,9 @@
 from simscen.core.case import Case
 from simscen.core.events import Event, EventKind
 from simscen.core.geometry import Pose2, Pose3
-from simscen.record import event_text, frames, pack_rare, topics
-from simscen.record.pack import PoseStampedPacker
+from simscen.record import event_text, frames, pack, pack_rare, topics
+from simscen.record.out import Out
 from simscen.record.simtime import SimTime
-from simscen.record.topics import Out
 
 
 class EventTopics:
@@ -15,7 +14,7 @@ class EventTopics:
     def __init__(self, out: Out, time: SimTime, case: Case) -> None:
         self._out, self._time = out, time
         self._goals = {goal.name: goal.pose for goal in case.every_goal}
-        self._goal = PoseStampedPacker(frames.MAP)
+        self._goal = pack.pose_stamped(frames.MAP).packer()
 
     def write(self, now: int, event: Event) -> None:
         """Write an event at `now` nanoseconds."""

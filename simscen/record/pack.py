@@ -1,140 +1,95 @@
-"""ROS 2 messages of one size as bytes. A packer is made once for its frames and called for every message.
+"""ROS 2 messages of one size, laid out. `packer()` of a layout gives what packs its fields, which are named here.
 
 Definitions: ROS 2 Humble's common_interfaces. Covariances that nobody knows are zeros, as REP 145 and the message
-comments ask.
+comments ask. A `stamp` is when something was measured, a `twist` and the poses of a belief are of the ground.
 """
 
-from simscen.core.geometry import Array, Pose3
-from simscen.core.motion import Twist
-from simscen.core.sensing import Imu
+from collections.abc import Sequence
+
 from simscen.record.cdr import Template
-from simscen.record.simtime import Stamp
 
 _NO_ROTATION = (0.0, 0.0, 0.0, 1.0)
+_TWIST = "2d24xd"
+"""Six numbers, of which the ground knows vx, vy and wz."""
+_COVARIANCE = "2d24x3d24xd144x2d24xd"
+"""36 numbers, of which the ground knows those of x, y and yaw."""
 
 
-class ClockPacker:
-    """rosgraph_msgs/msg/Clock."""
-
-    def __init__(self) -> None:
-        message = Template()
-        self._clock = message.slot("iI")
-        self._buffer = message.buffer
-
-    def __call__(self, stamp: Stamp) -> bytes:
-        """The message for simulated time `stamp`."""
-        self._clock(*stamp)
-        return bytes(self._buffer)
+def clock() -> Template:
+    """rosgraph_msgs/msg/Clock: stamp."""
+    message = Template()
+    message.slot("iI", "*stamp")
+    return message
 
 
-class Float64Packer:
-    """std_msgs/msg/Float64."""
-
-    def __init__(self) -> None:
-        message = Template()
-        self._data = message.slot("d")
-        self._buffer = message.buffer
-
-    def __call__(self, value: float) -> bytes:
-        """The message for `value`."""
-        self._data(value)
-        return bytes(self._buffer)
+def float64() -> Template:
+    """std_msgs/msg/Float64: value."""
+    message = Template()
+    message.slot("d", "value")
+    return message
 
 
-class TwistPacker:
-    """geometry_msgs/msg/Twist."""
-
-    def __init__(self) -> None:
-        message = Template()
-        self._twist = message.slot("6d")
-        self._buffer = message.buffer
-
-    def __call__(self, twist: Twist) -> bytes:
-        """The message for a velocity of the ground."""
-        vx, vy, wz = twist
-        self._twist(vx, vy, 0.0, 0.0, 0.0, wz)
-        return bytes(self._buffer)
+def twist() -> Template:
+    """geometry_msgs/msg/Twist: twist."""
+    message = Template()
+    message.slot(_TWIST, "*twist")
+    return message
 
 
-class OdometryPacker:
-    """nav_msgs/msg/Odometry: where `child` is in `frame`, and its velocity in its own frame."""
+def odometry(frame: str, child: str) -> Template:
+    """nav_msgs/msg/Odometry, where `child` is in `frame`, and its velocity in its own frame: stamp, pose, twist."""
+    message = _stamped(frame)
+    message.string(child)
+    message.slot("7d", "*pose")
+    message.put("36d", *[0.0] * 36)
+    message.slot(_TWIST, "*twist")
+    message.put("36d", *[0.0] * 36)
+    return message
 
-    def __init__(self, frame: str, child: str) -> None:
-        message = Template()
-        self._stamp = message.slot("iI")
+
+def imu(frame: str) -> Template:
+    """sensor_msgs/msg/Imu: stamp, turn, force. It has no heading; the first orientation covariance says so with -1."""
+    message = _stamped(frame)
+    message.put("4d", *_NO_ROTATION)
+    message.put("9d", -1.0, *[0.0] * 8)
+    message.slot("3d", "*turn")
+    message.put("9d", *[0.0] * 9)
+    message.slot("3d", "*force")
+    message.put("9d", *[0.0] * 9)
+    return message
+
+
+def pose_with_covariance(frame: str) -> Template:
+    """geometry_msgs/msg/PoseWithCovarianceStamped: stamp, pose, covariance (the nine numbers over x, y, yaw)."""
+    message = _stamped(frame)
+    message.slot("7d", "*pose")
+    message.slot(_COVARIANCE, "*covariance")
+    return message
+
+
+def pose_stamped(frame: str) -> Template:
+    """geometry_msgs/msg/PoseStamped: stamp, pose."""
+    message = _stamped(frame)
+    message.slot("7d", "*pose")
+    return message
+
+
+def transforms(links: Sequence[tuple[str, str, str]]) -> Template:
+    """tf2_msgs/msg/TFMessage: stamp, and the poses of the links, each of which is a frame, its child, and the name of
+    the field for the child's pose in the frame.
+    """
+    message = Template()
+    message.put("I", len(links))
+    for frame, child, pose in links:
+        message.slot("iI", "*stamp")
         message.string(frame)
         message.string(child)
-        self._pose = message.slot("7d")
-        message.put("36d", *[0.0] * 36)
-        self._twist = message.slot("6d")
-        message.put("36d", *[0.0] * 36)
-        self._buffer = message.buffer
-
-    def __call__(self, stamp: Stamp, pose: Pose3, twist: Twist) -> bytes:
-        """The message for a pose and a velocity of the ground, measured at `stamp`."""
-        vx, vy, wz = twist
-        self._stamp(*stamp)
-        self._pose(*pose)
-        self._twist(vx, vy, 0.0, 0.0, 0.0, wz)
-        return bytes(self._buffer)
+        message.slot("7d", f"*{pose}")
+    return message
 
 
-class ImuPacker:
-    """sensor_msgs/msg/Imu. It has no heading, which the first orientation covariance says with -1."""
-
-    def __init__(self, frame: str) -> None:
-        message = Template()
-        self._stamp = message.slot("iI")
-        message.string(frame)
-        message.put("4d", *_NO_ROTATION)
-        message.put("9d", -1.0, *[0.0] * 8)
-        self._turn = message.slot("3d")
-        message.put("9d", *[0.0] * 9)
-        self._force = message.slot("3d")
-        message.put("9d", *[0.0] * 9)
-        self._buffer = message.buffer
-
-    def __call__(self, stamp: Stamp, imu: Imu) -> bytes:
-        """The message for a reading that was taken at `stamp`."""
-        self._stamp(*stamp)
-        self._turn(*imu.angular_velocity)
-        self._force(*imu.linear_acceleration)
-        return bytes(self._buffer)
-
-
-class PoseWithCovariancePacker:
-    """geometry_msgs/msg/PoseWithCovarianceStamped, for poses of the ground."""
-
-    def __init__(self, frame: str) -> None:
-        message = Template()
-        self._stamp = message.slot("iI")
-        message.string(frame)
-        self._pose = message.slot("7d")
-        self._covariance = message.slot("36d")
-        self._buffer = message.buffer
-
-    def __call__(self, stamp: Stamp, pose: Pose3, covariance: Array) -> bytes:
-        """`covariance` (3, 3) is over (x, y, yaw); the message's is over (x, y, z, roll, pitch, yaw)."""
-        xx, xy, xa, yx, yy, ya, ax, ay, aa = covariance.ravel().tolist()
-        gap, row = (0.0, 0.0, 0.0), (0.0,) * 18
-        self._stamp(*stamp)
-        self._pose(*pose)
-        self._covariance(xx, xy, *gap, xa, yx, yy, *gap, ya, *row, ax, ay, *gap, aa)
-        return bytes(self._buffer)
-
-
-class PoseStampedPacker:
-    """geometry_msgs/msg/PoseStamped."""
-
-    def __init__(self, frame: str) -> None:
-        message = Template()
-        self._stamp = message.slot("iI")
-        message.string(frame)
-        self._pose = message.slot("7d")
-        self._buffer = message.buffer
-
-    def __call__(self, stamp: Stamp, pose: Pose3) -> bytes:
-        """The message for a pose at `stamp`."""
-        self._stamp(*stamp)
-        self._pose(*pose)
-        return bytes(self._buffer)
+def _stamped(frame: str) -> Template:
+    message = Template()
+    message.slot("iI", "*stamp")
+    message.string(frame)
+    return message

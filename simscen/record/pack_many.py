@@ -1,6 +1,7 @@
 """ROS 2 messages that hold many of something: numpy lays them out, no Python runs per beam, cell, pose or particle."""
 
 import struct
+from collections.abc import Callable
 
 import numpy as np
 
@@ -34,20 +35,19 @@ class LaserScanPacker:
     """sensor_msgs/msg/LaserScan without intensities."""
 
     def __init__(self, frame: str) -> None:
-        self._head = Template()
-        self._stamp = self._head.slot("iI")
-        self._head.string(frame)
-        self._numbers = self._head.slot("7f")
-        self._count = self._head.slot("I")
+        head = Template()
+        head.slot("iI", "*stamp")
+        head.string(frame)
+        head.slot("7fI", "*numbers")
+        self._pack = head.packer()
 
     def __call__(self, stamp: Stamp, scan: Scan) -> bytes:
         """The message for a scan that was taken at `stamp`."""
         n = len(scan.ranges)
         last = scan.angle_min + scan.angle_increment * (n - 1)
-        self._stamp(*stamp)
-        self._numbers(scan.angle_min, last, scan.angle_increment, 0.0, 0.0, scan.range_min, scan.range_max)
-        self._count(n)
-        return bytes(self._head.buffer) + scan.ranges.astype("<f4").tobytes() + b"\0\0\0\0"
+        angles = scan.angle_min, last, scan.angle_increment
+        head = self._pack(stamp, (*angles, 0.0, 0.0, scan.range_min, scan.range_max, n))
+        return head + scan.ranges.astype("<f4").tobytes() + b"\0\0\0\0"
 
 
 class PathPacker:
@@ -57,90 +57,90 @@ class PathPacker:
     """
 
     def __init__(self, frame: str) -> None:
-        self._head = Template()
-        self._stamp = self._head.slot("iI")
-        self._head.string(frame)
-        self._count = self._head.slot("I")
-        self._first = self._pose(frame, len(self._head.buffer) - len(HEADER))
+        head = Template()
+        head.slot("iI", "*stamp")
+        head.string(frame)
+        head.slot("I", "count")
+        self._pack = head.packer()
+        self._first = self._pose(frame, len(head.buffer) - len(HEADER))
         self._next = self._pose(frame, 0)
 
     @staticmethod
-    def _pose(frame: str, start: int) -> Template:
+    def _pose(frame: str, start: int) -> bytes:
+        """A pose up to its numbers, without its stamp."""
         pose = Template(prefix=b"", start=start)
         pose.put("iI", 0, 0)
         pose.string(frame)
         pose.align(8)
-        return pose
+        return bytes(pose.buffer[8:])
 
     def __call__(self, stamp: Stamp, points: Array) -> bytes:
         """`points` (n, 3) hold x, y, yaw in the packer's frame."""
-        self._stamp(*stamp)
-        self._count(len(points))
+        head = self._pack(stamp, len(points))
         if not len(points):
-            return bytes(self._head.buffer)
-        poses, header = ground_poses(points).astype("<f8"), struct.pack("<iI", *stamp)
-        first, other = (header + bytes(t.buffer)[len(header) :] for t in (self._first, self._next))
+            return head
+        poses, when = ground_poses(points).astype("<f8"), struct.pack("<iI", *stamp)
+        first, other = when + self._first, when + self._next
         rest = np.empty((len(points) - 1, len(other) + 56), dtype=np.uint8)
         rest[:, : len(other)] = np.frombuffer(other, dtype=np.uint8)
         rest[:, len(other) :] = poses[1:].view(np.uint8).reshape(-1, 56)
-        return b"".join((bytes(self._head.buffer), first, poses[0].tobytes(), rest.tobytes()))
+        return b"".join((head, first, poses[0].tobytes(), rest.tobytes()))
 
 
 class ParticleCloudPacker:
     """nav2_msgs/msg/ParticleCloud."""
 
     def __init__(self, frame: str) -> None:
-        self._head = Template()
-        self._stamp = self._head.slot("iI")
-        self._head.string(frame)
-        self._count = self._head.slot("I")
-        self._head.align(8)
+        head = Template()
+        head.slot("iI", "*stamp")
+        head.string(frame)
+        head.slot("I", "count")
+        head.align(8)
+        self._pack = head.packer()
 
     def __call__(self, stamp: Stamp, particles: Array) -> bytes:
         """`particles` (n, 4) hold x, y, yaw, weight; n > 0."""
-        self._stamp(*stamp)
-        self._count(len(particles))
         cloud = np.empty((len(particles), 8), dtype="<f8")
         cloud[:, :7] = ground_poses(particles)
         cloud[:, 7] = particles[:, 3]
-        return bytes(self._head.buffer) + cloud.tobytes()
+        return self._pack(stamp, len(particles)) + cloud.tobytes()
 
 
 class TransformsPacker:
     """tf2_msgs/msg/TFMessage. A transform ends on a multiple of eight bytes, so only the first is laid out apart."""
 
     def __init__(self) -> None:
-        self._layouts: dict[tuple[str, str, int], _Transform] = {}
+        self._firsts: dict[tuple[str, str, int], Callable[[Stamp, Pose3], bytes]] = {}
+        self._others: dict[tuple[str, str], Callable[[Stamp, Pose3], bytes]] = {}
 
     def __call__(self, links: list[Link]) -> bytes:
         """Each link is (frame, child frame, stamp, pose of the child in the frame)."""
-        start = 4
-        parts = [HEADER, struct.pack("<I", len(links))]
-        for frame, child, stamp, pose in links:
-            key = (frame, child, start)
-            layout = self._layouts.get(key)
-            if layout is None:
-                layout = self._layouts[key] = _Transform(frame, child, start)
-            parts.append(layout(stamp, pose))
-            start = 0
-        return b"".join(parts)
+        if not links:
+            return HEADER + bytes(4)
+        frame, child, stamp, pose = links[0]
+        key = frame, child, len(links)
+        known = self._firsts.get(key)
+        if known is None:
+            known = self._firsts[key] = _transform(frame, child, HEADER + struct.pack("<I", len(links)), 4)
+        message = known(stamp, pose)
+        return message if len(links) == 1 else b"".join((message, *map(self._other, links[1:])))
+
+    def _other(self, link: Link) -> bytes:
+        frame, child, stamp, pose = link
+        known = self._others.get((frame, child))
+        if known is None:
+            known = self._others[frame, child] = _transform(frame, child, b"", 0)
+        return known(stamp, pose)
 
 
-class _Transform:
-    """geometry_msgs/msg/TransformStamped inside a sequence, beginning `start` bytes after a multiple of eight."""
-
-    def __init__(self, frame: str, child: str, start: int) -> None:
-        message = Template(prefix=b"", start=start)
-        self._stamp = message.slot("iI")
-        message.string(frame)
-        message.string(child)
-        self._pose = message.slot("7d")
-        self._buffer = message.buffer
-
-    def __call__(self, stamp: Stamp, pose: Pose3) -> bytes:
-        self._stamp(*stamp)
-        self._pose(*pose)
-        return bytes(self._buffer)
+def _transform(frame: str, child: str, before: bytes, start: int) -> Callable[[Stamp, Pose3], bytes]:
+    """Packs geometry_msgs/msg/TransformStamped in a sequence, beginning `start` bytes after a multiple of eight."""
+    message = Template(prefix=before, start=start)
+    message.slot("iI", "*stamp")
+    message.string(frame)
+    message.string(child)
+    message.slot("7d", "*pose")
+    return message.packer()
 
 
 def occupancy_grid(frame: str, stamp: Stamp, grid: OccupancyGrid) -> bytes:

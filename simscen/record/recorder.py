@@ -11,10 +11,10 @@ from simscen.core.trace import Moment
 from simscen.record import header
 from simscen.record.header import LogHeader
 from simscen.record.logfile import LogFile
+from simscen.record.out import Namespaced, Publisher
 from simscen.record.robot_topics import RobotTopics
 from simscen.record.sceneryfile import scenery_of
 from simscen.record.simtime import SimTime
-from simscen.record.topics import Namespaced, Publisher
 from simscen.record.writer import McapWriter, Sink
 
 
@@ -37,11 +37,12 @@ class Recorder:
         for name, data in header.attachments(about).items():
             self._writer.attach(name, header.media_type(name), data)
         each, scenery = about.robots or {"": about}, scenery_of(about)
+        first = next(iter(each))
         self.robots = {
-            name: RobotTopics(Namespaced(out, name) if about.robots else out, time, one, scenery, name)
+            name: RobotTopics(Namespaced(out, name) if name else out, time, one, scenery, name, clock=name == first)
             for name, one in each.items()
         }
-        """What takes the moments of each robot, by name; the only one has none."""
+        """What takes the moments of each robot, by name; the only one has none. The first one tells the time."""
 
     def append(self, moment: Moment) -> None:
         """Write one beat of the only robot."""

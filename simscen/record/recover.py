@@ -6,6 +6,7 @@ from typing import IO
 
 from mcap import records
 
+from simscen.record.chunk import Channel
 from simscen.record.contents import Foreign
 from simscen.record.logfile import failure
 from simscen.record.openlog import WholeRecords, open_log
@@ -56,7 +57,7 @@ def _copy(stream: IO[bytes], file: IO[bytes]) -> None:
     """Chunks come out as they went in, so that only the end of the file changes."""
     writer: McapWriter | None = None
     kinds: dict[int, MessageType] = {}
-    channels: dict[int, int] = {}
+    channels: dict[int, Channel] = {}
     for record in WholeRecords(stream):
         if isinstance(record, records.Header):
             writer = McapWriter(file, record.profile, record.library)
@@ -69,7 +70,7 @@ def _copy(stream: IO[bytes], file: IO[bytes]) -> None:
             case records.Channel():
                 channels[record.id] = writer.channel(record.topic, kinds[record.schema_id], record.metadata)
             case records.Message():
-                writer.message(channels[record.channel_id], record.log_time, record.data)
+                channels[record.channel_id].write(record.log_time, record.data)
             case records.Attachment():
                 writer.attach(record.name, record.media_type, record.data)
             case records.Metadata():

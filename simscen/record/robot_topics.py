@@ -6,25 +6,27 @@ from simscen.core.trace import Moment
 from simscen.record import frames, pack_many, pack_rare, topics
 from simscen.record.event_topics import EventTopics
 from simscen.record.header import LogHeader
+from simscen.record.out import Out
 from simscen.record.scene_topics import SceneTopics
 from simscen.record.sensor_topics import SensorTopics
 from simscen.record.simtime import SimTime
 from simscen.record.stack_topics import StackTopics
 from simscen.record.thinning import Thinning
-from simscen.record.topics import Out
 from simscen.record.truth_topics import TruthTopics
 
 
 class RobotTopics:
-    """Eats the moments of a robot in the order of their ticks, and writes them to `out`."""
+    """Eats the moments of a robot in the order of their ticks, and writes them to `out`; the time only with `clock`."""
 
-    def __init__(self, out: Out, time: SimTime, about: LogHeader, scenery: Scenery, robot: str = "") -> None:
+    def __init__(
+        self, out: Out, time: SimTime, about: LogHeader, scenery: Scenery, robot: str = "", clock: bool = True
+    ) -> None:
         self._time, thinning, names = time, Thinning(time.rate), frames.RobotFrames(robot)
         if about.map is not None:
             out.publish(topics.MAP, 0, pack_many.occupancy_grid(frames.MAP, (0, 0), about.map))
         if about.robot_description:
             out.publish(topics.ROBOT_DESCRIPTION, 0, pack_rare.string(about.robot_description))
-        self._truth = TruthTopics(out, time, thinning, names)
+        self._truth = TruthTopics(out, time, thinning, names, clock)
         self._sensors = SensorTopics(out, time, thinning, about.frames, about.sensors, names)
         self._stack = StackTopics(out, time, thinning, names)
         self._events = EventTopics(out, time, about.case)
@@ -41,5 +43,6 @@ class RobotTopics:
         self._sensors.write(now, moment.readings)
         self._stack.write(now, tick, decision)
         self._scene.write(now, moment.events)
-        for event in (*moment.events, *decision.events):
-            self._events.write(now, event)
+        if moment.events or decision.events:
+            for event in (*moment.events, *decision.events):
+                self._events.write(now, event)

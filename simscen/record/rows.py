@@ -4,7 +4,7 @@ The TraceBuilder fills rows from moments, the log reader from messages. Both han
 the log stores, and one function turns them into yaw: so the two traces are equal to the last bit.
 """
 
-from array import array
+import struct
 from collections.abc import Iterable
 
 import numpy as np
@@ -17,20 +17,20 @@ from simscen.core.trace import Trace
 
 
 class Series:
-    """A signal in the making: a tick and `width` numbers a row."""
+    """A signal in the making: a tick and `width` numbers a row, packed as they come."""
 
     def __init__(self, width: int) -> None:
         self._width = width + 1
-        self._numbers = array("d")
+        self._pack = struct.Struct(f"{width + 1}d").pack
+        self._rows = bytearray()
 
     def add(self, tick: int, values: Iterable[float]) -> None:
         """Append a row. Ticks are exact in a double for a million years of simulated time."""
-        self._numbers.append(tick)
-        self._numbers.extend(values)
+        self._rows += self._pack(tick, *values)
 
     def columns(self) -> tuple[Ticks, Array]:
         """Ticks (n,) and values (n, width)."""
-        table = np.array(self._numbers, dtype=np.float64).reshape(-1, self._width)
+        table = np.frombuffer(bytes(self._rows)).reshape(-1, self._width)
         return table[:, 0].astype(np.int64), table[:, 1:]
 
 
@@ -66,7 +66,10 @@ class Rows:
 
     def object(self, name: str) -> Series:
         """The rows of a moving thing."""
-        return self.objects.setdefault(name, Series(7))
+        known = self.objects.get(name)
+        if known is None:
+            known = self.objects[name] = Series(7)
+        return known
 
     def trace(self, tick_rate: int, end: int) -> Trace:
         """What happened until `end`."""

@@ -13,7 +13,7 @@ from simscen.core.zones import Filter
 from simscen.record import frames, topics
 from simscen.record.frames import RobotFrames
 from simscen.record.markers import ARROW, LINE_LIST, TEXT, TRIANGLE_LIST, Colour, Marker, boxes, marker_array, rims
-from simscen.record.topics import Out
+from simscen.record.out import Out
 
 THING: Colour = (0.0, 0.41, 0.58, 1.0)
 PERSON: Colour = (0.48, 0.24, 0.51, 1.0)
@@ -46,6 +46,8 @@ class SceneTopics:
 
     def write(self, now: int, events: Sequence[Event]) -> None:
         """Take in what happened in a beat, at `now` nanoseconds."""
+        if self._begun and not events:
+            return
         came = [self._change_things(event) for event in events]
         switched = [self._switch(event) for event in events]
         if any(came) or not self._begun:

@@ -7,14 +7,15 @@ from typing_extensions import assert_never
 
 from simscen.core.geometry import Pose3
 from simscen.core.sensing import Bump, Image, Imu, Odometry, Readings, Scan
-from simscen.record import frames, pack_rare, topics
-from simscen.record.pack import ImuPacker, OdometryPacker
+from simscen.record import frames, pack, pack_rare, topics
+from simscen.record.out import Line, Out, Together
 from simscen.record.pack_many import LaserScanPacker, TransformsPacker
 from simscen.record.simtime import SimTime, Stamp
 from simscen.record.thinning import Thinning
-from simscen.record.topics import Out, Topic
+from simscen.record.topics import Topic
 
 _START: Stamp = (0, 0)
+_PRESSED, _FREE = pack_rare.boolean(True), pack_rare.boolean(False)
 _PLAIN = {
     "Scan": ("scan", topics.SCAN_TYPE),
     "Odometry": ("odom", topics.ODOMETRY_TYPE),
@@ -44,11 +45,13 @@ class SensorTopics:
     ) -> None:
         self._out, self._time, self._thinning = out, time, thinning
         self._topics: dict[tuple[str, str], Topic] = {}
+        self._lines: dict[tuple[str, str], Line] = {}
+        self._owns: tuple[Together, Together] | None = None
         self._plain: set[str] = set()
         self._scans: dict[str, LaserScanPacker] = {}
         self._names = names or frames.RobotFrames()
-        self._odometry = OdometryPacker(self._names.odom, self._names.base)
-        self._imu = ImuPacker(self._names.base)
+        self._odometry = pack.odometry(self._names.odom, self._names.base).packer()
+        self._imu = pack.imu(self._names.base).packer()
         self._transforms = TransformsPacker()
         self._mounts = dict(mounts)
         self._correction: Pose3 | None = None
@@ -68,11 +71,11 @@ class SensorTopics:
                 case Scan():
                     self._write_scan(now, reading)
                 case Imu():
-                    topic = self._topic(reading.sensor, "imu", topics.IMU_TYPE)
-                    self._out.publish(topic, now, self._imu(self._time.stamp(reading.tick), reading))
+                    turn, force = reading.angular_velocity, reading.linear_acceleration
+                    data = self._imu(self._time.stamp(reading.tick), turn, force)
+                    self._line("Imu", reading.sensor).write(now, data)
                 case Bump():
-                    topic = self._topic(reading.sensor, "bumper", topics.BUMPER_TYPE)
-                    self._out.publish(topic, now, pack_rare.boolean(reading.pressed))
+                    self._line("Bump", reading.sensor).write(now, _PRESSED if reading.pressed else _FREE)
                 case Image():
                     self._write_image(now, reading)
                 case _:
@@ -80,8 +83,7 @@ class SensorTopics:
 
     def topic_of(self, reading: Odometry | Scan) -> Topic:
         """The topic on which a reading is written."""
-        plain, kind = _PLAIN[type(reading).__name__]
-        return self._topic(reading.sensor, plain, kind)
+        return self._topic(reading.sensor, *_PLAIN[type(reading).__name__])
 
     def _known(self, sensor: str, kind: str) -> list[Topic]:
         if kind == "Image":
@@ -90,13 +92,21 @@ class SensorTopics:
 
     def _write_odometry(self, now: int, odometry: Odometry) -> None:
         stamp, pose = self._time.stamp(odometry.tick), Pose3.planar(odometry.pose)
-        self._out.publish(self.topic_of(odometry), now, self._odometry(stamp, pose, odometry.twist))
         if not self._thinning.keeps_odometry(odometry):
-            return
-        links = [(self._names.odom, self._names.base, stamp, pose)]
-        if self._correction is not None:
-            links.append((frames.MAP, self._names.odom, stamp, self._correction))
-        self._out.publish(topics.TF, now, self._transforms(links))
+            self._line("Odometry", odometry.sensor).write(now, self._odometry(stamp, pose, odometry.twist))
+        elif self._correction is None:
+            self._own(odometry)[0].write(now, stamp, pose, odometry.twist)
+        else:
+            self._own(odometry)[1].write(now, stamp, pose, odometry.twist, self._correction)
+
+    def _own(self, odometry: Odometry) -> tuple[Together, Together]:
+        """What writes the robot's own odometry, with what it says on /tf: alone, and with the correction."""
+        if self._owns is None:
+            layout = self.topic_of(odometry), pack.odometry(self._names.odom, self._names.base)
+            links = (self._names.odom, self._names.base, "pose"), (frames.MAP, self._names.odom, "correction")
+            alone, both = ((topics.TF, pack.transforms(those)) for those in (links[:1], links))
+            self._owns = self._out.together((layout, alone)), self._out.together((layout, both))
+        return self._owns
 
     def _write_scan(self, now: int, scan: Scan) -> None:
         packer = self._scans.get(scan.sensor)
@@ -105,7 +115,7 @@ class SensorTopics:
         if scan.sensor not in self._mounts:
             self._mounts[scan.sensor] = Pose3.planar(scan.mount)
             self._publish_mounts(now)
-        self._out.publish(self.topic_of(scan), now, packer(self._time.stamp(scan.tick), scan))
+        self._line("Scan", scan.sensor).write(now, packer(self._time.stamp(scan.tick), scan))
 
     def _write_image(self, now: int, image: Image) -> None:
         frame, stamp = self._names.of_sensor(image.sensor), self._time.stamp(image.tick)
@@ -120,6 +130,12 @@ class SensorTopics:
         links = [(base, self._names.of_sensor(name), _START, pose) for name, pose in self._mounts.items()]
         if links:
             self._out.publish(topics.TF_STATIC, now, self._transforms(links))
+
+    def _line(self, kind: str, sensor: str) -> Line:
+        line = self._lines.get((kind, sensor))
+        if line is None:
+            line = self._lines[kind, sensor] = self._out.line(self._topic(sensor, *_PLAIN[kind]))
+        return line
 
     def _topic(self, sensor: str, plain: str, kind: str) -> Topic:
         topic = self._topics.get((sensor, plain))

@@ -1,14 +1,11 @@
 """Ticks as nanoseconds and back, in whole numbers."""
 
-from dataclasses import dataclass
-
 SECOND = 1_000_000_000
 
 
 Stamp = tuple[int, int]  # builtin_interfaces/Time: whole seconds and the nanoseconds beyond them
 
 
-@dataclass(frozen=True)
 class SimTime:
     """Simulated time of a clock with `rate` ticks a second.
 
@@ -16,11 +13,11 @@ class SimTime:
     exactly for every rate below 1 GHz.
     """
 
-    rate: int
-
-    def __post_init__(self) -> None:
-        if not 1 <= self.rate < SECOND:
-            raise ValueError(f"a clock of {self.rate} Hz cannot be told in nanoseconds")
+    def __init__(self, rate: int) -> None:
+        if not 1 <= rate < SECOND:
+            raise ValueError(f"a clock of {rate} Hz cannot be told in nanoseconds")
+        self.rate = rate
+        self._last: tuple[int, Stamp] = (0, (0, 0))  # most of what a beat says is of that beat
 
     def nanoseconds(self, tick: int) -> int:
         """Nanoseconds since the start of the run."""
@@ -28,7 +25,9 @@ class SimTime:
 
     def stamp(self, tick: int) -> Stamp:
         """The same as a ROS time."""
-        return divmod(tick * SECOND // self.rate, SECOND)
+        if tick != self._last[0]:
+            self._last = tick, divmod(tick * SECOND // self.rate, SECOND)
+        return self._last[1]
 
     def tick(self, nanoseconds: int) -> int:
         """The tick that `nanoseconds` was written for."""

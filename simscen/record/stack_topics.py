@@ -3,13 +3,12 @@
 from simscen.core.belief import Belief
 from simscen.core.geometry import Pose3
 from simscen.core.trace import Decision
-from simscen.record import frames, pack_many, pack_rare, topics
+from simscen.record import frames, pack, pack_many, pack_rare, topics
 from simscen.record.frames import RobotFrames
-from simscen.record.pack import PoseWithCovariancePacker, TwistPacker
+from simscen.record.out import Out
 from simscen.record.pack_many import ParticleCloudPacker, PathPacker
 from simscen.record.simtime import SimTime
 from simscen.record.thinning import Thinning, Throttle
-from simscen.record.topics import Out
 
 PARTICLE_RATE = 2  # a cloud of 2000 is 128 kB, as much as all other topics say in a second
 POSES_RATE, MOST_POSES = 1, 200  # the same for the eye, to which 32-bit numbers are enough
@@ -21,10 +20,11 @@ class StackTopics:
 
     def __init__(self, out: Out, time: SimTime, thinning: Thinning, names: RobotFrames) -> None:
         self._out, self._time, self._thinning, self._names = out, time, thinning, names
-        self._belief = PoseWithCovariancePacker(frames.MAP)
+        self._belief = pack.pose_with_covariance(frames.MAP).packer()
         self._particles = ParticleCloudPacker(frames.MAP)
         self._path = PathPacker(frames.MAP)
-        self._command = TwistPacker()
+        self._command = pack.twist().packer()
+        self._commands, self._beliefs = out.line(topics.COMMAND), out.line(topics.BELIEF)
         self._particle_times = Throttle(time.rate, PARTICLE_RATE)
         self._poses_times = Throttle(time.rate, POSES_RATE)
         self._local_plan_times = Throttle(time.rate, LOCAL_PLAN_RATE)
@@ -44,14 +44,14 @@ class StackTopics:
             stamp = self._time.stamp(tick)
             self._out.publish(topic, now, pack_many.occupancy_grid(self._names.of(costmap.frame), stamp, costmap.grid))
         if self._thinning.keeps_command(tick, decision.command):
-            self._out.publish(topics.COMMAND, now, self._command(decision.command))
+            self._commands.write(now, self._command(decision.command))
         for line in decision.lines:
             self._out.publish(topics.ROSOUT, now, pack_rare.log(self._time.stamp(tick), *line))
 
     def _write_belief(self, now: int, tick: int, belief: Belief) -> None:
         stamp = self._time.stamp(tick)
         pose = Pose3.planar(belief.pose)
-        self._out.publish(topics.BELIEF, now, self._belief(stamp, pose, belief.covariance))
+        self._beliefs.write(now, self._belief(stamp, pose, belief.covariance.ravel().tolist()))
         if len(belief.particles) and self._particle_times.passes(tick):
             self._out.publish(topics.PARTICLES, now, self._particles(stamp, belief.particles))
         if len(belief.particles) and self._poses_times.passes(tick):

@@ -37,14 +37,14 @@ class Thinning:
             self._odometry = odometry.sensor
         return odometry.sensor == self._odometry
 
-    def moved(self, tick: int, truth: Truth) -> list[tuple[str, Pose3]]:
+    def moved(self, tick: int, truth: Truth) -> dict[str, Pose3]:
         """The moving things whose pose is kept at this tick, by name."""
-        kept = []
+        kept = {}
         for name, pose in truth.objects.items():
             last = self._objects.get(name)
             if last is None or last[1] != pose or tick - last[0] >= self._standstill_period:
                 self._objects[name] = (tick, pose)
-                kept.append((name, pose))
+                kept[name] = pose
         return kept
 
 

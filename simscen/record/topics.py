@@ -1,10 +1,6 @@
 """The topics of a log, with the types and quality of service that ROS 2's nodes would have given them."""
 
-from collections.abc import Mapping
-from typing import NamedTuple, Protocol
-
-from simscen.record.schemas import MessageType, load
-from simscen.record.writer import McapWriter
+from typing import NamedTuple
 
 
 class Topic(NamedTuple):
@@ -67,56 +63,3 @@ _QOS = """\
 def qos(latched: bool) -> str:
     """`offered_qos_profiles` as rosbag2 writes it."""
     return _QOS.format(depth=1, durability=1) if latched else _QOS.format(depth=10, durability=2)
-
-
-class Out(Protocol):
-    """Takes messages: a log, or a stack that is told them."""
-
-    def publish(self, topic: Topic, time: int, data: bytes) -> None:
-        """Take a message at `time` nanoseconds."""
-        ...
-
-
-class Publisher:
-    """Opens a channel the first time something is published on its topic."""
-
-    def __init__(self, writer: McapWriter) -> None:
-        self._writer = writer
-        self._types: Mapping[str, MessageType] = load()
-        self._channels: dict[str, int] = {}
-        self._told: dict[str, int] = {}
-
-    def once(self, topic: Topic, time: int, data: bytes) -> None:
-        """Write a message at `time` nanoseconds, if there is none of that time on its topic."""
-        if self._told.get(topic.name) != time:
-            self._told[topic.name] = time
-            self.publish(topic, time, data)
-
-    def publish(self, topic: Topic, time: int, data: bytes) -> None:
-        """Write a message at `time` nanoseconds."""
-        channel = self._channels.get(topic.name)
-        if channel is None:
-            channel = self._channels[topic.name] = self._open(topic)
-        self._writer.message(channel, time, data)
-
-    def _open(self, topic: Topic) -> int:
-        kind = self._types[topic.type]
-        metadata = {"offered_qos_profiles": qos(topic.latched), "topic_type_hash": kind.hash}
-        return self._writer.channel(topic.name, kind, metadata)
-
-
-class Namespaced:
-    """Takes the messages of one of several robots: its topics are in its namespace, as in Nav2's bringup of several.
-
-    There is one clock for all.
-    """
-
-    def __init__(self, out: Publisher, robot: str) -> None:
-        self._out, self._robot = out, robot
-
-    def publish(self, topic: Topic, time: int, data: bytes) -> None:
-        """Take a message at `time` nanoseconds."""
-        if topic == CLOCK:
-            self._out.once(topic, time, data)
-        else:
-            self._out.publish(topic._replace(name=f"/{self._robot}{topic.name}"), time, data)

@@ -1,32 +1,48 @@
 """What really happened: /clock, /ground_truth/odom, /simscen/clearance, and on /tf the robot and moving things."""
 
+from collections.abc import Iterable
+
 from simscen.core.trace import Truth
-from simscen.record import frames, topics
-from simscen.record.pack import ClockPacker, Float64Packer, OdometryPacker
+from simscen.record import frames, pack, topics
+from simscen.record.out import Out, Together
 from simscen.record.pack_many import TransformsPacker
 from simscen.record.simtime import SimTime
 from simscen.record.thinning import Thinning
-from simscen.record.topics import Out
+
+MOST_LAYOUTS = 16
+"""Sets of things that move at once, for which all messages are laid out together; most runs have few."""
 
 
 class TruthTopics:
-    """Writes truth samples, and the clock with them."""
+    """Writes truth samples, and the `clock` with them unless another robot's does."""
 
-    def __init__(self, out: Out, time: SimTime, thinning: Thinning, names: frames.RobotFrames) -> None:
+    def __init__(
+        self, out: Out, time: SimTime, thinning: Thinning, names: frames.RobotFrames, clock: bool = True
+    ) -> None:
         self._out, self._time, self._thinning, self._frame = out, time, thinning, names.truth
-        self._clock = ClockPacker()
-        self._odometry = OdometryPacker(frames.MAP, names.truth)
-        self._clearance = Float64Packer()
-        self._transforms = TransformsPacker()
+        truth = (topics.TRUTH, pack.odometry(frames.MAP, names.truth)), (topics.CLEARANCE, pack.float64())
+        self._always = ((topics.CLOCK, pack.clock()), *truth) if clock else truth
+        self._without = out.together(self._always)
+        self._layouts: dict[tuple[str, ...], Together] = {}
+        self._transforms, self._moves = TransformsPacker(), out.line(topics.TF)
 
     def write(self, now: int, tick: int, truth: Truth) -> None:
         """Write the sample of `tick`, which is at `now` nanoseconds."""
-        out, stamp = self._out, self._time.stamp(tick)
-        out.publish(topics.CLOCK, now, self._clock(stamp))
-        out.publish(topics.TRUTH, now, self._odometry(stamp, truth.pose, truth.twist))
-        out.publish(topics.CLEARANCE, now, self._clearance(truth.clearance))
-        links = [(frames.MAP, self._frame, stamp, truth.pose)]
-        if truth.objects:
-            moved = self._thinning.moved(tick, truth)
-            links += [(frames.MAP, frames.of_object(name), stamp, pose) for name, pose in moved]
-        out.publish(topics.TF, now, self._transforms(links))
+        moved = self._thinning.moved(tick, truth) if truth.objects else {}
+        stamp, fields = self._time.stamp(tick), (truth.pose, truth.twist, truth.clearance)
+        layout = self._layouts.get(tuple(moved))
+        if layout is None and len(self._layouts) < MOST_LAYOUTS:
+            layout = self._layouts[tuple(moved)] = self._layout(moved)
+        if layout is not None:
+            layout.write(now, stamp, *fields, *moved.values())
+            return
+        self._without.write(now, stamp, *fields)
+        links = [(frames.MAP, frames.of_object(name), stamp, pose) for name, pose in moved.items()]
+        self._moves.write(now, self._transforms([(frames.MAP, self._frame, stamp, truth.pose), *links]))
+
+    def _layout(self, moved: Iterable[str]) -> Together:
+        """The messages with the poses of these things on /tf, behind the robot's."""
+        links = [(frames.MAP, frames.of_object(name), f"thing{index}") for index, name in enumerate(moved)]
+        return self._out.together(
+            (*self._always, (topics.TF, pack.transforms([(frames.MAP, self._frame, "pose"), *links])))
+        )

@@ -16,7 +16,7 @@ from mcap import records
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 
-from simscen.record.chunk import Chunk
+from simscen.record.chunk import Channel, Chunk
 from simscen.record.schemas import MessageType
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -42,8 +42,7 @@ class McapWriter:
     def __init__(self, sink: Sink, profile: str, library: str, chunk_size: int = CHUNK_SIZE) -> None:
         self._sink = sink
         self._written = self._checksum = 0
-        self._chunk = Chunk()
-        self._chunk_size = chunk_size
+        self._chunk = Chunk(chunk_size, self._finish_chunk)
         self._compress = zstandard.ZstdCompressor(level=_COMPRESSION_LEVEL).compress
         self._schemas: dict[str, records.Schema] = {}
         self._channels: list[records.Channel] = []
@@ -54,8 +53,8 @@ class McapWriter:
         self._put(MAGIC)
         self._put(_encoded(records.Header(profile, library)))
 
-    def channel(self, topic: str, kind: MessageType, metadata: Mapping[str, str]) -> int:
-        """Open a channel of CDR messages; the number is what `message` asks for."""
+    def channel(self, topic: str, kind: MessageType, metadata: Mapping[str, str]) -> Channel:
+        """Open a channel of CDR messages."""
         schema = self._schemas.get(kind.name)
         if schema is None:
             schema = records.Schema(len(self._schemas) + 1, kind.definition.encode(), "ros2msg", kind.name)
@@ -64,13 +63,7 @@ class McapWriter:
         channel = records.Channel(len(self._channels) + 1, topic, "cdr", dict(metadata), schema.id)
         self._channels.append(channel)
         self._chunk.put(_encoded(channel))
-        return channel.id
-
-    def message(self, channel: int, time: int, data: bytes) -> None:
-        """Add a message at `time` nanoseconds."""
-        self._chunk.message(channel, time, data)
-        if self._chunk.size > self._chunk_size:
-            self._finish_chunk()
+        return Channel(channel.id, self._chunk)
 
     def attach(self, name: str, media_type: str, data: bytes) -> None:
         """Add a file."""
@@ -121,11 +114,10 @@ class McapWriter:
         return [list(group) for group in groups]
 
     def _finish_chunk(self) -> None:
-        chunk, self._chunk = self._chunk, Chunk()
-        content, (start, end) = chunk.content(), chunk.span()
+        content, (start, end) = self._chunk.content(), self._chunk.span()
         packed = self._compress(content)
         record = _encoded(records.Chunk("zstd", packed, end, start, zlib.crc32(content), len(content)))
-        at, index = self._written, chunk.indices()
+        at, index = self._written, {channel.number: channel.index() for channel in self._chunk.spoken}
         places = itertools.accumulate(map(len, index.values()), initial=at + len(record))
         self._chunks.append(
             records.ChunkIndex(
@@ -140,7 +132,8 @@ class McapWriter:
                 uncompressed_size=len(content),
             )
         )
-        self._counts.update(chunk.counts())
+        self._counts.update({channel.number: channel.count for channel in self._chunk.spoken})
+        self._chunk.clear()
         self._put(b"".join((record, *index.values())))
 
     def _put(self, data: bytes) -> None:

@@ -16,6 +16,7 @@ from simscen.core.errors import InvalidInput
 from simscen.core.problems import Problem
 from simscen.judge.judge import judge
 from simscen.loading.resolved import spec_of_text
+from simscen.record.chunk import Channel
 from simscen.record.openlog import WholeRecords
 from simscen.record.recover import recover
 from simscen.record.replay import read_run
@@ -103,7 +104,7 @@ def damaged_log(corpus: list[bytes], chance: random.Random) -> tuple[int, bytes]
     out = io.BytesIO()
     writer = McapWriter(out, "ros2", "simscen")
     kinds: dict[int, MessageType] = {}
-    channels: dict[int, int] = {}
+    channels: dict[int, Channel] = {}
     rate = chance.choice((0.0005, 0.002, 0.02))
 
     def damaged(data: bytes) -> bytes:
@@ -117,7 +118,7 @@ def damaged_log(corpus: list[bytes], chance: random.Random) -> tuple[int, bytes]
                 case records.Channel():
                     channels[record.id] = writer.channel(record.topic, kinds[record.schema_id], record.metadata)
                 case records.Message():
-                    writer.message(channels[record.channel_id], record.log_time, damaged(record.data))
+                    channels[record.channel_id].write(record.log_time, damaged(record.data))
                 case records.Attachment():
                     data = mutant([record.data], chance)[1] if chance.random() < 0.2 else record.data
                     writer.attach(record.name, record.media_type, data)

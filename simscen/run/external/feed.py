@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Collection, Iterator, Mapping
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,8 +14,8 @@ from simscen.core.geometry import Array, Pose3
 from simscen.core.grid import OccupancyGrid
 from simscen.core.sensing import Odometry, Reading, Readings, Scan
 from simscen.peer import messages
-from simscen.record import frames, pack_many, pack_rare, topics
-from simscen.record.pack import PoseWithCovariancePacker
+from simscen.record import frames, pack, pack_many, pack_rare, topics
+from simscen.record.out import Layouts, Line, Together
 from simscen.record.sensor_topics import SensorTopics
 from simscen.record.simtime import SimTime
 from simscen.record.thinning import Thinning
@@ -50,9 +51,9 @@ class Feed:
         """What is known of the robot from the start."""
         self._latched.append((topics.ROBOT_DESCRIPTION, pack_rare.string(description)))
         if estimate.pose is not None:
-            pack = PoseWithCovariancePacker(frames.MAP)
-            pose = Pose3.planar(estimate.pose)
-            self._latched.append((INITIAL_POSE, pack(_START, pose, np.diag(np.square(estimate.std)))))
+            told = pack.pose_with_covariance(frames.MAP).packer()
+            covariance = np.diag(np.square(estimate.std)).ravel().tolist()
+            self._latched.append((INITIAL_POSE, told(_START, Pose3.planar(estimate.pose), covariance)))
 
     def offer(self) -> Offer:
         """All that can be heard."""
@@ -93,6 +94,14 @@ class Feed:
         """What has been collected since this was last asked."""
         messages, self._waiting = self._waiting, []
         return messages
+
+    def line(self, topic: Topic) -> Line:
+        """As record's Publisher."""
+        return Line(lambda: partial(self.publish, topic))
+
+    def together(self, messages: Layouts) -> Together:
+        """As record's Publisher."""
+        return Together(self, messages)
 
     def publish(self, topic: Topic, time: int, data: bytes) -> None:
         """As record's Publisher, with a stack instead of a log."""

@@ -24,7 +24,7 @@ poses = st.lists(st.tuples(numbers, numbers, st.floats(-4, 4)), max_size=5)
 
 @given(numbers, numbers, numbers)
 def test_a_twist_is_what_the_engine_packs(vx: float, vy: float, wz: float) -> None:
-    assert messages.twist(vx, vy, wz) == pack.TwistPacker()(Twist(vx, vy, wz))
+    assert messages.twist(vx, vy, wz) == pack.twist().packer()(Twist(vx, vy, wz))
 
 
 @given(poses)
@@ -38,8 +38,8 @@ def test_a_path_is_what_the_engine_packs(points) -> None:
 
 @given(numbers, numbers, st.floats(-4, 4), st.lists(numbers, min_size=9, max_size=9))
 def test_a_pose_with_covariance_is_what_the_engine_packs(x: float, y: float, yaw: float, covariance) -> None:
-    theirs = pack.PoseWithCovariancePacker("map")
-    expected = theirs(STAMP, Pose3.planar(Pose2(x, y, yaw)), np.array(covariance).reshape(3, 3))
+    theirs = pack.pose_with_covariance("map").packer()
+    expected = theirs(STAMP, Pose3.planar(Pose2(x, y, yaw)), covariance)
     assert messages.pose_with_covariance(STAMP, (x, y, yaw), covariance) == expected
 
 
@@ -67,7 +67,7 @@ def test_a_scan_is_read_as_it_was_packed(frame: str, ranges) -> None:
 
 @given(numbers, numbers, st.floats(-3, 3), names)
 def test_odometry_is_read_as_it_was_packed(x: float, y: float, yaw: float, frame: str) -> None:
-    packed = pack.OdometryPacker(frame, "base")(STAMP, Pose3.planar(Pose2(x, y, yaw)), Twist(x, y, yaw))
+    packed = pack.odometry(frame, "base").packer()(STAMP, Pose3.planar(Pose2(x, y, yaw)), Twist(x, y, yaw))
     read = messages.read("nav_msgs/msg/Odometry", packed)
     assert (read.stamp, read.frame, read.child, read.vx, read.vy, read.wz) == (STAMP, frame, "base", x, y, yaw)
     assert read.pose == pytest.approx((x, y, yaw))
@@ -75,7 +75,9 @@ def test_odometry_is_read_as_it_was_packed(x: float, y: float, yaw: float, frame
 
 def test_an_imu_a_picture_and_a_map_are_read_as_they_were_packed() -> None:
     imu = Imu("imu", 0, (1.0, 2.0, 3.0), (4.0, 5.0, 6.0))
-    read = messages.read("sensor_msgs/msg/Imu", pack.ImuPacker("base")(STAMP, imu))
+    read = messages.read(
+        "sensor_msgs/msg/Imu", pack.imu("base").packer()(STAMP, imu.angular_velocity, imu.linear_acceleration)
+    )
     assert (read.angular_velocity, read.linear_acceleration) == ((1.0, 2.0, 3.0), (4.0, 5.0, 6.0))
     picture = np.arange(24, dtype=np.uint8).reshape(2, 4, 3)
     seen = messages.read("sensor_msgs/msg/Image", pack_rare.image("eye", STAMP, picture))

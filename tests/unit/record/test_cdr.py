@@ -5,7 +5,7 @@ import struct
 import numpy as np
 import pytest
 
-from simscen.record.cdr import Cursor, Template
+from simscen.record.cdr import Cursor, Template, packer_of
 
 
 def test_alignment_is_counted_after_the_header() -> None:
@@ -21,16 +21,29 @@ def test_a_string_carries_its_length_with_the_closing_nul() -> None:
     assert bytes(message.buffer[4:]) == b"\4\0\0\0a\xc3\xb1\0"
 
 
-def test_a_slot_filled_again_leaves_the_constants_alone() -> None:
+def test_a_packer_puts_fields_into_slots_and_leaves_the_constants_alone() -> None:
     message = Template()
-    stamp = message.slot("iI")
+    message.slot("iI", "*stamp")
     message.string("map")
-    stamp(1, 2)
-    first = bytes(message.buffer)
-    stamp(3, 4)
-    assert first[:4] == bytes(message.buffer[:4])
-    assert first[12:] == bytes(message.buffer[12:])
-    assert Cursor(bytes(message.buffer)).take("iI") == (3, 4)
+    message.put("2d", 0.0, 0.0)
+    message.slot("d8xd", "*ends")
+    pack = message.packer()
+    first, second = pack((1, 2), (0.5, 1.5)), pack((3, 4), (2.5, 3.5))
+    assert len(first) == len(message.buffer)
+    assert first[12:] == bytes(message.buffer[12:])[:-24] + struct.pack("<3d", 0.5, 0.0, 1.5)
+    assert second[12:-24] == first[12:-24]
+    cursor = Cursor(second)
+    assert cursor.take("iI") == (3, 4)
+    assert cursor.string() == "map"
+    assert cursor.take("5d") == (0.0, 0.0, 2.5, 0.0, 3.5)
+
+
+def test_fields_that_are_called_alike_are_asked_for_once() -> None:
+    one, other = Template(prefix=b""), Template(prefix=b"")
+    one.slot("d", "value")
+    other.slot("i", "count")
+    other.slot("d", "value")
+    assert packer_of([*one.parts, *other.parts])(0.5, 7) == struct.pack("<di4xd", 0.5, 7, 0.5)
 
 
 def test_a_cursor_reads_what_a_template_wrote() -> None:

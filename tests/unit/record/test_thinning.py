@@ -33,7 +33,7 @@ def test_things_that_move_are_always_kept() -> None:
     thinning = Thinning(240)
     for tick in range(5):
         pose = Pose3(x=float(tick))
-        assert thinning.moved(tick, Truth(Pose3(), STOP, 1.0, {"cart": pose})) == [("cart", pose)]
+        assert thinning.moved(tick, Truth(Pose3(), STOP, 1.0, {"cart": pose})) == {"cart": pose}
 
 
 def test_a_throttle_lets_pass_at_its_rate_and_at_once() -> None:

@@ -8,6 +8,10 @@ from mcap.reader import NonSeekingReader, make_reader
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
+from simscen.core.geometry import Pose3
+from simscen.core.motion import Twist
+from simscen.record import pack, topics
+from simscen.record.out import Publisher, Together
 from simscen.record.schemas import load
 from simscen.record.writer import McapWriter
 
@@ -18,12 +22,11 @@ MESSAGES = [(1 + i % 3, 1000 * (i // 2), random.Random(i).randbytes(300)) for i 
 def ours() -> bytes:
     stream = io.BytesIO()
     writer = McapWriter(stream, "ros2", "simscen")
-    for n in range(3):
-        writer.channel(f"/t{n}", TEXT, {"key": str(n)})
+    channels = [writer.channel(f"/t{n}", TEXT, {"key": str(n)}) for n in range(3)]
     writer.attach("a.txt", "text/plain", b"hello")
     writer.note("facts", {"seed": "7"})
-    for message in MESSAGES:
-        writer.message(*message)
+    for number, time, data in MESSAGES:
+        channels[number - 1].write(time, data)
     writer.finish()
     return stream.getvalue()
 
@@ -90,3 +93,25 @@ def test_a_file_without_messages_is_sound() -> None:
 
 def test_the_same_calls_give_the_same_bytes() -> None:
     assert ours() == ours()
+
+
+def test_messages_that_are_packed_together_give_the_bytes_of_single_ones() -> None:
+    """Also where a chunk ends among them, as it does here every few times, and where another is between them."""
+    layouts = (topics.TRUTH, pack.odometry("map", "base")), (topics.CLEARANCE, pack.float64())
+    pose, twist = Pose3(1.0, 2.0), Twist(0.5)
+
+    def written(together: bool) -> bytes:
+        stream = io.BytesIO()
+        writer = McapWriter(stream, "ros2", "simscen", chunk_size=5000)
+        out = Publisher(writer)
+        block = out.together(layouts) if together else Together(out, layouts)
+        for time in range(100):
+            block.write(time, (time, 0), pose, twist, 0.25)
+            if time % 7 == 0:
+                out.publish(topics.ROSOUT, time, bytes(time))
+        writer.finish()
+        return stream.getvalue()
+
+    assert written(True) == written(False)
+    reader = make_reader(io.BytesIO(written(True)), validate_crcs=True)
+    assert len(list(reader.iter_messages(topics=[topics.CLEARANCE.name], start_time=50))) == 50
