@@ -38,7 +38,9 @@ class Frames:
 
 def placed(frame: Pose2, poses: Array) -> Array:
     """Poses (n, 3) given in `frame`, in the frame around it."""
-    return np.column_stack((frame.apply(poses[:, :2]), wrap_array(poses[:, 2] + frame.yaw)))
+    moved = np.empty((len(poses), 3))
+    moved[:, :2], moved[:, 2] = frame.apply(poses[:, :2]), wrap_array(poses[:, 2] + frame.yaw)
+    return moved
 
 
 def placed_polygon(frame: Pose2, polygon: Polygon) -> Polygon:

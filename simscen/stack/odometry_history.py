@@ -1,8 +1,6 @@
 """Where odometry was at any recent tick, as tf knows it: a scan that comes late was taken from there."""
 
 from bisect import bisect_left, bisect_right
-from collections import deque
-from collections.abc import Iterable
 
 from simscen.core.geometry import Pose2
 
@@ -12,9 +10,10 @@ KEPT = 10
 _LARGEST = 1e6
 
 
-def believable(values: Iterable[float]) -> bool:
+def believable(values: tuple[float, float, float]) -> bool:
     """Whether these are numbers that a position, or a velocity, can have."""
-    return all(-_LARGEST < value < _LARGEST for value in values)
+    x, y, yaw = values
+    return -_LARGEST < x < _LARGEST and -_LARGEST < y < _LARGEST and -_LARGEST < yaw < _LARGEST
 
 
 class OdometryHistory:
@@ -22,26 +21,25 @@ class OdometryHistory:
 
     def __init__(self, tick_rate: int) -> None:
         self._span = KEPT * tick_rate
-        self._ticks: deque[int] = deque()
-        self._poses: deque[Pose2] = deque()
+        self._ticks: list[int] = []
+        self._poses: list[Pose2] = []
+        self.now = Pose2(0.0, 0.0)
+        """The newest pose; the origin before there is any."""
 
     def __bool__(self) -> bool:
         return bool(self._poses)
 
-    @property
-    def now(self) -> Pose2:
-        """The newest pose; the origin before there is any."""
-        return self._poses[-1] if self._poses else Pose2(0.0, 0.0)
-
     def add(self, tick: int, pose: Pose2) -> bool:
         """Take a reading in; False when it is of no use: not a place, or not newer than the last one."""
-        if not believable(pose) or (self._ticks and tick <= self._ticks[-1]):
+        ticks = self._ticks
+        if not believable(pose) or (ticks and tick <= ticks[-1]):
             return False
-        self._ticks.append(tick)
+        ticks.append(tick)
         self._poses.append(pose)
-        while self._ticks[0] < tick - self._span:
-            self._ticks.popleft()
-            self._poses.popleft()
+        self.now = pose
+        if ticks[0] < tick - self._span:
+            old = bisect_left(ticks, tick - self._span)
+            del ticks[:old], self._poses[:old]
         return True
 
     def reaches(self, tick: int) -> bool:
@@ -50,8 +48,9 @@ class OdometryHistory:
 
     def held(self, tick: int) -> Pose2:
         """The newest pose up to `tick`, for who cannot wait for the next; the oldest known before that."""
-        place = bisect_right(self._ticks, tick)
-        return self._poses[max(0, place - 1)] if self._poses else Pose2(0.0, 0.0)
+        if not self._ticks or tick >= self._ticks[-1]:
+            return self.now
+        return self._poses[max(0, bisect_right(self._ticks, tick) - 1)]
 
     def at(self, tick: int) -> Pose2 | None:
         """The pose at `tick`, interpolated along a constant twist's chord; None before the oldest, after the newest."""

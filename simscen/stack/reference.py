@@ -4,6 +4,7 @@ from typing import Any
 
 from simscen.core.belief import Estimate
 from simscen.core.events import Event
+from simscen.core.geometry import Pose2
 from simscen.core.motion import STOP
 from simscen.core.navigation import ErrorCode, Goal, Path
 from simscen.core.sensing import Image, Imu, Odometry, Readings, Scan
@@ -107,22 +108,25 @@ class ReferenceStack:
         self._tick = tick
         scanned = self._take(readings)
         controls = tick % self._control_period == 0
-        if controls:
-            self._update_costmaps(tick)
-            self._monitor.on_moving(self._prediction.around(tick))
-            self._control(tick)
-        self._commands.step(tick, self._odometry.now)
-        sent = self._commands.sent
-        if not controls and not readings and not self._events and sent is self._nothing.command:
-            return self._nothing
         local_plan: Path | None = None
         costmaps: tuple[CostGrid, ...] = ()
         if controls:
-            local_plan = self._publishing.local_plan(tick, self._navigator.plan is not None, self._frames)
+            frames = self._frames()
+            self._update_costmaps(tick, frames)
+            self._monitor.on_moving(self._prediction.around(tick))
+            self._control(tick, frames)
+            local_plan = self._publishing.local_plan(tick, self._navigator.plan is not None, frames)
             costmaps = self._publishing.costmaps(tick, self._costmaps)
-        self._nothing = Decision(sent)
-        events, self._events = tuple(self._events), []
+        self._commands.step(tick, self._odometry.now)
+        sent = self._commands.sent
+        if sent is not self._nothing.command:
+            self._nothing = Decision(sent)
+        elif not controls and not readings and not self._events:
+            return self._nothing
         belief, plan = self._publishing.belief(tick, scanned), self._publishing.plan(self.plan)
+        if belief is None and plan is None and local_plan is None and not costmaps and not self._events:
+            return self._nothing
+        events, self._events = tuple(self._events), []
         return Decision(sent, belief, plan, local_plan, events, costmaps=costmaps)
 
     def _take(self, readings: Readings) -> bool:
@@ -169,46 +173,45 @@ class ReferenceStack:
             self._odometry.add(reading.tick, reading.pose)
             self._prediction.on_odometry(reading.tick, reading.pose)
 
-    @property
     def _frames(self) -> Frames:
         """Where the robot is now; a robot without odometry has its map for odom frame."""
         pose = self._localizer.belief.pose
         return Frames(pose, self._odometry.now if self._odometry else pose)
 
-    def _update_costmaps(self, tick: int) -> None:
+    def _update_costmaps(self, tick: int, frames: Frames) -> None:
         """Feed the newest scan of each sensor, not older than a costmap's own period, and honour new zones."""
         if self._zones is not None and self._costmaps.due(tick):
             self._costmaps.set_zones(self._zones)
             self._speed_filter.set_zones(self._zones)
             self._zones = None
-        self._costmaps.update(tick, self._frames, self._odometry)
+        self._costmaps.update(tick, frames, self._odometry)
 
-    def _control(self, tick: int) -> None:
+    def _control(self, tick: int, frames: Frames) -> None:
         """See to the goals, and to the command that is wanted."""
         self._events += self._task.next(tick)
-        self._pass(tick)
+        self._pass(tick, frames.pose)
         goal = self._task.goal
         if goal is None:
-            self._stand(tick)
+            self._stand(tick, frames.pose)
             return
         self._prediction.settle()
-        last = (goal, *self._task.ahead)[-1]
+        *via, last = goal, *self._task.ahead
         if self._navigator.goal is not last:
             self._navigator.pursue(last)
-        self._navigator.via = tuple(each for each in (goal, *self._task.ahead) if each is not last)
+        self._navigator.via = tuple(via)
         if goal.timeout is not None and tick - self._task.since > goal.timeout * self._tick_rate:
             self._give_up(tick, NavigationFailure(ErrorCode.NAVIGATE_TIMEOUT, f"{goal.timeout:g} s are over"))
         elif self._monitor.silent(tick):
             self._commands.stop(tick)
         elif not self._commands.busy(tick):
-            self._navigate(tick)
+            self._navigate(tick, frames)
 
-    def _navigate(self, tick: int) -> None:
+    def _navigate(self, tick: int, frames: Frames) -> None:
         """One step of the navigator, and what comes of it."""
-        frames, periods = self._frames, self._commands.periods(tick)
         if self._speed_filter:
             self._controller.set_speed_limit(self._speed_filter.limit(frames.pose, self._controller.full_speed))
-        step = self._navigator.step(tick, frames, self._twist, self._commands.held(tick), periods)
+        held, periods = self._commands.held(tick), self._commands.periods(tick)
+        step = self._navigator.step(tick, frames, self._twist, held, periods)
         self._events += step.events
         if step.failure is not None:
             self._give_up(tick, step.failure)
@@ -219,22 +222,21 @@ class ReferenceStack:
             pose, view = frames.pose, self._costmaps.wide.view
             self._commands.want(tick, self._prediction.steer(tick, step.command, pose, self._twist, view, self.plan))
 
-    def _stand(self, tick: int) -> None:
+    def _stand(self, tick: int, pose: Pose2) -> None:
         """Nowhere to go; but out of the way of what comes at the robot, and back."""
-        pose, view = self._localizer.belief.pose, self._costmaps.wide.view
-        command = self._prediction.stand(tick, pose, self._twist, view)
+        command = self._prediction.stand(tick, pose, self._twist, self._costmaps.wide.view)
         if command == STOP or self._monitor.silent(tick):
             self._commands.stop(tick)
         elif not self._commands.busy(tick):
             self._commands.want(tick, command)
 
-    def _pass(self, tick: int) -> None:
+    def _pass(self, tick: int, pose: Pose2) -> None:
         """Poses that the robot is near to are behind it.
 
         Nav2's RemovePassedGoals: the way on is planned through the poses that remain.
         """
         while (goal := self._task.goal) is not None and goal.via:
-            if self._localizer.belief.pose.distance(goal.pose) > goal.xy_tolerance:
+            if pose.distance(goal.pose) > goal.xy_tolerance:
                 return
             self._events += self._task.passed(tick)
             self._events += self._task.next(tick)

@@ -1,6 +1,7 @@
 """What is worked out, but not there yet."""
 
 from collections import deque
+from collections.abc import Sequence
 from typing import Generic, TypeVar
 
 T = TypeVar("T")
@@ -17,8 +18,10 @@ class Underway(Generic[T]):
         """Work on this begins at `tick`."""
         self._waiting.append((tick + self._latency, result))
 
-    def take(self, tick: int) -> list[T]:
+    def take(self, tick: int) -> Sequence[T]:
         """What is there by now, oldest first."""
+        if not self._waiting:
+            return ()
         there: list[T] = []
         while self._waiting and self._waiting[0][0] <= tick:
             there.append(self._waiting.popleft()[1])

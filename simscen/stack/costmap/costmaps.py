@@ -1,6 +1,7 @@
 """The two costmaps of a stack, as in Nav2: a global one to plan on, and a local one to drive by."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -105,7 +106,7 @@ class _Rhythm:
     def due(self, tick: int) -> bool:
         return tick - self._updated >= self._period
 
-    def take(self, tick: int, frames: Frames, base: Pose2, odometry: OdometryHistory) -> list["_View"]:
+    def take(self, tick: int, frames: Frames, base: Pose2, odometry: OdometryHistory) -> Sequence["_View"]:
         """What has been taken in by now; without any reading an update waits for one. The robot is at `base` now."""
         if self.seen and self.due(tick):
             self._updated = tick

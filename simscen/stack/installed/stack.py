@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from simscen.core.belief import Estimate
+from simscen.core.belief import Belief, Estimate
 from simscen.core.events import Event, EventKind
 from simscen.core.grid import OccupancyGrid
 from simscen.core.navigation import Goal, Path
@@ -24,6 +24,7 @@ class InstalledStack(Watched):
     def __init__(self, spec: InProcessStack, setting: Setting) -> None:
         super().__init__("stack", spec, setting, Stack)
         self._last: Decision | None = None
+        self._belief: Belief | None = None
 
     def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:
         """Localise at the estimate, then drive to the goals in order."""
@@ -48,7 +49,10 @@ class InstalledStack(Watched):
 
     def decide(self, tick: int, readings: Readings) -> Decision:
         """The stack's decision. Raises RunError when it is none."""
-        decision = self.ask(self.inner.decide, tick, readings)
+        try:
+            decision = self.inner.decide(tick, readings)
+        except Exception as error:  # as in `ask`, and it is asked at every beat
+            self.raised(error)
         if decision is not self._last:  # a stack that repeats itself does so with the same object
             self._last = self._checked(decision, tick)
         return self._last
@@ -72,10 +76,11 @@ class InstalledStack(Watched):
             self.broke(f"decided {type(decision).__name__} instead of a Decision")
         self.checked_twist(decision.command)
         if decision.belief is not None:
-            checked_belief(self, decision.belief)
-        for path, what in ((decision.plan, "planned"), (decision.local_plan, "expects to drive")):
-            if path is not None:
-                self.checked_path(path, what)
+            self._belief = checked_belief(self, decision.belief, self._belief)
+        if decision.plan is not None:
+            self.checked_path(decision.plan, "planned")
+        if decision.local_plan is not None:
+            self.checked_path(decision.local_plan, "expects to drive")
         for costmap in decision.costmaps:
             self._look_at(costmap)
         for event in decision.events:

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, NoReturn, ParamSpec, TypeVar
 import numpy as np
 
 from simscen.core.errors import BROKEN, RunError
-from simscen.core.geometry import Pose2
+from simscen.core.geometry import Array, Pose2
 from simscen.core.motion import Twist
 from simscen.core.navigation import ErrorCode, Path
 from simscen.spec.component import Component
@@ -17,6 +17,7 @@ from simscen.stack.setting import Setting
 
 P = ParamSpec("P")
 T = TypeVar("T")
+NUMBER = (float, int)
 
 
 class Watched:
@@ -47,14 +48,18 @@ class Watched:
         """Call it; a failure to do what was asked passes, everything else is its own fault."""
         try:
             return method(*args, **kwargs)
-        except (RunError, MemoryError):
-            raise
         except Exception as error:  # the boundary to code of others, which can raise anything
-            if isinstance(error, NavigationFailure) and self.may_fail:
-                if not isinstance(error.code, ErrorCode):
-                    self.broke(f"fails with {error.code!r}, which is no ErrorCode")
-                raise
-            raise RunError("crashed", f"{self.who}: {type(error).__name__}: {error} ({self._place(error)})") from error
+            self.raised(error)
+
+    def raised(self, error: Exception) -> NoReturn:
+        """Raise what comes of an exception of the component."""
+        if isinstance(error, RunError | MemoryError):
+            raise error
+        if isinstance(error, NavigationFailure) and self.may_fail:
+            if not isinstance(error.code, ErrorCode):
+                self.broke(f"fails with {error.code!r}, which is no ErrorCode")
+            raise error
+        raise RunError("crashed", f"{self.who}: {type(error).__name__}: {error} ({self._place(error)})") from error
 
     def broke(self, what: str) -> NoReturn:
         """End the run: it answered with something that is no answer."""
@@ -67,7 +72,7 @@ class Watched:
         points = path.points
         if not isinstance(points, np.ndarray) or points.ndim != 2 or points.shape[1] != 3:
             self.broke(f"{what} a path whose points are {_shape(points)} instead of (n, 3): x, y, yaw")
-        if points.dtype.kind != "f" or not np.isfinite(points).all():
+        if points.dtype.kind != "f" or not all_finite(points):
             self.broke(f"{what} a path with points that are no finite numbers")
         return path
 
@@ -75,8 +80,9 @@ class Watched:
         """A velocity of three finite numbers."""
         if not isinstance(command, Twist):
             self.broke(f"commanded {type(command).__name__} instead of a Twist")
+        vx, vy, wz = command
         try:
-            finite = all(map(math.isfinite, command))
+            finite = math.isfinite(vx) and math.isfinite(vy) and math.isfinite(wz)
         except TypeError:
             finite = False
         if not finite:
@@ -85,7 +91,7 @@ class Watched:
 
     def checked_pose(self, pose: object, what: str) -> Pose2:
         """A pose of three finite numbers."""
-        if not isinstance(pose, Pose2) or not all(isinstance(v, float | int) and math.isfinite(v) for v in pose):
+        if not isinstance(pose, Pose2) or not (is_finite(pose[0]) and is_finite(pose[1]) and is_finite(pose[2])):
             self.broke(f"{what} {pose!r}, which is no finite pose")
         return pose
 
@@ -101,6 +107,16 @@ class Watched:
 def promised(protocol: type) -> list[str]:
     """The methods of a protocol; what it has besides may come to be when it is used."""
     return [name for name, what in vars(protocol).items() if callable(what) and not name.startswith("_")]
+
+
+def is_finite(value: object) -> bool:
+    """Whether this is a number, and neither nan nor infinite."""
+    return isinstance(value, NUMBER) and math.isfinite(value)
+
+
+def all_finite(values: Array) -> bool:
+    """Whether no number of an array is nan or infinite: then the sum of their squares is neither, or too large."""
+    return math.isfinite(np.vdot(values, values)) or bool(np.isfinite(values).all())
 
 
 def _shape(points: object) -> str:
