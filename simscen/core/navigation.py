@@ -85,6 +85,10 @@ class Goal:
     via: bool = False
     wait: float = 0.0
 
+    def at(self, pose: Pose2) -> Goal:
+        """The same goal elsewhere, or in another frame."""
+        return Goal(self.name, pose, self.xy_tolerance, self.yaw_tolerance, self.timeout, self.via, self.wait)
+
 
 @dataclass(frozen=True, eq=False)
 class Path:

@@ -173,7 +173,7 @@ def _stack(
         clock,
         stop_on_failure=prepared.spec.on_goal_failure != "continue",
         mode=prepared.spec.navigation.mode,
-        heard=lambda localizer: ToldLocalizer(localizer, told),
+        heard=lambda localizer: ToldLocalizer(localizer, told) if prepared.spec.faults else localizer,
     )
 
 

@@ -53,11 +53,11 @@ class CollisionMonitor:
 
     def on_scan(self, scan: Scan, odometry: Pose2) -> None:
         """A scan, and where odometry was when it came; one in which no beam answers is silence."""
-        answers = scan.ranges >= scan.range_min
-        if not answers.any():
+        answers = scan.ranges[scan.ranges >= scan.range_min]
+        if not len(answers):
             return
         self._seen[scan.sensor] = scan.tick
-        nearest = float(scan.ranges.min(where=answers, initial=math.inf))
+        nearest = float(answers.min())
         self._scans[scan.sensor] = Seen(scan, odometry, nearest - math.hypot(scan.mount.x, scan.mount.y))
 
     def on_moving(self, moving: Moving) -> None:

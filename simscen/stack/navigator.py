@@ -8,7 +8,7 @@ failure to plan; control has one retry until the next recovery, for its action g
 mapped wall fails after the first retry: no recovery changes that.
 """
 
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from simscen.core.events import Event, EventKind, Value
 from simscen.core.motion import STOP, Twist
@@ -23,8 +23,7 @@ from simscen.stack.recovery import RoundRobin
 from simscen.stack.replanning import PlanInForce
 
 
-@dataclass(frozen=True)
-class Step:
+class Step(NamedTuple):
     """What comes of a step: the velocity wanted, whether the goal is reached or has failed, and what happened."""
 
     command: Twist = STOP
@@ -110,7 +109,7 @@ class Navigator:
             command = self._follow(goal, frames, twist, held)
         except NavigationFailure as failure:
             step = self._failed(tick, goal, frames, failure)
-            return replace(step, events=(*events, *step.events))
+            return step._replace(events=(*events, *step.events))
         self._trouble_since = None
         return Step(command, events=events)
 
@@ -120,8 +119,8 @@ class Navigator:
             return STOP
         self._replanned = False
         self._path.tell(self._plans.plan, frames)
-        following = (*self.via, goal)[0]  # a tour may end where it begins: only the last drive to its end ends it
-        local = replace(following, pose=frames.odom_from_map.compose(following.pose))
+        following = self.via[0] if self.via else goal  # a tour may end where it begins: only its last drive ends it
+        local = following.at(frames.odom_from_map.compose(following.pose))
         command = self._controller.command(frames.odometry, twist, self._costmaps.near.view, local)
         if held:
             raise NavigationFailure(ErrorCode.FAILED_TO_MAKE_PROGRESS, "the collision monitor holds the robot")

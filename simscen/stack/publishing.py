@@ -34,7 +34,7 @@ class Publishing:
         self._belief_told = -self._belief_period
         self._local_plan_told = 0
         self._plan: Path | None = None
-        self._drawn = [_Drawn("global", "map", GLOBAL_RATE), _Drawn("local", "odom", LOCAL_RATE)]
+        self._wide, self._near = _Drawn("global", "map", GLOBAL_RATE), _Drawn("local", "odom", LOCAL_RATE)
 
     def belief(self, tick: int, scanned: bool) -> Belief | None:
         """The belief with each scan, and without one at BELIEF_RATE."""
@@ -60,12 +60,10 @@ class Publishing:
 
     def costmaps(self, tick: int, costmaps: Costmaps) -> tuple[CostGrid, ...]:
         """Both costmaps, each at its rate and when it has changed."""
-        views = (costmaps.wide, costmaps.near)
-        found = (
-            one.published(tick, costmap.view, self._tick_rate)
-            for one, costmap in zip(self._drawn, views, strict=True)
-            if tick >= one.due
-        )
+        if tick < self._wide.due and tick < self._near.due:
+            return ()
+        both = (self._wide, costmaps.wide), (self._near, costmaps.near)
+        found = (one.published(tick, costmap.view, self._tick_rate) for one, costmap in both if tick >= one.due)
         return tuple(grid for grid in found if grid is not None)
 
 

@@ -11,7 +11,7 @@ from simscen.core.zones import Zones
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.costmap.denoise_layer import without_specks
 from simscen.stack.costmap.frame import Cells, Frame
-from simscen.stack.costmap.inflation_layer import FAR, Inflation, squared_distances
+from simscen.stack.costmap.inflation_layer import Inflation, squared_distances
 from simscen.stack.costmap.live_layer import LiveLayer, Window
 from simscen.stack.costmap.obstacle_layer import crossed
 from simscen.stack.costmap.rolling import carried, left_behind, window_around, within
@@ -23,7 +23,6 @@ BEYOND_HULL = 0.5
 LOOK_AROUND = 5
 """Every which scan is asked what unknown cells it shows to be free: once a second at the default rate, Nav2's own for
 the global costmap. Nothing that drives waits for it, and of a map's outside there are many."""
-ALL = (slice(None), slice(None))
 
 
 class Costmap:
@@ -56,6 +55,7 @@ class Costmap:
         self._speck = spec.denoise_layer.minimal_group_size if spec.denoise_layer.enabled else 0
         self._revision, self._zoned, self._scans = 0, 0, 0
         self._newest: dict[str, tuple[Pose2, Scan | Image]] = {}
+        self._view: CostmapView | None = None
         layer = self._layer(Pose2(0.0, 0.0))
         self._live = LiveLayer(spec, self._inscribed, layer.frame)
         self._lay(layer)
@@ -65,8 +65,12 @@ class Costmap:
     @property
     def view(self) -> CostmapView:
         """The costmap now. Its arrays are windows on this costmap and valid until the next update."""
-        frame, radius = self._frame, self._spec.inflation_radius
-        return CostmapView(self._costs, self._distance, frame.resolution, frame.origin, self._revision, radius)
+        view, revision = self._view, self._revision
+        if view is None or view.revision != revision:
+            frame, radius = self._frame, self._spec.inflation_radius
+            view = CostmapView(self._costs, self._distance, frame.resolution, frame.origin, revision, radius)
+            self._view = view
+        return view
 
     @property
     def obstacle_cells(self) -> int:
@@ -117,10 +121,10 @@ class Costmap:
 
     def fits_static(self, pose: Pose2, tolerance: float) -> bool:
         """Whether the pose is off the walls of the map and the robot's inscribed circle fits somewhere so near it."""
-        row, column = self._frame.cells(np.array([[pose.x, pose.y]]))[0].tolist()
-        if self._static_squared[row, column] == 0:
+        here = self._frame.cell(pose.x, pose.y)
+        if self._static_squared[here] == 0:
             return False
-        near = self._frame.window((row, column), (row, column), math.ceil(tolerance / self._frame.resolution))
+        near = self._frame.window(here, here, math.ceil(tolerance / self._frame.resolution))
         fits = self._inflation.metres.take(self._static_squared[near]) > self._inscribed
         points = self._frame.centres(np.argwhere(fits) + np.array((near[0].start, near[1].start)))
         return bool((np.hypot(points[:, 0] - pose.x, points[:, 1] - pose.y) <= tolerance).any())
@@ -155,10 +159,10 @@ class Costmap:
 
     def _show(self) -> None:
         """Compute everything again."""
-        squared = np.minimum(self._static_squared, squared_distances(self._obstacles(ALL), self._margin))
-        self._costs = self._inflation.costs(squared, self._unknown)
-        self._distance = self._inflation.metres.take(squared)
+        self._costs = self._inflation.costs(self._static_squared, self._unknown)
+        self._distance = self._inflation.metres.take(self._static_squared)
         self._revision += 1
+        self._refresh(np.argwhere(self._live.marked()))
 
     def _obstacles(self, window: Window) -> Mask:
         """Live obstacles in a window, without specks where they are noise."""
@@ -189,13 +193,11 @@ class Costmap:
         low, high = changed.min(axis=0).tolist(), changed.max(axis=0).tolist()
         inner = self._frame.window((low[0], low[1]), (high[0], high[1]), self._margin + self._speck)
         outer = self._frame.window((low[0], low[1]), (high[0], high[1]), 2 * (self._margin + self._speck))
-        near = squared_distances(self._obstacles(outer))
-        near[near > self._margin * self._margin] = FAR
         part = (
             slice(inner[0].start - outer[0].start, inner[0].stop - outer[0].start),
             slice(inner[1].start - outer[1].start, inner[1].stop - outer[1].start),
         )
-        squared = np.minimum(self._static_squared[inner], near[part])
+        squared = np.minimum(self._static_squared[inner], squared_distances(self._obstacles(outer), self._margin)[part])
         self._distance[inner] = self._inflation.metres.take(squared)
         self._costs[inner] = self._inflation.costs(squared, self._unknown[inner])
         self._revision += 1

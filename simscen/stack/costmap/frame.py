@@ -1,5 +1,6 @@
 """Where the cells of a costmap are."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,11 @@ class Frame:
     origin: tuple[float, float]
     resolution: float
     shape: tuple[int, int]
+
+    def cell(self, x: float, y: float) -> tuple[int, int]:
+        """Row and column of the cell under a point; may lie off the grid."""
+        scale = 1.0 / self.resolution
+        return math.floor((y - self.origin[1]) * scale), math.floor((x - self.origin[0]) * scale)
 
     def cells(self, points: Array) -> Cells:
         """Cells (n, 2) as (row, column) under points (n, 2); may lie off the grid."""

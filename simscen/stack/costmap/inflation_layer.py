@@ -11,26 +11,19 @@ from simscen.stack.nearest import BEYOND, FARTHEST, squared_cells, squared_withi
 FREE, MAX_NON_OBSTACLE, INSCRIBED, LETHAL, NO_INFORMATION = 0, 252, 253, 254, 255
 FAR = BEYOND
 """The largest squared distance kept: 256 cells, 12.8 m at 5 cm."""
-LARGE = 20_000
-"""Cells of a grid from which on it is worth while not to look beyond a reach."""
 
 Squared = npt.NDArray[np.uint16]
 
 
-def squared_distances(lethal: npt.NDArray[np.bool_], reach: int = FARTHEST + 1) -> Squared:
-    """For each cell the exact squared distance in cells to the nearest lethal cell's centre, at most FAR.
-
-    Cells farther than `reach` from all of them may have FAR: of a large grid that is told much sooner.
-    """
-    squared = np.full(lethal.shape, FAR, dtype=np.uint16)
+def squared_distances(lethal: npt.NDArray[np.bool_], reach: int) -> Squared:
+    """For each cell the exact squared distance in cells to the nearest lethal cell's centre; FAR beyond `reach`."""
     if not lethal.any():
-        return squared
-    if reach <= FARTHEST and lethal.size >= LARGE:
-        for rows, near in squared_within(lethal, reach):
-            squared[rows] = near
-    else:
-        for rows, distances in squared_cells(lethal):
-            squared[rows] = np.minimum(distances, FAR)
+        return np.full(lethal.shape, FAR, dtype=np.uint16)
+    if reach <= FARTHEST:
+        return squared_within(lethal, reach)
+    squared = np.empty(lethal.shape, dtype=np.uint16)
+    for rows, distances in squared_cells(lethal):
+        squared[rows] = np.where(distances <= reach * reach, np.minimum(distances, FAR), FAR)
     return squared
 
 

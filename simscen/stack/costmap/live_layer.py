@@ -12,7 +12,7 @@ from simscen.stack.costmap.depth_layer import Heights, heights_seen, seen_throug
 from simscen.stack.costmap.frame import Cells, Frame
 from simscen.stack.costmap.inflation_layer import Squared
 from simscen.stack.costmap.obstacle_layer import crossed, hits, in_view
-from simscen.stack.costmap.rolling import carried
+from simscen.stack.costmap.rolling import Cell, carried
 from simscen.stack.costmap.static_layer import Mask
 
 BESIDE_A_WALL = 2
@@ -32,19 +32,21 @@ class LiveLayer:
         self._frame = frame
         self._scanned: Mask = np.zeros(frame.shape, dtype=bool)
         self._heights: Heights | None = None
+        self._marks: Cells = np.zeros((0, 2), dtype=np.int64)
 
     def forget_around(self, base: Pose2, metres: float) -> None:
         """Forget what lies so near to the robot along x and y."""
-        row, column = self._frame.cells(np.array([[base.x, base.y]]))[0].tolist()
-        window = self._frame.window((row, column), (row, column), math.ceil(metres / self._frame.resolution))
+        here = self._frame.cell(base.x, base.y)
+        window = self._frame.window(here, here, math.ceil(metres / self._frame.resolution))
         self._scanned[window] = False
+        self._marks = np.argwhere(self._scanned)
         if self._heights is not None:
             self._heights[window] = np.nan
 
     def out_of_view(self, base: Pose2, metres: float, scans: list[tuple[Pose2, Scan]]) -> Cells:
         """The cells so near to the robot that are marked by a lidar and that none looked at in these scans."""
-        row, column = self._frame.cells(np.array([[base.x, base.y]]))[0].tolist()
-        window = self._frame.window((row, column), (row, column), math.ceil(metres / self._frame.resolution))
+        here = self._frame.cell(base.x, base.y)
+        window = self._frame.window(here, here, math.ceil(metres / self._frame.resolution))
         cells: Cells = np.argwhere(self._scanned[window]) + np.array((window[0].start, window[1].start))
         for place, scan in scans:
             cells = cells[~in_view(cells, self._frame, scan, place)]
@@ -53,11 +55,13 @@ class LiveLayer:
     def mark(self, cells: Cells) -> None:
         """A lidar has seen something here."""
         _set(self._scanned, cells, True)
+        self._marks = np.argwhere(self._scanned)
 
     def roll(self, frame: Frame) -> None:
         """Go on in another window, with what lies in both."""
         before, self._frame = self._frame, frame
         self._scanned = carried(self._scanned, before, frame, False)
+        self._marks = np.argwhere(self._scanned)
         if self._heights is not None:
             self._heights = carried(self._heights, before, frame, np.nan)
 
@@ -70,18 +74,18 @@ class LiveLayer:
 
     def on_scan(self, base: Pose2, scan: Scan, walls: Squared) -> Cells:
         """Clear what the beams pass through, then mark what they hit; returns the cells that have changed."""
-        around, corner = self.around(base, math.hypot(scan.mount.x, scan.mount.y))
-        scanned = self._scanned[around]
-        was = scanned.copy()
-        marked = np.argwhere(scanned) + corner
-        if len(marked):
-            _set(self._scanned, marked[crossed(marked, self._frame, scan, base, self._spec)], False)
-        points = hits(scan, base, self._spec.obstacle_min_range, self._spec.obstacle_max_range)
-        cells = self._frame.cells(points)
-        _set(self._scanned, _off_walls(cells[self._frame.inside(cells)], walls), True)
-        if len(marked):
-            _set(self._scanned, marked[self._under_robot(marked, base)], False)
-        return np.argwhere(was != scanned) + corner
+        cells = self._frame.cells(hits(scan, base, self._spec.obstacle_min_range, self._spec.obstacle_max_range))
+        cells = _off_walls(cells[self._frame.inside(cells)], walls)
+        fresh = cells[~_get(self._scanned, cells)]
+        marks = self._marks
+        if len(marks):
+            _set(self._scanned, marks[crossed(marks, self._frame, scan, base, self._spec)], False)
+        _set(self._scanned, cells, True)
+        if len(marks):
+            _set(self._scanned, marks[self._under_robot(marks, base)], False)
+        kept = _get(self._scanned, marks)
+        self._marks = np.concatenate((marks[kept], fresh))
+        return np.concatenate((marks[~kept], fresh))
 
     def on_image(self, base: Pose2, image: Image, walls: Squared) -> Cells:
         """Clear what the camera sees through, then mark what it sees; returns the cells that may have changed."""
@@ -99,9 +103,9 @@ class LiveLayer:
 
     def around(self, base: Pose2, mount: float) -> tuple[Window, Cells]:
         """The cells that a sensor `mount` metres from the base can reach, and the corner that they are counted from."""
-        row, column = self._frame.cells(np.array([[base.x, base.y]]))[0].tolist()
+        here = self._frame.cell(base.x, base.y)
         far = max(self._spec.raytrace_max_range, self._spec.obstacle_max_range) + mount
-        window = self._frame.window((row, column), (row, column), math.ceil(far / self._frame.resolution) + 1)
+        window = self._frame.window(here, here, math.ceil(far / self._frame.resolution) + 1)
         return window, np.array((window[0].start, window[1].start))
 
     def _under_robot(self, cells: Cells, base: Pose2) -> Mask:
@@ -111,7 +115,11 @@ class LiveLayer:
 
 
 def _off_walls(cells: Cells, walls: Squared) -> Cells:
-    return cells[walls[cells[:, 0], cells[:, 1]] > BESIDE_A_WALL]
+    return cells[_get(walls, cells) > BESIDE_A_WALL]
+
+
+def _get(layer: npt.NDArray[Cell], cells: Cells) -> npt.NDArray[Cell]:
+    return layer[cells[:, 0], cells[:, 1]]
 
 
 def _set(layer: npt.NDArray[np.generic], cells: Cells, value: float) -> None:

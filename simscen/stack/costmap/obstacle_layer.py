@@ -26,24 +26,23 @@ class ScanAmongMoving(Scan):
 def hits(scan: Scan, base: Pose2, nearest: float, farthest: float) -> Array:
     """Map points (n, 2) of the beams that hit something that stands, `nearest` to `farthest` metres from the lidar."""
     ranges = scan.ranges
-    with np.errstate(invalid="ignore"):
-        use = (ranges >= max(scan.range_min, nearest)) & (ranges <= min(scan.range_max, farthest))
+    use = (ranges >= max(scan.range_min, nearest)) & (ranges <= min(scan.range_max, farthest))
     if isinstance(scan, ScanAmongMoving):
         use &= ~scan.moving
-    lidar = base.compose(scan.mount)
-    ranges, angles = ranges[use], scan.angles()[use] + lidar.yaw
-    return np.column_stack((lidar.x + ranges * np.cos(angles), lidar.y + ranges * np.sin(angles)))
+    lidar, beams = base.compose(scan.mount), np.flatnonzero(use)
+    ranges, angles = ranges[beams], scan.angle_min + scan.angle_increment * beams + lidar.yaw
+    points = np.empty((len(beams), 2))
+    points[:, 0], points[:, 1] = lidar.x + ranges * np.cos(angles), lidar.y + ranges * np.sin(angles)
+    return points
 
 
-def free_lengths(scan: Scan, spec: CostmapSpec) -> Array:
-    """How far each beam (n,) shows free space: to its hit, or to raytrace_max_range; nan and too near beams show 0.
+def _shown_free(ranges: Array, scan: Scan, spec: CostmapSpec) -> Array:
+    """How far beams (n,) show free space: to their hits, or to raytrace_max_range; nan and too near beams show 0.
 
     So do beams that meet nothing, unless `inf_is_valid`.
     """
-    ranges = scan.ranges
-    with np.errstate(invalid="ignore"):
-        seen = np.where(ranges > scan.range_max, np.inf if spec.inf_is_valid else 0.0, ranges)
-        return np.where(seen >= scan.range_min, np.minimum(seen, spec.raytrace_max_range), 0.0)
+    seen = np.where(ranges > scan.range_max, np.inf if spec.inf_is_valid else 0.0, ranges)
+    return np.where(seen >= scan.range_min, np.minimum(seen, spec.raytrace_max_range), 0.0)
 
 
 def in_view(cells: Cells, frame: Frame, scan: Scan, base: Pose2) -> npt.NDArray[np.bool_]:
@@ -72,12 +71,18 @@ def crossed(cells: Cells, frame: Frame, scan: Scan, base: Pose2, spec: CostmapSp
     turn = round(2 * math.pi / abs(step))
     if abs(turn * abs(step) - 2 * math.pi) < 1e-6:
         beam %= turn
-    free = free_lengths(scan, spec)
-    known = (beam >= 0) & (beam < len(free))
-    length = np.where(known, free[np.where(known, beam, 0)], 0.0)
+    known = (beam >= 0) & (beam < len(scan.ranges))
+    length = np.where(known, _shown_free(scan.ranges[np.where(known, beam, 0)], scan, spec), 0.0)
+    passes = np.zeros(len(cells), dtype=bool)
+    near = np.flatnonzero(distance * math.cos(step / 2) <= length)  # most cells lie behind what their beams hit
+    if not len(near):
+        return passes
+    bearing, off, distance, length = bearing[near], off[near], distance[near], length[near]
     direction = bearing - off
     half = frame.resolution / 2
     reach = half * (np.abs(np.cos(direction)) + np.abs(np.sin(direction)))
     along = distance * np.cos(off)
-    passes = (np.abs(distance * np.sin(off)) <= reach) & (along <= length - half) & (along >= spec.raytrace_min_range)
-    return np.asarray(passes)
+    passes[near] = (
+        (np.abs(distance * np.sin(off)) <= reach) & (along <= length - half) & (along >= spec.raytrace_min_range)
+    )
+    return passes

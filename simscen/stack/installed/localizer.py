@@ -42,7 +42,7 @@ class InstalledLocalizer(Watched):
             belief = self.inner.belief
         except Exception as error:  # as in `ask`, and it is asked at every beat
             self.raised(error)
-        if belief is not self._seen:
+        if self._seen is None or belief is not self._seen:
             self._seen = checked_belief(self, belief, self._seen)
         return self._seen
 

@@ -53,7 +53,7 @@ class InstalledStack(Watched):
             decision = self.inner.decide(tick, readings)
         except Exception as error:  # as in `ask`, and it is asked at every beat
             self.raised(error)
-        if decision is not self._last:  # a stack that repeats itself does so with the same object
+        if self._last is None or decision is not self._last:  # a stack that repeats itself does so with the same object
             self._last = self._checked(decision, tick)
         return self._last
 

@@ -62,8 +62,7 @@ class DistanceField:
         if bordered.any():
             if limit <= FARTHEST * grid.resolution:
                 metres = np.minimum(np.sqrt(np.arange(BEYOND + 1)) * grid.resolution, limit).astype(np.float32)
-                for rows, near in squared_within(bordered, math.ceil(limit / grid.resolution)):
-                    distance[rows] = metres.take(near)
+                distance = metres.take(squared_within(bordered, math.ceil(limit / grid.resolution)))
             else:
                 for rows, squared in squared_cells(bordered):
                     distance[rows] = np.minimum(np.sqrt(squared) * grid.resolution, limit)

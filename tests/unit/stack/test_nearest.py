@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import distance_transform_edt
 
+from simscen.stack import nearest
 from simscen.stack.nearest import BEYOND, squared_cells, squared_within
 
 
@@ -15,19 +16,17 @@ def test_distances_by_rows_are_scipys(shape):
     assert np.array_equal(whole, distance_transform_edt(~marked))
 
 
+@pytest.mark.parametrize("at_once", [1, 1000, nearest.AT_ONCE])
 @pytest.mark.parametrize(
-    ("shape", "reach"), [((1, 1), 3), ((64, 7), 9), ((7, 64), 80), ((150, 90), 4), ((3, 200), 180)]
+    ("shape", "reach"), [((1, 1), 3), ((64, 7), 9), ((7, 64), 80), ((150, 90), 4), ((3, 200), nearest.FARTHEST)]
 )
-def test_up_to_a_reach_the_same_distances_are_told_sooner(shape, reach):
+def test_up_to_a_reach_the_same_distances_are_told_sooner(shape, reach, at_once, monkeypatch):
+    monkeypatch.setattr(nearest, "AT_ONCE", at_once)
     marked = np.random.default_rng(5).random(shape) < 0.01
     marked[-1, -1] = True
-    told = np.full(shape, -1.0)
-    for rows, squared in squared_within(marked, reach):
-        told[rows] = squared
     whole = np.rint(distance_transform_edt(~marked) ** 2)
-    assert np.array_equal(told, np.where(whole <= reach**2, whole, BEYOND))
+    assert np.array_equal(squared_within(marked, reach), np.where(whole <= reach**2, whole, BEYOND))
 
 
 def test_where_nothing_is_marked_everything_is_beyond_the_reach():
-    told = [squared for _, squared in squared_within(np.zeros((70, 5), dtype=bool), 180)]
-    assert all((squared == BEYOND).all() for squared in told)
+    assert (squared_within(np.zeros((70, 5), dtype=bool), nearest.FARTHEST) == BEYOND).all()
