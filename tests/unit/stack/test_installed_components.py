@@ -193,7 +193,7 @@ class StillStack:
     cancel = preempt
 
     def decide(self, tick, readings):
-        return Decision(STOP) if tick < 60 else "stop"
+        return Decision(STOP) if tick < 60 else "stop" if tick < 120 else None
 '''
 POINTS = {
     "planner": {"straight": "odd:Straight", "careful": "odd:Careful", "gone": "odd:Gone", "foreign": "odd:Wild"},
@@ -353,6 +353,8 @@ def test_a_stack_of_a_package_is_checked_beat_by_beat(odd, tmp_path: Path) -> No
     assert stack.decide(0, ()).command == (0.0, 0.0, 0.0)
     with pytest.raises(RunError, match=r"stack `still` \(odd:StillStack\) decided str instead of a Decision"):
         stack.decide(60, ())
+    with pytest.raises(RunError, match="decided NoneType instead of a Decision"):
+        build_stack(spec, driven_setting(), Streams(1), Clock(RATE)).decide(120, ())
 
 
 def test_a_stack_of_a_package_that_takes_no_zones_is_known_before_it_is_told(odd, tmp_path: Path) -> None:

@@ -1,5 +1,7 @@
 """The list of goals as a client of Nav2's actions sees it: passed, waited at, preempted and failed together."""
 
+from dataclasses import replace
+
 import pytest
 
 from simscen.core.events import Event
@@ -159,3 +161,8 @@ def test_codes_of_several_poses_have_the_names_of_those_of_one():
     assert error_code(309) is ErrorCode.NO_VIAPOINTS_GIVEN
     assert error_code(603) is ErrorCode.STOP_ON_MISSED_WAYPOINT
     assert error_code(4711) == 4711
+
+
+def test_a_goal_in_another_frame_is_the_same_but_for_its_pose() -> None:
+    goal = Goal("there", Pose2(1, 2, 3), 0.1, 0.2, 30.0, True, 4.0)
+    assert goal.at(Pose2(5, 6, 7)) == replace(goal, pose=Pose2(5, 6, 7))
