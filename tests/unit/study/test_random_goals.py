@@ -111,3 +111,12 @@ def test_a_variant_of_drives_without_a_map_keeps_the_localizer_that_needs_none(t
     other = varied(made, "slow", OTHER, tmp_path / "v")
     spec = load_scenario(other.drives[0].file, other.root, other.world_path).spec
     assert (spec.stack.controller.desired_linear_vel, spec.stack.localizer.type) == (0.3, "amcl")
+
+
+def test_the_reference_tells_of_every_fault() -> None:
+    page = (Path(__file__).parents[3] / "docs/reference/navigation-benchmark.md").read_text(encoding="utf-8")
+    rows = {row.split("`")[1]: row for row in page.splitlines() if row.startswith("| `")}
+    assert set(FAULTS) <= set(rows)
+    for fault, (_, values) in FAULTS.items():
+        if "sector" not in fault:  # which is told by its width
+            assert all(f"| {value} " in rows[fault] for value in values)
