@@ -7,6 +7,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from PIL import Image
+
 import simscen.sim.simulation
 import simscen.stack.build  # noqa: F401 - engines are imported here so that the forks need not
 from simscen.core.run import Run
@@ -14,6 +16,7 @@ from simscen.record.replay import read_run
 from simscen.report.picture.compose import write_picture
 from simscen.report.picture.scene import Scene, with_robots
 from simscen.run.perform import perform
+from simscen.run.preload import import_components
 from simscen.run.prepare import Prepared
 from simscen.run.prepared_cache import PreparedCache
 from simscen.run.process.confine import MEMORY_BYTES
@@ -24,6 +27,7 @@ from simscen.run.process.zygote import Zygote
 from simscen.run.scenery import scenery_of
 
 _PREPARED = PreparedCache()
+Image.preinit()  # imports what it would import when the first picture is written
 
 
 def main() -> None:
@@ -35,10 +39,13 @@ def main() -> None:
 
 
 def _warm_up(job: Job) -> None:
-    """Prepare the scenario. Before what is kept takes more than half of the memory there is, it is let go."""
+    """Prepare the scenario, and import what its runs need.
+
+    Before what is kept takes more than half of the memory there is, it is let go.
+    """
     if _memory() > MEMORY_BYTES / 2:
         _PREPARED.clear()
-    _PREPARED.prepared(job.scenario)
+    import_components(_PREPARED.prepared(job.scenario))
 
 
 def _memory() -> int:
