@@ -76,8 +76,10 @@ class Drive(Protocol):
         ...
 
 
-def build(client: int, body: RobotBody, pose: Pose2, period: float, terrain: Terrain) -> tuple[Base, Drive]:
-    """A robot set down at `pose`, and its drive, whose firmware runs every `period` seconds."""
+def build(
+    client: int, body: RobotBody, pose: Pose2, period: float, tick: float, terrain: Terrain
+) -> tuple[Base, Drive]:
+    """A robot set down at `pose`, and its drive, whose firmware runs every `period` seconds; a step lasts `tick`."""
     match body.drive:
         case Omnidirectional():
             base = PlanarBase(client, body, pose)
@@ -86,8 +88,8 @@ def build(client: int, body: RobotBody, pose: Pose2, period: float, terrain: Ter
             base = PlanarBase(client, body, pose)
             return base, MecanumDrive(base, body, period)
         case Ackermann():
-            vehicle = Vehicle(client, body, pose, terrain)
+            vehicle = Vehicle(client, body, pose, terrain, tick)
             return vehicle, AckermannDrive(client, vehicle, body, period)
         case Differential() | SkidSteer():
-            vehicle = Vehicle(client, body, pose, terrain)
+            vehicle = Vehicle(client, body, pose, terrain, tick)
             return vehicle, SidedDrive(client, vehicle, body, period)

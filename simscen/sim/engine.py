@@ -18,6 +18,8 @@ FACES_AT_ONCE = 40_000
 """Bullet's shared-memory commands hold at most 131072 vertices and 524288 indices."""
 STRIP = 20.0
 """m of x that lie together in one lot of faces."""
+BREAKING = 0.02
+"""Share of a shape's extent within which a point of contact is the one of the step before."""
 AT_REST = 1e-6
 """(m/s)² below which a body is at rest; Bullet's own 0.05 would stop a ball that rolls at 0.2 m/s."""
 UNTIL_ASLEEP = 2.0
@@ -54,7 +56,7 @@ def connect(tick_rate: int, solver_iterations: int, one_by_one: bool = False) ->
         frictionERP=0.2,
         globalCFM=0.0,
         restitutionVelocityThreshold=0.2,
-        contactBreakingThreshold=0.02,
+        contactBreakingThreshold=BREAKING,
         contactSlop=1e-5,
         collisionFilterMode=0,
         useSplitImpulse=0,

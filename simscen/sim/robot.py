@@ -105,7 +105,7 @@ class Robot:
         `obstacles` are what of the `static` world is in its way.
         """
         self.name, self._scene = name, scene
-        self.base, self._drive = build(scene.client, body, pose, period, scene.terrain)
+        self.base, self._drive = build(scene.client, body, pose, period, 1 / scene.rate, scene.terrain)
         self.shape = Body(name, body.solid, Pose3.planar(pose), body.mass)
         self._contacts = Contacts(scene.rate)
         uneven = bool(scene.terrain and self.base.rolling)

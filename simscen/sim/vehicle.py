@@ -1,5 +1,6 @@
 """A robot in the engine: its hull as base, its wheels as links, and where its base frame is."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
@@ -8,7 +9,7 @@ import pybullet
 
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.motion import Twist
-from simscen.core.shapes import Solid
+from simscen.core.shapes import Solid, Sphere
 from simscen.sim import engine
 from simscen.sim.robot_body import RobotBody
 from simscen.sim.terrain import ON_CASTERS, ON_WHEELS, Terrain
@@ -18,6 +19,10 @@ Vector = tuple[float, float, float]
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 KNUCKLE = 0.2
 """Mass of a steering knuckle over that of its wheel."""
+PIN = 0.001
+"""Radius in m of what widens a wheel's extent."""
+SPARE = 1.1
+"""How much farther than its limits say a wheel may roll in a step."""
 HULL_PIECE = 0.001
 """Mass in kg of a piece of the hull that the engine needs as a link; the chassis holds the true mass."""
 
@@ -26,18 +31,22 @@ class Vehicle:
     """A robot on wheels, resting on the ground.
 
     A wheel touches the ground as a ball of its radius: one point of contact in the wheel's middle plane, so that the
-    radius and the separation in the datasheet are those of the contact, and half the time of a cylinder's contact.
+    radius and the separation in the datasheet are those of the contact, and half the time of a cylinder's contact. A
+    pin along its axle keeps it at one point however fast it rolls; see `_ball`.
     Only the hull touches obstacles. On uneven ground the casters are a link of their own, so that one that stands on a
     ramp can be told from a hull that scrapes it.
     """
 
-    def __init__(self, client: int, body: RobotBody, pose: Pose2, terrain: Terrain | None = None) -> None:
+    def __init__(
+        self, client: int, body: RobotBody, pose: Pose2, terrain: Terrain | None = None, tick: float = 0.0
+    ) -> None:
+        """Set down at `pose`; one step of the engine lasts `tick` seconds, 0 where nothing will ever drive it."""
         self._client, self._terrain = client, terrain
         moments, self._base_from_centre = body.chassis.principal()
         self._centre = self._base_from_centre.position
         self._centre_from_base = self._base_from_centre.inverse()
         casters = yielding(body.casters) if terrain else ()
-        self.id, self.joints, self.hull_links = _build(client, body, casters)
+        self.id, self.joints, self.hull_links = _build(client, body, casters, tick)
         self.rolling: Mapping[int, float] = _rolling(body, self.joints, self.hull_links, casters)
         standing = [(caster.pose.x, caster.pose.y) for caster in body.casters if not lowest(caster)]
         self._feet = np.array([*((wheel.x, wheel.y) for wheel in body.wheels), *standing])
@@ -135,7 +144,9 @@ def _rolling(body: RobotBody, joints: Sequence[int], hull: Sequence[int], caster
     return dict.fromkeys(wheels, ON_WHEELS) | ({hull[-1]: ON_CASTERS} if casters else {})
 
 
-def _build(client: int, body: RobotBody, casters: Sequence[Solid] = ()) -> tuple[int, tuple[int, ...], tuple[int, ...]]:
+def _build(
+    client: int, body: RobotBody, casters: Sequence[Solid], tick: float
+) -> tuple[int, tuple[int, ...], tuple[int, ...]]:
     """The multibody; for each wheel its first joint, steering before rolling; and the links of the hull.
 
     `casters` become the hull's last link; without any, those of the body are part of its first.
@@ -144,7 +155,8 @@ def _build(client: int, body: RobotBody, casters: Sequence[Solid] = ()) -> tuple
     joints: list[int] = []
     for wheel in body.wheels:
         joints.append(len(links))
-        links += _links(client, wheel, len(links))
+        rolled = tick * (body.limits.linear + body.limits.angular * abs(wheel.y))
+        links += _links(client, wheel, len(links), rolled)
     shapes = (
         [*engine.hull_shapes(client, body.hull), *engine.hull_shapes(client, casters)]
         if casters
@@ -191,12 +203,27 @@ class _Link(NamedTuple):
     axis: tuple[int, int, int]
 
 
-def _links(client: int, wheel: Wheel, number: int) -> list[_Link]:
-    ball: int = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=wheel.radius, physicsClientId=client)
-    place = (wheel.x, wheel.y, wheel.radius)
+def _links(client: int, wheel: Wheel, number: int, rolled: float) -> list[_Link]:
+    ball, place = _ball(client, wheel, rolled), (wheel.x, wheel.y, wheel.radius)
     if not wheel.steered:
         return [_Link(wheel.inertia.mass, ball, place, 0, pybullet.JOINT_REVOLUTE, (0, 1, 0))]
     return [
         _Link(KNUCKLE * wheel.inertia.mass, -1, place, 0, pybullet.JOINT_REVOLUTE, (0, 0, 1)),
         _Link(wheel.inertia.mass, ball, (0.0, 0.0, 0.0), number + 1, pybullet.JOINT_REVOLUTE, (0, 1, 0)),
     ]
+
+
+def _ball(client: int, wheel: Wheel, rolled: float) -> int:
+    """A wheel that rolls at most so many metres in one step.
+
+    Bullet takes a contact for the one of the step before if it is no farther from it on the wheel than a share of the
+    shape's extent, and otherwise keeps both: a bare ball that rolls by more than 2 % of its radius in a step trails up
+    to three points behind that carry nothing and double what a step costs. A pin along the axle, at whose height
+    nothing touches it, makes the extent large enough; it ends within the ball on the other side.
+    """
+    reach = min(SPARE * rolled / engine.BREAKING, 2 * abs(wheel.y) + wheel.radius / 2)
+    if reach <= wheel.radius:
+        shape: int = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=wheel.radius, physicsClientId=client)
+        return shape
+    pin = Solid(Sphere(PIN), Pose3(y=-math.copysign(reach, wheel.y)))
+    return engine.compound_shape(client, [Solid(Sphere(wheel.radius)), pin])

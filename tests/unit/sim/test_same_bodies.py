@@ -18,7 +18,8 @@ BEND = ((0.0, 0.0), (4.0, 0.0), (4.0, 1.2), (1.2, 1.2), (1.2, 4.0), (0.0, 4.0))
 
 def pressed(simulation) -> bool:
     """Whether the engine reports a contact of the robot with anything but the ground right now."""
-    return bool(touches(simulation._scene.client, simulation.robot.base.id, simulation.robot._names, lambda _: "", 1.0))
+    robot = simulation.robot
+    return bool(touches(simulation._scene.client, robot.base.id, robot._names, lambda _: "", 1.0, robot._stands))
 
 
 def watch(simulation, ticks, every=EVERY):
@@ -86,7 +87,7 @@ def test_ruling_contacts_out_gives_the_events_and_the_clearance_of_asking_at_eve
             simulation.drive(Twist(chance.uniform(-0.5, 0.5), 0.0, chance.uniform(-2, 2)))
             if k % 8 == 5:
                 simulation.push((chance.uniform(-4, 4), chance.uniform(-4, 4)))
-            if k == 16:
+            if k == 17:  # not into the cart: how Bullet parts what overlaps depends on where it saw both before
                 simulation.place_robot(Pose2(0.0, 0.0, chance.uniform(-3, 3)))
             more = watch(simulation, 96)
             events, samples = events + more[0], samples + more[1]
