@@ -207,8 +207,8 @@ def usual(spec: type[ControllerSpec], start: int, probe: int) -> list[Any]:
 
 
 def changed(other: Other) -> Iterator[tuple[int, ControllerSpec]]:
-    """The specifications to begin with, by number, each with each of the other values."""
-    for start, values in enumerate(STARTS[other.spec]):
+    """The specifications to begin with, by number, each with each of the other values; first what names its part."""
+    for start, values in sorted(enumerate(STARTS[other.spec]), key=lambda each: other.keys[0] not in each[1]):
         for value in other.values:
             try:
                 spec = other.spec.model_validate(with_value(values, other.keys, value))

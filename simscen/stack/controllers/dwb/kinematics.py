@@ -7,6 +7,7 @@ import numpy as np
 from simscen.core.geometry import Array
 from simscen.core.motion import Twist
 from simscen.model.controllers import DynamicWindow as DwbSpec
+from simscen.stack.controllers.limits import Limits, limits_of
 from simscen.stack.protocols import RobotModel
 
 SAME = 1e-5
@@ -14,29 +15,18 @@ SAME = 1e-5
 ROUNDING = float(np.finfo(np.float32).eps)
 """What squares of speeds may exceed their bounds by."""
 
-Axes = tuple[float, float, float]
-
 
 @dataclass(frozen=True)
-class Kinematics:
-    """Bounds of vx, vy in m/s and turn rate in rad/s; what a second changes upward, and downward (negative)."""
+class Kinematics(Limits):
+    """Limits, and what bounds combinations: least and greatest speed in m/s whichever way, least turn rate in rad/s."""
 
-    low: Axes
-    high: Axes
-    acceleration: Axes
-    deceleration: Axes
     min_speed_xy: float
     max_speed_xy: float
     min_speed_theta: float
-    turning_radius: float
 
     def scaled(self, share: float) -> "Kinematics":
-        """Under a speed limit, all greatest velocities by the same share; Nav2 does not slow reversing, this does."""
-        if share >= 1.0:
-            return self
-        (a, b, c), (d, e, f) = self.low, self.high
-        low, high = (a * share, b * share, c * share), (d * share, e * share, f * share)
-        return replace(self, low=low, high=high, max_speed_xy=self.max_speed_xy * share)
+        """Under a speed limit; Nav2 does not slow reversing, this does."""
+        return replace(super().scaled(share), max_speed_xy=self.max_speed_xy * min(share, 1.0))
 
     def valid(self, velocities: Array) -> Array:
         """Those of the velocities (n, 3) that the base may drive; standing still is none of them."""
@@ -52,23 +42,19 @@ class Kinematics:
 
 def kinematics_of(spec: DwbSpec, robot: RobotModel, fastest: float) -> Kinematics:
     """What the specification asks for, or leaves to the robot, and no more than that can do."""
-    faster, slower, turn = robot.linear_acceleration, -robot.linear_deceleration, robot.angular_acceleration
-    left = min(fastest if spec.max_vel_y is None else spec.max_vel_y, robot.max_lateral)
-    right = max(-left if spec.min_vel_y is None else spec.min_vel_y, -robot.max_lateral)
-    around = min(spec.max_vel_theta, robot.max_angular)
-    ups = ((spec.acc_lim_x, faster), (spec.acc_lim_y, faster), (spec.acc_lim_theta, turn))
-    downs = ((spec.decel_lim_x, slower), (spec.decel_lim_y, slower), (spec.decel_lim_theta, -turn))
-    ax, ay, az = (min(asked or can, can) for asked, can in ups)
-    dx, dy, dz = (max(asked or can, can) for asked, can in downs)
+    left = fastest if spec.max_vel_y is None else spec.max_vel_y
+    limits = limits_of(
+        robot,
+        low=(spec.min_vel_x, -left if spec.min_vel_y is None else spec.min_vel_y, -spec.max_vel_theta),
+        high=(fastest, left, spec.max_vel_theta),
+        acceleration=(spec.acc_lim_x, spec.acc_lim_y, spec.acc_lim_theta),
+        deceleration=(spec.decel_lim_x, spec.decel_lim_y, spec.decel_lim_theta),
+    )
     return Kinematics(
-        low=(max(spec.min_vel_x, -robot.max_reverse), right, -around),
-        high=(fastest, left, around),
-        acceleration=(ax, ay, az),
-        deceleration=(dx, dy, dz),
+        **vars(limits),
         min_speed_xy=spec.min_speed_xy,
         max_speed_xy=fastest if spec.max_speed_xy is None else spec.max_speed_xy,
         min_speed_theta=spec.min_speed_theta,
-        turning_radius=robot.turning_radius,
     )
 
 

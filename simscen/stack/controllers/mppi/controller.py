@@ -17,9 +17,10 @@ from simscen.model.mppi import Mppi as MppiSpec
 from simscen.stack.controllers.following import PathFollower
 from simscen.stack.controllers.free_way import FreeWay
 from simscen.stack.controllers.goal_pose import GoalPose
+from simscen.stack.controllers.limits import Limits
 from simscen.stack.controllers.local_plan import LocalPlan, local_plan
 from simscen.stack.controllers.mppi.judgement import Judgement
-from simscen.stack.controllers.mppi.limits import Limits, limits_of
+from simscen.stack.controllers.mppi.limits import in_order, mppi_limits
 from simscen.stack.controllers.mppi.rollouts import VX, VY, WZ, Rollouts, delay, integrated, predicted
 from simscen.stack.controllers.mppi.scene import Scene
 from simscen.stack.controllers.mppi.sequence import PAST, later, smoothed, within_limits
@@ -44,10 +45,10 @@ class MppiController(PathFollower):
         robot = setting.robot
         super().__init__(spec.vx_max, robot)
         self._spec, self._footprint, self._chance = spec, setting.footprint, setting.chance
-        self._base = limits_of(spec, robot, self._fastest)
-        model = spec.motion_model or ("Omni" if self._base.vy_max > 0.0 else "DiffDrive")
+        self._base = mppi_limits(spec, robot, self._fastest)
+        model = spec.motion_model or ("Omni" if self._base.high[1] > 0.0 else "DiffDrive")
         self._axes = 3 if model == "Omni" else 2
-        deviations = (spec.vx_std or SPREAD * self._fastest, spec.wz_std, spec.vy_std or SPREAD * self._base.vy_max)
+        deviations = (spec.vx_std or SPREAD * self._fastest, spec.wz_std, spec.vy_std or SPREAD * self._base.high[1])
         self._std = np.array(deviations[: self._axes], np.float32)
         late = (spec.model_delay_vx, spec.model_delay_wz, spec.model_delay_vy)
         self._delays = tuple(math.floor(each / spec.model_dt + 0.5) for each in late[: self._axes])
@@ -122,7 +123,7 @@ class MppiController(PathFollower):
         if self._spec.open_loop:
             return self._sent[:, -1]
         measured = np.array((twist.vx, twist.wz, twist.vy))[: self._axes]
-        change = (limits.slower * self._period, limits.faster * self._period)
+        change = (in_order(limits.deceleration) * self._period, in_order(limits.acceleration) * self._period)
         near = np.clip(sent, measured + change[0][: self._axes], measured + change[1][: self._axes])
         return near.astype(np.float32)
 
@@ -150,6 +151,8 @@ class MppiController(PathFollower):
         """nav2_mppi_controller's DefaultOptimalTrajectoryValidator."""
         spec, rolled = self._spec.TrajectoryValidator, scene.rolled
         steps = min(round(spec.collision_lookahead_time / scene.dt), len(rolled.x))
+        if steps == 0:
+            return True
         whole = spec.consider_footprint is not False
         gap = scene.gap(scene.spots(rolled.x[:steps], rolled.y[:steps]), rolled.yaw[:steps], whole)
         return not scene.hit(gap, whole).any()

@@ -18,11 +18,11 @@ ALMOST_STRAIGHT = np.float32(1e-6)
 def constraint(spec: model.MppiConstraintCritic, scene: Scene) -> Floats:
     """m/s too many over the seconds; of a car also metres by which it turns too tightly."""
     velocities, limits = scene.rolled.velocities, scene.limits
-    vx = velocities[VX]
-    excess = np.minimum(np.maximum(vx, np.float32(limits.vx_min)), np.float32(limits.vx_max))
+    vx, (low, *_), (high, left, _) = velocities[VX], limits.low, limits.high
+    excess = np.minimum(np.maximum(vx, np.float32(low)), np.float32(high))
     np.abs(np.subtract(vx, excess, out=excess), out=excess)
     if len(velocities) > VY:
-        excess += np.maximum(np.abs(velocities[VY]) - np.float32(limits.vy_max), 0)
+        excess += np.maximum(np.abs(velocities[VY]) - np.float32(left), 0)
     if limits.turning_radius > 0.0:
         turn = np.maximum(np.abs(velocities[WZ]), ALMOST_STRAIGHT)
         excess += np.maximum(np.float32(limits.turning_radius) - np.abs(vx) / turn, 0)

@@ -59,7 +59,7 @@ def path_angle(spec: model.MppiPathAngleCritic, scene: Scene) -> Floats | None:
     px, py, yaws = scene.path
     index = min(scene.furthest + spec.offset_from_furthest, len(px) - 1)
     x, y, yaw = px[index], py[index], yaws[index]
-    forward_only = spec.mode == 0 or (spec.mode == 1 and scene.limits.vx_min == 0.0)
+    forward_only = spec.mode == 0 or (spec.mode == 1 and scene.limits.low[0] == 0.0)
     off = float(wrapped(np.arctan2(y, x) - np.float32(scene.pose.yaw)))
     if spec.mode == 2 and wrapped(np.arctan2(y, x) - yaw) > HALF_TURN / 2:
         off = np.pi - off

@@ -9,7 +9,8 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from simscen.stack.controllers.mppi.limits import Limits
+from simscen.stack.controllers.limits import Limits
+from simscen.stack.controllers.mppi.limits import in_order
 from simscen.stack.controllers.sums import add_up
 
 Floats = npt.NDArray[np.float32]
@@ -40,8 +41,9 @@ def predicted(now: Floats, controls: Floats, limits: Limits, dt: float) -> Float
     """
     velocities = np.empty_like(controls)
     velocities[:, 0] = now[:, None]
-    faster, slower = (limits.faster * dt).astype(np.float32), (limits.slower * dt).astype(np.float32)
-    for here, asked, up, down in zip(velocities, controls, faster, slower, strict=False):
+    faster, slower = in_order(limits.acceleration) * dt, in_order(limits.deceleration) * dt
+    changes = zip(faster.astype(np.float32), slower.astype(np.float32), strict=True)
+    for here, asked, (up, down) in zip(velocities, controls, changes, strict=False):
         if down == -up:
             _followed(here, asked, up)
         else:

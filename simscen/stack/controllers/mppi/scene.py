@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Pose2
+from simscen.stack.controllers.limits import Limits
 from simscen.stack.controllers.local_plan import LocalPlan
-from simscen.stack.controllers.mppi.limits import Limits
 from simscen.stack.controllers.mppi.rollouts import Rollouts
 from simscen.stack.footprint import Discs, Footprint
 from simscen.stack.protocols import CostmapView
@@ -62,8 +62,10 @@ class Scene:
         square *= square
         up *= up
         square += up
-        np.copyto(square, np.inf, where=np.arange(len(x)) > reach[:, None])
-        return int(square.argmin(axis=1).max())
+        nearest = square.argmin(axis=1)
+        for one in np.flatnonzero(nearest > reach).tolist():
+            nearest[one] = square[one, : int(reach[one]) + 1].argmin()
+        return int(nearest.max())
 
     @cached_property
     def free_points(self) -> Mask:

@@ -3,7 +3,8 @@
 import numpy as np
 import numpy.typing as npt
 
-from simscen.stack.controllers.mppi.limits import Limits
+from simscen.stack.controllers.limits import Limits
+from simscen.stack.controllers.mppi.limits import in_order
 from simscen.stack.controllers.mppi.rollouts import VX, WZ
 
 Floats = npt.NDArray[np.float32]
@@ -31,8 +32,8 @@ def smoothed(sequence: Floats, past: Floats, order: int) -> Floats:
 
 def within_limits(sequence: Floats, now: Floats, limits: Limits, dt: float) -> Floats:
     """The nearest that the base can drive, from the velocity of `now` (axes,), which is the first of the sequence."""
-    low, high = limits.low.tolist(), limits.high.tolist()
-    faster, slower = (limits.faster * dt).tolist(), (limits.slower * dt).tolist()
+    low, high = in_order(limits.low).tolist(), in_order(limits.high).tolist()
+    faster, slower = (in_order(limits.acceleration) * dt).tolist(), (in_order(limits.deceleration) * dt).tolist()
     _keep_to_curve(sequence, limits)
     result = np.empty_like(sequence)
     for axis in range(len(sequence)):

@@ -13,10 +13,10 @@ from simscen.core.navigation import Goal, Path
 from simscen.model import mppi as model
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.arcs import poses_along
+from simscen.stack.controllers.limits import Limits
 from simscen.stack.controllers.local_plan import LocalPlan
 from simscen.stack.controllers.mppi import critics, path_critics
 from simscen.stack.controllers.mppi.controller import MppiController
-from simscen.stack.controllers.mppi.limits import Limits
 from simscen.stack.controllers.mppi.rollouts import Rollouts, delay, integrated, predicted
 from simscen.stack.controllers.mppi.scene import Scene
 from simscen.stack.controllers.mppi.sequence import later, smoothed, within_limits
@@ -26,7 +26,7 @@ from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
 from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot, setting
 
 PERIOD = 0.05
-LIMITS = Limits(0.5, -0.35, 0.5, 1.9, 3.0, -3.0, 3.0, -3.0, 3.5, 0.0)
+LIMITS = Limits((-0.35, -0.5, -1.9), (0.5, 0.5, 1.9), (3.0, 3.0, 3.5), (-3.0, -3.0, -3.5), 0.0)
 
 
 def view_of(*boxes: tuple[float, float, float, float], length: float = 12.0) -> CostmapView:
@@ -78,7 +78,7 @@ def test_velocities_follow_the_control_of_the_step_before_as_fast_as_acceleratio
 
 
 def test_braking_is_bounded_by_the_deceleration_whichever_way_it_goes() -> None:
-    limits = Limits(2.0, -2.0, 0.0, 1.0, 1.0, -3.0, 1.0, -3.0, 1.0, 0.0)
+    limits = Limits((-2.0, 0.0, -1.0), (2.0, 0.0, 1.0), (1.0, 1.0, 1.0), (-3.0, -3.0, -1.0), 0.0)
     for sign in (1.0, -1.0):
         controls = np.zeros((2, 3, 1), np.float32)
         velocities = predicted(np.array([sign, 0.0], np.float32), controls, limits, 0.1)
@@ -118,7 +118,7 @@ def test_a_sequence_too_short_to_smooth_stays_as_it_is() -> None:
 
 
 def test_a_car_never_turns_tighter_than_its_radius() -> None:
-    car = Limits(1.0, -1.0, 0.0, 5.0, 3.0, -3.0, 3.0, -3.0, 9.0, 2.0)
+    car = Limits((-1.0, 0.0, -5.0), (1.0, 0.0, 5.0), (3.0, 3.0, 9.0), (-3.0, -3.0, -9.0), 2.0)
     sequence = np.array([[0.5, 0.5, 0.5], [3.0, 3.0, -3.0]], np.float32)
     kept = within_limits(sequence, np.array([0.5, 0.0], np.float32), car, 0.05)
     assert (np.abs(kept[1]) <= np.abs(kept[0]) / 2.0 + 1e-6).all()
@@ -151,7 +151,7 @@ def test_constraint_critic_counts_metres_per_second_too_many_over_time() -> None
 
 
 def test_constraint_critic_counts_how_much_too_tightly_a_car_turns() -> None:
-    car = Limits(0.5, -0.35, 0.0, 1.9, 3.0, -3.0, 3.0, -3.0, 3.5, 1.0)
+    car = replace(LIMITS, turning_radius=1.0)
     said = critics.constraint(model.MppiConstraintCritic(), scene(along(0.4, turn=0.8), limits=car))
     assert said == pytest.approx([4.0 * 0.5 * 1.0], abs=1e-5)
 
