@@ -12,7 +12,7 @@ SPECS: dict[str, ControllerSpec] = {
         use_regulated_linear_velocity_scaling=False, use_cost_regulated_linear_velocity_scaling=False,
         use_velocity_scaled_lookahead_dist=False,
     ),
-    "dwb": DynamicWindow(type="dwb"),
+    "dwb": DynamicWindow(type="dwb", vx_samples=10, vtheta_samples=13),
     "mppi": Mppi(type="mppi", batch_size=400),
 }  # fmt: skip
 

@@ -20,6 +20,8 @@ PERIOD = 0.05
 GOAL = Goal("g", Pose2(7.0, 3.0, 1.0))
 STRAIGHT = np.column_stack((np.arange(1.0, 7.01, 0.05), np.full(121, 3.0), np.zeros(121)))
 SLACK = 1e-6
+NEAR, REST = 0.25, 3.0
+"""Metres and radians off the goal at most, and seconds for which it must stay there."""
 
 
 class ControllerContract(ComponentContract):
@@ -52,11 +54,14 @@ class ControllerContract(ComponentContract):
         return command
 
     def drive(self, controller: Controller, view: CostmapView, pose: Pose2, seconds: float) -> list[Pose2]:
-        """The track of a base that does at once what it is told."""
-        track, twist = [pose], Twist()
+        """The track of a base that does at once what it is told, until it has been at the goal for REST seconds."""
+        track, twist, there = [pose], Twist(), 0
         for _ in range(round(seconds / PERIOD)):
             twist = self.command(controller, track[-1], twist, view)
             track.append(moved(track[-1], twist))
+            there = there + 1 if at_goal(track[-1]) else 0
+            if there * PERIOD >= REST:
+                break
         return track
 
     @promise
@@ -64,8 +69,8 @@ class ControllerContract(ComponentContract):
         """Given a free path then the robot gets to its end beside it by no more than 0.3 m, and to the heading."""
         track = self.drive(self.following(), self.view(), Pose2(1.0, 3.1, 0.0), 40)
         off, turn = track[-1].distance(GOAL.pose), abs(track[-1].yaw - GOAL.pose.yaw)
-        demand(off < 0.25, f"ends {off:.2f} m from the end of the path after 40 s")
-        demand(turn < 0.25, f"ends {turn:.2f} rad from the goal's heading after 40 s")
+        demand(off < NEAR, f"ends {off:.2f} m from the end of the path after 40 s")
+        demand(turn < NEAR, f"ends {turn:.2f} rad from the goal's heading after 40 s")
         beside = max(abs(pose.y - 3.0) for pose in track)
         demand(beside < 0.3, f"is {beside:.2f} m beside the path")
 
@@ -167,6 +172,11 @@ class ControllerContract(ComponentContract):
             isinstance(plan, Path) and plan.points.shape[1:] == (3,) and np.isfinite(plan.points).all()
         )
         demand(fine, "the local plan is no path of finite poses (n, 3)")
+
+
+def at_goal(pose: Pose2) -> bool:
+    """Whether the base is where it is to end."""
+    return pose.distance(GOAL.pose) < NEAR and abs(pose.yaw - GOAL.pose.yaw) < NEAR
 
 
 def moved(pose: Pose2, twist: Twist) -> Pose2:

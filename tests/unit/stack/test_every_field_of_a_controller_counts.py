@@ -230,9 +230,7 @@ CASES = [
 def test_another_value_changes_a_command(other: Other) -> None:
     probes, tried = [*enumerate(PROBES[other.spec])][::-1], list(changed(other))
     assert any(
-        answers(spec, probe) != usual(other.spec, start, number)
-        for number, probe in probes
-        for start, spec in tried
+        answers(spec, probe) != usual(other.spec, start, number) for number, probe in probes for start, spec in tried
     )
 
 
