@@ -14,6 +14,7 @@ MISSED = 2
 """Beams that may miss within a piece."""
 VALLEY = 0.1
 """Metres by which the range must rise between two things that touch, as the scan sees them."""
+BOTH = 2
 STEP_APART = 1e3
 """Metres: more than any beam sees."""
 FEWEST = 3
@@ -29,8 +30,8 @@ class Clusters:
     """Pieces of a scan, in the lidar's frame.
 
     Piece k is the hits `first[k]` … `last[k]` of `points` (m, 2), which beam `beams` (m,) made. `centres` (n, 2) and
-    `radii` (n,) are of the cylinders that fill the same angle at the same distance. `whole` (n,): nothing nearer stands
-    at its edges, nor does the scan end there, so that all of it is seen.
+    `radii` (n,) are of the cylinders that fill the same angle at the same distance. `edges` (n,): at how many
+    of its two ends nothing nearer stands, nor the scan ends; at both, all of it is seen.
     """
 
     points: Array
@@ -39,7 +40,12 @@ class Clusters:
     last: Indices
     centres: Array
     radii: Array
-    whole: npt.NDArray[np.bool_]
+    edges: Indices
+
+    @property
+    def whole(self) -> npt.NDArray[np.bool_]:
+        """Which (n,) are seen from edge to edge."""
+        return np.asarray(self.edges == BOTH)
 
     @property
     def places(self) -> npt.NDArray[np.complex128]:
@@ -65,7 +71,7 @@ def clusters(ranges: Array, angles: Array, least: float, most: float, largest: f
     step = abs(float(angles[1] - angles[0])) if len(angles) > 1 else 0.0
     if len(beams) < FEWEST:
         none = np.zeros(0, dtype=np.int64)
-        return Clusters(points, beams, none, none, np.zeros((0, 2)), np.zeros(0), np.zeros(0, dtype=bool))
+        return Clusters(points, beams, none, none, np.zeros((0, 2)), np.zeros(0), none)
     off = points[1:] - points[:-1]
     apart = np.hypot(off[:, 0], off[:, 1])
     together = (apart <= np.maximum(GAP, SPARSE * step * np.minimum(r[1:], r[:-1]))) & (
@@ -83,8 +89,8 @@ def clusters(ranges: Array, angles: Array, least: float, most: float, largest: f
     first, last, nearest, radii = first[small], last[small], nearest[small], radii[small]
     middle, away = (a[first] + a[last]) / 2, nearest + radii
     centres = np.column_stack((away * np.cos(middle), away * np.sin(middle)))
-    whole = _clear(seen, beams[first] - 1, r[first], full_circle) & _clear(seen, beams[last] + 1, r[last], full_circle)
-    return Clusters(points, beams, first, last, centres, radii, whole)
+    edges = _clear(seen, beams[first] - 1, r[first], full_circle) + _clear(seen, beams[last] + 1, r[last], full_circle)
+    return Clusters(points, beams, first, last, centres, radii, edges)
 
 
 def _parted(ranges: Array, first: Indices, last: Indices) -> tuple[Indices, Indices]:
@@ -118,10 +124,10 @@ def _parted(ranges: Array, first: Indices, last: Indices) -> tuple[Indices, Indi
     return pieces[:, 0], pieces[:, 1]
 
 
-def _clear(seen: Array, beam: Indices, edge: Array, full_circle: bool) -> npt.NDArray[np.bool_]:
-    """Whether the beam beside an edge goes on beyond it."""
+def _clear(seen: Array, beam: Indices, edge: Array, full_circle: bool) -> Indices:
+    """1 where the beam beside an edge goes on beyond it, else 0."""
     inside = (beam >= 0) & (beam < len(seen))
-    return np.asarray((inside | full_circle) & (seen[beam % len(seen)] > edge))
+    return np.asarray((inside | full_circle) & (seen[beam % len(seen)] > edge), dtype=np.int64)
 
 
 def fitted(points: Array, centre: Array, radius: float) -> Array:

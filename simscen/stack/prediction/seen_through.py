@@ -27,6 +27,8 @@ FEWEST_BEAMS = 3
 TURNED = 0.02
 """rad: what beams beside a point must have gone farther, too: headings that are a second apart are wrong by some of it,
 and at an edge it is chance which beam hits."""
+SAME, SAME_RELATIVE = 0.12, 0.01
+"""Metres, and share of the range, within which an earlier beam must have ended to have hit what stands there now."""
 KEPT = 64
 """Scans at most."""
 FARTHEST = 1e5
@@ -67,21 +69,25 @@ class View:
 
     @cached_property
     def centre(self) -> float:
-        """… and what that is in beams, once those beside each are done with."""
-        return self.more - self.beside + (self.count - 1) / 2
+        """… and what that is in beams, those that are added included."""
+        return self.more + (self.count - 1) / 2
 
-    def free(self, scan: Scan) -> Array:
-        """How far away (n,) what appears later in each direction stands at most."""
+    def lengths(self, scan: Scan) -> Array:
+        """How far away (n,) the beams of a scan saw, and what is added at either end."""
         lengths = np.zeros(self.count + 2 * self.more)
         seen = lengths[self.more : -self.more]
         np.fmin(np.fmax(scan.ranges, 0.0), FARTHEST, out=seen)
         seen[seen < scan.range_min] = 0.0
         if self.full:
             lengths[: self.more], lengths[-self.more :] = seen[-self.more :], seen[: self.more]
-        lengths = _least(lengths, 2 * self.beside + 1)
-        lengths -= MARGIN
-        lengths *= 1.0 / (1.0 + RELATIVE)
         return lengths
+
+    def free(self, lengths: Array) -> Array:
+        """How far away what appears later in each direction stands at most; `beside` shorter at either end."""
+        free = _least(lengths, 2 * self.beside + 1)
+        free -= MARGIN
+        free *= 1.0 / (1.0 + RELATIVE)
+        return free
 
 
 def _least(values: Array, width: int) -> Array:
@@ -101,7 +107,18 @@ class Earlier:
     tick: int
     lidar: Pose2
     view: View
+    lengths: Array
     free: Array
+
+    def looked(self, places: Places, lidar: Pose2) -> tuple[npt.NDArray[np.int64], Array]:
+        """The beam (n,) that went towards each place that was seen by a lidar at `lidar`, and its distance in m."""
+        moved, view = self.lidar.between(lidar), self.view
+        into = places * cmath.rect(1.0, moved.yaw - view.middle)
+        into += complex(moved.x, moved.y) * cmath.rect(1.0, -view.middle)
+        beam = np.arctan2(into.imag, into.real)
+        beam *= 1.0 / view.increment
+        beam += view.centre + 0.5
+        return beam.astype(np.int64), np.abs(into)
 
 
 class SeenThrough:
@@ -120,24 +137,35 @@ class SeenThrough:
         if (view.count, view.start, view.increment) != (count, scan.angle_min, scan.angle_increment):
             self._view = view = View(count, scan.angle_min, scan.angle_increment)
         self._forget(scan.tick)
-        self._scans.append(Earlier(scan.tick, lidar, view, view.free(scan)))
+        lengths = view.lengths(scan)
+        self._scans.append(Earlier(scan.tick, lidar, view, lengths, view.free(lengths)))
 
     def appeared(self, tick: int, places: Places, lidar: Pose2) -> npt.NDArray[np.bool_]:
         """Which of the places (n,), seen at `tick` and in the frame of a lidar at `lidar`, were free about AGO before.
 
         What is farther away than FARTHEST never was.
         """
+        old = self._asked(tick)
+        if old is None:
+            return np.zeros(len(places), dtype=bool)
+        beam, distance = old.looked(places, lidar)
+        return old.free[beam - old.view.beside] > distance
+
+    def stood(self, tick: int, places: Places, lidar: Pose2) -> npt.NDArray[np.bool_]:
+        """Which of the places (n,) were hit about AGO before, too."""
+        old = self._asked(tick)
+        if old is None:
+            return np.ones(len(places), dtype=bool)
+        beam, distance = old.looked(places, lidar)
+        near = np.abs(old.lengths[beam[:, None] + np.arange(-1, 2)] - distance[:, None]).min(axis=1)
+        return np.asarray(near < SAME + SAME_RELATIVE * distance)
+
+    def _asked(self, tick: int) -> Earlier | None:
+        """The scan of about AGO before; None while there is none of AT_LEAST."""
         self._forget(tick)
         if not self._scans or self._scans[0].tick > tick - self._at_least:
-            return np.zeros(len(places), dtype=bool)
-        old = self._scans[0]
-        moved, view = old.lidar.between(lidar), old.view
-        into = places * cmath.rect(1.0, moved.yaw - view.middle)
-        into += complex(moved.x, moved.y) * cmath.rect(1.0, -view.middle)
-        beam = np.arctan2(into.imag, into.real)
-        beam *= 1.0 / view.increment
-        beam += view.centre + 0.5
-        return old.free[beam.astype(np.int64)] > np.abs(into)
+            return None
+        return self._scans[0]
 
     def _forget(self, tick: int) -> None:
         while len(self._scans) > 1 and self._scans[1].tick <= tick - self._ago:

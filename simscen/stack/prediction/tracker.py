@@ -8,6 +8,7 @@ nothing continues ends: soon where the lidar sees through the place, later where
 import math
 from collections import deque
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +16,7 @@ import numpy.typing as npt
 from simscen.core.geometry import Array, Pose2
 from simscen.core.sensing import Scan
 from simscen.model.guards import Prediction
-from simscen.stack.prediction.clusters import Clusters, clusters, fitted
+from simscen.stack.prediction.clusters import BOTH, Clusters, clusters, fitted
 from simscen.stack.prediction.kalman import corrected, predicted
 from simscen.stack.prediction.moving import Moving, nothing
 from simscen.stack.prediction.seen_through import FARTHEST, SeenThrough
@@ -41,9 +42,14 @@ ENDS_UNSEEN, ENDS_HIDDEN, ENDS_UNSURE = 0.35, 2.5, 0.8
 """Seconds without a hit after which a track ends: where the lidar sees through; where it cannot see; and for one that
 was not moving. All end when their place is known worse than this many metres."""
 UNSURE_PLACE = 1.2
+FASTEST = 4.0
+"""m/s: nothing indoors is faster; a track that is has gone from one thing to another."""
 SEEN_WHOLE, FARTHER, TWICE = 5, 0.4, 1.6
 """One that began beside something that moves has to be seen whole so often, to go so far in m, and to be so many times
 as fast as what moves at the least."""
+STANDS, STOOD_OFTEN = 0.5, 0.2
+"""Share of its hits that an earlier scan hit, too, from which a piece stands there; share of the last updates that a
+track which began so may stand."""
 LEAST_RADIUS = 0.15
 """Metres: of such a one."""
 MOSTLY = 0.6
@@ -62,16 +68,27 @@ RADIUS_GAIN = 0.3
 """How much a new look at a whole piece changes the radius of a track."""
 
 
+class Update(NamedTuple):
+    """When and where a track was hit; whether it stood where it had been free, or where something had been hit before.
+
+    `edges` is how many of its two ends were seen.
+    """
+
+    tick: int
+    x: float
+    y: float
+    came: bool
+    stood: bool
+    edges: int
+
+
 @dataclass
 class Track:
-    """What is known of a track besides its state.
-
-    `lately`: when and where it was hit in its last updates, whether it stood where it had been free, was seen whole.
-    """
+    """What is known of a track besides its state; `lately` are its last updates."""
 
     radius: float
     born: Array
-    lately: deque[tuple[int, float, float, bool, bool]] = field(default_factory=lambda: deque(maxlen=LATELY))
+    lately: deque[Update] = field(default_factory=lambda: deque(maxlen=LATELY))
     moving: bool = False
     moved: bool = False
     fast_at: int = 0
@@ -79,7 +96,7 @@ class Track:
     @property
     def hit_at(self) -> int:
         """When it was last hit."""
-        return self.lately[-1][0]
+        return self.lately[-1].tick
 
 
 class Tracker:
@@ -153,21 +170,24 @@ class Tracker:
         full = abs(len(scan.ranges) * abs(step) - 2 * math.pi) < abs(step)
         pieces = clusters(scan.ranges, self._angles, scan.range_min, self._farthest(scan), self._spec.max_radius, full)
         centres = lidar.apply(pieces.centres)
-        came = self._came(pieces, scan.tick, lidar)
-        taken = self._associate(pieces, centres, came, lidar)
-        self._begin(pieces, centres, came, taken, scan.tick)
+        count, share = self._shares(pieces, self._memory.appeared(scan.tick, pieces.places, lidar))
+        came = (count >= FEW) & (share >= APPEARED)
+        stood = self._shares(pieces, self._memory.stood(scan.tick, pieces.places, lidar))[1] > STANDS
+        taken = self._associate(pieces, centres, came, stood, lidar)
+        self._begin(pieces, centres, came, stood, taken, scan.tick)
         self._judge(scan, lidar)
         self._tell()
         self._mark(scan, lidar)
 
-    def _came(self, pieces: Clusters, tick: int, lidar: Pose2) -> npt.NDArray[np.bool_]:
-        """Which pieces (n,) stand where it was free."""
-        appeared = self._memory.appeared(tick, pieces.places, lidar)
-        total = np.concatenate(([0], np.cumsum(appeared)))
+    def _shares(self, pieces: Clusters, which: npt.NDArray[np.bool_]) -> tuple[Array, Array]:
+        """How many (n,) of each piece's hits these are, and the share."""
+        total = np.concatenate(([0], np.cumsum(which)))
         count = total[pieces.last + 1] - total[pieces.first]
-        return np.asarray((count >= FEW) & (count >= APPEARED * (pieces.last - pieces.first + 1)))
+        return count, count / (pieces.last - pieces.first + 1)
 
-    def _associate(self, pieces: Clusters, centres: Array, came: npt.NDArray[np.bool_], lidar: Pose2) -> set[int]:
+    def _associate(
+        self, pieces: Clusters, centres: Array, came: npt.NDArray[np.bool_], stood: npt.NDArray[np.bool_], lidar: Pose2
+    ) -> set[int]:
         """Give each track the piece nearest to where it should be, nearest pairs first."""
         taken: set[int] = set()
         if not self._tracks or not len(centres):
@@ -193,7 +213,7 @@ class Tracker:
                 self._states[numbers], self._covariances[numbers], np.array(places), np.array(deviations)
             )
             for number, piece in zip(numbers, fits, strict=True):
-                self._note(number, bool(came[piece]), bool(pieces.whole[piece]))
+                self._note(number, bool(came[piece]), bool(stood[piece]), int(pieces.edges[piece]))
         return taken
 
     def _measured(self, track: Track, pieces: Clusters, piece: int, state: Array, lidar: Pose2) -> tuple[Array, float]:
@@ -206,7 +226,15 @@ class Tracker:
         deviation = NOISE + RELATIVE * float(np.hypot(*centre)) + (0.0 if whole else HALF_SEEN)
         return lidar.apply(centre[None])[0], deviation
 
-    def _begin(self, pieces: Clusters, centres: Array, came: npt.NDArray[np.bool_], taken: set[int], tick: int) -> None:
+    def _begin(
+        self,
+        pieces: Clusters,
+        centres: Array,
+        came: npt.NDArray[np.bool_],
+        stood: npt.NDArray[np.bool_],
+        taken: set[int],
+        tick: int,
+    ) -> None:
         """Tracks of pieces that no track has taken and that stand where it was free."""
         # Among moving things others may, of which a thing that passed hid that they were not there before.
         also = (
@@ -228,12 +256,12 @@ class Tracker:
         for piece in new:
             track = Track(self._first_radius(pieces, piece), centres[piece].copy(), fast_at=tick)
             self._tracks.append(track)
-            self._note(len(self._tracks) - 1, bool(came[piece]), False)
+            self._note(len(self._tracks) - 1, bool(came[piece]), bool(stood[piece]), 0)
 
-    def _note(self, number: int, came: bool, whole: bool) -> None:
+    def _note(self, number: int, came: bool, stood: bool, edges: int) -> None:
         """Note that a track was hit."""
         x, y = self._states[number, :2].tolist()
-        self._tracks[number].lately.append((self._tick, x, y, came, whole))
+        self._tracks[number].lately.append(Update(self._tick, x, y, came, stood, edges))
 
     @staticmethod
     def _first_radius(pieces: Clusters, piece: int) -> float:
@@ -258,7 +286,8 @@ class Tracker:
                 limit = ENDS_HIDDEN
             rests = REMEMBERED if track.moved else RESTED
             rested = not track.moving and (self._tick - track.fast_at) / self._rate > rests
-            if unseen <= limit and spread <= UNSURE_PLACE and not rested:
+            possible = math.hypot(*self._states[number, 2:].tolist()) < FASTEST
+            if unseen <= limit and spread <= UNSURE_PLACE and possible and not rested:
                 keep.append(number)
         if len(keep) < len(self._tracks):
             self._tracks = [self._tracks[number] for number in keep]
@@ -272,30 +301,35 @@ class Tracker:
             track.fast_at = self._tick
         if track.moving:
             track.moving = (self._tick - track.fast_at) / self._rate <= STOOD
-        elif track.moved and speed > self._spec.min_speed and speed > noise:
-            track.moving = True  # it comes back over ground where it has just been
+        elif track.moved and speed > max(self._spec.min_speed, noise) and track.hit_at == self._tick:
+            track.moving = not track.lately[-1].stood  # it comes back over ground where it has just been
         elif speed > self._spec.min_speed:
             track.moving = track.moved = self._goes(number, track, speed, noise)
 
     def _goes(self, number: int, track: Track, speed: float, noise: float) -> bool:
         """Whether what is that fast is not only noise, nor something that stands and of which more comes into view."""
         x, y, vx, vy = self._states[number].tolist()
-        since, from_x, from_y = track.lately[0][:3]
-        dx, dy = x - from_x, y - from_y
-        way, seconds = math.hypot(dx, dy), (self._tick - since) / self._rate
-        spread = math.sqrt(max(self._covariances[number, 0, 0], self._covariances[number, 1, 1]))
+        lately, first = track.lately, track.lately[0]
+        dx, dy = x - first.x, y - first.y
+        way, seconds = math.hypot(dx, dy), (self._tick - first.tick) / self._rate
         if dx * vx + dy * vy <= 0.0:
             return False
-        # Over the last updates, both ends may be off.
-        sure, lately = speed > SURE * noise, way > max(self._spec.min_speed * seconds, SURE * math.sqrt(2.0) * spread)
-        if (sure or lately) and sum(each[3] for each in track.lately) >= max(HITS, MOSTLY * len(track.lately)):
+        spread = math.sqrt(max(self._covariances[number, 0, 0], self._covariances[number, 1, 1]))
+        whole = sum(each.edges == BOTH for each in lately)
+        sure = speed > SURE * noise
+        # Over the last updates, both ends may be off; and of what is half seen, more may come into view.
+        went = way > max(self._spec.min_speed * seconds, SURE * math.sqrt(2.0) * spread) and 2 * whole > len(lately)
+        if (sure or went) and sum(each.came for each in lately) >= max(HITS, MOSTLY * len(lately)):
             return way > TRAVELLED
         # Without that, only beside something else that moves: it may have hidden the place.
         if not sure or speed < TWICE * self._spec.min_speed or not any(each.moving for each in self._tracks):
             return False
+        if sum(each.stood for each in lately) > STOOD_OFTEN * len(lately):
+            return False
         far = math.dist((x, y), track.born.tolist()) > 2 * self._spec.max_radius + FAR
-        whole = sum(each[4] for each in track.lately) >= SEEN_WHOLE
-        return (whole and way > FARTHER) or (far and len(track.lately) == LATELY)
+        if far and len(lately) == LATELY and sum(each.edges > 0 for each in lately) >= MOSTLY * LATELY:
+            return True
+        return whole >= SEEN_WHOLE and way > FARTHER
 
     def _visible(self, number: int, scan: Scan, lidar: Pose2) -> bool:
         """Whether the lidar sees past the place where the middle of a track should be."""
