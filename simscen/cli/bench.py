@@ -1,32 +1,28 @@
-"""`simscen bench`: how fast it is; `bench worlds`: also in large worlds; `bench nav`: how well the stack drives;
-`bench localization`: how well it knows where it is.
-"""
+"""`simscen bench`: how fast it is here, and the other benchmarks as its commands."""
 
-import json
 from dataclasses import asdict
-from enum import Enum
-from typing import TYPE_CHECKING, Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from simscen.cli import bench_localization, bench_nav, bench_worlds
-from simscen.cli.diagnostics import print_text
+from simscen.cli import bench_compare, bench_growth, bench_localization, bench_nav, bench_suite, bench_worlds
+from simscen.cli.bench_result import Result
+from simscen.cli.bench_told import COMPARE, Format, earlier, show, tell
+from simscen.run.figure import Figure, Figures
 
 if TYPE_CHECKING:
     from simscen.run.bench import Field, Patrol
     from simscen.run.bench_external import External
+    from simscen.run.benchoverhead import Overhead
 
 app = typer.Typer(rich_markup_mode=None, add_completion=False)
+app.command("suite")(bench_suite.command)
+app.command("growth")(bench_growth.command)
+app.command("worlds")(bench_worlds.command)
+app.command("compare")(bench_compare.command)
 app.command("nav")(bench_nav.command)
 app.command("localization")(bench_localization.command)
-app.command("worlds")(bench_worlds.command)
-
-
-class Format(str, Enum):
-    """What is printed."""
-
-    TEXT = "text"
-    JSON = "json"
 
 
 @app.callback(invoke_without_command=True)
@@ -34,44 +30,90 @@ def command(
     ctx: typer.Context,
     format_: Annotated[Format, typer.Option("--format", help="What to print.")] = Format.TEXT,
     rounds: Annotated[int, typer.Option(min=1, max=100, help="Runs of the patrol; the median counts.")] = 5,
+    compare: Annotated[Path | None, typer.Option("--compare", metavar="FILE", help=COMPARE)] = None,
 ) -> None:
     """Measure how fast simscen runs here.
 
     A patrol of 60 s with everything on (240 Hz physics, 360 beams at 10 Hz, 500 to 2000 particles, full MCAP log) on
-    one core: times real time, where the time goes, and how long PyBullet alone takes to step and scan as often. Then a
+    one core: times real time, as a multiple of what PyBullet alone takes to step and scan as often, and what share each
+    part has. What surrounds a run: set-up and verdicts, its process, the start of a session, memory of a worker. Then a
     720-beam scan and a step in two fields of obstacles, beside PyBullet with one body for each. These are CPU times.
     Last the patrol with its stack behind the stack protocol: µs of wall time that the engine waits for it at each beat.
+
+    Less than a minute on an idle machine. Other commands take longer: `suite` on all cores, `growth` with what there
+    is, `worlds` that are large. --compare FILE holds the result against one of --format json, `compare` two of these.
     """
     if ctx.invoked_subcommand is not None:
         return
     from simscen.cli.quiet import engine_output_on_stderr
+    from simscen.cli.runsession import WARM_PROCESS
 
+    before = earlier(compare)
     with engine_output_on_stderr():
         from simscen.run import bench
         from simscen.run.bench_external import measure_external
+        from simscen.run.benchoverhead import measure_overhead
 
-        patrol = bench.measure_patrol(rounds)
+        patrol = bench.measure_patrol(rounds, tell)
+        overhead = measure_overhead(rounds, WARM_PROCESS, tell)
+        tell("fields of obstacles")
         fields = [bench.measure_field(count) for count in (209, 2090)]
+        tell("the stack as a process of its own")
         external = measure_external(max(1, rounds // 2))
-    if format_ is Format.JSON:
-        patrol_data = {**asdict(patrol), "real_time_factor": patrol.factor, "ratio_to_bare": patrol.cpu / patrol.bare}
-        external_data = {**asdict(external), "ratio": external.ratio}
-        fields_data = [asdict(field) for field in fields]
-        print(json.dumps({"patrol": patrol_data, "fields": fields_data, "external": external_data}, indent=2))
-        return
-    print_text("\n".join([*_patrol_lines(patrol, rounds), *_field_lines(fields), *_external_lines(external)]))
+    figures = {**_patrol_figures(patrol), **overhead.figures, **_other_figures(fields, external)}
+    lines = [*_patrol_lines(patrol, rounds), *_overhead_lines(overhead), *_field_lines(fields)]
+    text = "\n".join([*lines, *_external_lines(external)])
+    show(Result.here(figures), text, _sections(patrol, overhead, fields, external), format_, before)
+
+
+def _sections(patrol: "Patrol", overhead: "Overhead", fields: "list[Field]", external: "External") -> dict[str, Any]:
+    return {
+        "patrol": {**asdict(patrol), "real_time_factor": patrol.factor, "ratio_to_bare": patrol.ratio},
+        "overhead": asdict(overhead),
+        "fields": [asdict(field) for field in fields],
+        "external": {**asdict(external), "ratio": external.ratio},
+    }
+
+
+def _patrol_figures(patrol: "Patrol") -> Figures:
+    each, unit = 1e3 / patrol.simulated, "ms a simulated second"
+    return {
+        "patrol, times PyBullet alone": Figure.of(patrol.ratios, ""),
+        "patrol": Figure.of([each * cpu for cpu in patrol.cpus], unit),
+        "PyBullet alone": Figure.of([each * bare for bare in patrol.bares], unit),
+        **{name: Figure.of([each * one for one in rounds], unit) for name, rounds in patrol.parted.items()},
+    }
+
+
+def _other_figures(fields: "list[Field]", external: "External") -> Figures:
+    figures = dict[str, Figure]()
+    for field in fields:
+        figures[f"scan among {field.obstacles} obstacles"] = Figure(field.scan_ms, "ms")
+        figures[f"step among {field.obstacles} obstacles"] = Figure(field.step_us, "µs")
+    return {**figures, "beat with the stack as a process": Figure(external.there_us, "µs")}
 
 
 def _patrol_lines(patrol: "Patrol", rounds: int) -> list[str]:
     width = max(map(len, patrol.parts))
     shares = sorted(patrol.parts.items(), key=lambda part: -part[1])
-    ratio = f"{patrol.cpu / patrol.bare:.1f} times what PyBullet alone takes to step and scan as often"
+    ratio = f"{patrol.ratio:.2f} times what PyBullet alone takes to step and scan as often"
+    spread = f"{min(patrol.ratios):.2f} … {max(patrol.ratios):.2f} in single rounds"
     return [
         f"patrol of {patrol.simulated:g} s, everything on, one core",
         f"  {patrol.factor:.0f} times real time ({patrol.cpu:.2f} s of CPU time, median of {rounds})",
-        f"  {ratio} ({patrol.bare:.2f} s)",
-        *(f"    {n:{width}} {s / patrol.cpu:6.1%} {1e3 * s / patrol.simulated:6.2f} ms a second" for n, s in shares),
+        f"  {ratio} ({patrol.bare:.2f} s; {spread})",
+        f"    {'':{width}}  share   ms a simulated second   times PyBullet alone",
+        *(
+            f"    {n:{width}} {s / patrol.cpu:6.1%} {1e3 * s / patrol.simulated:23.2f} {s / patrol.bare:22.2f}"
+            for n, s in shares
+        ),
     ]
+
+
+def _overhead_lines(overhead: "Overhead") -> list[str]:
+    width = max(map(len, overhead.figures))
+    told = [f"    {name:{width}} {one.value:7.1f} {one.unit}" for name, one in overhead.figures.items()]
+    return ["what surrounds a run (CPU time unless it says so)", *told]
 
 
 def _field_lines(fields: "list[Field]") -> list[str]:

@@ -28,17 +28,35 @@ from simscen.worlds.rays import RayScene
 
 PATROL = Path(__file__).parent.parent / "data" / "bench" / "patrol.scenario.yaml"
 SEED = 1
+Tell = Callable[[str], None]
+"""Is told what is being measured."""
 BEAMS = 720
 
 
 @dataclass(frozen=True)
 class Patrol:
-    """A run of `simulated` seconds: CPU seconds in all, by part, and for PyBullet alone to step and scan as often."""
+    """A run of `simulated` seconds: CPU seconds in all, by part, and for PyBullet alone to step and scan as often.
+
+    Medians; `cpus`, `bares` and `parted` (by part) are what they are of: PyBullet alone had its turn after each run.
+    """
 
     simulated: float
     cpu: float
     parts: dict[str, float]
     bare: float
+    cpus: tuple[float, ...]
+    bares: tuple[float, ...]
+    parted: dict[str, tuple[float, ...]]
+
+    @property
+    def ratios(self) -> tuple[float, ...]:
+        """How many times as long as PyBullet alone each run took."""
+        return tuple(cpu / bare for cpu, bare in zip(self.cpus, self.bares, strict=True))
+
+    @property
+    def ratio(self) -> float:
+        """Their median: a machine that is slow for a while is so for both."""
+        return statistics.median(self.ratios)
 
     @property
     def factor(self) -> float:
@@ -60,18 +78,34 @@ class Field:
     bare_step_us: float
 
 
-def measure_patrol(rounds: int) -> Patrol:
-    """The median of several runs of the patrol, recorded as always; then once more, taken apart."""
+def nobody(_: str) -> None:
+    """Is told for nothing."""
+
+
+def measure_patrol(rounds: int, tell: Tell = nobody) -> Patrol:
+    """The median of several runs of the patrol, recorded as always; then half as many more, taken apart."""
     prepared = prepare(load_scenario(PATROL, PATROL.parent))
-    timed_run(prepared)  # the first run pays for imports and caches
-    runs = [timed_run(prepared) for _ in range(rounds)]
+    simulated, *_ = timed_run(prepared)  # the first run pays for imports and caches
+    cpus, bares = list[float](), list[float]()
+    for number in range(rounds):
+        tell(f"patrol, round {number + 1} of {rounds}")
+        cpus.append(timed_run(prepared)[1])
+        bares.append(bare_patrol(prepared, simulated))
+    cpu = statistics.median(cpus)
+    tell("patrol, taken apart")
+    taken = [_taken_apart(prepared, cpu) for _ in range((rounds + 1) // 2)]
+    parted = {name: tuple(one[name] for one in taken) for name in taken[0]}
+    parts = {name: statistics.median(each) for name, each in parted.items()}
+    return Patrol(simulated, cpu, parts, statistics.median(bares), tuple(cpus), tuple(bares), parted)
+
+
+def _taken_apart(prepared: Prepared, cpu: float) -> dict[str, float]:
+    """Seconds of a run's parts. The stopwatch sees wall time and costs some itself: scaled to a run without it."""
     watch = Stopwatch()
-    simulated, _, whole = timed_run(prepared, watch)
-    cpu = statistics.median(cpu for _, cpu, _ in runs)
-    # The stopwatch sees wall time and costs some itself: the parts are scaled to a run without it.
+    _, _, whole = timed_run(prepared, watch)
     parts = {name: seconds * cpu / whole for name, seconds in watch.seconds.items()}
     parts["lockstep, set-up, verdicts"] = cpu - sum(parts.values())
-    return Patrol(simulated, cpu, parts, _bare_patrol(prepared, simulated))
+    return parts
 
 
 def timed_run(prepared: Prepared, watch: Stopwatch | None = None) -> tuple[float, float, float]:
@@ -100,7 +134,7 @@ def _watched(watch: Stopwatch, rig: Rig, own: Sequence[Log]) -> Sequence[Log]:
     return ()
 
 
-def _bare_patrol(prepared: Prepared, simulated: float) -> float:
+def bare_patrol(prepared: Prepared, simulated: float) -> float:
     """CPU seconds that PyBullet takes to step and scan as often in the same world, and nothing else."""
     lidar = next(sensor.lidar for sensor in prepared.robot.sensors.values() if sensor.lidar)
     bare = BareWorld(prepared.built.mesh, prepared.body, prepared.start, triangulate)

@@ -3,8 +3,9 @@
 import pytest
 
 from simscen.loading.scenario import load_scenario
-from simscen.run.benchworlds import MOVABLE, write_arena, write_hall
+from simscen.run.benchworlds import MOVABLE, MOVING, STANDING, write_arena, write_hall, write_warehouse
 from simscen.run.prepare import prepare
+from simscen.run.worldsource import load_world
 
 
 def test_the_hall_holds_its_movable_meshes_and_a_way_past_them(tmp_path):
@@ -22,3 +23,10 @@ def test_the_arena_is_a_hundred_metres_wide_and_its_goals_can_be_reached(tmp_pat
     cells = prepared.built.map
     assert cells.resolution * cells.cells.shape[1] == pytest.approx(100.0)
     assert all(length is not None and length < 100 for length in prepared.case.shortest.values())
+
+
+def test_the_warehouse_holds_five_thousand_objects_of_which_twenty_move(tmp_path):
+    file = write_warehouse(tmp_path / "warehouse")
+    world = load_world(load_scenario(file, file.parent))
+    assert (len(world.solids), len(world.bodies)) == (STANDING + 4, MOVING)  # and four walls
+    assert all(body.path is not None for body in world.bodies)

@@ -1,0 +1,43 @@
+"""`simscen bench suite` and `bench compare` as a user calls them, with the shortest of suites."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+SCENARIO = """\
+simscen: 1
+world: {simscen: 1, walls: [{name: wall, points: [[0, 0], [6, 0], [6, 6], [0, 6], [0, 0]]}]}
+robot: {pose: {x: 3, y: 3}}
+time_limit: 0.1 s
+pass: [{collisions: {max: 0}}]
+"""
+
+
+def bench(*arguments: str) -> "subprocess.CompletedProcess[str]":
+    command = [sys.executable, "-m", "simscen.cli.main", "bench", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+
+
+def test_a_suite_is_measured_and_its_results_are_compared(tmp_path: Path) -> None:
+    for name in ("a", "b", "c"):
+        (tmp_path / f"{name}.scenario.yaml").write_text(SCENARIO)
+    done = bench("suite", str(tmp_path), "--most", "2", "-j", "1", "--format", "json")
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert (told["suite"]["runs"], told["suite"]["workers"], told["suite"]["unfinished"]) == (2, 1, [])
+    assert told["suite"]["simulated"] < 1.0
+    assert len(told["suite"]["memory"]) == 2
+    result = tmp_path / "result.json"
+    result.write_text(done.stdout)
+    compared = bench("compare", str(result), str(result))
+    assert compared.returncode == 0, compared.stderr
+    assert "suite: runs a minute" in compared.stdout
+    assert "1.00" in compared.stdout
+
+
+def test_nothing_is_measured_when_there_is_nothing_to_compare_with(tmp_path: Path) -> None:
+    (tmp_path / "none.json").write_text("{}")
+    done = bench("--compare", str(tmp_path / "none.json"))
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "none.json is no result of `simscen bench --format json`" in done.stderr

@@ -1,0 +1,107 @@
+"""Results of `simscen bench` are read again and compared; what is no result is told in words."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from simscen.cli.bench_compare import as_text, judgement
+from simscen.cli.bench_result import FORMAT, Result, as_json, read_result
+from simscen.core.errors import UsageError
+from simscen.run.figure import Figure
+
+BEFORE = Result(
+    {
+        "patrol": Figure.of((36.0, 40.0, 35.0), "ms a simulated second"),
+        "log": Figure.of((3.0, 3.2), "ms a simulated second"),
+        "suite: runs a minute": Figure(50.0, "", (), more_is_better=True),
+        "scan": Figure(0.0, "ms"),
+    },
+    "x86_64, 2 cores, avx",
+    "0.1.0",
+)
+AFTER = Result(
+    {
+        "patrol": Figure.of((18.0, 17.0, 20.0), "ms a simulated second"),
+        "log": Figure.of((3.1, 3.3), "ms a simulated second"),
+        "suite: runs a minute": Figure(100.0, "", (), more_is_better=True),
+        "step": Figure(14.0, "µs"),
+    },
+    "x86_64, 2 cores, avx",
+    "0.1.0",
+)
+
+TABLE = """\
+                                          before                       after  ratio  rounds before  rounds after
+patrol                  36 ms a simulated second    18 ms a simulated second   0.50        35 … 40       17 … 20  better
+log                    3.1 ms a simulated second  3.2 ms a simulated second   1.03        3 … 3.2     3.1 … 3.3   noise
+suite: runs a minute                          50                        100   2.00              -             -
+only before: scan
+only after: step"""
+
+
+def test_each_figure_of_both_has_a_line_with_what_is_noise() -> None:
+    told = as_text(BEFORE, AFTER)
+    assert [line.split() for line in told.splitlines()] == [line.split() for line in TABLE.splitlines()]
+
+
+def test_another_machine_and_another_version_are_told() -> None:
+    told = as_text(BEFORE, replace(AFTER, machine="aarch64, 4 cores", simscen="0.2.0"))
+    assert "simscen 0.1.0 before, 0.2.0 after" in told
+    assert "not the same machine: x86_64, 2 cores, avx before, aarch64, 4 cores after; only ratios tell" in told
+
+
+def test_more_of_what_is_better_is_better_and_fewer_than_two_rounds_say_nothing() -> None:
+    few, many = Figure.of((10.0, 11.0), "", more_is_better=True), Figure.of((20.0, 21.0), "", more_is_better=True)
+    assert (judgement(few, many), judgement(many, few)) == ("better", "worse")
+    assert judgement(few, Figure.of((20.0,), "")) == ""
+
+
+def test_a_figure_that_was_nothing_has_no_ratio() -> None:
+    assert as_text(BEFORE, BEFORE).splitlines()[-1].split() == ["scan", "0", "ms", "0", "ms", "-", "-", "-"]
+
+
+def test_a_result_is_read_as_it_was_written(tmp_path: Path) -> None:
+    file = tmp_path / "result.json"
+    file.write_text(as_json(BEFORE, {"patrol": {"cpu": 2.1}}))
+    assert read_result(file) == BEFORE
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", "is no result of `simscen bench --format json`: Expecting value"),
+        ("[" * 100_000, "is no result of `simscen bench --format json`"),
+        ("[1]", "is no result of `simscen bench --format json`: it has no key `simscen_bench`"),
+        ('{"patrol": {"cpu": 2.17}}', "it has no key `simscen_bench`"),
+        (json.dumps({"simscen_bench": FORMAT + 1}), f"of another version of simscen bench (format {FORMAT + 1}, this"),
+        (json.dumps({"simscen_bench": FORMAT}), "is a damaged result of simscen bench: KeyError at 'figures'"),
+        (json.dumps({"simscen_bench": FORMAT, "figures": [1]}), "is a damaged result of simscen bench: AttributeError"),
+        (
+            json.dumps({"simscen_bench": FORMAT, "figures": {"patrol": {"value": "fast", "unit": "", "rounds": []}}}),
+            "is a damaged result of simscen bench: ValueError",
+        ),
+    ],
+)
+def test_what_is_no_result_is_told_in_words(tmp_path: Path, text: str, told: str) -> None:
+    file = tmp_path / "result.json"
+    file.write_text(text)
+    with pytest.raises(UsageError) as error:
+        read_result(file)
+    assert str(file) in str(error.value)
+    assert told in str(error.value)
+
+
+@pytest.mark.parametrize("there", [False, True])
+def test_a_file_that_cannot_be_read_is_told_in_words(tmp_path: Path, there: bool) -> None:
+    file = tmp_path / "result.json"
+    if there:
+        file.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(UsageError, match=r"cannot read .*result\.json: (no text|No such file or directory)"):
+        read_result(file)
+
+
+def test_results_of_different_commands_have_nothing_to_compare() -> None:
+    with pytest.raises(UsageError, match="no figure in common: compare results of the same command"):
+        as_text(BEFORE, replace(AFTER, figures={"2 robots": Figure(80.0, "ms a simulated second")}))

@@ -1,0 +1,51 @@
+"""The scenarios of `simscen bench growth` have more of what they say, and the suite's is spread."""
+
+import pytest
+
+from simscen.loading.loaded import LoadedScenario
+from simscen.loading.scenario import load_scenario
+from simscen.run.benchgrowth import AXES, write_more
+from simscen.run.benchoverhead import SHORT, short_patrol
+from simscen.run.benchsuite import Suite, spread_over
+from simscen.run.worldsource import load_robot, load_world
+
+
+def count(axis: str, loaded: LoadedScenario) -> int:
+    spec, world = loaded.spec, load_world(loaded)
+    match axis:
+        case "obstacles":
+            return sum(solid.name.startswith("crate") for solid in world.solids)
+        case "objects":
+            return sum(body.mass > 0 for body in world.bodies)
+        case "moving objects":
+            return sum(body.path is not None for body in world.bodies) - 1  # the patrol's own cart
+        case "beams":
+            return next(sensor.lidar.beams for sensor in load_robot(loaded)[0].sensors.values() if sensor.lidar)
+        case "particles":
+            return spec.stack.localizer.max_particles
+        case _:
+            return len(loaded.robots)
+
+
+@pytest.mark.parametrize(("axis", "many"), [(axis, many) for axis, counts in AXES.items() for many in counts[::2]])
+def test_there_is_as_much_as_the_line_says(tmp_path, axis, many):
+    assert count(axis, load_scenario(write_more(tmp_path, axis, many), tmp_path)) == many
+
+
+def test_the_short_patrol_is_over_at_once(tmp_path):
+    assert load_scenario(short_patrol(tmp_path), tmp_path).spec.time_limit == SHORT
+
+
+def test_of_a_large_suite_every_so_manieth_is_run():
+    assert spread_over(list(range(89)), 60)[:4] == [0, 1, 2, 4]
+    assert len(set(spread_over(list(range(89)), 60))) == 60
+    assert spread_over([1, 2], 60) == [1, 2]
+
+
+def test_a_suite_is_held_against_pybullet_alone_for_as_long():
+    suite = Suite(60, (), 2, simulated=1200.0, wall=20.0, cpu=36.0, memory=(100.0, 120.0, 300.0), bare=0.0075)
+    figures = {name: figure.value for name, figure in suite.figures.items()}
+    assert figures["suite: runs a minute"] == 180.0
+    assert figures["suite: wall time, times PyBullet alone on one core"] == pytest.approx(20 / 9)
+    assert figures["suite: CPU time, times PyBullet alone"] == pytest.approx(4.0)
+    assert (figures["suite: memory of a worker"], figures["suite: memory of the largest worker"]) == (120.0, 300.0)
