@@ -18,6 +18,10 @@ BACK_OUT, AHEAD = 0.15, 1.0
 """m/s of backing out, Nav2's backup_speed, and seconds of free way that it needs."""
 
 
+BENDS = (0.0, 0.3, -0.3, 0.6, -0.6)
+"""Turn rates in rad/s that are tried in this order: one that drove in on a bend cannot leave straight."""
+
+
 class TurningRoom:
     """Finds out whether a robot can turn where it is.
 
@@ -39,6 +43,6 @@ class TurningRoom:
         return bool((room >= min(ROOM * costmap.resolution, float(room[0]))).all())
 
     def back_out(self, pose: Pose2, costmap: CostmapView) -> Twist | None:
-        """Straight back, where the robot came from; None when that is blocked, too."""
-        back = Twist(-BACK_OUT, 0.0, 0.0)
-        return back if time_free(self._footprint, costmap, pose, back, AHEAD) >= AHEAD else None
+        """Back, where the robot came from, as straight as is free; None when all bends are blocked, too."""
+        backs = (Twist(-BACK_OUT, 0.0, rate) for rate in BENDS)
+        return next((one for one in backs if time_free(self._footprint, costmap, pose, one, AHEAD) >= AHEAD), None)

@@ -56,6 +56,14 @@ def test_a_long_robot_in_a_slot_backs_out_of_it() -> None:
     assert turning.has_room(0.5 * math.pi, outside, view)
 
 
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_robot_that_is_blocked_behind_on_one_side_backs_out_in_a_bend_round_it(side: int) -> None:
+    back = room_of(LONG).back_out(HERE, seen(Flatland(discs=[(-0.5, side * 0.2, 0.05)]), LONG))
+    assert back is not None
+    assert back.vx < 0.0
+    assert side * back.wz > 0.0
+
+
 def test_a_robot_with_its_back_to_the_wall_does_not_back_out() -> None:
     closed = Flatland([*SLOT.boxes, (-0.6, -0.5, -0.5, 0.5)])
     assert room_of(LONG).back_out(HERE, seen(closed, LONG)) is None
