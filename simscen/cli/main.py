@@ -59,7 +59,7 @@ class Commands(TyperGroup):
         """The command itself; its module is imported now."""
         if cmd_name not in COMMANDS or not importlib.util.find_spec(_module(cmd_name)):
             return None
-        if cmd_name in LIGHT:
+        if cmd_name in LIGHT or cmd_name == "run":
             import_later("numpy")
         module = importlib.import_module(_module(cmd_name))
         gc.freeze()  # what is imported stays: it need never be looked through for garbage
