@@ -1,6 +1,7 @@
 """`simscen doctor`."""
 
 import hashlib
+import os
 import shlex
 import shutil
 import sys
@@ -34,10 +35,10 @@ Check = tuple[str, Callable[[], str]]
 def command() -> None:
     """Check that this installation can run scenarios.
 
-    Python, packages and their versions, what Linux must offer, limits of memory and files, room on the disk; one second
-    of a real run, twice, whose logs must be equal; and the speed of a patrol, beside PyBullet alone. Also what your own
-    configuration says that the names of external stacks run, and whether these programs are there. What is not well is
-    told with what helps. Exit code 0: all is well; 3: something is not.
+    Python, packages and their versions, what Linux must offer, limits of memory and files, room on the disk; where
+    worlds are cached; one second of a real run, twice, whose logs must be equal; and the speed of a patrol, beside PyBullet
+    alone. Also what your own configuration says that the names of external stacks run, and whether these programs are
+    there. What is not well is told with what helps. Exit code 0: all is well; 3: something is not.
     """
     well = True
     for name, check in checks():
@@ -61,6 +62,7 @@ def checks() -> Iterator[Check]:
     yield "shared", machine.shared_memory
     yield "temporary", partial(machine.writable, Path(tempfile.gettempdir()))
     yield "here", partial(machine.room, Path.cwd())
+    yield "cache", cache
     yield "stacks", stacks
     yield "run", run_twice
     yield "speed", speed
@@ -72,6 +74,22 @@ def _line(sign: str, name: str, told: str) -> str:
     first = f"  {sign} {name:10} "
     wrapper = textwrap.TextWrapper(width, first, " " * INDENT, break_long_words=False, break_on_hyphens=False)
     return wrapper.fill(told)
+
+
+def cache() -> str:
+    """Where maps and shortest ways of worlds are kept between sessions, and how much of them."""
+    from simscen.run.keptfiles import MOST_BYTES, VARIABLE, cache_folder, is_own, used
+
+    folder = cache_folder(os.environ)
+    if folder is None:
+        return f"nothing is kept between sessions ({VARIABLE})"
+    if not folder.exists():
+        return f"{folder}: nothing there yet"
+    if not is_own(folder):
+        told = f"{folder} is not used: it is no folder of yours, or others may write to it"
+        raise Ill(f"{told}; delete it, or name another with {VARIABLE}")
+    count, size = used(folder)
+    return f"{folder}: {count} files, {size / 1e6:.1f} MB of at most {MOST_BYTES / 1e6:.0f}; to be deleted at any time"
 
 
 def stacks() -> str:

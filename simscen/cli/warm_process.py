@@ -1,5 +1,6 @@
 """The program of the warm process: `python -I -m simscen.cli.warm_process [WHEREABOUTS] FD`. Not for people."""
 
+import os
 import resource
 import sys
 from collections.abc import Callable
@@ -15,6 +16,8 @@ from simscen.core.run import Run
 from simscen.record.replay import read_run
 from simscen.report.picture.compose import write_picture
 from simscen.report.picture.scene import Scene, with_robots
+from simscen.run.keptfiles import KeptFiles, cache_folder
+from simscen.run.keptworlds import KeptWorlds
 from simscen.run.perform import perform
 from simscen.run.preload import import_components
 from simscen.run.prepare import Prepared
@@ -26,7 +29,7 @@ from simscen.run.process.worker import Progress
 from simscen.run.process.zygote import Zygote
 from simscen.run.scenery import scenery_of
 
-_PREPARED = PreparedCache()
+_PREPARED = PreparedCache(KeptWorlds(KeptFiles(cache_folder(os.environ))))
 Image.preinit()  # imports what it would import when the first picture is written
 
 

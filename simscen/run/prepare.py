@@ -3,7 +3,7 @@
 Plain data and numpy arrays only, so that it can be made once in the warm process and survive the fork.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from simscen.core.belief import Estimate
@@ -11,6 +11,7 @@ from simscen.core.case import CLEARANCE_RANGE, Case
 from simscen.core.filtermasks import FilterMasks
 from simscen.core.geometry import Pose2
 from simscen.core.grid import OccupancyGrid
+from simscen.core.navigation import Goal
 from simscen.core.shapes import TriangleMesh
 from simscen.core.world import BuiltWorld
 from simscen.criteria.base import Criterion
@@ -31,7 +32,7 @@ from simscen.sim.robot_body import RobotBody
 from simscen.triggers.clearance_below import ClearanceBelow
 from simscen.worlds.build import build
 from simscen.worlds.meshing import fuse
-from simscen.worlds.shortest import legs_between
+from simscen.worlds.shortest import Leg, legs_between
 
 DEFAULT_LIDAR_HEIGHT = 0.2
 
@@ -75,15 +76,19 @@ BuildWorld = Callable[[LoadedScenario, float], BuiltWorld]
 """Gives the built world of a scenario, as a lidar at a height in metres maps it."""
 
 
+FindLegs = Callable[[BuiltWorld, Sequence[tuple[Pose2, Goal]], float], list[Leg]]
+"""Gives the shortest way of a disc of a radius from each pose to its goal."""
+
+
 def build_world(loaded: LoadedScenario, height: float) -> BuiltWorld:
     """Build it anew."""
     return build(load_world(loaded), height)
 
 
-def prepare(loaded: LoadedScenario, world_of: BuildWorld = build_world) -> Prepared:
+def prepare(loaded: LoadedScenario, world_of: BuildWorld = build_world, legs: FindLegs = legs_between) -> Prepared:
     """Build what the runs of this scenario share. Raises InvalidInput for files that cannot be used."""
     if not loaded.robots:
-        return _prepared(loaded, world_of)
+        return _prepared(loaded, world_of, legs)
     parts: dict[str, Prepared] = {}
     heights: dict[float, BuiltWorld] = {}
 
@@ -93,13 +98,13 @@ def prepare(loaded: LoadedScenario, world_of: BuildWorld = build_world) -> Prepa
         return heights[height]
 
     for name, view in loaded.robots.items():
-        parts[name] = _prepared(view, known)
+        parts[name] = _prepared(view, known, legs)
     reach = max(part.case.clearance_range for part in parts.values())
     parts = {name: replace(part, case=replace(part.case, clearance_range=reach)) for name, part in parts.items()}
     return replace(next(iter(parts.values())), loaded=loaded, robots=parts)
 
 
-def _prepared(loaded: LoadedScenario, world_of: BuildWorld) -> Prepared:
+def _prepared(loaded: LoadedScenario, world_of: BuildWorld, legs: FindLegs) -> Prepared:
     """For its only robot, or one of several."""
     spec = loaded.spec
     robot, body = load_robot(loaded)
@@ -132,12 +137,12 @@ def _prepared(loaded: LoadedScenario, world_of: BuildWorld) -> Prepared:
         stack=stack_of(spec),
         start=start,
         estimate=estimate_of(spec.own, start),
-        case=with_ways(case, built, obstacles),
+        case=with_ways(case, built, obstacles, legs),
         obstacles=obstacles,
     )
 
 
-def with_ways(case: Case, built: BuiltWorld, obstacles: TriangleMesh) -> Case:
+def with_ways(case: Case, built: BuiltWorld, obstacles: TriangleMesh, find_legs: FindLegs) -> Case:
     """The case with the shortest ways past the obstacles to its goals, and what they pass between.
 
     Where the robot is to fail at a goal, the way to the next one begins where the way to that one did.
@@ -146,7 +151,7 @@ def with_ways(case: Case, built: BuiltWorld, obstacles: TriangleMesh) -> Case:
     for goal in case.goals:
         ends.append((at, goal))
         at = at if goal.name in case.expected else goal.pose
-    legs = legs_between(replace(built, mesh=obstacles), ends, case.inscribed_radius)
+    legs = find_legs(replace(built, mesh=obstacles), ends, case.inscribed_radius)
     return replace(
         case,
         shortest={goal.name: leg.length for goal, leg in zip(case.goals, legs, strict=True)},

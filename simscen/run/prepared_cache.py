@@ -6,7 +6,9 @@ from dataclasses import replace
 
 from simscen.core.world import BuiltWorld
 from simscen.loading.loaded import LoadedScenario
-from simscen.run.prepare import Prepared, build_world, prepare
+from simscen.run.keptworlds import KeptWorlds
+from simscen.run.prepare import Prepared, prepare
+from simscen.run.worldsource import load_world
 
 MOST = 100
 """Scenarios that are kept; their runs follow each other, and a file may have a thousand variations."""
@@ -15,7 +17,9 @@ MOST = 100
 class PreparedCache:
     """Prepares scenarios; lives in the warm process, whose forks inherit what is here."""
 
-    def __init__(self) -> None:
+    def __init__(self, kept: KeptWorlds) -> None:
+        """`kept` is what earlier sessions left."""
+        self._kept = kept
         self._worlds: dict[str, BuiltWorld] = {}
         self._scenarios: dict[tuple[str, str, str], Prepared] = {}
 
@@ -25,7 +29,7 @@ class PreparedCache:
         if name not in self._scenarios:
             if len(self._scenarios) == MOST:
                 del self._scenarios[next(iter(self._scenarios))]
-            self._scenarios[name] = prepare(loaded, self._world)
+            self._scenarios[name] = prepare(loaded, self._world, self._kept.legs)
         return self._scenarios[name]
 
     def clear(self) -> None:
@@ -36,5 +40,5 @@ class PreparedCache:
     def _world(self, loaded: LoadedScenario, height: float) -> BuiltWorld:
         key = hashlib.sha256(pickle.dumps((replace(loaded.world, tree=None), height))).hexdigest()
         if key not in self._worlds:
-            self._worlds[key] = build_world(loaded, height)
+            self._worlds[key] = self._kept.build(load_world(loaded), height)
         return self._worlds[key]

@@ -62,10 +62,14 @@ def _numpy_features() -> dict[str, bool]:
 
 
 @cache
-def code() -> str:
-    """SHA-256 of simscen's own files: an installation from a working copy changes without a new version."""
+def code(*rooms: str) -> str:
+    """SHA-256 of simscen's own files: an installation from a working copy changes without a new version.
+
+    Of those in some `rooms` only, where any are named.
+    """
     sha, folder = hashlib.sha256(), PACKAGE
-    for file in sorted(path for path in folder.rglob("*") if path.suffix in (".py", ".yaml", ".json")):
+    files = [path for room in rooms or (".",) for path in (folder / room).rglob("*")]
+    for file in sorted(path for path in files if path.suffix in (".py", ".yaml", ".json")):
         sha.update(f"{file.relative_to(folder).as_posix()}\0".encode() + file.read_bytes())
     return sha.hexdigest()
 

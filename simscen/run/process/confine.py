@@ -11,6 +11,7 @@ MEMORY_BYTES = 4 << 30
 FILE_BYTES = 2 << 30
 OPEN_FILES = 256
 _PR_SET_PDEATHSIG = 1
+_PASSED_ON = {"PATH", "HOME", "LANG", "TMPDIR", "XDG_CACHE_HOME", "SIMSCEN_CACHE_DIR"}
 
 
 def die_with_parent(parent: int) -> None:
@@ -54,6 +55,6 @@ def limit_resources() -> None:
 
 def environment() -> dict[str, str]:
     """The environment of the processes that run scenarios: nothing secret, one BLAS thread, no hash seed."""
-    kept = {k: v for k, v in os.environ.items() if k in {"PATH", "HOME", "LANG", "TMPDIR"} or k.startswith("LC_")}
+    kept = {k: v for k, v in os.environ.items() if k in _PASSED_ON or k.startswith("LC_")}
     one_thread = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMEXPR", "TBB")}
     return {**kept, **one_thread, "PYTHONHASHSEED": "0"}

@@ -11,6 +11,7 @@ import pytest
 
 from simscen.cli import doctor, machine
 from simscen.run import bench
+from simscen.run.keptfiles import KeptFiles, cache_folder
 
 
 @pytest.fixture
@@ -39,6 +40,18 @@ def test_one_ill_thing_is_told_and_the_rest_is_checked(simscen, quick, monkeypat
         "  ✗ here       only 30 MiB are free"
     )
     assert ended.out.splitlines()[-1] == "  ✓ speed      not now, either"
+
+
+def test_the_cache_of_worlds_is_told_and_one_of_others_is_ill(tmp_path: Path, monkeypatch) -> None:
+    assert doctor.cache() == "nothing is kept between sessions (SIMSCEN_CACHE_DIR)"
+    monkeypatch.setenv("SIMSCEN_CACHE_DIR", str(tmp_path))
+    folder = cache_folder(os.environ)
+    assert doctor.cache() == f"{folder}: nothing there yet"
+    KeptFiles(folder).put("a" * 64, bytes(99_968))
+    assert doctor.cache() == f"{folder}: 1 files, 0.1 MB of at most 256; to be deleted at any time"
+    folder.chmod(0o777)
+    with pytest.raises(machine.Ill, match="others may write to it"):
+        doctor.cache()
 
 
 def test_speed_is_that_of_a_patrol_beside_pybullet(monkeypatch) -> None:

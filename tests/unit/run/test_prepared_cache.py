@@ -4,6 +4,8 @@ from pathlib import Path
 
 from simscen.loading.scenario import try_variations
 from simscen.run import prepared_cache
+from simscen.run.keptfiles import KeptFiles
+from simscen.run.keptworlds import KeptWorlds
 from simscen.run.prepared_cache import PreparedCache
 
 TEXT = """\
@@ -21,7 +23,7 @@ def test_variations_of_one_world_build_it_once_and_keep_only_the_last(tmp_path: 
     (tmp_path / "a.scenario.yaml").write_text(TEXT)
     variations = try_variations(tmp_path / "a.scenario.yaml", tmp_path)
     assert isinstance(variations, tuple)
-    cache = PreparedCache()
+    cache = PreparedCache(KeptWorlds(KeptFiles(None)))
     prepared = [cache.prepared(one) for one in variations]
     assert len({id(one.built) for one in prepared}) == 1
     assert [one.start.x for one in prepared] == [1, 2, 3]

@@ -1,0 +1,85 @@
+"""Maps and shortest ways that earlier sessions worked out change nothing but the time a session takes."""
+
+from pathlib import Path
+
+import pytest
+
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.navigation import Goal
+from simscen.core.shapes import Box, Solid
+from simscen.core.world import World
+from simscen.loading.scenario import load_scenario
+from simscen.run import keptworlds
+from simscen.run.keptfiles import KeptFiles
+from simscen.run.keptworlds import KeptWorlds
+from simscen.run.prepared_cache import PreparedCache
+from simscen.run.simulate import simulate
+
+SCENARIO = """\
+simscen: 1
+world:
+  simscen: 1
+  walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]
+  obstacles: [{name: crate, box: [0.5, 2, 1], pose: {x: 3, y: 1}}]
+robot: {pose: {x: 1, y: 1}}
+goals: [{name: desk, pose: {x: 5, y: 1}}, {name: behind the wall, pose: {x: 9, y: 9}}]
+time_limit: 2
+pass: [{collisions: {max: 0}}]
+"""
+
+
+def test_logs_are_the_same_with_a_cold_a_warm_and_a_damaged_cache(tmp_path: Path, monkeypatch) -> None:
+    (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
+    loaded = load_scenario(tmp_path / "a.scenario.yaml", tmp_path)
+    cache = tmp_path / "cache"
+
+    def log(kept: KeptFiles) -> bytes:
+        prepared = PreparedCache(KeptWorlds(kept)).prepared(loaded)
+        simulate(prepared, 1, log=tmp_path / "run.mcap")
+        return (tmp_path / "run.mcap").read_bytes()
+
+    without, cold = log(KeptFiles(None)), log(KeptFiles(cache))
+    assert len(list(cache.iterdir())) == 2
+    with monkeypatch.context() as broken:
+        broken.setattr(keptworlds, "map_of", None)
+        broken.setattr(keptworlds, "legs_between", None)
+        warm = log(KeptFiles(cache))
+    for file in cache.iterdir():
+        file.write_bytes(file.read_bytes()[:-3] + b"xyz")
+    assert without == cold == warm == log(KeptFiles(cache))
+
+
+def test_what_is_sound_and_means_nothing_counts_as_not_there(tmp_path: Path) -> None:
+    files = KeptFiles(tmp_path)
+    kept = KeptWorlds(files)
+    world = World("w", (Solid(Box((4.0, 0.2, 1.0)), Pose3(0.0, 2.0, 0.5), "wall"),), bounds=(-3.0, -3.0, 3.0, 3.0))
+    built = kept.build(world, 0.2)
+    ends = [(Pose2(0.0, 0.0), Goal("far", Pose2(0.0, 2.9)))]
+    legs = kept.legs(built, ends, 0.2)
+    for nonsense in (b"", b"[]", b"[1]", b'[{"length": "short"}]', bytes(40), bytes([255]) * 40):
+        for file in list(tmp_path.iterdir()):
+            files.put(file.name, nonsense)
+        again = kept.build(world, 0.2)
+        assert (again.map.cells == built.map.cells).all()
+        assert again.map.cells.dtype == built.map.cells.dtype
+        assert kept.legs(built, ends, 0.2) == legs
+
+
+@pytest.mark.parametrize("other", [(1.0, 0.0, 0.2), (0.0, 0.5, 0.2), (0.0, 0.0, 0.3)])
+def test_another_world_another_goal_and_another_robot_have_ways_of_their_own(tmp_path: Path, other) -> None:
+    kept = KeptWorlds(KeptFiles(tmp_path))
+
+    def legs(wall: float, goal: float, radius: float) -> object:
+        solid = Solid(Box((4.0, 0.2, 1.0)), Pose3(wall, 2.0, 0.5), "wall")
+        built = kept.build(World("w", (solid,), bounds=(-3.0, -3.0, 3.0, 3.0)), 0.2)
+        return kept.legs(built, [(Pose2(0.0, 0.0), Goal("far", Pose2(goal, 2.9)))], radius)
+
+    assert legs(*other) != legs(0.0, 0.0, 0.2) == legs(0.0, 0.0, 0.2)
+
+
+def test_results_of_other_code_are_not_used(monkeypatch) -> None:
+    before = keptworlds.key_of("map", 1.0)
+    keptworlds._circumstances.cache_clear()
+    monkeypatch.setattr(keptworlds, "code", lambda *rooms: "of another version")
+    assert keptworlds.key_of("map", 1.0) != before
+    keptworlds._circumstances.cache_clear()
