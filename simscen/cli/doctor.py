@@ -36,9 +36,9 @@ def command() -> None:
     """Check that this installation can run scenarios.
 
     Python, packages and their versions, what Linux must offer, limits of memory and files, room on the disk; where
-    worlds are cached; one second of a real run, twice, whose logs must be equal; and the speed of a patrol, beside PyBullet
-    alone. Also what your own configuration says that the names of external stacks run, and whether these programs are
-    there. What is not well is told with what helps. Exit code 0: all is well; 3: something is not.
+    worlds are cached; one second of a real run, twice, whose logs must be equal; and the speed of a patrol, beside
+    PyBullet alone. Also what your own configuration says that the names of external stacks run, and whether these
+    programs are there. What is not well is told with what helps. Exit code 0: all is well; 3: something is not.
     """
     well = True
     for name, check in checks():
