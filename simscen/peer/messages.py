@@ -252,6 +252,16 @@ def path(stamp: Stamp, poses: Sequence[Sequence[float]]) -> bytes:
     return message.done()
 
 
+def occupancy_grid(
+    stamp: Stamp, frame: str, resolution: float, width: int, origin: Sequence[float], cells: Sequence[int]
+) -> bytes:
+    """nav_msgs/msg/OccupancyGrid of rows of `width` cells, 0 … 100 or -1, the lowest first; `origin` is x, y, yaw."""
+    x, y, yaw = origin
+    message = Writer().put("iI", *stamp).string(frame).put("iI", *stamp).put("f", resolution)
+    message.put("2I", width, len(cells) // width if width else 0).put("7d", x, y, 0.0, *quaternion(yaw))
+    return message.numbers("b", cells).done()
+
+
 def transforms(links: Sequence[tuple[Stamp, str, str, Sequence[float]]]) -> bytes:
     """tf2_msgs/msg/TFMessage; each link is stamp, frame, child frame, and the child's x, y, yaw in the frame."""
     message = Writer().put("I", len(links))

@@ -73,10 +73,7 @@ Said = list[tuple[str, int, bytes]]
 
 
 def logs(file: Path, root: Path, folder: Path) -> tuple[Said, Said]:
-    """All messages of the scenario's log, with its stack in the engine and behind the protocol.
-
-    But for costmaps: a stack of one's own says none.
-    """
+    """All messages of the scenario's log, with its stack in the engine and behind the protocol."""
     prepared = prepare(load_scenario(file, root))
     here = simulate(prepared, log=folder / "here.mcap")
     there = simulate(served(prepared), log=folder / "there.mcap", printed=folder / "stack.log")
@@ -88,11 +85,7 @@ def logs(file: Path, root: Path, folder: Path) -> tuple[Said, Said]:
 def messages(log: Path) -> Said:
     with log.open("rb") as file:
         said = make_reader(file).iter_messages(log_time_order=False)
-        return [
-            (channel.topic, message.log_time, message.data)
-            for _, channel, message in said
-            if not channel.topic.endswith("_costmap/costmap")
-        ]
+        return [(channel.topic, message.log_time, message.data) for _, channel, message in said]
 
 
 SHIPPED = sorted(

@@ -30,7 +30,7 @@ from simscen.core.trace import Decision
 from simscen.model.stack import StackSpec
 from simscen.peer import Goal, Peer, Step, messages, wire
 from simscen.peer.client import EVENTS, Message
-from simscen.record import topics
+from simscen.record import pack_many, topics
 from simscen.record.simtime import SECOND, SimTime
 from simscen.run.external.topics import EXACT, KEEPOUT_MASK, SPEED_MASK
 from simscen.stack.build import build_stack
@@ -151,6 +151,9 @@ class ServedReference(Peer):
         self._followed = stack.plan is not None
         if decision.local_plan is not None:
             step.publish(topics.LOCAL_PLAN.name + EXACT, _numbers(decision.local_plan.points))
+        for costmap in decision.costmaps:
+            topic = topics.GLOBAL_COSTMAP if costmap.name == "global" else topics.LOCAL_COSTMAP
+            step.publish(topic.name, pack_many.occupancy_grid(costmap.frame, step.stamp, costmap.grid))
         for event in decision.events:
             if event.kind is EventKind.GOAL_ACCEPTED:
                 self._under_way = event.data["index"]

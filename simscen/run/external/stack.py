@@ -201,7 +201,7 @@ class ExternalStack:
         command = answer.command if answer.command is not None else self._held.command
         self._held = Decision(command)
         followed = answer.plan if answer.plan is not None and len(answer.plan.points) else None
-        return Decision(command, answer.belief, followed, answer.local_plan, events, answer.lines)
+        return Decision(command, answer.belief, followed, answer.local_plan, events, answer.lines, answer.costmaps)
 
     def _interrupt(self, kind: int, content: dict[str, Any]) -> None:
         """Tell the stack something that it answers at this very beat."""

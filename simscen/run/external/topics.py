@@ -26,6 +26,7 @@ HEARD = (
     Topic(topics.BELIEF.name + EXACT, POSE2D),
     Topic(topics.PARTICLES.name + EXACT, NUMBERS),
     Topic(topics.TF.name + EXACT, POSE2D),
+    *(topics.GLOBAL_COSTMAP, topics.LOCAL_COSTMAP),
 )
 """What a stack may say."""
 

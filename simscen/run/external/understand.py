@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from simscen.core.belief import Belief
 from simscen.core.geometry import Array, Pose2
+from simscen.core.grid import OccupancyGrid
 from simscen.core.motion import Twist
 from simscen.core.navigation import Path
-from simscen.core.trace import LogLine
+from simscen.core.trace import CostGrid, LogLine
 from simscen.peer import wire
 from simscen.peer.cdr import Reader
 from simscen.peer.messages import read
@@ -53,6 +55,7 @@ class Answer:
     correction: Pose2 | None = None
     events: tuple[dict[str, Any], ...] = ()
     lines: tuple[LogLine, ...] = field(default=())
+    costmaps: tuple[CostGrid, ...] = ()
 
 
 def by_topic(said: Messages, answers: dict[int, str]) -> Said:
@@ -82,6 +85,7 @@ def understood(said: Said, tick: int, time: SimTime, correction: Pose2 | None, d
         correction=correction,
         events=tuple(_told(said, topics.EVENTS.name, _event)),
         lines=tuple(_told(said, topics.ROSOUT.name, _line)),
+        costmaps=tuple(_costmaps(said)),
     )
 
 
@@ -121,6 +125,25 @@ def _path(said: Said, name: str, tick: int, time: SimTime) -> Path | None:
     if not np.isfinite(points).all():
         raise NotAllowed(f"a path on {name} that is not finite")
     return Path(points, made)
+
+
+def _costmaps(said: Said) -> Iterator[CostGrid]:
+    """The newest of each."""
+    for name, topic in (("global", topics.GLOBAL_COSTMAP.name), ("local", topics.LOCAL_COSTMAP.name)):
+        if said.get(topic):
+            yield _taken(topic, partial(_costmap, name), said[topic][-1])
+
+
+def _costmap(name: str, data: bytes) -> CostGrid:
+    told = read(topics.MAP.type, data)
+    if told.frame not in (frames.MAP, frames.ODOM):
+        raise NotAllowed(f"a {name} costmap in the frame `{told.frame}` instead of `{frames.MAP}` or `{frames.ODOM}`")
+    if not (0.0 < told.resolution < math.inf and all(map(math.isfinite, told.origin))):
+        raise NotAllowed(f"a {name} costmap of cells of {told.resolution:g} m at {tuple(told.origin)}")
+    if told.width * told.height != len(told.data):
+        raise NotAllowed(f"a {name} costmap of {told.width} x {told.height} cells with {len(told.data)} of them")
+    cells = np.array(told.data, dtype=np.int8).reshape(told.height, told.width)
+    return CostGrid(name, told.frame, OccupancyGrid(cells, told.resolution, Pose2(*told.origin)))
 
 
 def _twist(data: bytes) -> Twist:

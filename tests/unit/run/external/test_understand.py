@@ -32,6 +32,8 @@ EXAMPLES = {
     "/amcl_pose/exact": messages.pose2d(1, 2, 3),
     "/particle_cloud/exact": messages.float64_array([1, 2, 3, 4]),
     "/tf/exact": messages.pose2d(1, 2, 3),
+    "/global_costmap/costmap": messages.occupancy_grid((1, 0), "map", 0.05, 2, (1, 2, 0), [0, 100, -1, 50]),
+    "/local_costmap/costmap": messages.occupancy_grid((1, 0), "odom", 0.05, 2, (1, 2, 0), [0, 100]),
 }
 
 
@@ -54,6 +56,28 @@ def test_bytes_gone_wrong_are_refused_or_understood(name: str, data) -> None:
     for garbage in (bytes(sound), bytes(sound[:cut]), HEADER + data.draw(st.binary(max_size=60))):
         with suppress(NotAllowed):
             understand(**{name: garbage}, **with_belief)
+
+
+def test_a_costmap_is_recorded_as_it_was_said() -> None:
+    (costmap,) = understand(**{"/global_costmap/costmap": EXAMPLES["/global_costmap/costmap"]}).costmaps
+    assert (costmap.name, costmap.frame, costmap.grid.origin) == ("global", "map", Pose2(1, 2, 0))
+    assert costmap.grid.cells.tolist() == [[0, 100], [-1, 50]]
+    assert costmap.grid.resolution == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize(
+    ("frame", "resolution", "width", "origin"),
+    [
+        ("base_link", 0.05, 2, (0, 0, 0)),
+        ("map", 0.0, 2, (0, 0, 0)),
+        ("map", 0.05, 3, (0, 0, 0)),
+        ("map", 0.05, 2, (float("nan"), 0, 0)),
+    ],
+)
+def test_a_costmap_that_is_none_is_refused(frame: str, resolution: float, width: int, origin) -> None:
+    said = messages.occupancy_grid((1, 0), frame, resolution, width, origin, [0, 100, -1, 50])
+    with pytest.raises(NotAllowed, match="local costmap"):
+        understand(**{"/local_costmap/costmap": said})
 
 
 json_values = st.recursive(
