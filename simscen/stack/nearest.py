@@ -9,7 +9,6 @@ from collections.abc import Iterator
 
 import numpy as np
 import numpy.typing as npt
-from numpy.lib.stride_tricks import as_strided
 
 ROWS = 64
 WIDE = 30_000
@@ -47,8 +46,9 @@ def _lowered(squared: Squares, reach: int) -> Squares:
     step, (row, column) = max(1, AT_ONCE // (reach * width)), padded.strides
     for first in range(0, height, step):
         count = min(step, height - first)
-        below = as_strided(padded[first + reach - 1 :], (reach, count, width), (-row, row, column))
-        above = as_strided(padded[first + reach + 1 :], (reach, count, width), (row, row, column))
+        place, shape = (first + reach) * row, (reach, count, width)
+        below: Squares = np.ndarray(shape, np.uint16, padded, place - row, (-row, row, column))
+        above: Squares = np.ndarray(shape, np.uint16, padded, place + row, (row, row, column))
         either = np.minimum(below, above)
         either += _STEPS[:reach]
         own = padded[first + reach : first + reach + count]

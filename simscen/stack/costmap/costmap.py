@@ -56,6 +56,7 @@ class Costmap:
         self._revision, self._zoned, self._scans = 0, 0, 0
         self._newest: dict[str, tuple[Pose2, Scan | Image]] = {}
         self._view: CostmapView | None = None
+        self._changed: tuple[tuple[int, int], tuple[int, int]] | None = None
         layer = self._layer(Pose2(0.0, 0.0))
         self._live = LiveLayer(spec, self._inscribed, layer.frame)
         self._lay(layer)
@@ -64,7 +65,13 @@ class Costmap:
 
     @property
     def view(self) -> CostmapView:
-        """The costmap now. Its arrays are windows on this costmap and valid until the next update."""
+        """The costmap now. Its arrays are windows on this costmap and valid until the next update.
+
+        What updates have changed is computed here, once for all of them that nobody looked at.
+        """
+        if self._changed is not None:
+            self._refresh(*self._changed)
+            self._changed = None
         view, revision = self._view, self._revision
         if view is None or view.revision != revision:
             frame, radius = self._frame, self._spec.inflation_radius
@@ -83,9 +90,9 @@ class Costmap:
             self._roll(base)
         self._newest[seen.sensor] = (base, seen)
         if isinstance(seen, Image):
-            self._refresh(self._live.on_image(base, seen, self._static_squared))
+            self._touch(self._live.on_image(base, seen, self._static_squared))
             return
-        self._refresh(self._live.on_scan(base, seen, self._static_squared))
+        self._touch(self._live.on_scan(base, seen, self._static_squared))
         self._learn(base, seen)
 
     def clear(self, within: float = math.inf) -> None:
@@ -162,7 +169,8 @@ class Costmap:
         self._costs = self._inflation.costs(self._static_squared, self._unknown)
         self._distance = self._inflation.metres.take(self._static_squared)
         self._revision += 1
-        self._refresh(np.argwhere(self._live.marked()))
+        self._changed = None
+        self._touch(np.argwhere(self._live.marked()))
 
     def _obstacles(self, window: Window) -> Mask:
         """Live obstacles in a window, without specks where they are noise."""
@@ -179,20 +187,24 @@ class Costmap:
         around, corner = self._live.around(base, math.hypot(scan.mount.x, scan.mount.y))
         cells = np.argwhere(self._unknown[around]) + corner
         cells = cells[crossed(cells, self._frame, scan, base, self._spec)] if len(cells) else cells
+        self._unknown[cells[:, 0], cells[:, 1]] = False
+        self._touch(cells)
+
+    def _touch(self, cells: Cells) -> None:
+        """These cells have changed."""
         if not len(cells):
             return
-        rows, columns = cells[:, 0], cells[:, 1]
-        self._unknown[rows, columns] = False
-        self._costs[rows, columns] = self._inflation.at(self._distance[rows, columns])
+        low, high = cells.min(axis=0).tolist(), cells.max(axis=0).tolist()
+        if self._changed is not None:
+            low, high = map(min, low, self._changed[0]), map(max, high, self._changed[1])
+        (top, left), (bottom, right) = low, high
+        self._changed = (top, left), (bottom, right)
         self._revision += 1
 
-    def _refresh(self, changed: Cells) -> None:
-        """Compute distances and costs again wherever one of the changed cells can matter."""
-        if not len(changed):
-            return
-        low, high = changed.min(axis=0).tolist(), changed.max(axis=0).tolist()
-        inner = self._frame.window((low[0], low[1]), (high[0], high[1]), self._margin + self._speck)
-        outer = self._frame.window((low[0], low[1]), (high[0], high[1]), 2 * (self._margin + self._speck))
+    def _refresh(self, low: tuple[int, int], high: tuple[int, int]) -> None:
+        """Compute distances and costs again wherever one of the cells from `low` to `high` can matter."""
+        inner = self._frame.window(low, high, self._margin + self._speck)
+        outer = self._frame.window(low, high, 2 * (self._margin + self._speck))
         part = (
             slice(inner[0].start - outer[0].start, inner[0].stop - outer[0].start),
             slice(inner[1].start - outer[1].start, inner[1].stop - outer[1].start),
@@ -200,4 +212,3 @@ class Costmap:
         squared = np.minimum(self._static_squared[inner], squared_distances(self._obstacles(outer), self._margin)[part])
         self._distance[inner] = self._inflation.metres.take(squared)
         self._costs[inner] = self._inflation.costs(squared, self._unknown[inner])
-        self._revision += 1

@@ -37,7 +37,6 @@ class Inflation:
     def __init__(
         self, resolution: float, inscribed: float, inflation_radius: float, scaling: float, reach: float
     ) -> None:
-        self._resolution = resolution
         distance = np.sqrt(np.arange(FAR + 1)) * resolution
         self.metres: npt.NDArray[np.float32] = np.minimum(distance, reach).astype(np.float32)
         decay = MAX_NON_OBSTACLE * np.exp(-scaling * np.maximum(distance - inscribed, 0.0))
@@ -51,8 +50,3 @@ class Inflation:
         cost = self.cost.take(squared)
         cost[unknown & (cost < INSCRIBED)] = NO_INFORMATION
         return cost
-
-    def at(self, metres: npt.NDArray[np.float32]) -> npt.NDArray[np.uint8]:
-        """Costs of known cells that are so far from the nearest obstacle."""
-        squared = np.rint(np.square(metres.astype(np.float64) / self._resolution)).astype(np.int64)
-        return self.cost[np.minimum(squared, FAR)]

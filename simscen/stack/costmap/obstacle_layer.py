@@ -29,7 +29,7 @@ def hits(scan: Scan, base: Pose2, nearest: float, farthest: float) -> Array:
     use = (ranges >= max(scan.range_min, nearest)) & (ranges <= min(scan.range_max, farthest))
     if isinstance(scan, ScanAmongMoving):
         use &= ~scan.moving
-    lidar, beams = base.compose(scan.mount), np.flatnonzero(use)
+    lidar, beams = base.compose(scan.mount), use.nonzero()[0]
     ranges, angles = ranges[beams], scan.angle_min + scan.angle_increment * beams + lidar.yaw
     points = np.empty((len(beams), 2))
     points[:, 0], points[:, 1] = lidar.x + ranges * np.cos(angles), lidar.y + ranges * np.sin(angles)
@@ -71,10 +71,13 @@ def crossed(cells: Cells, frame: Frame, scan: Scan, base: Pose2, spec: CostmapSp
     turn = round(2 * math.pi / abs(step))
     if abs(turn * abs(step) - 2 * math.pi) < 1e-6:
         beam %= turn
-    known = (beam >= 0) & (beam < len(scan.ranges))
-    length = np.where(known, _shown_free(scan.ranges[np.where(known, beam, 0)], scan, spec), 0.0)
+    count = len(scan.ranges)
+    ranges = scan.ranges.take(beam, mode="clip")
+    if beam.min() < 0 or beam.max() >= count:
+        ranges = np.where((beam >= 0) & (beam < count), ranges, np.nan)  # nobody looks there
+    length = _shown_free(ranges, scan, spec)
     passes = np.zeros(len(cells), dtype=bool)
-    near = np.flatnonzero(distance * math.cos(step / 2) <= length)  # most cells lie behind what their beams hit
+    near = (distance * math.cos(step / 2) <= length).nonzero()[0]  # most cells lie behind what their beams hit
     if not len(near):
         return passes
     bearing, off, distance, length = bearing[near], off[near], distance[near], length[near]

@@ -275,11 +275,13 @@ def test_unknown_space_is_free_where_it_is_not_tracked() -> None:
     assert at(costmap(None, Spec(track_unknown_space=False)), 5.0, 5.0)[0] == 0
 
 
-def test_unknown_space_that_a_beam_passes_through_is_known_with_the_cost_it_has() -> None:
+@pytest.mark.parametrize("inflation_radius", [0.7, 1.0])  # the second is as far as distances are told
+def test_unknown_space_that_a_beam_passes_through_is_known_with_the_cost_it_has(inflation_radius: float) -> None:
     world = Flatland().room(8, 6)
-    known = costmap(world)
+    spec = Spec(inflation_radius=inflation_radius)
+    known = costmap(world, spec)
     grid = world.grid(BOUNDS)
-    map_ = Costmap(Spec(), Surroundings(ROBOT, OccupancyGrid(np.where(grid.cells, 100, -1).astype(np.int8), 0.05,
+    map_ = Costmap(spec, Surroundings(ROBOT, OccupancyGrid(np.where(grid.cells, 100, -1).astype(np.int8), 0.05,
                                                              grid.origin), RATE))  # fmt: skip
     pose = Pose2(4.0, 1.0)
     for each in (known, map_):
