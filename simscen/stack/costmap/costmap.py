@@ -186,7 +186,9 @@ class Costmap:
             return
         around, corner = self._live.around(base, math.hypot(scan.mount.x, scan.mount.y))
         cells = np.argwhere(self._unknown[around]) + corner
-        cells = cells[crossed(cells, self._frame, scan, base, self._spec)] if len(cells) else cells
+        if not len(cells):
+            return
+        cells = cells[crossed(self._frame.centres(cells), self._frame.resolution, scan, base, self._spec)]
         self._unknown[cells[:, 0], cells[:, 1]] = False
         self._touch(cells)
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.geometry import Pose2
+from simscen.core.geometry import Array, Pose2
 from simscen.core.sensing import Image, Scan
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.costmap.depth_layer import Heights, heights_seen, seen_through
@@ -78,11 +78,14 @@ class LiveLayer:
         cells = _off_walls(cells[self._frame.inside(cells)], walls)
         fresh = cells[~_get(self._scanned, cells)]
         marks = self._marks
-        if len(marks):
-            _set(self._scanned, marks[crossed(marks, self._frame, scan, base, self._spec)], False)
+        if not len(marks):
+            self._marks = fresh
+            _set(self._scanned, fresh, True)
+            return fresh
+        points = self._frame.centres(marks)
+        _set(self._scanned, marks[crossed(points, self._frame.resolution, scan, base, self._spec)], False)
         _set(self._scanned, cells, True)
-        if len(marks):
-            _set(self._scanned, marks[self._under_robot(marks, base)], False)
+        _set(self._scanned, marks[self._under_robot(points, base)], False)
         kept = _get(self._scanned, marks)
         self._marks = np.concatenate((marks[kept], fresh))
         return np.concatenate((marks[~kept], fresh))
@@ -93,10 +96,11 @@ class LiveLayer:
             self._heights = np.full(self._frame.shape, np.nan, dtype=np.float32)
         marked = np.argwhere(~np.isnan(self._heights))
         heights = self._heights[marked[:, 0], marked[:, 1]]
-        gone = seen_through(marked, heights, self._frame, image, base, self._spec) | self._under_robot(marked, base)
+        gone = seen_through(marked, heights, self._frame, image, base, self._spec)
+        gone |= self._under_robot(self._frame.centres(marked), base)
         _set(self._heights, marked[gone], np.nan)
         cells, heights = heights_seen(image, base, self._frame, self._spec)
-        shown = (walls[cells[:, 0], cells[:, 1]] > BESIDE_A_WALL) & ~self._under_robot(cells, base)
+        shown = (_get(walls, cells) > BESIDE_A_WALL) & ~self._under_robot(self._frame.centres(cells), base)
         cells = cells[shown]
         self._heights[cells[:, 0], cells[:, 1]] = heights[shown]
         return np.concatenate((marked[gone], cells))
@@ -108,10 +112,9 @@ class LiveLayer:
         window = self._frame.window(here, here, math.ceil(far / self._frame.resolution) + 1)
         return window, np.array((window[0].start, window[1].start))
 
-    def _under_robot(self, cells: Cells, base: Pose2) -> Mask:
-        """Nav2's footprint_clearing_enabled, for the inscribed circle."""
-        offset = self._frame.centres(cells) - np.array([base.x, base.y])
-        return np.asarray(np.hypot(offset[:, 0], offset[:, 1]) < self._inscribed)
+    def _under_robot(self, points: Array, base: Pose2) -> Mask:
+        """Nav2's footprint_clearing_enabled, for the inscribed circle and cells with these centres (n, 2)."""
+        return np.asarray(np.hypot(points[:, 0] - base.x, points[:, 1] - base.y) < self._inscribed)
 
 
 def _off_walls(cells: Cells, walls: Squared) -> Cells:

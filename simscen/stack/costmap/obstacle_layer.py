@@ -54,16 +54,15 @@ def in_view(cells: Cells, frame: Frame, scan: Scan, base: Pose2) -> npt.NDArray[
     return np.asarray(turned <= abs(scan.angle_increment) * len(scan.ranges))
 
 
-def crossed(cells: Cells, frame: Frame, scan: Scan, base: Pose2, spec: CostmapSpec) -> npt.NDArray[np.bool_]:
-    """Which of the cells (n, 2) a beam crosses before it hits anything.
+def crossed(points: Array, resolution: float, scan: Scan, base: Pose2, spec: CostmapSpec) -> npt.NDArray[np.bool_]:
+    """Which of the cells with these centres (n, 2) a beam crosses before it hits anything.
 
     A line crosses a square of half-width h when its distance from the centre is at most h (|cos| + |sin|); each cell
     is tested against the beam nearest to its centre, which crosses it if any does.
     """
     lidar = base.compose(scan.mount)
-    offset = frame.centres(cells) - np.array([lidar.x, lidar.y])
-    distance = np.hypot(offset[:, 0], offset[:, 1])
-    bearing = np.arctan2(offset[:, 1], offset[:, 0])
+    dx, dy = points[:, 0] - lidar.x, points[:, 1] - lidar.y
+    distance, bearing = np.hypot(dx, dy), np.arctan2(dy, dx)
     step = scan.angle_increment
     place = ((bearing - lidar.yaw - scan.angle_min) % (2 * math.pi)) / step
     beam = np.rint(place).astype(np.int64)
@@ -76,13 +75,13 @@ def crossed(cells: Cells, frame: Frame, scan: Scan, base: Pose2, spec: CostmapSp
     if beam.min() < 0 or beam.max() >= count:
         ranges = np.where((beam >= 0) & (beam < count), ranges, np.nan)  # nobody looks there
     length = _shown_free(ranges, scan, spec)
-    passes = np.zeros(len(cells), dtype=bool)
+    passes = np.zeros(len(points), dtype=bool)
     near = (distance * math.cos(step / 2) <= length).nonzero()[0]  # most cells lie behind what their beams hit
     if not len(near):
         return passes
     bearing, off, distance, length = bearing[near], off[near], distance[near], length[near]
     direction = bearing - off
-    half = frame.resolution / 2
+    half = resolution / 2
     reach = half * (np.abs(np.cos(direction)) + np.abs(np.sin(direction)))
     along = distance * np.cos(off)
     passes[near] = (

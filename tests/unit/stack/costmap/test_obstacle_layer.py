@@ -29,7 +29,7 @@ def test_crossed_cells_are_those_a_walk_along_the_beams_comes_through(beams: int
     step = 2 * math.pi / beams
     scan = Scan("l", 0, 2.0 + np.sin(3 * np.arange(beams) * step), -math.pi, step, 0.05, 12.0, Pose2(0.1, 0.05, 0.2))
     cells = np.argwhere(np.ones(FRAME.shape, dtype=bool))
-    found = {tuple(cell) for cell in cells[crossed(cells, FRAME, scan, base, spec)].tolist()}
+    found = {tuple(cell) for cell in cells[crossed(FRAME.centres(cells), FRAME.resolution, scan, base, spec)].tolist()}
     truth = walked(scan, base, spec)
     ends = {tuple(cell) for cell in FRAME.cells(hits(scan, base, 0.0, 99.0)).tolist()}
     # Cells at a beam's end may go either way: marking comes after clearing. Near the lidar many beams share a cell.
