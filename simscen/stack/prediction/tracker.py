@@ -22,9 +22,7 @@ from simscen.stack.prediction.moving import Moving, nothing
 from simscen.stack.prediction.seen_through import FARTHEST, SeenThrough
 
 CHECKED = 120
-"""Beams of a scan that are looked at while nothing moves."""
-SUSPICIOUS = 2
-"""Of those, how many must have appeared before the scan is looked at whole."""
+"""Beams of a scan that are looked at while nothing moves; all, when what one of these hits has appeared."""
 APPEARED, FEW = 0.3, 3
 """Share of a piece's hits, and how many at least, that must have appeared to begin a track."""
 NOISE, RELATIVE, HALF_SEEN = 0.02, 0.004, 0.10
@@ -64,6 +62,9 @@ like any other, for who turns round stands a moment, too; and until nobody expec
 """
 HALF_RADIUS = 0.3
 """Metres: the least radius of what is half hidden when it is first seen: that of a person."""
+BODY = 0.25
+"""Metres: the least radius of what is told as moving. Of another robot the lidar may see no more than its mast, of a
+person a leg."""
 RADIUS_GAIN = 0.3
 """How much a new look at a whole piece changes the radius of a track."""
 
@@ -106,7 +107,8 @@ class Tracker:
         self._spec, self._rate = spec, tick_rate
         self._memory = SeenThrough(tick_rate)
         self._angles: Array = np.zeros(0)
-        self._some, self._towards = slice(0, None), np.zeros(0, dtype=np.complex128)
+        self._some = self._all = slice(0, None)
+        self._towards = np.zeros(0, dtype=np.complex128)
         self._tracks: list[Track] = []
         self._states, self._covariances = np.zeros((0, 4)), np.zeros((0, 4, 4))
         self._tick = 0
@@ -142,18 +144,26 @@ class Tracker:
 
     def _look_along(self, angles: Array) -> None:
         """Note where the beams go, and which are looked at while nothing moves."""
-        self._angles, self._some = angles, slice(0, None, max(1, len(angles) // CHECKED))
-        self._towards = np.exp(1j * angles[self._some])
+        self._angles, self._towards = angles, np.exp(1j * angles)
+        every = max(1, len(angles) // CHECKED)
+        self._some, self._all = slice(0, None, every), slice(0, None)
 
     def _suspicious(self, scan: Scan, lidar: Pose2) -> bool:
-        """Whether a look at some of the beams shows that something has appeared."""
-        ranges = scan.ranges[self._some]
-        # What a beam that met nothing shows is farther off than anything was seen; nan is taken for that.
-        places = np.fmin(np.fmax(ranges, 0.0), 2 * FARTHEST) * self._towards
-        appeared = ranges[self._memory.appeared(scan.tick, places, lidar)]
-        if len(appeared) < SUSPICIOUS:
+        """Whether so many neighbouring beams hit what has appeared that it may be a thing."""
+        if not len(self._appeared(scan, lidar, self._some)):
             return False
-        return int(np.count_nonzero((appeared >= scan.range_min) & (appeared <= self._farthest(scan)))) >= SUSPICIOUS
+        beams = self._appeared(scan, lidar, self._all)
+        return len(beams) >= FEW and bool((beams[FEW - 1 :] - beams[: 1 - FEW]).min() * APPEARED <= FEW)
+
+    def _appeared(self, scan: Scan, lidar: Pose2, which: slice) -> npt.NDArray[np.int64]:
+        """Which of these beams hit what has appeared."""
+        ranges = scan.ranges[which]
+        # What a beam that met nothing shows is farther off than anything was seen; nan is taken for that.
+        places = np.fmin(np.fmax(ranges, 0.0), 2 * FARTHEST) * self._towards[which]
+        beams = self._memory.appeared(scan.tick, places, lidar).nonzero()[0]
+        return (
+            beams[(ranges[beams] >= scan.range_min) & (ranges[beams] <= self._farthest(scan))] if len(beams) else beams
+        )
 
     def _farthest(self, scan: Scan) -> float:
         return min(scan.range_max, self._spec.max_range)
@@ -172,7 +182,9 @@ class Tracker:
         centres = lidar.apply(pieces.centres)
         count, share = self._shares(pieces, self._memory.appeared(scan.tick, pieces.places, lidar))
         came = (count >= FEW) & (share >= APPEARED)
-        stood = self._shares(pieces, self._memory.stood(scan.tick, pieces.places, lidar))[1] > STANDS
+        stood = np.zeros(len(came), dtype=bool)
+        if any(track.moved for track in self._tracks):  # else nobody asks
+            stood = self._shares(pieces, self._memory.stood(scan.tick, pieces.places, lidar))[1] > STANDS
         taken = self._associate(pieces, centres, came, stood, lidar)
         self._begin(pieces, centres, came, stood, taken, scan.tick)
         self._judge(scan, lidar)
@@ -342,7 +354,7 @@ class Tracker:
         """Note what moves."""
         which = [number for number, track in enumerate(self._tracks) if track.moving]
         if which:
-            states, radii = self._states[which], np.array([self._tracks[number].radius for number in which])
+            states, radii = self._states[which], np.array([max(self._tracks[number].radius, BODY) for number in which])
             self.moving = Moving(states[:, :2], states[:, 2:], radii, self._covariances[which], self._spec.acceleration)
 
     def _mark(self, scan: Scan, lidar: Pose2) -> None:

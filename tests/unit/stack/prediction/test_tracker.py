@@ -127,6 +127,13 @@ def test_what_comes_at_a_walk_is_told_before_it_is_a_metre_away() -> None:
     assert watch.tracker.moving.velocities[0] == pytest.approx([-0.45, 0.0], abs=0.15)
 
 
+def test_of_another_robot_only_the_mast_is_seen_and_its_body_is_kept_off() -> None:
+    """Three beams of a degree hit it, two metres away."""
+    watch = Watch(lambda t: [(4.0 - 0.5 * t, 0.1, 0.06)], view=FULL, beams=360).run(5.0)
+    assert len(watch.tracker.moving) == 1
+    assert watch.tracker.moving.radii[0] >= 0.25
+
+
 def test_what_turns_round_is_told_though_it_comes_back_to_where_it_was_first_seen() -> None:
     """It creeps away, and so is not told at first, and then comes back faster."""
 
