@@ -26,6 +26,17 @@ def wrap_array(angles: Array) -> Array:
     return (angles + np.pi) % (2 * np.pi) - np.pi
 
 
+Vector = tuple[float, float, float]
+
+
+def rotated(turn: tuple[float, float, float, float], vector: Vector) -> Vector:
+    """A vector turned by a unit quaternion (x, y, z, w)."""
+    x, y, z, w = turn
+    a, b, c = vector
+    p, q, r = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
+    return a + w * p + y * r - z * q, b + w * q + z * p - x * r, c + w * r + x * q - y * p
+
+
 class Pose2(NamedTuple):
     """A position and heading in the plane; read `a_from_b` as the pose of frame b in frame a."""
 

@@ -42,7 +42,8 @@ class Director:
             for _ in range(0 if view is None or firing.spent else firing.fires(view)):
                 self._perform(number, step)
                 self._go_on(number)
-        self._end_faults()
+        if self._ends:
+            self._end_faults()
         for index, firing in enumerate(self._starts):
             if not firing.spent and firing.fires(self._stage) and index not in self._ends:
                 self._begin_fault(index)

@@ -98,6 +98,8 @@ class FaultRig:
 
     def disturb(self, readings: Readings) -> Readings:
         """The readings as the stack gets them."""
+        if not self._active:
+            return readings
         for active in self._at_work():
             if active.index in self._mapped:
                 self._mapped.remove(active.index)
@@ -122,7 +124,7 @@ class FaultRig:
 
     def belief(self, tick: int, belief: Belief) -> Belief:
         """What the navigator is told instead of a belief of the localizer."""
-        if not any(active.kind == BELIEF for active in self._active.values()):
+        if not self._active or not any(active.kind == BELIEF for active in self._active.values()):
             return belief
         if self._believed is None or self._believed[:2] != (tick, belief):
             told = belief
@@ -133,6 +135,8 @@ class FaultRig:
         return self._believed[2]
 
     def _at_work(self) -> list[_Active]:
+        if not self._active:
+            return []
         return [active for _, active in sorted(self._active.items(), key=lambda item: item[0])]
 
     def _late(self, active: _Active) -> Sequence[Reading]:

@@ -102,12 +102,16 @@ class LiveStage:
 
     def heard(self, decision: Decision, readings: Readings = ()) -> None:
         """What the stack was told, and what it decided and published."""
-        self._scanned |= {reading.sensor: self.tick for reading in readings if isinstance(reading, Scan)}
+        for reading in readings:
+            if isinstance(reading, Scan):
+                self._scanned[reading.sensor] = self.tick
         self._belief = decision.belief or self._belief
         self._history += decision.events
 
     def take_events(self) -> tuple[Event, ...]:
         """What has been noted since this was last asked."""
+        if not self._fresh:
+            return ()
         fresh = tuple(sorted(self._fresh, key=lambda event: event.tick))
         self._fresh.clear()
         return fresh

@@ -19,6 +19,7 @@ class Senses:
         latencies = latencies or {}
         self._latencies = [latencies.get(sensor.name, 0) for sensor in self._sensors]
         self._late: list[deque[Reading]] = [deque() for _ in self._sensors]
+        self._each = list(zip(self._sensors, self.periods, self._latencies, self._late, strict=True))
 
     @property
     def periods(self) -> tuple[int, ...]:
@@ -34,8 +35,8 @@ class Senses:
     def read(self, tick: int) -> Readings:
         """The readings that come at this tick."""
         come: list[Reading] = []
-        for sensor, latency, late in zip(self._sensors, self._latencies, self._late, strict=True):
-            if tick % sensor.period == 0:
+        for sensor, period, latency, late in self._each:
+            if tick % period == 0:
                 (late if latency else come).append(sensor.read(tick))
             while late and late[0].tick + latency <= tick:
                 come.append(late.popleft())

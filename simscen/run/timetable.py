@@ -16,8 +16,11 @@ class Timetable:
 
     def due(self, tick: int) -> bool:
         """Whether anything is due at `tick`."""
-        return any((tick - ticks) % period == 0 for period, ticks in self._beats)
+        for period, ticks in self._beats:
+            if (tick - ticks) % period == 0:
+                return True
+        return False
 
     def until_next(self, tick: int) -> int:
         """How many ticks lie between `tick` and the next one at which something is due; at least 1."""
-        return min(period - (tick - ticks) % period for period, ticks in self._beats)
+        return min([period - (tick - ticks) % period for period, ticks in self._beats])

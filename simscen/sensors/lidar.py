@@ -34,8 +34,10 @@ class LidarSensor:
     def read(self, tick: int) -> Scan:
         """One scan. inf: nothing within range; nan: something nearer than the lidar can measure."""
         pose = self._view.base_pose()
-        directions = self._directions @ pose.rotation().T
-        origins = np.repeat(pose.apply(self._lens), len(directions), axis=0)
+        world_from_base = pose.rotation()
+        directions = self._directions @ world_from_base.T
+        lens = self._lens @ world_from_base.T + np.array(pose.position)
+        origins = np.broadcast_to(lens, directions.shape)
         ranges = self._measured(self._rays.cast(origins, directions, self._reach))
         spec = self._spec
         return Scan(self.name, tick, ranges, self._first, self._increment, spec.min_range, spec.max_range, self._mount)

@@ -7,6 +7,7 @@ from simscen.core.motion import Twist
 from simscen.core.sensing import Odometry
 from simscen.model.robot import WheelOdometry
 from simscen.sensors.kinematics import kinematics_of
+from simscen.sensors.normals import Normals
 from simscen.sensors.sensor import SensorSetting
 
 
@@ -19,7 +20,8 @@ class WheelOdometrySensor:
 
     def __init__(self, spec: WheelOdometry, setting: SensorSetting) -> None:
         self.name, self.period = setting.name, setting.period
-        self._spec, self._seconds, self._chance, self._view = spec, setting.seconds, setting.chance, setting.view
+        self._spec, self._seconds, self._view = spec, setting.seconds, setting.view
+        self._normals = Normals(setting.chance)
         self._motion = kinematics_of(setting.drive)
         self._rolled = self._view.encoders()
         self._pose = Pose2(0.0, 0.0, 0.0)
@@ -27,10 +29,11 @@ class WheelOdometrySensor:
     def read(self, tick: int) -> Odometry:
         """The pose reckoned so far, and the mean velocity since the last reading."""
         rolled = self._view.encoders()
-        step = self._noisy(self._motion(tuple(b - a for a, b in zip(self._rolled, rolled, strict=True))))
+        step = self._noisy(self._motion(tuple([b - a for a, b in zip(self._rolled, rolled, strict=True)])))
         self._rolled = rolled
         self._pose = self._pose.compose(along_arc(step))
-        return Odometry(self.name, tick, self._pose, Twist(*(value / self._seconds for value in step)))
+        seconds = self._seconds
+        return Odometry(self.name, tick, self._pose, Twist(step.vx / seconds, step.vy / seconds, step.wz / seconds))
 
     def _noisy(self, step: Twist) -> Twist:
         """Thrun, Burgard and Fox, Probabilistic Robotics, table 5.6, for increments."""
@@ -38,7 +41,7 @@ class WheelOdometrySensor:
         driven, turned = math.hypot(step.vx, step.vy), abs(step.wz)
         if driven == 0 and turned == 0:
             return step
-        along, across, turn = self._chance.standard_normal(3).tolist()
+        along, across, turn = self._normals.take(3)
         spread = spec.translation_noise * math.sqrt(driven)
         heading = math.sqrt(spec.rotation_noise**2 * turned + spec.drift_noise**2 * driven)
         sideways = spread * across if step.vy else 0.0

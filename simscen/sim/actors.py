@@ -68,6 +68,7 @@ class Actors:
         self._client, self._rate, self._triangulate = client, tick_rate, triangulate
         self._actors: dict[str, Actor] = {}
         self._travelling: list[Actor] = []
+        self._pushable: list[Actor] = []
         self._poses: Mapping[str, Pose3] = {}
         self._posed_at: int | None = None
         self._still_since: int | None = None
@@ -155,9 +156,9 @@ class Actors:
         self._posed_at = self._still_since = None
         self._actors = dict(sorted(self._actors.items()))
         self._travelling = [actor for actor in self._actors.values() if actor.path is not None]
-        pushable = [actor for actor in self._actors.values() if actor.pushable]
-        self.pushing = bool(self._travelling and pushable)
-        for actor in pushable:
+        self._pushable = [actor for actor in self._actors.values() if actor.pushable]
+        self.pushing = bool(self._travelling and self._pushable)
+        for actor in self._pushable:
             # What lay on something that is gone has to fall; and what a script moves does not wake what it meets.
             engine.wake(self._client, actor.id, may_sleep=not self._travelling)
 
@@ -198,7 +199,9 @@ class Actors:
 
     def poses(self, tick: int) -> Mapping[str, Pose3]:
         """Where everything is, by name in order; the engine is asked at most once for each tick."""
-        if self._posed_at != tick and not self._asleep(tick):
+        if self._posed_at == tick:
+            return self._poses
+        if not self._asleep(tick):
             self._poses = {name: self._pose(actor, tick) for name, actor in self._actors.items()}
             self._posed_at = tick
             if self._still_since is None or not all(actor.resting for actor in self._actors.values()):
@@ -222,7 +225,6 @@ class Actors:
         return {name: (self._actors[name].body, pose) for name, pose in self.poses(tick).items()}
 
     def _pose(self, actor: Actor, tick: int) -> Pose3:
-        actor.resting = not actor.pushable and actor.path is None
         if actor.path is not None:
             if tick not in actor.scripted:
                 if len(actor.scripted) > 1:
@@ -230,7 +232,8 @@ class Actors:
                 pose = pose_at(actor.path, (tick - actor.since) / self._rate)
                 actor.scripted[tick] = Pose3.planar(pose, actor.body.pose.z)
             return actor.scripted[tick]
-        if not actor.pushable:
+        if not actor.body.mass > 0:
+            actor.resting = True
             return actor.body.pose
         said: Placing = pybullet.getBasePositionAndOrientation(actor.id, physicsClientId=self._client)
         actor.resting = actor.placed is not None and actor.placed[0] == said
@@ -251,10 +254,10 @@ class Actors:
     def lost(self, tick: int) -> str | None:
         """What has become of the first thing that the engine has lost, or None."""
         self.poses(tick)
-        for name, actor in self._actors.items():
+        for actor in self._pushable:
             if actor.placed is not None and actor.placed is not actor.sound:
                 place, turn = actor.placed[0]
-                if trouble := lost(f'object "{name}"', *place, *turn):
+                if trouble := lost(f'object "{actor.body.name}"', *place, *turn):
                     return trouble
                 actor.sound = actor.placed
         return None
@@ -274,14 +277,13 @@ class Actors:
 
         A thing that is hit by a heavier one leaves with up to twice its speed.
         """
+        fastest = max((actor.speed for actor in self._travelling), default=0.0)
+        if not self._pushable:
+            return fastest
         self.poses(tick)
-        speeds = [self._speed(actor) for actor in self._actors.values()]
-        several = sum(actor.pushable for actor in self._actors.values()) > 1
-        return max(speeds, default=0.0) * (2 if several else 1)
+        return max(fastest, *map(self._speed, self._pushable)) * (2 if len(self._pushable) > 1 else 1)
 
     def _speed(self, actor: Actor) -> float:
-        if not actor.pushable:
-            return actor.speed
         falling = 0.1 * GRAVITY  # what it may gain within that time
         if actor.resting:
             return falling

@@ -14,6 +14,7 @@ from simscen.sim.outline import extremes
 from simscen.sim.outline import reach as reach_of
 from simscen.sim.proximity import Proximity
 from simscen.sim.robot_body import RobotBody
+from simscen.sim.state import State
 
 HORIZON = 0.1
 """Seconds for which a clearance may at most rule out a contact."""
@@ -42,17 +43,19 @@ class Clearance:
         uneven: bool,
         robot: RobotBody,
         base: Base,
+        state: Callable[[], State],
         actors: Actors,
-        others: "Callable[[], Sequence[Clearance]]",
         reach: float,
     ) -> None:
-        """`others` gives the other robots, as they are measured; `reach` is how far is searched, in metres.
+        """`state` says where the robot is now; `reach` is how far is searched, in metres.
 
         `obstacles` are what of the `static` world is in the robot's way, which a ramp that it drives over is not.
         `uneven`: there is ground besides the floor, for its wheels and casters to stand on.
         """
         self._client, self._rate, self._base, self._actors = client, tick_rate, base, actors
-        self._others = others
+        self._state = state
+        self.others: Sequence[Clearance] = ()
+        """The other robots, as they are measured."""
         self._limits, (self._radius, self._height) = robot.limits, reach_of(robot.solid)
         self._size = ROUNDED + math.hypot(self._radius, self._height)
         # Where wheels roll on solids they may also hit them.
@@ -105,19 +108,19 @@ class Clearance:
         return self._distance
 
     def _search(self, tick: int, standing: Proximity) -> float:
-        pose = self._base.pose()
+        pose = self._state().pose
         nearest = min(self._reach, standing.distance(pose))
         for other in self._actors.within(pose.position, nearest + self._size, tick):
             for link in self._base.hull_links:
                 points = pybullet.getClosestPoints(self._base.id, other, nearest, link, physicsClientId=self._client)
                 nearest = min((point[8] for point in points), default=nearest)
-        for robot in self._others():
+        for robot in self.others:
             nearest = min(nearest, self._to_robot(robot, pose.position, nearest))
         return nearest
 
     def _to_robot(self, robot: "Clearance", place: Vector, within: float) -> float:
         """Distance in metres to another robot; inf above `within`."""
-        if math.dist(place, robot._base.pose().position) > within + self._size + robot._size:
+        if math.dist(place, robot._state().pose.position) > within + self._size + robot._size:
             return math.inf
         pairs = itertools.product(self._base.hull_links, robot._base.hull_links)
         found = (
@@ -128,7 +131,7 @@ class Clearance:
 
     def _place(self) -> Vector:
         """A place inside the hull, in the world."""
-        x, y, z = self._base.pose().apply(self._core).tolist()
+        x, y, z = self._state().pose.apply(self._core).tolist()
         return x, y, z
 
     def _enclosing(self, tick: int) -> str | None:
@@ -141,12 +144,12 @@ class Clearance:
 
         What another robot hits leaves with up to twice its speed.
         """
-        others, things = [robot._own_speed() for robot in self._others()], self._actors.top_speed(tick)
+        others, things = [robot._own_speed() for robot in self.others], self._actors.top_speed(tick)
         return self._own_speed() + (2 * max(things, *others) if others else things) + 0.1
 
     def _own_speed(self) -> float:
         """The greatest speed in m/s that any part of the robot can have for a while."""
-        limits, (linear, angular) = self._limits, self._base.velocity()
+        limits, (_, linear, angular) = self._limits, self._state()
         forward = max(limits.linear, limits.reverse or 0.0, limits.lateral or 0.0, math.hypot(*linear))
         turning = max(limits.angular, math.hypot(*angular)) * self._radius
         tipping = math.hypot(*angular[:2]) * self._height

@@ -3,13 +3,14 @@
 from collections.abc import Callable, Mapping
 from typing import Protocol
 
-from simscen.core.geometry import Pose2, Pose3
+from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
 from simscen.model.robot import Ackermann, Differential, Mecanum, Omnidirectional, SkidSteer
 from simscen.sim.ackermann import AckermannDrive
 from simscen.sim.mecanum import MecanumDrive
 from simscen.sim.planar import OmnidirectionalDrive, PlanarBase
 from simscen.sim.robot_body import RobotBody
+from simscen.sim.state import State
 from simscen.sim.terrain import Terrain
 from simscen.sim.vehicle import Vehicle
 from simscen.sim.wheels import SidedDrive
@@ -29,12 +30,8 @@ class Base(Protocol):
         """Set it down at rest, its base frame on the ground."""
         ...
 
-    def pose(self) -> Pose3:
-        """The base frame in the world."""
-        ...
-
-    def velocity(self) -> tuple[Vector, Vector]:
-        """Linear velocity of the base frame's origin (m/s) and angular velocity (rad/s), along the world's axes."""
+    def state(self) -> State:
+        """Where it is and how it moves now, asked of the engine."""
         ...
 
     def hold(self, friction: Callable[[float, float], float]) -> None:

@@ -16,7 +16,7 @@ def lost(what: str, x: float, y: float, z: float, *others: float) -> str | None:
 
     `others` are more numbers that have to be finite, such as its velocity.
     """
-    if not all(map(math.isfinite, (x, y, z, *others))):
+    if not math.isfinite(sum(others, x + y + z)):  # one that is not leaves no sum that is
         return f"{what} is nowhere: its pose is not finite"
     if z < -SUNK:
         return f"{what} is below the floor, at z = {z:.2f} m"

@@ -11,8 +11,8 @@ from simscen.sim import engine
 from simscen.sim.inertia import GRAVITY, MassProperties, combined
 from simscen.sim.ramp import Ramp
 from simscen.sim.robot_body import RobotBody
+from simscen.sim.state import State
 
-Vector = tuple[float, float, float]
 GRIP = 0.7
 """Most force of the motors over the robot's weight."""
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
@@ -70,19 +70,16 @@ class PlanarBase:
         for joint, value in zip(self.joints, pose, strict=True):
             pybullet.resetJointState(self.id, joint, value, 0.0, physicsClientId=self._client)
 
-    def pose(self) -> Pose3:
-        """The base frame in the world."""
-        return Pose3.planar(self.plane())
+    def state(self) -> State:
+        """Where it is and how it moves now."""
+        states = pybullet.getJointStates(self.id, self.joints, physicsClientId=self._client)
+        (x, vx, *_), (y, vy, *_), (yaw, wz, *_) = states
+        return State(Pose3.planar(Pose2(x, y, yaw)), (vx, vy, 0.0), (0.0, 0.0, wz))
 
     def plane(self) -> Pose2:
-        """Like `pose`; the heading counts full turns."""
+        """Where it is; the heading counts full turns."""
         states = pybullet.getJointStates(self.id, self.joints, physicsClientId=self._client)
         return Pose2(*(state[0] for state in states))
-
-    def velocity(self) -> tuple[Vector, Vector]:
-        """Linear (m/s) and angular (rad/s) velocity along the world's axes."""
-        vx, vy, wz = (state[1] for state in pybullet.getJointStates(self.id, self.joints, physicsClientId=self._client))
-        return (vx, vy, 0.0), (0.0, 0.0, wz)
 
     def push(self, impulse: tuple[float, float], seconds: float) -> None:
         """Push its centre of mass during the next step, which lasts `seconds`."""

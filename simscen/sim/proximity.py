@@ -58,15 +58,18 @@ class Proximity:
         self._pose = pose
         if math.hypot(pose.x - self._centre[0], pose.y - self._centre[1]) > STRIDE:
             self._look_around(pose)
+        place, turn = pose.position, pose.quaternion
         for hull in self._hull:
-            pybullet.resetBasePositionAndOrientation(hull, pose.position, pose.quaternion, physicsClientId=self._client)
+            pybullet.resetBasePositionAndOrientation(hull, place, turn, physicsClientId=self._client)
         farthest = min(self._distance + moved + SLACK, self._reach)
         nearest = math.inf if self._nearest is None else self._measure(self._nearest, farthest)
+        limit = min(nearest, self._reach)
         for part, bound in self._bounds.items():
-            if bound - self._travelled < min(nearest, self._reach) and part != self._nearest:
+            if bound - self._travelled < limit and part != self._nearest:
                 found = self._measure(part, min(nearest + SLACK, self._reach))
                 if found < nearest:
                     nearest, self._nearest = found, part
+                    limit = min(nearest, self._reach)
         self._distance = nearest
         return nearest
 
@@ -143,7 +146,9 @@ class Proximity:
 
 def _motion(before: Pose3, after: Pose3, radius: float, height: float) -> float:
     """The most that any point within `radius` of the base's axis and `height` of its origin has moved, in metres."""
-    same = abs(sum(a * b for a, b in zip(before.quaternion, after.quaternion, strict=True)))
+    _, _, _, ax, ay, az, aw = before
+    _, _, _, bx, by, bz, bw = after
+    same = abs(ax * bx + ay * by + az * bz + aw * bw)
     turned = 2 * math.acos(min(1.0, same))
     return math.dist(before.position, after.position) + turned * radius + math.dist(_up(before), _up(after)) * height
 

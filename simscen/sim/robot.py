@@ -21,8 +21,8 @@ from simscen.sim.film import Film
 from simscen.sim.floor import Floor
 from simscen.sim.lost import lost
 from simscen.sim.robot_body import RobotBody
+from simscen.sim.state import Seen
 from simscen.sim.terrain import Terrain, stands
-from simscen.sim.vehicle import base_twist
 
 Vector = tuple[float, float, float]
 
@@ -106,22 +106,17 @@ class Robot:
         """
         self.name, self._scene = name, scene
         self.base, self._drive = build(scene.client, body, pose, period, 1 / scene.rate, scene.terrain)
+        self._seen = Seen(self.base.state, lambda: scene.tick)
+        self._who = f'robot "{name}"' if name else "the robot"
+        self.others: tuple[Robot, ...] = ()
+        """The other robots, by name."""
         self.shape = Body(name, body.solid, Pose3.planar(pose), body.mass)
         self._contacts = Contacts(scene.rate)
         uneven = bool(scene.terrain and self.base.rolling)
-        self._clearance = Clearance(
-            scene.client, scene.rate, static, obstacles, uneven, body, self.base, scene.actors, self._clearances, reach
+        self.clearance = Clearance(
+            scene.client, scene.rate, static, obstacles, uneven, body, self.base, self._seen, scene.actors, reach
         )
         self._names: dict[int, str | None] = {}
-
-    @property
-    def others(self) -> "list[Robot]":
-        """The other robots, by name."""
-        return [robot for robot in self._scene.robots.values() if robot is not self]
-
-    def _clearances(self) -> list[Clearance]:
-        """How near the other robots are to things, as they see it."""
-        return [robot._clearance for robot in self.others]
 
     def drive(self, command: Twist) -> None:
         """Command a velocity in the base frame; the base follows within its limits."""
@@ -129,15 +124,14 @@ class Robot:
 
     def truth(self) -> Truth:
         """The robot as it really is. Raises RunError when the physics has lost it or anything else."""
-        scene, pose, velocity = self._scene, self.base.pose(), self.base.velocity()
-        who = f'robot "{self.name}"' if self.name else "the robot"
-        trouble = lost(who, *pose, *velocity[0], *velocity[1]) or scene.actors.lost(scene.tick)
+        scene, state = self._scene, self._seen()
+        trouble = lost(self._who, *state.pose, *state.linear, *state.angular) or scene.actors.lost(scene.tick)
         if trouble is not None:
             raise RunError("diverged", f"simulation diverged at t={scene.tick / scene.rate:.3f} s: {trouble}")
-        clearance, objects = self._clearance.measure(scene.tick), self.objects()
+        clearance, objects = self.clearance.measure(scene.tick), self.objects()
         if self._contacts.last == scene.tick:
             clearance = min(clearance, 0.0)  # surfaces that press on each other may be a hair apart
-        return Truth(pose, base_twist(pose, velocity), clearance, objects)
+        return Truth(state.pose, state.twist, clearance, objects)
 
     def collisions(self) -> tuple[Event, ...]:
         """collision.started and collision.ended since last asked.
@@ -149,29 +143,25 @@ class Robot:
     def objects(self) -> Mapping[str, Pose3]:
         """Where everything is that may move, other robots with it."""
         poses = self._scene.actors.poses(self._scene.tick)
-        if len(self._scene.robots) == 1:
-            return poses
-        return {
-            **poses,
-            **{robot.name: robot.base.pose() for robot in self._scene.robots.values() if robot is not self},
-        }
+        return {**poses, **{robot.name: robot.base_pose() for robot in self.others}} if self.others else poses
 
     def moving(self) -> Mapping[str, tuple[Body, Pose3]]:
         """The same with their bodies: what a scene of rays needs."""
         placed = self._scene.actors.placed(self._scene.tick)
-        return {**placed, **{robot.name: (robot.shape, robot.base.pose()) for robot in self.others}}
+        return {**placed, **{robot.name: (robot.shape, robot.base_pose()) for robot in self.others}}
 
     def base_pose(self) -> Pose3:
         """The robot's base frame in the world."""
-        return self.base.pose()
+        return self._seen().pose
 
     def base_velocity(self) -> tuple[Vector, Vector]:
         """Linear (m/s) and angular (rad/s) velocity of the base frame along the world's axes."""
-        return self.base.velocity()
+        state = self._seen()
+        return state.linear, state.angular
 
     def base_twist(self) -> Twist:
         """The robot's velocity in its own frame."""
-        return base_twist(self.base.pose(), self.base.velocity())
+        return self._seen().twist
 
     def encoders(self) -> tuple[float, ...]:
         """What the drive has rolled so far; see `drives.Drive.encoders`."""
@@ -187,7 +177,7 @@ class Robot:
         """What a camera at `mount` in the base frame sees; see `camera.picture`."""
         self._scene.actors.show(self._scene.tick)
         self._scene.film.set(self.moving())
-        return picture(self._scene.client, self.base.pose().compose(mount), width, height, field_of_view, far)
+        return picture(self._scene.client, self.base_pose().compose(mount), width, height, field_of_view, far)
 
     def place(self, pose: Pose2) -> None:
         """Set it down somewhere else, at rest."""
@@ -208,11 +198,12 @@ class Robot:
     def settled(self, pose: Pose2) -> None:
         """It stands at `pose`, at rest."""
         self.base.place(pose)
+        self._seen.forget()
         self._drive.rest()
 
     def shaken(self) -> None:
         """Something is pushed during the next step."""
-        self._clearance.shaken(self._scene.tick)
+        self.clearance.shaken(self._scene.tick)
 
     def advance(self) -> None:
         """One period of the firmware's loop."""
@@ -221,25 +212,28 @@ class Robot:
     def changed(self) -> None:
         """Something was put into or taken out of the world, or set down elsewhere."""
         scene = self._scene
+        self.others = tuple(robot for robot in scene.robots.values() if robot is not self)
+        self.clearance.others = [robot.clearance for robot in self.others]
         others = {robot.base.id: robot.name for robot in self.others}
         self._names = {**dict.fromkeys(scene.fixed), **scene.terrain.names, **scene.actors.ids(), **others}
-        self._clearance.forget()
+        self.clearance.forget()
 
     @property
     def calm_until(self) -> int:
         """The tick until which it cannot touch anything; -1 where a contact is open, and has to end in time."""
-        return -1 if self._contacts.touching else self._clearance.no_contact_before
+        return -1 if self._contacts.touching else self.clearance.no_contact_before
 
     def look(self) -> Motion:
         """Before a step in which something might touch something: see what is near; how it moves."""
-        tick, clearance = self._scene.tick, self._clearance
+        tick, clearance = self._scene.tick, self.clearance
         if clearance.unsure or (tick >= clearance.no_contact_before and not self._contacts.touching):
             clearance.measure(tick)
-        return Motion(self.base.pose().position, *self.base.velocity())
+        state = self._seen()
+        return Motion(state.pose.position, state.linear, state.angular)
 
     def feel(self, before: Before) -> None:
         """After that step: note what is touched."""
-        tick, clearance = self._scene.tick, self._clearance
+        tick, clearance = self._scene.tick, self.clearance
         if not self._contacts.touching and tick <= clearance.no_contact_before:
             return
         touched = touches(
@@ -256,4 +250,4 @@ class Robot:
 
     def close(self) -> None:
         """Give back what it has of engines of its own."""
-        self._clearance.close()
+        self.clearance.close()

@@ -83,9 +83,19 @@ class Simulation:
 
     def step(self, ticks: int) -> None:
         """Let `ticks` ticks pass."""
-        scene, until = self._scene, self._scene.tick + ticks
+        scene, until, firmware = self._scene, self._scene.tick + ticks, self._firmware
         calm = self._calm_until()
+        plain = not (scene.floor or scene.presses or self._attends)
         while scene.tick < until:
+            if plain and scene.tick < calm:
+                if scene.tick % firmware == 0:
+                    for robot in self.robots.values():
+                        robot.advance()
+                alone = min(until, calm, scene.tick - scene.tick % firmware + firmware) - scene.tick
+                for _ in range(alone):
+                    pybullet.stepSimulation(scene.client)
+                scene.tick += alone
+                continue
             if self._attends is not None and scene.tick % self._attends[0] == 0:
                 self._attends[1]()
             if scene.tick % self._firmware == 0:

@@ -7,15 +7,14 @@ from typing import NamedTuple
 import numpy as np
 import pybullet
 
-from simscen.core.geometry import Pose2, Pose3
-from simscen.core.motion import Twist
+from simscen.core.geometry import Pose2, Pose3, Vector, rotated
 from simscen.core.shapes import Solid, Sphere
 from simscen.sim import engine
 from simscen.sim.robot_body import RobotBody
+from simscen.sim.state import State
 from simscen.sim.terrain import ON_CASTERS, ON_WHEELS, Terrain
 from simscen.sim.undercarriage import Wheel, lowest, yielding
 
-Vector = tuple[float, float, float]
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 KNUCKLE = 0.2
 """Mass of a steering knuckle over that of its wheel."""
@@ -45,6 +44,7 @@ class Vehicle:
         moments, self._base_from_centre = body.chassis.principal()
         self._centre = self._base_from_centre.position
         self._centre_from_base = self._base_from_centre.inverse()
+        self._level = self._centre_from_base.quaternion == UPRIGHT
         casters = yielding(body.casters) if terrain else ()
         self.id, self.joints, self.hull_links = _build(client, body, casters, tick)
         self.rolling: Mapping[int, float] = _rolling(body, self.joints, self.hull_links, casters)
@@ -89,26 +89,21 @@ class Vehicle:
             angle = pybullet.getJointState(self.id, joint, physicsClientId=self._client)[0]
             pybullet.resetJointState(self.id, joint, angle, 0.0, physicsClientId=self._client)
 
-    def pose(self) -> Pose3:
-        """The base frame in the world."""
+    def state(self) -> State:
+        """Where it is and how it moves now."""
         position, turn = pybullet.getBasePositionAndOrientation(self.id, physicsClientId=self._client)
-        if self._centre_from_base.quaternion != UPRIGHT:
-            return Pose3(*position, *turn).compose(self._centre_from_base)
-        x, y, z = rotated(turn, self._centre)
-        return Pose3(position[0] - x, position[1] - y, position[2] - z, *turn)
-
-    def velocity(self) -> tuple[Vector, Vector]:
-        """Linear velocity of the base frame's origin in m/s and angular velocity in rad/s, along the world's axes."""
         (vx, vy, vz), (wx, wy, wz) = pybullet.getBaseVelocity(self.id, physicsClientId=self._client)
-        turn = pybullet.getBasePositionAndOrientation(self.id, physicsClientId=self._client)[1]
-        if self._centre_from_base.quaternion != UPRIGHT:
-            turn = Pose3(0, 0, 0, *turn).compose(self._centre_from_base).quaternion
-        x, y, z = rotated(turn, self._centre)
-        return (vx - (wy * z - wz * y), vy - (wz * x - wx * z), vz - (wx * y - wy * x)), (wx, wy, wz)
+        if self._level:
+            x, y, z = rotated(turn, self._centre)
+            pose = Pose3(position[0] - x, position[1] - y, position[2] - z, *turn)
+        else:
+            pose = Pose3(*position, *turn).compose(self._centre_from_base)
+            x, y, z = rotated(pose.quaternion, self._centre)
+        return State(pose, (vx - (wy * z - wz * y), vy - (wz * x - wx * z), vz - (wx * y - wy * x)), (wx, wy, wz))
 
     def hold(self, friction: Callable[[float, float], float]) -> None:
         """Give each wheel the friction of the floor below it."""
-        base = self.pose()
+        base = self.state().pose
         for link, place in self._wheels.items():
             x, y, _ = rotated(base.quaternion, place)
             found = friction(base.x + x, base.y + y)
@@ -121,21 +116,6 @@ class Vehicle:
         centre = pybullet.getBasePositionAndOrientation(self.id, physicsClientId=self._client)[0]
         force = (impulse[0] / seconds, impulse[1] / seconds, 0.0)
         pybullet.applyExternalForce(self.id, -1, force, centre, pybullet.WORLD_FRAME, physicsClientId=self._client)
-
-
-def rotated(turn: tuple[float, float, float, float], vector: Vector) -> Vector:
-    """A vector turned by a unit quaternion (x, y, z, w)."""
-    x, y, z, w = turn
-    a, b, c = vector
-    p, q, r = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
-    return a + w * p + y * r - z * q, b + w * q + z * p - x * r, c + w * r + x * q - y * p
-
-
-def base_twist(pose: Pose3, velocity: tuple[Vector, Vector]) -> Twist:
-    """A velocity along the world's axes as a twist in the base frame."""
-    back = (-pose.qx, -pose.qy, -pose.qz, pose.qw)
-    vx, vy, _ = rotated(back, velocity[0])
-    return Twist(vx, vy, rotated(back, velocity[1])[2])
 
 
 def _rolling(body: RobotBody, joints: Sequence[int], hull: Sequence[int], casters: Sequence[Solid]) -> dict[int, float]:

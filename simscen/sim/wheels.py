@@ -45,9 +45,8 @@ class SidedDrive:
 
     def encoders(self) -> tuple[float, ...]:
         """Mean angles in rad of the left and of the right wheels."""
-        return mean_angle(self._client, self._vehicle.id, self._left), mean_angle(
-            self._client, self._vehicle.id, self._right
-        )
+        robot = self._vehicle.id
+        return mean_angle(self._client, robot, self._left), mean_angle(self._client, robot, self._right)
 
     def _turn(self) -> None:
         vx, _, wz = self._ramp.velocity
@@ -91,5 +90,5 @@ def hold(client: int, robot: int, joints: Sequence[int], torques: Sequence[float
 
 def mean_angle(client: int, robot: int, joints: Sequence[int]) -> float:
     """The mean angle in rad of some joints."""
-    angles = [pybullet.getJointState(robot, joint, physicsClientId=client)[0] for joint in joints]
-    return float(sum(angles) / len(angles))
+    states = pybullet.getJointStates(robot, joints, physicsClientId=client)
+    return float(sum(state[0] for state in states) / len(states))
