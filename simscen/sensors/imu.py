@@ -1,13 +1,12 @@
 """An inertial unit at the base frame's origin."""
 
-import numpy as np
-
-from simscen.core.geometry import Array
+from simscen.core.geometry import rotated
 from simscen.core.sensing import Imu
 from simscen.model.robot import InertialUnit
+from simscen.sensors.normals import Normals
 from simscen.sensors.sensor import SensorSetting
 
-GRAVITY = np.array([0.0, 0.0, 9.81])
+GRAVITY = 9.81
 
 
 class ImuSensor:
@@ -15,22 +14,25 @@ class ImuSensor:
 
     def __init__(self, spec: InertialUnit, setting: SensorSetting) -> None:
         self.name, self.period = setting.name, setting.period
-        self._spec, self._seconds, self._chance, self._view = spec, setting.seconds, setting.chance, setting.view
-        self._bias = self._chance.normal(0.0, spec.gyro_bias, 3)
-        self._velocity = np.array(self._view.base_velocity()[0])
+        self._spec, self._seconds, self._view = spec, setting.seconds, setting.view
+        self._bias: list[float] = setting.chance.normal(0.0, spec.gyro_bias, 3).tolist()
+        self._normals = Normals(setting.chance)
+        self._velocity, _ = self._view.base_velocity()
 
     def read(self, tick: int) -> Imu:
         """Measure in the base frame; at rest and level the accelerometer shows +9.81 m/s² along z."""
-        base_from_world = self._view.base_pose().rotation().T
-        linear, angular = (np.array(part) for part in self._view.base_velocity())
-        force = (linear - self._velocity) / self._seconds + GRAVITY
+        pose, seconds = self._view.base_pose(), self._seconds
+        before, (linear, angular) = self._velocity, self._view.base_velocity()
         self._velocity = linear
-        noise = self._chance.standard_normal((2, 3))
-        turning = base_from_world @ angular + self._bias + self._spec.gyro_noise * noise[0]
-        pushing = base_from_world @ force + self._spec.accelerometer_noise * noise[1]
-        return Imu(self.name, tick, _vector(turning), _vector(pushing))
-
-
-def _vector(values: Array) -> tuple[float, float, float]:
-    x, y, z = values.tolist()
-    return x, y, z
+        ax, ay, az = linear[0] - before[0], linear[1] - before[1], linear[2] - before[2]
+        base_from_world = (-pose.qx, -pose.qy, -pose.qz, pose.qw)
+        p, q, r = rotated(base_from_world, angular)
+        x, y, z = rotated(base_from_world, (ax / seconds, ay / seconds, az / seconds + GRAVITY))
+        gyro, force, bias = self._spec.gyro_noise, self._spec.accelerometer_noise, self._bias
+        np, nq, nr, nx, ny, nz = self._normals.take(6)
+        return Imu(
+            self.name,
+            tick,
+            (p + bias[0] + gyro * np, q + bias[1] + gyro * nq, r + bias[2] + gyro * nr),
+            (x + force * nx, y + force * ny, z + force * nz),
+        )

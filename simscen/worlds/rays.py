@@ -67,9 +67,13 @@ class RayScene:
         if not self._solid:
             return
         centres, radii = self._centres, self._radii
-        ahead = centres @ directions.T - (origins * directions).sum(axis=1)
-        off = (centres**2).sum(axis=1)[:, np.newaxis] - 2 * (centres @ origins.T) + (origins**2).sum(axis=1) - ahead**2
-        meets = (ahead >= -radii) & (ahead - radii <= ends) & (off <= radii**2)
+        if origins.strides[0]:
+            ahead = centres @ directions.T - (origins * directions).sum(axis=1)
+            away = (centres**2).sum(axis=1)[:, np.newaxis] - 2 * (centres @ origins.T) + (origins**2).sum(axis=1)
+        else:  # all from one place, as a lidar's
+            centres = centres - origins[0]
+            ahead, away = centres @ directions.T, (centres**2).sum(axis=1)[:, np.newaxis]
+        meets = (ahead >= -radii) & (ahead - radii <= ends) & (away - ahead**2 <= radii**2)
         for number in np.flatnonzero(meets.any(axis=1)):
             yield self._solid[number], np.flatnonzero(meets[number])
 
