@@ -16,10 +16,7 @@ class Timetable:
 
     def due(self, tick: int) -> bool:
         """Whether anything is due at `tick`."""
-        for period, ticks in self._beats:
-            if (tick - ticks) % period == 0:
-                return True
-        return False
+        return self.until_next(tick - 1) == 1
 
     def until_next(self, tick: int) -> int:
         """How many ticks lie between `tick` and the next one at which something is due; at least 1."""
