@@ -6,6 +6,7 @@ with the supervisor over two pipes: jobs come in pickled, one line of JSON goes 
 
 import contextlib
 import faulthandler
+import gc
 import os
 import selectors
 import signal
@@ -67,10 +68,12 @@ class Zygote:
         parent = os.getpid()
         report, told = os.pipe()
         shown, printed = os.pipe()
+        gc.freeze()  # what is here the run need not look through for garbage, which would copy all of its memory
         pid = os.fork()
         if pid == 0:
             self._forget_everything()
             be_worker(job, parent, Pipes(told, printed), self._perform)
+        gc.unfreeze()
         os.close(told)
         os.close(printed)
         widen(shown)
