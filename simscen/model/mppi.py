@@ -9,6 +9,7 @@ from simscen.spec.base import Spec, by_default
 from simscen.spec.quantities import (
     Duration,
     NonNegativeAngle,
+    NonNegativeAngularSpeed,
     NonNegativeLength,
     NonNegativeSpeed,
     PositiveAcceleration,
@@ -36,6 +37,7 @@ CriticName = Literal[
     "PathAngleCritic",
     "PreferForwardCritic",
     "TwirlingCritic",
+    "VelocityDeadbandCritic",
 ]
 
 
@@ -170,6 +172,17 @@ class MppiTwirlingCritic(MppiCritic):
     """Of the mean turn rate in rad/s."""
 
 
+class MppiVelocityDeadbandCritic(MppiCritic):
+    """Against velocities that are too low to move a base with friction."""
+
+    cost_weight: Weight = 35.0
+    """Of m/s and rad/s too few, over the seconds."""
+    deadband_velocities: Annotated[
+        tuple[NonNegativeSpeed, NonNegativeSpeed, NonNegativeAngularSpeed], Field(strict=False)
+    ] = (0.0, 0.0, 0.0)
+    """Ahead, sideways and turning: below these the base does not move."""
+
+
 class MppiTrajectoryValidator(Spec):
     """The last look at the trajectory that comes out (mppi::DefaultOptimalTrajectoryValidator)."""
 
@@ -238,8 +251,9 @@ class Mppi(ControllerSpec):
     """Whether it takes its last command for the velocity that the robot has."""
     sgf_order: Annotated[int, Field(ge=1, le=2)] = 2
     """Of the Savitzky-Golay filter that smooths commands: 2 keeps their bends, 1 is a mean of nine."""
-    critics: Annotated[list[CriticName], Field(min_length=1, max_length=10)] | None = None
-    """Which are asked; default: all but ObstaclesCritic, as in Nav2, and TwirlingCritic only with the Omni model."""
+    critics: Annotated[list[CriticName], Field(min_length=1, max_length=11)] | None = None
+    """Which are asked; default: as in Nav2 all but ObstaclesCritic and VelocityDeadbandCritic, and TwirlingCritic
+    only with the Omni model."""
     ConstraintCritic: MppiConstraintCritic = by_default()
     """Keeps to the limits."""
     CostCritic: MppiCostCritic = by_default()
@@ -260,6 +274,8 @@ class Mppi(ControllerSpec):
     """Prefers driving forward."""
     TwirlingCritic: MppiTwirlingCritic = by_default()
     """Does not spin, where it is among `critics`."""
+    VelocityDeadbandCritic: MppiVelocityDeadbandCritic = by_default()
+    """Does not creep, where it is among `critics`."""
     TrajectoryValidator: MppiTrajectoryValidator = by_default()
     """Has the last word."""
 

@@ -52,6 +52,7 @@ PLAIN = {
             "PathAngle",
             "PreferForward",
             "Twirling",
+            "VelocityDeadband",
         )
     },
     "MppiCostCritic.critical_cost": "a cost, as the costmap's",

@@ -125,6 +125,11 @@ STARTS: dict[type[ControllerSpec], list[dict[str, Any]]] = {
         },
         {**SHORT, "CostCritic": {"near_collision_cost": 100, "near_goal_distance": 0.5}, "wz_max": 0.2},
         {**SHORT, "critics": ["ConstraintCritic", "PathFollowCritic"]},
+        {
+            **SHORT,
+            "critics": ["PathFollowCritic", "VelocityDeadbandCritic"],
+            "VelocityDeadbandCritic": {"deadband_velocities": [0.3, 0.0, 0.5]},
+        },
     ],
 }
 PROBES: dict[type[ControllerSpec], list[Probe]] = {

@@ -83,6 +83,16 @@ def twirling(spec: model.MppiTwirlingCritic, scene: Scene) -> Floats:
     return np.asarray(spec.cost_weight * np.abs(scene.rolled.velocities[WZ]).mean(axis=0))
 
 
+def velocity_deadband(spec: model.MppiVelocityDeadbandCritic, scene: Scene) -> Floats:
+    """What the velocities fall short of those that move the base, over the seconds."""
+    ahead, sideways, turn = spec.deadband_velocities
+    least = {VX: ahead, WZ: turn, VY: sideways}
+    short = np.zeros_like(scene.rolled.velocities[VX])
+    for axis, velocities in enumerate(scene.rolled.velocities):
+        short += np.maximum(np.float32(least[axis]) - np.abs(velocities), 0)
+    return np.asarray(spec.cost_weight * scene.dt * short.sum(axis=0))
+
+
 def apart(dx: Floats, dy: Floats) -> Floats:
     """Distances from differences, which it uses up; np.hypot takes five times as long, for numbers past 1e19."""
     dx *= dx

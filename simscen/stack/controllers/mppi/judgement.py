@@ -68,4 +68,6 @@ class Judgement:
                 said = critics.prefer_forward(spec.PreferForwardCritic, scene)
             case "TwirlingCritic" if length >= scene.tolerance:
                 said = critics.twirling(spec.TwirlingCritic, scene)
+            case "VelocityDeadbandCritic":
+                said = critics.velocity_deadband(spec.VelocityDeadbandCritic, scene)
         return said, None

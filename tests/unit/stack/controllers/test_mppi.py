@@ -257,5 +257,13 @@ def test_prefer_forward_critic_counts_metres_driven_backward() -> None:
     assert said == pytest.approx([0.0, 5.0 * 0.2], abs=1e-6)
 
 
+def test_velocity_deadband_critic_counts_what_velocities_fall_short_of_those_that_move_the_base() -> None:
+    spec = model.MppiVelocityDeadbandCritic(deadband_velocities=(0.2, 0.3, 0.4))
+    said = critics.velocity_deadband(spec, scene(along(0.05, -0.25, turn=-0.1)))
+    assert said == pytest.approx([35.0 * (0.15 + 0.3), 35.0 * 0.3], rel=1e-5)
+    strafing = np.concatenate((along(0.05, turn=-0.1), np.full((1, 10, 1), 0.1)))
+    assert critics.velocity_deadband(spec, scene(strafing)) == pytest.approx([35.0 * (0.15 + 0.3 + 0.2)], rel=1e-5)
+
+
 def test_twirling_critic_is_the_mean_turn_rate() -> None:
     assert critics.twirling(model.MppiTwirlingCritic(), scene(along(0.3, turn=-0.5))) == pytest.approx([5.0])
