@@ -1,0 +1,86 @@
+"""What motion prediction tells of people who walk through a furnished house, against the simulator's truth."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from simscen.core.geometry import Pose2
+from simscen.core.trace import Moment
+from simscen.loading.scenario import load_scenario
+from simscen.run.agent import Agent
+from simscen.run.prepare import prepare
+from simscen.run.simulate import simulate
+from simscen.stack.installed.stack import InstalledStack
+from simscen.stack.reference import ReferenceStack
+
+WORLDS = Path(__file__).parents[2] / "worlds"
+HOUSE = """\
+simscen: 1
+world: house.world.yaml
+robot: {pose: {x: 9.4, y: 7.3, yaw: 90 deg}}
+goals: [{pose: {x: 6.0, y: 4.95, yaw: 0 deg}}, {pose: {x: 3.0, y: 3.0, yaw: 180 deg}}]
+events:
+  - name: two walk
+    when: {time: 1 s}
+    do:
+      - {pedestrian: {name: anna, pose: {x: 1.0, y: 5.2}, goals: [[11.0, 5.2]]}}
+      - {pedestrian: {name: bert, pose: {x: 3.0, y: 6.6}, goals: [[3.2, 5.0], [3.0, 3.2], [5.5, 3.0]]}}
+time_limit: 40 s
+pass: [{collisions: {max: 0, caused_by_robot: true}}]
+"""
+
+
+class Compared:
+    """At each scan: errors of what is told of people, and what is told to move and does not."""
+
+    def __init__(self, agent: Agent) -> None:
+        assert isinstance(agent.stack, InstalledStack) and isinstance(agent.stack.inner, ReferenceStack)
+        (self.prediction, *_) = agent.stack.inner.components["prediction"]
+        self.places: list[float] = []
+        self.speeds: list[float] = []
+        self.false, self.turning, self.scans = 0, 0, 0
+        self.before: dict[str, tuple[int, Pose2]] = {}
+
+    def append(self, moment: Moment) -> None:
+        if moment.truth is None or not any(reading.sensor == "lidar" for reading in moment.readings):
+            return
+        people = {name: pose.plane for name, pose in moment.truth.objects.items()}
+        moving = self.prediction.around(moment.tick)
+        here = moment.truth.pose.plane
+        c, s = math.cos(here.yaw), math.sin(here.yaw)
+        centres, velocities = here.apply(moving.centres), moving.velocities @ np.array([[c, s], [-s, c]])
+        self.scans += 1
+        self.turning += abs(moment.truth.twist.wz) > 0.3
+        for centre, velocity in zip(centres, velocities, strict=True):
+            off, name = min((math.hypot(centre[0] - pose.x, centre[1] - pose.y), name) for name, pose in people.items())
+            if off > 0.5:
+                self.false += 1
+            elif name in self.before:
+                since, pose = self.before[name]
+                seconds = (moment.tick - since) / 240
+                walks = ((people[name].x - pose.x) / seconds, (people[name].y - pose.y) / seconds)
+                self.places.append(off)
+                self.speeds.append(math.dist(velocity, walks))
+        self.before = {name: (moment.tick, pose) for name, pose in people.items()}
+
+    def finish(self) -> None:
+        pass
+
+
+def test_people_are_known_to_centimetres_and_furniture_does_not_walk(tmp_path: Path) -> None:
+    file = tmp_path / "walkers.scenario.yaml"
+    file.write_text(HOUSE)
+    heard: list[Compared] = []
+
+    def attach(rig, logs):
+        heard.append(Compared(rig.agents[0]))
+        return heard
+
+    simulate(prepare(load_scenario(file, tmp_path, (WORLDS,))), 1, attach=attach)
+    (compared,) = heard
+    assert compared.turning > 40  # of what stands, much is seen while the robot turns
+    assert len(compared.places) > 60
+    assert np.median(compared.places) < 0.03 and np.percentile(compared.places, 90) < 0.12
+    assert np.median(compared.speeds) < 0.1 and np.percentile(compared.speeds, 90) < 0.4
+    assert compared.false <= 0.03 * len(compared.places)
