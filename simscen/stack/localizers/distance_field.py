@@ -29,20 +29,20 @@ def by_blocks(judge: Callable[[Array], Array], poses: Array) -> Array:
 def beyond_the_map(grid: OccupancyGrid) -> npt.NDArray[np.bool_]:
     """Unknown cells, bordered by one more all around, where the map ends: no beam would have been stopped before.
 
-    These are the ones whose nearest known cell is free; where it is a wall no beam gets, but further off than BEHIND
-    there may be rooms that nobody mapped.
+    These are the ones that no known cell is nearer to than a free one; where a wall is nearer no beam gets, but further
+    off than BEHIND there may be rooms that nobody mapped.
     """
-    from scipy.ndimage import distance_transform_edt
-
     unknown = np.pad(grid.cells == UNKNOWN, 1, constant_values=True)
     if unknown.all():
         return unknown
     if np.count_nonzero(unknown) == unknown.size - grid.cells.size and math.sqrt(2) * grid.resolution <= BEHIND:
         beside: npt.NDArray[np.bool_] = np.pad(grid.cells == FREE, 1, mode="edge")
         return unknown & beside  # all is known: the nearest known cell is the next one
-    distance, (row, column) = distance_transform_edt(unknown, return_indices=True)
-    free = np.pad(grid.cells == FREE, 1)
-    beyond: npt.NDArray[np.bool_] = unknown & (free[row, column] | (distance * grid.resolution > BEHIND))
+    reach = min(FARTHEST, math.ceil(BEHIND / grid.resolution))
+    known = squared_within(~unknown, reach)
+    beyond = squared_within(np.pad(grid.cells == FREE, 1), reach) == known
+    beyond |= known > (BEHIND / grid.resolution) ** 2
+    beyond &= unknown
     return beyond
 
 
