@@ -41,8 +41,11 @@ def _thing(body: Body, world: World) -> Thing:
 
 def _ground(mesh: TriangleMesh, reach: float) -> Iterator[Ground]:
     """What of the static world wheels may roll on, which are `reach` metres tall at most."""
+    owners = sorted(terrain(mesh, reach))
+    if not owners:
+        return  # as most worlds: normals of many thousand faces take a while
     up, slopes = facing_up(mesh), normals(mesh)
-    for owner in sorted(terrain(mesh, reach)):
+    for owner in owners:
         own = mesh.owners == owner
         corners = mesh.vertices[mesh.faces[own]].reshape(-1, 3)
         normal = max(slopes[own & up].tolist(), key=lambda one: -one[2])  # its steepest part
