@@ -36,37 +36,47 @@ class RayScene:
         self._device: EmbreeDevice = static._device if isinstance(static, RayScene) else EmbreeDevice()
         self._static: _Part = static._static if isinstance(static, RayScene) else _Part(self._device, static)
         self._parts: dict[int, _Part] = {}
+        self._bodies: Mapping[str, Placed] = {}
         self._movers: dict[str, _Mover] = {}
-        self._solid: list[_Mover] = []
 
     def set_moving(self, bodies: Mapping[str, Placed]) -> None:
         """Say where the bodies are now: by name, the triangles in a body's frame and the pose of that frame."""
         self._parts = {id(mesh): self._parts.get(id(mesh)) or _Part(self._device, mesh) for mesh, _ in bodies.values()}
-        movers = {name: self._mover(name, mesh, pose) for name, (mesh, pose) in bodies.items()}
-        if movers != self._movers:
-            self._movers, solid = movers, [mover for mover in movers.values() if len(mover.part.mesh.faces)]
-            self._solid = solid
-            self._centres = np.array([mover.centre for mover in solid]).reshape(-1, 3)
-            self._radii = np.array([[mover.part.radius] for mover in solid]).reshape(-1, 1)
+        self._bodies = dict(bodies)
 
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
         """See core.rays.RayCaster."""
         distances = self._static.distances(origins, directions)
-        for mover, rays in self._near(origins, directions, np.minimum(distances, reach)):
+        for mover, rays in self._met(origins, directions, np.minimum(distances, reach)):
             distances[rays] = np.minimum(distances[rays], mover.distances(origins[rays], directions[rays]))
         return np.where(distances <= min(reach, _NO_HIT), distances, np.inf).astype(np.float64)
 
-    def _mover(self, name: str, mesh: TriangleMesh, pose: Pose3) -> "_Mover":
-        known, part = self._movers.get(name), self._parts[id(mesh)]
-        return known if known and known.part is part and known.pose == pose else _Mover(part, pose)
+    def _near(self, origins: Array, ends: Singles) -> "list[_Mover]":
+        """The moving bodies that are no farther from where the rays begin than the longest of them is."""
+        if not self._bodies or not len(origins):
+            return []
+        place, far = origins[0].tolist(), float(ends.max())
+        if origins.strides[0]:
+            far += float(np.linalg.norm(origins - origins[0], axis=1).max())
+        known, self._movers = self._movers, {}
+        for name, (mesh, pose) in self._bodies.items():
+            part = self._parts[id(mesh)]
+            if len(mesh.faces) and math.dist(pose.position, place) <= far + part.extent:
+                mover = known.get(name)
+                if mover is None or mover.part is not part or mover.pose != pose:
+                    mover = _Mover(part, pose)
+                self._movers[name] = mover
+        return list(self._movers.values())
 
-    def _near(
+    def _met(
         self, origins: Array, directions: Array, ends: Singles
     ) -> Iterator[tuple["_Mover", npt.NDArray[np.int64]]]:
         """The moving bodies and the numbers of the rays that meet the sphere around them before they end."""
-        if not self._solid:
+        movers = self._near(origins, ends)
+        if not movers:
             return
-        centres, radii = self._centres, self._radii
+        centres = np.array([mover.centre for mover in movers])
+        radii = np.array([[mover.part.radius] for mover in movers])
         if origins.strides[0]:
             ahead = centres @ directions.T - (origins * directions).sum(axis=1)
             away = (centres**2).sum(axis=1)[:, np.newaxis] - 2 * (centres @ origins.T) + (origins**2).sum(axis=1)
@@ -75,17 +85,21 @@ class RayScene:
             ahead, away = centres @ directions.T, (centres**2).sum(axis=1)[:, np.newaxis]
         meets = (ahead >= -radii) & (ahead - radii <= ends) & (away - ahead**2 <= radii**2)
         for number in np.flatnonzero(meets.any(axis=1)):
-            yield self._solid[number], np.flatnonzero(meets[number])
+            yield movers[number], np.flatnonzero(meets[number])
 
 
 class _Part:
-    """One Embree scene of a mesh, about the middle of that mesh; `radius` is that of the sphere around it."""
+    """One Embree scene of a mesh, about the middle of that mesh; `radius` is that of the sphere around it.
+
+    `extent` is how far it may be from the origin of its frame.
+    """
 
     def __init__(self, device: EmbreeDevice, mesh: TriangleMesh) -> None:
         self.mesh, self.middle = mesh, _middle(mesh.vertices)
         corners = mesh.vertices - self.middle
         # A little more, for rays that graze the furthest corner.
         self.radius = 1.001 * float(np.linalg.norm(corners, axis=1).max(initial=0.0))
+        self.extent = self.radius + float(np.linalg.norm(self.middle))
         # Robust: without it rays may slip through the edge between two triangles.
         self._scene = EmbreeScene(device, True)
         if len(mesh.faces):

@@ -155,3 +155,16 @@ for _ in range(200):
 def test_a_scene_that_the_garbage_collector_takes_does_not_crash():
     """Embree 2 did, once in a hundred runs in one process: its device went before its scenes."""
     assert subprocess.run([sys.executable, "-c", COLLECTED], check=False).returncode == 0
+
+
+@pytest.mark.parametrize("spread", [0.0, 3.0])
+def test_a_body_farther_off_than_any_ray_reaches_is_left_out_until_it_comes_nearer(spread):
+    """Also where rays begin in several places, and where a body lies far from the origin of its frame."""
+    off = fuse([Solid(Box((1.0, 1.0, 2.0)), Pose3(-6.0, 0.0, 0.0))])
+    scene, (origins, directions) = RayScene(fuse([])), around(8, (0.0, 0.0, 0.5))
+    origins[4:, 0] -= spread
+    for x, seen in ((18.0, math.inf), (10.0, 3.5), (30.0, math.inf)):
+        scene.set_moving({"far": (CART, Pose3(50.0)), "body": (off, Pose3(x))})
+        assert scene.cast(origins, directions, 5.0)[0] == pytest.approx(seen)
+    scene.set_moving({"body": (off, Pose3(6.0 - 4.0 - spread))})
+    assert scene.cast(origins, directions, 5.0)[4] == pytest.approx(3.5)
