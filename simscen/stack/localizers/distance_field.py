@@ -40,7 +40,7 @@ def beyond_the_map(grid: OccupancyGrid) -> npt.NDArray[np.bool_]:
         return unknown & beside  # all is known: the nearest known cell is the next one
     reach = min(FARTHEST, math.ceil(BEHIND / grid.resolution))
     known = squared_within(~unknown, reach)
-    beyond = squared_within(np.pad(grid.cells == FREE, 1), reach) == known
+    beyond: npt.NDArray[np.bool_] = squared_within(np.pad(grid.cells == FREE, 1), reach) == known
     beyond |= known > (BEHIND / grid.resolution) ** 2
     beyond &= unknown
     return beyond
