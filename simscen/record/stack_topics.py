@@ -10,7 +10,7 @@ from simscen.record.pack_many import ParticleCloudPacker, PathPacker
 from simscen.record.simtime import SimTime
 from simscen.record.thinning import Thinning, Throttle
 
-PARTICLE_RATE = 2  # a cloud of 2000 is 128 kB, as much as all other topics say in a second
+PARTICLE_RATE = 2  # a cloud of 500 is 32 kB, a third of what all other topics say in a second
 POSES_RATE, MOST_POSES = 1, 200  # the same for the eye, to which 32-bit numbers are enough
 LOCAL_PLAN_RATE = 5  # only for the eye
 
