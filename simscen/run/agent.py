@@ -36,12 +36,15 @@ class Agent:
     timetable: Timetable
     truth_period: int
     logs: Sequence[Log] = ()
+    due: bool = field(default=True, init=False)
+    """Whether anything is due for it at this beat."""
     _truth: Truth | None = field(default=None, init=False)
 
     def look(self, tick: int) -> None:
         """Where the robot is now, and what it has touched."""
         self._truth = self.robot.truth() if tick % self.truth_period == 0 else None
-        self.stage.begin_beat(self._truth, self.timetable.due(tick))
+        self.due = self.timetable.due(tick)
+        self.stage.begin_beat(self._truth, self.due)
 
     def decide(self, tick: int) -> Moment:
         """Read the sensors that are due, and hand them to the stack after the faults have had their way with them."""

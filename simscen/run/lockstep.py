@@ -36,7 +36,7 @@ def run_lockstep(rig: Rig) -> Event:
         for director in rig.directors:
             director.direct()
 
-        due = [agent for agent in rig.agents if agent.timetable.due(tick)]
+        due = [agent for agent in rig.agents if agent.due]
         moments = [agent.decide(tick) for agent in due]
         end = None if tick % rig.truth_period else end_of(tick, (agent.ending for agent in rig.agents))
         for agent, moment in zip(due, moments, strict=True):
@@ -46,4 +46,4 @@ def run_lockstep(rig: Rig) -> Event:
 
         for agent, moment in zip(due, moments, strict=True):
             agent.drive(moment)
-        simulation.step(min(agent.timetable.until_next(tick) for agent in rig.agents))
+        simulation.step(min([agent.timetable.until_next(tick) for agent in rig.agents]))

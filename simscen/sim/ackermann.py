@@ -10,7 +10,7 @@ from simscen.sim.inertia import GRAVITY
 from simscen.sim.ramp import Ramp
 from simscen.sim.robot_body import RobotBody
 from simscen.sim.vehicle import Vehicle
-from simscen.sim.wheels import driven, hold, mean_angle, rolls
+from simscen.sim.wheels import driven, hold, mean_angles, rolls
 
 STEERING_RATE = 3.2
 """rad/s: what the servo of an F1TENTH car does (f1tenth_gym, sv_max; O'Kelly et al. 2020)."""
@@ -72,7 +72,7 @@ class AckermannDrive:
 
     def encoders(self) -> tuple[float, ...]:
         """Angles in rad of the rear wheels."""
-        return mean_angle(self._client, self._robot, self._left), mean_angle(self._client, self._robot, self._right)
+        return mean_angles(self._client, self._robot, self._left, self._right)
 
     def _steer(self) -> None:
         slope, half = math.tan(self._steering), self._drive.wheel_separation / (2 * self._drive.wheel_base)

@@ -100,6 +100,8 @@ class Contacts:
 
     def take(self) -> tuple[Event, ...]:
         """The events since last asked."""
+        if not self._events:
+            return ()
         events, self._events = tuple(self._events), []
         return events
 

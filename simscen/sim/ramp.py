@@ -13,12 +13,14 @@ class Ramp:
         self._speed_up = limits.linear_acceleration * period
         self._slow_down = (limits.linear_deceleration or limits.linear_acceleration) * period
         self._turn = limits.angular_acceleration * period
-        self.target = STOP
+        self._asked = self.target = STOP
         self.velocity = STOP
 
     def command(self, twist: Twist) -> None:
         """What to drive from now on."""
-        limits = self._limits
+        if twist == self._asked:
+            return
+        limits, self._asked = self._limits, twist
         self.target = Twist(
             min(limits.linear, max(-(limits.reverse or limits.linear), twist.vx)),
             min(self._lateral, max(-self._lateral, twist.vy)),

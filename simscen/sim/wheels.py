@@ -45,8 +45,7 @@ class SidedDrive:
 
     def encoders(self) -> tuple[float, ...]:
         """Mean angles in rad of the left and of the right wheels."""
-        robot = self._vehicle.id
-        return mean_angle(self._client, robot, self._left), mean_angle(self._client, robot, self._right)
+        return mean_angles(self._client, self._vehicle.id, self._left, self._right)
 
     def _turn(self) -> None:
         vx, _, wz = self._ramp.velocity
@@ -88,7 +87,7 @@ def hold(client: int, robot: int, joints: Sequence[int], torques: Sequence[float
     )
 
 
-def mean_angle(client: int, robot: int, joints: Sequence[int]) -> float:
-    """The mean angle in rad of some joints."""
-    states = pybullet.getJointStates(robot, joints, physicsClientId=client)
-    return float(sum(state[0] for state in states) / len(states))
+def mean_angles(client: int, robot: int, left: list[int], right: list[int]) -> tuple[float, float]:
+    """The mean angles in rad of some joints on the left and of some on the right."""
+    angles = [state[0] for state in pybullet.getJointStates(robot, left + right, physicsClientId=client)]
+    return sum(angles[: len(left)]) / len(left), sum(angles[len(left) :]) / len(right)

@@ -124,7 +124,7 @@ class _Mover:
     @cached_property
     def centre(self) -> Array:
         """The middle of the body in the world."""
-        centre: Array = self.pose.apply(self.part.middle[np.newaxis])[0]
+        centre: Array = self._turn @ self.part.middle + self.pose.position
         return centre
 
     @cached_property
