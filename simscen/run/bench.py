@@ -126,7 +126,7 @@ def _watched(watch: Stopwatch, rig: Rig, own: Sequence[Log]) -> Sequence[Log]:
     watch.watch("truth and contacts", agent.robot, "truth", "collisions")
     watch.watch("sensors", agent.senses, "read")
     if isinstance(agent.stack, InstalledStack) and isinstance(agent.stack.inner, ReferenceStack):
-        for name, (component, *methods) in agent.stack.inner.components.items():
+        for name, component, methods in agent.stack.inner.components:
             watch.watch(name, component, *methods)
     watch.watch("navigator", agent.stack, "decide")
     for name, listener in zip(("trace", "log"), own, strict=True):

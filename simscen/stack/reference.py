@@ -92,16 +92,18 @@ class ReferenceStack:
         return self._task.goal
 
     @property
-    def components(self) -> dict[str, tuple[Any, ...]]:
-        """What is worth measuring: name → the component and its methods that take time."""
-        return {
-            "localizer": (self._localizer, "on_odometry", "on_imu", "on_scan"),
-            "costmap": (self._costmaps, "update"),
-            "planner": (self._navigator.planner, "plan"),
-            "controller": (self._controller, "command", "set_path"),
-            "collision monitor": (self._monitor, "allow", "on_scan"),
-            "prediction": (self._prediction, "on_scan", "steer", "stand"),
-        }
+    def components(self) -> tuple[tuple[str, Any, tuple[str, ...]], ...]:
+        """What is worth measuring: a part's name, something of it, and the methods of that which take time."""
+        return (
+            ("localizer", self._localizer, ("on_odometry", "on_imu", "on_scan")),
+            ("costmap", self._costmaps, ("update",)),
+            ("costmap", self._costmaps.wide, ("refresh",)),
+            ("costmap", self._costmaps.near, ("refresh",)),
+            ("planner", self._navigator.planner, ("plan",)),
+            ("controller", self._controller, ("command", "set_path")),
+            ("collision monitor", self._monitor, ("allow", "on_scan")),
+            ("prediction", self._prediction, ("on_scan", "steer", "stand")),
+        )
 
     def decide(self, tick: int, readings: Readings) -> Decision:
         """Take the readings of this beat and say what to drive."""

@@ -70,8 +70,7 @@ class Costmap:
         What updates have changed is computed here, once for all of them that nobody looked at.
         """
         if self._changed is not None:
-            self._refresh(*self._changed)
-            self._changed = None
+            self.refresh(*self._changed)
         view, revision = self._view, self._revision
         if view is None or view.revision != revision:
             frame, radius = self._frame, self._spec.inflation_radius
@@ -203,8 +202,9 @@ class Costmap:
         self._changed = (top, left), (bottom, right)
         self._revision += 1
 
-    def _refresh(self, low: tuple[int, int], high: tuple[int, int]) -> None:
+    def refresh(self, low: tuple[int, int], high: tuple[int, int]) -> None:
         """Compute distances and costs again wherever one of the cells from `low` to `high` can matter."""
+        self._changed = None
         inner = self._frame.window(low, high, self._margin + self._speck)
         outer = self._frame.window(low, high, 2 * (self._margin + self._speck))
         part = (
