@@ -31,7 +31,7 @@ AMCL_PARAMETERS: Mapping[str, Mapping[str, object]] = {
     "nav2": {
         "laser_model_type": "likelihood_field", "sigma_hit": 0.2, "likelihood_exponent": 1.0,
         "beams_beyond_the_map": "miss", "map_trust_none": 0.0, "map_trust_full": 0.0,
-        "match_scans": False, "relocalization": "random",
+        "match_scans": False, "settling_distance": 0.0, "relocalization": "random",
     },
     "consistent": {
         "alpha1": 0.0005, "alpha2": 0.0005, "alpha3": 0.0005, "alpha4": 0.0005, "alpha5": 0.0005,
@@ -114,6 +114,9 @@ class Amcl(Ranged, LocalizerSpec):
     particles are one narrow group: rooms are rebuilt, and nobody draws the map anew."""
     map_trust_full: Probability = 0.8
     """From this share on it counts in full, in between in proportion; 0 = it always does, as in Nav2."""
+    settling_distance: NonNegativeLength = 4.0
+    """Over so many metres from a place that was told, turns of 2 rad counting as one, scans count more and more, from a
+    fifth on: what one room shows fits many places. 0 = in full at once, as in Nav2."""
     match_scans: bool = True
     """Correct each step of odometry by how the scan fits those of the last metres, where these can tell."""
     selective_resampling: bool = False

@@ -129,7 +129,8 @@ class AmclLocalizer:
         if (answer := self._filter.correct(scan)) is not None:
             self._correction = _Correction(*answer, odometry, scan.tick)
         else:
-            carried = self._correction.map_from_odom.compose(odometry)
+            last = self._correction
+            carried = last.map_from_odom.compose(odometry) if matched is None else last.pose.compose(matched.delta)
             covariance = spread(self._filter.particles, carried)
             self._correction = _Correction(carried, covariance, odometry, self._correction.tick)
 

@@ -22,6 +22,11 @@ ENOUGH, PLAIN, BETTER, GOOD = 2.0, 0.05, 0.1, 0.75
 """A robot that was told nothing is where scans of ENOUGH metres fit by PLAIN better than anywhere else; one that had a
 place is elsewhere when they fit there so, and GOOD, and by BETTER better than where it was, in two searches that agree.
 """
+CHECKED, FITS = 1.5, 0.85
+"""m, turns included, after each of which a robot that has a place is compared with its neighbourhood, if what it saw
+fits less than that."""
+NEAR_GOOD, NEAR_BETTER = 0.82, 0.04
+"""It is moved to a place nearby that fits so, so much better than where it is, and by PLAIN better than any other."""
 AGREE = 0.7, 0.3
 """m, rad: two searches agree that find places so near to each other, the way between them taken off."""
 SHARPNESS = 0.02
@@ -42,7 +47,7 @@ class Finder:
         self._search, self._trust, self._memory = search, trust, ScanMemory()
         self._known = known
         self._fits: deque[float] = deque(maxlen=RECENT)
-        self._wait, self._driven, self._doubted = 0.0, 0.0, False
+        self._wait, self._driven, self._unchecked, self._doubted = 0.0, 0.0, 0.0, False
         self._last: Pose2 | None = None
         self._suspected: tuple[Pose2, Pose2] | None = None
 
@@ -55,18 +60,37 @@ class Finder:
         """
         view = self._memory.add(scan, base, *limits)
         if self._last is not None:
-            self._driven += travelled(self._last, base)
+            self._driven += (moved := travelled(self._last, base))
+            self._unchecked += moved
         self._last = base
         if not len(view.ends):
             return None
         here = np.array([believed])
         if (fit := self._trust.fit(here, view.ends, TELLING)) is not None:
             self._fits.append(fit)
+        if self._known and (near := self._nearby(base, here)) is not None:
+            return near
         if self._known and not self._in_doubt():
             return None
         if self._driven < self._wait:
             return None
         return self._sought(self._memory.about(base), base, here)
+
+    def _nearby(self, base: Pose2, here: Array) -> tuple[Array, Array] | None:
+        """Where the robot is that is only somewhat off: it was told so, or drifted where there was no map."""
+        if min(self._unchecked, self._memory.length) < CHECKED:
+            return None
+        self._unchecked, view = 0.0, self._memory.about(base)
+        if not len(view.ends) or self._trust.fit(here, view.ends, TELLING) is None:
+            return None
+        if (fit := float(self._search.fit(here, view)[0])) > FITS:
+            return None
+        poses, fits = self._search.near(view, here[0])
+        plain = len(fits) == 1 or fits[0] - fits[1] > PLAIN
+        if not plain or fits[0] < max(NEAR_GOOD, fit + NEAR_BETTER):
+            return None
+        self._fits.clear()
+        return poses[:1], np.ones(1)
 
     def _in_doubt(self) -> bool:
         """Whether recent scans do not fit. When that begins, what was seen before may be of another place."""

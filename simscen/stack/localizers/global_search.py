@@ -29,6 +29,8 @@ REACH = 15.0
 """m: points further off are left out; a coarse heading moves them too far."""
 KEPT, REFINED, ANSWERS = 3000, 250, 40
 """How many places go from the coarsest grid to the next stage, and to the last; how many are told."""
+NEARBY, REFINED_NEARBY = ((6, 0.2), (9, 0.035)), 12
+"""Steps of so many m, and of so many rad, to each side; and how many of these places are refined."""
 APART = (0.5, 0.2)
 """m and rad: two places nearer than both are one."""
 WAYS = 0.5
@@ -49,6 +51,10 @@ class View:
         return View(_evenly(self.ends, count), _evenly(self.passed, count))
 
 
+def _within_reach(view: View) -> View:
+    return View(*(points[np.hypot(*points.T) < REACH] for points in (view.ends, view.passed)))
+
+
 def _evenly(points: Array, count: int) -> Array:
     if len(points) <= count:
         return points
@@ -63,7 +69,7 @@ class GlobalSearch:
 
     def places(self, view: View) -> tuple[Array, Array]:
         """Poses (k, 3) in the map frame, and how well each fits (k,), 0 … 1, best first; k is at most ANSWERS."""
-        near = View(*(points[np.hypot(*points.T) < REACH] for points in (view.ends, view.passed)))
+        near = _within_reach(view)
         if not len(near.ends):
             return np.empty((0, 3)), np.empty(0)
         poses = self._coarsely(near.thinned(COARSE_POINTS))
@@ -72,6 +78,17 @@ class GlobalSearch:
         poses, _ = distinct(poses, self.fit(poses, some), REFINED)
         for metres, turn in ((0.1, 1.0), (0.05, 0.5)):
             poses = self._climbed(poses, some, metres, np.radians(turn))
+        return distinct(poses, self.fit(poses, fine), ANSWERS)
+
+    def near(self, view: View, pose: Array) -> tuple[Array, Array]:
+        """As `places`, but only those within NEARBY of `pose` (3,)."""
+        close = _within_reach(view)
+        some, fine = close.thinned(COARSE_POINTS), close.thinned(POINTS)
+        aside, turn = (np.arange(-steps, steps + 1) * step for steps, step in NEARBY)
+        poses = pose + np.stack(np.meshgrid(aside, aside, turn, indexing="ij"), axis=-1).reshape(-1, 3)
+        poses, _ = distinct(poses, self.fit(poses, some), REFINED_NEARBY)
+        for metres, degrees in ((0.1, 1.0), (0.05, 0.5), (0.05, 0.5)):
+            poses = self._climbed(poses, some, metres, np.radians(degrees))
         return distinct(poses, self.fit(poses, fine), ANSWERS)
 
     def fit(self, poses: Array, view: View) -> Array:

@@ -22,11 +22,15 @@ from simscen.stack.localizers.particles import FreeSpace, Particles
 from simscen.stack.localizers.recovery import PROBES, Recovery
 from simscen.stack.localizers.resampling import adaptive, systematic
 from simscen.stack.localizers.scan_matcher import Step, moved
+from simscen.stack.localizers.scan_memory import METRES_A_RAD
 
 CONVERGED_WITHIN = 0.5  # nav2_amcl's pf.dist_threshold, in m
 
 BELIEVE_WHEELS = 0.2
 """Share of the particles that follow odometry where the scans say otherwise."""
+
+AT_ONCE = 0.2
+"""What the first scan counts, of what it does when the robot has driven `settling_distance` m."""
 
 
 class ParticleFilter:
@@ -48,9 +52,11 @@ class ParticleFilter:
         self._recovery = Recovery(self._spec.recovery_alpha_slow, self._spec.recovery_alpha_fast, self._sensor.strays)
         self._put_anywhere = np.zeros(len(self.particles.weights), dtype=np.bool_)
         self._corrections, self._trusted = 0, 1.0
+        self._settled = AT_ONCE if estimate.pose is not None and self._spec.settling_distance > 0 else 1.0
 
     def move(self, delta: Pose2) -> None:
         """Move each particle by its own noisy copy of a motion that odometry reports in the base frame."""
+        self._settle(delta)
         poses = self._motion.sample(self.particles.poses, delta, self._chance)
         self.particles = Particles(poses, self.particles.weights)
 
@@ -60,17 +66,27 @@ class ParticleFilter:
         Where the two differ wheels slip, or people walk along with the robot: then some particles believe
         odometry, and the map decides, unless it does not show what is around.
         """
+        self._settle(delta)
         poses = moved(self.particles.poses, seen, self._chance)
         if self._trusted > 0 and not seen.agrees(delta):
             some = self._chance.random(len(poses)) < BELIEVE_WHEELS
             poses[some] = self._motion.sample(self.particles.poses[some], delta, self._chance)
         self.particles = Particles(poses, self.particles.weights)
 
+    def _settle(self, delta: Pose2) -> None:
+        """The first metres from a place that was told: a scan of a room fits many places, and only the next rooms tell.
+
+        So scans count little at first, and what was told counts on.
+        """
+        if self._settled < 1.0:
+            way = math.hypot(delta.x, delta.y) + METRES_A_RAD * abs(delta.yaw)
+            self._settled = min(1.0, self._settled + way / self._spec.settling_distance)
+
     def put(self, poses: Array, shares: Array) -> tuple[Pose2, Array]:
         """Put all particles about `poses` (k, 3), each with its share (k,); and where they say the robot is then."""
         drawn = around_places(poses, shares, self._bound.most, self._chance)
         self.particles = Particles.equal(drawn)
-        self._put_anywhere = np.zeros(len(drawn), dtype=np.bool_)
+        self._put_anywhere, self._settled = np.zeros(len(drawn), dtype=np.bool_), 1.0
         return summarise(self.particles, self._sensor.peak)
 
     def correct(self, scan: Scan) -> tuple[Pose2, Array] | None:
@@ -88,7 +104,8 @@ class ParticleFilter:
             self._trusted = self._trust.of(self.particles, ends)
             if self._trusted == 0:
                 return None
-            logarithm = logarithm * self._trusted
+        counts = self._trusted * self._settled
+        logarithm = logarithm * counts
         best = float(logarithm.max())
         if best == logarithm.min() and best > -np.inf:
             return None
@@ -96,21 +113,21 @@ class ParticleFilter:
         weights = self.particles.weights * np.exp(logarithm - shift)
         total = float(weights.sum())
         if self._recovery.wanted:
-            self._observe(beams, weights, shift)
+            self._observe(beams, weights, shift, counts)
         self.particles = Particles(poses, weights / total) if total > 0 else Particles.equal(poses)
         answer = summarise(self.particles, self._sensor.peak) if total > 0 else None
         self._resample()
         return answer
 
-    def _observe(self, beams: Beams, weights: Array, shift: float) -> None:
+    def _observe(self, beams: Beams, weights: Array, shift: float, counts: float) -> None:
         """Tell the recovery how the particles explain a scan, but for those that were put anywhere a scan ago.
 
-        `weights` (n,) are theirs times the likelihood of the beams, without the factor exp(shift).
+        `weights` (n,) are theirs times the likelihood of the beams to the power `counts`, without a factor exp(shift).
         """
         kept = ~self._put_anywhere if not self._put_anywhere.all() else slice(None)
         likely = float(weights[kept].sum() / self.particles.weights[kept].sum())
         tracked = math.log(likely) + shift if likely > 0 else -math.inf
-        anywhere = self._sensor.log_likelihood(self._anywhere.draw(PROBES, self._chance), beams, False)
+        anywhere = counts * self._sensor.log_likelihood(self._anywhere.draw(PROBES, self._chance), beams, False)
         scale = self._sensor.tempering(beams)
         self._recovery.observe(tracked * scale, anywhere * scale)
 

@@ -45,7 +45,7 @@ COARSEST = 0.04
 """rad between two beams: of a lidar whose beams are further apart nobody can tell which points are of one surface."""
 AGREES = (0.03, 0.1, 0.03, 0.1)
 """m, and of each metre; rad, and of each rad: within this the match and odometry say the same."""
-INFLATED, FLOOR = 2.0, (0.005, 0.005, 0.002)
+INFLATED, FLOOR = 0.5, (0.004, 0.003, 0.0015)
 """Of the covariance that the match itself gives, and standard deviations in m, m, rad that are added: neighbouring
 frames share the errors of their surfaces."""
 

@@ -82,8 +82,9 @@ PARTS = [
         **dict.fromkeys(("z_short", "z_max", "lambda_short"), ((amcl(laser_model_type="beam"), scenes.moved),)),
         **dict.fromkeys(
             ("beam_skip_distance", "beam_skip_threshold", "beam_skip_error_threshold"),
-            ((amcl(do_beamskip=True, beam_skip_threshold=0.9), scenes.moved),),
+            ((amcl(do_beamskip=True, beam_skip_threshold=0.9, settling_distance=0.0), scenes.moved),),
         ),
+        "do_beamskip": ((amcl(beam_skip_threshold=0.9, settling_distance=0.0), scenes.moved),),
     }, {"laser_min_range": [0.5, 1.5], "laser_max_range": [0.5, 1.5], "min_particles": [100],
         "laser_likelihood_max_dist": [0.2]}),
     Part(("localizer",), localizers.Ekf, (({"localizer": {"type": "ekf"}}, scenes.slipped),)),

@@ -9,6 +9,7 @@ from pydantic import ValidationError
 from simscen.core.belief import Belief, Estimate
 from simscen.core.chance import Streams
 from simscen.core.geometry import Pose2
+from simscen.core.grid import UNKNOWN
 from simscen.core.motion import Twist
 from simscen.core.sensing import Odometry, Scan
 from simscen.model.localizers import Amcl
@@ -105,6 +106,24 @@ def test_a_scan_that_arrives_late_corrects_the_pose_at_which_it_was_taken() -> N
             punctual.on_scan(seen(START.compose(step), tick))
     delayed.on_scan(seen(START.compose(steps[0][1]), 24))
     assert delayed.belief.pose == pytest.approx(punctual.belief.pose)
+
+
+def test_where_there_is_no_map_the_pose_follows_what_the_scans_show_and_not_wheels_that_slip() -> None:
+    unknown = replace(grid(), cells=np.full_like(grid().cells, UNKNOWN))
+    subject = amcl(Amcl(), Setting(replace(surroundings(), map=unknown), "localizer", Streams(1)))
+    subject.reset(Estimate(START, (0.01, 0.01, 0.01)))
+    for k in range(8):
+        subject.on_odometry(odometry(24 * k, Pose2(0.3 * k, 0.03 * k, 0.04 * k)))
+        subject.on_scan(seen(START.compose(Pose2(0.26 * k, 0.0, 0.0)), 24 * k))
+    off = START.compose(Pose2(0.26 * 7, 0.0, 0.0)).between(subject.belief.pose)
+    assert np.hypot(off.x, off.y) < 0.06
+    assert abs(off.yaw) < 0.03
+
+
+def test_the_first_scan_counts_little_beside_what_was_told() -> None:
+    settling, at_once = (started(Amcl(settling_distance=metres)).belief for metres in (4.0, 0.0))
+    assert np.trace(settling.covariance) > 1.5 * np.trace(at_once.covariance)
+    assert np.hypot(*(np.array(START) - settling.pose)[:2]) < 0.2
 
 
 def test_scans_older_than_any_odometry_are_left_alone() -> None:

@@ -27,6 +27,16 @@ def test_the_place_that_fits_best_is_where_the_scan_was_taken(pose: Pose2) -> No
     assert (np.diff(fits) <= 0).all()
 
 
+@pytest.mark.parametrize("pose", PLACES)
+def test_a_robot_that_is_told_a_place_half_a_metre_off_is_found_nearby(pose: Pose2) -> None:
+    told = np.array(pose.compose(Pose2(0.4, -0.3, 0.2)))
+    poses, fits = GlobalSearch(grid()).near(scanned(pose), told)
+    off = pose.between(Pose2(*poses[0].tolist()))
+    assert np.hypot(off.x, off.y) < 0.1
+    assert abs(off.yaw) < 0.03
+    assert fits[0] > GlobalSearch(grid()).fit(told[np.newaxis], scanned(pose))[0] + 0.05
+
+
 def test_the_same_view_gives_the_same_places_bit_for_bit() -> None:
     view = scanned(PLACES[0])
     first, again = (GlobalSearch(grid()).places(view) for _ in range(2))

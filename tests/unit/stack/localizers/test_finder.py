@@ -1,0 +1,40 @@
+"""A robot that is somewhat off is put right by what it saw on its way."""
+
+import numpy as np
+import pytest
+
+from simscen.core.geometry import Array, Pose2
+from simscen.stack.localizers.distance_field import beyond_the_map
+from simscen.stack.localizers.finder import Finder
+from simscen.stack.localizers.global_search import GlobalSearch
+from simscen.stack.localizers.likelihood_field import obstacle_field
+from simscen.stack.localizers.map_trust import MapTrust
+from simscen.testing.room import BEAMS, cast, grid, scan
+
+START = Pose2(-2.5, -1.8, 0.6)
+OFF = Pose2(0.4, -0.3, 0.15)
+
+
+def found(off: Pose2) -> list[Array]:
+    """Where a robot is put that drives 2 m and believes to be `off`."""
+    trust = MapTrust(obstacle_field(grid(), 2.0), beyond_the_map(grid()).ravel(), 0.45, 0.8)
+    finder, places = Finder(GlobalSearch(grid()), trust, known=True), []
+    for way in np.arange(0.0, 2.0, 0.25).tolist():
+        base = Pose2(way, 0.0, 0.0)
+        pose = START.compose(base)
+        ranges = cast(np.array([pose]), -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS))[0]
+        put = finder.places(scan(ranges), base, pose.compose(off), (0.0, 100.0))
+        if put is not None:
+            places.append(np.array(pose.between(Pose2(*put[0][0].tolist()))))
+    return places
+
+
+def test_a_robot_that_is_half_a_metre_off_is_put_where_its_last_metres_fit() -> None:
+    (place,) = found(OFF)
+    assert np.hypot(place[0], place[1]) < 0.1
+    assert abs(place[2]) < 0.03
+
+
+@pytest.mark.parametrize("off", [Pose2(0, 0, 0), Pose2(0.05, -0.05, 0.02)])
+def test_a_robot_that_knows_its_place_is_left_there(off: Pose2) -> None:
+    assert found(off) == []
