@@ -109,6 +109,6 @@ def _cpu(what: Callable[[], object]) -> float:
 def _child(*arguments: str) -> float:
     """CPU ms of a Python called so."""
     before = getrusage(RUSAGE_CHILDREN)
-    subprocess.run([sys.executable, *arguments], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([sys.executable, *arguments], check=True, capture_output=True)
     after = getrusage(RUSAGE_CHILDREN)
     return 1e3 * (after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)

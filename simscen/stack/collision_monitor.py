@@ -19,6 +19,8 @@ from simscen.stack.protocols import RobotModel
 
 STEPS = 8
 """Moments within the prediction at which the hull is compared with the scan."""
+NEARER = 0.005
+"""Metres by which something that moves must come nearer than to a robot that stood, for braking to help."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,17 +104,22 @@ class CollisionMonitor:
     def _time_unmet(self, wanted: Twist, horizon: float) -> float:
         """Seconds until something that moves would be within the stop margin of the hull, both on their ways.
 
-        The whole horizon where a robot that stood would be met as soon: to brake for that is no help.
+        The whole horizon where a robot that stood would be met as soon and as closely: to brake for that is no help.
         """
         times = np.linspace(0.0, horizon, STEPS + 1)
-        centres, least = self._moving.at(times), self._moving.radii + self._spec.stop_margin
-        met = []
-        for twist in (wanted, STOP):
-            poses = poses_along(Pose2(0.0, 0.0), twist, times)
-            gaps = np.stack([self._gaps(centres[:, k], poses[k : k + 1])[0] for k in range(len(times))]) - least
-            touched = ((gaps[1:] < 0.0) & (gaps[1:] < gaps[0] - 1e-4)).any(axis=1)
-            met.append(float(times[int(touched.argmax())]) if touched.any() else horizon)
-        return met[0] if met[0] < met[1] else horizon
+        centres = self._moving.at(times)
+        gaps, standing = (self._gaps_to(centres, twist, times) for twist in (wanted, STOP))
+        met, anyway = ((ways[1:] < 0.0) & (ways[1:] < ways[0] - 1e-4) for ways in (gaps, standing))
+        first = (met | anyway).argmax(axis=0)  # of each thing, the moment that tells which of the two is worse
+        worse = np.diagonal((gaps < standing - NEARER)[1 + first])
+        when = (met & worse).any(axis=1)
+        return float(times[int(when.argmax())]) if when.any() else horizon
+
+    def _gaps_to(self, centres: Array, twist: Twist, times: Array) -> Array:
+        """How far (times, things) what moves is from the stop margin when the robot goes with `twist`."""
+        poses = poses_along(Pose2(0.0, 0.0), twist, times)
+        gaps = [self._gaps(centres[:, k], poses[k : k + 1])[0] for k in range(len(times))]
+        return np.stack(gaps) - (self._moving.radii + self._spec.stop_margin)
 
     def _gaps(self, points: Array, poses: Array) -> Array:
         """Distance (poses, points) from the hull's edge at each pose to each point; negative inside.

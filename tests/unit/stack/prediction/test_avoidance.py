@@ -135,3 +135,5 @@ def test_the_collision_monitor_brakes_by_the_relative_velocity_and_only_where_br
     assert told(1.0, 0.0, -1.0, 0.0) < standing  # it comes
     assert told(0.8, -1.2, 0.0, 1.2) < 1.0  # it crosses, and would be hit
     assert told(-1.0, 0.0, 1.5, 0.0) == 1.0  # it comes from behind: standing would be worse
+    assert told(1.0, 0.0, -4.0, 0.0) < 0.5  # it comes as soon to a robot that stands, but no nearer
+    assert told(0.0, 0.9, 0.0, -1.5) == 1.0  # it comes from the side: to go on is as good as to stand
