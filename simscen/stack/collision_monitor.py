@@ -111,7 +111,7 @@ class CollisionMonitor:
         gaps, standing = (self._gaps_to(centres, twist, times) for twist in (wanted, STOP))
         met, anyway = ((ways[1:] < 0.0) & (ways[1:] < ways[0] - 1e-4) for ways in (gaps, standing))
         first = (met | anyway).argmax(axis=0)  # of each thing, the moment that tells which of the two is worse
-        worse = np.diagonal((gaps < standing - NEARER)[1 + first])
+        worse = (gaps < standing - NEARER)[1 + first, np.arange(len(first))]
         when = (met & worse).any(axis=1)
         return float(times[int(when.argmax())]) if when.any() else horizon
 
