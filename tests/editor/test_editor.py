@@ -151,8 +151,10 @@ PLACES = {
     "stack.external": Place("scenario", STACK + "external: mine\n  "),
     **{f"stack.{key}": Place("scenario", f"{STACK}{key}:\n    ") for key in (
         "costmap", "local_costmap", "planner", "goal_checker", "progress_checker", "recovery", "velocity_smoother",
-        "collision_monitor",
+        "collision_monitor", "prediction", "latency",
     )},
+    "stack.denoise_layer": Place("scenario", STACK + "costmap:\n    denoise_layer:\n      "),
+    **{f"stack.{each}": Place("scenario", f"{STACK}planner:\n    type: {each}\n    ") for each in ("navfn", "smac_2d")},
     "stack file.stack file": Place("stack", ""),
     "stack file.configuration": Place("config", ""),
     "stack file.stacks": Place("config", "stacks:\n  mine:\n    "),

@@ -36,7 +36,7 @@ class Compared:
 
     def __init__(self, agent: Agent) -> None:
         assert isinstance(agent.stack, InstalledStack) and isinstance(agent.stack.inner, ReferenceStack)
-        (self.prediction, *_) = agent.stack.inner.components["prediction"]
+        (self.prediction,) = (part for name, part, _ in agent.stack.inner.components if name == "prediction")
         self.places: list[float] = []
         self.speeds: list[float] = []
         self.false, self.turning, self.scans = 0, 0, 0

@@ -55,10 +55,12 @@ def test_the_cache_of_worlds_is_told_and_one_of_others_is_ill(tmp_path: Path, mo
 
 
 def test_speed_is_that_of_a_patrol_beside_pybullet(monkeypatch) -> None:
-    parts = {"physics": 1.0}
-    monkeypatch.setattr(bench, "measure_patrol", lambda _: bench.Patrol(60.0, 2.0, parts, 0.5))
+    def patrol(cpu: float, bare: float) -> bench.Patrol:
+        return bench.Patrol(60.0, cpu, {"physics": 1.0}, bare, (cpu,), (bare,), {"physics": (1.0,)})
+
+    monkeypatch.setattr(bench, "measure_patrol", lambda _: patrol(2.0, 0.5))
     assert doctor.speed() == "30 times real time on one core, 4.0 times what PyBullet alone takes"
-    monkeypatch.setattr(bench, "measure_patrol", lambda _: bench.Patrol(60.0, 90.0, parts, 20.0))
+    monkeypatch.setattr(bench, "measure_patrol", lambda _: patrol(90.0, 20.0))
     with pytest.raises(machine.Ill, match="a faster processor"):
         doctor.speed()
 

@@ -107,7 +107,7 @@ def test_a_ros_map_stays_a_file_of_its_own(simscen, room: Path) -> None:
 
 def test_a_world_too_large_for_one_file_is_told(simscen, room: Path) -> None:
     box = "<collision name='c{}'><geometry><box><size>1 1 1</size></box></geometry></collision>"
-    boxes = "".join(box.format(number) for number in range(2001))
+    boxes = "".join(box.format(number) for number in range(10_001))
     model = f"<model name='x'><static>1</static><pose>0 0 1 0 0 0</pose><link name='l'>{boxes}</link></model>"
     (room / "big.sdf").write_text(SDF.format(more=model))
     ended = simscen("world", "convert", "big.sdf", "big.world.yaml")

@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 import simscen.ros2
-from simscen.record.pack import TwistPacker
+from simscen.core.motion import Twist
+from simscen.record import pack
 from simscen.ros2 import cdr
 from simscen.ros2.domain import claim, surroundings
 from simscen.ros2.failure import Failure
@@ -113,9 +114,7 @@ def test_a_velocity_of_another_byte_order_is_read_too() -> None:
 
 
 def test_a_twist_is_written_as_in_the_log() -> None:
-    from simscen.core.motion import Twist
-
-    assert cdr.twist((0.3, 0.1, 0, 0, 0, -0.7)) == TwistPacker()(Twist(0.3, 0.1, -0.7))
+    assert cdr.twist((0.3, 0.1, 0, 0, 0, -0.7)) == pack.twist().packer()(Twist(0.3, 0.1, -0.7))
 
 
 def _alive(pid: int) -> bool:
