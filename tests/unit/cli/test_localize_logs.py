@@ -116,7 +116,8 @@ def test_a_lidar_is_where_tf_static_says_even_upside_down(
     write_map(tmp_path)
     write_bag(tmp_path / "bag", said(mount, base))
     found = localized(simscen, "bag")
-    assert found["error"]["max"] < 0.2
+    assert found["error"]["max"] < 0.25  # in its first metres, where one scan proves little to the default profile
+    assert found["error"]["median"] < 0.1
     assert "note:" not in found["err"]
 
 
