@@ -66,7 +66,8 @@ library: setup  ## Run each shipped scenario with twenty seeds, and write what c
 planners: setup  ## Compare all planners on the same ways, and write the figures into the docs (minutes)
 	@$(BIN)/python tests/planning/compare.py
 
-check: lint types layers schemas  ## Lint, types, layers, drift of schemas and docs
+check: setup  ## Lint, types, layers, drift of schemas and docs
+	@$(MAKE) --no-print-directory -j 2 -O lint types layers schemas
 
 lint: setup
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check --quiet .

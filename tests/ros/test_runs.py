@@ -21,6 +21,11 @@ SCENARIOS = [
 ]
 
 
+def left_out(value: str) -> object:
+    """One of several values that `make test` leaves to `make test-ros`."""
+    return pytest.param(value, marks=pytest.mark.long)
+
+
 def digest(log: Path) -> str:
     return hashlib.sha256(log.read_bytes()).hexdigest()
 
@@ -54,7 +59,11 @@ def test_it_passes_a_scenario_that_ships(ros, run, name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "action", ["navigate_to_pose", pytest.param("navigate_through_poses", marks=pytest.mark.long), "follow_waypoints"]
+    "action",
+    [
+        "navigate_to_pose",
+        *map(left_out, ("navigate_through_poses", "follow_waypoints")),
+    ],
 )
 def test_goals_go_to_an_action_of_nav2(with_interfaces, run, tmp_path: Path, action: str) -> None:
     file = tmp_path / "short.scenario.yaml"
@@ -72,7 +81,8 @@ WAY = "goals: [{name: way, pose: {x: 1.8, y: 1}%s}, {name: end, pose: {x: 2.4, y
 TOURS = {"navigate_through_poses": WAY % "", "follow_waypoints": WAY % ", on_reached: {wait: 1 s}"}
 
 
-@pytest.mark.parametrize("mode", ["navigate_through_poses", pytest.param("follow_waypoints", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("mode", ["navigate_through_poses", "follow_waypoints"])
 def test_the_scenario_says_by_which_action_goals_go(with_interfaces, run, tmp_path: Path, mode: str) -> None:
     head = "simscen: 1\nworld: room.world.yaml\nrobot: {pose: start}\ntime_limit: 90\n"
     tour = f"navigation: {{mode: {mode}, loops: 2}}\n{TOURS[mode]}\npass: [{{goals_reached: {{}}}}]\n"
@@ -103,6 +113,7 @@ def test_runs_in_lockstep_are_equal_bit_for_bit_two_at_a_time(ros, run, repeats:
     assert told == [told[0]] * repeats
 
 
+@pytest.mark.long
 def test_paced_runs_say_so(ros, run) -> None:
     words = ["--sync", "paced", "--factor", "4", "--launch", ros.node("navigator")]
     ended = run(*words, scenario="short.scenario.yaml")
@@ -129,6 +140,7 @@ def test_killing_the_node_is_an_error_of_that_run_only_and_nothing_is_left(ros, 
     assert alive(tag) == []
 
 
+@pytest.mark.long
 def test_a_ros_without_tf2_msgs_and_nav2_msgs_is_driven_by_goal_pose(ros, run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PYTHONPATH", str(NODES.with_name("without")))
     ended = run("--launch", ros.node("navigator"), scenario="short.scenario.yaml")
@@ -160,7 +172,8 @@ pass: [{goals_reached: {goals: [near]}}, {result: {status: CANCELED}}, {collisio
 
 
 @pytest.mark.parametrize(
-    "action", ["", "navigate_to_pose", pytest.param("navigate_through_poses", marks=pytest.mark.long)]
+    "action",
+    ["", *map(left_out, ("navigate_to_pose", "navigate_through_poses"))],
 )
 def test_goals_are_preempted_and_canceled(with_interfaces, run, tmp_path: Path, action: str) -> None:
     (tmp_path / "changes.scenario.yaml").write_text(CHANGES)
