@@ -18,6 +18,7 @@ from simscen.report.picture.compose import write_picture
 from simscen.report.picture.scene import Scene, with_robots
 from simscen.run.keptfiles import KeptFiles, cache_folder
 from simscen.run.keptworlds import KeptWorlds
+from simscen.run.logheader import log_header
 from simscen.run.perform import perform
 from simscen.run.preload import import_components
 from simscen.run.prepare import Prepared
@@ -42,13 +43,15 @@ def main() -> None:
 
 
 def _warm_up(job: Job) -> None:
-    """Prepare the scenario, and import what its runs need.
+    """Prepare the scenario, import what its runs need, and work out what their logs say at the beginning.
 
     Before what is kept takes more than half of the memory there is, it is let go.
     """
     if _memory() > MEMORY_BYTES / 2:
         _PREPARED.clear()
-    import_components(_PREPARED.prepared(job.scenario))
+    prepared = _PREPARED.prepared(job.scenario)
+    import_components(prepared)
+    log_header(prepared, job.key.seed)
 
 
 def _memory() -> int:

@@ -8,9 +8,9 @@ from typing import Any
 
 from simscen.core.run import Run
 from simscen.judge.resultdata import to_json
-from simscen.loading.resolved import resolved_text
 from simscen.run.agent import Log
 from simscen.run.external.build import for_robot
+from simscen.run.logheader import log_header
 from simscen.run.prepare import Prepared
 from simscen.run.simulate import simulate
 from simscen.sim.alone import NAMELESS
@@ -28,7 +28,7 @@ def perform(prepared: Prepared, seed: int, folder: Path, logs: tuple[Log, ...], 
     Returns the end record: the outcome and the log's SHA-256, for the supervisor.
     """
     log = folder / "run.mcap"
-    (folder / "scenario.yaml").write_text(resolved_text(prepared.loaded), encoding="utf-8")
+    (folder / "scenario.yaml").write_text(log_header(prepared, seed).scenario, encoding="utf-8")
     run = simulate(prepared, seed, log=log, attach=lambda *_: logs, printed=folder / "stack.log")
     (folder / "result.json").write_text(to_json(run.result), encoding="utf-8")
     for name, one in (run.robots or {NAMELESS: run}).items():

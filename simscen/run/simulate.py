@@ -15,13 +15,9 @@ from simscen.judge.result import result_of
 from simscen.judge.resultdata import to_json
 from simscen.judge.several import together
 from simscen.loading.discovery import default_root
-from simscen.loading.plugins import fact_of, origin, plugins_of
-from simscen.loading.resolved import resolved_text
+from simscen.loading.plugins import plugins_of
 from simscen.loading.scenario import load_scenario
-from simscen.record.header import CHOSEN, STACK_NAME, VARIATION, LogHeader
 from simscen.record.recorder import Recorder
-from simscen.record.sceneryfile import NAME as SCENERY
-from simscen.record.sceneryfile import scenery_to_json
 from simscen.record.tracebuilder import TraceBuilder
 from simscen.run.agent import Log
 from simscen.run.assemble import assemble
@@ -29,11 +25,9 @@ from simscen.run.blame import blamed
 from simscen.run.external.stack import ExternalStack
 from simscen.run.faultymap import with_faulty_map
 from simscen.run.lockstep import Rig, run_lockstep
+from simscen.run.logheader import log_header
 from simscen.run.prepare import Prepared, prepare
-from simscen.run.scenery import scenery_of
-from simscen.run.sensornames import sensor_frames, sensor_kinds
 from simscen.sim.alone import NAMELESS
-from simscen.sim.urdf.describe import describe
 
 Attach = Callable[[Rig, Sequence[Log]], Sequence[Log]]
 """Is shown the rig and the logs of its first robot before the first beat; what it returns listens to that, too."""
@@ -154,31 +148,3 @@ def _judged(prepared: Prepared, seed: int, trace: Trace, log: Path | None) -> Ru
         expected=loaded.expectation,
     )
     return Run(replace(result, stack=loaded.stack), trace, prepared.case, log)
-
-
-def log_header(prepared: Prepared, seed: int) -> LogHeader:
-    """What the log says about the run."""
-    header, parts = _log_header(prepared, seed), prepared.robots.items()
-    header = replace(header, files={SCENERY: scenery_to_json(scenery_of(prepared))})
-    return replace(header, robots={name: _log_header(part, seed) for name, part in parts}) if parts else header
-
-
-def _log_header(prepared: Prepared, seed: int) -> LogHeader:
-    return LogHeader(
-        name=prepared.loaded.id,
-        seed=seed,
-        case=prepared.case,
-        scenario=resolved_text(prepared.loaded),
-        map=prepared.map,
-        robot_description=describe(prepared.body),
-        frames=sensor_frames(prepared.robot),
-        sensors=sensor_kinds(prepared),
-        facts={**_key_facts(prepared), **{fact_of(entry): origin(entry) for entry in plugins_of(prepared.loaded)}},
-    )
-
-
-def _key_facts(prepared: Prepared) -> dict[str, str]:
-    """The stack that was chosen in place of the scenario's own, as it was given, and what the run is called."""
-    loaded = prepared.loaded
-    told = {CHOSEN: loaded.stack, STACK_NAME: loaded.stack_name, VARIATION: loaded.variation}
-    return {name: value for name, value in told.items() if value}
