@@ -29,6 +29,7 @@ from simscen.run.process.whereabouts import settle_in
 from simscen.run.process.worker import Progress
 from simscen.run.process.zygote import Zygote
 from simscen.run.scenery import scenery_of
+from simscen.sim.engine import make_ahead
 
 _PREPARED = PreparedCache(KeptWorlds(KeptFiles(cache_folder(os.environ))))
 Image.preinit()  # imports what it would import when the first picture is written
@@ -43,7 +44,7 @@ def main() -> None:
 
 
 def _warm_up(job: Job) -> None:
-    """Prepare the scenario, import what its runs need, and work out what their logs say at the beginning.
+    """Prepare the scenario, import what its runs need, and make what is the same in all of them.
 
     Before what is kept takes more than half of the memory there is, it is let go.
     """
@@ -52,6 +53,7 @@ def _warm_up(job: Job) -> None:
     prepared = _PREPARED.prepared(job.scenario)
     import_components(prepared)
     log_header(prepared, job.key.seed)
+    make_ahead()
 
 
 def _memory() -> int:

@@ -23,7 +23,6 @@ class BareWorld:
         self, static: TriangleMesh | Sequence[Solid], robot: RobotBody, pose: Pose2, triangulate: engine.Triangulate
     ) -> None:
         self._client = engine.connect(240, 10)
-        engine.ground(self._client)
         if isinstance(static, TriangleMesh):
             engine.static_mesh(self._client, static)
         else:

@@ -56,7 +56,6 @@ class Simulation:
         the engine has no primitive for.
         """
         client = engine.connect(tick_rate, solver_iterations, one_by_one=len(robots) > 1)
-        engine.ground(client)
         terrain = Terrain(client, static, max((w.radius for r in robots.values() for w in r.body.wheels), default=0.0))
         fixed = engine.static_mesh(client, terrain.rest)
         film, actors = Film(client, static, triangulate), Actors(client, tick_rate, triangulate)
