@@ -6,7 +6,7 @@ brackets. Its event parser has none of these: it is a state machine, and we stop
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import yaml
 from yaml import events as ev
@@ -30,9 +30,12 @@ class _Refused(Exception):
         self.problem = problem
 
 
-def compose(text: str, path: str) -> tuple[Node | None, list[Problem]]:
-    """The only document of `text` as a tree, and every problem found; the tree is None where there is none."""
-    composer = _Composer(path, text)
+def compose(text: str, path: str, *, last_wins: bool = False) -> tuple[Node | None, list[Problem]]:
+    """The only document of `text` as a tree, and every problem found; the tree is None where there is none.
+
+    With `last_wins` the last of two equal keys counts, which is worth a warning: so ROS 2 reads its files.
+    """
+    composer = _Composer(path, text, last_wins)
     try:
         root = composer.document()
     except _Refused as refused:
@@ -53,6 +56,7 @@ class _Anchor:
 class _Composer:
     path: str
     text: str
+    last_wins: bool = False
     problems: list[Problem] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -133,9 +137,10 @@ class _Composer:
             height = max(height, below)
             if key == "<<" and isinstance(value, Fields | Items):
                 merged.extend(value.items if isinstance(value, Items) else [value])
-            elif key in entries:
+                continue
+            if key in entries:
                 self._duplicate(event, key, entries[key].key)
-            else:
+            if self.last_wins or key not in entries:
                 entries[key] = Entry(self._place(event), value)
         return Fields(self._place(start), self._merge(start, entries, merged)), height + 1
 
@@ -181,9 +186,12 @@ class _Composer:
             )
 
     def _duplicate(self, event: ev.Event, key: str, first: Place) -> None:
-        hint = "remove one of the two"
         message = f"duplicate key `{key}` (first at {first.line}:{first.col})"
-        self.problems.append(self._problem(event, "SC007", message, hint))
+        if self.last_wins:
+            twice = self._problem(event, "SC007", message, "this one counts, as in ROS 2")
+            self.problems.append(replace(twice, severity="warning"))
+        else:
+            self.problems.append(self._problem(event, "SC007", message, "remove one of the two"))
 
     def _place(self, event: ev.Event) -> Place:
         mark = event.start_mark

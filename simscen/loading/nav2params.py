@@ -12,16 +12,22 @@ from simscen.loading.tree import Fields, Node, Place
 from simscen.ros2.nav2 import Offer, check
 
 PARAMETERS = "ros__parameters"
+EVERY_NODE = "**"
 
 
 @dataclass(frozen=True)
 class Nav2Parameters:
-    """Node → parameter with dots → value, and where each stands; `shown` is the file for people."""
+    """Node → parameter with dots → value, and where each stands; `shown` is the file for people.
+
+    What `/**` says is said to every node of the file. `notes` are keys that stand there twice: the last counts, as in
+    ROS 2.
+    """
 
     shown: str
     nodes: Mapping[str, Mapping[str, Any]]
     places: Mapping[tuple[str, str], Place]
     text: str
+    notes: tuple[Problem, ...] = ()
 
     def problems(self, offer: Offer) -> list[Problem]:
         """What does not fit, in the order of the file."""
@@ -44,20 +50,23 @@ def read_nav2_parameters(path: Path, shown: str = "") -> Nav2Parameters | list[P
     text = read_text(path, shown)
     if isinstance(text, Problem):
         return [text]
-    tree, problems = compose(text, shown)
-    if problems or tree is None:
-        return problems
+    tree, problems = compose(text, shown, last_wins=True)
+    notes = tuple(problem for problem in problems if problem.severity == "warning")
+    if len(notes) < len(problems) or tree is None:
+        return [problem for problem in problems if problem not in notes]
     found = dict(_nodes(tree, ""))
     if not found:
         return [Problem(shown, 0, 0, "SC340", f"no parameters of nodes: there is no key {PARAMETERS} in it")]
     nodes: dict[str, dict[str, Any]] = {}
     places: dict[tuple[str, str], Place] = {}
-    for name, parameters in found.items():
+    everybodys = found.pop(EVERY_NODE, None)
+    for name, parameters in found.items() if found else ((EVERY_NODE, Fields(Place(shown, 0, 0), {})),):
         nodes[name] = {}
-        for key, value in _flat(parameters, ""):
-            nodes[name][key] = value.plain
-            places[name, key] = value.place
-    return Nav2Parameters(shown, nodes, places, text)
+        for said in (everybodys, parameters):
+            for key, value in _flat(said, "") if said else ():
+                nodes[name][key] = value.plain
+                places[name, key] = value.place
+    return Nav2Parameters(shown, nodes, places, text, notes)
 
 
 def _nodes(node: Node, name: str) -> Iterator[tuple[str, Fields]]:

@@ -8,7 +8,8 @@ from pydantic import BaseModel
 
 from simscen.core.problems import Problem
 from simscen.loading.document import Library, merge
-from simscen.loading.nav2nodes import Found, Known, found, strangers
+from simscen.loading.nav2found import Found, Known
+from simscen.loading.nav2nodes import found, strangers
 from simscen.loading.nav2params import Nav2Parameters, read_nav2_parameters
 from simscen.loading.paths import Refusal
 from simscen.loading.tree import Entry, Fields, Items, Leaf, Node, Place, child, value_place
@@ -65,7 +66,7 @@ def with_parameters(stack: Fields, library: Library, taken: Taken) -> Fields:
     for one in found_here:
         if one.path:
             below = merge(below, _nested(one, parameters))
-    taken.notes += sorted(_notes(found_here, parameters))
+    taken.notes += sorted({*parameters.notes, *_notes(found_here, parameters)})
     return merge(stack, below)
 
 
@@ -89,14 +90,22 @@ def _notes(found_here: Sequence[Found], parameters: Nav2Parameters) -> Iterator[
     for one in found_here:
         if one.why:
             yield _note(parameters.places[one.node, one.parameter], f"{one.node}: `{one.parameter}`: {one.why}")
+    used = {parameters.places[one.node, one.parameter] for one in found_here if one.path}
     for node in parameters.nodes:
-        names = [one.parameter for one in found_here if one.node == node and not one.path and not one.why]
-        if names:
-            told = f"{node}: nothing here is like {', '.join(names)}"
-            yield _note(parameters.places[node, names[0]], told)
+        places = [
+            (parameters.places[node, one.parameter], one.parameter)
+            for one in found_here
+            if one.node == node
+            and not one.path
+            and not one.why
+            and parameters.places[node, one.parameter] not in used  # what every node is told concerns some
+        ]
+        if places:
+            told = ", ".join(f"{name} ({place.line})" for place, name in sorted(places))
+            yield _note(min(places)[0], f"{node}: nothing here is like {told}")
     for node in strangers(parameters.nodes):
-        places = [place for (name, _), place in parameters.places.items() if name == node]
-        yield from (_note(place, f"nothing here is like the node {node}") for place in places[:1])
+        places_of = [place for (name, _), place in parameters.places.items() if name == node]
+        yield _note(min(places_of), f"nothing here is like the node {node}")
 
 
 def _note(place: Place, message: str) -> Problem:

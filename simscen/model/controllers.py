@@ -26,6 +26,8 @@ from simscen.spec.quantities import (
 )
 
 Deceleration = Annotated[float, Field(ge=-1000, lt=0), Quantity("acceleration")]
+SidewaysAcceleration = Annotated[float, Field(ge=0, le=1000), Quantity("acceleration")]
+SidewaysDeceleration = Annotated[float, Field(ge=-1000, le=0), Quantity("acceleration")]
 AngularDeceleration = Annotated[float, Field(ge=-1000, lt=0), Quantity("angular acceleration")]
 
 
@@ -118,22 +120,22 @@ class DynamicWindow(ControllerSpec):
     """What turns slower than this must move by at least `min_speed_xy`."""
     acc_lim_x: PositiveAcceleration | None = None
     """Default: the robot's own limit; so are those below."""
-    acc_lim_y: PositiveAcceleration | None = None
-    """Sideways."""
+    acc_lim_y: SidewaysAcceleration | None = None
+    """Sideways; 0 for a base that cannot."""
     acc_lim_theta: PositiveAngularAcceleration | None = None
     """Of its turn rate."""
     decel_lim_x: Deceleration | None = None
     """Towards lower speeds, negative."""
-    decel_lim_y: Deceleration | None = None
-    """Sideways, to the right, negative."""
+    decel_lim_y: SidewaysDeceleration | None = None
+    """Sideways, to the right, negative; 0 for a base that cannot."""
     decel_lim_theta: AngularDeceleration | None = None
     """Of its turn rate, to the right, negative."""
-    vx_samples: Annotated[int, Field(ge=2, le=200)] = 20
-    """Speeds forward that are tried."""
-    vy_samples: Annotated[int, Field(ge=1, le=200)] = 5
-    """Speeds sideways that are tried, where the base can do any."""
-    vtheta_samples: Annotated[int, Field(ge=2, le=200)] = 20
-    """Turn rates that are tried."""
+    vx_samples: Annotated[int, Field(ge=0, le=200)] = 20
+    """Speeds forward that are tried; two at least, as in Nav2."""
+    vy_samples: Annotated[int, Field(ge=0, le=200)] = 5
+    """Speeds sideways that are tried, where the base can do any; two at least, as in Nav2."""
+    vtheta_samples: Annotated[int, Field(ge=0, le=200)] = 20
+    """Turn rates that are tried; two at least, as in Nav2."""
     sim_time: PositiveDuration = 1.7
     """How far ahead each is followed."""
     linear_granularity: Annotated[Length, Field(ge=0.01, le=10)] = 0.05

@@ -98,7 +98,7 @@ def test_what_the_scenario_says_wins(tmp_path: Path) -> None:
     assert other.controller.type == "dwb"
 
 
-NOT_OURS = ("precise.path_length_tolerance", "FollowPath.min_distance_to_obstacle")
+NOT_OURS = "precise.path_length_tolerance (12), FollowPath.min_distance_to_obstacle (17)"
 
 
 def test_what_has_no_counterpart_is_named_where_it_stands(tmp_path: Path) -> None:
@@ -106,9 +106,9 @@ def test_what_has_no_counterpart_is_named_where_it_stands(tmp_path: Path) -> Non
     told = [(note.line, note.message) for note in loaded(tmp_path, "stack: {nav2_params: nav2.yaml}").notes]
     assert all("SC341" in note for note in notes)
     assert told == [
-        (12, f"controller_server: nothing here is like {', '.join(NOT_OURS)}"),
-        (37, "collision_monitor: `Stop.action_type`: there is no polygon that does stop here"),
-        (40, "behavior_server: nothing here is like cycle_frequency"),
+        (12, f"controller_server: nothing here is like {NOT_OURS}"),
+        (36, "collision_monitor: `polygons`: there is no polygon that does stop here, as Stop does"),
+        (40, "behavior_server: nothing here is like cycle_frequency (40)"),
         (42, "nothing here is like the node docking_server"),
     ]
 
@@ -173,3 +173,91 @@ def test_a_stack_file_may_take_its_parameters_from_one(tmp_path: Path) -> None:
     choice = load_stack_file("ours", "ours.stack.yaml", tmp_path / "ours.stack.yaml", tmp_path)
     assert choice.section is not None
     assert choice.section.plain["controller"]["desired_linear_vel"] == 0.4
+
+
+HUMBLE = """\
+/**:
+  ros__parameters: {use_sim_time: true, failure_tolerance: 0.7}
+amcl:
+  ros__parameters: {robot_model_type: "differential", set_initial_pose: true, max_beams: 30, max_beams: 40}
+/bot/controller_server:
+  ros__parameters:
+    progress_checker_plugin: "slow"
+    goal_checker_plugins: ["general_goal_checker", "precise"]
+    controller_plugins: ["FollowPath"]
+    slow: {plugin: "nav2_controller::SimpleProgressChecker", movement_time_allowance: 25.0}
+    general_goal_checker: {plugin: "nav2_controller::SimpleGoalChecker", yaw_goal_tolerance: 0.4}
+    precise: {plugin: "nav2_controller::SimpleGoalChecker", yaw_goal_tolerance: 0.1}
+    FollowPath:
+      plugin: "dwb_core::DWBLocalPlanner"
+      acc_lim_y: 0.0
+      decel_lim_y: 0.0
+      vy_samples: 0
+      critics: ["RotateToGoal", "Oscillation", "BaseObstacle", "PathDist", "GoalDist", "PreferForward"]
+      PathDist.scale: 30.0
+global_costmap:
+  global_costmap:
+    ros__parameters:
+      robot_radius: 0.22
+      rolling_window: true
+      plugins: ["obstacle_layer"]
+      obstacle_layer:
+        plugin: "nav2_costmap_2d::ObstacleLayer"
+        observation_sources: scan
+        scan: {obstacle_max_range: 4.0, clearing: false}
+        old: {obstacle_max_range: 9.0}
+      static_layer: {plugin: "nav2_costmap_2d::StaticLayer"}
+recoveries_server:
+  ros__parameters: {simulate_ahead_time: 1.5}
+collision_monitor:
+  ros__parameters:
+    polygons: ["Near"]
+    Near: {action_type: "approach", enabled: false, max_points: 3}
+"""
+
+
+def test_a_file_of_humble_is_read_as_humble_meant_it(tmp_path: Path) -> None:
+    stack = loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", HUMBLE).spec.stack
+    drives = stack.controller
+    assert (stack.localizer.robot_model, stack.localizer.max_beams) == ("differential", 40)
+    assert (stack.failure_tolerance, stack.progress_checker.movement_time_allowance) == (0.7, 25.0)
+    assert stack.goal_checker.yaw_goal_tolerance == 0.4
+    assert (drives.type, drives.acc_lim_y, drives.decel_lim_y, drives.vy_samples) == ("dwb", 0.0, 0.0, 0)
+    assert (drives.path_dist_scale, drives.path_align_scale, drives.goal_align_scale) == (30.0, 0.0, 0.0)
+    assert (stack.costmap.obstacle_max_range, stack.recovery.simulate_ahead_time) == (4.0, 1.5)
+    assert (stack.collision_monitor.enabled, stack.collision_monitor.min_points) == (False, 4)
+
+
+def test_every_parameter_that_changes_nothing_here_is_named_with_its_line(tmp_path: Path) -> None:
+    told = [(note.line, note.message) for note in loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", HUMBLE).notes]
+    assert told == [
+        (4, "amcl: `set_initial_pose`: the scenario says where the robot begins"),
+        (4, "duplicate key `max_beams` (first at 4:79)"),
+        (8, "controller_server: `goal_checker_plugins`: there is one goal_checker here, which is general_goal_checker,"
+         " and no precise"),
+        (18, "controller_server: `FollowPath.critics`: there is no PreferForward here"),
+        (23, "global_costmap: `robot_radius`: the robot's file says how large it is"),
+        (24, "global_costmap: `rolling_window`: the local costmap always rolls, the global one with `map: none`"),
+        (29, "global_costmap: nothing here is like obstacle_layer.scan.clearing (29),"
+         " obstacle_layer.old.obstacle_max_range (30)"),
+        (31, "global_costmap: `static_layer.plugin`: `plugins` does not name static_layer"),
+    ]  # fmt: skip
+
+
+def test_a_rotation_shim_leaves_its_controller_to_drive_alone(tmp_path: Path) -> None:
+    shimmed = """\
+controller_server:
+  ros__parameters:
+    FollowPath:
+      plugin: "nav2_rotation_shim_controller::RotationShimController"
+      primary_controller:
+        plugin: "nav2_mppi_controller::MPPIController"
+        motion_model: "Ackermann"
+        AckermannConstraints: {min_turning_r: 0.6}
+        critics: ["CostCritic", "GoalCritic", "MineCritic"]
+"""
+    found = loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", shimmed)
+    drives = found.spec.stack.controller
+    assert (drives.type, drives.motion_model, drives.min_turning_r) == ("mppi", "Ackermann", 0.6)
+    assert drives.critics == ["CostCritic", "GoalCritic"]
+    assert [note.line for note in found.notes] == [6, 9]
