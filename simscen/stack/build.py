@@ -18,11 +18,12 @@ from simscen.stack.installed.goal_checker import InstalledGoalChecker
 from simscen.stack.installed.localizer import InstalledLocalizer
 from simscen.stack.installed.planner import InstalledPlanner
 from simscen.stack.installed.stack import InstalledStack
+from simscen.stack.installed.watched import made
 from simscen.stack.navigator import Navigator
 from simscen.stack.plan_keeper import PlanKeeper
 from simscen.stack.prediction.motion_prediction import MotionPrediction
 from simscen.stack.progress_checker import ProgressChecker
-from simscen.stack.protocols import Behavior, Localizer, Surroundings
+from simscen.stack.protocols import Behavior, Controller, Localizer, Surroundings
 from simscen.stack.recovery import RoundRobin
 from simscen.stack.reference import ReferenceStack
 from simscen.stack.setting import Setting
@@ -68,7 +69,7 @@ def reference_stack(spec: StackSpec, setting: Setting) -> ReferenceStack:
         name="controller",
         resolution=spec.local_costmap.completed(spec.costmap).resolution,
     )
-    controller = InstalledController(spec.controller, driving)
+    controller: Controller = made(InstalledController, spec.controller, driving)
     costmaps = Costmaps(spec, surroundings, controller.full_speed * spec.controller.looks_ahead, latency["costmap"])
     driving = replace(driving, clear_costmap=costmaps.clear, clear_around=costmaps.clear_around)
     planning = replace(driving, name="planner", resolution=costmaps.wide.view.resolution)
@@ -85,7 +86,7 @@ def reference_stack(spec: StackSpec, setting: Setting) -> ReferenceStack:
         plans,
         controller,
         RoundRobin(_behaviors(spec.recovery, driving), spec.recovery),
-        InstalledGoalChecker(spec.goal_checker, driving.named("goal_checker")),
+        made(InstalledGoalChecker, spec.goal_checker, driving.named("goal_checker")),
         ProgressChecker(spec.progress_checker),
         costmaps,
         setting.control_period,
@@ -100,7 +101,7 @@ def reference_stack(spec: StackSpec, setting: Setting) -> ReferenceStack:
     )
     return ReferenceStack(
         surroundings,
-        setting.heard(InstalledLocalizer(spec.localizer, driving.named("localizer"))),
+        setting.heard(made(InstalledLocalizer, spec.localizer, driving.named("localizer"))),
         costmaps,
         controller,
         navigator,

@@ -46,10 +46,10 @@ class Commands:
 
     def step(self, tick: int, odometry: Pose2) -> None:
         """Time has come to this tick, and the robot to this pose in the odom frame."""
-        for wanted, periods in self._wanted.take(tick):
-            self._allowed.put(tick, self._guarded(tick, wanted, periods, odometry))
-        for allowed in self._allowed.take(tick):
-            self.sent = allowed
+        while tick >= self._wanted.due:
+            self._allowed.put(tick, self._guarded(tick, *self._wanted.take(), odometry))
+        while tick >= self._allowed.due:
+            self.sent = self._allowed.take()
 
     def held(self, tick: int) -> bool:
         """Whether the monitor has allowed nothing for its `hold_timeout`; once told, the waiting begins anew."""

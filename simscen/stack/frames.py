@@ -1,8 +1,7 @@
 """Where the robot is, in the map frame and in the odom frame: what tf2 would know."""
 
 import math
-from dataclasses import dataclass
-from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,8 +9,7 @@ from simscen.core.geometry import Array, Pose2, wrap, wrap_array
 from simscen.core.world import Polygon
 
 
-@dataclass(frozen=True)
-class Frames:
+class Frames(NamedTuple):
     """Where the robot is now: `pose` in the map frame, as believed, and `odometry` in the odom frame, as rolled.
 
     Corrections of the localizer make `pose` jump; `odometry` never jumps, but drifts.
@@ -20,12 +18,12 @@ class Frames:
     pose: Pose2
     odometry: Pose2
 
-    @cached_property
+    @property
     def map_from_odom(self) -> Pose2:
         """The correction that a localizer publishes."""
         return self.pose.compose(self.odometry.inverse())
 
-    @cached_property
+    @property
     def odom_from_map(self) -> Pose2:
         """Its inverse."""
         return self.odometry.compose(self.pose.inverse())

@@ -1,5 +1,6 @@
 """Where odometry was at any recent tick, as tf knows it: a scan that comes late was taken from there."""
 
+import math
 from bisect import bisect_left, bisect_right
 
 from simscen.core.geometry import Pose2
@@ -23,6 +24,7 @@ class OdometryHistory:
         self._span = KEPT * tick_rate
         self._ticks: list[int] = []
         self._poses: list[Pose2] = []
+        self._newest: float = -math.inf
         self.now = Pose2(0.0, 0.0)
         """The newest pose; the origin before there is any."""
 
@@ -31,24 +33,24 @@ class OdometryHistory:
 
     def add(self, tick: int, pose: Pose2) -> bool:
         """Take a reading in; False when it is of no use: not a place, or not newer than the last one."""
-        ticks = self._ticks
-        if not believable(pose) or (ticks and tick <= ticks[-1]):
+        if tick <= self._newest or not believable(pose):
             return False
+        ticks, oldest = self._ticks, tick - self._span
         ticks.append(tick)
         self._poses.append(pose)
-        self.now = pose
-        if ticks[0] < tick - self._span:
-            old = bisect_left(ticks, tick - self._span)
+        self._newest, self.now = tick, pose
+        if ticks[0] < oldest:
+            old = bisect_left(ticks, oldest)
             del ticks[:old], self._poses[:old]
         return True
 
     def reaches(self, tick: int) -> bool:
         """Whether there is odometry at `tick` or later."""
-        return bool(self._ticks) and self._ticks[-1] >= tick
+        return self._newest >= tick
 
     def held(self, tick: int) -> Pose2:
         """The newest pose up to `tick`, for who cannot wait for the next; the oldest known before that."""
-        if not self._ticks or tick >= self._ticks[-1]:
+        if tick >= self._newest:
             return self.now
         return self._poses[max(0, bisect_right(self._ticks, tick) - 1)]
 

@@ -108,11 +108,10 @@ class ReferenceStack:
     def decide(self, tick: int, readings: Readings) -> Decision:
         """Take the readings of this beat and say what to drive."""
         self._tick = tick
-        scanned = self._take(readings)
-        controls = tick % self._control_period == 0
+        scanned = self._take(tick, readings)
         local_plan: Path | None = None
         costmaps: tuple[CostGrid, ...] = ()
-        if controls:
+        if controls := tick % self._control_period == 0:
             frames = self._frames()
             self._update_costmaps(tick, frames)
             self._monitor.on_moving(self._prediction.around(tick))
@@ -123,7 +122,7 @@ class ReferenceStack:
         sent = self._commands.sent
         if sent is not self._nothing.command:
             self._nothing = Decision(sent)
-        elif not controls and not readings and not self._events:
+        if not controls and not readings and not self._events:
             return self._nothing
         belief, plan = self._publishing.belief(tick, scanned), self._publishing.plan(self.plan)
         if belief is None and plan is None and local_plan is None and not costmaps and not self._events:
@@ -131,10 +130,10 @@ class ReferenceStack:
         events, self._events = tuple(self._events), []
         return Decision(sent, belief, plan, local_plan, events, costmaps=costmaps)
 
-    def _take(self, readings: Readings) -> bool:
+    def _take(self, tick: int, readings: Readings) -> bool:
         """Hand the readings on; whether there was a scan among them."""
         scans: list[Scan] = []
-        self._match()
+        self._match(tick)
         for reading in readings:
             match reading:
                 case Odometry():
@@ -145,8 +144,8 @@ class ReferenceStack:
                     self._prediction.on_imu(reading)
                 case Scan():
                     if reading.sensor in self._lidars:  # echoes of a sonar show obstacles, but no walls to match
-                        self._matched.put(self._tick, reading)
-                        self._match()
+                        self._matched.put(tick, reading)
+                        self._match(tick)
                     scans.append(reading)
                 case Image() if reading.field_of_view > 0.0:
                     self._costmaps.see(reading)
@@ -159,10 +158,10 @@ class ReferenceStack:
             self._costmaps.see(marking)
         return bool(scans)
 
-    def _match(self) -> None:
+    def _match(self, tick: int) -> None:
         """The localizer is done with these scans by now: so much later it knows what they are worth."""
-        for scan in self._matched.take(self._tick):
-            self._localizer.on_scan(scan)
+        while tick >= self._matched.due:
+            self._localizer.on_scan(self._matched.take())
 
     def _dead_reckon(self, reading: Odometry) -> None:
         """Remember the way the robot took; the truth only stands in for wheels where there are none."""
@@ -170,9 +169,8 @@ class ReferenceStack:
             return
         if reading.sensor != TRUTH and not self._wheels:
             self._wheels, self._odometry = True, OdometryHistory(self._tick_rate)
-        if believable(reading.pose) and believable(reading.twist):
+        if believable(reading.twist) and self._odometry.add(reading.tick, reading.pose):
             self._twist = reading.twist
-            self._odometry.add(reading.tick, reading.pose)
             self._prediction.on_odometry(reading.tick, reading.pose)
 
     def _frames(self) -> Frames:

@@ -114,7 +114,10 @@ class _Rhythm:
                 if isinstance(one, Image) or not np.isnan(one.ranges).all():
                     self._underway.put(tick, (odometry.then(base, one.tick), one, frames))
             self.seen.clear()
-        return self._underway.take(tick)
+        there: list[_View] = []
+        while tick >= self._underway.due:
+            there.append(self._underway.take())
+        return there
 
 
 _View = tuple[Pose2, Scan | Image, Frames]

@@ -2,7 +2,7 @@
 
 import math
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, ClassVar, NoReturn, ParamSpec, TypeVar
 
 import numpy as np
@@ -17,7 +17,18 @@ from simscen.stack.setting import Setting
 
 P = ParamSpec("P")
 T = TypeVar("T")
-NUMBER = (float, int)
+
+
+S = TypeVar("S", bound=Component)
+
+
+def made(door: Callable[[S, Setting], T], spec: S, setting: Setting) -> T:
+    """A component: behind its door when it is of a package of others, by itself when it ships.
+
+    A stack of shipped parts has one door, its own, which looks at what is decided rather than at every answer.
+    """
+    component: T = (spec.implementation() if spec.component.startswith("simscen.") else door)(spec, setting)
+    return component
 
 
 class Watched:
@@ -80,18 +91,13 @@ class Watched:
         """A velocity of three finite numbers."""
         if not isinstance(command, Twist):
             self.broke(f"commanded {type(command).__name__} instead of a Twist")
-        vx, vy, wz = command
-        try:
-            finite = math.isfinite(vx) and math.isfinite(vy) and math.isfinite(wz)
-        except TypeError:
-            finite = False
-        if not finite:
+        if not are_numbers(command):
             self.broke(f"commanded {tuple(command)}, which is no velocity")
         return command
 
     def checked_pose(self, pose: object, what: str) -> Pose2:
         """A pose of three finite numbers."""
-        if not isinstance(pose, Pose2) or not (is_finite(pose[0]) and is_finite(pose[1]) and is_finite(pose[2])):
+        if not isinstance(pose, Pose2) or not are_numbers(pose):
             self.broke(f"{what} {pose!r}, which is no finite pose")
         return pose
 
@@ -109,9 +115,12 @@ def promised(protocol: type) -> list[str]:
     return [name for name, what in vars(protocol).items() if callable(what) and not name.startswith("_")]
 
 
-def is_finite(value: object) -> bool:
-    """Whether this is a number, and neither nan nor infinite."""
-    return isinstance(value, NUMBER) and math.isfinite(value)
+def are_numbers(values: Iterable[object]) -> bool:
+    """Whether these are real numbers, and none of them nan or infinite."""
+    try:
+        return math.isfinite(math.hypot(*values))  # type: ignore[arg-type]  # what is none raises
+    except TypeError:
+        return False
 
 
 def all_finite(values: Array) -> bool:

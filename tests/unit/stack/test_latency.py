@@ -104,7 +104,7 @@ def test_a_localizer_is_handed_scans_when_it_would_be_done_with_them_with_the_ti
     d = start(localizer=0.05)
     heard: list[tuple[int, int]] = []
     localizer = d.stack.inner._localizer
-    localizer.inner.on_scan = lambda scan: heard.append((d.tick, scan.tick))
+    localizer.on_scan = lambda scan: heard.append((d.tick, scan.tick))
     d.run(0.5)
     assert {now - then for now, then in heard} == {12}
 
@@ -113,7 +113,10 @@ def test_what_is_under_way_is_there_after_its_time_and_in_order() -> None:
     underway = Underway[str](5)
     underway.put(0, "a")
     underway.put(3, "b")
-    assert underway.take(4) == []
+    assert underway.due == 5
     assert underway.busy(4)
-    assert underway.take(8) == ["a", "b"]
+    assert underway.take() == "a"
+    assert underway.due == 8
+    assert underway.take() == "b"
+    assert underway.due == math.inf
     assert not underway.busy(8)
