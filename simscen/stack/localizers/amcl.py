@@ -33,8 +33,13 @@ class _Correction:
     tick: int
 
     @cached_property
+    def before(self) -> Pose2:
+        """The odom frame seen from where the robot was then."""
+        return self.odometry.inverse()
+
+    @cached_property
     def map_from_odom(self) -> Pose2:
-        return self.pose.compose(self.odometry.inverse())
+        return self.pose.compose(self.before)
 
 
 class AmclLocalizer:
@@ -100,7 +105,7 @@ class AmclLocalizer:
         """The last correction, carried on by odometry."""
         if self._belief is None:
             last, now = self._correction, self._odometry.now if self._odometry else self._correction.odometry
-            covariance = self._motion.carry(last.covariance, last.pose.yaw, last.odometry.between(now))
+            covariance = self._motion.carry(last.covariance, last.pose.yaw, last.before.compose(now))
             pose = last.map_from_odom.compose(now)
             self._belief = Belief(pose, covariance, last.map_from_odom, self._filter.particles.table, last.tick)
         return self._belief

@@ -24,11 +24,11 @@ def opaque_field(grid: OccupancyGrid, max_distance: float) -> DistanceField:
 
 def cast_rays(field: DistanceField, poses: Array, beams: Beams) -> Array:
     """Ranges (n, b) in m that `beams` would measure from robot `poses` (n, 3), to within half a cell."""
-    x, y, heading = (column[:, None].astype(np.float64) for column in field.coordinates(poses))
-    (forward, left), c, s, cell = beams.origin, np.cos(heading), np.sin(heading), field.resolution
-    angle = heading + beams.bearings
-    x = np.broadcast_to(x + (forward * c - left * s) / cell, angle.shape).ravel()
-    y = np.broadcast_to(y + (forward * s + left * c) / cell, angle.shape).ravel()
+    places, heading = (values.astype(np.float64)[..., None] for values in field.coordinates(poses))
+    forward, left, c, s = beams.origin.real, beams.origin.imag, np.cos(heading), np.sin(heading)
+    angle, cell = heading + beams.bearings, field.resolution
+    x = np.broadcast_to(places[0] + (forward * c - left * s) / cell, angle.shape).ravel()
+    y = np.broadcast_to(places[1] + (forward * s + left * c) / cell, angle.shape).ravel()
     flown = _march(field, x, y, angle.ravel(), beams.range_max / cell)
     ranges: Array = flown.reshape(angle.shape) * cell
     return ranges

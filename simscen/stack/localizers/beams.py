@@ -1,7 +1,8 @@
 """The beams of a scan that a particle filter looks at."""
 
+import cmath
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -9,30 +10,38 @@ import numpy.typing as npt
 from simscen.core.geometry import Array
 from simscen.core.sensing import Scan
 
+Plane = npt.NDArray[np.complex128]
+"""Points or directions x + iy: turned by a product, placed by a sum."""
+
 
 @dataclass(frozen=True, eq=False)
 class Beams:
     """Beams that gave an answer.
 
-    `ranges` (b,) in m, at most `range_max`, which means that nothing was hit; `bearings` (b,) in the base frame in
-    rad; `origin` is the lidar's place in the base frame.
+    `ranges` (b,) in m, at most `range_max`, which means that nothing was hit; `towards` (b,) are unit vectors along
+    them in the base frame; `origin` is the lidar's place in the base frame.
     """
 
     ranges: Array
-    bearings: Array
-    origin: tuple[float, float]
+    towards: Plane
+    origin: complex
     range_max: float
 
-    def ends(self) -> Array:
-        """Where the beams that hit something ended: points (m, 2) in the base frame."""
-        hit = self.ranges < self.range_max
-        ranges, bearings = self.ranges[hit], self.bearings[hit]
-        return np.column_stack((ranges * np.cos(bearings), ranges * np.sin(bearings))) + self.origin
+    @property
+    def bearings(self) -> Array:
+        """Directions (b,) of the beams in the base frame, in rad."""
+        return np.angle(self.towards)
+
+    @cached_property
+    def ends(self) -> Plane:
+        """Where the beams that hit something ended: points (m,) in the base frame."""
+        hit = np.flatnonzero(self.ranges < self.range_max)
+        return self.ranges.take(hit) * self.towards.take(hit) + self.origin
 
 
-def directions(scan: Scan) -> Array:
-    """Unit vectors (n, 2) along the beams of a scan, in the lidar's frame; not to be written to."""
-    return _directions(scan.angle_min, scan.angle_increment, len(scan.ranges))
+def directions(scan: Scan) -> Plane:
+    """Unit vectors (n,) along the beams of a scan, in the base frame; not to be written to."""
+    return _directions(scan.angle_min, scan.angle_increment, len(scan.ranges), scan.mount.yaw)
 
 
 @lru_cache(maxsize=1024)
@@ -44,10 +53,10 @@ def evenly(count: int, most: int) -> npt.NDArray[np.int64]:
 
 
 @lru_cache(maxsize=8)
-def _directions(first: float, increment: float, count: int) -> Array:
+def _directions(first: float, increment: float, count: int, turn: float) -> Plane:
     """Beams of a lidar point the same ways in all its scans."""
     angles = first + increment * np.arange(count, dtype=np.float64)
-    towards = np.column_stack((np.cos(angles), np.sin(angles)))
+    towards: Plane = (np.cos(angles) + 1j * np.sin(angles)) * cmath.rect(1.0, turn)
     towards.flags.writeable = False
     return towards
 
@@ -59,11 +68,9 @@ def select_beams(scan: Scan, count: int, least: float, most: float) -> Beams:
     maximal: nav2_amcl has no notion of too near either.
     """
     step = -(-len(scan.ranges) // count) or 1
-    ranges = scan.ranges[::step]
+    ranges, towards = scan.ranges[::step], directions(scan)[::step]
     range_max, range_min = min(scan.range_max, most), max(scan.range_min, least)
-    answered = ~np.isnan(ranges)
-    with np.errstate(invalid="ignore"):
-        usable = (ranges > range_min) & (ranges < range_max)
-    ranges = np.where(usable, ranges, range_max)
-    bearings = scan.mount.yaw + scan.angles()[::step]
-    return Beams(ranges[answered], bearings[answered], (scan.mount.x, scan.mount.y), range_max)
+    if (silent := np.isnan(ranges)).any():
+        ranges, towards = ranges[~silent], towards[~silent]
+    ranges = np.where((ranges > range_min) & (ranges < range_max), ranges, range_max)
+    return Beams(ranges, towards, complex(scan.mount.x, scan.mount.y), range_max)

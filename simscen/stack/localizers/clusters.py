@@ -4,10 +4,12 @@ import math
 
 import numpy as np
 
-from simscen.core.geometry import Array, Pose2, wrap, wrap_array
+from simscen.core.geometry import Array, Pose2, wrap
 from simscen.stack.localizers.kld import BIN_METRES, BINS_OF_YAW, Keys, bins, join, split
-from simscen.stack.localizers.particles import Particles
+from simscen.stack.localizers.particles import Particles, wrapped
 
+BINS_IN_TOUCH = 8
+"""The most that poses fill which are nearer to each other than a bin is wide, in all three coordinates."""
 _AROUND = np.array([(x, y, a) for x in (-1, 0, 1) for y in (-1, 0, 1) for a in (-1, 0, 1)])
 
 
@@ -46,43 +48,49 @@ def summarise(particles: Particles, peak: float = 1.0) -> tuple[Pose2, Array]:
     heading too, which nav2_amcl leaves zero. Headings are averaged on the circle.
     """
     poses, weights = particles.poses, particles.weights
-    if not _in_touch(poses):
+    if not in_touch(particles):
         labels = clusters(bins(poses))
         heaviest = labels == np.bincount(labels, weights=weights).argmax()
         poses, weights = poses[heaviest], weights[heaviest]
-    mean, width = _mean(poses, weights)
+    mean = _mean(poses, weights)
     if peak == 1.0:
         return mean, spread(particles, mean)
-    best, narrower = _mean(poses, (weights / weights.max()) ** peak)
+    peaked = (weights / weights.max()) ** peak
+    best = _mean(poses, peaked)
+    width, narrower = _width(poses, weights, mean), _width(poses, peaked, best)
     towards = width / (width + narrower) if narrower > 0 else 1.0
     turned = mean.yaw + towards * wrap(best.yaw - mean.yaw)
     pose = Pose2(mean.x + towards * (best.x - mean.x), mean.y + towards * (best.y - mean.y), wrap(turned))
     return pose, spread(particles, pose)
 
 
-def _in_touch(poses: Array) -> bool:
-    """Whether poses (n, 3) are so near to each other that their bins touch, whichever they are."""
-    x, y, yaw = (poses.max(axis=0) - poses.min(axis=0)).tolist()
-    return bool(max(x, y) < BIN_METRES and yaw < 2 * math.pi / BINS_OF_YAW)
+def in_touch(particles: Particles) -> bool:
+    """Whether they are so near to each other that their bins touch, whichever these are."""
+    x, y, yaw = particles.extent
+    return x < BIN_METRES and y < BIN_METRES and yaw < 2 * math.pi / BINS_OF_YAW
 
 
-def _mean(poses: Array, weights: Array) -> tuple[Pose2, float]:
-    """The mean of poses (n, 3) by weights (n,), and the variance of their places about it in m²."""
-    shares, yaw = weights / weights.sum(), poses[:, 2]
-    x, y = (shares @ poses[:, :2]).tolist()
-    off = np.square(poses[:, :2] - (x, y)).sum(axis=1)
-    return Pose2(x, y, math.atan2(shares @ np.sin(yaw), shares @ np.cos(yaw))), float(shares @ off)
+def _mean(poses: Array, weights: Array) -> Pose2:
+    """The mean of poses (n, 3) by weights (n,)."""
+    total, yaw = float(weights.sum()), poses[:, 2]
+    x, y = (weights @ poses[:, :2]).tolist()
+    return Pose2(x / total, y / total, math.atan2(weights @ np.sin(yaw), weights @ np.cos(yaw)))
+
+
+def _width(poses: Array, weights: Array, mean: Pose2) -> float:
+    """The variance of the places of poses (n, 3) by weights (n,) about their mean, in m²."""
+    return float(weights @ np.square(poses[:, :2] - mean[:2]).sum(axis=1) / weights.sum())
 
 
 def spread(particles: Particles, pose: Pose2) -> Array:
     """The expected squared error (3, 3) of `pose`, if the particles are right."""
-    error = errors_about(np.array(pose), particles.poses)
-    covariance: Array = (error.T * particles.weights) @ error
+    error = errors_about(np.array(pose), particles.poses).T
+    covariance: Array = (error * particles.weights) @ error.T
     return covariance
 
 
 def errors_about(pose: Array, poses: Array) -> Array:
     """What `poses` (n, 3) differ by from `pose` (3,), headings wrapped."""
     error = poses - pose
-    error[:, 2] = wrap_array(error[:, 2])
+    error[:, 2] = wrapped(error[:, 2])
     return error

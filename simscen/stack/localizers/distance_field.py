@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array
 from simscen.core.grid import FREE, UNKNOWN, OccupancyGrid
+from simscen.stack.localizers.beams import Plane
 from simscen.stack.nearest import BEYOND, FARTHEST, squared_cells, squared_within
 
 Float32 = npt.NDArray[np.float32]
@@ -23,6 +24,8 @@ BEHIND = 1.0
 
 def by_blocks(judge: Callable[[Array], Array], poses: Array) -> Array:
     """What `judge` says (n,) of `poses` (n, 3), asked in blocks."""
+    if len(poses) <= BLOCK:
+        return judge(poses)
     return np.concatenate([judge(poses[begin : begin + BLOCK]) for begin in range(0, len(poses), BLOCK)])
 
 
@@ -71,13 +74,15 @@ class DistanceField:
         self.table: Float32 = distance.ravel()
         self.resolution = grid.resolution
         self._height, self._width = grid.shape
-        self._grid_from_map = grid.origin.inverse()
+        x, y, self._turn = grid.origin.inverse()
+        c, s = math.cos(self._turn), math.sin(self._turn)
+        self._axes = np.array([[c, -s], [s, c]]) / grid.resolution
+        self._corner = np.array([[x], [y]]) / grid.resolution + 1
 
-    def coordinates(self, poses: Array) -> tuple[Float32, Float32, Float32]:
-        """Poses (n, 3) of the map frame as x, y in cells of the bordered table, and headings relative to it."""
-        local = self._grid_from_map.apply(poses[:, :2]) / self.resolution + 1
-        heading = poses[:, 2] + self._grid_from_map.yaw
-        return local[:, 0].astype(np.float32), local[:, 1].astype(np.float32), heading.astype(np.float32)
+    def coordinates(self, poses: Array) -> tuple[Float32, Float32]:
+        """Poses (n, 3) of the map frame: x and y (2, n) in cells of the bordered table, and headings (n,) in it."""
+        places = self._axes @ poses.T[:2] + self._corner
+        return places.astype(np.float32), (poses[:, 2] + self._turn).astype(np.float32)
 
     def cells(self, x: Float32, y: Float32) -> Cells:
         """Indices into `table` of points given in cells; any finite point will do. Overwrites `x` and `y`."""
@@ -87,13 +92,17 @@ class DistanceField:
         row += column
         return row
 
-    def cells_seen(self, poses: Array, points: Array) -> Cells:
-        """Indices (n, b) into `table` of `points` (b, 2) in the base frame as seen from each of `poses` (n, 3)."""
-        x, y, heading = self.coordinates(poses)
-        c, s = np.cos(heading), np.sin(heading)
+    def cells_seen(self, poses: Array, points: Plane) -> Cells:
+        """Indices (n, b) into `table` of `points` (b,) in the base frame as seen from each of `poses` (n, 3)."""
+        places, heading = self.coordinates(poses)
+        count = len(heading)
         ends = np.ones((3, len(points)), dtype=np.float32)
-        ends[:2] = points.T / self.resolution
-        to_x, to_y = np.empty((2, len(x), 3), dtype=np.float32)
-        to_x[:, 0], to_x[:, 1], to_x[:, 2] = c, -s, x
-        to_y[:, 0], to_y[:, 1], to_y[:, 2] = s, c, y
-        return self.cells(to_x @ ends, to_y @ ends)
+        ends[0], ends[1] = points.real, points.imag
+        ends[:2] /= np.float32(self.resolution)
+        axes = np.empty((3, 2, count), dtype=np.float32)
+        axes[0, 0] = axes[1, 1] = np.cos(heading)
+        axes[0, 1] = np.sin(heading)
+        np.negative(axes[0, 1], out=axes[1, 0])
+        axes[2] = places
+        x_and_y = axes.reshape(3, -1).T @ ends
+        return self.cells(x_and_y[:count], x_and_y[count:])

@@ -1,5 +1,6 @@
 """When a particle filter is lost, and where its robot may be instead."""
 
+import math
 from collections import deque
 
 import numpy as np
@@ -58,15 +59,15 @@ class Finder:
 
         `base` is where it was when it took the scan, in a frame that drifts; `limits` are the ranges that count.
         """
-        view = self._memory.add(scan, base, *limits)
+        ends = self._memory.add(scan, base, *limits)
         if self._last is not None:
             self._driven += (moved := travelled(self._last, base))
             self._unchecked += moved
         self._last = base
-        if not len(view.ends):
+        if not len(ends):
             return None
         here = np.array([believed])
-        if (fit := self._trust.fit(here, view.ends, TELLING)) is not None:
+        if (fit := self._trust.fit(here, ends, TELLING)) is not None:
             self._fits.append(fit)
         if self._known and (near := self._nearby(base, here)) is not None:
             return near
@@ -94,7 +95,7 @@ class Finder:
 
     def _in_doubt(self) -> bool:
         """Whether recent scans do not fit. When that begins, what was seen before may be of another place."""
-        before, self._doubted = self._doubted, len(self._fits) == RECENT and float(np.mean(self._fits)) < DOUBTFUL
+        before, self._doubted = self._doubted, len(self._fits) == RECENT and sum(self._fits) < RECENT * DOUBTFUL
         if self._doubted and not before:
             self._memory.forget(1)
             self._wait = 0.0
@@ -125,7 +126,7 @@ class Finder:
 def _agree(first: Pose2, then: Pose2, second: Pose2, now: Pose2) -> bool:
     """Whether a robot that was `first` when its base was at `then` is `second` when it is at `now`."""
     off = first.compose(then.between(now)).between(second)
-    return float(np.hypot(off.x, off.y)) < AGREE[0] and abs(off.yaw) < AGREE[1]
+    return math.hypot(off.x, off.y) < AGREE[0] and abs(off.yaw) < AGREE[1]
 
 
 def around(poses: Array, shares: Array, count: int, chance: np.random.Generator) -> Array:

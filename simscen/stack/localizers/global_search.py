@@ -5,15 +5,16 @@ by how many of the points seen fall near what the map shows; here also by how mu
 The best are refined. Nothing is drawn by chance, and the work is bounded by the size of the map.
 """
 
+import cmath
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.geometry import Array, Pose2, wrap_array
+from simscen.core.geometry import Array, wrap_array
 from simscen.core.grid import FREE, OCCUPIED, OccupancyGrid
-from simscen.stack.localizers.beams import evenly
+from simscen.stack.localizers.beams import Plane, evenly
 from simscen.stack.localizers.distance_field import DistanceField
 from simscen.stack.localizers.likelihood_field import surfaces
 
@@ -33,6 +34,8 @@ NEARBY, REFINED_NEARBY = ((6, 0.2), (9, 0.035)), 12
 """Steps of so many m, and of so many rad, to each side; and how many of these places are refined."""
 APART = (0.5, 0.2)
 """m and rad: two places nearer than both are one."""
+SHARES = (0.3, 0.55, 0.8)
+"""Of a beam's length: where the points lie that it passed."""
 WAYS = 0.5
 """What it counts that the ways to all points are free, beside 1 for all points being where the map shows something."""
 
@@ -41,10 +44,16 @@ Levels = npt.NDArray[np.uint8]
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """What was seen around a pose, in its frame: `ends` (n, 2) of beams, and points (m, 2) that they `passed`."""
+    """What was seen around a pose, in its frame: `ends` (n,) of beams, and points (m,) that they `passed`."""
 
-    ends: Array
-    passed: Array
+    ends: Plane
+    passed: Plane
+
+    @classmethod
+    def of(cls, ends: Plane, lidar: Plane) -> "View":
+        """What beams show that go from where the `lidar` (n,) was to `ends` (n,)."""
+        ways = ends - lidar
+        return cls(ends, np.concatenate([lidar + ways * share for share in SHARES]))
 
     def thinned(self, count: int) -> "View":
         """At most `count` of each, evenly chosen."""
@@ -52,10 +61,10 @@ class View:
 
 
 def _within_reach(view: View) -> View:
-    return View(*(points[np.hypot(*points.T) < REACH] for points in (view.ends, view.passed)))
+    return View(*(points[np.abs(points) < REACH] for points in (view.ends, view.passed)))
 
 
-def _evenly(points: Array, count: int) -> Array:
+def _evenly(points: Plane, count: int) -> Plane:
     if len(points) <= count:
         return points
     return points[evenly(len(points), count)]
@@ -103,7 +112,7 @@ class GlobalSearch:
         """The share of the ends of a view that fit at each of `poses` (n, 3): (n,), 0 … 1."""
         return self._mean(self._near, poses, view.ends)
 
-    def _mean(self, table: Levels, poses: Array, points: Array) -> Array:
+    def _mean(self, table: Levels, poses: Array, points: Plane) -> Array:
         blocks = [
             table.take(self._field.cells_seen(poses[begin : begin + 512], points)).mean(axis=1)
             for begin in range(0, len(poses), 512)
@@ -150,7 +159,7 @@ class GlobalSearch:
         for turn, score in zip(turns.tolist(), scores, strict=True):
             total = np.zeros((rows, columns), dtype=np.uint32)
             for table, points, weight in zip(tables, (view.ends, view.passed), weights, strict=True):
-                moved = Pose2(0.0, 0.0, turn).apply(points) / cell
+                moved = (points * (cmath.rect(1.0, turn) / cell)).view(np.float64).reshape(-1, 2)
                 offsets = np.floor(moved + 0.5).astype(np.int64) + border
                 some = np.zeros((rows, columns), dtype=np.uint32 if len(points) > 257 else np.uint16)
                 for right, up in offsets.tolist():

