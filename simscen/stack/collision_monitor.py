@@ -40,26 +40,28 @@ class CollisionMonitor:
         self._timeout = round(spec.source_timeout * tick_rate)
         self.hold_ticks = spec.hold_timeout * tick_rate or math.inf
         """For how long it may allow nothing until that is a failure."""
-        self._seen = dict.fromkeys(lidars, 0)
+        self._seen, self._oldest = dict.fromkeys(lidars, 0), 0
         self._scans: dict[str, Seen] = {}
         self._moving = nothing()
         corners = np.array(robot.footprint, dtype=np.float64)
         ends = np.roll(corners, -1, axis=0)
         normal = np.column_stack((ends[:, 1] - corners[:, 1], corners[:, 0] - ends[:, 0]))
+        self._near = robot.circumscribed_radius + spec.stop_margin
         self._normal = normal / np.hypot(normal[:, 0], normal[:, 1])[:, None]
         self._offset = np.sum(self._normal * corners, axis=1)
 
     def start(self, tick: int) -> None:
         """Sources count as heard now."""
         self._seen = dict.fromkeys(self._seen, tick)
+        self._oldest = tick
 
     def on_scan(self, scan: Scan, odometry: Pose2) -> None:
         """A scan, and where odometry was when it came; one in which no beam answers is silence."""
-        answers = scan.ranges[scan.ranges >= scan.range_min]
-        if not len(answers):
+        nearest = _nearest(scan)
+        if nearest is None:
             return
         self._seen[scan.sensor] = scan.tick
-        nearest = float(answers.min())
+        self._oldest = min(self._seen.values())
         self._scans[scan.sensor] = Seen(scan, odometry, nearest - math.hypot(scan.mount.x, scan.mount.y))
 
     def on_moving(self, moving: Moving) -> None:
@@ -68,7 +70,7 @@ class CollisionMonitor:
 
     def silent(self, tick: int) -> bool:
         """Whether a lidar has not been heard for `source_timeout`."""
-        return self._spec.enabled and any(tick - seen > self._timeout for seen in self._seen.values())
+        return tick - self._oldest > self._timeout and self._spec.enabled and bool(self._seen)
 
     def allow(self, wanted: Twist, odometry: Pose2) -> Twist:
         """The command, slowed down so that the first contact is at least `time_before_collision` away."""
@@ -86,11 +88,10 @@ class CollisionMonitor:
 
     def _time_free(self, seen: "Seen", wanted: Twist, odometry: Pose2, horizon: float) -> float:
         """Seconds until a point of the scan would be within the stop margin; points it moves away from are no harm."""
-        moved = seen.odometry.between(odometry)
-        reach = self._robot.circumscribed_radius + self._spec.stop_margin
-        reach += math.hypot(wanted.vx, wanted.vy) * horizon + math.hypot(moved.x, moved.y)
+        reach = self._near + math.hypot(wanted.vx, wanted.vy) * horizon + seen.odometry.distance(odometry)
         if seen.nearest > reach:
             return horizon
+        moved = seen.odometry.between(odometry)
         points = moved.inverse().apply(_points_within(seen.scan, reach))
         if not len(points):
             return horizon
@@ -134,6 +135,15 @@ class CollisionMonitor:
         body = np.stack((cosine * dx + sine * dy, cosine * dy - sine * dx), axis=-1)
         gaps: Array = (body @ self._normal.T - self._offset).max(axis=-1)
         return gaps
+
+
+def _nearest(scan: Scan) -> float | None:
+    """Metres to the nearest thing that a beam answers; None where none does."""
+    nearest = float(np.fmin.reduce(scan.ranges, initial=math.inf))
+    if nearest >= scan.range_min and nearest < math.inf:
+        return nearest
+    answers = scan.ranges[scan.ranges >= scan.range_min]
+    return float(answers.min()) if len(answers) else None
 
 
 def _points_within(scan: Scan, reach: float) -> Array:

@@ -31,9 +31,9 @@ class Commands:
         """How many of its periods the controller has taken since it was last asked, or since the robot was stopped."""
         return max(1, (tick - self._asked) // self._period)
 
-    def want(self, tick: int, wanted: Twist) -> None:
-        """What the controller makes of what it was told at this tick."""
-        self._wanted.put(tick, (wanted, self.periods(tick)))
+    def want(self, tick: int, wanted: Twist, periods: int) -> None:
+        """What the controller makes of what it was told at this tick, so many of its periods after the last time."""
+        self._wanted.put(tick, (wanted, periods))
         self._asked = tick
 
     def stop(self, tick: int) -> None:

@@ -18,9 +18,8 @@ from simscen.stack.frames import Frames
 from simscen.stack.local_path import LocalPath
 from simscen.stack.plan_keeper import PlanKeeper
 from simscen.stack.progress_checker import ProgressChecker
-from simscen.stack.protocols import Behavior, Controller, GoalChecker, NavigationFailure, Planner
+from simscen.stack.protocols import Behavior, Controller, GoalChecker, NavigationFailure
 from simscen.stack.recovery import RoundRobin
-from simscen.stack.replanning import PlanInForce
 
 
 class Step(NamedTuple):
@@ -50,7 +49,9 @@ class Navigator:
         failure_tolerance: float,
     ) -> None:
         """`period` between two steps and `failure_tolerance` in seconds; -1 bears a failing controller for ever."""
-        self._plans, self._controller, self._recovery = plans, controller, recovery
+        self.plans = plans
+        """Who sees to the plan that is being followed."""
+        self._controller, self._recovery = controller, recovery
         self._goal_checker, self._progress, self._costmaps = goal_checker, progress, costmaps
         self._path = LocalPath(controller)
         self._period, self._failure_tolerance = period, failure_tolerance
@@ -60,18 +61,8 @@ class Navigator:
         """What is to be passed before the goal, in this order."""
         self._forget()
 
-    @property
-    def plan(self) -> PlanInForce | None:
-        """The plan being followed."""
-        return self._plans.plan
-
-    @property
-    def planner(self) -> Planner:
-        """Who makes the plans."""
-        return self._plans.planner
-
     def _forget(self) -> None:
-        self._plans.reset(self._clock)
+        self.plans.reset(self._clock)
         self._behavior: Behavior | None = None
         self._behavior_since = 0.0
         self._replanned = self._controlled_again = False
@@ -105,7 +96,7 @@ class Navigator:
             return Step(reached=True)
         events: tuple[Event, ...] = ()
         try:
-            events = self._plans.step(tick, self._clock, goal, frames.pose, self.via)
+            events = self.plans.step(tick, self._clock, goal, frames.pose, self.via)
             command = self._follow(goal, frames, twist, held)
         except NavigationFailure as failure:
             step = self._failed(tick, goal, frames, failure)
@@ -115,10 +106,11 @@ class Navigator:
 
     def _follow(self, goal: Goal, frames: Frames, twist: Twist, held: bool) -> Twist:
         """The controller's command on the plan in force; the robot stands while the first plan is worked out."""
-        if self._plans.plan is None:
+        plan = self.plans.plan
+        if plan is None:
             return STOP
         self._replanned = False
-        self._path.tell(self._plans.plan, frames)
+        self._path.tell(plan, frames)
         following = self.via[0] if self.via else goal  # a tour may end where it begins: only its last drive ends it
         local = following.at(frames.odom_from_map.compose(following.pose))
         command = self._controller.command(frames.odometry, twist, self._costmaps.near.view, local)
@@ -142,16 +134,16 @@ class Navigator:
                 if self._tolerable():
                     return Step()
                 failure = self._impatient(failure)
-            self._plans.not_followed()
+            self.plans.not_followed()
             retry, self._controlled_again = not self._controlled_again, True
         if retry:
             self._trouble_since = None
             (self._costmaps.wide if planning else self._costmaps.near).clear()
-            self._plans.drop("recovery")
+            self.plans.drop("recovery")
             return Step(events=events)
         if self._hopeless(goal, failure):
             return Step(failure=failure, events=events)
-        self._plans.drop("recovery")
+        self.plans.drop("recovery")
         self._replanned, self._controlled_again, self._trouble_since = False, False, None
         self._behavior = self._recovery.next()
         if self._behavior is None:

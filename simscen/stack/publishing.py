@@ -34,6 +34,7 @@ class Publishing:
         self._belief_told = -self._belief_period
         self._local_plan_told = 0
         self._plan: Path | None = None
+        self._driving = False
         self._wide, self._near = _Drawn("global", "map", GLOBAL_RATE), _Drawn("local", "odom", LOCAL_RATE)
 
     def belief(self, tick: int, scanned: bool) -> Belief | None:
@@ -45,14 +46,15 @@ class Publishing:
 
     def plan(self, plan: Path | None) -> Path | None:
         """The plan, once."""
+        self._driving = plan is not None
         if plan is self._plan or plan is None:
             return None
         self._plan = plan
         return plan
 
-    def local_plan(self, tick: int, driving: bool, frames: Frames) -> Path | None:
+    def local_plan(self, tick: int, frames: Frames) -> Path | None:
         """What the controller expects to drive, in the map frame, while there is a plan to follow."""
-        if not driving or tick - self._local_plan_told < self._local_plan_period:
+        if not self._driving or tick - self._local_plan_told < self._local_plan_period:
             return None
         self._local_plan_told = tick
         plan = self._controller.local_plan

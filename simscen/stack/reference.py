@@ -75,7 +75,6 @@ class ReferenceStack:
         self._navigator.stop()
         self._prediction.hold()
         self._commands.stop(tick)
-        self._nothing = Decision(STOP)
 
     def set_zones(self, tick: int, zones: Zones) -> None:
         """These zones hold from the next update of the costmap on, and no others."""
@@ -84,7 +83,8 @@ class ReferenceStack:
     @property
     def plan(self) -> Path | None:
         """The plan being followed."""
-        return self._navigator.plan.path if self._navigator.plan else None
+        plan = self._navigator.plans.plan
+        return None if plan is None else plan.path
 
     @property
     def goal(self) -> Goal | None:
@@ -99,7 +99,7 @@ class ReferenceStack:
             ("costmap", self._costmaps, ("update",)),
             ("costmap", self._costmaps.wide, ("refresh",)),
             ("costmap", self._costmaps.near, ("refresh",)),
-            ("planner", self._navigator.planner, ("plan",)),
+            ("planner", self._navigator.plans.planner, ("plan",)),
             ("controller", self._controller, ("command", "set_path")),
             ("collision monitor", self._monitor, ("allow", "on_scan")),
             ("prediction", self._prediction, ("on_scan", "steer", "stand")),
@@ -109,6 +109,7 @@ class ReferenceStack:
         """Take the readings of this beat and say what to drive."""
         self._tick = tick
         scanned = self._take(tick, readings)
+        plan: Path | None = None
         local_plan: Path | None = None
         costmaps: tuple[CostGrid, ...] = ()
         if controls := tick % self._control_period == 0:
@@ -116,16 +117,15 @@ class ReferenceStack:
             self._update_costmaps(tick, frames)
             self._monitor.on_moving(self._prediction.around(tick))
             self._control(tick, frames)
-            local_plan = self._publishing.local_plan(tick, self._navigator.plan is not None, frames)
+            plan = self._publishing.plan(self.plan)
+            local_plan = self._publishing.local_plan(tick, frames)
             costmaps = self._publishing.costmaps(tick, self._costmaps)
         self._commands.step(tick, self._odometry.now)
         sent = self._commands.sent
-        if sent is not self._nothing.command:
-            self._nothing = Decision(sent)
-        if not controls and not readings and not self._events:
-            return self._nothing
-        belief, plan = self._publishing.belief(tick, scanned), self._publishing.plan(self.plan)
+        belief = self._publishing.belief(tick, scanned) if readings or controls else None
         if belief is None and plan is None and local_plan is None and not costmaps and not self._events:
+            if sent is not self._nothing.command:
+                self._nothing = Decision(sent)
             return self._nothing
         events, self._events = tuple(self._events), []
         return Decision(sent, belief, plan, local_plan, events, costmaps=costmaps)
@@ -133,7 +133,8 @@ class ReferenceStack:
     def _take(self, tick: int, readings: Readings) -> bool:
         """Hand the readings on; whether there was a scan among them."""
         scans: list[Scan] = []
-        self._match(tick)
+        if tick >= self._matched.due:
+            self._match(tick)
         for reading in readings:
             match reading:
                 case Odometry():
@@ -188,7 +189,8 @@ class ReferenceStack:
 
     def _control(self, tick: int, frames: Frames) -> None:
         """See to the goals, and to the command that is wanted."""
-        self._events += self._task.next(tick)
+        if self._task.goal is None:
+            self._events += self._task.next(tick)
         self._pass(tick, frames.pose)
         goal = self._task.goal
         if goal is None:
@@ -208,7 +210,7 @@ class ReferenceStack:
 
     def _navigate(self, tick: int, frames: Frames) -> None:
         """One step of the navigator, and what comes of it."""
-        if self._speed_filter:
+        if self._speed_filter.used:
             self._controller.set_speed_limit(self._speed_filter.limit(frames.pose, self._controller.full_speed))
         held, periods = self._commands.held(tick), self._commands.periods(tick)
         step = self._navigator.step(tick, frames, self._twist, held, periods)
@@ -220,7 +222,8 @@ class ReferenceStack:
             self._stop(tick)
         else:
             pose, view = frames.pose, self._costmaps.wide.view
-            self._commands.want(tick, self._prediction.steer(tick, step.command, pose, self._twist, view, self.plan))
+            command = self._prediction.steer(tick, step.command, pose, self._twist, view, self.plan)
+            self._commands.want(tick, command, periods)
 
     def _stand(self, tick: int, pose: Pose2) -> None:
         """Nowhere to go; but out of the way of what comes at the robot, and back."""
@@ -228,7 +231,7 @@ class ReferenceStack:
         if command == STOP or self._monitor.silent(tick):
             self._commands.stop(tick)
         elif not self._commands.busy(tick):
-            self._commands.want(tick, command)
+            self._commands.want(tick, command, self._commands.periods(tick))
 
     def _pass(self, tick: int, pose: Pose2) -> None:
         """Poses that the robot is near to are behind it.

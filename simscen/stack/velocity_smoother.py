@@ -18,6 +18,7 @@ class VelocitySmoother:
         turn = min(spec.max_angular_accel or robot.angular_acceleration, robot.angular_acceleration)
         self._turn = turn * period
         self._most, self._most_turn = spec.max_velocity or math.inf, spec.max_angular_velocity or math.inf
+        self._limits = math.isfinite(min(self._most, self._most_turn))
         self._steered = robot.turning_radius > 0.0
         self._last = Twist()
 
@@ -29,19 +30,23 @@ class VelocitySmoother:
         """The velocity to send now, so many periods after the last one."""
         if not self._enabled:
             return wanted
-        wanted = self._within(wanted)
-        last = self._last
-        vx = self._towards(last.vx, wanted.vx, periods)
-        if self._steered and wanted.vx != 0.0:
-            turn = vx * wanted.wz / wanted.vx  # nav2's scale_velocities: a car keeps to the curve while it speeds up
+        ahead, left, turn = self._within(wanted)
+        was_ahead, was_left, was_turn = self._last
+        vx = ahead if ahead == was_ahead else self._towards(was_ahead, ahead, periods)
+        vy = left if left == was_left else self._towards(was_left, left, periods)
+        if self._steered and ahead != 0.0:
+            turn = vx * turn / ahead  # nav2's scale_velocities: a car keeps to the curve while it speeds up
         else:
-            turn = self._turned(last.wz, wanted.wz, periods)
-        self._last = Twist(vx, self._towards(last.vy, wanted.vy, periods), turn)
+            step = periods * self._turn
+            turn = min(max(turn, was_turn - step), was_turn + step)
+        self._last = Twist(vx, vy, turn)
         return self._last
 
     def _within(self, wanted: Twist) -> Twist:
         """No faster than it may be; a base that steers keeps to its curve."""
-        if max(abs(wanted.vx), abs(wanted.vy)) <= self._most and abs(wanted.wz) <= self._most_turn:
+        if not self._limits or (
+            max(abs(wanted.vx), abs(wanted.vy)) <= self._most and abs(wanted.wz) <= self._most_turn
+        ):
             return wanted
         vx, vy = (min(max(part, -self._most), self._most) for part in (wanted.vx, wanted.vy))
         wz = min(max(wanted.wz, -self._most_turn), self._most_turn)
@@ -55,6 +60,3 @@ class VelocitySmoother:
             wanted = 0.0
         step = periods * (self._faster if abs(wanted) > abs(now) else self._slower)
         return min(max(wanted, now - step), now + step)
-
-    def _turned(self, now: float, wanted: float, periods: int) -> float:
-        return min(max(wanted, now - periods * self._turn), now + periods * self._turn)

@@ -11,14 +11,12 @@ class SpeedFilter:
 
     def __init__(self, surroundings: Surroundings) -> None:
         self._zones, self._mask = surroundings.speed_zones, surroundings.masks.speed
-        self._used = bool(self._zones) or self._mask is not None
-
-    def __bool__(self) -> bool:
-        return self._used
+        self.used = bool(self._zones) or self._mask is not None
+        """Whether anything has been limited so far."""
 
     def set_zones(self, zones: Zones) -> None:
         """From now on these hold; where there are none any more, a limit has to be lifted once."""
-        self._zones, self._mask, self._used = zones.speed, zones.masks.speed, True
+        self._zones, self._mask, self.used = zones.speed, zones.masks.speed, True
 
     def limit(self, pose: Pose2, full_speed: float) -> float | None:
         """The lowest limit in m/s where the robot believes itself; None outside all. `full_speed` is without limits."""

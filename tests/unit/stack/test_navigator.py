@@ -148,7 +148,7 @@ def test_a_robot_that_does_not_move_is_found_out() -> None:
 def test_a_plan_that_fails_now_and_then_is_made_anew_each_time_without_a_recovery() -> None:
     """Nav2's RecoveryNode counts its retries from the last success on."""
     d = start(rooms(), spec=StackSpec(localizer=TRUTH, planner=OmplPlanner(replanning="rate", replanning_rate=1.0)))
-    planner, calls = d.stack.inner._navigator.planner, []
+    planner, calls = d.stack.inner._navigator.plans.planner, []
     plan = planner.plan
 
     def flaky(*asked: object) -> Path:
@@ -166,7 +166,7 @@ def test_a_plan_that_fails_now_and_then_is_made_anew_each_time_without_a_recover
 
 def test_a_plan_that_fails_twice_in_a_row_leads_to_a_recovery() -> None:
     d = start(rooms())
-    planner, calls = d.stack.inner._navigator.planner, []
+    planner, calls = d.stack.inner._navigator.plans.planner, []
     plan = planner.plan
 
     def flaky(*asked: object) -> Path:
