@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array
+from simscen.stack.prediction.moving import Moving
 from simscen.stack.protocols import CostmapView, RobotModel
 
 Mask = npt.NDArray[np.bool_]
@@ -80,6 +81,15 @@ class Footprint:
             edge[touching] = (near[touching] - self._depth).min(axis=1)
         return np.asarray(np.minimum(edge, middle))
 
+    def gap(self, moving: Moving, poses: Array, times: Array, sigmas: float = 0.0) -> Array:
+        """Metres (…,) from the hull at poses (…, 3) to what moves, where it will be `times` seconds from now.
+
+        `times` broadcast with them. Negative where they will meet; of a hull that is not round less than it is, by
+        some centimetres. Things are so many standard deviations of their places wider.
+        """
+        x, y, yaw = np.moveaxis(poses, -1, 0)
+        return np.asarray(self.discs.gap(moving, x, y, yaw, times, sigmas), dtype=np.float64)
+
     def _hull_free(self, costmap: CostmapView, poses: Array) -> Mask:
         return np.asarray((distances(costmap, self._placed(poses)) > 0).all(axis=1))
 
@@ -120,6 +130,27 @@ class Discs:
             least = near if least is None else np.minimum(least, near)
         assert least is not None
         return np.asarray(least - np.float32(self.radius))
+
+
+    def gap(self, moving: Moving, x: Reals, y: Reals, yaw: Reals, times: Reals, sigmas: float = 0.0) -> Reals:
+        """Metres (…,) from the discs at poses (…,) to what moves, where it will be at `times`; see Moving.gap."""
+        least = [moving.gap(*at, times, sigmas) for at in self._placed(x, y, yaw)]
+        return np.asarray(np.min(least, axis=0) - self.radius)
+
+    def nearness(
+        self, moving: Moving, x: Reals, y: Reals, yaw: Reals, times: Reals, kept_off: float
+    ) -> tuple[Reals, Mask]:
+        """How near the discs at poses (…,) come to what moves, and which touch it; see Moving.nearness."""
+        near = [moving.nearness(*at, times, self.radius, kept_off) for at in self._placed(x, y, yaw)]
+        return np.max([one for one, _ in near], axis=0), np.any([touch for _, touch in near], axis=0)
+
+    def _placed(self, x: Reals, y: Reals, yaw: Reals) -> list[tuple[Reals, Reals]]:
+        """The discs' middles."""
+        offsets = self.offsets.tolist()
+        if offsets == [0.0]:
+            return [(x, y)]
+        cosine, sine = np.cos(yaw), np.sin(yaw)
+        return [(x + offset * cosine, y + offset * sine) for offset in offsets]
 
 
 def _inner_points(corners: Array, resolution: float, inscribed: float) -> Array:

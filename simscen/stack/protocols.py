@@ -23,6 +23,7 @@ from simscen.core.sensing import Imu, Odometry, Readings, Scan
 from simscen.core.trace import Decision
 from simscen.core.world import Polygon
 from simscen.core.zones import Zones
+from simscen.stack.prediction.moving import NOTHING, Moving
 
 
 class NavigationFailure(Exception):
@@ -114,6 +115,10 @@ class CostmapView:
     less than the inflation radius and half a metre beyond the hull. `revision` grows with each
     change; `inflation_radius` is how far in metres an obstacle's costs reach. The arrays may be windows on a costmap
     that goes on living: they hold until its next update.
+
+    `moving` is what motion prediction says of things that move, now and in this frame, of which nothing is in the costs:
+    `Footprint.gap` says how near a robot comes to them. Empty where nothing moves, where nobody predicts, and on the
+    global costmap: what moves will have gone before a robot gets far.
     """
 
     costs: npt.NDArray[np.uint8]
@@ -122,6 +127,7 @@ class CostmapView:
     origin: tuple[float, float]
     revision: int = 0
     inflation_radius: float = 0.55
+    moving: Moving = NOTHING
 
     def with_less_room(self, metres: float) -> "CostmapView":
         """The same place with every obstacle so much larger all round."""

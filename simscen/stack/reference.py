@@ -116,6 +116,7 @@ class ReferenceStack:
             frames = self._frames()
             self._update_costmaps(tick, frames)
             self._monitor.on_moving(self._prediction.around(tick))
+            self._costmaps.near.moving = self._prediction.seen_from(tick, frames.odometry)
             self._control(tick, frames)
             plan = self._publishing.plan(self.plan)
             local_plan = self._publishing.local_plan(tick, frames)

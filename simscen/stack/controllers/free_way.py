@@ -1,14 +1,23 @@
 """Whether what a controller is about to drive is free: the check that all of them share."""
 
-from simscen.core.geometry import Pose2
+import numpy as np
+
+from simscen.core.geometry import Array, Pose2
 from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import ErrorCode
+from simscen.stack.arcs import poses_along
 from simscen.stack.footprint import Footprint
 from simscen.stack.lookahead import time_free
 from simscen.stack.protocols import CostmapView, NavigationFailure
 
 CREEP = 0.1
 """m/s. When only slower than this would keep the time to collision, the way is blocked."""
+PARTS: Array = np.array((1.0, 0.75, 0.5, 0.25, 0.0))
+"""Parts of a command at which it may let things pass that move."""
+MOMENT, SIGMAS = 0.1, 0.5
+"""Seconds between two moments at which they are compared, and standard deviations by which they are taken for wider."""
+NEARER = 1e-4
+"""Metres: whom one is too near already is met by coming nearer."""
 
 
 class FreeWay:
@@ -18,7 +27,7 @@ class FreeWay:
         self._footprint = footprint
 
     def seconds(self, costmap: CostmapView, pose: Pose2, command: Twist, horizon: float) -> float:
-        """For how long the command can be driven; `horizon` if for all of it."""
+        """For how long the command can be driven; `horizon` if for all of it. Of what stands."""
         return horizon if command == STOP else time_free(self._footprint, costmap, pose, command, horizon)
 
     def within(self, command: Twist, free: float, horizon: float, demanded: float) -> Twist:
@@ -32,3 +41,19 @@ class FreeWay:
         if max(abs(command.vx), abs(command.vy)) * scale < CREEP:
             raise NavigationFailure(ErrorCode.NO_VALID_CONTROL, f"collision ahead in {free:.2f} s")
         return Twist(command.vx * scale, command.vy * scale, command.wz * scale)
+
+    def letting_pass(self, command: Twist, costmap: CostmapView, pose: Pose2, horizon: float) -> Twist:
+        """The command at the greatest part of it that meets nothing which moves, or if all do, meets it last.
+
+        Both on their ways: who crosses and will have gone is no reason to slow down, and before who will be there the
+        robot slows, or stands. That is no failure, for what moves goes on.
+        """
+        if not len(costmap.moving) or command == STOP:
+            return command
+        times = np.arange(0.0, horizon + MOMENT / 2, MOMENT)
+        arcs = poses_along(pose, command, np.multiply.outer(PARTS, times).ravel()).reshape(len(PARTS), -1, 3)
+        gaps = self._footprint.gap(costmap.moving, arcs, times, SIGMAS)
+        met = (gaps[:, 1:] < 0.0) & (gaps[:, 1:] < gaps[:, :1] - NEARER)
+        free = np.where(met.any(axis=1), met.argmax(axis=1), len(times))
+        part = float(PARTS[int(free.argmax())])
+        return command if part == 1.0 else Twist(part * command.vx, part * command.vy, part * command.wz)

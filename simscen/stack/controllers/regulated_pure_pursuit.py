@@ -83,7 +83,7 @@ class RegulatedPurePursuit(PathFollower):
             command = self._drive(bend, backward, pose, costmap)
             free, horizon = self._time_free(command, pose, costmap, self._as_far_as(carrot))
             if free >= horizon:
-                return command
+                return self._letting_pass(command, pose, costmap, horizon)
             arcs.append((free, horizon, command))
             if aside is None and self._straight_is_free(carrot, backward, command, pose, costmap):
                 aside = _bearing(carrot, backward)
@@ -92,11 +92,12 @@ class RegulatedPurePursuit(PathFollower):
         free, horizon, command = max(arcs, key=lambda arc: arc[0])
         demanded = self._spec.max_allowed_time_to_collision_up_to_carrot
         try:
-            return self._free_way.within(command, free, horizon, demanded)
+            slower = self._free_way.within(command, free, horizon, demanded)
         except NavigationFailure:
             if aside is None:
                 raise
             return self._turn(aside, pose, twist, costmap)
+        return self._letting_pass(slower, pose, costmap, horizon)
 
     def _straight_is_free(
         self, carrot: tuple[float, float], backward: bool, arc: Twist, pose: Pose2, costmap: CostmapView
@@ -191,6 +192,12 @@ class RegulatedPurePursuit(PathFollower):
             return allowed, allowed
         horizon = min(allowed, carrot / abs(command.vx)) if command.vx != 0.0 else allowed
         return self._free_way.seconds(costmap, pose, command, horizon), horizon
+
+    def _letting_pass(self, command: Twist, pose: Pose2, costmap: CostmapView, horizon: float) -> Twist:
+        """The command, slowed where somebody will be on its arc by then."""
+        if not self._spec.use_collision_detection:
+            return command
+        return self._free_way.letting_pass(command, costmap, pose, horizon)
 
 
 def _bearing(carrot: tuple[float, float], backward: bool) -> float:

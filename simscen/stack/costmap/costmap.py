@@ -16,6 +16,7 @@ from simscen.stack.costmap.live_layer import LiveLayer, Window
 from simscen.stack.costmap.obstacle_layer import crossed
 from simscen.stack.costmap.rolling import carried, left_behind, window_around, within
 from simscen.stack.costmap.static_layer import Mask, StaticLayer, empty_layer, static_layer
+from simscen.stack.prediction.moving import NOTHING
 from simscen.stack.protocols import CostmapView, Surroundings
 
 BEYOND_HULL = 0.5
@@ -57,6 +58,8 @@ class Costmap:
         self._newest: dict[str, tuple[Pose2, Scan | Image]] = {}
         self._view: CostmapView | None = None
         self._changed: tuple[tuple[int, int], tuple[int, int]] | None = None
+        self.moving = NOTHING
+        """What moves, in its frame; shown with it."""
         layer = self._layer(Pose2(0.0, 0.0))
         self._live = LiveLayer(spec, self._inscribed, layer.frame)
         self._lay(layer)
@@ -72,9 +75,9 @@ class Costmap:
         if self._changed is not None:
             self.refresh(*self._changed)
         view, revision = self._view, self._revision
-        if view is None or view.revision != revision:
-            frame, radius = self._frame, self._spec.inflation_radius
-            view = CostmapView(self._costs, self._distance, frame.resolution, frame.origin, revision, radius)
+        if view is None or view.revision != revision or view.moving is not self.moving:
+            frame, radius, moving = self._frame, self._spec.inflation_radius, self.moving
+            view = CostmapView(self._costs, self._distance, frame.resolution, frame.origin, revision, radius, moving)
             self._view = view
         return view
 

@@ -16,12 +16,12 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.motion import STOP, Twist
 from simscen.model.guards import Prediction
 from simscen.stack.footprint import Discs
-from simscen.stack.prediction.moving import Moving
+from simscen.stack.prediction.moving import WIDEST, Moving
 from simscen.stack.prediction.rollouts import HORIZON, TIMES, Repertoire, Rollouts, along_path, arc, joined
 from simscen.stack.protocols import CostmapView, RobotModel
 
-ROOM, SIGMAS, MOST_ROOM = 0.25, 1.0, 0.8
-"""Metres that the robot keeps off what moves, and standard deviations of where that will be, up to so many metres."""
+ROOM = 0.25
+"""Metres that the robot keeps off what moves, besides a standard deviation of where that will be."""
 SOON = 1.2
 """Seconds in which what may happen counts e times less."""
 NEAR, HIT, LASTING = 3.0, 10.0, 1.0
@@ -70,7 +70,8 @@ class Avoidance:
 
         All in one frame. `path` (n, 2) is what is followed; a robot that follows none belongs at `home`.
         """
-        near = self._near(moving, pose)
+        reach = self._robot.circumscribed_radius + WIDEST + self._speed * TIMES
+        near = moving.near(pose.x, pose.y, reach, TIMES)
         if not len(near):
             self._last = None
             return wanted
@@ -91,15 +92,6 @@ class Avoidance:
         self._last = Twist(float(ways.commands[best, 0]), 0.0, float(ways.commands[best, 1]))
         return self._last
 
-    def _near(self, moving: Moving, pose: Pose2) -> Moving:
-        """Those that the robot could come near to within the horizon, if it drove towards them."""
-        if not len(moving):
-            return moving
-        places = moving.at(TIMES)
-        off = np.hypot(places[:, :, 0] - pose.x, places[:, :, 1] - pose.y) - moving.radii[:, None]
-        reach = self._robot.circumscribed_radius + MOST_ROOM + self._speed * TIMES
-        return moving.chosen(np.asarray((off < reach).any(axis=1)))
-
     def _own(self, wanted: Twist, pose: Pose2, twist: Twist, path: Array | None) -> Rollouts:
         if path is None or len(path) < 2 or wanted.vx == 0.0:
             return arc(pose, wanted, SLOWER if wanted != STOP else (1.0,))
@@ -111,17 +103,7 @@ class Avoidance:
 
     def _risk(self, ways: Rollouts, moving: Moving) -> Array:
         """What each way (n,) costs for what it comes near to."""
-        places, deviation = moving.at(TIMES), moving.deviations(TIMES)
-        room = np.minimum(ROOM + SIGMAS * deviation, MOST_ROOM)
-        worst = np.zeros(ways.x.shape)
-        hit = np.zeros(ways.x.shape, dtype=bool)
-        for offset in self._discs.offsets.tolist():
-            x, y = ways.x + offset * np.cos(ways.yaw), ways.y + offset * np.sin(ways.yaw)
-            for number in range(len(moving)):
-                dx, dy = x - places[number, :, 0], y - places[number, :, 1]
-                gap = np.sqrt(dx * dx + dy * dy) - (moving.radii[number] + self._discs.radius)
-                worst = np.maximum(worst, (room[number] - gap) / room[number])
-                hit |= gap < 0.03
+        worst, hit = self._discs.nearness(moving, ways.x, ways.y, ways.yaw, TIMES, ROOM)
         soon = np.exp(-TIMES / SOON)
         near = np.clip(worst, 0.0, 2.0) ** 2 * soon
         risk: Array = NEAR * near.max(axis=1) + LASTING * near.mean(axis=1) + HIT * (hit * soon).max(axis=1)

@@ -77,8 +77,12 @@ class MotionPrediction:
 
     def around(self, tick: int) -> Moving:
         """What moves at a tick, in the base frame."""
+        return self.seen_from(tick, Pose2(0.0, 0.0))
+
+    def seen_from(self, tick: int, pose: Pose2) -> Moving:
+        """What moves at a tick, in a frame in which the robot is at `pose` now."""
         moving = self.moving(tick)
-        return moving.seen_from(self._rolled.now) if len(moving) else moving
+        return moving.seen_from(self._rolled.now.compose(pose.inverse())) if len(moving) else moving
 
     def steer(
         self, tick: int, wanted: Twist, pose: Pose2, twist: Twist, costmap: CostmapView, plan: Path | None
@@ -89,7 +93,7 @@ class MotionPrediction:
         if not len(moving):
             self._avoidance.rest()
             return wanted
-        moving = moving.seen_from(self._rolled.now.compose(pose.inverse()))
+        moving = self.seen_from(tick, pose)
         path = None if plan is None else plan.points[:, :2]
         return self._avoidance.steer(wanted, pose, twist, moving, costmap, path)
 
@@ -123,5 +127,5 @@ class MotionPrediction:
         if not len(moving):
             self._avoidance.rest()
             return wanted
-        moving = moving.seen_from(self._rolled.now.compose(pose.inverse()))
+        moving = self.seen_from(tick, pose)
         return self._avoidance.steer(wanted, pose, twist, moving, costmap, None, home)

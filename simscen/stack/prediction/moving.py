@@ -1,10 +1,20 @@
 """What moves: where it is, how fast and how sure that is, at a moment."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
+
+WIDEST = 0.8
+"""Metres by which what is not known of a place widens it at most."""
+TOUCH = 0.03
+"""Metres: whoever comes nearer is taken to touch."""
+
+Mask = npt.NDArray[np.bool_]
+Reals = npt.NDArray[np.floating]
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,12 +41,61 @@ class Moving:
 
     def deviations(self, times: Array) -> Array:
         """Standard deviation (n, times) in m of that, along the axis in which it is greatest."""
-        xx = np.maximum(self.covariances[:, 0, 0], self.covariances[:, 1, 1])
-        vv = np.maximum(self.covariances[:, 2, 2], self.covariances[:, 3, 3])
-        xv = np.maximum(self.covariances[:, 0, 2], self.covariances[:, 1, 3])
+        return np.array(list(self._spreads(times))).reshape(len(self), len(times))
+
+    def _spreads(self, times: Reals) -> Iterator[Reals]:
+        """The same of one after the other, at times of any shape."""
         turned = (0.5 * self.acceleration * times**2) ** 2
-        grown: Array = np.sqrt(xx[:, None] + 2.0 * xv[:, None] * times + vv[:, None] * times**2 + turned)
-        return grown
+        for c in self.covariances:
+            xx, xv, vv = max(c[0, 0], c[1, 1]), max(c[0, 2], c[1, 3]), max(c[2, 2], c[3, 3])
+            yield np.sqrt(float(xx) + 2.0 * float(xv) * times + float(vv) * times**2 + turned)
+
+    def gap(self, x: Reals, y: Reals, times: Reals, sigmas: float = 0.0) -> Reals:
+        """Metres (…,) from points (…,) to the surface of what will be nearest at `times`, which broadcast with them.
+
+        Things are so many standard deviations wider, up to WIDEST; inf where nothing moves.
+        """
+        least = np.full(np.broadcast_shapes(x.shape, times.shape), np.inf, x.dtype)
+        for gap, deviation in self._gaps(x, y, times):
+            np.minimum(least, gap - np.minimum(sigmas * deviation, WIDEST) if sigmas else gap, out=least)
+        return least
+
+    def nearness(self, x: Reals, y: Reals, times: Reals, radius: float, kept_off: float) -> tuple[Reals, Mask]:
+        """How near discs at points (…,) are to what will be nearest at `times`, and which of them touch it then.
+
+        0 and less from so far off as is to be kept (metres, and a standard deviation of the place, up to WIDEST), 1
+        where they touch.
+        """
+        shape = np.broadcast_shapes(x.shape, times.shape)
+        nearest, touched = np.full(shape, -np.inf, x.dtype), np.zeros(shape, np.bool_)
+        for gap, deviation in self._gaps(x, y, times):
+            gap -= radius
+            touched |= gap < TOUCH
+            gap /= -np.minimum(kept_off + deviation, WIDEST)
+            np.maximum(nearest, gap, out=nearest)
+        nearest += 1.0
+        return nearest, touched
+
+    def _gaps(self, x: Reals, y: Reals, times: Reals) -> Iterator[tuple[Reals, Reals]]:
+        """Of each thing, the metres to its surface, and the standard deviation of its place then."""
+        rows = zip(self.centres.tolist(), self.velocities.tolist(), self.radii.tolist(), strict=True)
+        for ((cx, cy), (vx, vy), radius), deviation in zip(rows, self._spreads(times), strict=True):
+            dx, dy = x - (cx + vx * times), y - (cy + vy * times)
+            dx *= dx
+            dy *= dy
+            dx += dy
+            np.sqrt(dx, out=dx)
+            dx -= radius
+            yield dx, deviation
+
+    def near(self, x: float, y: float, reach: Array, times: Array) -> "Moving":
+        """Those whose surface comes within `reach` (m,) of a point at one of the `times` (m,)."""
+        if not len(self):
+            return self
+        places = self.at(times)
+        off = np.hypot(places[:, :, 0] - x, places[:, :, 1] - y) - self.radii[:, None]
+        close = (off < reach).any(axis=1)
+        return self if close.all() else self.chosen(np.asarray(close))
 
     def seen_from(self, frame: Pose2) -> "Moving":
         """The same in another frame, which is at `frame` in this one."""
@@ -59,7 +118,7 @@ class Moving:
             self, centres=self.centres + self.velocities * seconds, covariances=step @ self.covariances @ step.T
         )
 
-    def chosen(self, which: "np.typing.NDArray[np.bool_]") -> "Moving":
+    def chosen(self, which: Mask) -> "Moving":
         """Those of them."""
         return replace(
             self,
@@ -73,3 +132,6 @@ class Moving:
 def nothing(acceleration: float = 0.0) -> Moving:
     """Nothing moves."""
     return Moving(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), np.zeros((0, 4, 4)), acceleration)
+
+
+NOTHING = nothing()

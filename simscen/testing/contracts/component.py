@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -59,7 +59,7 @@ def view_of(world: Flatland, robot: RobotModel, bounds: tuple[float, float, floa
 
 def copied(view: CostmapView) -> CostmapView:
     """The same costmap in arrays of its own."""
-    return CostmapView(view.costs.copy(), view.distance.copy(), view.resolution, view.origin, view.revision)
+    return replace(view, costs=view.costs.copy(), distance=view.distance.copy())
 
 
 def same(one: CostmapView, other: CostmapView) -> bool:

@@ -1,11 +1,13 @@
-"""Whether a trajectory hits anything: dwb_critics' BaseObstacle and ObstacleFootprint as a veto."""
+"""Whether a trajectory hits anything: dwb_critics' BaseObstacle and ObstacleFootprint as a veto, of what moves, too."""
 
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.geometry import Pose2
+from simscen.core.geometry import Array, Pose2
 from simscen.stack.controllers.dwb.trajectories import Trajectories
+from simscen.stack.controllers.free_way import NEARER, SIGMAS
 from simscen.stack.footprint import Footprint
+from simscen.stack.prediction.moving import Moving
 from simscen.stack.protocols import CostmapView
 
 ROOM = 0.05
@@ -25,8 +27,11 @@ class Room:
     ) -> int | None:
         """The first of the trajectories in this order, the best coming first, that keeps ROOM; else that hits nothing.
 
-        From a collision, the first that leads out of it.
+        From a collision, the first that leads out of it. Among things that move, first come those that meet none of
+        them, and then those that meet them last.
         """
+        if len(costmap.moving):
+            order = order[np.argsort(-self._unmet(costmap.moving, tried, order), kind="stable")]
         gaps = np.empty((len(tried.x), len(order)), np.float32)
         for start in range(0, len(order), AT_ONCE):
             part = slice(start, start + AT_ONCE)
@@ -42,3 +47,10 @@ class Room:
             no_nearer = (gaps >= gaps[0]).all(axis=0)
             free = no_nearer & (gaps[-1] > gaps[0] + 0.5 * costmap.resolution)
         return int(order[int(free.argmax())]) if free.any() else None
+
+    def _unmet(self, moving: Moving, tried: Trajectories, order: npt.NDArray[np.intp]) -> Array:
+        """Seconds (k,) for which these trajectories meet nothing that moves, where both will be; inf for all of it."""
+        times = tried.passed[:, tried.turn[order]]
+        gaps = self._footprint.gap(moving, tried.poses(order), times, SIGMAS)
+        met = (gaps < ROOM) & (gaps < gaps[0] - NEARER)
+        return np.where(met.any(axis=0), times[met.argmax(axis=0), np.arange(len(order))], np.inf)

@@ -17,12 +17,14 @@ class Trajectories:
     """Positions (steps, n) of trajectories that begin where the robot is, and headings (steps, m) of the few turns.
 
     `turn` (n,) says which of the headings are each trajectory's: most share theirs with others, and sines are dear.
+    `passed` (steps, m) are the seconds till then.
     """
 
     x: Array
     y: Array
     yaw: Array
     turn: npt.NDArray[np.intp]
+    passed: Array
 
     def __len__(self) -> int:
         return len(self.turn)
@@ -49,19 +51,20 @@ def trajectories(
     counts = np.maximum(1.0, np.ceil(np.maximum(linear, np.abs(velocities[:, 2]) * seconds / radians)))
     _, one, turn = np.unique(velocities[:, 2] + 1j * counts, return_index=True, return_inverse=True)
     count, dt = counts[one], seconds / counts[one]
-    number = np.arange(1, math.ceil(counts.max()) + 1)[:, None]
-    passed, lasts = np.minimum(number, count) * dt, np.where(number <= count, dt, 0.0)
+    number = np.arange(math.ceil(counts.max()) + 1)[:, None]
+    moments, number = np.minimum(number, count) * dt, number[1:]
+    after, lasts = moments[1:], np.where(number <= count, dt, 0.0)
     bounds = list(zip(now, kinematics.acceleration, kinematics.deceleration, strict=True))
-    wz = _changing(velocities[one, 2], *bounds[2], passed)
+    wz = _changing(velocities[one, 2], *bounds[2], after)
     yaw = _from(pose.yaw, wz * lasts)
     cosine, sine = (each.take(turn, axis=1) for each in (np.cos(yaw[:-1]) * lasts, np.sin(yaw[:-1]) * lasts))
-    passed = passed.take(turn, axis=1)
+    passed = after.take(turn, axis=1)
     vx = _changing(velocities[:, 0], *bounds[0], passed)
     dx, dy = vx * cosine, vx * sine
     if now.vy != 0.0 or velocities[:, 1].any():
         vy = _changing(velocities[:, 1], *bounds[1], passed)
         dx, dy = dx - vy * sine, dy + vy * cosine
-    return Trajectories(_from(pose.x, dx), _from(pose.y, dy), yaw, turn)
+    return Trajectories(_from(pose.x, dx), _from(pose.y, dy), yaw, turn, moments)
 
 
 def _changing(target: Array, start: float, up: float, down: float, passed: Array) -> Array:

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from simscen.model import mppi as model
 from simscen.stack.controllers.mppi.rollouts import VX, VY, WZ
-from simscen.stack.controllers.mppi.scene import Mask, Scene
+from simscen.stack.controllers.mppi.scene import Mask, Scene, apart
 
 Floats = npt.NDArray[np.float32]
 ALMOST_STRAIGHT = np.float32(1e-6)
@@ -39,6 +39,9 @@ def cost(spec: model.MppiCostCritic, scene: Scene) -> tuple[Floats, Mask]:
     price[spec.near_collision_cost :] = spec.critical_cost
     paid = price.take(scene.costs(spots)).sum(axis=0)
     total = np.where(hit, np.float32(spec.collision_cost), paid)
+    if len(scene.moving):
+        near, met = scene.meeting
+        total += len(x) * (spec.critical_cost * near + spec.collision_cost * met)
     return np.asarray(spec.cost_weight / 254.0 / len(x) * total), hit
 
 
@@ -56,6 +59,9 @@ def obstacles(spec: model.MppiObstaclesCritic, scene: Scene) -> tuple[Floats, Ma
         inflated = np.float32(scene.costmap.inflation_radius)
         repulsion = np.where(costs >= 1, inflated - gap, np.float32(0)).sum(axis=0)
         total = total + spec.repulsion_weight * (repulsion - repulsion.min()) / len(x)
+    if len(scene.moving):
+        near_to, met = scene.meeting
+        total = total + spec.critical_weight * (near_to + spec.collision_cost * met)
     return np.asarray(total), hit
 
 
@@ -91,14 +97,6 @@ def velocity_deadband(spec: model.MppiVelocityDeadbandCritic, scene: Scene) -> F
     for axis, velocities in enumerate(scene.rolled.velocities):
         short += np.maximum(np.float32(least[axis]) - np.abs(velocities), 0)
     return np.asarray(spec.cost_weight * scene.dt * short.sum(axis=0))
-
-
-def apart(dx: Floats, dy: Floats) -> Floats:
-    """Distances from differences, which it uses up; np.hypot takes five times as long, for numbers past 1e19."""
-    dx *= dx
-    dy *= dy
-    dx += dy
-    return np.sqrt(dx, out=dx)
 
 
 def wrapped(angles: Floats) -> Floats:

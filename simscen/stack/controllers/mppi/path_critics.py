@@ -4,8 +4,8 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.model import mppi as model
-from simscen.stack.controllers.mppi.critics import apart, wrapped
-from simscen.stack.controllers.mppi.scene import Scene
+from simscen.stack.controllers.mppi.critics import wrapped
+from simscen.stack.controllers.mppi.scene import Scene, apart
 from simscen.stack.controllers.sums import add_up
 
 Floats = npt.NDArray[np.float32]

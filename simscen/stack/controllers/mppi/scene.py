@@ -7,16 +7,21 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.geometry import Pose2
+from simscen.core.geometry import Array, Pose2
 from simscen.stack.controllers.limits import Limits
 from simscen.stack.controllers.local_plan import LocalPlan
 from simscen.stack.controllers.mppi.rollouts import Rollouts
 from simscen.stack.footprint import Discs, Footprint
+from simscen.stack.prediction.moving import WIDEST, Moving
 from simscen.stack.protocols import CostmapView
 
 Floats = npt.NDArray[np.float32]
 Mask = npt.NDArray[np.bool_]
 INSCRIBED, UNKNOWN = 253, 255
+KEPT_OFF = 0.25
+"""Metres that rollouts keep off what moves, and a standard deviation of where it will be."""
+SOON = 1.2
+"""Seconds in which what may happen counts e times less."""
 ESCAPE = 0.01
 """Metres: a robot in collision may go where it is no more than so much nearer to the obstacle."""
 
@@ -72,6 +77,37 @@ class Scene:
         """Which points (m,) of the plan the middle of the robot can be at, as far as is known."""
         costs = self.costs(self.spots(*self.path[:2]))
         return np.asarray((costs < INSCRIBED) | (costs == UNKNOWN))
+
+    @cached_property
+    def moving(self) -> Moving:
+        """What moves and may come near to a rollout, in the frame of the rollouts."""
+        rolled, moving = self.rolled, self.costmap.moving
+        if not len(moving):
+            return moving
+        reach = np.sqrt((rolled.x * rolled.x + rolled.y * rolled.y).max(axis=1)) + self.footprint.circumscribed
+        near = moving.near(self.pose.x, self.pose.y, reach + WIDEST, self.times)
+        return near.seen_from(Pose2(self.pose.x, self.pose.y, 0.0)) if len(near) else near
+
+    @cached_property
+    def times(self) -> Array:
+        """Seconds (steps,) from now to the steps of the rollouts."""
+        times: Array = self.dt * np.arange(1.0, len(self.rolled.x) + 1.0)
+        return times
+
+    @cached_property
+    def meeting(self) -> tuple[Floats, Floats]:
+        """What each rollout (n,) comes too near to that moves: the mean nearness, and 1 for a hit.
+
+        Both count less the later it is, for what moves may have turned by then.
+        """
+        rolled, times = self.rolled, self.times.astype(np.float32)[:, None]
+        reached, touched = self.footprint.discs.nearness(self.moving, rolled.x, rolled.y, rolled.yaw, times, KEPT_OFF)
+        soon = np.exp(-times / np.float32(SOON))
+        near = np.clip(reached, 0.0, 2.0)
+        near *= near
+        close: Floats = (near * soon).mean(axis=0)
+        met: Floats = (touched * soon).max(axis=0)
+        return close, met
 
     @cached_property
     def _costs(self) -> npt.NDArray[np.uint8]:
@@ -134,3 +170,11 @@ class Scene:
     def _distance(self, spots: Spots) -> Floats:
         near = self._distances.take(spots.cell)
         return near if spots.on_map is None else np.where(spots.on_map, near, np.float32(np.inf))
+
+
+def apart(dx: Floats, dy: Floats) -> Floats:
+    """Distances from differences, which it uses up; np.hypot takes five times as long, for numbers past 1e19."""
+    dx *= dx
+    dy *= dy
+    dx += dy
+    return np.sqrt(dx, out=dx)
