@@ -131,7 +131,6 @@ class Discs:
         assert least is not None
         return np.asarray(least - np.float32(self.radius))
 
-
     def gap(self, moving: Moving, x: Reals, y: Reals, yaw: Reals, times: Reals, sigmas: float = 0.0) -> Reals:
         """Metres (…,) from the discs at poses (…,) to what moves, where it will be at `times`; see Moving.gap."""
         least = [moving.gap(*at, times, sigmas) for at in self._placed(x, y, yaw)]

@@ -116,9 +116,9 @@ class CostmapView:
     change; `inflation_radius` is how far in metres an obstacle's costs reach. The arrays may be windows on a costmap
     that goes on living: they hold until its next update.
 
-    `moving` is what motion prediction says of things that move, now and in this frame, of which nothing is in the costs:
-    `Footprint.gap` says how near a robot comes to them. Empty where nothing moves, where nobody predicts, and on the
-    global costmap: what moves will have gone before a robot gets far.
+    `moving` is what motion prediction says of things that move, now and in this frame; nothing of them is in the costs.
+    `Footprint.gap` says how near a robot will come to them. Empty where nothing moves, where nobody predicts, and on
+    the global costmap: what moves will have gone before a robot gets far.
     """
 
     costs: npt.NDArray[np.uint8]

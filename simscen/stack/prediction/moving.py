@@ -69,10 +69,8 @@ class Moving:
         shape = np.broadcast_shapes(x.shape, times.shape)
         nearest, touched = np.full(shape, -np.inf, x.dtype), np.zeros(shape, np.bool_)
         for gap, deviation in self._gaps(x, y, times):
-            gap -= radius
-            touched |= gap < TOUCH
-            gap /= -np.minimum(kept_off + deviation, WIDEST)
-            np.maximum(nearest, gap, out=nearest)
+            touched |= gap < radius + TOUCH
+            np.maximum(nearest, (radius - gap) / np.minimum(kept_off + deviation, WIDEST), out=nearest)
         nearest += 1.0
         return nearest, touched
 
