@@ -70,6 +70,7 @@ if TYPE_CHECKING:
     from simscen.spec.references import GoalName, MaskFile, MovableName, ObjectName, RegionName
     from simscen.stack.footprint import Footprint, distances
     from simscen.stack.journal import Task
+    from simscen.stack.prediction.moving import Moving
     from simscen.stack.protocols import (
         Behavior,
         Controller,
@@ -136,6 +137,7 @@ __all__ = [
     "MotionPath",
     "Mount",
     "MovableName",
+    "Moving",
     "NavigationFailure",
     "NonNegativeLength",
     "ObjectName",
@@ -292,6 +294,7 @@ _WHERE = {
         "distances",
     ),
     "simscen.stack.journal": ("Task",),
+    "simscen.stack.prediction.moving": ("Moving",),
     "simscen.sensors.sensor": (
         "Sensor",
         "SensorSetting",
