@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simscen.core.geometry import Array
+from simscen.core.remembered import remembered
 from simscen.core.shapes import TriangleMesh
 
 if TYPE_CHECKING:
@@ -45,6 +46,7 @@ def facing_up(mesh: TriangleMesh, steepest: float = STEEPEST) -> Faces:
     return found
 
 
+@remembered
 def terrain(mesh: TriangleMesh, reach: float) -> Owners:
     """The solids of a static mesh, by number, that wheels which get onto a step of `reach` m at most may roll on."""
     faces = np.flatnonzero(facing_up(mesh))

@@ -268,6 +268,18 @@ class Actors:
             if math.dist(pose[:3], place) <= distance + self._actors[name].size:
                 yield self._actors[name].id
 
+    @property
+    def loose(self) -> bool:
+        """Whether there is anything that can be pushed."""
+        return bool(self._pushable)
+
+    def coming(self, tick: int, ticks: int) -> Iterator[tuple[int, Vector, float]]:
+        """Of all that can be pushed: number, place, and how far from there any part of it can be so many ticks on."""
+        if self._pushable:
+            poses, travelled = self.poses(tick), self.top_speed(tick) * ticks / self._rate
+            for actor in self._pushable:
+                yield actor.id, poses[actor.body.name].position, actor.size + travelled
+
     def ids(self) -> dict[int, str | None]:
         """Names by the engine's numbers."""
         return {actor.id: name for name, actor in self._actors.items()}

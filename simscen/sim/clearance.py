@@ -57,7 +57,8 @@ class Clearance:
         self.others: Sequence[Clearance] = ()
         """The other robots, as they are measured."""
         self._limits, (self._radius, self._height) = robot.limits, reach_of(robot.solid)
-        self._size = ROUNDED + math.hypot(self._radius, self._height)
+        self.size = ROUNDED + math.hypot(self._radius, self._height)
+        """How far from its base the robot extends, in m."""
         # Where wheels roll on solids they may also hit them.
         touching = replace(robot, casters=(*robot.casters, *robot.tyres)) if uneven else robot
         self._proximity = Proximity(static, touching, reach)
@@ -110,7 +111,7 @@ class Clearance:
     def _search(self, tick: int, standing: Proximity) -> float:
         pose = self._state().pose
         nearest = min(self._reach, standing.distance(pose))
-        for other in self._actors.within(pose.position, nearest + self._size, tick):
+        for other in self._actors.within(pose.position, nearest + self.size, tick):
             for link in self._base.hull_links:
                 points = pybullet.getClosestPoints(self._base.id, other, nearest, link, physicsClientId=self._client)
                 nearest = min((point[8] for point in points), default=nearest)
@@ -120,7 +121,7 @@ class Clearance:
 
     def _to_robot(self, robot: "Clearance", place: Vector, within: float) -> float:
         """Distance in metres to another robot; inf above `within`."""
-        if math.dist(place, robot._state().pose.position) > within + self._size + robot._size:
+        if math.dist(place, robot._state().pose.position) > within + self.size + robot.size:
             return math.inf
         pairs = itertools.product(self._base.hull_links, robot._base.hull_links)
         found = (

@@ -100,8 +100,12 @@ def touch(client: int, body: int, link: int, group: int, others: int) -> None:
 
 def static_mesh(client: int, mesh: TriangleMesh) -> list[int]:
     """What never moves, as few bodies: concave meshes without the faces that lie on the ground."""
-    faces = above_floor(mesh.vertices, mesh.faces)
-    return [_concave(client, mesh, tile) for tile in tiles(mesh.vertices, faces)]
+    return static_faces(client, mesh.vertices, above_floor(mesh.vertices, mesh.faces))
+
+
+def static_faces(client: int, vertices: Array, faces: Faces) -> list[int]:
+    """Faces that never move, as few bodies."""
+    return [_concave(client, vertices, tile) for tile in tiles(vertices, faces)]
 
 
 def tiles(vertices: Array, faces: Faces) -> list[Faces]:
@@ -118,8 +122,8 @@ def above_floor(vertices: Array, faces: Faces) -> Faces:
     return standing
 
 
-def _concave(client: int, mesh: TriangleMesh, faces: Faces) -> int:
-    body = fixed(client, concave_shape(client, compact(mesh.vertices, faces)))
+def _concave(client: int, vertices: Array, faces: Faces) -> int:
+    body = fixed(client, concave_shape(client, compact(vertices, faces)))
     # Bullet would thicken the triangles by 1 mm.
     pybullet.changeDynamics(body, -1, collisionMargin=0.0, physicsClientId=client)
     return body

@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from simscen.core.facemesh import CONVEX_FACES
 from simscen.core.geometry import Array
+from simscen.core.remembered import remembered
 from simscen.core.shapes import TriangleMesh
 
 EDGE = 4.0
@@ -52,6 +53,7 @@ class Parts:
         return found
 
 
+@remembered
 def parts_of(mesh: TriangleMesh) -> Parts:
     """The parts of a mesh."""
     corners = mesh.vertices[mesh.faces]

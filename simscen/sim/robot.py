@@ -23,6 +23,7 @@ from simscen.sim.lost import lost
 from simscen.sim.robot_body import RobotBody
 from simscen.sim.state import Seen
 from simscen.sim.terrain import Terrain, stands
+from simscen.sim.walls import Walls
 
 Vector = tuple[float, float, float]
 
@@ -39,11 +40,11 @@ class Press:
 
 @dataclass(eq=False)
 class Scene:
-    """What all robots of a simulation share, and the robots by name; `fixed` are the bodies that never move."""
+    """What all robots of a simulation share, and the robots by name."""
 
     client: int
     rate: int
-    fixed: list[int]
+    walls: Walls
     terrain: Terrain
     actors: Actors
     film: Film
@@ -215,8 +216,12 @@ class Robot:
         self.others = tuple(robot for robot in scene.robots.values() if robot is not self)
         self.clearance.others = [robot.clearance for robot in self.others]
         others = {robot.base.id: robot.name for robot in self.others}
-        self._names = {**dict.fromkeys(scene.fixed), **scene.terrain.names, **scene.actors.ids(), **others}
+        self._names = {**dict.fromkeys(scene.walls.bodies), **scene.terrain.names, **scene.actors.ids(), **others}
         self.clearance.forget()
+
+    def know_walls(self, bodies: list[int]) -> None:
+        """These stand now, too."""
+        self._names.update(dict.fromkeys(bodies))
 
     @property
     def calm_until(self) -> int:

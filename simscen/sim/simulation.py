@@ -1,5 +1,6 @@
 """The world in motion: robots, what stands, what moves. Time is whole ticks."""
 
+import itertools
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
@@ -18,6 +19,7 @@ from simscen.sim.film import Film
 from simscen.sim.robot import Robot, Scene
 from simscen.sim.robot_body import RobotBody
 from simscen.sim.terrain import Terrain
+from simscen.sim.walls import Walls
 
 FIRMWARE_RATE = 60
 """Hz at which a base's firmware updates its wheel speeds; Clearpath's and Robotis' run at 50 to 100 Hz."""
@@ -57,18 +59,20 @@ class Simulation:
         """
         client = engine.connect(tick_rate, solver_iterations, one_by_one=len(robots) > 1)
         terrain = Terrain(client, static, max((w.radius for r in robots.values() for w in r.body.wheels), default=0.0))
-        fixed = engine.static_mesh(client, terrain.rest)
+        walls = Walls(client, terrain.rest)
         film, actors = Film(client, static, triangulate), Actors(client, tick_rate, triangulate)
-        self._scene = Scene(client, tick_rate, fixed, terrain, actors, film)
+        self._scene = Scene(client, tick_rate, walls, terrain, actors, film)
         self._attends: tuple[int, Callable[[], None]] | None = None
         self._firmware = max(1, round(tick_rate / FIRMWARE_RATE))
         self.robots: dict[str, Robot] = self._scene.robots
         for name, (body, pose, obstacles) in sorted(robots.items()):
             period = self._firmware / tick_rate
-            walls = static if obstacles is None else obstacles
-            self.robots[name] = Robot(name, self._scene, static, walls, body, pose, period, clearance_range)
+            ways = static if obstacles is None else obstacles
+            self.robots[name] = Robot(name, self._scene, static, ways, body, pose, period, clearance_range)
         for thing in sorted(bodies, key=lambda body: body.name):
             actors.add(terrain.lifted(thing), 0)
+        if not walls.complete:
+            self._put_up_walls(SETTLING)
         for _ in range(SETTLING):
             pybullet.stepSimulation(client)
         for name, robot in self.robots.items():
@@ -83,7 +87,7 @@ class Simulation:
     def step(self, ticks: int) -> None:
         """Let `ticks` ticks pass."""
         scene, until, firmware = self._scene, self._scene.tick + ticks, self._firmware
-        calm = self._calm_until()
+        calm = self._calm_until(ticks)
         plain = not (scene.floor or scene.presses or self._attends)
         while scene.tick < until:
             if plain and scene.tick < calm:
@@ -109,10 +113,15 @@ class Simulation:
                 scene.tick += 1
             else:
                 self._careful_step()
-                calm = self._calm_until()
+                calm = self._calm_until(ticks)
 
-    def _calm_until(self) -> int:
-        """The tick until which no step counts; -1 where each does, as where something pushes something."""
+    def _calm_until(self, ticks: int) -> int:
+        """The tick until which no step counts; -1 where each does, as where something pushes something.
+
+        For so many ticks, the walls stand that what is loose may come to meanwhile.
+        """
+        if self._scene.actors.loose and not self._scene.walls.complete:
+            self._put_up_walls(ticks)
         return -1 if self._scene.actors.pushing else min(robot.calm_until for robot in self.robots.values())
 
     def _careful_step(self) -> None:
@@ -120,12 +129,23 @@ class Simulation:
         scene = self._scene
         scene.actors.begin(scene.tick)
         motions = {robot.base.id: robot.look() for robot in self.robots.values()}
+        if not scene.walls.complete:
+            self._put_up_walls(1)
         others = scene.actors.velocities(scene.tick)
         pybullet.stepSimulation(scene.client)
         scene.tick += 1
         for robot in self.robots.values():
             robot.feel(Before(motions[robot.base.id], others, motions))
         scene.actors.show(scene.tick)
+
+    def _put_up_walls(self, ticks: int) -> None:
+        """Those that anything could touch within the next ticks, robots only if they are not calm."""
+        scene = self._scene
+        near = [(robot.base.id, robot.base_pose().position, robot.clearance.size) for robot in self.robots.values()]
+        for body in itertools.chain(near, scene.actors.coming(scene.tick, ticks)):
+            if fresh := scene.walls.near(*body):
+                for robot in self.robots.values():
+                    robot.know_walls(fresh)
 
     def lay(self, name: str, patch: Patch) -> None:
         """Make a piece of floor slippery, or dry again; a patch of the same name is replaced."""
