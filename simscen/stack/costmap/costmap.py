@@ -44,7 +44,7 @@ class Costmap:
         size: tuple[float, float] | None = None,
         no_farther: float = math.inf,
     ) -> None:
-        self._spec, self._surroundings = spec, surroundings
+        self._spec, self._surroundings, self._tracks = spec, surroundings, spec.track_unknown_space
         self._rolling = surroundings.map is None
         self._size, self._no_farther = size or (spec.rolling_size, spec.rolling_size), no_farther
         self._inscribed = surroundings.robot.inscribed_radius
@@ -61,6 +61,7 @@ class Costmap:
         self.moving = NOTHING
         """What moves, in its frame; shown with it."""
         layer = self._layer(Pose2(0.0, 0.0))
+        self._frame: Frame = layer.frame
         self._live = LiveLayer(spec, self._inscribed, layer.frame)
         self._lay(layer)
         self._unknown = layer.unknown
@@ -92,10 +93,13 @@ class Costmap:
             self._roll(base)
         self._newest[seen.sensor] = (base, seen)
         if isinstance(seen, Image):
-            self._touch(self._live.on_image(base, seen, self._static_squared))
+            self._touch_cells(self._live.on_image(base, seen, self._static_squared))
             return
-        self._touch(self._live.on_scan(base, seen, self._static_squared))
-        self._learn(base, seen)
+        changed = self._live.on_scan(base, seen, self._static_squared)
+        if len(changed):
+            self._touch(*self._frame.extent(changed))
+        if self._tracks:
+            self._learn(base, seen)
 
     def clear(self, within: float = math.inf) -> None:
         """Forget every live obstacle `within` so many metres of the robot along x and y, but those that it sees now.
@@ -144,11 +148,13 @@ class Costmap:
 
     def _roll(self, base: Pose2) -> None:
         """Follow the robot; what is new in the window is unknown, where that is tracked."""
-        before = self._frame
-        layer = self._layer(base)
-        self._lay(layer)
-        self._live.roll(layer.frame)
-        self._unknown = carried(self._unknown, before, layer.frame, self._spec.track_unknown_space)
+        before, window = self._frame, window_around(base, self._size, self._spec.resolution)
+        if self._surroundings.keepout or self._surroundings.masks.keepout is not None:
+            self._lay(self._layer_in(window))
+        self._frame = window  # where nothing is forbidden, the cells of one window are those of any other
+        self._live.roll(window)
+        if self._tracks:
+            self._unknown = carried(self._unknown, before, window, True)
         self._show()
 
     def _layer(self, centre: Pose2) -> StaticLayer:
@@ -157,7 +163,7 @@ class Costmap:
     def _layer_in(self, window: Frame) -> StaticLayer:
         """What never changes but by an order; in this window, where there is no map."""
         grid, keepout, mask = self._surroundings.map, self._surroundings.keepout, self._surroundings.masks.keepout
-        unknown = self._spec.track_unknown_space
+        unknown = self._tracks
         if grid is None:
             return empty_layer(window, keepout, mask, unknown)
         return static_layer(grid, keepout, mask, unknown)
@@ -168,11 +174,11 @@ class Costmap:
 
     def _show(self) -> None:
         """Compute everything again."""
-        self._costs = self._inflation.costs(self._static_squared, self._unknown)
+        self._costs = self._inflation.costs(self._static_squared, self._unknown if self._tracks else None)
         self._distance = self._inflation.metres.take(self._static_squared)
         self._revision += 1
         self._changed = None
-        self._touch(np.argwhere(self._live.marked()))
+        self._touch_cells(np.argwhere(self._live.marked()))
 
     def _obstacles(self, window: Window) -> Mask:
         """Live obstacles in a window, without specks where they are noise."""
@@ -186,23 +192,30 @@ class Costmap:
         self._scans += 1
         if self._scans % LOOK_AROUND != 1:
             return
-        around, corner = self._live.around(base, math.hypot(scan.mount.x, scan.mount.y))
-        cells = np.argwhere(self._unknown[around]) + corner
-        if not len(cells):
+        frame = self._frame
+        around = self._live.around(base, math.hypot(scan.mount.x, scan.mount.y))
+        rows, columns = self._unknown[around].nonzero()
+        if not len(rows):
             return
-        cells = cells[crossed(self._frame.centres(cells), self._frame.resolution, scan, base, self._spec)]
-        self._unknown[cells[:, 0], cells[:, 1]] = False
-        self._touch(cells)
+        cells = (rows + around[0].start) * frame.shape[1] + (columns + around[1].start)
+        cells = cells[crossed(frame.points(cells), frame.resolution, scan, base, self._spec)]
+        if len(cells):
+            self._unknown[np.divmod(cells, frame.shape[1])] = False
+            self._touch(*frame.extent(cells))
 
-    def _touch(self, cells: Cells) -> None:
-        """These cells have changed."""
-        if not len(cells):
-            return
-        low, high = cells.min(axis=0).tolist(), cells.max(axis=0).tolist()
+    def _touch_cells(self, cells: Cells) -> None:
+        """These cells (n, 2) have changed."""
+        if len(cells):
+            (top, left), (bottom, right) = cells.min(axis=0).tolist(), cells.max(axis=0).tolist()
+            self._touch((top, left), (bottom, right))
+
+    def _touch(self, low: tuple[int, int], high: tuple[int, int]) -> None:
+        """Cells from `low` to `high` have changed."""
         if self._changed is not None:
-            low, high = map(min, low, self._changed[0]), map(max, high, self._changed[1])
-        (top, left), (bottom, right) = low, high
-        self._changed = (top, left), (bottom, right)
+            before_low, before_high = self._changed
+            low = min(low[0], before_low[0]), min(low[1], before_low[1])
+            high = max(high[0], before_high[0]), max(high[1], before_high[1])
+        self._changed = low, high
         self._revision += 1
 
     def refresh(self, low: tuple[int, int], high: tuple[int, int]) -> None:
@@ -216,4 +229,4 @@ class Costmap:
         )
         squared = np.minimum(self._static_squared[inner], squared_distances(self._obstacles(outer), self._margin)[part])
         self._distance[inner] = self._inflation.metres.take(squared)
-        self._costs[inner] = self._inflation.costs(squared, self._unknown[inner])
+        self._costs[inner] = self._inflation.costs(squared, self._unknown[inner] if self._tracks else None)

@@ -111,13 +111,21 @@ class _Rhythm:
         if self.seen and self.due(tick):
             self._updated = tick
             for one in self.seen.values():
-                if isinstance(one, Image) or not np.isnan(one.ranges).all():
+                if isinstance(one, Image) or not _blind(one):
                     self._underway.put(tick, (odometry.then(base, one.tick), one, frames))
             self.seen.clear()
+        if tick < self._underway.due:
+            return ()
         there: list[_View] = []
         while tick >= self._underway.due:
             there.append(self._underway.take())
         return there
+
+
+def _blind(scan: Scan) -> bool:
+    """Whether no beam says anything."""
+    ranges = scan.ranges
+    return not len(ranges) or bool(math.isnan(ranges.item(0)) and np.isnan(ranges).all())
 
 
 _View = tuple[Pose2, Scan | Image, Frames]

@@ -7,8 +7,11 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array
+from simscen.stack.localizers.beams import Plane
 
 Cells = npt.NDArray[np.int64]
+Numbers = npt.NDArray[np.int64]
+"""Cells (n,) by number: row by row, from cell (0, 0) on."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +42,29 @@ class Frame:
         """Which of the cells (n, 2) lie on the grid."""
         rows, columns = cells[:, 0], cells[:, 1]
         return (rows >= 0) & (columns >= 0) & (rows < self.shape[0]) & (columns < self.shape[1])
+
+    def numbers(self, points: Plane) -> Numbers:
+        """The cells under those of the points (n,) that lie on the grid."""
+        local = (points - complex(*self.origin)) * (1.0 / self.resolution)
+        cells = np.floor(local.view(np.float64)).astype(np.int64)
+        columns, rows = cells[::2], cells[1::2]
+        # Below zero is far beyond every grid without a sign.
+        inside = (columns.view(np.uint64) < self.shape[1]) & (rows.view(np.uint64) < self.shape[0])
+        numbers: Numbers = (rows * self.shape[1] + columns)[inside]
+        return numbers
+
+    def points(self, numbers: Numbers) -> Plane:
+        """The centres (n,) of cells."""
+        rows, columns = np.divmod(numbers, self.shape[1])
+        corner, edge = complex(*self.origin), self.resolution
+        points: Plane = rows * (1j * edge) + (columns * edge + (corner + (0.5 + 0.5j) * edge))
+        return points
+
+    def extent(self, numbers: Numbers) -> tuple[tuple[int, int], tuple[int, int]]:
+        """The lowest and the highest row and column of cells, of which there is one."""
+        columns = numbers % self.shape[1]
+        top, bottom = int(numbers.min()) // self.shape[1], int(numbers.max()) // self.shape[1]
+        return (top, int(columns.min())), (bottom, int(columns.max()))
 
     def covers(self, x: float, y: float) -> bool:
         """Whether the point lies on the grid."""

@@ -9,7 +9,7 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.sensing import Image, Scan
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.costmap.depth_layer import Heights, heights_seen, seen_through
-from simscen.stack.costmap.frame import Cells, Frame
+from simscen.stack.costmap.frame import Cells, Frame, Numbers
 from simscen.stack.costmap.inflation_layer import Squared
 from simscen.stack.costmap.obstacle_layer import crossed, hits, in_view
 from simscen.stack.costmap.rolling import Cell, carried
@@ -17,6 +17,7 @@ from simscen.stack.costmap.static_layer import Mask
 
 BESIDE_A_WALL = 2
 """Hits within one cell (squared distance 2) of a mapped wall are the wall itself: marking them would tell nothing."""
+NONE: Numbers = np.zeros(0, dtype=np.int64)
 Window = tuple[slice, slice]
 
 
@@ -32,14 +33,14 @@ class LiveLayer:
         self._frame = frame
         self._scanned: Mask = np.zeros(frame.shape, dtype=bool)
         self._heights: Heights | None = None
-        self._marks: Cells = np.zeros((0, 2), dtype=np.int64)
+        self._marks: Numbers = NONE
 
     def forget_around(self, base: Pose2, metres: float) -> None:
         """Forget what lies so near to the robot along x and y."""
         here = self._frame.cell(base.x, base.y)
         window = self._frame.window(here, here, math.ceil(metres / self._frame.resolution))
         self._scanned[window] = False
-        self._marks = np.argwhere(self._scanned)
+        self._marks = np.flatnonzero(self._scanned)
         if self._heights is not None:
             self._heights[window] = np.nan
 
@@ -55,13 +56,13 @@ class LiveLayer:
     def mark(self, cells: Cells) -> None:
         """A lidar has seen something here."""
         _set(self._scanned, cells, True)
-        self._marks = np.argwhere(self._scanned)
+        self._marks = np.flatnonzero(self._scanned)
 
     def roll(self, frame: Frame) -> None:
         """Go on in another window, with what lies in both."""
         before, self._frame = self._frame, frame
         self._scanned = carried(self._scanned, before, frame, False)
-        self._marks = np.argwhere(self._scanned)
+        self._marks = np.flatnonzero(self._scanned)
         if self._heights is not None:
             self._heights = carried(self._heights, before, frame, np.nan)
 
@@ -72,23 +73,27 @@ class LiveLayer:
         both: Mask = self._scanned[window] | ~np.isnan(self._heights[window])
         return both
 
-    def on_scan(self, base: Pose2, scan: Scan, walls: Squared) -> Cells:
+    def on_scan(self, base: Pose2, scan: Scan, walls: Squared) -> Numbers:
         """Clear what the beams pass through, then mark what they hit; returns the cells that have changed."""
-        cells = self._frame.cells(hits(scan, base, self._spec.obstacle_min_range, self._spec.obstacle_max_range))
-        cells = _off_walls(cells[self._frame.inside(cells)], walls)
-        fresh = cells[~_get(self._scanned, cells)]
-        marks = self._marks
-        if not len(marks):
-            self._marks = fresh
-            _set(self._scanned, fresh, True)
-            return fresh
-        points = self._frame.centres(marks)
-        _set(self._scanned, marks[crossed(points, self._frame.resolution, scan, base, self._spec)], False)
-        _set(self._scanned, cells, True)
-        _set(self._scanned, marks[self._under_robot(points, base)], False)
-        kept = _get(self._scanned, marks)
-        self._marks = np.concatenate((marks[kept], fresh))
-        return np.concatenate((marks[~kept], fresh))
+        spec, frame, scanned = self._spec, self._frame, self._scanned.reshape(-1)
+        seen = frame.numbers(hits(scan, base, spec.obstacle_min_range, spec.obstacle_max_range))
+        known = scanned.take(seen)
+        fresh = seen[~known]
+        fresh = fresh[walls.take(fresh) > BESIDE_A_WALL]
+        marks, lost = self._marks, NONE
+        if len(marks):
+            points = frame.points(marks)
+            gone = marks[crossed(points, frame.resolution, scan, base, spec)]
+            under = marks[np.abs(points - complex(base.x, base.y)) < self._inscribed]
+            if len(gone) or len(under):
+                scanned[gone] = False
+                scanned[seen[known]] = True
+                scanned[under] = False  # Nav2's footprint_clearing_enabled, for the inscribed circle
+                kept = scanned.take(marks)
+                lost, marks = marks[~kept], marks[kept]
+        scanned[fresh] = True
+        self._marks = np.concatenate((marks, fresh)) if len(fresh) else marks
+        return np.concatenate((lost, fresh))
 
     def on_image(self, base: Pose2, image: Image, walls: Squared) -> Cells:
         """Clear what the camera sees through, then mark what it sees; returns the cells that may have changed."""
@@ -105,20 +110,15 @@ class LiveLayer:
         self._heights[cells[:, 0], cells[:, 1]] = heights[shown]
         return np.concatenate((marked[gone], cells))
 
-    def around(self, base: Pose2, mount: float) -> tuple[Window, Cells]:
-        """The cells that a sensor `mount` metres from the base can reach, and the corner that they are counted from."""
+    def around(self, base: Pose2, mount: float) -> Window:
+        """The cells that a sensor `mount` metres from the base can reach."""
         here = self._frame.cell(base.x, base.y)
         far = max(self._spec.raytrace_max_range, self._spec.obstacle_max_range) + mount
-        window = self._frame.window(here, here, math.ceil(far / self._frame.resolution) + 1)
-        return window, np.array((window[0].start, window[1].start))
+        return self._frame.window(here, here, math.ceil(far / self._frame.resolution) + 1)
 
     def _under_robot(self, points: Array, base: Pose2) -> Mask:
         """Nav2's footprint_clearing_enabled, for the inscribed circle and cells with these centres (n, 2)."""
         return np.asarray(np.hypot(points[:, 0] - base.x, points[:, 1] - base.y) < self._inscribed)
-
-
-def _off_walls(cells: Cells, walls: Squared) -> Cells:
-    return cells[_get(walls, cells) > BESIDE_A_WALL]
 
 
 def _get(layer: npt.NDArray[Cell], cells: Cells) -> npt.NDArray[Cell]:

@@ -4,6 +4,7 @@ Nav2 walks along every beam. Here only the cells that are marked now are asked w
 which is the same question and a hundred times fewer cells.
 """
 
+import cmath
 import math
 from dataclasses import dataclass, field
 
@@ -13,7 +14,8 @@ import numpy.typing as npt
 from simscen.core.geometry import Array, Pose2
 from simscen.core.sensing import Scan
 from simscen.model.costmaps import Costmap as CostmapSpec
-from simscen.stack.costmap.frame import Cells, Frame
+from simscen.stack.costmap.frame import Cells, Frame, Numbers
+from simscen.stack.localizers.beams import Plane, directions
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,17 +25,21 @@ class ScanAmongMoving(Scan):
     moving: npt.NDArray[np.bool_] = field(kw_only=True)
 
 
-def hits(scan: Scan, base: Pose2, nearest: float, farthest: float) -> Array:
-    """Map points (n, 2) of the beams that hit something that stands, `nearest` to `farthest` metres from the lidar."""
+def hits(scan: Scan, base: Pose2, nearest: float, farthest: float) -> Plane:
+    """Map points x + iy (n,) of the beams that hit something that stands, `nearest` to `farthest` metres away."""
     ranges = scan.ranges
     use = (ranges >= max(scan.range_min, nearest)) & (ranges <= min(scan.range_max, farthest))
     if isinstance(scan, ScanAmongMoving):
         use &= ~scan.moving
-    lidar, beams = base.compose(scan.mount), use.nonzero()[0]
-    ranges, angles = ranges[beams], scan.angle_min + scan.angle_increment * beams + lidar.yaw
-    points = np.empty((len(beams), 2))
-    points[:, 0], points[:, 1] = lidar.x + ranges * np.cos(angles), lidar.y + ranges * np.sin(angles)
+    beams, turned = use.nonzero()[0], cmath.rect(1.0, base.yaw)
+    points: Plane = ranges.take(beams) * directions(scan).take(beams) * turned
+    points += _place(scan, base)
     return points
+
+
+def _place(scan: Scan, base: Pose2) -> complex:
+    """Where the lidar is in the map, x + iy."""
+    return complex(base.x, base.y) + cmath.rect(1.0, base.yaw) * complex(scan.mount.x, scan.mount.y)
 
 
 def _shown_free(ranges: Array, scan: Scan, spec: CostmapSpec) -> Array:
@@ -54,37 +60,39 @@ def in_view(cells: Cells, frame: Frame, scan: Scan, base: Pose2) -> npt.NDArray[
     return np.asarray(turned <= abs(scan.angle_increment) * len(scan.ranges))
 
 
-def crossed(points: Array, resolution: float, scan: Scan, base: Pose2, spec: CostmapSpec) -> npt.NDArray[np.bool_]:
-    """Which of the cells with these centres (n, 2) a beam crosses before it hits anything.
+def crossed(points: Plane, resolution: float, scan: Scan, base: Pose2, spec: CostmapSpec) -> Numbers:
+    """Indices of those cells with these centres x + iy (n,) that a beam crosses before it hits anything.
 
     A line crosses a square of half-width h when its distance from the centre is at most h (|cos| + |sin|); each cell
     is tested against the beam nearest to its centre, which crosses it if any does.
     """
-    lidar = base.compose(scan.mount)
-    dx, dy = points[:, 0] - lidar.x, points[:, 1] - lidar.y
-    distance, bearing = np.hypot(dx, dy), np.arctan2(dy, dx)
-    step = scan.angle_increment
-    place = ((bearing - lidar.yaw - scan.angle_min) % (2 * math.pi)) / step
-    beam = np.rint(place).astype(np.int64)
-    off = (place - beam) * step
-    turn = round(2 * math.pi / abs(step))
-    if abs(turn * abs(step) - 2 * math.pi) < 1e-6:
-        beam %= turn
-    count = len(scan.ranges)
-    ranges = scan.ranges.take(beam, mode="clip")
-    if beam.min() < 0 or beam.max() >= count:
-        ranges = np.where((beam >= 0) & (beam < count), ranges, np.nan)  # nobody looks there
-    length = _shown_free(ranges, scan, spec)
-    passes = np.zeros(len(points), dtype=bool)
-    near = (distance * math.cos(step / 2) <= length).nonzero()[0]  # most cells lie behind what their beams hit
+    first, step, half = base.yaw + scan.mount.yaw + scan.angle_min, scan.angle_increment, resolution / 2
+    seen = (points - _place(scan, base)) * cmath.rect(1.0, -first)
+    distance, bearing = np.abs(seen), np.arctan2(seen.imag, seen.real)
+    beam, ranges = _nearest_beams(bearing, scan)
+    near = (distance * math.cos(step / 2) + half <= ranges).nonzero()[0]  # most lie behind what their beams hit
     if not len(near):
-        return passes
-    bearing, off, distance, length = bearing[near], off[near], distance[near], length[near]
-    direction = bearing - off
-    half = resolution / 2
+        return near
+    distance, bearing, length = distance[near], bearing[near], _shown_free(ranges[near], scan, spec)
+    off = np.remainder(bearing - beam[near] * step + math.pi, 2 * math.pi) - math.pi
+    direction = first + bearing - off
     reach = half * (np.abs(np.cos(direction)) + np.abs(np.sin(direction)))
     along = distance * np.cos(off)
-    passes[near] = (
-        (np.abs(distance * np.sin(off)) <= reach) & (along <= length - half) & (along >= spec.raytrace_min_range)
-    )
-    return passes
+    passed = (np.abs(distance * np.sin(off)) <= reach) & (along <= length - half) & (along >= spec.raytrace_min_range)
+    crossed_by: Numbers = near[passed]
+    return crossed_by
+
+
+def _nearest_beams(bearing: Array, scan: Scan) -> tuple[Numbers, Array]:
+    """The beams nearest to directions (n,) that are counted from the first beam, and their ranges; nan beyond them."""
+    step, count = scan.angle_increment, len(scan.ranges)
+    turn = round(2 * math.pi / abs(step))
+    even = abs(turn * abs(step) - 2 * math.pi) < 1e-6
+    if even and turn == count:
+        beam = np.rint(bearing / step).astype(np.int64)
+        return beam, scan.ranges.take(beam, mode="wrap")
+    beam = np.rint((bearing % (2 * math.pi)) / step).astype(np.int64)
+    if even:
+        beam %= turn
+    ranges = scan.ranges.take(beam, mode="clip")
+    return beam, np.where((beam >= 0) & (beam < count), ranges, np.nan)
