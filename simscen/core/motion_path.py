@@ -13,22 +13,21 @@ Step = tuple[float, float, float]
 
 def pose_at(path: MotionPath, seconds: float) -> Pose2:
     """The pose on the path, `seconds` after it was set off."""
-    local = min(max(_local(path, path.elapsed(seconds)), path.times[0]), path.times[-1])
-    if len(path.times) == 1:
+    times = path.times
+    if len(times) == 1:
         return path.poses[0]
-    leg = min(bisect_right(path.times, local) - 1, len(path.times) - 2)
+    local = min(max(_local(path, path.elapsed(seconds)), times[0]), times[-1])
+    leg = min(bisect_right(times, local), len(times) - 1) - 1
     begin, end = path.poses[leg], path.poses[leg + 1]
-    lasts = path.times[leg + 1] - path.times[leg]
-    part = (local - path.times[leg]) / lasts if lasts > 0 else 1.0
+    lasts = times[leg + 1] - times[leg]
+    part = (local - times[leg]) / lasts if lasts > 0 else 1.0
     if path.ease == "spline":
         return _on_curve(path, leg, part)
     if path.ease == "smooth":
         part = part * part * (3.0 - 2.0 * part)
-    return Pose2(
-        begin.x + part * (end.x - begin.x),
-        begin.y + part * (end.y - begin.y),
-        wrap(begin.yaw + part * wrap(end.yaw - begin.yaw)),
-    )
+    (x, y, yaw), (to_x, to_y, to_yaw) = begin, end
+    heading = wrap(yaw) if to_yaw == yaw else wrap(yaw + part * wrap(to_yaw - yaw))
+    return Pose2(x + part * (to_x - x), y + part * (to_y - y), heading)
 
 
 def top_speed(path: MotionPath, reach: float = 0.0) -> float:

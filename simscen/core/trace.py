@@ -7,7 +7,8 @@ gives the same Trace, so that a run can be judged years later without a simulato
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -22,8 +23,7 @@ from simscen.core.samples import Samples, Ticks
 from simscen.core.sensing import Readings
 
 
-@dataclass(frozen=True)
-class Truth:
+class Truth(NamedTuple):
     """The robot as it really is: `pose` of its base in the world, `twist` in its own frame.
 
     `clearance` is the distance in metres from the robot's hull to the nearest obstacle surface (negative when they
@@ -33,7 +33,7 @@ class Truth:
     pose: Pose3
     twist: Twist
     clearance: float
-    objects: Mapping[str, Pose3] = field(default_factory=dict)
+    objects: Mapping[str, Pose3] = MappingProxyType({})
 
 
 class LogLine(NamedTuple):

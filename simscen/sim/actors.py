@@ -1,7 +1,7 @@
 """Things that move: by a script, or because they are pushed."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -68,6 +68,7 @@ class Actors:
         self._client, self._rate, self._triangulate = client, tick_rate, triangulate
         self._actors: dict[str, Actor] = {}
         self._travelling: list[Actor] = []
+        self._fastest = 0.0
         self._pushable: list[Actor] = []
         self._poses: Mapping[str, Pose3] = {}
         self._posed_at: int | None = None
@@ -151,11 +152,13 @@ class Actors:
         actor = self._actors[name]
         actor.path, actor.since, actor.speed = path, tick, speed
         actor.scripted.clear()
+        self._fastest = max(self._fastest, speed)
 
     def _sort(self) -> None:
         self._posed_at = self._still_since = None
         self._actors = dict(sorted(self._actors.items()))
         self._travelling = [actor for actor in self._actors.values() if actor.path is not None]
+        self._fastest = max((actor.speed for actor in self._travelling), default=0.0)
         self._pushable = [actor for actor in self._actors.values() if actor.pushable]
         self.pushing = bool(self._travelling and self._pushable)
         for actor in self._pushable:
@@ -190,22 +193,22 @@ class Actors:
     def show(self, tick: int) -> None:
         """Put the scripted bodies where they are at `tick`."""
         for actor in self._travelling:
-            pose = self._pose(actor, tick)
-            if pose != actor.shown:
-                actor.shown = pose
-                pybullet.resetBasePositionAndOrientation(
-                    actor.id, pose.position, pose.quaternion, physicsClientId=self._client
-                )
+            self._show(actor, self._pose(actor, tick))
+
+    def _show(self, actor: Actor, pose: Pose3) -> None:
+        if pose != actor.shown:
+            actor.shown = pose
+            pybullet.resetBasePositionAndOrientation(actor.id, pose[:3], pose[3:], self._client)
 
     def poses(self, tick: int) -> Mapping[str, Pose3]:
         """Where everything is, by name in order; the engine is asked at most once for each tick."""
-        if self._posed_at == tick:
-            return self._poses
-        if not self._asleep(tick):
-            self._poses = {name: self._pose(actor, tick) for name, actor in self._actors.items()}
+        if self._posed_at != tick:
             self._posed_at = tick
-            if self._still_since is None or not all(actor.resting for actor in self._actors.values()):
-                self._still_since = tick
+            if self._travelling or not self._asleep(tick):
+                self._poses = {name: self._pose(actor, tick) for name, actor in self._actors.items()}
+                still = self._still_since is not None and not self._travelling
+                if not (still and all(actor.resting for actor in self._actors.values())):
+                    self._still_since = tick
         return self._poses
 
     def _asleep(self, tick: int) -> bool:
@@ -226,16 +229,17 @@ class Actors:
 
     def _pose(self, actor: Actor, tick: int) -> Pose3:
         if actor.path is not None:
-            if tick not in actor.scripted:
+            there = actor.scripted.get(tick)
+            if there is None:
                 if len(actor.scripted) > 1:
                     actor.scripted.clear()
-                pose = pose_at(actor.path, (tick - actor.since) / self._rate)
-                actor.scripted[tick] = Pose3.planar(pose, actor.body.pose.z)
-            return actor.scripted[tick]
+                there = Pose3.planar(pose_at(actor.path, (tick - actor.since) / self._rate), actor.body.pose.z)
+                actor.scripted[tick] = there
+            return there
         if not actor.body.mass > 0:
             actor.resting = True
             return actor.body.pose
-        said: Placing = pybullet.getBasePositionAndOrientation(actor.id, physicsClientId=self._client)
+        said: Placing = pybullet.getBasePositionAndOrientation(actor.id, self._client)
         actor.resting = actor.placed is not None and actor.placed[0] == said
         if actor.placed is None or not actor.resting:
             actor.placed = said, Pose3(*said[0], *said[1]).compose(actor.centre_from_base)
@@ -253,20 +257,32 @@ class Actors:
 
     def lost(self, tick: int) -> str | None:
         """What has become of the first thing that the engine has lost, or None."""
+        if not self._pushable:
+            return None
         self.poses(tick)
         for actor in self._pushable:
             if actor.placed is not None and actor.placed is not actor.sound:
                 place, turn = actor.placed[0]
-                if trouble := lost(f'object "{actor.body.name}"', *place, *turn):
+                if trouble := lost(f'object "{actor.body.name}"', *place, sum(turn)):
                     return trouble
                 actor.sound = actor.placed
         return None
 
-    def within(self, place: Vector, distance: float, tick: int) -> Iterator[int]:
-        """The engine's numbers of those that may be as near to a place as a distance in metres."""
-        for name, pose in self.poses(tick).items():
-            if math.dist(pose[:3], place) <= distance + self._actors[name].size:
-                yield self._actors[name].id
+    def within(self, place: Vector, distance: float, tick: int) -> list[int]:
+        """The engine's numbers of those that may be as near to a place as a distance in metres, for it to be asked.
+
+        A scripted one is put where it is now if that is so near, or where the engine has had it until now: nobody is
+        to run into what has gone.
+        """
+        near, poses = list[int](), self.poses(tick)
+        for name, actor in self._actors.items():
+            pose, reach = poses[name], distance + actor.size
+            is_near = math.dist(pose[:3], place) <= reach
+            if actor.path is not None and (is_near or math.dist(actor.shown[:3], place) <= reach):
+                self._show(actor, pose)
+            if is_near:
+                near.append(actor.id)
+        return near
 
     @property
     def loose(self) -> bool:
@@ -289,11 +305,10 @@ class Actors:
 
         A thing that is hit by a heavier one leaves with up to twice its speed.
         """
-        fastest = max((actor.speed for actor in self._travelling), default=0.0)
         if not self._pushable:
-            return fastest
+            return self._fastest
         self.poses(tick)
-        return max(fastest, *map(self._speed, self._pushable)) * (2 if len(self._pushable) > 1 else 1)
+        return max(self._fastest, *map(self._speed, self._pushable)) * (2 if len(self._pushable) > 1 else 1)
 
     def _speed(self, actor: Actor) -> float:
         falling = 0.1 * GRAVITY  # what it may gain within that time

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import pybullet
 
+from simscen.core.geometry import Pose3
 from simscen.core.shapes import TriangleMesh
 from simscen.sim.actors import Actors
 from simscen.sim.drives import Base
@@ -56,7 +57,8 @@ class Clearance:
         self._state = state
         self.others: Sequence[Clearance] = ()
         """The other robots, as they are measured."""
-        self._limits, (self._radius, self._height) = robot.limits, reach_of(robot.solid)
+        limits, (self._radius, self._height) = robot.limits, reach_of(robot.solid)
+        self._limits, self._quickest = limits, max(limits.linear, limits.reverse or 0.0, limits.lateral or 0.0)
         self.size = ROUNDED + math.hypot(self._radius, self._height)
         """How far from its base the robot extends, in m."""
         # Where wheels roll on solids they may also hit them.
@@ -92,10 +94,10 @@ class Clearance:
         """The clearance at `tick`, which is now, in metres; the reach where nothing is nearer."""
         if self._measured_at == tick:
             return self._distance
-        self._actors.show(tick)
-        self._distance = gap = self._search(tick, self._ways)
+        pose = self._state().pose
+        self._distance = gap = self._search(tick, pose, self._ways)
         if self._ways is not self._proximity:
-            gap = min(gap, self._search(tick, self._proximity))
+            gap = min(gap, self._search(tick, pose, self._proximity))
         self._measured_at = tick
         if self.unsure:
             self.enclosed_by = self._enclosing(tick)
@@ -108,15 +110,14 @@ class Clearance:
         self._actors.undisturbed(self._base.id, until=self.no_contact_before)
         return self._distance
 
-    def _search(self, tick: int, standing: Proximity) -> float:
-        pose = self._state().pose
-        nearest = min(self._reach, standing.distance(pose))
-        for other in self._actors.within(pose.position, nearest + self.size, tick):
+    def _search(self, tick: int, pose: Pose3, standing: Proximity) -> float:
+        nearest, place = min(self._reach, standing.distance(pose)), pose[:3]
+        for other in self._actors.within(place, nearest + self.size, tick):
             for link in self._base.hull_links:
                 points = pybullet.getClosestPoints(self._base.id, other, nearest, link, physicsClientId=self._client)
                 nearest = min((point[8] for point in points), default=nearest)
         for robot in self.others:
-            nearest = min(nearest, self._to_robot(robot, pose.position, nearest))
+            nearest = min(nearest, self._to_robot(robot, place, nearest))
         return nearest
 
     def _to_robot(self, robot: "Clearance", place: Vector, within: float) -> float:
@@ -145,16 +146,17 @@ class Clearance:
 
         What another robot hits leaves with up to twice its speed.
         """
-        others, things = [robot._own_speed() for robot in self.others], self._actors.top_speed(tick)
-        return self._own_speed() + (2 * max(things, *others) if others else things) + 0.1
+        things = self._actors.top_speed(tick)
+        if self.others:
+            things = 2 * max(things, *[robot._own_speed() for robot in self.others])
+        return self._own_speed() + things + 0.1
 
     def _own_speed(self) -> float:
         """The greatest speed in m/s that any part of the robot can have for a while."""
-        limits, (_, linear, angular) = self._limits, self._state()
-        forward = max(limits.linear, limits.reverse or 0.0, limits.lateral or 0.0, math.hypot(*linear))
-        turning = max(limits.angular, math.hypot(*angular)) * self._radius
-        tipping = math.hypot(*angular[:2]) * self._height
-        return 1.25 * (forward + turning + tipping)
+        _, linear, (x, y, z) = self._state()
+        forward = max(self._quickest, math.hypot(*linear))
+        turning = max(self._limits.angular, math.hypot(x, y, z)) * self._radius
+        return 1.25 * (forward + turning + math.hypot(x, y) * self._height)
 
     def owner(self, place: Vector) -> str:
         """The static solid that is touched at a place; remembered by the centimetre, since contacts last."""

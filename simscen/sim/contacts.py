@@ -71,10 +71,9 @@ class Contacts:
         self._ongoing: dict[str, _Ongoing] = {}
         self._events: list[Event] = []
 
-    @property
-    def last(self) -> int:
-        """The tick of the last touch; -1 before the first, or once its collision is over."""
-        return max((seen.last for seen in self._ongoing.values()), default=-1)
+    def touched(self, tick: int) -> bool:
+        """Whether anything was touched at `tick`, which is now."""
+        return bool(self._ongoing) and any(seen.last == tick for seen in self._ongoing.values())
 
     @property
     def touching(self) -> bool:

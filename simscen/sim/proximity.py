@@ -38,10 +38,12 @@ class Proximity:
         self._radius, self._height = outline.reach(robot.solid)
         self._hull = [engine.fixed(self._client, shape) for shape in engine.hull_shapes(self._client, robot.solid)]
         self._parts = parts_of(static)
-        self._bodies: dict[int, list[int]] = {}
+        self._pairs: dict[int, list[tuple[int, int]]] = {}
         # For each part around: a lower bound of its distance plus what had been travelled when that was known.
         self._bounds: dict[int, float] = {}
         self._travelled = 0.0
+        # The least of them, but for the nearest part's: as long as that is farther, no other has to be looked at.
+        self._least = -math.inf
         self._nearest: int | None = None
         self._distance = math.inf
         self._pose, self._centre = Pose3(), (math.inf, math.inf)
@@ -56,13 +58,20 @@ class Proximity:
         moved = _motion(self._pose, pose, self._radius, self._height)
         self._travelled += moved
         self._pose = pose
-        if math.hypot(pose.x - self._centre[0], pose.y - self._centre[1]) > STRIDE:
+        if math.dist(pose[:2], self._centre) > STRIDE:
             self._look_around(pose)
-        place, turn = pose.position, pose.quaternion
         for hull in self._hull:
-            pybullet.resetBasePositionAndOrientation(hull, place, turn, physicsClientId=self._client)
-        farthest = min(self._distance + moved + SLACK, self._reach)
-        nearest = math.inf if self._nearest is None else self._measure(self._nearest, farthest)
+            pybullet.resetBasePositionAndOrientation(hull, pose[:3], pose[3:], self._client)
+        nearest = math.inf
+        if self._nearest is not None:
+            nearest = self._measure(self._nearest, min(self._distance + moved + SLACK, self._reach))
+        if self._least - self._travelled < min(nearest, self._reach):
+            nearest = self._look_for_nearer(nearest)
+        self._distance = nearest
+        return nearest
+
+    def _look_for_nearer(self, nearest: float) -> float:
+        """Measures the other parts that may be nearer."""
         limit = min(nearest, self._reach)
         for part, bound in self._bounds.items():
             if bound - self._travelled < limit and part != self._nearest:
@@ -70,18 +79,21 @@ class Proximity:
                 if found < nearest:
                     nearest, self._nearest = found, part
                     limit = min(nearest, self._reach)
-        self._distance = nearest
+        others = [bound for part, bound in self._bounds.items() if part != self._nearest]
+        self._least = min(others, default=math.inf)
         return nearest
 
     def _measure(self, part: int, within: float) -> float:
         """Distance to one part; inf if above `within`. Remembers what is known for later."""
-        bodies = self._bodies.get(part)
-        if bodies is None:
-            bodies = self._bodies[part] = self._build(part)
-        nearest = math.inf
-        for hull, body in itertools.product(self._hull, bodies):
-            for point in pybullet.getClosestPoints(hull, body, within, physicsClientId=self._client):
-                nearest = min(nearest, point[8])
+        pairs = self._pairs.get(part)
+        if pairs is None:
+            pairs = self._pairs[part] = list(itertools.product(self._hull, self._build(part)))
+        points = [
+            point[8]
+            for hull, body in pairs
+            for point in pybullet.getClosestPoints(hull, body, within, physicsClientId=self._client)
+        ]
+        nearest: float = min(points, default=math.inf)
         self._bounds[part] = min(nearest, within) + self._travelled
         return nearest
 
@@ -97,6 +109,7 @@ class Proximity:
             part: max(bound + self._travelled, known.get(part, -math.inf))
             for bound, part in sorted(zip(far[near].tolist(), near.tolist(), strict=True))
         }
+        self._least = -math.inf
         if self._nearest not in self._bounds:
             self._nearest = None
 
@@ -148,15 +161,11 @@ def _motion(before: Pose3, after: Pose3, radius: float, height: float) -> float:
     """The most that any point within `radius` of the base's axis and `height` of its origin has moved, in metres."""
     _, _, _, ax, ay, az, aw = before
     _, _, _, bx, by, bz, bw = after
-    same = abs(ax * bx + ay * by + az * bz + aw * bw)
-    turned = 2 * math.acos(min(1.0, same))
-    return math.dist(before.position, after.position) + turned * radius + math.dist(_up(before), _up(after)) * height
-
-
-def _up(pose: Pose3) -> tuple[float, float, float]:
-    """The base's z axis in the world."""
-    x, y, z, w = pose.quaternion
-    return 2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)
+    turned = 2 * math.acos(min(1.0, abs(ax * bx + ay * by + az * bz + aw * bw)))
+    # The base's z axis in the world, before and after.
+    up = 2 * (ax * az + aw * ay), 2 * (ay * az - aw * ax), 1 - 2 * (ax * ax + ay * ay)
+    now = 2 * (bx * bz + bw * by), 2 * (by * bz - bw * bx), 1 - 2 * (bx * bx + by * by)
+    return math.dist(before[:3], after[:3]) + turned * radius + math.dist(up, now) * height
 
 
 def point_to_triangles(point: Array, corners: Array) -> Array:

@@ -107,7 +107,7 @@ class Robot:
         """
         self.name, self._scene = name, scene
         self.base, self._drive = build(scene.client, body, pose, period, 1 / scene.rate, scene.terrain)
-        self._seen = Seen(self.base.state, lambda: scene.tick)
+        self._seen = Seen(self.base.state, scene)
         self._who = f'robot "{name}"' if name else "the robot"
         self.others: tuple[Robot, ...] = ()
         """The other robots, by name."""
@@ -125,14 +125,15 @@ class Robot:
 
     def truth(self) -> Truth:
         """The robot as it really is. Raises RunError when the physics has lost it or anything else."""
-        scene, state = self._scene, self._seen()
-        trouble = lost(self._who, *state.pose, *state.linear, *state.angular) or scene.actors.lost(scene.tick)
+        scene, state, tick = self._scene, self._seen(), self._scene.tick
+        (x, y, z, i, j, k, w), (vx, vy, vz), (wx, wy, wz) = pose, _, _ = state
+        trouble = lost(self._who, x, y, z, i + j + k + w + vx + vy + vz + wx + wy + wz) or scene.actors.lost(tick)
         if trouble is not None:
-            raise RunError("diverged", f"simulation diverged at t={scene.tick / scene.rate:.3f} s: {trouble}")
-        clearance, objects = self.clearance.measure(scene.tick), self.objects()
-        if self._contacts.last == scene.tick:
+            raise RunError("diverged", f"simulation diverged at t={tick / scene.rate:.3f} s: {trouble}")
+        clearance = self.clearance.measure(tick)
+        if self._contacts.touched(tick):
             clearance = min(clearance, 0.0)  # surfaces that press on each other may be a hair apart
-        return Truth(state.pose, state.twist, clearance, objects)
+        return Truth(pose, state.twist, clearance, self.objects())
 
     def collisions(self) -> tuple[Event, ...]:
         """collision.started and collision.ended since last asked.

@@ -65,6 +65,7 @@ class Simulation:
         self._attends: tuple[int, Callable[[], None]] | None = None
         self._firmware = max(1, round(tick_rate / FIRMWARE_RATE))
         self.robots: dict[str, Robot] = self._scene.robots
+        self._each: tuple[Robot, ...] = ()
         for name, (body, pose, obstacles) in sorted(robots.items()):
             period = self._firmware / tick_rate
             ways = static if obstacles is None else obstacles
@@ -77,6 +78,7 @@ class Simulation:
             pybullet.stepSimulation(client)
         for name, robot in self.robots.items():
             robot.settled(robots[name].pose)
+        self._each = tuple(self.robots.values())
         self._scene.changed()
 
     @property
@@ -91,13 +93,15 @@ class Simulation:
         plain = not (scene.floor or scene.presses or self._attends)
         while scene.tick < until:
             if plain and scene.tick < calm:
-                if scene.tick % firmware == 0:
-                    for robot in self.robots.values():
-                        robot.advance()
-                alone = min(until, calm, scene.tick - scene.tick % firmware + firmware) - scene.tick
-                for _ in range(alone):
+                tick, calm_until = scene.tick, min(until, calm)
+                while tick < calm_until:
+                    if tick % firmware == 0:
+                        scene.tick = tick
+                        for robot in self._each:
+                            robot.advance()
                     pybullet.stepSimulation(scene.client)
-                scene.tick += alone
+                    tick += 1
+                scene.tick = tick
                 continue
             if self._attends is not None and scene.tick % self._attends[0] == 0:
                 self._attends[1]()
@@ -122,7 +126,7 @@ class Simulation:
         """
         if self._scene.actors.loose and not self._scene.walls.complete:
             self._put_up_walls(ticks)
-        return -1 if self._scene.actors.pushing else min(robot.calm_until for robot in self.robots.values())
+        return -1 if self._scene.actors.pushing else min([robot.calm_until for robot in self._each])
 
     def _careful_step(self) -> None:
         """A step in which something might touch something; scripted bodies need to be in place only here."""

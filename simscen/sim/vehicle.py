@@ -91,8 +91,8 @@ class Vehicle:
 
     def state(self) -> State:
         """Where it is and how it moves now."""
-        position, turn = pybullet.getBasePositionAndOrientation(self.id, physicsClientId=self._client)
-        (vx, vy, vz), (wx, wy, wz) = pybullet.getBaseVelocity(self.id, physicsClientId=self._client)
+        position, turn = pybullet.getBasePositionAndOrientation(self.id, self._client)
+        (vx, vy, vz), (wx, wy, wz) = pybullet.getBaseVelocity(self.id, self._client)
         if self._level:
             x, y, z = rotated(turn, self._centre)
             pose = Pose3(position[0] - x, position[1] - y, position[2] - z, *turn)

@@ -102,7 +102,7 @@ def test_a_solid_as_large_as_a_map_is_asked_where_the_robot_is_only():
     wall = wall_of_many_triangles(400, 60)
     made = Proximity(fuse([Solid(wall, Pose3(), "wall")]), robot_body(shipped("turtlebot")), 2.0)
     assert made.distance(Pose3(4.0, 0.0)) == pytest.approx(1.0 - 0.22, abs=1e-3)
-    assert sum(len(made._parts.faces(part)) for part in made._bodies) < 0.5 * len(wall.faces)
+    assert sum(len(made._parts.faces(part)) for part in made._pairs) < 0.5 * len(wall.faces)
     assert made.owner((5.0, 1.0, 0.5)) == "wall"
     assert made.around((4.0, 0.0, 0.5)) == []
 
