@@ -191,13 +191,16 @@ class LiveRays:
         return self._scene.cast(origins, directions, reach)
 
     def _placed(self) -> Mapping[str, tuple[TriangleMesh, Pose3]]:
-        moving = {name: moved for name, moved in self._robot.moving().items() if name not in self._without}
-        known = self._meshes
-        self._meshes = {}
-        for name, (body, _) in moving.items():
-            before = known.get(name)
-            self._meshes[name] = before if before and before[0] is body.solids else (body.solids, self._fused(body))
-        return {name: (self._meshes[name][1], pose) for name, (_, pose) in moving.items()}
+        placed, known = dict[str, tuple[TriangleMesh, Pose3]](), self._meshes
+        for name, (body, pose) in self._robot.moving().items():
+            if name not in self._without:
+                before = known.get(name)
+                if before is None or before[0] is not body.solids:
+                    before = known[name] = (body.solids, self._fused(body))
+                placed[name] = before[1], pose
+        if len(known) > len(placed):
+            self._meshes = {name: known[name] for name in placed}
+        return placed
 
     def _fused(self, body: Body) -> TriangleMesh:
         """Its surface, which is the same one for all that are alike: a row of chairs is built once."""

@@ -29,15 +29,15 @@ class LidarSensor:
         angles = self._first + self._increment * np.arange(spec.beams, dtype=np.float64)
         self._directions = _directions(angles + spec.mount.yaw)
         self._reach = spec.max_range + CERTAIN * spec.noise
-        self._lens = np.array([[spec.mount.x, spec.mount.y, spec.mount.z]])
+        self._lens = np.array([spec.mount.x, spec.mount.y, spec.mount.z])
 
     def read(self, tick: int) -> Scan:
         """One scan. inf: nothing within range; nan: something nearer than the lidar can measure."""
         pose = self._view.base_pose()
-        world_from_base = pose.rotation()
-        directions = self._directions @ world_from_base.T
-        lens = self._lens @ world_from_base.T + np.array(pose.position)
-        origins = np.broadcast_to(lens, directions.shape)
+        base_from_world = pose.rotation().T
+        directions = self._directions @ base_from_world
+        lens = self._lens @ base_from_world + pose[:3]
+        origins = np.ndarray(directions.shape, np.float64, lens, 0, (0, 8))  # one place for all rays
         ranges = self._measured(self._rays.cast(origins, directions, self._reach))
         spec = self._spec
         return Scan(self.name, tick, ranges, self._first, self._increment, spec.min_range, spec.max_range, self._mount)
@@ -46,8 +46,13 @@ class LidarSensor:
         """What the electronics make of true distances."""
         spec = self._spec
         if spec.noise > 0:
-            distances = distances + self._chance.normal(0.0, spec.noise, len(distances))
-        ranges = np.round(distances / spec.resolution) * spec.resolution
+            ranges = self._chance.normal(0.0, spec.noise, len(distances))
+            ranges += distances
+            ranges /= spec.resolution
+        else:
+            ranges = distances / spec.resolution
+        np.rint(ranges, out=ranges)
+        ranges *= spec.resolution
         ranges[ranges > spec.max_range] = np.inf
         ranges[ranges < spec.min_range] = np.nan
         return ranges

@@ -15,8 +15,9 @@ class Normals:
 
     def take(self, count: int) -> list[float]:
         """The next `count` of them."""
-        if self._next + count > len(self._ahead):
-            self._ahead = self._ahead[self._next :] + self._chance.standard_normal(max(count, AT_ONCE)).tolist()
-            self._next = 0
-        self._next += count
-        return self._ahead[self._next - count : self._next]
+        begin, end = self._next, self._next + count
+        if end > len(self._ahead):
+            self._ahead = self._ahead[begin:] + self._chance.standard_normal(max(count, AT_ONCE)).tolist()
+            begin, end = 0, count
+        self._next = end
+        return self._ahead[begin:end]

@@ -20,7 +20,9 @@ class WheelOdometrySensor:
 
     def __init__(self, spec: WheelOdometry, setting: SensorSetting) -> None:
         self.name, self.period = setting.name, setting.period
-        self._spec, self._seconds, self._view = spec, setting.seconds, setting.view
+        self._seconds, self._view = setting.seconds, setting.view
+        # Standard deviation along the way, and variances of the heading, after one metre or radian.
+        self._spread, self._twist, self._drift = spec.translation_noise, spec.rotation_noise**2, spec.drift_noise**2
         self._normals = Normals(setting.chance)
         self._motion = kinematics_of(setting.drive)
         self._rolled = self._view.encoders()
@@ -28,30 +30,29 @@ class WheelOdometrySensor:
 
     def read(self, tick: int) -> Odometry:
         """The pose reckoned so far, and the mean velocity since the last reading."""
-        rolled = self._view.encoders()
-        step = self._noisy(self._motion(tuple([b - a for a, b in zip(self._rolled, rolled, strict=True)])))
+        rolled, before, seconds = self._view.encoders(), self._rolled, self._seconds
         self._rolled = rolled
-        self._pose = self._pose.compose(along_arc(step))
-        seconds = self._seconds
-        return Odometry(self.name, tick, self._pose, Twist(step.vx / seconds, step.vy / seconds, step.wz / seconds))
+        step = self._noisy(self._motion(tuple([b - a for a, b in zip(before, rolled, strict=True)])))
+        self._pose = pose = self._pose.compose(along_arc(step))
+        vx, vy, wz = step
+        return Odometry(self.name, tick, pose, Twist(vx / seconds, vy / seconds, wz / seconds))
 
     def _noisy(self, step: Twist) -> Twist:
         """Thrun, Burgard and Fox, Probabilistic Robotics, table 5.6, for increments."""
-        spec = self._spec
-        driven, turned = math.hypot(step.vx, step.vy), abs(step.wz)
+        vx, vy, wz = step
+        driven, turned = math.hypot(vx, vy), abs(wz)
         if driven == 0 and turned == 0:
             return step
         along, across, turn = self._normals.take(3)
-        spread = spec.translation_noise * math.sqrt(driven)
-        heading = math.sqrt(spec.rotation_noise**2 * turned + spec.drift_noise**2 * driven)
-        sideways = spread * across if step.vy else 0.0
-        return Twist(step.vx + spread * along, step.vy + sideways, step.wz + heading * turn)
+        spread = self._spread * math.sqrt(driven)
+        heading = math.sqrt(self._twist * turned + self._drift * driven)
+        return Twist(vx + spread * along, vy + (spread * across if vy else 0.0), wz + heading * turn)
 
 
 def along_arc(step: Twist) -> Pose2:
     """Where a motion at constant velocity leads (the exponential map of SE(2)): m, m, rad in the base frame."""
-    turn = step.wz
+    vx, vy, turn = step
     if abs(turn) < 1e-9:
-        return Pose2(step.vx, step.vy, turn)
+        return Pose2(vx, vy, turn)
     sine, cosine = math.sin(turn) / turn, (1 - math.cos(turn)) / turn
-    return Pose2(step.vx * sine - step.vy * cosine, step.vx * cosine + step.vy * sine, turn)
+    return Pose2(vx * sine - vy * cosine, vx * cosine + vy * sine, turn)

@@ -11,7 +11,7 @@ from embreex.mesh_construction import TriangleMesh as EmbreeMesh
 from embreex.rtcore import EmbreeDevice
 from embreex.rtcore_scene import EmbreeScene
 
-from simscen.core.geometry import Array, Pose3
+from simscen.core.geometry import Array, Pose3, Vector, rotated
 from simscen.core.shapes import TriangleMesh
 
 Singles = npt.NDArray[np.float32]
@@ -41,20 +41,24 @@ class RayScene:
 
     def set_moving(self, bodies: Mapping[str, Placed]) -> None:
         """Say where the bodies are now: by name, the triangles in a body's frame and the pose of that frame."""
-        self._parts = {id(mesh): self._parts.get(id(mesh)) or _Part(self._device, mesh) for mesh, _ in bodies.values()}
-        self._bodies = dict(bodies)
+        known, self._parts = self._parts, {}
+        for mesh, _ in bodies.values():
+            if id(mesh) not in self._parts:
+                self._parts[id(mesh)] = known.get(id(mesh)) or _Part(self._device, mesh)
+        self._bodies = bodies
 
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
         """See core.rays.RayCaster."""
-        distances = self._static.distances(origins, directions)
-        for mover, rays in self._met(origins, directions, np.minimum(distances, reach)):
-            distances[rays] = np.minimum(distances[rays], mover.distances(origins[rays], directions[rays]))
-        return np.where(distances <= min(reach, _NO_HIT), distances, np.inf).astype(np.float64)
+        distances, limit = self._static.distances(origins, directions), min(reach, _NO_HIT)
+        if self._bodies and len(origins):
+            for mover, rays in self._met(origins, directions, np.minimum(distances, reach)):
+                distances[rays] = np.minimum(distances[rays], mover.distances(origins[rays], directions[rays]))
+        answer = distances.astype(np.float64)
+        answer[distances > limit] = np.inf
+        return answer
 
     def _near(self, origins: Array, ends: Singles) -> "list[_Mover]":
         """The moving bodies that are no farther from where the rays begin than the longest of them is."""
-        if not self._bodies or not len(origins):
-            return []
         place, far = origins[0].tolist(), float(ends.max())
         if origins.strides[0]:
             far += float(np.linalg.norm(origins - origins[0], axis=1).max())
@@ -75,17 +79,34 @@ class RayScene:
         movers = self._near(origins, ends)
         if not movers:
             return
+        if not origins.strides[0]:  # all from one place, as a lidar's
+            yield from _met_from(origins[0].tolist(), directions, ends, movers)
+            return
         centres = np.array([mover.centre for mover in movers])
         radii = np.array([[mover.part.radius] for mover in movers])
-        if origins.strides[0]:
-            ahead = centres @ directions.T - (origins * directions).sum(axis=1)
-            away = (centres**2).sum(axis=1)[:, np.newaxis] - 2 * (centres @ origins.T) + (origins**2).sum(axis=1)
-        else:  # all from one place, as a lidar's
-            centres = centres - origins[0]
-            ahead, away = centres @ directions.T, (centres**2).sum(axis=1)[:, np.newaxis]
+        ahead = centres @ directions.T - (origins * directions).sum(axis=1)
+        away = (centres**2).sum(axis=1)[:, np.newaxis] - 2 * (centres @ origins.T) + (origins**2).sum(axis=1)
         meets = (ahead >= -radii) & (ahead - radii <= ends) & (away - ahead**2 <= radii**2)
         for number in np.flatnonzero(meets.any(axis=1)):
             yield movers[number], np.flatnonzero(meets[number])
+
+
+def _met_from(
+    place: list[float], directions: Array, ends: Singles, movers: "list[_Mover]"
+) -> Iterator[tuple["_Mover", npt.NDArray[np.int64]]]:
+    """The same of rays that all begin at one place: they meet a sphere within a cone about its middle."""
+    ways = [[c - p for c, p in zip(mover.centre, place, strict=True)] for mover in movers]
+    beyond = [sum(w * w for w in way) - mover.part.radius**2 for way, mover in zip(ways, movers, strict=True)]
+    # How far ahead the middle of a sphere has to be; a ray that begins inside of one meets it anyway.
+    least = [[math.sqrt(square) if square > 0 else -math.inf] for square in beyond]
+    ahead = np.array(ways) @ directions.T
+    towards = ahead >= least
+    for mover, near, each in zip(movers, towards, ahead, strict=True):
+        rays = near.nonzero()[0]
+        if len(rays):
+            rays = rays[each[rays] - mover.part.radius <= ends[rays]]
+            if len(rays):
+                yield mover, rays
 
 
 class _Part:
@@ -96,6 +117,8 @@ class _Part:
 
     def __init__(self, device: EmbreeDevice, mesh: TriangleMesh) -> None:
         self.mesh, self.middle = mesh, _middle(mesh.vertices)
+        x, y, z = self.middle.tolist()
+        self.centre = (x, y, z)
         corners = mesh.vertices - self.middle
         # A little more, for rays that graze the furthest corner.
         self.radius = 1.001 * float(np.linalg.norm(corners, axis=1).max(initial=0.0))
@@ -108,7 +131,11 @@ class _Part:
 
     def distances(self, origins: Array, directions: Array) -> Singles:
         """Distances (n,) in the mesh's own frame, beyond _NO_HIT where nothing is hit."""
-        starts = np.subtract(origins, self.middle).astype(np.float32)
+        if origins.strides[0]:
+            starts = np.subtract(origins, self.middle).astype(np.float32)
+        else:
+            starts = np.empty(origins.shape, np.float32)
+            starts[:] = origins[0] - self.middle
         along = np.ascontiguousarray(directions, dtype=np.float32)
         answer: Singles = self._scene.run(starts, along, query="DISTANCE")
         return answer
@@ -122,10 +149,11 @@ class _Mover:
     pose: Pose3
 
     @cached_property
-    def centre(self) -> Array:
+    def centre(self) -> Vector:
         """The middle of the body in the world."""
-        centre: Array = self._turn @ self.part.middle + self.pose.position
-        return centre
+        x, y, z, *turn = self.pose
+        p, q, r = rotated((turn[0], turn[1], turn[2], turn[3]), self.part.centre)
+        return x + p, y + q, z + r
 
     @cached_property
     def _turn(self) -> Array:
