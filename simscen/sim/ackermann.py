@@ -72,7 +72,7 @@ class AckermannDrive:
 
     def encoders(self) -> tuple[float, ...]:
         """Angles in rad of the rear wheels."""
-        return mean_angles(self._client, self._robot, self._left, self._right)
+        return mean_angles(self._client, self._robot, self._left + self._right, len(self._left))
 
     def _steer(self) -> None:
         slope, half = math.tan(self._steering), self._drive.wheel_separation / (2 * self._drive.wheel_base)

@@ -29,13 +29,13 @@ class Ramp:
 
     def advance(self) -> bool:
         """Take one step towards the command; whether there was one to take."""
-        if self.velocity == self.target:
+        (vx, vy, wz), (to_x, to_y, to_w) = now, target = self.velocity, self.target
+        if now == target:
             return False
-        now, target = self.velocity, self.target
         self.velocity = Twist(
-            _towards(now.vx, target.vx, self._speed_up, self._slow_down),
-            _towards(now.vy, target.vy, self._speed_up, self._slow_down),
-            _towards(now.wz, target.wz, self._turn, self._turn),
+            vx if vx == to_x else _towards(vx, to_x, self._speed_up, self._slow_down),
+            vy if vy == to_y else _towards(vy, to_y, self._speed_up, self._slow_down),
+            wz if wz == to_w else _towards(wz, to_w, self._turn, self._turn),
         )
         return True
 

@@ -26,6 +26,7 @@ class SidedDrive:
         scale = drive.turning_scale if isinstance(drive, SkidSteer) else 1.0
         self._half = drive.wheel_separation * scale / 2
         self._left, self._right, self._torques = driven(body, vehicle)
+        self._joints = self._left + self._right
         self._still_rolls = False
         self._turn()
 
@@ -45,20 +46,18 @@ class SidedDrive:
 
     def encoders(self) -> tuple[float, ...]:
         """Mean angles in rad of the left and of the right wheels."""
-        return mean_angles(self._client, self._vehicle.id, self._left, self._right)
+        return mean_angles(self._client, self._vehicle.id, self._joints, len(self._left))
 
     def _turn(self) -> None:
         vx, _, wz = self._ramp.velocity
-        self._still_rolls = vx == wz == 0 and rolls(
-            self._client, self._vehicle.id, self._left + self._right, self._radius
-        )
+        self._still_rolls = vx == wz == 0 and rolls(self._client, self._vehicle.id, self._joints, self._radius)
         if vx == wz == 0 and not self._still_rolls:
-            hold(self._client, self._vehicle.id, self._left + self._right, self._torques)
+            hold(self._client, self._vehicle.id, self._joints, self._torques)
             return
         left, right = (vx - wz * self._half) / self._radius, (vx + wz * self._half) / self._radius
         pybullet.setJointMotorControlArray(
             self._vehicle.id,
-            self._left + self._right,
+            self._joints,
             pybullet.VELOCITY_CONTROL,
             targetVelocities=[left] * len(self._left) + [right] * len(self._right),
             forces=self._torques,
@@ -87,7 +86,10 @@ def hold(client: int, robot: int, joints: Sequence[int], torques: Sequence[float
     )
 
 
-def mean_angles(client: int, robot: int, left: list[int], right: list[int]) -> tuple[float, float]:
-    """The mean angles in rad of some joints on the left and of some on the right."""
-    angles = [state[0] for state in pybullet.getJointStates(robot, left + right, physicsClientId=client)]
-    return sum(angles[: len(left)]) / len(left), sum(angles[len(left) :]) / len(right)
+def mean_angles(client: int, robot: int, joints: Sequence[int], left: int) -> tuple[float, float]:
+    """The mean angles in rad of joints on the left, which are the first so many, and of the others on the right."""
+    states = pybullet.getJointStates(robot, joints, physicsClientId=client)
+    if len(states) == 2:
+        return states[0][0], states[1][0]
+    angles = [state[0] for state in states]
+    return sum(angles[:left]) / left, sum(angles[left:]) / (len(angles) - left)
