@@ -1,7 +1,7 @@
 """Things that move: by a script, or because they are pushed."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
