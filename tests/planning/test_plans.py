@@ -16,21 +16,37 @@ from simscen.testing.flatland import Flatland
 GROUNDS = {"rooms": rooms, "forest": forest, "maze": maze}
 
 
-def test_nearly_every_plan_of_the_default_planner_costs_at_most_five_percent_more_than_the_optimum() -> None:
+@pytest.mark.parametrize("multiplier", [2.0, 5.0])
+@pytest.mark.parametrize("kind", GROUNDS)
+def test_a_plan_of_the_default_planner_costs_at_most_five_percent_more_than_the_optimum(
+    kind: str, multiplier: float
+) -> None:
     ratios = []
-    for kind, ground in GROUNDS.items():
-        for seed in range(3):
-            chance = np.random.default_rng((seed, len(kind)))
-            view = view_of(*ground(chance))
-            rates = Rates(view, ROBOT, 2.0, True)
-            middle = np.argwhere(rates.free)[len(np.argwhere(rates.free)) // 2][::-1] * view.resolution + view.origin
-            inside = Pose2(*middle.tolist())
-            start, goal = pair(rates, find_ends(rates, inside, inside, 0.5).reachable, chance)
-            points = OmplPlanner(Spec(), ROBOT).plan(view, start, goal, 1 + seed).points
-            assert np.isfinite(rates.at(points[:, :2])).all()
-            ratios.append(rates.along(points[:, :2]) / cheapest(rates, start, goal))
+    for seed in range(3):
+        chance = np.random.default_rng((seed, len(kind)))
+        view = view_of(*GROUNDS[kind](chance))
+        rates = Rates(view, ROBOT, multiplier, True)
+        middle = np.argwhere(rates.free)[len(np.argwhere(rates.free)) // 2][::-1] * view.resolution + view.origin
+        inside = Pose2(*middle.tolist())
+        start, goal = pair(rates, find_ends(rates, inside, inside, 0.5).reachable, chance)
+        points = OmplPlanner(Spec(cost_travel_multiplier=multiplier), ROBOT).plan(view, start, goal, 1 + seed).points
+        assert np.isfinite(rates.at(points[:, :2])).all()
+        ratios.append(rates.along(points[:, :2]) / cheapest(rates, start, goal))
     assert np.mean(ratios) < 1.02
-    assert np.mean(np.array(ratios) > 1.05) <= 1 / 9
+    assert max(ratios) < 1.05
+
+
+@pytest.mark.parametrize(("kind", "number", "seed"), [("rooms", 4, 2), ("forest", 3, 2), ("forest", 5, 1)])
+def test_a_plan_takes_the_cheaper_one_of_two_ways_that_cost_nearly_the_same(kind: str, number: int, seed: int) -> None:
+    """It took the other one: a gap of a cell or two was not sampled, or straight legs said little of what ways cost."""
+    chance = np.random.default_rng((number, 77, len(kind)))
+    view = view_of(*GROUNDS[kind](chance))
+    rates = Rates(view, ROBOT, 2.0, True)
+    free = np.argwhere(rates.free & (view.distance < 0.6))
+    inside = Pose2(*((free[len(free) // 2][::-1] + 0.5) * view.resolution + view.origin).tolist())
+    start, goal = pair(rates, find_ends(rates, inside, inside, 0.5).reachable, chance)
+    points = OmplPlanner(Spec(), ROBOT).plan(view, start, goal, seed).points
+    assert rates.along(points[:, :2]) < 1.045 * cheapest(rates, start, goal)
 
 
 def corridor_with_a_corner() -> Flatland:
@@ -65,7 +81,7 @@ def test_the_dearer_costs_are_taken_the_more_room_is_left() -> None:
     ends = Pose2(1, 6.5), Pose2(6.5, 1)
     rooms_left = [
         least_room(OmplPlanner(Spec(cost_travel_multiplier=factor), ROBOT).plan(view, *ends, 1).points)
-        for factor in (0.0, 1.0, 5.0)
+        for factor in (0.0, 0.5, 5.0)
     ]
     assert rooms_left[0] + 0.1 < rooms_left[1] < rooms_left[2]
 

@@ -16,14 +16,15 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from simscen.core.geometry import Array
+from simscen.stack.planners.blocks import pooled, roomiest
 from simscen.stack.planners.rates import Rates
 from simscen.stack.planners.search import Point
 from simscen.stack.protocols import CostmapView
 
-BLOCK = 0.2
+BLOCK, PRICED_BLOCK = 0.2, 0.15
 """Metres, about: the coarse grid's resolution."""
-MOST_BLOCKS = 40_000
-"""Larger maps get larger blocks: Dijkstra on so many takes 10 ms."""
+MOST_BLOCKS, MOST_PRICED = 40_000, 20_000
+"""Larger maps get larger blocks: Dijkstra on 40 000 takes 10 ms."""
 LEG = 30.0
 """Metres of a way that are searched in one go."""
 Mask = npt.NDArray[np.bool_]
@@ -35,16 +36,19 @@ class InformedSet:
     Distances are those of king's and knight's moves, at most 2.8 % too long (8.2 % without the knight).
     """
 
-    def __init__(self, rates: Rates, start: Point, goal: Point) -> None:
-        wanted = round(BLOCK / rates.resolution)
-        self._factor = max(1, wanted, math.ceil(math.sqrt(rates.height * rates.width / MOST_BLOCKS)))
+    def __init__(self, rates: Rates, start: Point, goal: Point, priced: bool = False) -> None:
+        """`priced`: by what ways cost, in metres of free ground, rather than by their lengths."""
+        size, most = (PRICED_BLOCK, MOST_PRICED) if priced else (BLOCK, MOST_BLOCKS)
+        fewest = math.ceil(math.sqrt(rates.height * rates.width / most))
+        self._factor = max(1, round(size / rates.resolution), fewest)
         self._size = self._factor * rates.resolution
         self._origin = rates.origin
         self._height, self._width = -(-rates.height // self._factor), -(-rates.width // self._factor)
         ends = [self._index(*start), self._index(*goal)]
-        graph = _graph(rates.free, self._factor)
-        through: Array = dijkstra(graph, directed=False, indices=ends) * self._size
-        self._along, self._sum = through[0], through[0] + through[1]
+        graph = _graph(rates, self._factor, priced)
+        lengths, self._before = dijkstra(graph, directed=False, indices=ends, return_predecessors=True)
+        through: Array = lengths * self._size
+        self._along, self._sum, self._end = through[0], through[0] + through[1], ends[1]
         self.length = float(through[0][ends[1]])
         self._inside = b"\1" * len(self._sum)
 
@@ -59,6 +63,25 @@ class InformedSet:
         if low > 0.0 or high < self.length:
             inside &= (self._along >= low - more) & (self._along <= high * (1.0 + slack) + more)
         self._inside = inside.tobytes()
+
+    def holds(self, points: Array) -> Mask:
+        """Which of the points (n, 2) lie in the set."""
+        columns, rows = ((points - self._origin) / self._size).astype(np.int64).T
+        held: Mask = np.frombuffer(self._inside, dtype=bool)[rows * self._width + columns]
+        return held
+
+    def way(self, costmap: CostmapView, roomy: float) -> Array:
+        """The places (n, 2) with most room in the blocks of the way itself, but those of its ends; where there is as
+        much as `roomy` metres, every third only.
+        """
+        blocks = [int(self._before[0, self._end])]
+        while blocks[-1] >= 0:
+            blocks.append(int(self._before[0, blocks[-1]]))
+        between = np.array(blocks[:-2], dtype=np.int64)
+        rows, columns = roomiest(costmap.distance, np.column_stack(np.divmod(between, self._width)), self._factor)
+        kept = (costmap.distance[rows, columns] < roomy) | (np.arange(len(rows)) % 3 == 0)
+        places: Array = (np.column_stack((columns, rows))[kept] + 0.5) * costmap.resolution + self._origin
+        return places
 
     def stops(self, costmap: CostmapView) -> list[tuple[Point, float]]:
         """Points of a near-shortest way to search between, at most LEG metres apart, and how far along they are.
@@ -104,7 +127,7 @@ class InformedSet:
         return int(row * self._width + column)
 
 
-def _pooled(free: Mask, factor: int) -> Mask:
+def _cut(free: Mask, factor: int) -> Mask:
     """The cells cut to blocks (rows, columns, factor, factor), with blocked ones added to fill the last."""
     height, width = (-(-side // factor) * factor for side in free.shape)
     padded = np.zeros((height, width), dtype=bool)
@@ -145,15 +168,31 @@ def _at(mask: Mask, rows: int, columns: int) -> Mask:
     return moved
 
 
-def _graph(free: Mask, factor: int) -> csr_matrix:
-    """Edges between blocks a move apart, as long as the move in blocks."""
-    blocks = _pooled(free, factor)
+def _graph(rates: Rates, factor: int, priced: bool) -> csr_matrix:
+    """Edges between blocks a move apart, as long as the move in blocks, or times what both cost."""
+    free = rates.free
+    blocks = _cut(free, factor)
     height, width = blocks.shape[:2]
+    price = _prices(rates, factor) if priced else None
     starts, ends, lengths = [], [], []
     for (rows, columns), possible in _steps(blocks).items():
         at = np.flatnonzero(possible)
+        to = at + (rows * width + columns)
         starts.append(at)
-        ends.append(at + rows * width + columns)
-        lengths.append(np.full(len(at), math.hypot(rows, columns)))
+        ends.append(to)
+        length = math.hypot(rows, columns)
+        lengths.append(np.full(len(at), length) if price is None else 0.5 * length * (price[at] + price[to]))
     entries = (np.concatenate(lengths), (np.concatenate(starts), np.concatenate(ends)))
     return csr_matrix(entries, shape=(height * width, height * width))
+
+
+def _prices(rates: Rates, factor: int) -> Array:
+    """What a metre costs in each block, flat: between its best cell and the mean of those where the robot can be.
+
+    The best alone makes nothing of what is dear for a cell or two, the mean makes a gap dearer than its middle.
+    """
+    finite = np.isfinite(rates.rates)
+    least = pooled(rates.rates, factor, np.minimum, np.inf)
+    total = pooled(np.where(finite, rates.rates, np.float32(0.0)), factor, np.add, 0.0)
+    prices: Array = 0.5 * (least + total / np.maximum(pooled(finite, factor, np.add, 0.0), 1.0))
+    return prices.reshape(-1)

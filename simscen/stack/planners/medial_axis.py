@@ -5,20 +5,22 @@ is where the distance to the nearest obstacle falls off to both sides.
 """
 
 import math
-from functools import reduce
 
 import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array
+from simscen.stack.planners.blocks import pooled, roomiest
 from simscen.stack.protocols import CostmapView
 
 BLOCK = 0.1
 """Metres, about: cells are looked at in blocks of this size."""
 BESIDE = 0.2
 """Metres to either side of the axis at which the distance has to be less."""
-ON_AXIS, IN_THE_OPEN = 0.8, 1.1
+IN_THE_TIGHT, ON_AXIS, IN_THE_OPEN = 0.3, 0.8, 1.1
 """Metres between samples."""
+TIGHT = 0.15
+"""Metres of room beyond the least up to which it is tight: a straight line from sample to sample hardly fits there."""
 Mask = npt.NDArray[np.bool_]
 
 
@@ -28,28 +30,20 @@ def medial_axis_samples(costmap: CostmapView, free: Mask, seed: int, density: in
     factor = max(1, round(BLOCK / costmap.resolution)) if density == 1 else 1
     size = factor * costmap.resolution
     room = np.where(free, costmap.distance, np.float32(0.0))
-    most = _pooled(room, factor)
+    most = pooled(room, factor, np.maximum, 0.0)
     open_ground = most >= room.max() - 1e-6
     axis = _ridges(most, max(1, round(BESIDE / size)), 0.4 * size)
+    tight = axis & (most < room[free].min(initial=np.inf) + TIGHT)
     chosen = [
+        _thinned(tight, IN_THE_TIGHT / density / size, chance),
         _thinned(axis, ON_AXIS / density / size, chance),
         _thinned(open_ground, IN_THE_OPEN / density / size, chance),
         _thinned((most > 0) & ~open_ground, IN_THE_OPEN / density / size, chance),
     ]
-    rows, columns = _roomiest(room, np.concatenate(chosen), factor)
+    rows, columns = roomiest(room, np.concatenate(chosen), factor)
     x = costmap.origin[0] + (columns + 0.5) * costmap.resolution
     y = costmap.origin[1] + (rows + 0.5) * costmap.resolution
     return np.column_stack((x, y))
-
-
-def _pooled(room: npt.NDArray[np.float32], factor: int) -> npt.NDArray[np.float32]:
-    """The most room in each block; the last ones are filled up with none."""
-    height, width = (-(-side // factor) * factor for side in room.shape)
-    padded = np.zeros((height, width), dtype=np.float32)
-    padded[: room.shape[0], : room.shape[1]] = room
-    parts = [padded[row::factor, column::factor] for row in range(factor) for column in range(factor)]
-    most: npt.NDArray[np.float32] = reduce(np.maximum, parts)
-    return most
 
 
 def _ridges(room: npt.NDArray[np.float32], reach: int, less: float) -> Mask:
@@ -77,15 +71,3 @@ def _thinned(mask: Mask, spacing: float, chance: np.random.Generator) -> npt.NDA
     chosen = np.full(int(square.max(initial=0)) + 1, -1)
     chosen[square] = cells  # the last one of each square
     return np.column_stack(np.divmod(chosen[chosen >= 0], mask.shape[1]))
-
-
-def _roomiest(
-    room: npt.NDArray[np.float32], blocks: npt.NDArray[np.int64], factor: int
-) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """The cell with most room in each of the blocks (n, 2)."""
-    inner = np.arange(factor)
-    rows = np.minimum(blocks[:, 0, None] * factor + np.repeat(inner, factor), room.shape[0] - 1)
-    columns = np.minimum(blocks[:, 1, None] * factor + np.tile(inner, factor), room.shape[1] - 1)
-    best = room[rows, columns].argmax(axis=1)
-    which = np.arange(len(blocks))
-    return rows[which, best], columns[which, best]

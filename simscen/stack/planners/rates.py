@@ -29,7 +29,7 @@ class Rates:
     """
 
     def __init__(self, costmap: CostmapView, robot: RobotModel, multiplier: float, allow_unknown: bool) -> None:
-        self.costmap = costmap
+        self.costmap, self.inscribed = costmap, robot.inscribed_radius
         self.height, self.width = costmap.costs.shape
         self.resolution, self.origin = costmap.resolution, costmap.origin
         counted = np.minimum(np.arange(256), UNKNOWN_COSTS) / MAX_NON_OBSTACLE

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from simscen.core.geometry import Array
 from simscen.stack.planners.ends import Ends
 from simscen.stack.planners.informed_set import InformedSet
 from simscen.stack.planners.medial_axis import medial_axis_samples
@@ -15,6 +16,12 @@ DENSITIES = (1, 2, 4, 8)
 """Samples to the metre of one search after the other, as multiples."""
 CORRIDORS = (0.05, 0.15, 1.0)
 """How much longer than the coarse grid's shortest way a way in the corridor may be (ratio), one after the other."""
+DEARER = 0.15
+"""How much more a way may cost than the cheapest over blocks (ratio) to be looked at: these err by a few per cent."""
+REACH, FAR_REACH = 1.8, 2.3
+"""Metres between samples up to which a straight way is tried: where a way over blocks is among them, and elsewhere."""
+ROOMY = 0.15
+"""Metres beyond the robot's radius where a straight way from one sample to the next has room."""
 Legs = Iterator[Problem]
 
 
@@ -24,10 +31,23 @@ def uniform(rates: Rates, ends: Ends, _: int) -> Iterator[Legs]:
 
 
 def medial_axis(rates: Rates, ends: Ends, seed: int) -> Iterator[Legs]:
-    """At samples on the medial axis and, thinly, in the open; more and more of them."""
+    """At samples on the medial axis and, thinly, in the open, where a way that costs little more than the cheapest can
+    pass, and along that one, as blocks tell; if these do not suffice, anywhere, more and more of them.
+    """
     whole = _whole(rates, ends)
+    first = _where_cheap(rates, ends, medial_axis_samples(rates.costmap, ends.reachable, seed))
+    yield iter((replace(whole, samples=first, reach=REACH),))
     for density in DENSITIES:
-        yield iter((replace(whole, samples=medial_axis_samples(rates.costmap, ends.reachable, seed, density)),))
+        samples = medial_axis_samples(rates.costmap, ends.reachable, seed, density)
+        yield iter((replace(whole, samples=samples, reach=FAR_REACH / density),))
+
+
+def _where_cheap(rates: Rates, ends: Ends, samples: Array) -> Array:
+    """Those where a way that costs little more than the cheapest over blocks can pass, and points of that way."""
+    informed = InformedSet(rates, ends.start, ends.goal, priced=True)
+    informed.narrow(DEARER)
+    way = informed.way(rates.costmap, rates.inscribed + ROOMY)
+    return np.vstack((samples[informed.holds(samples)], way[np.isfinite(rates.at(way))]))
 
 
 def corridor(rates: Rates, ends: Ends, _: int) -> Iterator[Legs]:

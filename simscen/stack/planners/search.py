@@ -6,7 +6,7 @@ OMPL calls that a mistake in its log, yet it does what is wanted (measured), hen
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from ompl import base as ob
@@ -33,33 +33,24 @@ RANGE = 1.0
 """Metres that a tree grows at most in one step. OMPL's default, a fifth of the map, mostly ends in walls of a house."""
 BATCH = 200
 """Samples that BIT* draws at a time where it draws them itself."""
+FIRST_DRAWN = 4
+"""Times that BIT* asks whether to stop before its first batch is drawn, and one more."""
 ou.setLogLevel(ou.LOG_NONE)
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """What is searched: `bounds` are (min x, min y, max x, max y), `samples` (n, 2) those to use, if not OMPL's own."""
+    """What is searched: `bounds` are (min x, min y, max x, max y).
+
+    `samples` (n, 2) are those to use, if not OMPL's own, and `reach` the metres up to which two of them are joined.
+    """
 
     start: Point
     goal: Point
     bounds: tuple[float, float, float, float]
     motion: Motion
     samples: Array | None = None
-
-
-class _Asked:
-    """Passes questions on until it is told to forget whom it asked: OMPL's bindings leak what is given to them."""
-
-    def __init__(self, motion: Motion) -> None:
-        self._motion: Motion | None = motion
-
-    def __call__(self, ax: float, ay: float, bx: float, by: float) -> float:
-        assert self._motion is not None
-        return self._motion(ax, ay, bx, by)
-
-    def forget(self) -> None:
-        """Let go of the costmap."""
-        self._motion = None
+    reach: float = 2.3
 
 
 class _Motions(ob.MotionValidator):  # type: ignore[misc] # ompl has no types
@@ -67,11 +58,11 @@ class _Motions(ob.MotionValidator):  # type: ignore[misc] # ompl has no types
 
     def __init__(self, information: Any, motion: Motion) -> None:
         super().__init__(information)
-        self._motion = motion
+        self.motion = motion
 
     def checkMotion(self, a: Any, b: Any) -> bool:
         """Whether the straight motion is free."""
-        return self._motion(a[0], a[1], b[0], b[1]) < math.inf
+        return self.motion(a[0], a[1], b[0], b[1]) < math.inf
 
 
 class _Dearer(ob.OptimizationObjective):  # type: ignore[misc] # ompl has no types
@@ -79,12 +70,12 @@ class _Dearer(ob.OptimizationObjective):  # type: ignore[misc] # ompl has no typ
 
     def __init__(self, information: Any, motion: Motion) -> None:
         super().__init__(information)
-        self._motion = motion
+        self.motion = motion
 
     def motionCost(self, a: Any, b: Any) -> Any:
         """Its cost along the straight line, less its length."""
         ax, ay, bx, by = a[0], a[1], b[0], b[1]
-        return ob.Cost(self._motion(ax, ay, bx, by) - math.hypot(bx - ax, by - ay))
+        return ob.Cost(self.motion(ax, ay, bx, by) - math.hypot(bx - ax, by - ay))
 
     def stateCost(self, _: Any) -> Any:
         """Standing costs nothing."""
@@ -96,11 +87,11 @@ class _Priced(ob.PathLengthOptimizationObjective):  # type: ignore[misc] # ompl 
 
     def __init__(self, information: Any, motion: Motion) -> None:
         super().__init__(information)
-        self._motion = motion
+        self.motion = motion
 
     def motionCost(self, a: Any, b: Any) -> Any:
         """Its cost along the straight line."""
-        return ob.Cost(self._motion(a[0], a[1], b[0], b[1]))
+        return ob.Cost(self.motion(a[0], a[1], b[0], b[1]))
 
     def motionCostHeuristic(self, a: Any, b: Any) -> Any:
         """Its length: no metre costs less than 1."""
@@ -115,19 +106,27 @@ class _Validity:
     """
 
     def __init__(self, problem: Problem) -> None:
-        self._motion = problem.motion
+        self.motion = problem.motion
         self._ends = (problem.start, problem.goal)
         self._left: Iterator[list[float]] | None = None if problem.samples is None else iter(problem.samples.tolist())
 
     def __call__(self, state: Any) -> bool:
         x, y = state[0], state[1]
         if self._left is None or (x, y) in self._ends:
-            return self._motion(x, y, x, y) < math.inf
+            return self.motion(x, y, x, y) < math.inf
         sample = next(self._left, None)
         if sample is None:
             return False
         state[0], state[1] = sample
         return True
+
+
+_Asked = _Motions | _Dearer | _Priced | _Validity
+"""All that OMPL asks."""
+
+
+def _nowhere(_ax: float, _ay: float, _bx: float, _by: float) -> float:
+    return math.inf
 
 
 def search(kind: str, problem: Problem, seed: int, iterations: int, improving: int) -> list[Point] | None:
@@ -136,29 +135,33 @@ def search(kind: str, problem: Problem, seed: int, iterations: int, improving: i
     A planner that improves its path does so for `improving` iterations, or until it has made the best of the samples
     it was given. OMPL's "approximate solution" counts as none.
     """
-    asked = _Asked(problem.motion)
+    asked: list[_Asked] = []
     try:
-        return _searched(kind, replace(problem, motion=asked), seed, iterations, improving)
+        return _searched(kind, problem, seed, iterations, improving, asked)
     finally:
-        asked.forget()
+        for one in asked:  # OMPL's bindings leak what is given to them: let go of the costmap
+            one.motion = _nowhere
 
 
-def _searched(kind: str, problem: Problem, seed: int, iterations: int, improving: int) -> list[Point] | None:
+def _searched(
+    kind: str, problem: Problem, seed: int, iterations: int, improving: int, asked: "list[_Asked]"
+) -> list[Point] | None:
     ou.RNG.setSeed(seed)
-    information = _information(problem)
+    information = _information(problem, asked)
     ends = _state(information, problem.start), _state(information, problem.goal)
     if not all(information.satisfiesBounds(end) and information.isValid(end) for end in ends):
         return None  # a planner would wait for a better goal, 5 ms an iteration
     definition = ob.ProblemDefinition(information)
     definition.setStartAndGoalStates(*ends)
-    objective = _Priced if kind == "informed_rrt_star" else _objective
-    definition.setOptimizationObjective(objective(information, problem.motion))
+    definition.setOptimizationObjective(_objective(kind, information, problem.motion, asked))
     planner = PLANNERS[kind](information)
     if hasattr(planner, "setRange"):
         planner.setRange(RANGE)
     if kind == "bit_star":
         planner.setUseKNearest(False)
         planner.setSamplesPerBatch(BATCH if problem.samples is None else len(problem.samples))
+        if problem.samples is not None:
+            planner.setRewireFactor(problem.reach / _radius(problem.bounds, len(problem.samples) + 2))
     planner.setProblemDefinition(definition)
     planner.setup()
     planner.solve(ob.PlannerTerminationCondition(_over(kind, problem, planner, iterations, improving)))
@@ -167,16 +170,36 @@ def _searched(kind: str, problem: Problem, seed: int, iterations: int, improving
     return [(state[0], state[1]) for state in definition.getSolutionPath().getStates()]
 
 
+def _radius(bounds: tuple[float, float, float, float], states: int) -> float:
+    """Up to which distance BIT* joins so many states with a rewire factor of 1 (Karaman & Frazzoli's r of RRG)."""
+    area = (bounds[2] - bounds[0]) * (bounds[3] - bounds[1])
+    return 2.0 * math.sqrt(1.5 * area / math.pi * math.log(states) / states)
+
+
 def _over(kind: str, problem: Problem, planner: Any, iterations: int, improving: int) -> Callable[[], bool]:
     """When this planner has done enough."""
     if problem.samples is not None:
-        return after(iterations, lambda: planner.numBatches() > 1)
+        return _after_one_batch(planner, iterations)
     if kind in SATISFIED:
         return after(iterations)
     return after(iterations, lambda: math.isfinite(planner.bestCost().value()), improving)  # told of in the end only
 
 
-def _information(problem: Problem) -> Any:
+def _after_one_batch(planner: Any, iterations: int) -> Callable[[], bool]:
+    """Says stop when BIT* draws its second batch; so that this is a small one, it is told of it during the first."""
+    batches, left = planner.numBatches, iterations
+
+    def over() -> bool:
+        nonlocal left
+        left -= 1
+        if left == iterations - FIRST_DRAWN:
+            planner.setSamplesPerBatch(1)
+        return left < 0 or batches() > 1
+
+    return over
+
+
+def _information(problem: Problem, asked: "list[_Asked]") -> Any:
     space = ob.RealVectorStateSpace(2)
     limits = ob.RealVectorBounds(2)
     for axis in (0, 1):
@@ -184,18 +207,24 @@ def _information(problem: Problem) -> Any:
         limits.setHigh(axis, problem.bounds[axis + 2])
     space.setBounds(limits)
     information = ob.SpaceInformation(space)
-    information.setStateValidityChecker(_Validity(problem))
-    information.setMotionValidator(_Motions(information, problem.motion))
+    validity, motions = _Validity(problem), _Motions(information, problem.motion)
+    asked += [validity, motions]
+    information.setStateValidityChecker(validity)
+    information.setMotionValidator(motions)
     information.setup()
     return information
 
 
-def _objective(information: Any, motion: Motion) -> Any:
+def _objective(kind: str, information: Any, motion: Motion, asked: "list[_Asked]") -> Any:
     """Length, and what is dearer than it: so OMPL's own length is the heuristic, worked out without Python."""
-    objective = ob.MultiOptimizationObjective(information)
-    objective.addObjective(ob.PathLengthOptimizationObjective(information), 1.0)
-    objective.addObjective(_Dearer(information, motion), 1.0)
-    return objective
+    objective = (_Priced if kind == "informed_rrt_star" else _Dearer)(information, motion)
+    asked.append(objective)
+    if kind == "informed_rrt_star":
+        return objective
+    both = ob.MultiOptimizationObjective(information)
+    both.addObjective(ob.PathLengthOptimizationObjective(information), 1.0)
+    both.addObjective(objective, 1.0)
+    return both
 
 
 def _state(information: Any, point: Point) -> Any:

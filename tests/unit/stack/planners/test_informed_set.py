@@ -1,5 +1,6 @@
 import math
 
+import numpy as np
 import pytest
 
 from simscen.model.costmaps import Costmap as Spec
@@ -47,3 +48,19 @@ def test_no_way_has_no_length_and_a_thin_wall_is_not_leapt_over() -> None:
     assert math.isinf(InformedSet(tested, (1.0, 1.0), (9.0, 1.0)).length)
     slit = ground((4.9, 0.0, 5.0, 2.8), (4.9, 3.25, 5.0, 6.0), radius=0.25)
     assert math.isinf(InformedSet(slit, (1.0, 3.0), (9.0, 3.0)).length)
+
+
+def test_by_cost_the_set_goes_by_what_ways_cost_and_knows_the_way_itself() -> None:
+    tested = ground((4.9, 0.0, 5.0, 0.6), (4.9, 1.2, 5.0, 4.0))  # a narrow gap ahead, and roomy ground farther up
+    tested.rates[(tested.rates > 1.0) & (tested.rates < math.inf)] *= 20.0
+    informed = InformedSet(tested, (1.0, 1.0), (9.0, 1.0), priced=True)
+    shortest = InformedSet(tested, (1.0, 1.0), (9.0, 1.0))
+    assert shortest.length == pytest.approx(8.0, rel=0.03)
+    assert shortest.length < informed.length
+    way = informed.way(tested.costmap, 9.0)
+    assert way[:, 1].max() > 4.2
+    assert np.isfinite(tested.at(way)).all()
+    informed.narrow(0.05)
+    assert informed.holds(way).all()
+    assert not informed.holds(np.array([(4.95, 0.9)])).any()
+    assert len(informed.way(tested.costmap, 0.0)) == math.ceil(len(way) / 3)
