@@ -20,7 +20,7 @@ from simscen.run.keptfiles import KeptFiles, cache_folder
 from simscen.run.keptworlds import KeptWorlds
 from simscen.run.logheader import log_header
 from simscen.run.perform import perform
-from simscen.run.preload import import_components
+from simscen.run.preload import import_components, work_out_ahead
 from simscen.run.prepare import Prepared
 from simscen.run.prepared_cache import PreparedCache
 from simscen.run.process.confine import MEMORY_BYTES
@@ -52,6 +52,7 @@ def _warm_up(job: Job) -> None:
         _PREPARED.clear()
     prepared = _PREPARED.prepared(job.scenario)
     import_components(prepared)
+    work_out_ahead(prepared)
     log_header(prepared, job.key.seed)
     make_ahead()
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
+from simscen.core.remembered import remembered
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -44,11 +45,7 @@ class OccupancyGrid:
         rows, columns = self.shape
         most = math.isqrt(MOST_CELLS // max(1, rows * columns))
         parts = min(most, math.ceil(self.resolution / finest - 1e-6))
-        if parts <= 1:
-            return self
-        return OccupancyGrid(
-            self.cells.repeat(parts, axis=0).repeat(parts, axis=1), self.resolution / parts, self.origin
-        )
+        return self if parts <= 1 else _split(self, parts)
 
     def cell_of(self, points: Array) -> npt.NDArray[np.int64]:
         """Cells (n, 2) as (row, column) of map points (n, 2); may lie outside the grid."""
@@ -71,3 +68,9 @@ class OccupancyGrid:
         known = self.inside(cells)
         values[known] = self.cells[cells[known, 0], cells[known, 1]]
         return values
+
+
+@remembered
+def _split(grid: OccupancyGrid, parts: int) -> OccupancyGrid:
+    cells = grid.cells.repeat(parts, axis=0).repeat(parts, axis=1)
+    return OccupancyGrid(cells, grid.resolution / parts, grid.origin)

@@ -3,26 +3,25 @@
 Runs of one scenario share its world: the warm process works out what they all need of it, and its forks inherit that.
 """
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
 from functools import wraps
 from typing import Any, Concatenate, ParamSpec, TypeVar
-from weakref import WeakKeyDictionary
 
-Thing = TypeVar("Thing", bound=Hashable)
+Thing = TypeVar("Thing")
 More = ParamSpec("More")
 Result = TypeVar("Result")
 
 
 def remembered(make: Callable[Concatenate[Thing, More], Result]) -> Callable[Concatenate[Thing, More], Result]:
-    """`make`, called once for each thing, which is known by identity, and each set of further arguments.
+    """`make`, called once for each thing, and each set of further arguments; the thing itself holds the result.
 
-    Nobody may write into what it gives; and that must not hold the thing itself, for then neither would ever go.
+    Nobody may write into what it gives.
     """
-    known: WeakKeyDictionary[Thing, dict[Any, Result]] = WeakKeyDictionary()
+    name = f"_{make.__module__}.{make.__qualname__}"
 
     @wraps(make)
     def ask(thing: Thing, /, *more: More.args, **named: More.kwargs) -> Result:
-        results = known.setdefault(thing, {})
+        results: dict[Any, Result] = vars(thing).setdefault(name, {})
         key = more, *sorted(named.items())
         if key not in results:
             results[key] = make(thing, *more, **named)

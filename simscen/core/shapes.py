@@ -139,7 +139,7 @@ class MotionPath:
         return self.mode == "once" and self.elapsed(seconds) >= self.times[-1]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class TriangleMesh:
     """Many solids fused: `vertices` (n, 3), `faces` (m, 3) and, for each face, the index of its owner in `names`.
 

@@ -1,12 +1,15 @@
-"""Imports what the runs of a scenario are built of, once in the warm process rather than in each of its forks."""
+"""What the runs of a scenario are built of is imported and worked out once, rather than in each of their processes."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from importlib import import_module
 
 from pydantic import BaseModel
 
+from simscen.model.localizers import Amcl
 from simscen.model.recovery import Recovery
+from simscen.model.stack import StackSpec
 from simscen.run.prepare import Prepared
+from simscen.sim.walls import ready
 from simscen.spec.component import Component
 
 
@@ -15,6 +18,17 @@ def import_components(prepared: Prepared) -> None:
     for part in prepared.each.values():
         for module in own_modules(_components((part.stack, part.robot.sensors))):
             import_module(module)
+
+
+def work_out_ahead(prepared: Prepared) -> None:
+    """What each of its runs would need of the world and of the map: 0.6 s for a map of 100 x 100 m."""
+    from simscen.stack.localizers.build import matching
+
+    ready(prepared.built.mesh)
+    for part in prepared.each.values():
+        ready(part.obstacles)
+        if part.map is not None and isinstance(part.stack, StackSpec) and isinstance(part.stack.localizer, Amcl):
+            matching(part.map.refined(part.stack.costmap.resolution), part.stack.localizer).ready()
 
 
 def own_modules(components: Iterable[Component]) -> Iterator[str]:

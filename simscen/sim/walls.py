@@ -11,6 +11,7 @@ from simscen.core.geometry import Array
 from simscen.core.remembered import remembered
 from simscen.core.shapes import TriangleMesh
 from simscen.sim import engine
+from simscen.sim.parts import parts_of
 
 FEW = 10_000
 """Faces that the engine takes in 30 ms, at once."""
@@ -78,6 +79,13 @@ class Walls:
     def _built(self, lot: int) -> list[int]:
         faces = self._lots.faces[self._lots.starts[lot] : self._lots.starts[lot + 1]]
         return engine.static_faces(self._client, self._vertices, faces)
+
+
+def ready(mesh: TriangleMesh) -> None:
+    """Work out now what runs in a world need to know of its walls."""
+    parts_of(mesh)
+    if len(mesh.faces) > FEW:
+        _lots_of(mesh)
 
 
 @remembered

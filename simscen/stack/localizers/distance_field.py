@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -13,11 +14,14 @@ from simscen.stack.nearest import BEYOND, FARTHEST, squared_cells, squared_withi
 
 Float32 = npt.NDArray[np.float32]
 Cells = npt.NDArray[np.int32]
+Kind = TypeVar("Kind", np.float32, np.uint8)
 
 
 # 512 x 60 beams fit the second-level cache. Larger tables also cost fresh pages from the system at every update:
 # 5000 particles at once took 8 to 100 ms, in blocks 3 ms.
 BLOCK = 512
+AT_ONCE = 2**16
+"""Cells."""
 BEHIND = 1.0
 """m: what is unknown behind a wall is at most so thick."""
 
@@ -72,12 +76,19 @@ class DistanceField:
         if not walled:
             distance[[0, -1], :] = distance[:, [0, -1]] = limit
         self.table: Float32 = distance.ravel()
-        self.resolution = grid.resolution
+        self.limit, self.resolution = limit, grid.resolution
         self._height, self._width = grid.shape
         x, y, self._turn = grid.origin.inverse()
         c, s = math.cos(self._turn), math.sin(self._turn)
         self._axes = np.array([[c, -s], [s, c]]) / grid.resolution
         self._corner = np.array([[x], [y]]) / grid.resolution + 1
+
+    def told(self, of: Callable[[Float32], npt.NDArray[Kind]], kind: type[Kind]) -> npt.NDArray[Kind]:
+        """What is made of each distance, flat as the table; some at a time, for a large map's takes hundreds of MB."""
+        result = np.empty(len(self.table), kind)
+        for begin in range(0, len(result), AT_ONCE):
+            result[begin : begin + AT_ONCE] = of(self.table[begin : begin + AT_ONCE])
+        return result
 
     def coordinates(self, poses: Array) -> tuple[Float32, Float32]:
         """Poses (n, 3) of the map frame: x and y (2, n) in cells of the bordered table, and headings (n,) in it."""

@@ -15,11 +15,13 @@ import numpy.typing as npt
 from simscen.core.geometry import Array, wrap_array
 from simscen.core.grid import FREE, OCCUPIED, OccupancyGrid
 from simscen.stack.localizers.beams import Plane, evenly
-from simscen.stack.localizers.distance_field import DistanceField
+from simscen.stack.localizers.distance_field import DistanceField, Float32
 from simscen.stack.localizers.likelihood_field import surfaces
 
 WIDTH = 0.2
 """m: the standard deviation of a point from what it belongs to."""
+FAR = 4 * WIDTH
+"""m beyond which a point belongs to nothing."""
 COARSE = 0.2
 """m: the coarsest grid of places."""
 HEADINGS = 180
@@ -73,8 +75,13 @@ def _evenly(points: Plane, count: int) -> Plane:
 class GlobalSearch:
     """The most likely places of a map for what was seen."""
 
-    def __init__(self, grid: OccupancyGrid) -> None:
-        self._grid = grid
+    def __init__(self, grid: OccupancyGrid, field: DistanceField | None = None) -> None:
+        """`field` is that of the surfaces of the same map, if anyone has it."""
+        self._grid, self._known = grid, field
+
+    def ready(self) -> None:
+        """Work out now what `near` and `fit` look up."""
+        _ = self._near, self._open
 
     def places(self, view: View) -> tuple[Array, Array]:
         """Poses (k, 3) in the map frame, and how well each fits (k,), 0 … 1, best first; k is at most ANSWERS."""
@@ -122,13 +129,14 @@ class GlobalSearch:
 
     @cached_property
     def _field(self) -> DistanceField:
-        return DistanceField(self._grid, surfaces(self._grid.cells == OCCUPIED), 4 * WIDTH, walled=False)
+        if self._known is not None and self._known.limit >= FAR:
+            return self._known
+        return DistanceField(self._grid, surfaces(self._grid.cells == OCCUPIED), FAR, walled=False)
 
     @cached_property
     def _near(self) -> Levels:
         """How near each cell is to an obstacle, 0 … 255."""
-        levels: Levels = np.round(255 * np.exp(np.square(self._field.table) / (-2 * WIDTH**2))).astype(np.uint8)
-        return levels
+        return self._field.told(_nearness, np.uint8)
 
     @cached_property
     def _open(self) -> Levels:
@@ -182,6 +190,12 @@ class GlobalSearch:
         climbed: Array = around.reshape(len(poses), -1, 3)[np.arange(len(poses)), best]
         climbed[:, 2] = wrap_array(climbed[:, 2])
         return climbed
+
+
+def _nearness(metres: Float32) -> Levels:
+    fitting = np.exp(np.square(np.minimum(metres, np.float32(FAR))) / (-2 * WIDTH**2))
+    levels: Levels = np.round(255 * fitting).astype(np.uint8)
+    return levels
 
 
 def _pooled(levels: Levels, each: int) -> Levels:

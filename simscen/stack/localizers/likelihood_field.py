@@ -166,5 +166,4 @@ class LikelihoodFieldProb:
 
 def _hit(field: DistanceField, z_hit: float, sigma_hit: float) -> Float32:
     """The part of a beam's probability that its end decides, for each cell of the field."""
-    hit: Float32 = np.float32(z_hit) * np.exp(np.square(field.table) / np.float32(-2 * sigma_hit**2))
-    return hit
+    return field.told(lambda d: np.float32(z_hit) * np.exp(np.square(d) / np.float32(-2 * sigma_hit**2)), np.float32)

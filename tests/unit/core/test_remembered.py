@@ -1,0 +1,29 @@
+"""What is worked out once for as long as a thing lives."""
+
+import gc
+import weakref
+
+from simscen.core.remembered import remembered
+
+
+class Thing:
+    pass
+
+
+def test_each_thing_and_each_set_of_arguments_is_asked_about_once_and_forgotten_with_the_thing():
+    asked = []
+
+    @remembered
+    def made(thing, more, last=0):
+        asked.append((more, last))
+        return thing, [more, last]
+
+    one, other = Thing(), Thing()
+    assert made(one, 1) is made(one, 1)
+    assert made(one, 1, last=2) is made(one, 1, last=2)
+    assert made(other, 1) is not made(one, 1)
+    assert asked == [(1, 0), (1, 2), (1, 0)]
+    gone = weakref.ref(one)
+    del one
+    gc.collect()
+    assert gone() is None
