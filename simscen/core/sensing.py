@@ -9,6 +9,7 @@ import numpy as np
 
 from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.motion import Twist
+from simscen.core.oftenmade import often_made
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -42,7 +43,7 @@ class Scan:
         return self.mount.apply(np.column_stack((ranges * np.cos(angles), ranges * np.sin(angles))))
 
 
-@dataclass(frozen=True)
+@often_made()
 class Odometry:
     """Dead reckoning from the wheels: `pose` in the odom frame, `twist` in the base frame."""
 
@@ -52,7 +53,7 @@ class Odometry:
     twist: Twist
 
 
-@dataclass(frozen=True)
+@often_made()
 class Imu:
     """Turn rate (rad/s, about x y z), specific force (m/s², with gravity) and heading (rad), in the base frame."""
 
@@ -62,7 +63,7 @@ class Imu:
     linear_acceleration: tuple[float, float, float]
 
 
-@dataclass(frozen=True)
+@often_made()
 class Bump:
     """A bumper: whether it is pressed."""
 

@@ -19,6 +19,7 @@ from simscen.core.geometry import Pose3
 from simscen.core.grid import OccupancyGrid
 from simscen.core.motion import Twist
 from simscen.core.navigation import Path
+from simscen.core.oftenmade import often_made
 from simscen.core.samples import Samples, Ticks
 from simscen.core.sensing import Readings
 
@@ -52,7 +53,7 @@ class CostGrid(NamedTuple):
     grid: OccupancyGrid
 
 
-@dataclass(frozen=True, eq=False)
+@often_made(eq=False)
 class Decision:
     """What the stack made of a beat: its `command`, and what it would publish. None means: nothing new."""
 
@@ -65,7 +66,7 @@ class Decision:
     costmaps: tuple[CostGrid, ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
+@often_made(eq=False)
 class Moment:
     """One beat of the lockstep: truth, what the robot was told (faults applied), what it decided, what happened.
 
