@@ -38,12 +38,16 @@ class Agent:
     logs: Sequence[Log] = ()
     due: bool = field(default=True, init=False)
     """Whether anything is due for it at this beat."""
+    next: int = field(default=0, init=False)
+    """The tick of its next beat."""
     _truth: Truth | None = field(default=None, init=False)
 
     def look(self, tick: int) -> None:
         """Where the robot is now, and what it has touched."""
         self._truth = self.robot.truth() if tick % self.truth_period == 0 else None
-        self.due = self.timetable.due(tick)
+        self.due = tick == self.next
+        if self.due:
+            self.next += self.timetable.until_next(tick)
         self.stage.begin_beat(self._truth, self.due)
 
     def decide(self, tick: int) -> Moment:
@@ -52,7 +56,8 @@ class Agent:
         readings = self.faults.disturb(self.senses.read(tick))
         decision = self.stack.decide(tick, readings)
         self.stage.heard(decision, readings)
-        self.ending.heard(decision)
+        if decision.events:
+            self.ending.heard(decision)
         return Moment(tick, self._truth, readings, decision, self.stage.take_events())
 
     def record(self, moment: Moment, end: Event | None) -> None:

@@ -12,9 +12,9 @@ TIME_LIMIT = "time limit"
 class Ending:
     """Ends a robot's part in a run a while after its navigation task has ended, or at the time limit.
 
-    It hears of every beat of the robot. A task that was given anew in the meantime (a goal sent by an event) takes the
-    ending back. A run ends with the first sample of the truth from then on, so that all its samples are evenly spaced:
-    what is derived from them (accelerations, windows of time) means the same at its end as before.
+    It hears of every beat of the robot that has events. A task that was given anew in the meantime (a goal sent by an
+    event) takes the ending back. A run ends with the first sample of the truth from then on, so that all its samples
+    are evenly spaced: what is derived from them (accelerations, windows of time) means the same at its end as before.
     """
 
     def __init__(self, clock: Clock, time_limit: float, linger: float, idle: bool = False) -> None:
@@ -24,7 +24,7 @@ class Ending:
         self._over: int | None = 0 if idle else None
 
     def heard(self, decision: Decision) -> None:
-        """What the stack decided at a beat; tell each of them."""
+        """What the stack decided at a beat; tell each in which something happened."""
         for event in decision.events:
             if event.kind == EventKind.NAVIGATION_ENDED:
                 self._over = event.tick + self._linger

@@ -112,6 +112,10 @@ class FaultRig:
     def command(self, tick: int, command: Twist) -> Twist:
         """The command as the wheels get it: what cmd_vel lets through, then what else befalls the wheels."""
         sends = self._link.sends(tick, command)
+        if not self._linked and not self._active:
+            if sends:
+                self._link.hear(tick, command)
+            return command
         if self._linked:
             self._transmit(tick, command if sends else None)
             command = self._link.driven(tick)

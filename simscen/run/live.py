@@ -79,15 +79,16 @@ class LiveStage:
         self._due = due
         before = self._pose
         self._look(truth)
-        self._travelled += before.distance(self._pose)
+        self._travelled += math.hypot(self._pose.x - before.x, self._pose.y - before.y)
         for collision in self._robot.collisions():
             self.note(collision)
 
     def pass_on(self, tick: int) -> None:
         """Give the stack the orders that have waited for this beat of its own."""
-        orders, self._orders = self._orders, []
-        for order in orders:
-            order(tick)
+        if self._orders:
+            orders, self._orders = self._orders, []
+            for order in orders:
+                order(tick)
 
     def _order(self, order: Callable[[int], None]) -> None:
         self._orders.append(order)
@@ -96,9 +97,9 @@ class LiveStage:
 
     def _look(self, truth: Truth | None = None) -> None:
         if truth is not None:
-            self._pose, self._twist, self._clearance = truth.pose.plane, truth.twist, truth.clearance
+            self._pose, self._twist, self._clearance = truth.pose, truth.twist, truth.clearance
         else:
-            self._pose, self._twist = self._robot.base_pose().plane, self._robot.base_twist()
+            self._pose, self._twist = self._robot.base_pose(), self._robot.base_twist()
 
     def heard(self, decision: Decision, readings: Readings = ()) -> None:
         """What the stack was told, and what it decided and published."""
@@ -144,7 +145,7 @@ class LiveStage:
     @property
     def robot(self) -> Pose2:
         """The true pose of the robot."""
-        return self._pose
+        return self._pose.plane
 
     @property
     def twist(self) -> Twist:

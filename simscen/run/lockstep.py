@@ -28,17 +28,18 @@ class Rig:
 
 def run_lockstep(rig: Rig) -> Event:
     """Run to the end; each robot's moments go to its logs. Returns the event that ended the run."""
-    simulation = rig.simulation
+    simulation, agents, directors = rig.simulation, rig.agents, rig.directors
+    endings = [agent.ending for agent in agents]
     while True:
         tick = simulation.tick
-        for agent in rig.agents:
+        for agent in agents:
             agent.look(tick)
-        for director in rig.directors:
+        for director in directors:
             director.direct()
 
-        due = [agent for agent in rig.agents if agent.due]
+        due = [agent for agent in agents if agent.due]
         moments = [agent.decide(tick) for agent in due]
-        end = None if tick % rig.truth_period else end_of(tick, (agent.ending for agent in rig.agents))
+        end = None if tick % rig.truth_period else end_of(tick, endings)
         for agent, moment in zip(due, moments, strict=True):
             agent.record(moment, end)
         if end is not None:
@@ -46,4 +47,4 @@ def run_lockstep(rig: Rig) -> Event:
 
         for agent, moment in zip(due, moments, strict=True):
             agent.drive(moment)
-        simulation.step(min([agent.timetable.until_next(tick) for agent in rig.agents]))
+        simulation.step(min([agent.next for agent in agents]) - tick)
