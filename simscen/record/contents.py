@@ -146,9 +146,9 @@ class Contents:
         kind = self._types.get(channel.schema_id, "")
         by_topic: dict[tuple[str, str], Handler] = {
             topics.TRUTH[:2]: self._truth,
-            topics.CLEARANCE[:2]: lambda tick, data: self._rows.clearance.add(tick, unpack.float64(data)),
+            topics.CLEARANCE[:2]: lambda tick, data: self._rows.clearance.add(tick, *unpack.float64(data)),
             topics.BELIEF[:2]: self._belief,
-            topics.COMMAND[:2]: lambda tick, data: self._rows.command.add(tick, unpack.twist(data)),
+            topics.COMMAND[:2]: lambda tick, data: self._rows.command.add(tick, *unpack.twist(data)),
             topics.PLAN[:2]: self._plan,
             topics.EVENTS[:2]: self._event,
             topics.TF[:2]: self._transforms,
@@ -166,14 +166,14 @@ class Contents:
 
     def _truth(self, tick: int, data: bytes) -> None:
         pose, twist = unpack.odometry(data)
-        self._rows.truth.add(tick, pose + twist)
+        self._rows.truth.add(tick, *pose, *twist)
 
     def _odometry(self, tick: int, data: bytes) -> None:
-        self._rows.odometry.add(tick, unpack.odometry(data)[0])
+        self._rows.odometry.add(tick, *unpack.odometry(data)[0])
 
     def _belief(self, tick: int, data: bytes) -> None:
         pose, covariance = unpack.pose_with_covariance(data)
-        self._rows.belief.add(tick, pose + covariance)
+        self._rows.belief.add(tick, *pose, *covariance)
 
     def _scan(self, tick: int, _: bytes) -> None:
         self._rows.scans.append(tick)
@@ -188,7 +188,7 @@ class Contents:
     def _transforms(self, tick: int, data: bytes) -> None:
         for link in unpack.transforms(data):
             if (name := frames.object_in(link.child)) is not None:
-                self._rows.object(name).add(tick, link.pose)
+                self._rows.object(name).add(tick, *link.pose)
 
     def _mounts(self, _: int, data: bytes) -> None:
         self._frames = self._seen.mounts = {

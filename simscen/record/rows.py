@@ -4,8 +4,8 @@ The TraceBuilder fills rows from moments, the log reader from messages. Both han
 the log stores, and one function turns them into yaw: so the two traces are equal to the last bit.
 """
 
+import math
 import struct
-from collections.abc import Iterable
 
 import numpy as np
 
@@ -24,9 +24,13 @@ class Series:
         self._pack = struct.Struct(f"{width + 1}d").pack
         self._rows = bytearray()
 
-    def add(self, tick: int, values: Iterable[float]) -> None:
+    def add(self, tick: int, *values: float) -> None:
         """Append a row. Ticks are exact in a double for a million years of simulated time."""
         self._rows += self._pack(tick, *values)
+
+    def extend(self, ticks: Ticks, values: Array) -> None:
+        """Append rows: ticks (n,) and values (n, width)."""
+        self._rows += np.column_stack((ticks, values)).tobytes()
 
     def columns(self) -> tuple[Ticks, Array]:
         """Ticks (n,) and values (n, width)."""
@@ -39,6 +43,15 @@ def yaw(quaternions: Array) -> Array:
     x, y, z, w = quaternions.T.copy()
     angles: Array = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
     return angles
+
+
+def lifted(points: Array) -> Array:
+    """(n, 7) poses, as Pose3.planar makes them to the last bit, of points (n, 3) x, y, yaw."""
+    poses = np.zeros((len(points), 7))
+    poses[:, :2] = points[:, :2]
+    halves = np.where(np.isfinite(points[:, 2]), points[:, 2] / 2, np.nan).tolist()
+    poses[:, 5], poses[:, 6] = [math.sin(half) for half in halves], [math.cos(half) for half in halves]
+    return poses
 
 
 def on_the_ground(poses: Array) -> Array:

@@ -1,13 +1,13 @@
 """Collects the moments of a run into its Trace."""
 
-from simscen.core.belief import Belief
-from simscen.core.geometry import Pose3
+import numpy as np
+
 from simscen.core.sensing import Odometry, Scan
 from simscen.core.time import Clock
 from simscen.core.trace import Moment, Trace
 from simscen.record import event_text
 from simscen.record.pack_many import ground_poses
-from simscen.record.rows import Rows
+from simscen.record.rows import Rows, Series, lifted
 from simscen.record.thinning import Thinning
 
 
@@ -22,26 +22,28 @@ class TraceBuilder:
         self._clock = clock
         self._thinning = Thinning(clock.rate)
         self._rows = Rows()
+        self._truth, self._odometry, self._belief = Series(11), Series(3), Series(9)
+        """Pose, twist and clearance; x, y, yaw; the same with a covariance: they become rows at the end."""
 
     def append(self, moment: Moment) -> None:
         """Take in one beat: appends a few numbers, computes nothing."""
         tick, truth, decision, rows = moment.tick, moment.truth, moment.decision, self._rows
         if truth is not None:
-            rows.truth.add(tick, (*truth.pose, *truth.twist))
-            rows.clearance.add(tick, (truth.clearance,))
+            self._truth.add(tick, *truth.pose, *truth.twist, truth.clearance)
             if truth.objects:
                 for name, pose in self._thinning.moved(tick, truth).items():
-                    rows.object(name).add(tick, pose)
+                    rows.object(name).add(tick, *pose)
         for reading in moment.readings:
             if isinstance(reading, Odometry):
                 if self._thinning.keeps_odometry(reading):
-                    rows.odometry.add(tick, Pose3.planar(reading.pose))
+                    self._odometry.add(tick, *reading.pose)
             elif isinstance(reading, Scan):
                 rows.scans.append(tick)
         if self._thinning.keeps_command(tick, decision.command):
-            rows.command.add(tick, decision.command)
+            rows.command.add(tick, *decision.command)
         if decision.belief is not None:
-            self._belief(tick, decision.belief)
+            xx, xy, xa, _, yy, ya, _, _, aa = decision.belief.covariance.ravel().tolist()
+            self._belief.add(tick, *decision.belief.pose, xx, xy, xa, yy, ya, aa)
         if decision.plan is not None:
             rows.plans.append((decision.plan.tick, ground_poses(decision.plan.points)))
         if moment.events or decision.events:
@@ -49,9 +51,12 @@ class TraceBuilder:
                 rows.events.append(event_text.from_json(event_text.to_json(event)))
 
     def finish(self, end_tick: int) -> Trace:
-        """The run until `end_tick`."""
-        return self._rows.trace(self._clock.rate, end_tick)
-
-    def _belief(self, tick: int, belief: Belief) -> None:
-        xx, xy, xa, _, yy, ya, _, _, aa = belief.covariance.ravel().tolist()
-        self._rows.belief.add(tick, (*Pose3.planar(belief.pose), xx, xy, xa, yy, ya, aa))
+        """The run until `end_tick`; nothing may be appended to it from then on."""
+        rows, (ticks, truth) = self._rows, self._truth.columns()
+        rows.truth.extend(ticks, truth[:, :10])
+        rows.clearance.extend(ticks, truth[:, 10:])
+        ticks, odometry = self._odometry.columns()
+        rows.odometry.extend(ticks, lifted(odometry))
+        ticks, belief = self._belief.columns()
+        rows.belief.extend(ticks, np.column_stack((lifted(belief), belief[:, 3:])))
+        return rows.trace(self._clock.rate, end_tick)

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from simscen.core.evidence import Evidence
-from simscen.core.geometry import Array
 from simscen.core.samples import Ticks
 from simscen.record.foreign.collected import Collected
 from simscen.record.foreign.goals import events_of
@@ -17,7 +16,7 @@ from simscen.record.foreign.tracks import Track, stamped, track_of, track_of_tf
 from simscen.record.foreign.unusable import Unusable
 from simscen.record.foreign.velocity import is_unfilled, velocity
 from simscen.record.foreign.wanted import Wanted
-from simscen.record.rows import Rows, Series, on_the_ground
+from simscen.record.rows import Rows, on_the_ground
 
 LONGEST_GAP = 1.0
 """Seconds without a word about the truth from which on something may have happened in between."""
@@ -132,7 +131,7 @@ class Reading:
             twists = None
         if twists is None:
             twists = velocity(ticks, ground, self.time.rate)
-        _add(self.rows.truth, ticks, np.column_stack((poses, twists)))
+        self.rows.truth.extend(ticks, np.column_stack((poses, twists)))
         if gap := self._gap(ticks):
             self.partial |= dict.fromkeys((Evidence.TRUTH, Evidence.VELOCITY), f"{track.source} says nothing {gap}")
 
@@ -147,7 +146,7 @@ class Reading:
 
     def _add_belief(self, track: Track) -> None:
         ticks, kept = _last_of_each(self._ticks(track))
-        _add(self.rows.belief, ticks, np.column_stack((track.poses[kept], track.covariances[kept])))
+        self.rows.belief.extend(ticks, np.column_stack((track.poses[kept], track.covariances[kept])))
         truth_ticks, truth = self.rows.truth.columns()
         before = truth[truth_ticks <= ticks[0], :2]
         moved = float(np.hypot(*np.ptp(before, axis=0))) if len(before) else 0.0
@@ -181,9 +180,9 @@ class Reading:
         kept_ticks, kept = _last_of_each(ticks)
         match role:
             case "odom":
-                _add(self.rows.odometry, kept_ticks, np.array([values[k].pose for k in kept]))
+                self.rows.odometry.extend(kept_ticks, np.array([values[k].pose for k in kept]))
             case "cmd_vel":
-                _add(self.rows.command, kept_ticks, np.array([values[k].values for k in kept]))
+                self.rows.command.extend(kept_ticks, np.array([values[k].values for k in kept]))
             case "scan":
                 self.rows.scans.extend(ticks.tolist())
             case "plan":
@@ -213,8 +212,3 @@ def _last_of_each(ticks: Ticks) -> tuple[Ticks, Ticks]:
     ascending = ticks[order]
     last = np.append(ascending[1:] != ascending[:-1], True)
     return ascending[last], order[last]
-
-
-def _add(series: Series, ticks: Ticks, values: Array) -> None:
-    for tick, row in zip(ticks.tolist(), values.tolist(), strict=True):
-        series.add(tick, row)
