@@ -24,6 +24,9 @@ from simscen.stack.tasks import Task
 from simscen.stack.underway import Underway
 from simscen.stack.zones import SpeedFilter
 
+HERE = Pose2(0.0, 0.0)
+"""Of the robot in its own frame."""
+
 
 class ReferenceStack:
     """Nav2 in miniature. Decides at the controller's rate and repeats its command in between."""
@@ -51,6 +54,7 @@ class ReferenceStack:
         self._publishing = Publishing(surroundings.tick_rate, localizer, controller)
         self._matched = Underway[Scan](localizer_latency)
         self._events: list[Event] = []
+        self._moves = False
         self._tick = 0
         self._twist = STOP
         self._odometry, self._wheels = OdometryHistory(surroundings.tick_rate), False
@@ -115,8 +119,8 @@ class ReferenceStack:
         if controls := tick % self._control_period == 0:
             frames = self._frames()
             self._update_costmaps(tick, frames)
-            self._monitor.on_moving(self._prediction.around(tick))
-            self._costmaps.near.moving = self._prediction.seen_from(tick, frames.odometry)
+            if not self._prediction.calm or self._moves:
+                self._foretell(tick, frames)
             self._control(tick, frames)
             plan = self._publishing.plan(self.plan)
             local_plan = self._publishing.local_plan(tick, frames)
@@ -143,7 +147,7 @@ class ReferenceStack:
                     self._dead_reckon(reading)
                 case Imu():
                     self._localizer.on_imu(reading)
-                    self._prediction.on_imu(reading)
+                    self._prediction.take(reading)
                 case Scan():
                     if reading.sensor in self._lidars:  # echoes of a sonar show obstacles, but no walls to match
                         self._matched.put(tick, reading)
@@ -173,7 +177,7 @@ class ReferenceStack:
             self._wheels, self._odometry = True, OdometryHistory(self._tick_rate)
         if believable(reading.twist) and self._odometry.add(reading.tick, reading.pose):
             self._twist = reading.twist
-            self._prediction.on_odometry(reading.tick, reading.pose)
+            self._prediction.take(reading)
 
     def _frames(self) -> Frames:
         """Where the robot is now; a robot without odometry has its map for odom frame."""
@@ -188,6 +192,13 @@ class ReferenceStack:
             self._zones = None
         self._costmaps.update(tick, frames, self._odometry)
 
+    def _foretell(self, tick: int, frames: Frames) -> None:
+        """Tell the collision monitor and the controller what moves, each in its frame."""
+        around = self._prediction.seen_from(tick, HERE)
+        self._moves = len(around) > 0
+        self._monitor.on_moving(around)
+        self._costmaps.near.moving = self._prediction.seen_from(tick, frames.odometry)
+
     def _control(self, tick: int, frames: Frames) -> None:
         """See to the goals, and to the command that is wanted."""
         if self._task.goal is None:
@@ -197,7 +208,8 @@ class ReferenceStack:
         if goal is None:
             self._stand(tick, frames.pose)
             return
-        self._prediction.settle()
+        if self._prediction.stands:
+            self._prediction.settle()
         *via, last = goal, *self._task.ahead
         if self._navigator.goal is not last:
             self._navigator.pursue(last)
@@ -222,8 +234,10 @@ class ReferenceStack:
             self._events += self._task.reached(tick)
             self._stop(tick)
         else:
-            pose, view = frames.pose, self._costmaps.wide.view
-            command = self._prediction.steer(tick, step.command, pose, self._twist, view, self.plan)
+            command, pose = step.command, frames.pose
+            if not self._prediction.calm:
+                view = self._costmaps.wide.view
+                command = self._prediction.steer(tick, command, pose, self._twist, view, self.plan)
             self._commands.want(tick, command, periods)
 
     def _stand(self, tick: int, pose: Pose2) -> None:

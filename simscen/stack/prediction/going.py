@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 from simscen.model.guards import Prediction
 from simscen.stack.prediction.clusters import BOTH
-from simscen.stack.prediction.tracks import LATELY, Tracks
+from simscen.stack.prediction.tracks import LATELY, Track, Tracks
 
 SURE, TRAVELLED, HITS = 3.0, 0.15, 3
 """A track moves when its speed is so many standard deviations, now or over its last updates, and it has come so far in
@@ -27,10 +27,22 @@ posts does not."""
 FAR = 0.5
 """Metres beyond twice the largest radius: what has gone so far moves, though no beam was ever where it came from. What
 is seen of a wall, at the end of the field of view, grows by less."""
+UNCOME = 5
+"""Updates without standing where it had been free, after which what nobody has seen move is followed no more."""
 RESTED, STOOD, REMEMBERED = 0.5, 1.5, 10.0
 """Seconds for which something stands until it is no longer followed, if it has not moved; until what moved is a thing
 like any other, for who turns round stands a moment, too; and until nobody expects any more that it may set off again.
 """
+
+
+def _slides(tracks: Tracks, track: Track) -> bool:
+    """Whether it has not once stood where it had been free, for some updates, and nothing at all moves.
+
+    So does a wall of which the robot sees another part at each moment. What does move begins anew when it comes.
+    """
+    if track.moved or len(track.lately) < UNCOME or any(each.came for each in list(track.lately)[-UNCOME:]):
+        return False
+    return not any(each.moving for each in tracks.known)
 
 
 class Going:
@@ -60,7 +72,7 @@ class Going:
         rests = REMEMBERED if track.moved else RESTED
         rested = not track.moving and (tracks.tick - track.fast_at) / self._rate > rests
         impossible = math.hypot(*tracks.states[number, 2:].tolist()) >= FASTEST
-        if impossible or rested or tracks.place_deviation(number) > UNSURE_PLACE:
+        if impossible or rested or _slides(tracks, track) or tracks.place_deviation(number) > UNSURE_PLACE:
             return True
         if unseen == 0.0 or not track.moving:
             return unseen > ENDS_UNSURE

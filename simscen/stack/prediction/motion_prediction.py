@@ -7,7 +7,7 @@ import numpy as np
 from simscen.core.geometry import Pose2
 from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import Path
-from simscen.core.sensing import Imu, Scan
+from simscen.core.sensing import Scan
 from simscen.model.guards import Prediction
 from simscen.stack.costmap.obstacle_layer import ScanAmongMoving
 from simscen.stack.prediction.avoidance import Avoidance
@@ -32,26 +32,31 @@ class MotionPrediction:
         self._trackers = {name: Tracker(spec, tick_rate) for name in lidars} if spec.enabled else {}
         self._avoidance = Avoidance(spec, robot, full_speed)
         self._standing = Standing(robot, full_speed)
-        self._looked, self._enough, self._held = 0, LOOKS * tick_rate if self._trackers else 0, False
+        self._enough, self._held = LOOKS * tick_rate, False
+        self.stands = False
+        """Whether it has been told to stand since it last drove."""
         self._rolled = Rolled(tick_rate)
         self._nothing = nothing(spec.acceleration)
         self._seeing: list[Tracker] = []
-
-    def on_odometry(self, tick: int, pose: Pose2) -> None:
-        """Take the wheels' odometry in."""
-        if self._trackers:
-            self._rolled.on_odometry(tick, pose)
-
-    def on_imu(self, imu: Imu) -> None:
-        """Take a turn rate in."""
-        self._rolled.on_imu(imu)
+        self.take = self._rolled.take
+        """Takes in the wheels' odometry, or a turn rate."""
+        self.calm = not self._trackers
+        """Whether nothing moves that it knows of, and it has looked long enough to know: then it changes no command."""
 
     def on_scan(self, scan: Scan) -> None:
         """Take a scan in."""
         tracker = self._trackers.get(scan.sensor)
-        if tracker is not None:
-            tracker.on_scan(scan, self._rolled.at(scan.tick))
-            self._seeing = [each for each in self._trackers.values() if len(each.moving)]
+        if tracker is None:
+            return
+        tracker.on_scan(scan, self._rolled.at(scan.tick))
+        if self.calm and not tracker.sees:
+            return
+        self._seeing = [each for each in self._trackers.values() if each.sees]
+        self.calm = not self._seeing and all(
+            each.began is not None and scan.tick - each.began >= self._enough for each in self._trackers.values()
+        )
+        if not self._seeing:
+            self._avoidance.rest()
 
     def marking(self, scan: Scan) -> Scan:
         """The scan as costmaps should take it in: what it shows of things that move is not to be marked."""
@@ -75,10 +80,6 @@ class MotionPrediction:
             self._spec.acceleration,
         )
 
-    def around(self, tick: int) -> Moving:
-        """What moves at a tick, in the base frame."""
-        return self.seen_from(tick, Pose2(0.0, 0.0))
-
     def seen_from(self, tick: int, pose: Pose2) -> Moving:
         """What moves at a tick, in a frame in which the robot is at `pose` now."""
         moving = self.moving(tick)
@@ -88,44 +89,38 @@ class MotionPrediction:
         self, tick: int, wanted: Twist, pose: Pose2, twist: Twist, costmap: CostmapView, plan: Path | None
     ) -> Twist:
         """The command to give for the one that is wanted; `pose`, `costmap` and `plan` are in one frame."""
-        wanted = self._cautious(tick, wanted)
-        moving = self.moving(tick)
-        if not len(moving):
-            self._avoidance.rest()
-            return wanted
-        moving = self.seen_from(tick, pose)
+        if not self._seeing:
+            return wanted if self.calm else _cautious(wanted)
         path = None if plan is None else plan.points[:, :2]
-        return self._avoidance.steer(wanted, pose, twist, moving, costmap, path)
-
-    def _cautious(self, tick: int, wanted: Twist) -> Twist:
-        """The command, slowed down as long as nothing can be known yet of what moves."""
-        if self._looked >= self._enough or (speed := math.hypot(wanted.vx, wanted.vy)) <= LOOKING:
-            return wanted
-        began = [tracker.began for tracker in self._trackers.values() if tracker.began is not None]
-        self._looked = tick - max(began) if len(began) == len(self._trackers) else 0
-        scale = LOOKING / speed
-        return Twist(scale * wanted.vx, scale * wanted.vy, scale * wanted.wz)
+        return self._avoidance.steer(wanted, pose, twist, self.seen_from(tick, pose), costmap, path)
 
     def settle(self) -> None:
         """The robot drives: where it stands next is where it belongs."""
         self._standing.leave()
-        self._held = False
+        self._held = self.stands = False
 
     def hold(self) -> None:
         """Somebody has told the robot to stop: it stays where it is, come what may, until it is told to drive."""
-        self._held = True
+        self._held = self.stands = True
 
     def stand(self, tick: int, pose: Pose2, twist: Twist, costmap: CostmapView) -> Twist:
         """The command to give to a robot that is to stand: to get out of the way, and to come back."""
+        self.stands = True
         if self._held:
             return STOP
-        moving = self.moving(tick)
-        home = self._standing.home(pose, bool(len(moving)))
+        home = self._standing.home(pose, bool(self._seeing))
         if home is None:
             return STOP
         wanted = self._standing.back(pose)
-        if not len(moving):
-            self._avoidance.rest()
+        if not self._seeing:
             return wanted
-        moving = self.seen_from(tick, pose)
-        return self._avoidance.steer(wanted, pose, twist, moving, costmap, None, home)
+        return self._avoidance.steer(wanted, pose, twist, self.seen_from(tick, pose), costmap, None, home)
+
+
+def _cautious(wanted: Twist) -> Twist:
+    """The command, slowed down as long as nothing can be known yet of what moves."""
+    speed = math.hypot(wanted.vx, wanted.vy)
+    if speed <= LOOKING:
+        return wanted
+    scale = LOOKING / speed
+    return Twist(scale * wanted.vx, scale * wanted.vy, scale * wanted.wz)

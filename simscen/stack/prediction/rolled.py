@@ -7,15 +7,16 @@ were taken a second apart.
 
 import math
 from collections import deque
+from collections.abc import Callable
 
 from simscen.core.geometry import Pose2, wrap
-from simscen.core.sensing import Imu
+from simscen.core.sensing import Imu, Odometry
 from simscen.stack.odometry_history import KEPT
 
 FASTEST = 100.0
 """rad/s: no robot turns faster; a gyroscope that says so is broken."""
-WAITING = 100
-"""Steps that may wait to be added up."""
+WAITING = 10_000
+"""Readings that may wait to be added up: of minutes, after which nobody compares scans."""
 
 
 class Rolled:
@@ -23,10 +24,12 @@ class Rolled:
 
     def __init__(self, tick_rate: int) -> None:
         self._rate = tick_rate
-        self._last: tuple[int, Pose2] | None = None
+        self._last: Odometry | None = None
         self._turned, self._turns = 0.0, 0
-        self._waiting: list[tuple[int, Pose2, float | None]] = []
+        self._waiting: deque[Odometry | Imu] = deque(maxlen=WAITING)
         self._poses = deque([(-1, 0.0, 0.0, 0.0)])
+        self.take: Callable[[Odometry | Imu], None] = self._waiting.append
+        """Takes a reading in; there are eighty a second, so that is all that it does."""
 
     @property
     def now(self) -> Pose2:
@@ -37,39 +40,36 @@ class Rolled:
     def at(self, tick: int) -> Pose2:
         """The newest pose up to a tick; the oldest known before that."""
         self._add_up()
-        kept = next((each for each in reversed(self._poses) if each[0] <= tick), self._poses[0])
-        return _pose(kept)
-
-    def on_imu(self, imu: Imu) -> None:
-        """Keep a turn rate until the next odometry."""
-        rate = imu.angular_velocity[2]
-        if abs(rate) < FASTEST:
-            self._turned += rate
-            self._turns += 1
-
-    def on_odometry(self, tick: int, pose: Pose2) -> None:
-        """Take a step, from one pose of the wheels' odometry to the next."""
-        self._waiting.append((tick, pose, self._turned / self._turns if self._turns else None))
-        self._turned, self._turns = 0.0, 0
-        if len(self._waiting) >= WAITING:
-            self._add_up()
+        poses = self._poses
+        if poses[-1][0] <= tick:
+            return _pose(poses[-1])
+        return _pose(next((each for each in reversed(poses) if each[0] <= tick), poses[0]))
 
     def _add_up(self) -> None:
         if not self._waiting:
             return
         newest, x, y, yaw = self._poses[-1]
-        for tick, pose, rate in self._waiting:
-            last, self._last = self._last, (tick, pose)
-            if last is not None and tick > last[0] and tick > newest:
-                before = last[1]
+        last, turned, turns = self._last, self._turned, self._turns
+        for reading in self._waiting:
+            if isinstance(reading, Imu):
+                rate = reading.angular_velocity[2]
+                if abs(rate) < FASTEST:
+                    turned += rate
+                    turns += 1
+                continue
+            tick, pose = reading.tick, reading.pose
+            if last is not None and tick > last.tick and tick > newest:
+                before = last.pose
                 step = math.remainder(pose.yaw - before.yaw, math.tau)
-                turn = step if rate is None else rate * (tick - last[0]) / self._rate
+                turn = turned / turns * (tick - last.tick) / self._rate if turns else step
                 # The wheels' step, turned into this frame, and by half of what they know too little of the turn.
                 into = yaw - before.yaw + (turn - step) / 2
                 c, s = math.cos(into), math.sin(into)
                 dx, dy = pose.x - before.x, pose.y - before.y
                 x, y, yaw, newest = x + c * dx - s * dy, y + s * dx + c * dy, yaw + turn, tick
                 self._poses.append((tick, x, y, yaw))
+            last, turned, turns = reading, 0.0, 0
+        self._last, self._turned, self._turns = last, turned, turns
         self._waiting.clear()
         while self._poses[0][0] < newest - KEPT * self._rate:
             self._poses.popleft()

@@ -136,7 +136,6 @@ class SeenThrough:
             return
         if (view.count, view.start, view.increment) != (count, scan.angle_min, scan.angle_increment):
             self._view = view = View(count, scan.angle_min, scan.angle_increment)
-        self._forget(scan.tick)
         lengths = view.lengths(scan)
         self._scans.append(Earlier(scan.tick, lidar, view, lengths, view.free(lengths)))
 
@@ -162,11 +161,7 @@ class SeenThrough:
 
     def _asked(self, tick: int) -> Earlier | None:
         """The scan of about AGO before; None while there is none of AT_LEAST."""
-        self._forget(tick)
-        if not self._scans or self._scans[0].tick > tick - self._at_least:
-            return None
-        return self._scans[0]
-
-    def _forget(self, tick: int) -> None:
-        while len(self._scans) > 1 and self._scans[1].tick <= tick - self._ago:
-            self._scans.popleft()
+        scans, ago = self._scans, tick - self._ago
+        while len(scans) > 1 and scans[1].tick <= ago:
+            scans.popleft()
+        return scans[0] if scans and scans[0].tick <= tick - self._at_least else None

@@ -39,8 +39,8 @@ class Tracker:
         self._spec, self._rate = spec, tick_rate
         self._memory = SeenThrough(tick_rate)
         self._angles: Array = np.zeros(0)
-        self._some = self._all = slice(0, None)
-        self._towards = np.zeros(0, dtype=np.complex128)
+        self._every = 1
+        self._towards = self._towards_some = np.zeros(0, dtype=np.complex128)
         self._tracks, self._going = Tracks(), Going(spec, tick_rate)
         self.began: int | None = None
         """When the first scan was taken."""
@@ -51,6 +51,11 @@ class Tracker:
         """What moves, at the tick of the newest scan."""
 
     @property
+    def sees(self) -> bool:
+        """Whether anything moves."""
+        return self.moving is not self._nothing
+
+    @property
     def tick(self) -> int:
         """When the newest scan was taken."""
         return self._tracks.tick
@@ -59,7 +64,7 @@ class Tracker:
         """Take a scan in that was taken with the base at `odometry`."""
         lidar = odometry.compose(scan.mount)
         if len(self._angles) != len(scan.ranges):
-            self._look_along(scan.angles())
+            self._look_along(scan)
         if self.began is None:
             self.began = scan.tick
         self._tracks.forecast(scan.tick, (scan.tick - self.tick) / self._rate, self._spec.acceleration)
@@ -68,28 +73,32 @@ class Tracker:
             self._follow(scan, lidar)
         self._memory.remember(scan, lidar)
 
-    def _look_along(self, angles: Array) -> None:
+    def _look_along(self, scan: Scan) -> None:
         """Note where the beams go, and which are looked at while nothing moves."""
-        self._angles, self._towards = angles, np.exp(1j * angles)
-        every = max(1, len(angles) // CHECKED)
-        self._some, self._all = slice(0, None, every), slice(0, None)
+        self._angles = scan.angles()
+        self._every = max(1, len(self._angles) // CHECKED)
+        self._towards = np.exp(1j * self._angles)
+        self._towards_some = self._towards[:: self._every].copy()
 
     def _suspicious(self, scan: Scan, lidar: Pose2) -> bool:
         """Whether so many neighbouring beams hit what has appeared that it may be a thing."""
-        if not len(self._appeared(scan, lidar, self._some)):
+        some = scan.ranges[:: self._every]
+        if not len(self._appeared(scan, some, self._towards_some, lidar)):
             return False
-        beams = self._appeared(scan, lidar, self._all)
+        beams = self._appeared(scan, scan.ranges, self._towards, lidar)
         return len(beams) >= FEW and bool((beams[FEW - 1 :] - beams[: 1 - FEW]).min() * APPEARED <= FEW)
 
-    def _appeared(self, scan: Scan, lidar: Pose2, which: slice) -> npt.NDArray[np.int64]:
-        """Which of these beams hit what has appeared."""
-        ranges = scan.ranges[which]
+    def _appeared(
+        self, scan: Scan, ranges: Array, towards: npt.NDArray[np.complex128], lidar: Pose2
+    ) -> npt.NDArray[np.int64]:
+        """Which beams of these ranges hit what has appeared."""
         # What a beam that met nothing shows is farther off than anything was seen; nan is taken for that.
-        places = np.fmin(np.fmax(ranges, 0.0), 2 * FARTHEST) * self._towards[which]
+        places = np.fmin(np.fmax(ranges, 0.0), 2 * FARTHEST) * towards
         beams = self._memory.appeared(scan.tick, places, lidar).nonzero()[0]
-        return (
-            beams[(ranges[beams] >= scan.range_min) & (ranges[beams] <= self._farthest(scan))] if len(beams) else beams
-        )
+        if not len(beams):
+            return beams
+        hit = ranges[beams]
+        return beams[(hit >= scan.range_min) & (hit <= self._farthest(scan))]
 
     def _farthest(self, scan: Scan) -> float:
         return min(scan.range_max, self._spec.max_range)
