@@ -1,7 +1,7 @@
 """Things that move: by a script, or because they are pushed."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from simscen.core.motion_path import pose_at, top_speed
 from simscen.core.shapes import Body, Mesh, MotionPath
 from simscen.sim import engine
 from simscen.sim.enclosure import winds_around
+from simscen.sim.encounters import HORIZON, Balls, encounters
 from simscen.sim.inertia import GRAVITY, of_solids
 from simscen.sim.lost import lost
 from simscen.sim.outline import reach
@@ -20,6 +21,8 @@ FRICTION = 0.6
 """Of pushable things on the ground: about that of wood or cardboard on concrete."""
 Vector = tuple[float, float, float]
 Placing = tuple[Vector, tuple[float, float, float, float]]
+NEVER = 2**62
+"""A tick that never comes."""
 JUMP = 50.0
 """A script that asks for more m/s than this sets its body down elsewhere, rather than hurl it through the world."""
 
@@ -47,6 +50,8 @@ class Actor:
     """What of that was last found not to be lost."""
     resting: bool = False
     """Whether it has not moved at all since the engine was asked before."""
+    led: bool = False
+    """Whether it may be given another path at any time."""
     scripted: dict[int, Pose3] = field(default_factory=dict)
     """Where its path has it at the ticks that were asked for last."""
 
@@ -55,13 +60,19 @@ class Actor:
         """Whether the engine moves it, rather than a script or nothing."""
         return self.body.mass > 0 and self.path is None
 
+    def parked(self, since: float, seconds: float) -> bool:
+        """Whether its path, set off `since` seconds ago, leaves it where it is for so many more."""
+        if self.path is None or self.led:
+            return False
+        return self.path.over(since) or since + seconds < self.path.start
+
 
 class Actors:
     """All that moves but the robots, by name and in the order of names, so that the engine's order is always the same.
 
-    Scripted bodies are kept where the engine last needed them; `begin` and `finish` around a step make them push
+    Scripted bodies are kept where the engine last needed them; `begin` and `show` around a step make them push
     what they meet, with their true velocity. Without velocity they would push only by sinking in: a cart at 1 m/s by
-    20 mm, with it by 0.1 mm.
+    20 mm, with it by 0.1 mm. What can be pushed sleeps where it lies until something comes near; see `encounters`.
     """
 
     def __init__(self, client: int, tick_rate: int, triangulate: engine.Triangulate) -> None:
@@ -75,8 +86,10 @@ class Actors:
         self._still_since: int | None = None
         self._until_asleep = math.ceil(2 * engine.UNTIL_ASLEEP * tick_rate)
         self._undisturbed: dict[int, int] = {}
-        self.pushing = False
-        """Whether scripted bodies might push pushable ones."""
+        self._looked_until = -1
+        self._meeting: list[Actor] = []
+        self._shaken_at = -1
+        self._lying: Balls | None = None
 
     def add(self, body: Body, tick: int) -> None:
         """Put a body into the world; one of the same name makes way."""
@@ -132,7 +145,7 @@ class Actors:
     def wake(self, name: str) -> None:
         """See to it that a body can be pushed one tick from now: Bullet forgets forces on what it has to wake."""
         if self.mass(name):
-            engine.wake(self._client, self._actors[name].id, may_sleep=not self._travelling)
+            engine.wake(self._client, self._actors[name].id)
 
     def push(self, name: str, impulse: tuple[float, float]) -> None:
         """Push a body's centre of mass during the next tick, in N s; what cannot be pushed, or is gone, is not."""
@@ -151,6 +164,7 @@ class Actors:
         """
         actor = self._actors[name]
         actor.path, actor.since, actor.speed = path, tick, speed
+        actor.led = True
         actor.scripted.clear()
         self._fastest = max(self._fastest, speed)
 
@@ -160,15 +174,50 @@ class Actors:
         self._travelling = [actor for actor in self._actors.values() if actor.path is not None]
         self._fastest = max((actor.speed for actor in self._travelling), default=0.0)
         self._pushable = [actor for actor in self._actors.values() if actor.pushable]
-        self.pushing = bool(self._travelling and self._pushable)
+        self._looked_until, self._meeting, self._lying = -1, [], None
         for actor in self._pushable:
-            # What lay on something that is gone has to fall; and what a script moves does not wake what it meets.
-            engine.wake(self._client, actor.id, may_sleep=not self._travelling)
+            engine.wake(self._client, actor.id)  # what lay on something that is gone has to fall
 
-    def begin(self, tick: int) -> None:
-        """Before the step that leads from `tick` to the next: scripted bodies in place and with their velocity."""
-        self.show(tick)
+    def shaken(self, tick: int) -> None:
+        """Something is pushed during the step from `tick` on: how fast things are now says nothing about it."""
+        self._looked_until, self._shaken_at = -1, tick
+
+    def apart_until(self, tick: int, robots: Callable[[], float]) -> int:
+        """The tick until which no scripted body can push anything; -1 where one may push something during this step.
+
+        What one may meet soon is awake from now on. `robots` says how fast any robot may be for a while, in m/s.
+        """
+        if not (self._travelling and self._pushable):
+            return NEVER
+        if tick >= self._looked_until:
+            self._look(tick, robots())
+        return -1 if self._meeting else self._looked_until
+
+    def _look(self, tick: int, robots: float) -> None:
+        """See who may meet; all are put where they are, for until the next look nobody may run into what has gone."""
+        poses, moving = self.poses(tick), list[Actor]()
         for actor in self._travelling:
+            self._show(actor, poses[actor.body.name])
+            if not actor.parked((tick - actor.since) / self._rate, HORIZON):
+                moving.append(actor)
+        if self._lying is None or not self._asleep(tick):
+            self._lying = Balls.of((poses[a.body.name][:3], a.size, self._speed(a)) for a in self._pushable)
+        scripted = Balls.of((poses[a.body.name][:3], a.size, a.speed) for a in moving)
+        # What is hit by something heavier leaves with up to twice its speed.
+        found = encounters(scripted, self._lying, 2 * max(robots, self._fastest, float(self._lying.speeds.max())))
+        self._meeting = [moving[number] for number in found.scripted]
+        for number in found.pushable:
+            engine.wake(self._client, self._pushable[number].id)
+            self._still_since = None
+        self._looked_until = tick + (1 if tick == self._shaken_at else max(1, math.floor(found.seconds * self._rate)))
+
+    def begin(self, tick: int, everything: bool = True) -> None:
+        """Before the step that leads from `tick` to the next: scripted bodies in place and with their velocity.
+
+        Not `everything`: only those that may push something.
+        """
+        for actor in self._travelling if everything else self._meeting:
+            self._show(actor, self._pose(actor, tick))
             velocity, turning = self._scripted(actor, tick)
             if turning or any(velocity):
                 pybullet.resetBaseVelocity(actor.id, velocity, (0.0, 0.0, turning), physicsClientId=self._client)
@@ -190,9 +239,9 @@ class Actors:
             for actor in self._actors.values()
         }
 
-    def show(self, tick: int) -> None:
-        """Put the scripted bodies where they are at `tick`."""
-        for actor in self._travelling:
+    def show(self, tick: int, everything: bool = True) -> None:
+        """Put the scripted bodies where they are at `tick`, or those that may push something."""
+        for actor in self._travelling if everything else self._meeting:
             self._show(actor, self._pose(actor, tick))
 
     def _show(self, actor: Actor, pose: Pose3) -> None:
@@ -204,15 +253,16 @@ class Actors:
         """Where everything is, by name in order; the engine is asked at most once for each tick."""
         if self._posed_at != tick:
             self._posed_at = tick
-            if self._travelling or not self._asleep(tick):
+            if not self._asleep(tick):
                 self._poses = {name: self._pose(actor, tick) for name, actor in self._actors.items()}
-                still = self._still_since is not None and not self._travelling
-                if not (still and all(actor.resting for actor in self._actors.values())):
+                if self._still_since is None or not all(actor.resting for actor in self._pushable):
                     self._still_since = tick
+            elif self._travelling:
+                self._poses = {**self._poses, **{a.body.name: self._pose(a, tick) for a in self._travelling}}
         return self._poses
 
     def _asleep(self, tick: int) -> bool:
-        """Whether everything has long been lying, so that the engine lets it lie, and nothing can have touched it.
+        """Whether all that can be pushed has long been lying, so that the engine lets it lie, and nobody touched it.
 
         What something only comes near to wakes in the engine and creeps by less than a micrometre until it is touched.
         """

@@ -148,10 +148,10 @@ class Clearance:
         """
         things = self._actors.top_speed(tick)
         if self.others:
-            things = 2 * max(things, *[robot._own_speed() for robot in self.others])
-        return self._own_speed() + things + 0.1
+            things = 2 * max(things, *[robot.own_speed() for robot in self.others])
+        return self.own_speed() + things + 0.1
 
-    def _own_speed(self) -> float:
+    def own_speed(self) -> float:
         """The greatest speed in m/s that any part of the robot can have for a while."""
         _, linear, (x, y, z) = self._state()
         forward = max(self._quickest, math.hypot(*linear))

@@ -242,13 +242,10 @@ def body(client: int, mass: float, shape: int, pose: Pose3, frame: Frame, fricti
     return number
 
 
-def wake(client: int, number: int, may_sleep: bool) -> None:
-    """Wake a body; one that `may_sleep` lies still from UNTIL_ASLEEP after it came to rest until it is touched."""
-    allowed = pybullet.ACTIVATION_STATE_ENABLE_SLEEPING if may_sleep else pybullet.ACTIVATION_STATE_DISABLE_SLEEPING
-    pybullet.changeDynamics(
-        number, -1, activationState=allowed | pybullet.ACTIVATION_STATE_WAKE_UP, sleepThreshold=AT_REST,
-        physicsClientId=client,
-    )  # fmt: skip
+def wake(client: int, number: int) -> None:
+    """Wake a body; it lies still again from UNTIL_ASLEEP after it came to rest until something with mass touches it."""
+    awake = pybullet.ACTIVATION_STATE_ENABLE_SLEEPING | pybullet.ACTIVATION_STATE_WAKE_UP
+    pybullet.changeDynamics(number, -1, activationState=awake, sleepThreshold=AT_REST, physicsClientId=client)
 
 
 def fixed(client: int, shape: int) -> int:

@@ -78,6 +78,7 @@ class Scene:
 
     def shaken(self) -> None:
         """Something is pushed during the next step."""
+        self.actors.shaken(self.tick)
         for robot in self.robots.values():
             robot.shaken()
 

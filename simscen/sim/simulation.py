@@ -88,25 +88,18 @@ class Simulation:
 
     def step(self, ticks: int) -> None:
         """Let `ticks` ticks pass."""
-        scene, until, firmware = self._scene, self._scene.tick + ticks, self._firmware
-        calm = self._calm_until(ticks)
+        scene, until, calm = self._scene, self._scene.tick + ticks, -1
         plain = not (scene.floor or scene.presses or self._attends)
         while scene.tick < until:
+            if scene.tick >= calm:
+                calm = self._calm_until(ticks)
             if plain and scene.tick < calm:
-                tick, calm_until = scene.tick, min(until, calm)
-                while tick < calm_until:
-                    if tick % firmware == 0:
-                        scene.tick = tick
-                        for robot in self._each:
-                            robot.advance()
-                    pybullet.stepSimulation(scene.client)
-                    tick += 1
-                scene.tick = tick
+                self._step_calmly(min(until, calm))
                 continue
             if self._attends is not None and scene.tick % self._attends[0] == 0:
                 self._attends[1]()
             if scene.tick % self._firmware == 0:
-                for robot in self.robots.values():
+                for robot in self._each:
                     robot.advance()
             if scene.floor:
                 scene.hold()
@@ -117,20 +110,41 @@ class Simulation:
                 scene.tick += 1
             else:
                 self._careful_step()
-                calm = self._calm_until(ticks)
+
+    def _step_calmly(self, until: int) -> None:
+        scene, tick = self._scene, self._scene.tick
+        while tick < until:
+            if tick % self._firmware == 0:
+                scene.tick = tick
+                for robot in self._each:
+                    robot.advance()
+            pybullet.stepSimulation(scene.client)
+            tick += 1
+        scene.tick = tick
 
     def _calm_until(self, ticks: int) -> int:
         """The tick until which no step counts; -1 where each does, as where something pushes something.
 
         For so many ticks, the walls stand that what is loose may come to meanwhile.
         """
-        if self._scene.actors.loose and not self._scene.walls.complete:
+        actors = self._scene.actors
+        if actors.loose and not self._scene.walls.complete:
             self._put_up_walls(ticks)
-        return -1 if self._scene.actors.pushing else min([robot.calm_until for robot in self._each])
+        calm = min([robot.calm_until for robot in self._each])
+        return min(calm, actors.apart_until(self._scene.tick, self._fastest)) if actors.loose else calm
+
+    def _fastest(self) -> float:
+        return max([robot.clearance.own_speed() for robot in self._each])
 
     def _careful_step(self) -> None:
         """A step in which something might touch something; scripted bodies need to be in place only here."""
         scene = self._scene
+        if scene.tick < min([robot.calm_until for robot in self._each]):  # only things may touch each other
+            scene.actors.begin(scene.tick, everything=False)
+            pybullet.stepSimulation(scene.client)
+            scene.tick += 1
+            scene.actors.show(scene.tick, everything=False)
+            return
         scene.actors.begin(scene.tick)
         motions = {robot.base.id: robot.look() for robot in self.robots.values()}
         if not scene.walls.complete:

@@ -97,3 +97,75 @@ def test_what_is_put_onto_something_asleep_wakes_it(simulate):
     run(simulation, 240)
     assert simulation.object_pose("crate") != Pose3(2.0)
     assert simulation.object_pose("anvil").z < 0.35
+
+
+FAR_CART = Body("far cart", CRATE, Pose3(-8.0), path=MotionPath((0.0, 60.0), (Pose2(-8, 0), Pose2(-8, 6))))
+
+
+def test_what_lies_sleeps_though_a_script_moves_something_elsewhere(simulate):
+    simulation = simulate(bodies=[Body("crate", CRATE, Pose3(2.0), 5.0), FAR_CART])
+    run(simulation, LONG)
+    before = engine_pose(simulation, "crate")
+    run(simulation, 20 * 240)
+    assert engine_pose(simulation, "crate") == before
+    assert simulation.object_pose("far cart").y == pytest.approx(2.5)
+
+
+@pytest.mark.parametrize("start", [0.0, 8.0])
+def test_a_cart_that_comes_from_afar_pushes_what_sleeps(simulate, start):
+    """Also one that stood beside it all the while."""
+    begin = Pose2(2.58 if start else -1.0, 3.0)
+    path = MotionPath((0.0, 8.0), (begin, Pose2(4.0, 3.0)), start=start)
+    cart = Body("cart", CRATE, Pose3(*path.poses[0][:2]), path=path)
+    simulation = simulate(bodies=[Body("crate", CRATE, Pose3(3.0, 3.0), 3.0), cart, FAR_CART])
+    run(simulation, round((start + 8.5) * 240))
+    slides = (4.0 - begin.x) ** 2 / 8.0**2 / (2 * 0.6 * 9.81)
+    assert simulation.object_pose("crate").x == pytest.approx(4.4 + slides, abs=0.01)
+
+
+def test_a_whole_stack_that_is_pushed_at_its_bottom_moves(simulate):
+    cart = Body("cart", CRATE, Pose3(-1.0), path=MotionPath((0.0, 20.0), (Pose2(-1, 3), Pose2(4, 3))))
+    stack = [Body(f"crate{k}", CRATE, Pose3(3.0, 3.0, 0.4 * k), 3.0) for k in range(3)]
+    simulation = simulate(bodies=[*stack, cart])
+    run(simulation, 22 * 240)
+    assert [simulation.object_pose(f"crate{k}").x for k in range(3)] == pytest.approx([4.4] * 3, abs=0.05)
+
+
+def test_what_is_pushed_by_something_that_is_pushed_moves(simulate):
+    cart = Body("cart", CRATE, Pose3(-1.0), path=MotionPath((0.0, 20.0), (Pose2(-1, 3), Pose2(4, 3))))
+    row = [Body(f"crate{k}", CRATE, Pose3(3.0 + 0.5 * k, 3.0), 3.0) for k in range(3)]
+    simulation = simulate(bodies=[*row, cart])
+    run(simulation, 22 * 240)
+    assert [simulation.object_pose(f"crate{k}").x for k in range(3)] == pytest.approx([4.4, 4.8, 5.2], abs=0.03)
+
+
+def test_what_lies_on_something_that_a_script_takes_away_falls(simulate):
+    """A drawer that is pulled out after everything has gone to sleep, faster than what lies on it could follow."""
+    path = MotionPath((0.0, 0.1), (Pose2(2.0, 3.0), Pose2(4.0, 3.0)), start=6.0)
+    drawer = Body("drawer", CRATE, Pose3(2.0, 3.0), path=path)
+    simulation = simulate(bodies=[Body("crate", CRATE, Pose3(2.0, 3.0, 0.4), 2.0), drawer, FAR_CART])
+    run(simulation, 5 * 240)
+    assert simulation.object_pose("crate").z == pytest.approx(0.4, abs=2e-3)
+    run(simulation, 3 * 240)
+    assert simulation.object_pose("crate").z == pytest.approx(0.0, abs=5e-3)
+
+
+def test_what_lies_where_a_script_puts_something_down_gives_way(simulate):
+    """A path that jumps: nothing comes along on the way there."""
+    path = MotionPath((0.0, 1.0, 1.0, 2.0), (Pose2(-6, 3), Pose2(-6, 3), Pose2(2.3, 3), Pose2(2.3, 3)), start=6.0)
+    simulation = simulate(
+        bodies=[Body("crate", CRATE, Pose3(2.0, 3.0), 2.0), Body("cart", CRATE, Pose3(-6, 3), path=path)]
+    )
+    run(simulation, 10 * 240)
+    assert simulation.object_pose("crate").x < 1.95
+
+
+def test_a_ball_rolls_through_where_a_cart_has_been(simulate):
+    """The engine has the cart where it is, not where it was when somebody last came near."""
+    path = MotionPath((0.0, 4.0, 8.0, 9.0), (Pose2(3, 3), Pose2(3, 9), Pose2(3, 9), Pose2(3, 9)))
+    ball = Body("ball", BALL, Pose3(1.0, 3.0), 1.0)
+    simulation = simulate(bodies=[ball, Body("cart", CRATE, Pose3(3.0, 3.0), path=path)])
+    run(simulation, 4 * 240)
+    simulation.push_object("ball", (1.0, 0.0))
+    run(simulation, 4 * 240)
+    assert engine_pose(simulation, "ball")[0] > 3.5
