@@ -29,7 +29,7 @@ from simscen.run.process.whereabouts import settle_in
 from simscen.run.process.worker import Progress
 from simscen.run.process.zygote import Zygote
 from simscen.run.scenery import scenery_of
-from simscen.sim.engine import make_ahead
+from simscen.sim.clients import CLIENTS
 
 _PREPARED = PreparedCache(KeptWorlds(KeptFiles(cache_folder(os.environ))))
 Image.preinit()  # imports what it would import when the first picture is written
@@ -54,7 +54,7 @@ def _warm_up(job: Job) -> None:
     import_components(prepared)
     work_out_ahead(prepared)
     log_header(prepared, job.key.seed)
-    make_ahead()
+    CLIENTS.make_ahead()
 
 
 def _memory() -> int:

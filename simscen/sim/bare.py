@@ -9,6 +9,7 @@ import pybullet
 from simscen.core.geometry import Pose2
 from simscen.core.shapes import Solid, TriangleMesh
 from simscen.sim import engine
+from simscen.sim.clients import Clients
 from simscen.sim.robot_body import RobotBody
 from simscen.sim.vehicle import Vehicle
 
@@ -22,7 +23,8 @@ class BareWorld:
     def __init__(
         self, static: TriangleMesh | Sequence[Solid], robot: RobotBody, pose: Pose2, triangulate: engine.Triangulate
     ) -> None:
-        self._client = engine.connect(240, 10)
+        self._client = Clients().take()  # one of its own, which nobody has used
+        engine.set_up(self._client, 240, 10)
         if isinstance(static, TriangleMesh):
             engine.static_mesh(self._client, static)
         else:

@@ -37,23 +37,11 @@ Frame = tuple[tuple[float, float, float], Pose3]
 Faces = npt.NDArray[np.int32]
 
 
-_AHEAD: list[int] = []
-"""Clients with nothing in them but the ground, which nobody has used yet."""
+def set_up(client: int, tick_rate: int, solver_iterations: int, one_by_one: bool = False) -> None:
+    """Set every parameter, so that no default decides a trajectory.
 
-
-def make_ahead() -> None:
-    """Make now what the next `connect` gives, if it is not there: 37 MB that forks of this process need not touch."""
-    if not _AHEAD:
-        _AHEAD.append(_blank())
-
-
-def connect(tick_rate: int, solver_iterations: int, one_by_one: bool = False) -> int:
-    """A fresh engine without graphics, with nothing but the plane z = 0.
-
-    Every parameter is set, so that no default decides a trajectory. `one_by_one`: what touches nothing in common is
-    solved apart, so that it does not matter what else is in the world.
+    `one_by_one`: what touches nothing in common is solved apart, so that it does not matter what else is in the world.
     """
-    client = _AHEAD.pop() if _AHEAD else _blank()
     pybullet.setPhysicsEngineParameter(
         fixedTimeStep=1 / tick_rate,
         numSolverIterations=solver_iterations,
@@ -81,16 +69,6 @@ def connect(tick_rate: int, solver_iterations: int, one_by_one: bool = False) ->
         physicsClientId=client,
     )
     pybullet.setGravity(0, 0, -GRAVITY, physicsClientId=client)
-    return client
-
-
-def _blank() -> int:
-    client: int = pybullet.connect(pybullet.DIRECT)
-    if client < 0:
-        raise RuntimeError("PyBullet has no free client left")
-    plane = fixed(client, pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client))
-    touch(client, plane, -1, GROUND, EVERYTHING)
-    return client
 
 
 def touch(client: int, body: int, link: int, group: int, others: int) -> None:

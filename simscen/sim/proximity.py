@@ -19,6 +19,7 @@ from simscen.core.geometry import Array, Pose3
 from simscen.core.shapes import TriangleMesh
 from simscen.core.terrain import FLOOR
 from simscen.sim import engine, outline
+from simscen.sim.clients import CLIENTS
 from simscen.sim.enclosure import winds_around
 from simscen.sim.parts import parts_of
 from simscen.sim.robot_body import RobotBody
@@ -33,7 +34,7 @@ class Proximity:
     """The solids of a static world, as seen from one robot. `reach` is how far it looks, in metres."""
 
     def __init__(self, static: TriangleMesh, robot: RobotBody, reach: float) -> None:
-        self._client = pybullet.connect(pybullet.DIRECT)
+        self._client = CLIENTS.take()
         self._mesh, self._reach = static, reach
         self._radius, self._height = outline.reach(robot.solid)
         self._hull = [engine.fixed(self._client, shape) for shape in engine.hull_shapes(self._client, robot.solid)]
@@ -154,7 +155,7 @@ class Proximity:
 
     def close(self) -> None:
         """Give the engine back."""
-        pybullet.disconnect(self._client)
+        CLIENTS.give_back(self._client)
 
 
 def _motion(before: Pose3, after: Pose3, radius: float, height: float) -> float:

@@ -14,6 +14,7 @@ from simscen.core.shapes import Body, MotionPath, TriangleMesh
 from simscen.core.surface import Patch
 from simscen.sim import engine
 from simscen.sim.actors import Actors
+from simscen.sim.clients import CLIENTS
 from simscen.sim.contacts import Before
 from simscen.sim.film import Film
 from simscen.sim.robot import Robot, Scene
@@ -57,7 +58,8 @@ class Simulation:
         within `clearance_range` metres of a hull. `triangulate` gives the surface of a shape, for moving things that
         the engine has no primitive for.
         """
-        client = engine.connect(tick_rate, solver_iterations, one_by_one=len(robots) > 1)
+        client = CLIENTS.take()
+        engine.set_up(client, tick_rate, solver_iterations, one_by_one=len(robots) > 1)
         terrain = Terrain(client, static, max((w.radius for r in robots.values() for w in r.body.wheels), default=0.0))
         walls = Walls(client, terrain.rest)
         film, actors = Film(client, static, triangulate), Actors(client, tick_rate, triangulate)
@@ -235,4 +237,4 @@ class Simulation:
         """Give the engine back."""
         for robot in self.robots.values():
             robot.close()
-        pybullet.disconnect(self._scene.client)
+        CLIENTS.give_back(self._scene.client)

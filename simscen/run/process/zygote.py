@@ -1,8 +1,8 @@
 """The warm process: it has its imports done and its worlds built, and forks one process for each run.
 
-It never creates an OMPL object, and of Bullet one client with nothing but the ground in it, which it never steps: every
-fork starts from the same blank state. It speaks with the supervisor over two pipes: jobs come in pickled, one line of
-JSON goes back for each thing that happens.
+It never creates an OMPL object, and of Bullet two clients with nothing but the ground in them, which it never steps:
+every fork starts from the same blank state. It speaks with the supervisor over two pipes: jobs come in pickled, one
+line of JSON goes back for each thing that happens.
 """
 
 import contextlib
