@@ -9,8 +9,9 @@ from simscen.model.localizers import Amcl
 from simscen.model.recovery import Recovery
 from simscen.model.stack import StackSpec
 from simscen.run.prepare import Prepared
-from simscen.sim.walls import ready
+from simscen.sim import walls
 from simscen.spec.component import Component
+from simscen.worlds import rays
 
 
 def import_components(prepared: Prepared) -> None:
@@ -24,9 +25,10 @@ def work_out_ahead(prepared: Prepared) -> None:
     """What each of its runs would need of the world and of the map: 0.6 s for a map of 100 x 100 m."""
     from simscen.stack.localizers.build import matching
 
-    ready(prepared.built.mesh)
+    rays.ready(prepared.built.mesh)
+    walls.ready(prepared.built.mesh)
     for part in prepared.each.values():
-        ready(part.obstacles)
+        walls.ready(part.obstacles)
         if part.map is not None and isinstance(part.stack, StackSpec) and isinstance(part.stack.localizer, Amcl):
             matching(part.map.refined(part.stack.costmap.resolution), part.stack.localizer).ready()
 

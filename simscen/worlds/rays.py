@@ -11,13 +11,20 @@ from embreex.mesh_construction import TriangleMesh as EmbreeMesh
 from embreex.rtcore import EmbreeDevice
 from embreex.rtcore_scene import EmbreeScene
 
+from simscen.core.facelots import FaceLots, lots_of
+from simscen.core.facemesh import compact
 from simscen.core.geometry import Array, Pose3, Vector, rotated
-from simscen.core.shapes import TriangleMesh
+from simscen.core.remembered import remembered
+from simscen.core.shapes import Mesh, TriangleMesh
 
 Singles = npt.NDArray[np.float32]
 Indices = npt.NDArray[np.int32]
 Placed = tuple[TriangleMesh, Pose3]
 
+FEW = 20_000
+"""Triangles of a world that is taken as a whole, in 25 ms."""
+EDGE, AHEAD = 8.0, 8.0
+"""m of the squares that others are taken in, and beyond the reach of rays within which they are."""
 _NO_HIT = np.float32(1e30)
 """Embree answers 1e37 for a ray that meets nothing."""
 
@@ -34,7 +41,11 @@ class RayScene:
     def __init__(self, static: "TriangleMesh | RayScene") -> None:
         """Of a world; or of that of another scene, which is then built once for both."""
         self._device: EmbreeDevice = static._device if isinstance(static, RayScene) else EmbreeDevice()
-        self._static: _Part = static._static if isinstance(static, RayScene) else _Part(self._device, static)
+        if isinstance(static, RayScene):
+            world = static._static
+            self._static: _Part | _Window = _Window(self._device, world.mesh) if isinstance(world, _Window) else world
+        else:
+            self._static = (_Window if len(static.faces) > FEW else _Part)(self._device, static)
         self._parts: dict[int, _Part] = {}
         self._bodies: Mapping[str, Placed] = {}
         self._movers: dict[str, _Mover] = {}
@@ -49,7 +60,10 @@ class RayScene:
 
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
         """See core.rays.RayCaster."""
-        distances, limit = self._static.distances(origins, directions), min(reach, _NO_HIT)
+        static = self._static
+        if isinstance(static, _Window):
+            static = static.around(origins, reach)
+        distances, limit = static.distances(origins, directions), min(reach, _NO_HIT)
         if self._bodies and len(origins):
             for mover, rays in self._met(origins, directions, np.minimum(distances, reach)):
                 distances[rays] = np.minimum(distances[rays], mover.distances(origins[rays], directions[rays]))
@@ -115,8 +129,9 @@ class _Part:
     `extent` is how far it may be from the origin of its frame.
     """
 
-    def __init__(self, device: EmbreeDevice, mesh: TriangleMesh) -> None:
-        self.mesh, self.middle = mesh, _middle(mesh.vertices)
+    def __init__(self, device: EmbreeDevice, mesh: TriangleMesh | Mesh, middle: Array | None = None) -> None:
+        """About a `middle` of something larger, if that is given."""
+        self.middle = _middle(mesh.vertices) if middle is None else middle
         x, y, z = self.middle.tolist()
         self.centre = (x, y, z)
         corners = mesh.vertices - self.middle
@@ -139,6 +154,33 @@ class _Part:
         along = np.ascontiguousarray(directions, dtype=np.float32)
         answer: Singles = self._scene.run(starts, along, query="DISTANCE")
         return answer
+
+
+class _Window:
+    """The world of a mesh about the place that rays were last cast from: of a large one most is out of their reach.
+
+    Embree takes a microsecond for each triangle, and some 200 bytes. Those around are where all of them would be.
+    """
+
+    def __init__(self, device: EmbreeDevice, mesh: TriangleMesh) -> None:
+        self.mesh = mesh
+        self._device, self._middle = device, _middle_of(mesh)
+        self._part: _Part | None = None
+        self._place, self._far = (0.0, 0.0), 0.0
+
+    def around(self, origins: Array, reach: float) -> _Part:
+        """A scene that holds all that rays from the origins (n, 3) may meet within their reach."""
+        x, y = origins[0, :2].tolist() if len(origins) else self._place
+        if len(origins) and origins.strides[0]:
+            reach += float(np.abs(origins[:, :2] - origins[0, :2]).max())
+        away = max(abs(x - self._place[0]), abs(y - self._place[1]))
+        if self._part is None or away + reach > self._far:
+            self._place, self._far = (x, y), reach + AHEAD
+            lots = _lots_of(self.mesh)
+            near = np.flatnonzero(lots.near(x, y, self._far)).tolist()
+            faces = np.concatenate([np.empty((0, 3), np.int32), *(lots.lot(number) for number in near)])
+            self._part = _Part(self._device, compact(self.mesh.vertices, faces), self._middle)
+        return self._part
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,3 +211,20 @@ def _middle(vertices: Array) -> Array:
         return np.zeros(3)
     middle: Array = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
     return middle
+
+
+def ready(mesh: TriangleMesh) -> None:
+    """Work out now what scenes of a world need to know of it."""
+    if len(mesh.faces) > FEW:
+        _middle_of(mesh)
+        _lots_of(mesh)
+
+
+@remembered
+def _middle_of(mesh: TriangleMesh) -> Array:
+    return _middle(mesh.vertices)
+
+
+@remembered
+def _lots_of(mesh: TriangleMesh) -> FaceLots:
+    return lots_of(mesh.vertices, mesh.faces, EDGE)

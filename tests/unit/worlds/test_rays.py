@@ -6,8 +6,9 @@ import numpy as np
 import pybullet
 import pytest
 
-from simscen.core.geometry import Pose3
+from simscen.core.geometry import Pose2, Pose3
 from simscen.core.shapes import Box, Cylinder, Extrusion, Solid, Sphere, TriangleMesh
+from simscen.worlds import rays
 from simscen.worlds.meshing import fuse
 from simscen.worlds.rays import RayScene
 
@@ -137,6 +138,22 @@ def test_many_bodies_are_seen_as_if_they_were_one_world():
     apart.set_moving({f"box {k}": (box, pose) for k, pose in enumerate(places)})
     origins, directions = random_rays(5000, 7, (-10, -10, 0.05), (10, 10, 1.9))
     assert_agree(apart.cast(origins, directions), together.cast(origins, directions))
+
+
+def test_of_a_large_world_what_is_in_reach_is_where_all_of_it_would_be_to_the_last_bit(monkeypatch):
+    chance = np.random.default_rng(8)
+    places = chance.uniform((-60, -60, 0), (60, 60, 3), (1500, 3)).tolist()
+    mesh = fuse([Solid(Box((0.7, 0.3, 0.9)), Pose3.planar(Pose2(*place), 0.45)) for place in places])
+    whole = RayScene(mesh)
+    monkeypatch.setattr(rays, "FEW", 0)
+    near = RayScene(RayScene(mesh))
+    for x in (-70.0, -58.0, -20.0, -19.0, 0.0, 45.0, -20.0):
+        origins, directions = around(360, (x, 0.3 * x, 0.3))
+        for reach in (4.0, 12.0, 25.0):
+            assert np.array_equal(near.cast(origins, directions, reach), whole.cast(origins, directions, reach))
+    origins, directions = random_rays(500, 9, (-60, -60, 0.1), (60, 60, 0.8))
+    assert np.array_equal(near.cast(origins, directions, 5.0), whole.cast(origins, directions, 5.0))
+    assert np.array_equal(near.cast(origins, directions), whole.cast(origins, directions))
 
 
 COLLECTED = """
