@@ -138,8 +138,8 @@ class ReferenceStack:
     def _take(self, tick: int, readings: Readings) -> bool:
         """Hand the readings on; whether there was a scan among them."""
         scans: list[Scan] = []
-        if tick >= self._matched.due:
-            self._match(tick)
+        while tick >= self._matched.due:  # the localizer is done with these scans by now, and knows what they are worth
+            self._localizer.on_scan(self._matched.take())
         for reading in readings:
             match reading:
                 case Odometry():
@@ -149,25 +149,25 @@ class ReferenceStack:
                     self._localizer.on_imu(reading)
                     self._prediction.take(reading)
                 case Scan():
-                    if reading.sensor in self._lidars:  # echoes of a sonar show obstacles, but no walls to match
-                        self._matched.put(tick, reading)
-                        self._match(tick)
                     scans.append(reading)
                 case Image() if reading.field_of_view > 0.0:
                     self._costmaps.see(reading)
                 case _:
                     pass
         for scan in scans:  # after all odometry of this beat, wherever that stands among the readings
-            self._prediction.on_scan(scan)
-            marking = self._prediction.marking(scan)
-            self._monitor.on_scan(marking, self._odometry.held(scan.tick))
-            self._costmaps.see(marking)
+            self._look(tick, scan)
         return bool(scans)
 
-    def _match(self, tick: int) -> None:
-        """The localizer is done with these scans by now: so much later it knows what they are worth."""
-        while tick >= self._matched.due:
-            self._localizer.on_scan(self._matched.take())
+    def _look(self, tick: int, scan: Scan) -> None:
+        """Hand a scan on."""
+        if scan.sensor in self._lidars:  # echoes of a sonar show obstacles, but no walls to match
+            self._matched.put(tick, scan)
+            while tick >= self._matched.due:
+                self._localizer.on_scan(self._matched.take())
+        self._prediction.on_scan(scan)
+        marking = self._prediction.marking(scan)
+        self._monitor.on_scan(marking, self._odometry.held(scan.tick))
+        self._costmaps.see(marking)
 
     def _dead_reckon(self, reading: Odometry) -> None:
         """Remember the way the robot took; the truth only stands in for wheels where there are none."""
