@@ -70,4 +70,5 @@ class OdometryHistory:
 
     def then(self, now: Pose2, tick: int) -> Pose2:
         """Where a robot that is at `now` was at `tick`, in whatever frame `now` is given; held, not interpolated."""
-        return now.compose(self.now.between(self.held(tick)))
+        held = self.held(tick)
+        return now if held is self.now else now.compose(self.now.between(held))

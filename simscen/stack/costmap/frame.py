@@ -10,6 +10,7 @@ from simscen.core.geometry import Array
 from simscen.stack.localizers.beams import Plane
 
 Cells = npt.NDArray[np.int64]
+_least, _most = np.minimum.reduce, np.maximum.reduce
 Numbers = npt.NDArray[np.int64]
 """Cells (n,) by number: row by row, from cell (0, 0) on."""
 
@@ -62,9 +63,9 @@ class Frame:
 
     def extent(self, numbers: Numbers) -> tuple[tuple[int, int], tuple[int, int]]:
         """The lowest and the highest row and column of cells, of which there is one."""
-        columns = numbers % self.shape[1]
-        top, bottom = int(numbers.min()) // self.shape[1], int(numbers.max()) // self.shape[1]
-        return (top, int(columns.min())), (bottom, int(columns.max()))
+        width = self.shape[1]
+        first, last, columns = int(_least(numbers)), int(_most(numbers)), numbers % width
+        return (first // width, int(_least(columns))), (last // width, int(_most(columns)))
 
     def covers(self, x: float, y: float) -> bool:
         """Whether the point lies on the grid."""

@@ -91,9 +91,11 @@ class LiveLayer:
                 scanned[under] = False  # Nav2's footprint_clearing_enabled, for the inscribed circle
                 kept = scanned.take(marks)
                 lost, marks = marks[~kept], marks[kept]
-        scanned[fresh] = True
-        self._marks = np.concatenate((marks, fresh)) if len(fresh) else marks
-        return np.concatenate((lost, fresh))
+        if len(fresh):
+            scanned[fresh] = True
+            marks = np.concatenate((marks, fresh))
+        self._marks = marks
+        return np.concatenate((lost, fresh)) if len(lost) else fresh
 
     def on_image(self, base: Pose2, image: Image, walls: Squared) -> Cells:
         """Clear what the camera sees through, then mark what it sees; returns the cells that may have changed."""

@@ -1,5 +1,6 @@
 """Components that packages add: chosen by `type`, built by one door, and named where they break."""
 
+import math
 import pickle
 import subprocess
 import sys
@@ -12,11 +13,13 @@ from simscen.cli.jsonschema import as_text, schema_of
 from simscen.core.chance import Streams
 from simscen.core.errors import InvalidInput, RunError
 from simscen.core.geometry import Pose2
+from simscen.core.motion import Twist
 from simscen.core.navigation import ErrorCode, Goal
 from simscen.core.time import Clock
 from simscen.loading.scenario import load_scenario
 from simscen.model.stack import StackSpec
 from simscen.stack.build import build_stack
+from simscen.stack.controllers.regulated_pure_pursuit import RegulatedPurePursuit
 from simscen.stack.protocols import NavigationFailure
 from simscen.testing.flatland import RATE, Drive, Flatland, drive, round_robot
 
@@ -297,6 +300,22 @@ def test_every_role_is_named_where_it_breaks(odd, stack: dict, told: str) -> Non
     with pytest.raises(RunError) as broken:
         driven(**stack).run(1)
     assert broken.value.kind == "broken-component"
+    assert told in str(broken.value)
+
+
+@pytest.mark.parametrize(
+    ("command", "kind", "told"),
+    [
+        (lambda *asked: Twist(math.nan), "broken-component", "which is no velocity"),
+        (lambda *asked: 1 / 0, "crashed", "ZeroDivisionError: division by zero (navigator.py:"),
+    ],
+)
+def test_what_ships_is_looked_at_in_what_the_stack_decides(monkeypatch, command, kind: str, told: str) -> None:
+    monkeypatch.setattr(RegulatedPurePursuit, "command", command)
+    with pytest.raises(RunError) as broken:
+        driven().run(1)
+    assert broken.value.kind == kind
+    assert str(broken.value).startswith("stack `reference` (simscen.stack.build:reference_stack)")
     assert told in str(broken.value)
 
 
