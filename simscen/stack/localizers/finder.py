@@ -30,6 +30,10 @@ NEAR_GOOD, NEAR_BETTER = 0.82, 0.04
 """It is moved to a place nearby that fits so, so much better than where it is, and by PLAIN better than any other."""
 AGREE = 0.7, 0.3
 """m, rad: two searches agree that find places so near to each other, the way between them taken off."""
+ASTRAY, BACK_GOOD, BACK_PLAIN = 20, 0.9, 0.1
+"""So many scans that correct without a beam that the map could tell anything of, and a robot is sought on the map, too:
+what it saw since says it is back if it fits so, and by so much better than anywhere else, in two searches that agree.
+Rooms that nobody mapped often look like one that somebody did, though less than that."""
 SHARPNESS = 0.02
 """Of two places that fit so much better or worse, the better gets e times as many particles."""
 AROUND = (0.1, 0.1, 0.05)
@@ -51,6 +55,7 @@ class Finder:
         self._wait, self._driven, self._unchecked, self._doubted = 0.0, 0.0, 0.0, False
         self._last: Pose2 | None = None
         self._suspected: tuple[Pose2, Pose2] | None = None
+        self._astray = 0
 
     def places(
         self, scan: Scan, base: Pose2, believed: Pose2, limits: tuple[float, float]
@@ -69,9 +74,10 @@ class Finder:
         here = np.array([believed])
         if (fit := self._trust.fit(here, ends, TELLING)) is not None:
             self._fits.append(fit)
+        self._astray = self._astray + 1 if fit is None else 0
         if self._known and (near := self._nearby(base, here)) is not None:
             return near
-        if self._known and not self._in_doubt():
+        if self._known and not (self._in_doubt() or self._astray >= ASTRAY):
             return None
         if self._driven < self._wait:
             return None
@@ -106,20 +112,23 @@ class Finder:
         waited, self._wait, self._driven = self._wait, BETWEEN, 0.0
         if not len(poses):
             return None
-        plain = len(fits) == 1 or fits[0] - fits[1] > PLAIN
+        good, clear = (BACK_GOOD, BACK_PLAIN) if self._astray >= ASTRAY else (GOOD, PLAIN)
+        plain = len(fits) == 1 or fits[0] - fits[1] > clear
         if not self._known:
             self._known = plain and self._memory.length >= ENOUGH
             shares = np.exp((fits - fits[0]) / SHARPNESS)
             return poses, shares / shares.sum()
-        if plain and fits[0] > GOOD and fits[0] > self._search.fit(here, view)[0] + BETTER:
+        if plain and fits[0] > good and fits[0] > self._search.fit(here, view)[0] + BETTER:
             found = Pose2(*poses[0].tolist())
             agreed = self._suspected is not None and _agree(*self._suspected, found, base)
             self._suspected = None if agreed else (found, base)
             if agreed:
                 self._fits.clear()
+                self._astray = 0
                 return poses[:1], np.ones(1)
         else:
-            self._suspected, self._wait = None, min(MOST_BETWEEN, 2 * max(waited, BETWEEN))
+            more = MOST_BETWEEN if self._astray >= ASTRAY else 2 * max(waited, BETWEEN)
+            self._suspected, self._wait = None, min(MOST_BETWEEN, more)
         return None
 
 

@@ -15,11 +15,11 @@ START = Pose2(-2.5, -1.8, 0.6)
 OFF = Pose2(0.4, -0.3, 0.15)
 
 
-def found(off: Pose2) -> list[Array]:
-    """Where a robot is put that drives 2 m and believes to be `off`."""
+def found(off: Pose2, apart: float = 0.25) -> list[Array]:
+    """Where a robot is put that drives 2 m, with a scan each so many, and believes to be `off`."""
     trust = MapTrust(obstacle_field(grid(), 2.0), beyond_the_map(grid()).ravel(), 0.45, 0.8)
     finder, places = Finder(GlobalSearch(grid()), trust, known=True), []
-    for way in np.arange(0.0, 2.0, 0.25).tolist():
+    for way in np.arange(0.0, 2.0, apart).tolist():
         base = Pose2(way, 0.0, 0.0)
         pose = START.compose(base)
         ranges = cast(np.array([pose]), -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS))[0]
@@ -38,3 +38,9 @@ def test_a_robot_that_is_half_a_metre_off_is_put_where_its_last_metres_fit() -> 
 @pytest.mark.parametrize("off", [Pose2(0, 0, 0), Pose2(0.05, -0.05, 0.02)])
 def test_a_robot_that_knows_its_place_is_left_there(off: Pose2) -> None:
     assert found(off) == []
+
+
+def test_a_robot_that_believes_to_be_off_the_map_is_found_when_it_is_back() -> None:
+    (place,) = found(Pose2(40.0, 3.0, 0.7), apart=0.05)
+    assert np.hypot(place[0], place[1]) < 0.1
+    assert abs(place[2]) < 0.03
