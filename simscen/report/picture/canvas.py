@@ -62,25 +62,26 @@ class Canvas:
     What is drawn with `part` is on the list of `parts`; with `busy`, labels keep off it.
     """
 
-    def __init__(self, bounds: Bounds, scale: float, background: Colour) -> None:
+    def __init__(self, bounds: Bounds, scale: float, background: Colour | None) -> None:
+        """Without a `background`, an image has to be laid before anything is drawn."""
         self.bounds, self.scale = bounds, scale
         x0, y0, x1, y1 = bounds
         self.width, self.height = max(1, math.ceil((x1 - x0) * scale)), max(1, math.ceil((y1 - y0) * scale))
-        self._image = Image.new("RGB", (self.width * SAMPLES, self.height * SAMPLES), background)
-        self._draw = ImageDraw.Draw(self._image, "RGBA")
+        if background is not None:
+            self.lay(Image.new("RGB", self.samples, background))
         self._busy = Image.new("L", (-(-self.width // COARSE), -(-self.height // COARSE)), 0)
         self._keep_off = ImageDraw.Draw(self._busy)
         self.notes: list[Note] = []
         self.parts: list[Part] = []
 
-    def paste(self, image: Image.Image) -> None:
-        """Put an image of the whole canvas, supersampled, under everything drawn later."""
-        self._image.paste(image, (0, 0))
+    def lay(self, image: Image.Image) -> None:
+        """Draw from now on upon this image, which is as large as the whole canvas, supersampled: nobody copies it."""
+        self._image, self._draw = image, ImageDraw.Draw(image, "RGBA")
 
     @property
     def samples(self) -> tuple[int, int]:
         """Width and height of the supersampled image."""
-        return self._image.size
+        return self.width * SAMPLES, self.height * SAMPLES
 
     @property
     def busy(self) -> Array:

@@ -66,7 +66,7 @@ def write_picture(scene: Scene, path: Path) -> None:
 
 def _map(scene: Scene) -> Canvas:
     bounds = ground.extent(scene.map, _shown(scene))
-    canvas = Canvas(bounds, _scale(bounds), palette.UNKNOWN)
+    canvas = Canvas(bounds, _scale(bounds), None)
     ground.lay(canvas, scene.map)
     grid.draw_grid(canvas)
     labels = [label for draw_all in _OF_ALL for label in draw_all(canvas, scene)]

@@ -1,5 +1,7 @@
 """The map under a picture, and which part of it is worth showing."""
 
+from functools import cache
+
 import numpy as np
 import numpy.typing as npt
 from PIL import Image
@@ -34,7 +36,7 @@ def lay(canvas: Canvas, grid: OccupancyGrid) -> None:
     corners = np.array([[x0, y1], [x0 + per_pixel, y1], [x0, y1 - per_pixel]])
     at, right, down = grid.origin.inverse().apply(corners) / resolution
     affine = (right[0] - at[0], down[0] - at[0], at[0], right[1] - at[1], down[1] - at[1], at[1])
-    canvas.paste(
+    canvas.lay(
         image.transform(canvas.samples, Image.Transform.AFFINE, tuple(map(float, affine)), fillcolor=palette.UNKNOWN)
     )
 
@@ -44,12 +46,18 @@ def _coloured(grid: OccupancyGrid, pixel: float) -> tuple[Image.Image, float]:
     cells, merge = grid.cells, max(1, int(pixel / grid.resolution))
     if merge > 1:
         cells = _merged(cells, merge)
+    return Image.fromarray(_colours()[cells.view(np.uint8)]), grid.resolution * merge
+
+
+@cache
+def _colours() -> npt.NDArray[np.uint8]:
+    """The colour of each cost as an unsigned byte."""
     table = np.empty((256, 3), dtype=np.uint8)
     for value in range(256):
         share = min(value, OCCUPIED) / OCCUPIED
         table[value] = [round(f + share * (w - f)) for f, w in zip(palette.FREE, palette.WALL, strict=True)]
     table[np.uint8(UNKNOWN % 256)] = palette.UNKNOWN
-    return Image.fromarray(table[cells.view(np.uint8)]), grid.resolution * merge
+    return table
 
 
 def _merged(cells: npt.NDArray[np.int8], merge: int) -> npt.NDArray[np.int8]:
