@@ -7,6 +7,7 @@ Template, and each message is then packed in one call.
 import math
 import struct
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from itertools import groupby
 from typing import Any, NamedTuple
 
@@ -72,10 +73,11 @@ class Template:
 
     def packer(self) -> Callable[..., bytes]:
         """What packs a message: it takes the fields of the slots, in their order."""
-        return packer_of(self.parts)
+        return packer_of(tuple(self.parts))
 
 
-def packer_of(parts: "Sequence[bytes | Slot]") -> Callable[..., bytes]:
+@lru_cache(maxsize=256)
+def packer_of(parts: "tuple[bytes | Slot, ...]") -> Callable[..., bytes]:
     """What packs constants and fields into bytes: it takes the fields in the order in which they come first.
 
     It is made as Python's named tuples are, from text in which nothing but the names of fields varies: everything then

@@ -124,7 +124,7 @@ class _AtOnce(Together):
             self._places.append((channel, self._room))
             self._room += HEAD + len(message.buffer)
             self._chunk = channel.chunk
-        self._pack = packer_of(parts)
+        self._pack = packer_of(tuple(parts))
 
 
 class Namespaced:

@@ -43,7 +43,7 @@ def test_fields_that_are_called_alike_are_asked_for_once() -> None:
     one.slot("d", "value")
     other.slot("i", "count")
     other.slot("d", "value")
-    assert packer_of([*one.parts, *other.parts])(0.5, 7) == struct.pack("<di4xd", 0.5, 7, 0.5)
+    assert packer_of((*one.parts, *other.parts))(0.5, 7) == struct.pack("<di4xd", 0.5, 7, 0.5)
 
 
 def test_a_cursor_reads_what_a_template_wrote() -> None:
