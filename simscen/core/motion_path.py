@@ -3,7 +3,7 @@
 import math
 from bisect import bisect_right
 
-from simscen.core.geometry import Pose2, wrap
+from simscen.core.geometry import Pose2, Pose3, wrap
 from simscen.core.shapes import MotionPath
 
 FASTEST_EASED = 1.5
@@ -25,9 +25,46 @@ def pose_at(path: MotionPath, seconds: float) -> Pose2:
         return _on_curve(path, leg, part)
     if path.ease == "smooth":
         part = part * part * (3.0 - 2.0 * part)
-    (x, y, yaw), (to_x, to_y, to_yaw) = begin, end
-    heading = wrap(yaw) if to_yaw == yaw else wrap(yaw + part * wrap(to_yaw - yaw))
-    return Pose2(x + part * (to_x - x), y + part * (to_y - y), heading)
+    return Pose2(
+        begin.x + part * (end.x - begin.x),
+        begin.y + part * (end.y - begin.y),
+        wrap(begin.yaw + part * wrap(end.yaw - begin.yaw)),
+    )
+
+
+class Track:
+    """A path at a height `z`, asked at one time after the other: what is the same along a leg is worked out once."""
+
+    def __init__(self, path: MotionPath, z: float) -> None:
+        self._path, self._z = path, z
+        self._first, self._last = path.times[0], path.times[-1]
+        self._even = len(path.times) > 1 and path.ease == "linear"
+        self._begin, self._end = math.inf, -math.inf
+
+    def at(self, seconds: float) -> Pose3:
+        """`pose_at`, upright in space."""
+        path = self._path
+        if not self._even:
+            return Pose3.planar(pose_at(path, seconds), self._z)
+        local = min(max(_local(path, path.elapsed(seconds)), self._first), self._last)
+        if not self._begin <= local < self._end:
+            self._enter(local)
+        part = (local - self._begin) / self._lasts if self._lasts > 0 else 1.0
+        (x, y, yaw), dx, dy, turn = self._pose, self._dx, self._dy, self._turn
+        x, y = x + part * dx, y + part * dy
+        if turn:
+            return Pose3.planar(Pose2(x, y, wrap(yaw + part * turn)), self._z)
+        return Pose3(x, y, self._z, 0.0, 0.0, self._qz, self._qw)
+
+    def _enter(self, local: float) -> None:
+        path, last = self._path, len(self._path.times) - 1
+        leg = min(bisect_right(path.times, local), last) - 1
+        self._begin, end = path.times[leg], path.times[leg + 1]
+        self._lasts, self._end = end - self._begin, end if leg + 1 < last else math.inf
+        self._pose = begin = path.poses[leg]
+        to = path.poses[leg + 1]
+        self._dx, self._dy, self._turn = to.x - begin.x, to.y - begin.y, wrap(to.yaw - begin.yaw)
+        *_, self._qz, self._qw = Pose3.planar(Pose2(begin.x, begin.y, wrap(begin.yaw)))
 
 
 def top_speed(path: MotionPath, reach: float = 0.0) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 import pybullet
 
 from simscen.core.geometry import Pose2, Pose3, wrap
-from simscen.core.motion_path import pose_at, top_speed
+from simscen.core.motion_path import Track, top_speed
 from simscen.core.shapes import Body, Mesh, MotionPath
 from simscen.sim import engine
 from simscen.sim.enclosure import winds_around
@@ -52,6 +52,8 @@ class Actor:
     """Whether it has not moved at all since the engine was asked before."""
     led: bool = False
     """Whether it may be given another path at any time."""
+    track: Track | None = None
+    """Its path as it is asked for."""
     scripted: dict[int, Pose3] = field(default_factory=dict)
     """Where its path has it at the ticks that were asked for last."""
 
@@ -164,7 +166,7 @@ class Actors:
         """
         actor = self._actors[name]
         actor.path, actor.since, actor.speed = path, tick, speed
-        actor.led = True
+        actor.led, actor.track = True, None
         actor.scripted.clear()
         self._fastest = max(self._fastest, speed)
 
@@ -251,14 +253,17 @@ class Actors:
 
     def poses(self, tick: int) -> Mapping[str, Pose3]:
         """Where everything is, by name in order; the engine is asked at most once for each tick."""
-        if self._posed_at != tick:
-            self._posed_at = tick
-            if not self._asleep(tick):
-                self._poses = {name: self._pose(actor, tick) for name, actor in self._actors.items()}
-                if self._still_since is None or not all(actor.resting for actor in self._pushable):
-                    self._still_since = tick
-            elif self._travelling:
-                self._poses = {**self._poses, **{a.body.name: self._pose(a, tick) for a in self._travelling}}
+        if self._posed_at == tick:
+            return self._poses
+        if self._posed_at is None or (self._pushable and not self._asleep(tick)):
+            self._poses = {name: self._pose(actor, tick) for name, actor in self._actors.items()}
+            if self._still_since is None or not all(actor.resting for actor in self._pushable):
+                self._still_since = tick
+        elif self._travelling:
+            self._poses = poses = dict(self._poses)
+            for actor in self._travelling:
+                poses[actor.body.name] = self._pose(actor, tick)
+        self._posed_at = tick
         return self._poses
 
     def _asleep(self, tick: int) -> bool:
@@ -283,8 +288,9 @@ class Actors:
             if there is None:
                 if len(actor.scripted) > 1:
                     actor.scripted.clear()
-                there = Pose3.planar(pose_at(actor.path, (tick - actor.since) / self._rate), actor.body.pose.z)
-                actor.scripted[tick] = there
+                if actor.track is None:
+                    actor.track = Track(actor.path, actor.body.pose.z)
+                actor.scripted[tick] = there = actor.track.at((tick - actor.since) / self._rate)
             return there
         if not actor.body.mass > 0:
             actor.resting = True

@@ -1,9 +1,7 @@
 """Ray casting with Embree: one scene for what never moves, and one for each thing that does, in its own frame."""
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Mapping
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +17,7 @@ from simscen.core.shapes import Mesh, TriangleMesh
 
 Singles = npt.NDArray[np.float32]
 Indices = npt.NDArray[np.int32]
+Numbers = npt.NDArray[np.int64]
 Placed = tuple[TriangleMesh, Pose3]
 
 FEW = 20_000
@@ -48,7 +47,6 @@ class RayScene:
             self._static = (_Window if len(static.faces) > FEW else _Part)(self._device, static)
         self._parts: dict[int, _Part] = {}
         self._bodies: Mapping[str, Placed] = {}
-        self._movers: dict[str, _Mover] = {}
 
     def set_moving(self, bodies: Mapping[str, Placed]) -> None:
         """Say where the bodies are now: by name, the triangles in a body's frame and the pose of that frame."""
@@ -65,84 +63,71 @@ class RayScene:
             static = static.around(origins, reach)
         distances, limit = static.distances(origins, directions), min(reach, _NO_HIT)
         if self._bodies and len(origins):
-            for mover, rays in self._met(origins, directions, np.minimum(distances, reach)):
-                distances[rays] = np.minimum(distances[rays], mover.distances(origins[rays], directions[rays]))
+            self._shorten(origins, directions, distances, reach)
         answer = distances.astype(np.float64)
         answer[distances > limit] = np.inf
         return answer
 
-    def _near(self, origins: Array, ends: Singles) -> "list[_Mover]":
-        """The moving bodies that are no farther from where the rays begin than the longest of them is."""
-        place, far = origins[0].tolist(), float(ends.max())
-        if origins.strides[0]:
+    def _shorten(self, origins: Array, directions: Array, ends: Singles, reach: float) -> None:
+        """Let rays end where they meet moving bodies; those are asked for that meet the sphere around one."""
+        place, far, one = origins[0].tolist(), min(float(ends.max()), reach), not origins.strides[0]
+        if not one:
             far += float(np.linalg.norm(origins - origins[0], axis=1).max())
-        known, self._movers = self._movers, {}
-        for name, (mesh, pose) in self._bodies.items():
+        for mesh, pose in self._bodies.values():
             part = self._parts[id(mesh)]
-            if len(mesh.faces) and math.dist(pose.position, place) <= far + part.extent:
-                mover = known.get(name)
-                if mover is None or mover.part is not part or mover.pose != pose:
-                    mover = _Mover(part, pose)
-                self._movers[name] = mover
-        return list(self._movers.values())
-
-    def _met(
-        self, origins: Array, directions: Array, ends: Singles
-    ) -> Iterator[tuple["_Mover", npt.NDArray[np.int64]]]:
-        """The moving bodies and the numbers of the rays that meet the sphere around them before they end."""
-        movers = self._near(origins, ends)
-        if not movers:
-            return
-        if not origins.strides[0]:  # all from one place, as a lidar's
-            yield from _met_from(origins[0].tolist(), directions, ends, movers)
-            return
-        centres = np.array([mover.centre for mover in movers])
-        radii = np.array([[mover.part.radius] for mover in movers])
-        ahead = centres @ directions.T - (origins * directions).sum(axis=1)
-        away = (centres**2).sum(axis=1)[:, np.newaxis] - 2 * (centres @ origins.T) + (origins**2).sum(axis=1)
-        meets = (ahead >= -radii) & (ahead - radii <= ends) & (away - ahead**2 <= radii**2)
-        for number in np.flatnonzero(meets.any(axis=1)):
-            yield movers[number], np.flatnonzero(meets[number])
-
-
-def _met_from(
-    place: list[float], directions: Array, ends: Singles, movers: "list[_Mover]"
-) -> Iterator[tuple["_Mover", npt.NDArray[np.int64]]]:
-    """The same of rays that all begin at one place: they meet a sphere within a cone about its middle."""
-    ways = [[c - p for c, p in zip(mover.centre, place, strict=True)] for mover in movers]
-    beyond = [sum(w * w for w in way) - mover.part.radius**2 for way, mover in zip(ways, movers, strict=True)]
-    # How far ahead the middle of a sphere has to be; a ray that begins inside of one meets it anyway.
-    least = [[math.sqrt(square) if square > 0 else -math.inf] for square in beyond]
-    ahead = np.array(ways) @ directions.T
-    towards = ahead >= least
-    for mover, near, each in zip(movers, towards, ahead, strict=True):
-        rays = near.nonzero()[0]
-        if len(rays):
-            rays = rays[each[rays] - mover.part.radius <= ends[rays]]
+            centre = part.middle_at(pose)
+            away = math.dist(centre, place) - part.radius
+            if away > far or not len(mesh.faces):
+                continue
+            if one:  # as a lidar's
+                way = [there - here for here, there in zip(place, centre, strict=True)]
+                rays = _in_cone(way, part.radius, directions)
+                rays = rays[ends[rays] >= away]
+            else:
+                rays = _meeting(centre - origins, part.radius, directions, ends)
             if len(rays):
-                yield mover, rays
+                turn = pose.rotation()
+                found = part.distances((origins[rays] - pose.position) @ turn, directions[rays] @ turn)
+                ends[rays] = np.minimum(ends[rays], found)
+
+
+def _in_cone(way: list[float], radius: float, directions: Array) -> Numbers:
+    """The rays from one place that meet a sphere, whose middle is a `way` off; all where they begin inside of it."""
+    square = sum([part * part for part in way]) - radius * radius
+    chosen: Numbers = (directions @ way >= (math.sqrt(square) if square > 0 else -math.inf)).nonzero()[0]
+    return chosen
+
+
+def _meeting(ways: Array, radius: float, directions: Array, ends: Singles) -> Numbers:
+    """The rays that meet a sphere before they end; `ways` (n, 3) lead from where each begins to its middle."""
+    ahead = (ways * directions).sum(axis=1)
+    beside = (ways * ways).sum(axis=1) - ahead**2
+    chosen: Numbers = ((ahead >= -radius) & (ahead - radius <= ends) & (beside <= radius * radius)).nonzero()[0]
+    return chosen
 
 
 class _Part:
-    """One Embree scene of a mesh, about the middle of that mesh; `radius` is that of the sphere around it.
-
-    `extent` is how far it may be from the origin of its frame.
-    """
+    """One Embree scene of a mesh, about the middle of that mesh; `radius` is that of the sphere around it."""
 
     def __init__(self, device: EmbreeDevice, mesh: TriangleMesh | Mesh, middle: Array | None = None) -> None:
         """About a `middle` of something larger, if that is given."""
         self.middle = _middle(mesh.vertices) if middle is None else middle
         x, y, z = self.middle.tolist()
-        self.centre = (x, y, z)
+        self._centre = (x, y, z)
         corners = mesh.vertices - self.middle
         # A little more, for rays that graze the furthest corner.
         self.radius = 1.001 * float(np.linalg.norm(corners, axis=1).max(initial=0.0))
-        self.extent = self.radius + float(np.linalg.norm(self.middle))
         # Robust: without it rays may slip through the edge between two triangles.
         self._scene = EmbreeScene(device, True)
         if len(mesh.faces):
             faces = np.ascontiguousarray(mesh.faces, dtype=np.int32)
             EmbreeMesh(self._scene, np.ascontiguousarray(corners, dtype=np.float32), faces)
+
+    def middle_at(self, pose: Pose3) -> Vector:
+        """Where its middle is in the world, with its frame at a pose."""
+        x, y, z, i, j, k, w = pose
+        p, q, r = rotated((i, j, k, w), self._centre)
+        return x + p, y + q, z + r
 
     def distances(self, origins: Array, directions: Array) -> Singles:
         """Distances (n,) in the mesh's own frame, beyond _NO_HIT where nothing is hit."""
@@ -181,29 +166,6 @@ class _Window:
             faces = np.concatenate([np.empty((0, 3), np.int32), *(lots.lot(number) for number in near)])
             self._part = _Part(self._device, compact(self.mesh.vertices, faces), self._middle)
         return self._part
-
-
-@dataclass(frozen=True, eq=False)
-class _Mover:
-    """A body where it is now."""
-
-    part: _Part
-    pose: Pose3
-
-    @cached_property
-    def centre(self) -> Vector:
-        """The middle of the body in the world."""
-        x, y, z, *turn = self.pose
-        p, q, r = rotated((turn[0], turn[1], turn[2], turn[3]), self.part.centre)
-        return x + p, y + q, z + r
-
-    @cached_property
-    def _turn(self) -> Array:
-        return self.pose.rotation()
-
-    def distances(self, origins: Array, directions: Array) -> Singles:
-        """As _Part.distances, of rays in the world."""
-        return self.part.distances((origins - self.pose.position) @ self._turn, directions @ self._turn)
 
 
 def _middle(vertices: Array) -> Array:

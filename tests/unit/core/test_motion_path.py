@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline
 
-from simscen.core.geometry import Pose2, wrap
-from simscen.core.motion_path import pose_at, top_speed
+from simscen.core.geometry import Pose2, Pose3, wrap
+from simscen.core.motion_path import Track, pose_at, top_speed
 from simscen.core.shapes import MotionPath
 
 THERE = (Pose2(0, 0, 0), Pose2(2, 0, 0), Pose2(2, 1, math.pi / 2))
@@ -114,3 +114,15 @@ def test_phase_is_how_far_into_the_path_it_begins_and_start_when_it_goes_on():
     assert not late.over(1e9)
     assert MotionPath((0.0, 2.0, 3.0), THERE, start=1.0, phase=1.0).over(3.0)
     assert not MotionPath((0.0, 2.0, 3.0), THERE, start=1.0, phase=1.0).over(2.9)
+
+
+@pytest.mark.parametrize("mode", ["once", "loop", "back_and_forth"])
+@pytest.mark.parametrize("ease", ["linear", "smooth", "spline"])
+def test_a_track_is_where_its_path_is_bit_for_bit(mode, ease):
+    """In whatever order it is asked, with legs that last no time, that turn, and that do not."""
+    poses = (Pose2(0, 0, 3.0), Pose2(1, 0, 3.0), Pose2(1, 2, -3.0), Pose2(4, 2, -3.0), Pose2(0.3, 0, 3.0))
+    path = MotionPath((1.0, 2.0, 3.5, 3.5, 5.0), poses, mode, 0.7, ease, 0.2)
+    track, times = Track(path, 0.4), [k * 0.1 for k in range(150)]
+    for seconds in [*times, *times[::-7]]:
+        assert track.at(seconds) == Pose3.planar(pose_at(path, seconds), 0.4)
+    assert Track(MotionPath((0.0,), (Pose2(1, 2, 3),)), 0.0).at(5.0) == Pose3.planar(Pose2(1, 2, 3))
