@@ -19,6 +19,7 @@ from simscen.stack.protocols import RobotModel
 
 STEPS = 8
 """Moments within the prediction at which the hull is compared with the scan."""
+HERE = Pose2(0.0, 0.0)
 NEARER = 0.005
 """Metres by which something that moves must come nearer than to a robot that stood, for braking to help."""
 
@@ -46,6 +47,7 @@ class CollisionMonitor:
         corners = np.array(robot.footprint, dtype=np.float64)
         ends = np.roll(corners, -1, axis=0)
         normal = np.column_stack((ends[:, 1] - corners[:, 1], corners[:, 0] - ends[:, 0]))
+        self._times = np.linspace(0.0, spec.time_before_collision, STEPS + 1)
         self._near = robot.circumscribed_radius + spec.stop_margin
         self._normal = normal / np.hypot(normal[:, 0], normal[:, 1])[:, None]
         self._offset = np.sum(self._normal * corners, axis=1)
@@ -95,8 +97,8 @@ class CollisionMonitor:
         points = moved.inverse().apply(_points_within(seen.scan, reach))
         if not len(points):
             return horizon
-        times = np.linspace(0.0, horizon, STEPS + 1)
-        gap = self._gaps(points, poses_along(Pose2(0.0, 0.0), wanted, times))
+        times = self._times
+        gap = self._gaps(points[None], poses_along(HERE, wanted, times))
         now, least = gap[0], self._spec.stop_margin
         touched = (gap[1:] < least) & (gap[1:] < now - 1e-4)
         when = touched.sum(axis=1) >= self._spec.min_points
@@ -107,28 +109,32 @@ class CollisionMonitor:
 
         The whole horizon where a robot that stood would be met as soon and as closely: to brake for that is no help.
         """
-        times = np.linspace(0.0, horizon, STEPS + 1)
-        centres = self._moving.at(times)
-        gaps, standing = (self._gaps_to(centres, twist, times) for twist in (wanted, STOP))
-        met, anyway = ((ways[1:] < 0.0) & (ways[1:] < ways[0] - 1e-4) for ways in (gaps, standing))
+        times = self._times
+        centres = self._moving.at(times).transpose(1, 0, 2)
+        gaps = self._gaps_to(centres, wanted)
+        met = (gaps[1:] < 0.0) & (gaps[1:] < gaps[0] - 1e-4)
+        if not met.any():
+            return horizon
+        standing = self._gaps_to(centres, STOP)
+        anyway = (standing[1:] < 0.0) & (standing[1:] < standing[0] - 1e-4)
         first = (met | anyway).argmax(axis=0)  # of each thing, the moment that tells which of the two is worse
         worse = (gaps < standing - NEARER)[1 + first, np.arange(len(first))]
         when = (met & worse).any(axis=1)
         return float(times[int(when.argmax())]) if when.any() else horizon
 
-    def _gaps_to(self, centres: Array, twist: Twist, times: Array) -> Array:
+    def _gaps_to(self, centres: Array, twist: Twist) -> Array:
         """How far (times, things) what moves is from the stop margin when the robot goes with `twist`."""
-        poses = poses_along(Pose2(0.0, 0.0), twist, times)
-        gaps = [self._gaps(centres[:, k], poses[k : k + 1])[0] for k in range(len(times))]
-        return np.stack(gaps) - (self._moving.radii + self._spec.stop_margin)
+        return self._gaps(centres, poses_along(HERE, twist, self._times)) - (
+            self._moving.radii + self._spec.stop_margin
+        )
 
     def _gaps(self, points: Array, poses: Array) -> Array:
-        """Distance (poses, points) from the hull's edge at each pose to each point; negative inside.
+        """Distance (poses, n) from the hull's edge at each pose to points (poses or 1, n, 2); negative inside.
 
         For a polygon it is the distance to the farthest of its edge lines, which is never more than the true one.
         """
-        dx = points[None, :, 0] - poses[:, None, 0]
-        dy = points[None, :, 1] - poses[:, None, 1]
+        dx = points[:, :, 0] - poses[:, None, 0]
+        dy = points[:, :, 1] - poses[:, None, 1]
         if self._robot.radius is not None:
             return np.hypot(dx, dy) - self._robot.radius
         cosine, sine = np.cos(poses[:, None, 2]), np.sin(poses[:, None, 2])
