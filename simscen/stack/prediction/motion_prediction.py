@@ -38,6 +38,7 @@ class MotionPrediction:
         self._rolled = Rolled(tick_rate)
         self._nothing = nothing(spec.acceleration)
         self._seeing: list[Tracker] = []
+        self._foretold: tuple[int, Moving] | None = None
         self.take = self._rolled.take
         """Takes in the wheels' odometry, or a turn rate."""
         self.calm = not self._trackers
@@ -49,6 +50,7 @@ class MotionPrediction:
         if tracker is None:
             return
         tracker.on_scan(scan, self._rolled.at(scan.tick))
+        self._foretold = None
         if self.calm and not tracker.sees:
             return
         self._seeing = [each for each in self._trackers.values() if each.sees]
@@ -69,6 +71,11 @@ class MotionPrediction:
         """What moves at a tick, in the frame of `Rolled`; with several lidars, as each of them sees it."""
         if not self._seeing:
             return self._nothing
+        if self._foretold is None or self._foretold[0] != tick:
+            self._foretold = tick, self._after(tick)
+        return self._foretold[1]
+
+    def _after(self, tick: int) -> Moving:
         seen = [tracker.moving.after((tick - tracker.tick) / self._rate) for tracker in self._seeing]
         if len(seen) == 1:
             return seen[0]

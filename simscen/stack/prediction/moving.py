@@ -1,7 +1,8 @@
 """What moves: where it is, how fast and how sure that is, at a moment."""
 
+import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -98,32 +99,26 @@ class Moving:
     def seen_from(self, frame: Pose2) -> "Moving":
         """The same in another frame, which is at `frame` in this one."""
         back = frame.inverse()
-        c, s = np.cos(back.yaw), np.sin(back.yaw)
-        turn = np.array([[c, -s], [s, c]])
-        both = np.kron(np.eye(2), turn)
-        return replace(
-            self,
-            centres=back.apply(self.centres),
-            velocities=self.velocities @ turn.T,
-            covariances=both @ self.covariances @ both.T,
-        )
+        c, s = math.cos(back.yaw), math.sin(back.yaw)
+        both = np.array(((c, -s, 0.0, 0.0), (s, c, 0.0, 0.0), (0.0, 0.0, c, -s), (0.0, 0.0, s, c)))
+        centres, velocities = back.apply(self.centres), self.velocities @ both[:2, :2].T
+        return Moving(centres, velocities, self.radii, both @ self.covariances @ both.T, self.acceleration)
 
     def after(self, seconds: float) -> "Moving":
         """The same so many seconds later."""
         step = np.eye(4)
         step[0, 2] = step[1, 3] = seconds
-        return replace(
-            self, centres=self.centres + self.velocities * seconds, covariances=step @ self.covariances @ step.T
-        )
+        centres, covariances = self.centres + self.velocities * seconds, step @ self.covariances @ step.T
+        return Moving(centres, self.velocities, self.radii, covariances, self.acceleration)
 
     def chosen(self, which: Mask) -> "Moving":
         """Those of them."""
-        return replace(
-            self,
-            centres=self.centres[which],
-            velocities=self.velocities[which],
-            radii=self.radii[which],
-            covariances=self.covariances[which],
+        return Moving(
+            self.centres[which],
+            self.velocities[which],
+            self.radii[which],
+            self.covariances[which],
+            self.acceleration,
         )
 
 
