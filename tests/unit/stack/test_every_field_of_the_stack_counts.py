@@ -62,7 +62,7 @@ def of_planner(kind: str) -> dict[str, tuple[tuple[Said, Scene], ...]]:
         "replanning": ((planner(**said), scenes.long_way),),
         "replanning_rate": ((planner(**said, replanning="rate"), scenes.long_way),),
         "cautious": ((impatient, scenes.two_ways),),
-        "allow_unknown": ((planner(**said), scenes.half_known),),
+        "allow_unknown": (({**planner(**said), "costmap": {"raytrace_max_range": 1.0}}, scenes.half_known),),
     }
 
 
