@@ -182,6 +182,7 @@ class RegulatedPurePursuit(PathFollower):
             near = math.hypot(*_seen_from(pose, *self._track.piece_end))
             scaled = speed * near / spec.approach_velocity_scaling_dist
             speed = min(speed, max(scaled, spec.min_approach_linear_velocity))
+            left = max(left, near)  # who has made way for somebody at the end of the path has to come back to it
         braking = math.sqrt(1.6 * self._robot.linear_deceleration * left)
         return min(speed, max(braking, spec.min_approach_linear_velocity))
 
