@@ -28,6 +28,8 @@ STRIDE = 0.25
 """m that the robot may move before the list of solids around it is made anew."""
 SLACK = 0.15
 """m beyond the nearest within which others are measured too, so that they need not be asked again at once."""
+NOISE = 0.005
+"""m farther than the nearest may have gone within which it is measured; what lies farther costs time."""
 
 
 class Proximity:
@@ -37,7 +39,7 @@ class Proximity:
         self._client = CLIENTS.take()
         self._mesh, self._reach = static, reach
         self._radius, self._height = outline.reach(robot.solid)
-        self._hull = [engine.fixed(self._client, shape) for shape in engine.hull_shapes(self._client, robot.solid)]
+        self._hull = engine.hull_shapes(self._client, robot.solid)
         self._parts = parts_of(static)
         self._pairs: dict[int, list[tuple[int, int]]] = {}
         # For each part around: a lower bound of its distance plus what had been travelled when that was known.
@@ -61,11 +63,11 @@ class Proximity:
         self._pose = pose
         if math.dist(pose[:2], self._centre) > STRIDE:
             self._look_around(pose)
-        for hull in self._hull:
-            pybullet.resetBasePositionAndOrientation(hull, pose[:3], pose[3:], self._client)
         nearest = math.inf
         if self._nearest is not None:
-            nearest = self._measure(self._nearest, min(self._distance + moved + SLACK, self._reach))
+            nearest = self._measure(self._nearest, min(self._distance + moved + NOISE, self._reach))
+            if nearest == math.inf:
+                self._nearest, self._least = None, -math.inf
         if self._least - self._travelled < min(nearest, self._reach):
             nearest = self._look_for_nearer(nearest)
         self._distance = nearest
@@ -89,10 +91,19 @@ class Proximity:
         pairs = self._pairs.get(part)
         if pairs is None:
             pairs = self._pairs[part] = list(itertools.product(self._hull, self._build(part)))
+        place, turn, client = self._pose[:3], self._pose[3:], self._client
         points = [
             point[8]
             for hull, body in pairs
-            for point in pybullet.getClosestPoints(hull, body, within, physicsClientId=self._client)
+            for point in pybullet.getClosestPoints(
+                -1,
+                body,
+                within,
+                collisionShapeA=hull,
+                collisionShapePositionA=place,
+                collisionShapeOrientationA=turn,
+                physicsClientId=client,
+            )
         ]
         nearest: float = min(points, default=math.inf)
         self._bounds[part] = min(nearest, within) + self._travelled
