@@ -33,10 +33,7 @@ AMCL_PARAMETERS: Mapping[str, Mapping[str, object]] = {
         "beams_beyond_the_map": "miss", "map_trust_none": 0.0, "map_trust_full": 0.0,
         "match_scans": False, "settling_distance": 0.0, "relocalization": "random",
     },
-    "consistent": {
-        "alpha1": 0.0005, "alpha2": 0.0005, "alpha3": 0.0005, "alpha4": 0.0005, "alpha5": 0.0005,
-        "likelihood_exponent": 1.0, "map_trust_none": 0.85, "map_trust_full": 1.0,
-    },
+    "consistent": {"covariance": "scatter"},
 }  # fmt: skip
 """What AMCL's parameters are by default under each name."""
 
@@ -119,6 +116,9 @@ class Amcl(Ranged, LocalizerSpec):
     fifth on: what one room shows fits many places. 0 = in full at once, as in Nav2."""
     match_scans: bool = True
     """Correct each step of odometry by how the scan fits those of the last metres, where these can tell."""
+    covariance: Literal["particles", "scatter"] = "particles"
+    """What the covariance is told from: the particles, as in Nav2, or also how the poses of the last metres scatter
+    about the way that the robot saw itself go, for particles all err together; that with `match_scans` only."""
     selective_resampling: bool = False
     """Resample only when the effective number of particles is below half of them."""
     do_beamskip: bool = False

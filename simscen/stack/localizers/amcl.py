@@ -17,6 +17,7 @@ from simscen.stack.localizers.map_trust import MapTrust
 from simscen.stack.localizers.motion_models import MotionModel
 from simscen.stack.localizers.particle_filter import ParticleFilter
 from simscen.stack.localizers.scan_matcher import ScanMatcher, Step
+from simscen.stack.localizers.scatter import Scatter
 from simscen.stack.odometry_history import OdometryHistory
 
 
@@ -71,6 +72,7 @@ class AmclLocalizer:
         self._correction = _Correction(pose, covariance, Pose2(0, 0, 0), 0)
         self._moved_to: Pose2 | None = None
         self._matcher = ScanMatcher() if self._spec.match_scans else None
+        self._scatter = Scatter() if self._spec.covariance == "scatter" and self._matcher is not None else None
         self._matched: tuple[str, Pose2] | None = None
         self._due: dict[str, bool] = {}
         self._waiting: dict[str, Scan] = {}
@@ -105,7 +107,7 @@ class AmclLocalizer:
         """The last correction, carried on by odometry."""
         if self._belief is None:
             last, now = self._correction, self._odometry.now if self._odometry else self._correction.odometry
-            covariance = self._motion.carry(last.covariance, last.pose.yaw, last.before.compose(now))
+            covariance = (self._scatter or self._motion).carry(last.covariance, last.pose.yaw, last.before.compose(now))
             pose = last.map_from_odom.compose(now)
             self._belief = Belief(pose, covariance, last.map_from_odom, self._filter.particles.table, last.tick)
         return self._belief
@@ -128,11 +130,16 @@ class AmclLocalizer:
         matched = None if self._matcher is None else self._matched_step(self._matcher, scan, odometry)
         if delta is not None and matched is not None:
             self._filter.follow(matched, delta)
+            if self._scatter is not None:
+                self._scatter.compare(matched.delta, delta)
         elif delta is not None:
             self._filter.move(delta)
         self._due[scan.sensor], self._moved_to, self._belief = False, odometry, None
         if (answer := self._filter.correct(scan)) is not None:
-            self._correction = _Correction(*answer, odometry, scan.tick)
+            pose, covariance = answer
+            if self._scatter is not None:
+                covariance = self._scatter.widened(pose, covariance, self._base(odometry))
+            self._correction = _Correction(pose, covariance, odometry, scan.tick)
         else:
             last = self._correction
             carried = last.map_from_odom.compose(odometry) if matched is None else last.pose.compose(matched.delta)
@@ -151,13 +158,18 @@ class AmclLocalizer:
     def _look_elsewhere(self, finder: Finder, scan: Scan, odometry: Pose2) -> None:
         """Put the particles where the robot may be if it is not where it was thought to be."""
         limits = self._spec.laser_min_range, self._spec.farthest
-        base = odometry
-        if self._matcher is not None and self._matched is not None:
-            base = self._matcher.pose.compose(self._matched[1].between(odometry))
+        base = self._base(odometry)
         believed = self._correction.map_from_odom.compose(odometry)
         if (places := finder.places(scan, base, believed, limits)) is not None:
             self._correction = _Correction(*self._filter.put(*places), odometry, scan.tick)
             self._moved_to, self._belief = odometry, None
+            self._scatter = None if self._scatter is None else Scatter()
+
+    def _base(self, odometry: Pose2) -> Pose2:
+        """Where the robot is at `odometry` in a frame that drifts: by what its scans show of its motion, if they do."""
+        if self._matcher is None or self._matched is None:
+            return odometry
+        return self._matcher.pose.compose(self._matched[1].between(odometry))
 
     def _moved_enough(self, delta: Pose2) -> bool:
         return math.hypot(delta.x, delta.y) > self._spec.update_min_d or abs(delta.yaw) > self._spec.update_min_a
