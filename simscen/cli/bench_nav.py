@@ -82,7 +82,7 @@ def command(
         experiments += [each for each in offer.make() if whole or _named(each.name, only)]
     if not experiments:
         raise NothingSelected("no experiment is called so, or its data is not here")
-    others = [] if stack is None else _with_stack(stack, experiments, made, project)
+    others = [] if stack is None else with_stack(stack, experiments, made, project)
     trials = drive([*experiments, *others], folder, workers or len(os.sched_getaffinity(0)))
     rows = [measured(one, runs) for one, runs in zip([*experiments, *others], trials, strict=True)]
     pairs = [
@@ -94,13 +94,14 @@ def command(
         sys.exit(Exit.INCOMPLETE)
 
 
-def _with_stack(file: Path, experiments: list["Experiment"], made: Path, project: Path) -> list["Experiment"]:
+def with_stack(file: Path, experiments: list["Experiment"], made: Path, project: Path) -> list["Experiment"]:
     """The same experiments with the parameters of a stack file. Raises InvalidInput."""
+    from simscen.loading.nav2stack import KEY as NAV2_PARAMS  # what such a file says has been taken into the section
     from simscen.loading.stackfile import load_stack_file
     from simscen.study.variants import varied
 
     choice = load_stack_file(file.name.split(".")[0], str(file), file, project)
-    said = choice.section.plain if choice.section else {}
+    said = {key: value for key, value in (choice.section.plain if choice.section else {}).items() if key != NAV2_PARAMS}
     return [
         varied(one, f"{one.name}, {choice.name}", said, made / "with_stack" / str(number))
         for number, one in enumerate(experiments)

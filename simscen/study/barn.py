@@ -25,7 +25,10 @@ TUNED = f"""\
   localizer: {LOCALIZER}
   costmap: {COSTMAP}
   # Nav2's 0.9 m is for 0.5 m/s; at 2 m/s this bend is 2 m/s² sideways.
-  controller: {{desired_linear_vel: 2 m/s, regulated_linear_scaling_min_radius: 2 m}}
+  controller:
+    type: regulated_pure_pursuit  # said, so that another stack's controller takes its place as a whole
+    desired_linear_vel: 2 m/s
+    regulated_linear_scaling_min_radius: 2 m
 """
 """The stack's parameters for the speed of the challenge."""
 DEFAULT = f"  localizer: {LOCALIZER}\n"
@@ -33,7 +36,7 @@ DEFAULT = f"  localizer: {LOCALIZER}\n"
 CONTROLLERS = {
     f"{name} at 0.5 m/s": f"  localizer: {LOCALIZER}\n  costmap: {COSTMAP}\n  controller: {said}\n"
     for name, said in (
-        ("regulated pure pursuit", "{desired_linear_vel: 0.5 m/s}"),
+        ("regulated pure pursuit", "{type: regulated_pure_pursuit, desired_linear_vel: 0.5 m/s}"),
         ("dwb", "{type: dwb, max_vel_x: 0.5 m/s}"),
         ("mppi", "{type: mppi, vx_max: 0.5 m/s}"),
     )

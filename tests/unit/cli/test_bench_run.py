@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.cli.bench_nav import _with_stack
+from simscen.cli.bench_nav import with_stack
 from simscen.cli.bench_run import _planned
 from simscen.study import corridors
 from simscen.study.experiment import Experiment
@@ -18,7 +18,7 @@ def test_with_another_stack_no_run_of_an_experiment_is_taken_for_one_of_another(
     stack = tmp_path / "slow.stack.yaml"
     stack.write_text("simscen: 1\nstack: {controller: {desired_linear_vel: 0.3}}\n", encoding="utf-8")
     alike = [hall(tmp_path / "made/wide"), hall(tmp_path / "made/narrow")]
-    others = _with_stack(stack, alike, tmp_path / "made", tmp_path)
+    others = with_stack(stack, alike, tmp_path / "made", tmp_path)
     jobs, owners = _planned(others, tmp_path / "out")
     assert [owners[job.key][0] for job in jobs] == [0, 0, 1, 1]
     assert len({job.folder for job in jobs}) == 4

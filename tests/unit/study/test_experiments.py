@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from simscen.cli.bench_nav import with_stack
 from simscen.loading.scenario import load_scenario
 from simscen.study.experiments import Experiment, corner_cases, dynamic_fields, generated_fields, localizations, sandbox
 
@@ -53,3 +54,26 @@ def test_every_corner_case_that_ships_is_an_experiment() -> None:
 def test_the_sandbox_loads_with_and_without_the_box(tmp_path: Path) -> None:
     for experiment in sandbox(tmp_path, SANDBOX, [1]):
         loads(experiment)
+
+
+NAV2 = """\
+controller_server:
+  ros__parameters: {FollowPath: {plugin: "nav2_mppi_controller::MPPIController", vx_max: 0.4}}
+planner_server:
+  ros__parameters: {GridBased: {plugin: "nav2_navfn_planner::NavfnPlanner"}}
+"""
+
+
+def test_every_experiment_can_be_driven_by_a_stack_of_other_parts_from_a_file_of_nav2(tmp_path: Path) -> None:
+    (tmp_path / "nav2.yaml").write_text(NAV2)
+    (tmp_path / "ours.stack.yaml").write_text("simscen: 1\nstack: {nav2_params: nav2.yaml}\n")
+    experiments = [
+        generated_fields(tmp_path / "made", (1,)),
+        *dynamic_fields(tmp_path / "made", (1,))[:1],
+        *corner_cases(PROJECT / "scenarios", PROJECT, range(1, 2)),
+        *localizations(tmp_path / "made", PROJECT / "worlds", range(1, 2), range(1, 2)),
+    ]
+    for other in with_stack(tmp_path / "ours.stack.yaml", experiments, tmp_path / "made", PROJECT):
+        for drive in other.drives:
+            stack = load_scenario(drive.file, other.root, other.world_path).spec.stack
+            assert (stack.controller.type, stack.controller.vx_max, stack.planner.type) == ("mppi", 0.4, "navfn")
