@@ -132,12 +132,17 @@ def _clear(seen: Array, beam: Indices, edge: Array, full_circle: bool) -> Indice
 
 def fitted(points: Array, centre: Array, radius: float) -> Array:
     """The centre (2,) of the circle of this radius that fits points (n, 2) of its arc best, from a first guess."""
+    at, place, count = points[:, 0] + 1j * points[:, 1], complex(centre[0], centre[1]), len(points)
     for _ in range(STEPS):
-        off = centre - points
-        distance = np.maximum(np.hypot(off[:, 0], off[:, 1]), 1e-6)
-        towards = off / distance[:, None]
-        normal = towards.T @ towards
+        off = place - at
+        distance = np.maximum(np.abs(off), 1e-6)
+        towards = off / distance
+        # Of unit vectors x + iy the squares add up to x² - y² + 2ixy, the squared lengths to x² + y².
+        square = complex(np.add.reduce(towards * towards))
+        length = float(np.vdot(towards, towards).real)
         # A short arc says little of how the circle lies across: there, stay.
-        normal += np.eye(2) * (0.02 * len(points))
-        centre = centre - np.linalg.solve(normal, towards.T @ (distance - radius))
-    return centre
+        xx, yy, xy = (length + square.real) / 2, (length - square.real) / 2, square.imag / 2
+        xx, yy = xx + 0.02 * count, yy + 0.02 * count
+        miss = complex(np.dot(towards, distance - radius))
+        place -= complex(yy * miss.real - xy * miss.imag, xx * miss.imag - xy * miss.real) / (xx * yy - xy * xy)
+    return np.array((place.real, place.imag))
