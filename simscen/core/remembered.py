@@ -15,7 +15,7 @@ Result = TypeVar("Result")
 def remembered(make: Callable[Concatenate[Thing, More], Result]) -> Callable[Concatenate[Thing, More], Result]:
     """`make`, called once for each thing, and each set of further arguments; the thing itself holds the result.
 
-    Nobody may write into what it gives.
+    Nobody may write into what it gives; if that held the thing in turn, both would stay until garbage is collected.
     """
     name = f"_{make.__module__}.{make.__qualname__}"
 

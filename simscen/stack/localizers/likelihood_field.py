@@ -126,10 +126,8 @@ class LikelihoodFieldProb:
         They count as SAYS_NOTHING of a hit, for to leave them out would favour places from which more of them do.
         """
         self._field, self._z_rand, self._skipping, self._exponent = field, np.float32(z_rand), skipping, exponent
-        self._hit = _hit(field, z_hit, sigma_hit)
-        self._range_max, self._logarithm = math.nan, self._hit
-        if beyond is not None:
-            self._hit[beyond] = np.maximum(self._hit[beyond], np.float32(SAYS_NOTHING * z_hit))
+        self._z_hit, self._sigma_hit, self._beyond = z_hit, sigma_hit, beyond
+        self._range_max, self._logarithm = math.nan, field.table
 
     def log_likelihood(self, poses: Array, beams: Beams, converged: bool) -> Array:
         """Logarithms (n,) of Π p."""
@@ -148,8 +146,12 @@ class LikelihoodFieldProb:
     def _logarithms(self, range_max: float) -> Float32:
         """Those of the probability of a beam that ends in each cell of the field."""
         if range_max != self._range_max:
+            chance = _hit(self._field, self._z_hit, self._sigma_hit)
+            if self._beyond is not None:
+                chance[self._beyond] = np.maximum(chance[self._beyond], np.float32(SAYS_NOTHING * self._z_hit))
+            chance += self._z_rand / np.float32(range_max)
             with np.errstate(divide="ignore"):
-                self._logarithm = np.log(self._hit + self._z_rand / np.float32(range_max))
+                self._logarithm = np.log(chance, out=chance)
             self._range_max = range_max
         return self._logarithm
 
