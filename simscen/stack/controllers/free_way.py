@@ -1,5 +1,7 @@
 """Whether what a controller is about to drive is free: the check that all of them share."""
 
+import math
+
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
@@ -15,7 +17,7 @@ CREEP = 0.1
 PARTS: Array = np.array((1.0, 0.75, 0.5, 0.25, 0.0))
 """Parts of a command at which it may let things pass that move."""
 MOMENT, SIGMAS = 0.1, 0.5
-"""Seconds between two moments at which they are compared, and standard deviations by which they are taken for wider."""
+"""Seconds at most between two moments at which they are compared, and standard deviations by which they count wider."""
 NEARER = 1e-4
 """Metres: whom one is too near already is met by coming nearer."""
 
@@ -50,7 +52,7 @@ class FreeWay:
         """
         if not len(costmap.moving) or command == STOP:
             return command
-        times = np.arange(0.0, horizon + MOMENT / 2, MOMENT)
+        times = np.linspace(0.0, horizon, max(1, math.ceil(horizon / MOMENT)) + 1)
         arcs = poses_along(pose, command, np.multiply.outer(PARTS, times).ravel()).reshape(len(PARTS), -1, 3)
         gaps = self._footprint.gap(costmap.moving, arcs, times, SIGMAS)
         met = (gaps[:, 1:] < 0.0) & (gaps[:, 1:] < gaps[:, :1] - NEARER)

@@ -13,6 +13,7 @@ from simscen.model import mppi as model
 from simscen.model.controllers import DynamicWindow, RegulatedPurePursuit
 from simscen.model.mppi import Mppi
 from simscen.stack.controllers.dwb.controller import DynamicWindowController
+from simscen.stack.controllers.free_way import FreeWay
 from simscen.stack.controllers.limits import Limits
 from simscen.stack.controllers.local_plan import LocalPlan
 from simscen.stack.controllers.mppi import critics
@@ -124,3 +125,13 @@ def test_a_hull_that_is_not_round_is_as_long_as_it_is_and_turns_with_the_robot()
     true = np.array([1.3, 0.3, 0.6])
     assert (gaps < true).all()
     assert (gaps > true - 0.15).all()  # a row of discs reaches a little beyond the hull
+
+
+@pytest.mark.parametrize("horizon", [0.0, 0.01, 0.04, 0.06])
+def test_a_way_of_less_than_the_time_between_two_moments_is_looked_at_from_end_to_end(horizon: float) -> None:
+    """Of a carrot that is all but reached."""
+    free = FreeWay(Footprint(ROBOT, 0.05))
+    assert free.letting_pass(SPEED, among(GONE), HERE, horizon) == SPEED
+    ahead = among((HERE.x + 0.403, 0.0, 0.0, 0.0))
+    expected = max(part for part in (1.0, 0.75, 0.5, 0.25, 0.0) if part * 0.5 * horizon <= 0.003)
+    assert free.letting_pass(SPEED, ahead, HERE, horizon).vx == pytest.approx(expected * 0.5)
