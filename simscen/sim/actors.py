@@ -32,7 +32,8 @@ class Actor:
     """A body in the engine: `shown` is where the engine has it, `path` began at tick `since`.
 
     `speed` is the fastest that any part of it ever moves along its path, in m/s, `size` how far from its origin it
-    extends, in metres. Where the engine has it as a surface without an inside, `surface` is that, in the body's frame.
+    extends, and `radius` how far from its axis, in metres. Where the engine has it as a surface without an inside,
+    `surface` is that, in the body's frame.
     """
 
     id: int
@@ -43,6 +44,7 @@ class Actor:
     since: int
     speed: float
     size: float
+    radius: float
     surface: Mesh | None
     placed: tuple[Placing, Pose3] | None = None
     """What the engine last said of its centre of mass, and the pose that comes of it."""
@@ -111,7 +113,7 @@ class Actors:
         surface = engine.fused(body.solids, self._triangulate) if engine.hollow(body.solids, pushable) else None
         centre = frame[1].inverse()
         self._actors[body.name] = Actor(number, body, centre, body.pose, body.path, tick, speed,
-                                         math.hypot(radius, height), surface)  # fmt: skip
+                                         math.hypot(radius, height), radius, surface)  # fmt: skip
         self._sort()
 
     def remove(self, name: str) -> None:
@@ -204,7 +206,7 @@ class Actors:
                 moving.append(actor)
         if self._lying is None or not self._asleep(tick):
             self._lying = Balls.of((poses[a.body.name][:3], a.size, self._speed(a)) for a in self._pushable)
-        scripted = Balls.of((poses[a.body.name][:3], a.size, a.speed) for a in moving)
+        scripted = Balls.of((poses[a.body.name][:3], a.radius, a.speed) for a in moving)  # upright, all of them
         # What is hit by something heavier leaves with up to twice its speed.
         found = encounters(scripted, self._lying, 2 * max(robots, self._fastest, float(self._lying.speeds.max())))
         self._meeting = [moving[number] for number in found.scripted]

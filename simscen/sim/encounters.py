@@ -23,7 +23,7 @@ ROUNDED = 0.05
 
 
 class Balls(NamedTuple):
-    """Bodies for now: each lies within its radius (n,) in m of its place (n, 3), and moves at most so fast, in m/s."""
+    """Bodies seen from above: each within its radius (n,) in m of its place (n, 2), at most so fast, in m/s."""
 
     places: Array
     radii: Array
@@ -31,10 +31,10 @@ class Balls(NamedTuple):
 
     @classmethod
     def of(cls, balls: Iterable[tuple[Vector, float, float]]) -> "Balls":
-        """From place, radius and speed of each."""
+        """From place in space, radius and speed of each."""
         each = list(balls)
         places, radii, speeds = zip(*each, strict=True) if each else ((), (), ())
-        return cls(np.array(places).reshape(-1, 3), np.array(radii), np.array(speeds))
+        return cls(np.array(places).reshape(-1, 3)[:, :2], np.array(radii), np.array(speeds))
 
 
 class Encounters(NamedTuple):

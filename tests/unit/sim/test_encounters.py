@@ -9,8 +9,8 @@ from simscen.sim.encounters import HORIZON, SOON, Balls, encounters
 def test_nobody_meets_within_the_time_that_is_promised():
     rng = np.random.default_rng(5)
     for _ in range(300):
-        scripted = Balls(rng.uniform(-2, 2, (3, 3)), rng.uniform(0.1, 0.3, 3), rng.uniform(0, 2, 3))
-        pushable = Balls(rng.uniform(-2, 2, (4, 3)), rng.uniform(0.1, 0.3, 4), rng.uniform(0, 1, 4))
+        scripted = Balls(rng.uniform(-2, 2, (3, 2)), rng.uniform(0.1, 0.3, 3), rng.uniform(0, 2, 3))
+        pushable = Balls(rng.uniform(-2, 2, (4, 2)), rng.uniform(0.1, 0.3, 4), rng.uniform(0, 1, 4))
         found = encounters(scripted, pushable, hit=1.5)
         assert 0 < found.seconds <= HORIZON
         apart = np.linalg.norm(scripted.places[:, None] - pushable.places, axis=2)
