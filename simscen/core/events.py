@@ -20,6 +20,8 @@ class EventKind(str, Enum):
     PLAN_FAILED = "plan.failed"  # error_code, error_name, message
     RECOVERY_STARTED = "recovery.started"  # behaviour: spin, wait, backup, clear_costmap; error_code, error_name
     RECOVERY_ENDED = "recovery.ended"  # behaviour; outcome
+    ROBOT_HELD = "robot.held"  # what it waits for: collision_monitor, planner, controller; message: why
+    ROBOT_RELEASED = "robot.released"  # what it waited for
     COLLISION_STARTED = "collision.started"  # what was hit; x, y, impulse (N s), speed (m/s), robot_part
     COLLISION_ENDED = "collision.ended"  # what was hit
     FAULT_STARTED = "fault.started"  # label, e.g. "lidar.off"; entry (number of the fault, from 0), sensor, fault

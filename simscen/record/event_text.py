@@ -12,6 +12,7 @@ _LEVELS = {
     EventKind.GOAL_CANCELED: WARN,
     EventKind.PLAN_FAILED: WARN,
     EventKind.RECOVERY_STARTED: WARN,
+    EventKind.ROBOT_HELD: WARN,
     EventKind.FAULT_STARTED: WARN,
 }
 

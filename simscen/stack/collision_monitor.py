@@ -38,7 +38,8 @@ class CollisionMonitor:
 
     def __init__(self, spec: MonitorSpec, robot: RobotModel, lidars: tuple[str, ...], tick_rate: int) -> None:
         self._spec, self._robot = spec, robot
-        self._timeout = round(spec.source_timeout * tick_rate)
+        self._timeout, self._tick_rate = round(spec.source_timeout * tick_rate), tick_rate
+        self._came: dict[str, tuple[int, int]] = {}
         self.hold_ticks = spec.hold_timeout * tick_rate or math.inf
         """For how long it may allow nothing until that is a failure."""
         self._seen, self._oldest = dict.fromkeys(lidars, 0), 0
@@ -57,8 +58,9 @@ class CollisionMonitor:
         self._seen = dict.fromkeys(self._seen, tick)
         self._oldest = tick
 
-    def on_scan(self, scan: Scan, odometry: Pose2) -> None:
-        """A scan, and where odometry was when it came; one in which no beam answers is silence."""
+    def on_scan(self, scan: Scan, odometry: Pose2, tick: int = 0) -> None:
+        """A scan that came at `tick`, and where odometry was; one in which no beam answers is silence."""
+        self._came[scan.sensor] = tick, scan.tick
         nearest = _nearest(scan)
         if nearest is None:
             return
@@ -73,6 +75,18 @@ class CollisionMonitor:
     def silent(self, tick: int) -> bool:
         """Whether a lidar has not been heard for `source_timeout`."""
         return tick - self._oldest > self._timeout and self._spec.enabled and bool(self._seen)
+
+    def silence(self, tick: int) -> str:
+        """Why the lidar that was heard longest ago is taken for silent."""
+        name = min(self._seen, key=lambda sensor: self._seen[sensor])
+        limit, ago = f"source_timeout is {self._spec.source_timeout:g} s", (tick - self._seen[name]) / self._tick_rate
+        came, taken = self._came.get(name, (None, 0))
+        if came is None or (tick - came) > self._timeout:
+            return f"lidar `{name}` has been silent for {ago:.2f} s; {limit}"
+        if taken != self._seen[name]:
+            return f"lidar `{name}` has been blind for {ago:.2f} s, as no beam of its scans answers; {limit}"
+        late = (came - taken) / self._tick_rate
+        return f"scans of lidar `{name}` are {late:.2f} s old when they come; {limit}"
 
     def allow(self, wanted: Twist, odometry: Pose2) -> Twist:
         """The command, slowed down so that the first contact is at least `time_before_collision` away."""

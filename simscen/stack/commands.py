@@ -20,6 +20,8 @@ class Commands:
         self._smoother, self._monitor, self._period = smoother, monitor, period
         self._wanted, self._allowed = Underway[tuple[Twist, int]](latency[0]), Underway[Twist](latency[1])
         self._asked, self._free_at = 0, 0
+        self.latency = latency[0]
+        """Ticks that the controller takes for a command."""
         self.sent = STOP
         """What is sent to the base now."""
 

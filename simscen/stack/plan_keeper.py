@@ -92,6 +92,11 @@ class PlanKeeper:
         return self._hear(tick, now)
 
     @property
+    def waiting(self) -> int:
+        """How many ticks the planner takes, where there is no plan to follow meanwhile; else 0."""
+        return self._latency if self.plan is None and self._asked is not None else 0
+
+    @property
     def _rate(self) -> float:
         return self._spec.replanning_rate or (THROUGH_POSES_RATE if self._via else USUAL_RATE)
 

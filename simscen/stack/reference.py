@@ -1,5 +1,6 @@
 """The reference stack: readings in; localise, map, navigate, smooth, guard; one command out."""
 
+from functools import partial
 from typing import Any
 
 from simscen.core.belief import Estimate
@@ -20,6 +21,7 @@ from simscen.stack.odometry_history import OdometryHistory, believable
 from simscen.stack.prediction.motion_prediction import MotionPrediction
 from simscen.stack.protocols import Controller, Localizer, NavigationFailure, Surroundings
 from simscen.stack.publishing import Publishing
+from simscen.stack.standstill import Standstill
 from simscen.stack.tasks import Task
 from simscen.stack.underway import Underway
 from simscen.stack.zones import SpeedFilter
@@ -59,6 +61,7 @@ class ReferenceStack:
         self._twist = STOP
         self._odometry, self._wheels = OdometryHistory(surroundings.tick_rate), False
         self._zones: Zones | None = None
+        self._standstill = Standstill(surroundings.tick_rate)
         self._nothing = Decision(STOP)
 
     def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:
@@ -76,6 +79,7 @@ class ReferenceStack:
     def cancel(self, tick: int) -> None:
         """Cancel the current goal and all after it."""
         self._events += self._task.cancel(tick)
+        self._events += self._standstill.over(tick)
         self._navigator.stop()
         self._prediction.hold()
         self._commands.stop(tick)
@@ -166,7 +170,7 @@ class ReferenceStack:
                 self._localizer.on_scan(self._matched.take())
         self._prediction.on_scan(scan)
         marking = self._prediction.marking(scan)
-        self._monitor.on_scan(marking, self._odometry.held(scan.tick))
+        self._monitor.on_scan(marking, self._odometry.held(scan.tick), tick)
         self._costmaps.see(marking)
 
     def _dead_reckon(self, reading: Odometry) -> None:
@@ -218,8 +222,13 @@ class ReferenceStack:
             self._give_up(tick, NavigationFailure(ErrorCode.NAVIGATE_TIMEOUT, f"{goal.timeout:g} s are over"))
         elif self._monitor.silent(tick):
             self._commands.stop(tick)
+            self._events += self._standstill.held(tick, "collision_monitor", partial(self._monitor.silence, tick))
         elif not self._commands.busy(tick):
             self._navigate(tick, frames)
+        elif self._commands.sent == STOP:
+            self._waits(tick, "controller", self._commands.latency)
+        elif self._standstill.holds:
+            self._events += self._standstill.over(tick)
 
     def _navigate(self, tick: int, frames: Frames) -> None:
         """One step of the navigator, and what comes of it."""
@@ -239,6 +248,16 @@ class ReferenceStack:
                 view = self._costmaps.wide.view
                 command = self._prediction.steer(tick, command, pose, self._twist, view, self.plan)
             self._commands.want(tick, command, periods)
+            if waiting := self._navigator.plans.waiting:
+                self._waits(tick, "planner", waiting)
+            elif self._standstill.holds and self._commands.sent != STOP:
+                self._events += self._standstill.over(tick)
+
+    def _waits(self, tick: int, part: str, latency: int) -> None:
+        """The robot stands until this part of its stack is done."""
+        seconds = f"{latency / self._tick_rate:.3g} s"
+        message = f"the {part} takes {seconds} (stack: latency: {part}), with nothing to follow meanwhile"
+        self._events += self._standstill.held(tick, part, lambda: message)
 
     def _stand(self, tick: int, pose: Pose2) -> None:
         """Nowhere to go; but out of the way of what comes at the robot, and back."""
@@ -264,5 +283,6 @@ class ReferenceStack:
         self._stop(tick)
 
     def _stop(self, tick: int) -> None:
+        self._events += self._standstill.over(tick)
         self._navigator.stop()
         self._commands.stop(tick)

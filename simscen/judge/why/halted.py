@@ -22,7 +22,7 @@ def halted(trace: Trace, case: Case, tick: int) -> tuple[list[str], set[str]]:
     if goal is None:
         return [], set()
     there = things(trace, tick)
-    lines, named = [*_walled_in(case, goal), *_touching(trace, tick)], set[str]()
+    lines, named = [*_walled_in(case, goal), *_held(trace, tick), *_touching(trace, tick)], set[str]()
     for told, events in (
         _occupied(trace, case, goal, there),
         blocked(trace, case, goal.name, tick, there),
@@ -54,6 +54,17 @@ def _walled_in(case: Case, goal: Goal) -> list[str]:
     narrow = [passage for passage in case.passages if passage.goal == goal.name and passage.width < needed]
     where = f": the widest is {narrow[0].told}" if narrow else ""
     return [f"the world itself leaves a robot of {needed:.2f} m no way to goal {goal.name}{where}"]
+
+
+def _held(trace: Trace, tick: int) -> list[str]:
+    """What its own stack says that it waits for."""
+    last = [event for event in trace.of_kind(EventKind.ROBOT_HELD, EventKind.ROBOT_RELEASED) if event.tick <= tick][-1:]
+    return [
+        f"its {event.name.replace('_', ' ')} holds it, as it said at t = {trace.seconds(event.tick):.2f} s: "
+        f"{event.data.get('message', '')}"
+        for event in last
+        if event.kind == EventKind.ROBOT_HELD
+    ]
 
 
 def _touching(trace: Trace, tick: int) -> list[str]:

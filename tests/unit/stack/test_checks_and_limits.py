@@ -197,6 +197,17 @@ def test_silence_is_a_lidar_unheard_for_the_timeout_or_blind() -> None:
     assert guard.silent(181)
 
 
+def test_why_a_lidar_counts_as_silent_is_told() -> None:
+    guard = monitor(source_timeout=0.3)
+    guard.start(0)
+    assert guard.silence(240) == "lidar `lidar` has been silent for 1.00 s; source_timeout is 0.3 s"
+    guard.on_scan(scan((2.0, 0.0), tick=120), Pose2(0, 0), 240)
+    assert guard.silence(241) == "scans of lidar `lidar` are 0.50 s old when they come; source_timeout is 0.3 s"
+    guard.on_scan(Scan("lidar", 300, np.full(9, np.nan), 0.0, 0.1, 0.05, 12.0), Pose2(0, 0), 300)
+    assert "blind for 0.75 s, as no beam of its scans answers" in guard.silence(300)
+    assert "silent" in guard.silence(400)
+
+
 def test_arcs_are_those_of_a_fine_integration() -> None:
     twist, pose = Twist(0.7, 0.2, -0.9), Pose2(1.0, 2.0, 0.4)
     x, y, yaw = pose

@@ -225,10 +225,15 @@ def test_a_silent_lidar_stops_the_robot_within_half_a_second_and_it_goes_on_when
     d.run(14.5)
     assert d.commands[-1] == STOP
     assert not d.kinds("recovery.started")  # the progress checker's clock stood still
+    (held,) = d.kinds("robot.held")
+    assert held.name == "collision_monitor"
+    assert held.tick < 6.6 * 240
+    assert "`lidar` has been silent" in held.data["message"]
     d.blind = False
     d.run(60)
     assert d.result == "SUCCEEDED"
     assert not d.kinds("recovery.started")
+    assert [event.name for event in d.kinds("robot.released")] == ["collision_monitor"]
 
 
 def test_cancel_stops_at_once_and_ends_the_task() -> None:

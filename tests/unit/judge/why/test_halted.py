@@ -122,3 +122,10 @@ def test_a_thing_that_the_robot_on_its_goal_would_just_touch_does_not_stand_on_i
 def test_what_is_thirty_centimetres_away_may_hold_the_robot():
     (line,) = why("stuck", box(0, "crate", 4.7, 0, 0.4, 0.4), case={**CASE, "passages": []})
     assert line == "why: crate was 0.30 m from the robot"
+
+
+def test_what_its_own_stack_waits_for_is_named_while_it_does():
+    held = [2, "robot.held", "collision_monitor", {"message": "scans of lidar `lidar` come late"}]
+    (line,) = why("goals_reached", [held])
+    assert line == "why: its collision monitor holds it, as it said at t = 2.00 s: scans of lidar `lidar` come late"
+    assert why("goals_reached", [held, [4, "robot.released", "collision_monitor"]]) == []

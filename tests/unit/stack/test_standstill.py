@@ -1,0 +1,46 @@
+"""A robot that stands and waits for a part of its stack says so, and for which."""
+
+import pytest
+
+from simscen.core.events import Event
+from simscen.core.geometry import Pose2
+from simscen.core.navigation import Goal
+from simscen.model.latency import Latency
+from simscen.model.stack import StackSpec
+from simscen.stack.standstill import Standstill
+from simscen.testing.flatland import Flatland, drive
+
+
+def kinds(events: tuple[Event, ...]) -> list[tuple[str, str]]:
+    return [(str(event.kind), event.name) for event in events]
+
+
+def test_a_reason_is_told_once_after_a_second_and_its_end_as_well() -> None:
+    standstill = Standstill(240)
+    assert [kinds(standstill.held(tick, "planner", lambda: "why")) for tick in (12, 251, 252, 264)] == [
+        [], [], [("robot.held", "planner")], [],
+    ]  # fmt: skip
+    assert kinds(standstill.over(300)) == [("robot.released", "planner")]
+    assert standstill.over(301) == ()
+    standstill.held(400, "planner", lambda: "why")
+    assert standstill.over(500) == ()
+
+
+def test_another_reason_ends_the_one_before() -> None:
+    standstill = Standstill(240)
+    standstill.held(0, "planner", lambda: "why")
+    standstill.held(240, "planner", lambda: "why")
+    assert kinds(standstill.held(300, "controller", lambda: "why")) == [("robot.released", "planner")]
+    assert kinds(standstill.held(540, "controller", lambda: "why")) == [("robot.held", "controller")]
+
+
+@pytest.mark.parametrize("part", ["planner", "controller"])
+def test_a_robot_that_waits_for_its_planner_or_its_controller_says_so(part: str) -> None:
+    world = Flatland().room(8, 6)
+    spec = StackSpec(latency=Latency(**{part: 2.0}))
+    d = drive(world, Pose2(1, 3), Goal("g", Pose2(6, 3)), spec=spec, grid=world.grid((-0.5, -0.5, 8.5, 6.5))).run(6.0)
+    held, released = d.kinds("robot.held")[0], d.kinds("robot.released")[0]
+    assert held.name == released.name == part
+    assert f"the {part} takes 2 s" in held.data["message"]
+    assert 1.0 <= held.tick / 240 < 1.2
+    assert 2.0 <= released.tick / 240 < 2.3
