@@ -96,12 +96,13 @@ def command(
 
 def with_stack(file: Path, experiments: list["Experiment"], made: Path, project: Path) -> list["Experiment"]:
     """The same experiments with the parameters of a stack file. Raises InvalidInput."""
-    from simscen.loading.nav2stack import KEY as NAV2_PARAMS  # what such a file says has been taken into the section
     from simscen.loading.stackfile import load_stack_file
     from simscen.study.variants import varied
 
     choice = load_stack_file(file.name.split(".")[0], str(file), file, project)
-    said = {key: value for key, value in (choice.section.plain if choice.section else {}).items() if key != NAV2_PARAMS}
+    for note in choice.notes:
+        print(note, file=sys.stderr)
+    said = choice.section.plain if choice.section else {}
     return [
         varied(one, f"{one.name}, {choice.name}", said, made / "with_stack" / str(number))
         for number, one in enumerate(experiments)

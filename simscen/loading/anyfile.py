@@ -34,7 +34,7 @@ def problems_of(kind: str, file: Path, root: Path, world_path: Sequence[Path] = 
     if kind == "stack":
         from simscen.loading.stackfile import stack_file  # a model of its own, which few commands need
 
-        return found if isinstance(found := stack_file(path, library), list) else []
+        return found if isinstance(found := stack_file(path, library), list) else found[1]
     if kind == "base":
         from simscen.loading.basefile import problems_of_base
 

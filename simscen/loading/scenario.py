@@ -111,7 +111,7 @@ def _with_choice(
     loaded = _several(spec, tree, library, file) if spec.robots else _one(spec, tree, library, file)
     if isinstance(loaded, list):
         return loaded
-    notes = (*loaded.notes, *library.with_source(taken.notes))
+    notes = (*loaded.notes, *library.with_source(taken.notes), *(choice.notes if choice is not None else ()))
     return replace(loaded, notes=notes).having(choice=choice, variation=one.name, set_by=one.set_by)
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from simscen.core.externalcommand import ExternalCommand
+from simscen.core.problems import Problem
 from simscen.loading.tree import Entry, Fields, Leaf, Node, Place, child
 
 OF_THE_SCENARIO = ("keepout", "keepout_mask", "speed_zones", "speed_mask")
@@ -20,7 +21,8 @@ class StackChoice:
     """What `--stack NAME=VALUE` means; `value` is as it was given.
 
     `file` is the stack file that it names, `section` the `stack:` of that; `type` is the type of stack that it names;
-    `runs` is the command that it is. `texts` and `files` are those of the stack file and what it extends (Library).
+    `runs` is the command that it is. `texts` and `files` are those of the stack file and what it extends (Library),
+    `notes` what of them means nothing.
     """
 
     name: str
@@ -31,6 +33,7 @@ class StackChoice:
     texts: Mapping[str, str] = field(default_factory=dict, repr=False)
     files: Mapping[str, Path] = field(default_factory=dict, repr=False)
     runs: ExternalCommand | None = field(default=None, repr=False)
+    notes: tuple[Problem, ...] = field(default=(), repr=False)
 
     @property
     def written(self) -> str:

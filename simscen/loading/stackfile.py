@@ -6,6 +6,7 @@ from pathlib import Path
 from simscen.core.errors import InvalidInput
 from simscen.core.problems import Problem
 from simscen.loading.document import Library
+from simscen.loading.nav2stack import KEY as NAV2_PARAMS
 from simscen.loading.nav2stack import with_nav2_parameters
 from simscen.loading.paths import Fence
 from simscen.loading.stackchoice import OF_THE_SCENARIO, StackChoice
@@ -23,19 +24,28 @@ def load_stack_file(name: str, value: str, path: Path, root: Path, world_path: S
     found = stack_file(path, library)
     if isinstance(found, list):
         raise InvalidInput(found)
-    return StackChoice(name, value, "", path.absolute(), found, dict(library.texts), dict(library.files))
+    section, notes = found
+    return StackChoice(
+        name, value, "", path.absolute(), section, dict(library.texts), dict(library.files), notes=tuple(notes)
+    )
 
 
-def stack_file(path: Path, library: Library) -> Fields | list[Problem]:
-    """The `stack:` section of a stack file, or all that is wrong with the file."""
+def stack_file(path: Path, library: Library) -> tuple[Fields, list[Problem]] | list[Problem]:
+    """The `stack:` section of a stack file and what of it means nothing, or all that is wrong with the file.
+
+    What a parameter file of Nav2 says is part of the section, which names that file no more: it may lie where no
+    scenario can reach it.
+    """
     file = library.fence.entered(path)
     if isinstance(file, Problem):
         return [file]
     tree, problems = library.read(file)
     if problems or tree is None:
         return library.with_source(problems)
+    notes: list[Problem] = []
     if isinstance(tree, Fields):
         taken = with_nav2_parameters(tree, library)
+        notes = library.with_source(taken.notes)
         if taken.problems:
             return library.with_source(sorted(taken.problems))
         tree = taken.tree
@@ -44,7 +54,8 @@ def stack_file(path: Path, library: Library) -> Fields | list[Problem]:
     misplaced = _misplaced(section) if isinstance(section, Fields) else []
     if isinstance(spec, list) or misplaced or not isinstance(section, Fields):
         return library.with_source(sorted([*misplaced, *(spec if isinstance(spec, list) else [])]))
-    return section
+    kept = {key: entry for key, entry in section.entries.items() if key != NAV2_PARAMS}
+    return Fields(section.place, kept), notes
 
 
 def _misplaced(section: Fields) -> list[Problem]:

@@ -173,6 +173,19 @@ def test_a_stack_file_may_take_its_parameters_from_one(tmp_path: Path) -> None:
     choice = load_stack_file("ours", "ours.stack.yaml", tmp_path / "ours.stack.yaml", tmp_path)
     assert choice.section is not None
     assert choice.section.plain["controller"]["desired_linear_vel"] == 0.4
+    assert "docking_server" in "".join(note.message for note in choice.notes)
+
+
+def test_a_stack_file_elsewhere_has_its_parameters_beside_it(tmp_path: Path) -> None:
+    (tmp_path / "here").mkdir()
+    (tmp_path / "nav2.yaml").write_text(PARAMS)
+    (tmp_path / "ours.stack.yaml").write_text("simscen: 1\nstack: {nav2_params: nav2.yaml}\n")
+    file = tmp_path / "here" / "a.scenario.yaml"
+    file.write_text(SCENARIO)
+    choice = load_stack_file("ours", "ours.stack.yaml", tmp_path / "ours.stack.yaml", tmp_path / "here")
+    found = load_scenario(file, tmp_path / "here", choice=choice)
+    assert found.spec.stack.controller.desired_linear_vel == 0.4
+    assert any("docking_server" in note.message for note in found.notes)
 
 
 HUMBLE = """\
