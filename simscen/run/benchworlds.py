@@ -1,5 +1,6 @@
 """What a simulated second costs in worlds as people have them, each held against the patrol of a small house."""
 
+import gc
 import math
 import resource
 import statistics
@@ -68,6 +69,7 @@ def measure_worlds(rounds: int) -> Iterator[Cost]:
 def _measured(name: str, file: Path, rounds: int) -> Cost:
     import time
 
+    gc.collect()  # what was there of the last world would count as memory of this one
     begun = time.process_time()
     prepared = prepare(load_scenario(file, file.parent))
     preparing = time.process_time() - begun
