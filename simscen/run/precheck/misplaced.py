@@ -22,6 +22,7 @@ from simscen.worlds.overlap import placed, polygons_overlap
 from simscen.worlds.upright import upright
 
 GOAL_HINT = "move it, or expect the failure with `result: {status: FAILED, error_code: GOAL_OCCUPIED}`"
+OUTSIDE_HINT = GOAL_HINT.replace("GOAL_OCCUPIED", "GOAL_OUTSIDE_MAP")
 WITHIN = (-0.9, 0.0, 0.9)
 """Shares of a goal's tolerances at which the robot may stand instead."""
 
@@ -40,7 +41,8 @@ def _start(scene: Scene) -> Iterator[tuple[Keys, Problem]]:
 
 def _goals(scene: Scene) -> Iterator[tuple[Keys, Problem]]:
     for keys, goal in scene.targets:
-        found = list(_told(scene, keys, f"goal `{goal.name}`", goal.pose, scene.world.solids, GOAL_HINT))
+        hint = OUTSIDE_HINT if scene.ground.outside(goal.pose) else GOAL_HINT
+        found = list(_told(scene, keys, f"goal `{goal.name}`", goal.pose, scene.world.solids, hint))
         if not found or not _fits_nearby(scene, goal):
             yield from found
         place = goal.pose.x, goal.pose.y
