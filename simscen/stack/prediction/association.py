@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
-from simscen.stack.prediction.clusters import Clusters, fitted
+from simscen.stack.prediction.clusters import Clusters, Indices, fitted
 from simscen.stack.prediction.kalman import corrected
 from simscen.stack.prediction.tracks import Track, Tracks
 
@@ -44,21 +44,18 @@ def associate(tracks: Tracks, seen: Seen) -> set[int]:
     if not len(tracks) or not len(seen.centres):
         return taken
     off, gate = _apart(tracks, seen)
-    numbers, fits, places, deviations = list[int](), list[int](), list[Array](), list[float]()
+    given = dict[int, int]()
     for track, piece in sorted(np.argwhere(off <= gate).tolist(), key=lambda pair: (off[pair[0], pair[1]], pair)):
-        if track in numbers or piece in taken:
-            continue
-        taken.add(piece)
-        numbers.append(track)
-        fits.append(piece)
-        place, deviation = _measured(tracks.known[track], seen, piece, tracks.states[track])
-        places.append(place)
-        deviations.append(deviation)
-    if numbers:
+        if track not in given and piece not in taken:
+            taken.add(piece)
+            given[track] = piece
+    if given:
+        numbers = list(given)
+        places, deviations = _measured(tracks, numbers, seen, np.array(list(given.values())))
         tracks.states[numbers], tracks.covariances[numbers] = corrected(
-            tracks.states[numbers], tracks.covariances[numbers], np.array(places), np.array(deviations)
+            tracks.states[numbers], tracks.covariances[numbers], places, deviations
         )
-        for number, piece in zip(numbers, fits, strict=True):
+        for number, piece in given.items():
             tracks.note(number, bool(seen.came[piece]), bool(seen.stood[piece]), int(seen.pieces.edges[piece]))
     return taken
 
@@ -73,16 +70,17 @@ def _apart(tracks: Tracks, seen: Seen) -> tuple[Array, Array]:
     return off, GATE + GATE_SIGMAS * spread[:, None] + np.where(seen.pieces.whole[None, :], 0.0, radii[:, None])
 
 
-def _measured(track: Track, seen: Seen, piece: int, state: Array) -> tuple[Array, float]:
-    """Where the middle of a track is seen, in the odom frame, and the standard deviation of that."""
+def _measured(tracks: Tracks, numbers: list[int], seen: Seen, which: Indices) -> tuple[Array, Array]:
+    """Where the middles of tracks are seen (n, 2), in the odom frame, as these pieces; and the standard deviations."""
     pieces, lidar = seen.pieces, seen.lidar
-    whole = bool(pieces.whole[piece])
-    if whole:
-        track.radius += RADIUS_GAIN * (float(pieces.radii[piece]) - track.radius)
-    first = pieces.centres[piece] if whole else lidar.inverse().apply(state[None, :2])[0]
-    centre = fitted(pieces.of(piece), first, track.radius)
-    deviation = NOISE + RELATIVE * float(np.hypot(*centre)) + (0.0 if whole else HALF_SEEN)
-    return lidar.apply(centre[None])[0], deviation
+    whole, radii = pieces.whole[which], np.array([tracks.known[number].radius for number in numbers])
+    radii = np.where(whole, radii + RADIUS_GAIN * (pieces.radii[which] - radii), radii)
+    for number, radius in zip(numbers, radii.tolist(), strict=True):
+        tracks.known[number].radius = radius
+    expected = lidar.inverse().apply(tracks.states[numbers, :2])
+    centres = fitted(pieces, which, np.where(whole[:, None], pieces.centres[which], expected), radii)
+    deviations = NOISE + RELATIVE * np.hypot(centres[:, 0], centres[:, 1]) + np.where(whole, 0.0, HALF_SEEN)
+    return lidar.apply(centres), deviations
 
 
 def begin(tracks: Tracks, seen: Seen, taken: set[int]) -> None:

@@ -52,10 +52,6 @@ class Clusters:
         """The hits (m,) as complex numbers."""
         return self.points.view(np.complex128)[:, 0]
 
-    def of(self, number: int) -> Array:
-        """The hits (k, 2) of a piece."""
-        return self.points[self.first[number] : self.last[number] + 1]
-
 
 def clusters(ranges: Array, angles: Array, least: float, most: float, largest: float, full_circle: bool) -> Clusters:
     """The pieces of a scan of beams that answer between `least` and `most` metres, none with a radius over `largest`.
@@ -130,19 +126,25 @@ def _clear(seen: Array, beam: Indices, edge: Array, full_circle: bool) -> Indice
     return np.asarray((inside | full_circle) & (seen[beam % len(seen)] > edge), dtype=np.int64)
 
 
-def fitted(points: Array, centre: Array, radius: float) -> Array:
-    """The centre (2,) of the circle of this radius that fits points (n, 2) of its arc best, from a first guess."""
-    at, place, count = points[:, 0] + 1j * points[:, 1], complex(centre[0], centre[1]), len(points)
+def fitted(pieces: Clusters, which: Indices, centres: Array, radii: Array) -> Array:
+    """The centres (n, 2) of the circles of these radii (n,) that fit the arcs of `which` (n,) pieces best.
+
+    `centres` (n, 2) are a first guess.
+    """
+    first, count = pieces.first[which], pieces.last[which] - pieces.first[which] + 1
+    begin = np.cumsum(count) - count
+    owner = np.repeat(np.arange(len(which)), count)
+    at = pieces.places[np.arange(len(owner)) + (first - begin)[owner]]
+    place, radius = centres[:, 0] + 1j * centres[:, 1], radii[owner]
     for _ in range(STEPS):
-        off = place - at
+        off = place[owner] - at
         distance = np.maximum(np.abs(off), 1e-6)
         towards = off / distance
-        # Of unit vectors x + iy the squares add up to x² - y² + 2ixy, the squared lengths to x² + y².
-        square = complex(np.add.reduce(towards * towards))
-        length = float(np.vdot(towards, towards).real)
+        # Of unit vectors x + iy the squares add up to x² - y² + 2ixy, the squared lengths to their number.
+        square = np.add.reduceat(towards * towards, begin)
         # A short arc says little of how the circle lies across: there, stay.
-        xx, yy, xy = (length + square.real) / 2, (length - square.real) / 2, square.imag / 2
-        xx, yy = xx + 0.02 * count, yy + 0.02 * count
-        miss = complex(np.dot(towards, distance - radius))
-        place -= complex(yy * miss.real - xy * miss.imag, xx * miss.imag - xy * miss.real) / (xx * yy - xy * xy)
-    return np.array((place.real, place.imag))
+        xx, yy, xy = (1.04 * count + square.real) / 2, (1.04 * count - square.real) / 2, square.imag / 2
+        miss = np.add.reduceat(towards * (distance - radius), begin)
+        across = yy * miss.real - xy * miss.imag + 1j * (xx * miss.imag - xy * miss.real)
+        place = place - across / (xx * yy - xy * xy)
+    return np.column_stack((place.real, place.imag))
