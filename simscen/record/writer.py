@@ -44,8 +44,9 @@ class McapWriter:
         self._written = self._checksum = 0
         self._chunk = Chunk(chunk_size, self._finish_chunk)
         self._compress = zstandard.ZstdCompressor(level=_COMPRESSION_LEVEL).compress
-        self._schemas: dict[str, records.Schema] = {}
-        self._channels: list[records.Channel] = []
+        self._schemas: dict[str, int] = {}
+        self._schema_records: list[bytes] = []
+        self._channel_records: list[bytes] = []
         self._counts: Counter[int] = Counter()
         self._chunks: list[records.ChunkIndex] = []
         self._attachments: list[records.AttachmentIndex] = []
@@ -57,13 +58,15 @@ class McapWriter:
         """Open a channel of CDR messages."""
         schema = self._schemas.get(kind.name)
         if schema is None:
-            schema = records.Schema(len(self._schemas) + 1, kind.definition.encode(), "ros2msg", kind.name)
-            self._schemas[kind.name] = schema
-            self._chunk.put(_encoded(schema))
-        channel = records.Channel(len(self._channels) + 1, topic, "cdr", dict(metadata), schema.id)
-        self._channels.append(channel)
-        self._chunk.put(_encoded(channel))
-        return Channel(channel.id, self._chunk)
+            schema = self._schemas[kind.name] = len(self._schemas) + 1
+            record = _encoded(records.Schema(schema, kind.definition.encode(), "ros2msg", kind.name))
+            self._schema_records.append(record)
+            self._chunk.put(record)
+        number = len(self._channel_records) + 1
+        record = _encoded(records.Channel(number, topic, "cdr", dict(metadata), schema))
+        self._channel_records.append(record)
+        self._chunk.put(record)
+        return Channel(number, self._chunk)
 
     def attach(self, name: str, media_type: str, data: bytes) -> None:
         """Add a file."""
@@ -84,7 +87,7 @@ class McapWriter:
             self._finish_chunk()
         self._put(_encoded(records.DataEnd(self._checksum)))
         start = self._written
-        groups = [_encoded(*group) for group in self._summary()]
+        groups = self._summary()
         offsets = []
         for group in groups:
             if group:
@@ -98,20 +101,21 @@ class McapWriter:
         self._put(_encoded(records.Footer(start, offset_start, checksum)))
         self._put(MAGIC)
 
-    def _summary(self) -> list[list[records.McapRecord]]:
+    def _summary(self) -> list[bytes]:
+        """Its groups of records."""
         statistics = records.Statistics(
             attachment_count=len(self._attachments),
-            channel_count=len(self._channels),
+            channel_count=len(self._channel_records),
             channel_message_counts=dict(sorted(self._counts.items())),
             chunk_count=len(self._chunks),
             message_count=self._counts.total(),
             message_end_time=max((c.message_end_time for c in self._chunks), default=0),
             message_start_time=min((c.message_start_time for c in self._chunks), default=0),
             metadata_count=len(self._notes),
-            schema_count=len(self._schemas),
+            schema_count=len(self._schema_records),
         )
-        groups = [self._schemas.values(), self._channels, [statistics], self._chunks, self._attachments, self._notes]
-        return [list(group) for group in groups]
+        told = b"".join(self._schema_records), b"".join(self._channel_records), _encoded(statistics)
+        return [*told, _encoded(*self._chunks), _encoded(*self._attachments), _encoded(*self._notes)]
 
     def _finish_chunk(self) -> None:
         content, (start, end) = self._chunk.content(), self._chunk.span()

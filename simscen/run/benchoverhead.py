@@ -11,9 +11,12 @@ from resource import RUSAGE_CHILDREN, getrusage
 from tempfile import TemporaryDirectory
 
 from simscen.core.result import RunKey
+from simscen.core.trace import Moment
 from simscen.loading.scenario import load_scenario
+from simscen.run.agent import Log
 from simscen.run.bench import PATROL, SEED, Tell, nobody
 from simscen.run.figure import Figure, Figures
+from simscen.run.lockstep import Rig
 from simscen.run.outfolder import run_folder
 from simscen.run.prepare import prepare
 from simscen.run.process.jobs import Job, ProcessEnd
@@ -30,12 +33,14 @@ MILLISECONDS, MEGABYTES = "ms", "MB"
 class Overhead:
     """Each of several rounds: CPU ms but where it says wall, MB.
 
-    `run`: assembling, log and verdicts of a run in this process. `process`: the same as a session does it, from the
-    fork on, with its picture; `wall` is how long that takes, `memory` the most that its process has used. `preparing`:
-    world, map and ways, once for all runs. `start`: importing the engines, once a session. `validate`: the command.
+    `run`: a run of SHORT in this process. `beyond`: what of that lies outside of its beats: assembling, the log's
+    beginning and end, verdicts. `process`: the same run as a session does it, from the fork on, with its picture;
+    `wall` is how long that takes, `memory` the most that its process has used. `preparing`: world, map and ways, once
+    for all runs. `start`: importing the engines, once a session. `validate`: the command.
     """
 
     run: tuple[float, ...]
+    beyond: tuple[float, ...]
     process: tuple[float, ...]
     wall: tuple[float, ...]
     memory: tuple[float, ...]
@@ -47,7 +52,8 @@ class Overhead:
     def figures(self) -> Figures:
         """Their medians."""
         return {
-            "a run beyond its simulation": Figure.of(self.run, MILLISECONDS),
+            f"a run of {SHORT} s": Figure.of(self.run, MILLISECONDS),
+            "of that beyond its simulation": Figure.of(self.beyond, MILLISECONDS),
             "the same as a process": Figure.of(self.process, MILLISECONDS),
             "the same as a process, wall time": Figure.of(self.wall, MILLISECONDS),
             "preparing a scenario": Figure.of(self.preparing, MILLISECONDS),
@@ -55,6 +61,24 @@ class Overhead:
             "simscen validate": Figure.of(self.validate, MILLISECONDS),
             "memory of a worker": Figure.of(self.memory, MEGABYTES),
         }
+
+
+class _Beats:
+    """CPU ms that a run takes from its first beat to its last: its simulation, with the first plan."""
+
+    def attach(self, rig: Rig, own: Sequence[Log]) -> Sequence[Log]:
+        """The run begins."""
+        self.begun = self.ended = time.process_time()
+        return (self,)
+
+    def append(self, moment: Moment) -> None:
+        """Another beat has passed."""
+        self.ended = time.process_time()
+
+    @property
+    def took(self) -> float:
+        """Of the last run."""
+        return 1e3 * (self.ended - self.begun)
 
 
 def measure_overhead(rounds: int, entry: Sequence[str], tell: Tell = nobody) -> Overhead:
@@ -66,12 +90,14 @@ def measure_overhead(rounds: int, entry: Sequence[str], tell: Tell = nobody) -> 
         prepared = prepare(loaded)
         log = Path(folder, "run.mcap")
 
+        beats = _Beats()
+
         def run() -> object:
             log.unlink(missing_ok=True)
-            return simulate(prepared, SEED, log=log)
+            return simulate(prepared, SEED, log=log, attach=beats.attach)
 
         run()
-        whole = [_cpu(run) for _ in range(rounds)]
+        each = [(_cpu(run), beats.took) for _ in range(rounds)]
         keys = [RunKey(loaded.id, seed + 1) for seed in range(rounds + 1)]
         jobs = [Job(n, loaded, key, run_folder(Path(folder), key), WALL_LIMIT) for n, key in enumerate(keys)]
         ends = [
@@ -81,7 +107,8 @@ def measure_overhead(rounds: int, entry: Sequence[str], tell: Tell = nobody) -> 
         ]
         others = ends[1:]  # the first waits for the engines to be imported
         return Overhead(
-            run=tuple(whole),
+            run=tuple(whole for whole, _ in each),
+            beyond=tuple(whole - simulated for whole, simulated in each),
             process=tuple(1e3 * end.cpu for end in others),
             wall=tuple(1e3 * end.wall for end in others),
             memory=tuple(end.peak_bytes / 1e6 for end in others),

@@ -106,12 +106,20 @@ def _chain(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
 
 
 def _ring(radius: float, z: float) -> Array:
+    return _rings(np.array([radius]), np.array([z]))
+
+
+def _rings(radii: Array, heights: Array) -> Array:
+    """Points of level circles about the z axis, one after the other."""
     angles = np.arange(_CIRCLE) * (2 * math.pi / _CIRCLE)
-    return np.column_stack((radius * np.cos(angles), radius * np.sin(angles), np.full(_CIRCLE, z)))
+    points = np.empty((len(radii), _CIRCLE, 3))
+    points[:, :, 0], points[:, :, 1] = np.outer(radii, np.cos(angles)), np.outer(radii, np.sin(angles))
+    points[:, :, 2] = heights[:, None]
+    return points.reshape(-1, 3)
 
 
 def _ball(radii: tuple[float, float, float]) -> Array:
-    latitudes = np.linspace(-math.pi / 2, math.pi / 2, _CIRCLE // 2 + 1)
-    rings = [_ring(max(0.0, math.cos(latitude)), math.sin(latitude)) for latitude in latitudes]
-    result: Array = np.concatenate(rings) * radii
+    latitudes = np.linspace(-math.pi / 2, math.pi / 2, _CIRCLE // 2 + 1).tolist()
+    rings = [(max(0.0, math.cos(latitude)), math.sin(latitude)) for latitude in latitudes]
+    result: Array = _rings(*np.array(rings).T) * radii
     return result
