@@ -18,10 +18,10 @@ NEAR = 0.3
 
 def halted(trace: Trace, case: Case, tick: int) -> tuple[list[str], set[str]]:
     """Sentences on what is in the way of the goal that is driven to at `tick`; and the events that put it there."""
-    goal = _goal(trace, case, tick)
-    if goal is None:
+    story = _story(trace, case, tick)
+    if story is None:
         return [], set()
-    there = things(trace, tick)
+    goal, there = story.goal, things(trace, tick)
     lines, named = [*_walled_in(case, goal), *_held(trace, tick), *_touching(trace, tick)], set[str]()
     for told, events in (
         _occupied(trace, case, goal, there),
@@ -31,13 +31,13 @@ def halted(trace: Trace, case: Case, tick: int) -> tuple[list[str], set[str]]:
         if "" in events or not events <= named:  # of what an event brought, one sentence is enough
             lines += told
             named |= events
-    return lines, named
+    return lines or _given_up(trace, story, tick), named
 
 
-def _goal(trace: Trace, case: Case, tick: int) -> Goal | None:
-    """The goal that the robot was given last by `tick`, as long as it is wanted."""
+def _story(trace: Trace, case: Case, tick: int) -> GoalStory | None:
+    """What became of the goal that the robot was given last by `tick`, as long as it is wanted."""
     begun = [story for story in stories(trace, case) if began(story) <= tick]
-    return begun[-1].goal if begun and not _over(begun[-1], tick) else None
+    return begun[-1] if begun and not _over(begun[-1], tick) else None
 
 
 def _over(story: GoalStory, tick: int) -> bool:
@@ -65,6 +65,16 @@ def _held(trace: Trace, tick: int) -> list[str]:
         for event in last
         if event.kind == EventKind.ROBOT_HELD
     ]
+
+
+def _given_up(trace: Trace, story: GoalStory, tick: int) -> list[str]:
+    """What its own stack said when it gave the goal up, and what it had tried."""
+    end = story.end
+    message = end.data.get("message") if end is not None and end.tick <= tick else None
+    if not message:
+        return []
+    tried = [e.name for e in trace.of_kind(EventKind.RECOVERY_STARTED) if began(story) <= e.tick <= tick]
+    return [f"it gave up and said: {message}" + (f"; {', '.join(tried)} had not helped" if tried else "")]
 
 
 def _touching(trace: Trace, tick: int) -> list[str]:

@@ -129,3 +129,15 @@ def test_what_its_own_stack_waits_for_is_named_while_it_does():
     (line,) = why("goals_reached", [held])
     assert line == "why: its collision monitor holds it, as it said at t = 2.00 s: scans of lidar `lidar` come late"
     assert why("goals_reached", [held, [4, "robot.released", "collision_monitor"]]) == []
+
+
+def test_where_nothing_else_is_known_its_stack_is_quoted_with_what_it_had_tried():
+    said = {"error_name": "PATIENCE_EXCEEDED", "message": "no room to turn"}
+    given_up = [[0, "goal.accepted", "study"], [5, "recovery.started", "spin", {}], [6, "recovery.started", "wait", {}]]
+    given_up.append([8, "goal.failed", "study", said])
+
+    def told(*things):
+        return causes("result", 2400, sketch({**STANDS, "events": [*given_up, *things]}), sketch_case(CASE))
+
+    assert told() == ["why: it gave up and said: no room to turn; spin, wait had not helped"]
+    assert "said" not in "".join(told(*box(1, "crate", 5, 0, 0.6, 2.0, "crate falls")))
