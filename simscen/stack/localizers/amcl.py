@@ -64,7 +64,8 @@ class AmclLocalizer:
         """Start over: particles around the estimate's pose, or over all free space when it has none."""
         self._odometry = OdometryHistory(self._tick_rate)
         self._filter.begin(estimate)
-        self._finder = None if self._search is None else Finder(*self._search, estimate.pose is not None)
+        settling = self._spec.settling_distance
+        self._finder = None if self._search is None else Finder(*self._search, estimate, settling)
         if estimate.pose is None:
             pose, covariance = summarise(self._filter.particles)
         else:

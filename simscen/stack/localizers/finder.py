@@ -5,9 +5,11 @@ from collections import deque
 
 import numpy as np
 
+from simscen.core.belief import Estimate
 from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.core.sensing import Scan
-from simscen.stack.localizers.global_search import GlobalSearch, View
+from simscen.stack.localizers.clusters import errors_about
+from simscen.stack.localizers.global_search import APART, GlobalSearch, View
 from simscen.stack.localizers.map_trust import MapTrust
 from simscen.stack.localizers.scan_memory import ScanMemory, travelled
 
@@ -28,8 +30,13 @@ CHECKED, FITS = 1.5, 0.85
 fits less than that."""
 NEAR_GOOD, NEAR_BETTER = 0.82, 0.04
 """It is moved to a place nearby that fits so, so much better than where it is, and by PLAIN better than any other."""
+LIKELIER = 1.5
+"""While a told place counts: the logarithm of how many times likelier another place nearby must be for a robot to be
+moved there, by what was told and all that was seen since."""
 AGREE = 0.7, 0.3
 """m, rad: two searches agree that find places so near to each other, the way between them taken off."""
+AGREED = 2.0
+"""m, turns included, over which searches must agree."""
 ASTRAY, BACK_GOOD, BACK_PLAIN = 20, 0.9, 0.1
 """So many scans that correct without a beam that the map could tell anything of, and a robot is sought on the map, too:
 what it saw since says it is back if it fits so, and by so much better than anywhere else, in two searches that agree.
@@ -48,14 +55,16 @@ class Finder:
     that was told a place is moved only by what is plainly better.
     """
 
-    def __init__(self, search: GlobalSearch, trust: MapTrust, known: bool) -> None:
+    def __init__(self, search: GlobalSearch, trust: MapTrust, told: Estimate, settling: float) -> None:
+        """What was `told` counts for the first `settling` m, turns included."""
         self._search, self._trust, self._memory = search, trust, ScanMemory()
-        self._known = known
+        self._known, self._told, self._settling = told.pose is not None, told, settling
+        self._begun: Pose2 | None = None
         self._fits: deque[float] = deque(maxlen=RECENT)
         self._wait, self._driven, self._unchecked, self._doubted = 0.0, 0.0, 0.0, False
         self._last: Pose2 | None = None
         self._suspected: tuple[Pose2, Pose2] | None = None
-        self._astray = 0
+        self._since, self._astray = 0.0, 0
 
     def places(
         self, scan: Scan, base: Pose2, believed: Pose2, limits: tuple[float, float]
@@ -68,10 +77,16 @@ class Finder:
         if self._last is not None:
             self._driven += (moved := travelled(self._last, base))
             self._unchecked += moved
+            self._settling -= moved
+            self._since += moved
+        else:
+            self._begun = base
         self._last = base
         if not len(ends):
             return None
         here = np.array([believed])
+        if self._settling > 0 and (settled := self._as_told(base, here)) is not None:
+            return settled
         if (fit := self._trust.fit(here, ends, TELLING)) is not None:
             self._fits.append(fit)
         self._astray = self._astray + 1 if fit is None else 0
@@ -82,6 +97,33 @@ class Finder:
         if self._driven < self._wait:
             return None
         return self._sought(self._memory.about(base), base, here)
+
+    def _as_told(self, base: Pose2, here: Array) -> tuple[Array, Array] | None:
+        """Where the robot is by what it was told and all that it saw since, where particles settled elsewhere.
+
+        A scan of a room whose furniture was moved fits another place of it, and the next scans, which show the same,
+        confirm that. Seen together, and with the ways to what was seen, which must be free, they often do not.
+        """
+        if self._told.pose is None or self._begun is None:
+            return None
+        view = self._memory.about(base)
+        if not len(view.ends) or (fit := self._search.fit(here, view))[0] > FITS:
+            return None
+        told = np.array(self._told.pose.compose(self._begun.between(base)))
+        poses, fits = self._search.near(view, told)
+        likely, own = self._likely(poses, fits, told), self._likely(here, fit, told)[0]
+        best = int(likely.argmax())
+        off = errors_about(here[0], poses[best : best + 1])[0]
+        if likely[best] - own < LIKELIER or (math.hypot(off[0], off[1]) < APART[0] and abs(off[2]) < APART[1]):
+            return None
+        self._fits.clear()
+        return poses[best : best + 1], np.ones(1)
+
+    def _likely(self, poses: Array, fits: Array, told: Array) -> Array:
+        """The logarithm of how likely `poses` (n, 3) are that fit so: (n,), but for a constant."""
+        std = np.maximum(self._told.std, AROUND)
+        likely: Array = fits / SHARPNESS - 0.5 * np.square(errors_about(told, poses) / std).sum(axis=1)
+        return likely
 
     def _nearby(self, base: Pose2, here: Array) -> tuple[Array, Array] | None:
         """Where the robot is that is only somewhat off: it was told so, or drifted where there was no map."""
@@ -120,9 +162,10 @@ class Finder:
             return poses, shares / shares.sum()
         if plain and fits[0] > good and fits[0] > self._search.fit(here, view)[0] + BETTER:
             found = Pose2(*poses[0].tolist())
-            agreed = self._suspected is not None and _agree(*self._suspected, found, base)
-            self._suspected = None if agreed else (found, base)
-            if agreed:
+            if self._suspected is None or not _agree(*self._suspected, found, base):
+                self._suspected, self._since = (found, base), 0.0
+            elif self._since >= AGREED:
+                self._suspected = None
                 self._fits.clear()
                 self._astray = 0
                 return poses[:1], np.ones(1)

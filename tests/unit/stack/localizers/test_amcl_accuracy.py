@@ -54,10 +54,11 @@ def test_people_moved_furniture_and_slipping_wheels_do_not_make_recovery_throw_a
 def test_recovery_does_not_take_a_good_cloud_apart_with_what_it_puts_anywhere_at_once(world: str) -> None:
     """Errors of 5 and 16 m when a share as large as the averages asked for went anywhere with each scan.
 
-    Of eight seeds the worst is now and then 2.3 m off for a beat, whatever numbers are drawn.
+    People and moved things alone make one drive of some six 2.3 m wrong for a few seconds, whatever numbers are drawn.
     """
-    (drive,) = (one for one in drives("crowded", "likelihood_field", [12], [world]))
-    assert off(drive).max() < 3.0
+    largest = sorted(off(drive).max() for drive in drives("crowded", "likelihood_field", [12, 13, 14], [world]))
+    assert largest[1] < 1.0
+    assert largest[2] < 3.0
 
 
 def test_a_kidnapped_robot_finds_itself_with_recovery_and_not_without() -> None:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from simscen.core.belief import Estimate
 from simscen.core.geometry import Array, Pose2
 from simscen.stack.localizers.distance_field import beyond_the_map
 from simscen.stack.localizers.finder import Finder
@@ -15,12 +16,12 @@ START = Pose2(-2.5, -1.8, 0.6)
 OFF = Pose2(0.4, -0.3, 0.15)
 
 
-def found(off: Pose2, apart: float = 0.25) -> list[Array]:
-    """Where a robot is put that drives 2 m, with a scan each so many, and believes to be `off`."""
+def found(off: Pose2, apart: float = 0.25, way: float = 2.0, settling: float = 0.0) -> list[Array]:
+    """Where a robot is put that was told START, drives some `way`, scans each so many m and believes to be `off`."""
     trust = MapTrust(obstacle_field(grid(), 2.0), beyond_the_map(grid()).ravel(), 0.45, 0.8)
-    finder, places = Finder(GlobalSearch(grid()), trust, known=True), []
-    for way in np.arange(0.0, 2.0, apart).tolist():
-        base = Pose2(way, 0.0, 0.0)
+    finder, places = Finder(GlobalSearch(grid()), trust, Estimate(START), settling), []
+    for driven in np.arange(0.0, way, apart).tolist():
+        base = Pose2(driven, 0.0, 0.0)
         pose = START.compose(base)
         ranges = cast(np.array([pose]), -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS))[0]
         put = finder.places(scan(ranges), base, pose.compose(off), (0.0, 100.0))
@@ -41,6 +42,25 @@ def test_a_robot_that_knows_its_place_is_left_there(off: Pose2) -> None:
 
 
 def test_a_robot_that_believes_to_be_off_the_map_is_found_when_it_is_back() -> None:
-    (place,) = found(Pose2(40.0, 3.0, 0.7), apart=0.05)
+    (place,) = found(Pose2(40.0, 3.0, 0.7), apart=0.05, way=3.5)
     assert np.hypot(place[0], place[1]) < 0.1
     assert abs(place[2]) < 0.03
+
+
+def test_particles_that_settle_elsewhere_than_the_robot_was_told_are_put_back_if_what_it_saw_fits_there() -> None:
+    """Until 1.5 m were driven nobody asked, and then only for a place that fits 0.82."""
+    place = found(Pose2(0.9, -0.5, 0.1), way=0.3, settling=4.0)[0]
+    assert np.hypot(place[0], place[1]) < 0.15
+    assert abs(place[2]) < 0.05
+
+
+def test_what_was_told_counts_for_the_settling_distance_only() -> None:
+    assert found(Pose2(0.9, -0.5, 0.1), way=0.3, settling=0.0) == []
+
+
+def test_a_robot_is_moved_far_only_when_searches_agree_over_two_metres() -> None:
+    """Within 0.7 m, on a floor that was rebuilt, what was seen fitted a room 11 m away by chance."""
+    away = Pose2(3.0, 2.0, 2.5)
+    assert found(away, way=3.0) == []
+    (place,) = found(away, way=4.25)[:1]
+    assert np.hypot(place[0], place[1]) < 0.1
