@@ -30,7 +30,7 @@ CHECKED, FITS = 1.5, 0.85
 fits less than that."""
 NEAR_GOOD, NEAR_BETTER = 0.82, 0.04
 """It is moved to a place nearby that fits so, so much better than where it is, and by PLAIN better than any other."""
-LIKELIER = 1.5
+LIKELIER = 3.0
 """While a told place counts: the logarithm of how many times likelier another place nearby must be for a robot to be
 moved there, by what was told and all that was seen since."""
 AGREE = 0.7, 0.3
@@ -104,10 +104,12 @@ class Finder:
         A scan of a room whose furniture was moved fits another place of it, and the next scans, which show the same,
         confirm that. Seen together, and with the ways to what was seen, which must be free, they often do not.
         """
-        if self._told.pose is None or self._begun is None:
+        if self._told.pose is None or self._begun is None or not self._memory.length:
             return None
         view = self._memory.about(base)
-        if not len(view.ends) or (fit := self._search.fit(here, view))[0] > FITS:
+        if not len(view.ends) or self._trust.fit(here, view.ends, TELLING) is None:
+            return None
+        if (fit := self._search.fit(here, view))[0] > FITS:
             return None
         told = np.array(self._told.pose.compose(self._begun.between(base)))
         poses, fits = self._search.near(view, told)
