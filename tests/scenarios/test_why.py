@@ -59,7 +59,7 @@ faults: [{sensor: lidar, off: {}, when: {time: 4 s}}]
 pass: [{goals_reached: {}}]
 """,
         "goals_reached",
-        "meanwhile: lidar.off was at work since t = 4.00 s, for ",
+        "why: its collision monitor holds it, as it said at t = 5.25 s: lidar `lidar` has been silent for 1.35 s; ",
     ),
 }
 

@@ -6,8 +6,9 @@ import numpy as np
 
 from simscen.core.case import Case
 from simscen.core.events import EventKind
-from simscen.core.navigation import Goal
+from simscen.core.navigation import ErrorCode, Goal
 from simscen.core.trace import Trace
+from simscen.criteria.codes import code_of
 from simscen.criteria.moments import GoalStory, began, stories
 from simscen.judge.why.blocked import blocked
 from simscen.judge.why.things import Thing, things
@@ -57,8 +58,12 @@ def _walled_in(case: Case, goal: Goal) -> list[str]:
 
 
 def _held(trace: Trace, tick: int) -> list[str]:
-    """What its own stack says that it waits for."""
-    last = [event for event in trace.of_kind(EventKind.ROBOT_HELD, EventKind.ROBOT_RELEASED) if event.tick <= tick][-1:]
+    """What its own stack says that it waits for; who gives a goal up no longer waits from then on."""
+    last = [
+        event
+        for event in trace.of_kind(EventKind.ROBOT_HELD, EventKind.ROBOT_RELEASED)
+        if event.tick <= tick - (event.kind == EventKind.ROBOT_RELEASED)
+    ][-1:]
     return [
         f"its {event.name.replace('_', ' ')} holds it, as it said at t = {trace.seconds(event.tick):.2f} s: "
         f"{event.data.get('message', '')}"
@@ -70,7 +75,9 @@ def _held(trace: Trace, tick: int) -> list[str]:
 def _given_up(trace: Trace, story: GoalStory, tick: int) -> list[str]:
     """What its own stack said when it gave the goal up, and what it had tried."""
     end = story.end
-    message = end.data.get("message") if end is not None and end.tick <= tick else None
+    if end is None or end.tick > tick or code_of(end) == ErrorCode.NAVIGATE_TIMEOUT.name:  # that only says when
+        return []
+    message = end.data.get("message")
     if not message:
         return []
     tried = [e.name for e in trace.of_kind(EventKind.RECOVERY_STARTED) if began(story) <= e.tick <= tick]

@@ -15,7 +15,10 @@ from simscen.stack.tasks import Task
 
 LARGEST_CODE = 65_535
 LONGEST_TEXT = 4096
-_FREE = {kind.value for kind in EventKind if kind.value.split(".")[0] in ("plan", "recovery")}
+_FREE = {kind.value for kind in EventKind if kind.value.split(".")[0] in ("plan", "recovery")} | {
+    EventKind.ROBOT_HELD.value,
+    EventKind.ROBOT_RELEASED.value,
+}
 """Kinds that a stack may tell of as it likes."""
 
 
