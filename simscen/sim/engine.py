@@ -227,8 +227,11 @@ def wake(client: int, number: int) -> None:
 
 
 def fixed(client: int, shape: int) -> int:
-    """A body that never moves."""
-    return body(client, 0.0, shape, Pose3(), ((0.0, 0.0, 0.0), Pose3()), 1.0)
+    """A body that never moves; it sleeps, for Bullet looks anew at what lies upon something that is awake."""
+    number = body(client, 0.0, shape, Pose3(), ((0.0, 0.0, 0.0), Pose3()), 1.0)
+    sleeps = pybullet.ACTIVATION_STATE_ENABLE_SLEEPING
+    pybullet.changeDynamics(number, -1, activationState=sleeps, physicsClientId=client)
+    return number
 
 
 def _primitive(shape: Shape) -> tuple[int, Sequence[float], float, float]:
