@@ -25,6 +25,7 @@ from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.footprint import Footprint
 from simscen.stack.goal_checker import AT_REST, SimpleGoalChecker
 from simscen.stack.lookahead import time_free
+from simscen.stack.prediction.moving import Moving
 from simscen.stack.progress_checker import ProgressChecker
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel, Surroundings
 from simscen.stack.recovery import RoundRobin
@@ -357,3 +358,23 @@ def test_a_task_says_how_it_ended_with_the_code_of_the_last_failure() -> None:
         (9, "navigation.ended", "FAILED"),
     ]
     assert told[-1].data == {"error_code": 206, "error_name": "GOAL_OCCUPIED"}
+
+
+@pytest.mark.parametrize("robot", [round_robot(), box_robot(1.0, 0.3)])
+def test_the_monitor_brakes_for_what_moves_wherever_the_whole_look_at_the_hull_would(
+    robot: RobotModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hasty, thorough = (CollisionMonitor(MonitorSpec(), robot, (), RATE) for _ in range(2))
+    monkeypatch.setattr(thorough, "_comes_near", lambda *_: True)
+    chance, braked, spared = np.random.default_rng(4), 0, 0
+    for _ in range(400):
+        places, speeds = chance.normal(0.0, 1.2, (2, 2)), chance.normal(0.0, 0.7, (2, 2))
+        moving = Moving(places, speeds, np.array((0.3, 0.1)), np.zeros((2, 4, 4)), 0.0)
+        wanted = Twist(*chance.normal(0.0, (0.5, 0.1, 0.8)).tolist())
+        hasty.on_moving(moving)
+        thorough.on_moving(moving)
+        assert hasty.allow(wanted, Pose2(0.0, 0.0)) == (allowed := thorough.allow(wanted, Pose2(0.0, 0.0)))
+        braked += allowed != wanted
+        spared += not hasty._comes_near(wanted, MonitorSpec().time_before_collision)
+    assert braked > 10
+    assert spared > 100
