@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
+from simscen.core.oftenmade import often_made
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,7 +18,7 @@ class Estimate:
     std: tuple[float, float, float] = (0.5, 0.5, 0.2618)
 
 
-@dataclass(frozen=True, eq=False)
+@often_made(eq=False)
 class Belief:
     """A localizer's answer: `pose` in the map frame and its covariance (3, 3) over (x, y, yaw).
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import Enum, IntEnum
 from typing import Literal
 
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
+from simscen.core.oftenmade import often_made
 
 RecoveryBehavior = Literal["clear_costmap", "spin", "wait", "backup"]
 """The behaviours of a recovery, with Nav2's names."""
@@ -69,7 +70,7 @@ class TaskResult(str, Enum):
     FAILED = "FAILED"
 
 
-@dataclass(frozen=True)
+@often_made()
 class Goal:
     """A pose to reach in the map frame, within tolerances (m, rad), in at most `timeout` simulated seconds.
 
@@ -90,7 +91,7 @@ class Goal:
         return Goal(self.name, pose, self.xy_tolerance, self.yaw_tolerance, self.timeout, self.via, self.wait)
 
 
-@dataclass(frozen=True, eq=False)
+@often_made(eq=False)
 class Path:
     """A planned path: `points` (n, 3) x, y, yaw in the map frame, made at `tick`."""
 

@@ -46,7 +46,7 @@ class CollisionMonitor:
         """For how long it may allow nothing until that is a failure."""
         self._seen, self._oldest = dict.fromkeys(lidars, 0), 0
         self._scans: dict[str, Seen] = {}
-        self._moving = nothing()
+        self._moving, self._moves = nothing(), False
         corners = np.array(robot.footprint, dtype=np.float64)
         ends = np.roll(corners, -1, axis=0)
         normal = np.column_stack((ends[:, 1] - corners[:, 1], corners[:, 0] - ends[:, 0]))
@@ -75,7 +75,7 @@ class CollisionMonitor:
 
     def on_moving(self, moving: Moving) -> None:
         """What moves around the robot now, in its base frame; beams that hit it are left to this."""
-        self._moving = moving
+        self._moving, self._moves = moving, len(moving) > 0
 
     def silent(self, tick: int) -> bool:
         """Whether a lidar has not been heard for `source_timeout`."""
@@ -97,19 +97,20 @@ class CollisionMonitor:
         """The command, slowed down so that the first contact is at least `time_before_collision` away."""
         if not self._spec.enabled or wanted == STOP:
             return wanted
-        horizon = self._spec.time_before_collision
-        scale = 1.0
+        free = horizon = self._spec.time_before_collision
         for seen in self._scans.values():
-            scale = min(scale, self._time_free(seen, wanted, odometry, horizon) / horizon)
-        if len(self._moving) and self._comes_near(wanted, horizon):
-            scale = min(scale, self._time_unmet(wanted, horizon) / horizon)
-        if scale >= 1.0:
+            free = min(free, self._time_free(seen, wanted, odometry, horizon))
+        if self._moves and self._comes_near(wanted, horizon):
+            free = min(free, self._time_unmet(wanted, horizon))
+        if free >= horizon:
             return wanted
+        scale = free / horizon
         return Twist(wanted.vx * scale, wanted.vy * scale, wanted.wz * scale) if scale > 0.0 else STOP
 
     def _time_free(self, seen: "Seen", wanted: Twist, odometry: Pose2, horizon: float) -> float:
         """Seconds until a point of the scan would be within the stop margin; points it moves away from are no harm."""
-        reach = self._near + math.hypot(wanted.vx, wanted.vy) * horizon + seen.odometry.distance(odometry)
+        (vx, vy, _), (x, y, _), (then_x, then_y, _) = wanted, odometry, seen.odometry
+        reach = self._near + math.hypot(vx, vy) * horizon + math.hypot(x - then_x, y - then_y)
         if seen.nearest > reach:
             return horizon
         moved = seen.odometry.between(odometry)

@@ -22,6 +22,8 @@ class Commands:
         self._asked, self._free_at = 0, 0
         self.latency = latency[0]
         """Ticks that the controller takes for a command."""
+        self.late = any(latency)
+        """Whether there may be something to do between two commands of the controller."""
         self.sent = STOP
         """What is sent to the base now."""
 

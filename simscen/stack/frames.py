@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from simscen.core.geometry import Array, Pose2, wrap, wrap_array
+from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.core.world import Polygon
 
 
@@ -30,8 +30,10 @@ class Frames(NamedTuple):
 
     def moved(self, odom_from_map: Pose2, reach: float) -> float:
         """Metres by which what lies up to `reach` metres from the robot moved in odom since this was the correction."""
-        before = odom_from_map.compose(self.pose)
-        return before.distance(self.odometry) + reach * abs(wrap(before.yaw - self.odometry.yaw))
+        (x, y, yaw), (mapped_x, mapped_y, mapped_yaw), (now_x, now_y, now_yaw) = odom_from_map, self.pose, self.odometry
+        c, s = math.cos(yaw), math.sin(yaw)
+        dx, dy = x + c * mapped_x - s * mapped_y - now_x, y + s * mapped_x + c * mapped_y - now_y
+        return math.hypot(dx, dy) + reach * abs(math.remainder(yaw + mapped_yaw - now_yaw, math.tau))
 
 
 def placed(frame: Pose2, poses: Array) -> Array:

@@ -4,6 +4,8 @@ Nav2 accepts at the very edge of the tolerance, which turns a localisation error
 Here the robot goes on until it is well inside, or until it stands anywhere inside.
 """
 
+import math
+
 from simscen.core.geometry import Pose2, wrap
 from simscen.core.motion import Twist
 from simscen.core.navigation import Goal
@@ -33,6 +35,7 @@ class SimpleGoalChecker:
         standing = abs(twist.vx) + abs(twist.vy) < STANDING and abs(twist.wz) < 5 * STANDING
         self._stood = self._stood + 1 if standing else 0
         part = 1.0 if self._stood >= AT_REST else self._well_inside
-        there = goal.pose.distance(pose) <= part * goal.xy_tolerance
-        self._there = there or (self._stateful and self._there and goal.pose.distance(pose) <= goal.xy_tolerance)
+        away = math.hypot(pose.x - goal.pose.x, pose.y - goal.pose.y)
+        there = away <= part * goal.xy_tolerance
+        self._there = there or (self._stateful and self._there and away <= goal.xy_tolerance)
         return self._there and abs(wrap(goal.pose.yaw - pose.yaw)) <= part * goal.yaw_tolerance

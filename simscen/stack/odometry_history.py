@@ -18,10 +18,10 @@ def believable(values: tuple[float, float, float]) -> bool:
 
 
 class OdometryHistory:
-    """The poses of one odometry of the last KEPT seconds, by tick."""
+    """The poses of one odometry of the last KEPT seconds, by tick; what is older is thrown away a second at a time."""
 
     def __init__(self, tick_rate: int) -> None:
-        self._span = KEPT * tick_rate
+        self._span, self._most = KEPT * tick_rate, (KEPT + 1) * tick_rate
         self._ticks: list[int] = []
         self._poses: list[Pose2] = []
         self._newest: float = -math.inf
@@ -33,16 +33,22 @@ class OdometryHistory:
 
     def add(self, tick: int, pose: Pose2) -> bool:
         """Take a reading in; False when it is of no use: not a place, or not newer than the last one."""
-        if tick <= self._newest or not believable(pose):
+        x, y, yaw = pose
+        here = -_LARGEST < x < _LARGEST and -_LARGEST < y < _LARGEST and -_LARGEST < yaw < _LARGEST
+        if tick <= self._newest or not here:
             return False
-        ticks, oldest = self._ticks, tick - self._span
+        ticks = self._ticks
         ticks.append(tick)
         self._poses.append(pose)
         self._newest, self.now = tick, pose
-        if ticks[0] < oldest:
-            old = bisect_left(ticks, oldest)
+        if ticks[0] < tick - self._most:
+            old = self._first()
             del ticks[:old], self._poses[:old]
         return True
+
+    def _first(self) -> int:
+        """Where what counts still begins."""
+        return bisect_left(self._ticks, self._newest - self._span)
 
     def reaches(self, tick: int) -> bool:
         """Whether there is odometry at `tick` or later."""
@@ -52,16 +58,20 @@ class OdometryHistory:
         """The newest pose up to `tick`, for who cannot wait for the next; the oldest known before that."""
         if tick >= self._newest:
             return self.now
-        return self._poses[max(0, bisect_right(self._ticks, tick) - 1)]
+        first = self._first()
+        return self._poses[max(first, bisect_right(self._ticks, tick, first) - 1)]
 
     def at(self, tick: int) -> Pose2 | None:
         """The pose at `tick`, interpolated along a constant twist's chord; None before the oldest, after the newest."""
-        after = bisect_left(self._ticks, tick)
+        if tick == self._newest:
+            return self.now
+        first = self._first()
+        after = bisect_left(self._ticks, tick, first)
         if after == len(self._ticks):
             return None
         if self._ticks[after] == tick:
             return self._poses[after]
-        if after == 0:
+        if after == first:
             return None
         share = (tick - self._ticks[after - 1]) / (self._ticks[after] - self._ticks[after - 1])
         before = self._poses[after - 1]

@@ -8,7 +8,7 @@ Promises are written as *given … then …* and tested in tests/contracts on ev
 """
 
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +19,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.grid import OccupancyGrid
 from simscen.core.motion import Twist
 from simscen.core.navigation import ErrorCode, Goal, Path
+from simscen.core.oftenmade import often_made
 from simscen.core.sensing import Imu, Odometry, Readings, Scan
 from simscen.core.trace import Decision
 from simscen.core.world import Polygon
@@ -99,11 +100,24 @@ class Localizer(Protocol):
         ...
 
 
+@runtime_checkable
+class TellsPose(Protocol):
+    """What a localizer that ships can do besides: say where the robot is, and not how sure that is.
+
+    That is asked at each step of the controller, and half as often published.
+    """
+
+    @property
+    def pose(self) -> Pose2:
+        """That of the belief, to the last digit."""
+        ...
+
+
 LETHAL = 254
 """nav2_costmap_2d's cost of an obstacle."""
 
 
-@dataclass(frozen=True, eq=False)
+@often_made(eq=False)
 class CostmapView:
     """A costmap at a moment: the global one in the map frame, which planners see, or the local one in the odom frame.
 

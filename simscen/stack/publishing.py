@@ -24,6 +24,11 @@ CELLS_A_SECOND = 125_000
 _PUBLISHED = np.array([0, *(1 + 97 * (cost - 1) // 251 for cost in range(1, 253)), 99, 100, UNKNOWN], dtype=np.int8)
 
 
+Published = tuple[Path | None, Path | None, tuple[CostGrid, ...]]
+"""The plan, the local plan and costmaps, where they are new."""
+NOTHING_NEW: Published = (None, None, ())
+
+
 class Publishing:
     """Picks what is new."""
 
@@ -31,39 +36,37 @@ class Publishing:
         self._localizer, self._controller, self._tick_rate = localizer, controller, tick_rate
         self._belief_period = math.ceil(tick_rate / BELIEF_RATE)
         self._local_plan_period = math.ceil(tick_rate / LOCAL_PLAN_RATE)
-        self._belief_told = -self._belief_period
-        self._local_plan_told = 0
+        self.belief_due = 0
+        """The tick from which on the belief is told without a scan."""
+        self._local_plan_due = self._local_plan_period
         self._plan: Path | None = None
-        self._driving = False
         self._wide, self._near = _Drawn("global", "map", GLOBAL_RATE), _Drawn("local", "odom", LOCAL_RATE)
 
-    def belief(self, tick: int, scanned: bool) -> Belief | None:
-        """The belief with each scan, and without one at BELIEF_RATE."""
-        if not scanned and tick - self._belief_told < self._belief_period:
-            return None
-        self._belief_told = tick
+    def belief(self, tick: int) -> Belief:
+        """The belief; asked with each scan, and without one at BELIEF_RATE."""
+        self.belief_due = tick + self._belief_period
         return self._localizer.belief
 
-    def plan(self, plan: Path | None) -> Path | None:
-        """The plan, once."""
-        self._driving = plan is not None
-        if plan is self._plan or plan is None:
-            return None
+    def news(self, tick: int, frames: Frames, plan: Path | None, costmaps: Costmaps) -> Published:
+        """What is new after a step of the controller, which follows this plan."""
+        local_plan, drawn = None, tuple[CostGrid, ...]()
+        if plan is not None and tick >= self._local_plan_due:
+            local_plan = self._driven(tick, frames)
+        if tick >= self._wide.due or tick >= self._near.due:
+            drawn = self._drawn(tick, costmaps)
+        if plan is None or plan is self._plan:
+            return None, local_plan, drawn
         self._plan = plan
-        return plan
+        return plan, local_plan, drawn
 
-    def local_plan(self, tick: int, frames: Frames) -> Path | None:
-        """What the controller expects to drive, in the map frame, while there is a plan to follow."""
-        if not self._driving or tick - self._local_plan_told < self._local_plan_period:
-            return None
-        self._local_plan_told = tick
+    def _driven(self, tick: int, frames: Frames) -> Path | None:
+        """What the controller expects to drive, in the map frame."""
+        self._local_plan_due = tick + self._local_plan_period
         plan = self._controller.local_plan
         return None if plan is None else Path(placed(frames.map_from_odom, plan.points), plan.tick)
 
-    def costmaps(self, tick: int, costmaps: Costmaps) -> tuple[CostGrid, ...]:
+    def _drawn(self, tick: int, costmaps: Costmaps) -> tuple[CostGrid, ...]:
         """Both costmaps, each at its rate and when it has changed."""
-        if tick < self._wide.due and tick < self._near.due:
-            return ()
         both = (self._wide, costmaps.wide), (self._near, costmaps.near)
         found = (one.published(tick, costmap.view, self._tick_rate) for one, costmap in both if tick >= one.due)
         return tuple(grid for grid in found if grid is not None)

@@ -9,7 +9,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.motion import STOP
 from simscen.core.navigation import ErrorCode, Goal, Path
 from simscen.core.sensing import Image, Imu, Odometry, Readings, Scan
-from simscen.core.trace import CostGrid, Decision
+from simscen.core.trace import Decision
 from simscen.core.zones import Zones
 from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.commands import Commands
@@ -19,8 +19,8 @@ from simscen.stack.localizers.ground_truth import TRUTH
 from simscen.stack.navigator import Navigator
 from simscen.stack.odometry_history import OdometryHistory, believable
 from simscen.stack.prediction.motion_prediction import MotionPrediction
-from simscen.stack.protocols import Controller, Localizer, NavigationFailure, Surroundings
-from simscen.stack.publishing import Publishing
+from simscen.stack.protocols import Controller, Localizer, NavigationFailure, Surroundings, TellsPose
+from simscen.stack.publishing import NOTHING_NEW, Published, Publishing
 from simscen.stack.standstill import Standstill
 from simscen.stack.tasks import Task
 from simscen.stack.underway import Underway
@@ -49,6 +49,7 @@ class ReferenceStack:
     ) -> None:
         self._speed_filter = SpeedFilter(surroundings)
         self._localizer, self._costmaps, self._controller = localizer, costmaps, controller
+        self._whereabouts = localizer if isinstance(localizer, TellsPose) else None
         self._navigator, self._task, self._commands, self._monitor = navigator, task, commands, monitor
         self._prediction = prediction
         self._tick_rate, self._lidars = surroundings.tick_rate, frozenset(surroundings.lidars)
@@ -115,29 +116,32 @@ class ReferenceStack:
 
     def decide(self, tick: int, readings: Readings) -> Decision:
         """Take the readings of this beat and say what to drive."""
-        self._tick = tick
+        self._tick, belief = tick, None
         scanned = self._take(tick, readings)
-        plan: Path | None = None
-        local_plan: Path | None = None
-        costmaps: tuple[CostGrid, ...] = ()
-        if controls := tick % self._control_period == 0:
-            frames = self._frames()
-            self._update_costmaps(tick, frames)
-            if not self._prediction.calm or self._moves:
-                self._foretell(tick, frames)
-            self._control(tick, frames)
-            plan = self._publishing.plan(self.plan)
-            local_plan = self._publishing.local_plan(tick, frames)
-            costmaps = self._publishing.costmaps(tick, self._costmaps)
-        self._commands.step(tick, self._odometry.now)
+        controls = tick % self._control_period == 0
+        plan, local_plan, costmaps = self._step(tick) if controls else NOTHING_NEW
+        if controls or self._commands.late:
+            self._commands.step(tick, self._odometry.now)
+        if scanned or (tick >= self._publishing.belief_due and (readings or controls)):
+            belief = self._publishing.belief(tick)
         sent = self._commands.sent
-        belief = self._publishing.belief(tick, scanned) if readings or controls else None
         if belief is None and plan is None and local_plan is None and not costmaps and not self._events:
             if sent is not self._nothing.command:
                 self._nothing = Decision(sent)
             return self._nothing
         events, self._events = tuple(self._events), []
-        return Decision(sent, belief, plan, local_plan, events, costmaps=costmaps)
+        return Decision(sent, belief, plan, local_plan, events, (), costmaps)
+
+    def _step(self, tick: int) -> Published:
+        """What is done at the controller's rate."""
+        where = self._whereabouts
+        pose = self._localizer.belief.pose if where is None else where.pose
+        frames = Frames(pose, self._odometry.now if self._odometry else pose)
+        self._update_costmaps(tick, frames)
+        if not self._prediction.calm or self._moves:
+            self._foretell(tick, frames)
+        self._control(tick, frames)
+        return self._publishing.news(tick, frames, self.plan, self._costmaps)
 
     def _take(self, tick: int, readings: Readings) -> bool:
         """Hand the readings on; whether there was a scan among them."""
@@ -183,11 +187,6 @@ class ReferenceStack:
             self._twist = reading.twist
             self._prediction.take(reading)
 
-    def _frames(self) -> Frames:
-        """Where the robot is now; a robot without odometry has its map for odom frame."""
-        pose = self._localizer.belief.pose
-        return Frames(pose, self._odometry.now if self._odometry else pose)
-
     def _update_costmaps(self, tick: int, frames: Frames) -> None:
         """Feed the newest scan of each sensor, not older than a costmap's own period, and honour new zones."""
         if self._zones is not None and self._costmaps.due(tick):
@@ -207,14 +206,14 @@ class ReferenceStack:
         """See to the goals, and to the command that is wanted."""
         if self._task.goal is None:
             self._events += self._task.next(tick)
-        self._pass(tick, frames.pose)
-        goal = self._task.goal
+        if (goal := self._task.goal) is not None and goal.via:
+            goal = self._pass(tick, frames.pose)
         if goal is None:
             self._stand(tick, frames.pose)
             return
         if self._prediction.stands:
             self._prediction.settle()
-        *via, last = goal, *self._task.ahead
+        *via, last = (goal, *self._task.ahead) if goal.via else (goal,)
         if self._navigator.goal is not last:
             self._navigator.pursue(last)
         self._navigator.via = tuple(via)
@@ -267,16 +266,17 @@ class ReferenceStack:
         elif not self._commands.busy(tick):
             self._commands.want(tick, command, self._commands.periods(tick))
 
-    def _pass(self, tick: int, pose: Pose2) -> None:
-        """Poses that the robot is near to are behind it.
+    def _pass(self, tick: int, pose: Pose2) -> Goal | None:
+        """Poses that the robot is near to are behind it; returns the goal that is not.
 
         Nav2's RemovePassedGoals: the way on is planned through the poses that remain.
         """
         while (goal := self._task.goal) is not None and goal.via:
             if pose.distance(goal.pose) > goal.xy_tolerance:
-                return
+                break
             self._events += self._task.passed(tick)
             self._events += self._task.next(tick)
+        return goal
 
     def _give_up(self, tick: int, failure: NavigationFailure) -> None:
         self._events += self._task.failed(tick, failure.code, str(failure))

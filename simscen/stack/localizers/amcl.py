@@ -62,7 +62,7 @@ class AmclLocalizer:
 
     def reset(self, estimate: Estimate) -> None:
         """Start over: particles around the estimate's pose, or over all free space when it has none."""
-        self._odometry = OdometryHistory(self._tick_rate)
+        self._odometry, self._begun = OdometryHistory(self._tick_rate), False
         self._filter.begin(estimate)
         settling = self._spec.settling_distance
         self._finder = None if self._search is None else Finder(*self._search, estimate, settling)
@@ -81,11 +81,10 @@ class AmclLocalizer:
 
     def on_odometry(self, odometry: Odometry) -> None:
         """Carry the pose on, and use scans that waited for this odometry."""
-        first = not self._odometry
         if not self._odometry.add(odometry.tick, odometry.pose):
             return
-        if first:
-            start = self._correction
+        if not self._begun:
+            start, self._begun = self._correction, True
             self._correction = _Correction(start.pose, start.covariance, odometry.pose, start.tick)
         self._belief = None
         if self._waiting:
@@ -107,11 +106,16 @@ class AmclLocalizer:
     def belief(self) -> Belief:
         """The last correction, carried on by odometry."""
         if self._belief is None:
-            last, now = self._correction, self._odometry.now if self._odometry else self._correction.odometry
-            covariance = (self._scatter or self._motion).carry(last.covariance, last.pose.yaw, last.before.compose(now))
-            pose = last.map_from_odom.compose(now)
-            self._belief = Belief(pose, covariance, last.map_from_odom, self._filter.particles.table, last.tick)
+            last = self._correction
+            delta = last.before.compose(self._odometry.now)
+            covariance = (self._scatter or self._motion).carry(last.covariance, last.pose.yaw, delta)
+            self._belief = Belief(self.pose, covariance, last.map_from_odom, self._filter.particles.table, last.tick)
         return self._belief
+
+    @property
+    def pose(self) -> Pose2:
+        """That of the belief."""
+        return self._correction.map_from_odom.compose(self._odometry.now)
 
     def _use(self, scan: Scan) -> None:
         """Correct with a scan if its lidar is due; after enough motion all lidars are due once."""

@@ -373,7 +373,8 @@ def test_the_monitor_brakes_for_what_moves_wherever_the_whole_look_at_the_hull_w
         wanted = Twist(*chance.normal(0.0, (0.5, 0.1, 0.8)).tolist())
         hasty.on_moving(moving)
         thorough.on_moving(moving)
-        assert hasty.allow(wanted, Pose2(0.0, 0.0)) == (allowed := thorough.allow(wanted, Pose2(0.0, 0.0)))
+        allowed = thorough.allow(wanted, Pose2(0.0, 0.0))
+        assert hasty.allow(wanted, Pose2(0.0, 0.0)) == allowed
         braked += allowed != wanted
         spared += not hasty._comes_near(wanted, MonitorSpec().time_before_collision)
     assert braked > 10
