@@ -1,11 +1,10 @@
 """One robot under test, beat by beat: what it senses, the stack that drives it, what disturbs it, and who listens."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Protocol
 
 from simscen.core.events import Event
 from simscen.core.trace import Moment, Truth
+from simscen.record.backlog import Log
 from simscen.run.ending import Ending
 from simscen.run.faultrig import FaultRig
 from simscen.run.live import LiveStage
@@ -13,14 +12,6 @@ from simscen.run.senses import Senses
 from simscen.run.timetable import Timetable
 from simscen.sim.robot import Robot
 from simscen.stack.protocols import Stack
-
-
-class Log(Protocol):
-    """Takes the moments of a robot, in order: the MCAP recorder, the trace builder, a progress display."""
-
-    def append(self, moment: Moment) -> None:
-        """Take one moment."""
-        ...
 
 
 @dataclass(eq=False)
@@ -35,12 +26,14 @@ class Agent:
     ending: Ending
     timetable: Timetable
     truth_period: int
-    logs: Sequence[Log] = ()
+    logs: tuple[Log, ...] = ()
     due: bool = field(default=True, init=False)
     """Whether anything is due for it at this beat."""
     next: int = field(default=0, init=False)
     """The tick of its next beat."""
     _truth: Truth | None = field(default=None, init=False)
+    moment: Moment = field(init=False)
+    """What it made of its last beat."""
 
     def look(self, tick: int) -> None:
         """Where the robot is now, and what it has touched."""
@@ -48,25 +41,34 @@ class Agent:
         self.due = tick == self.next
         if self.due:
             self.next += self.timetable.until_next(tick)
-        self.stage.begin_beat(self._truth, self.due)
+        if self.stage.watched:
+            self.stage.begin_beat(self._truth, self.due)
+        for collision in self.robot.collisions():
+            self.stage.note(collision)
 
-    def decide(self, tick: int) -> Moment:
+    def decide(self, tick: int) -> None:
         """Read the sensors that are due, and hand them to the stack after the faults have had their way with them."""
-        self.stage.pass_on(tick)
-        readings = self.faults.disturb(self.senses.read(tick))
+        stage, faults = self.stage, self.faults
+        if stage.orders:
+            stage.pass_on(tick)
+        readings = self.senses.read(tick)
+        if faults.active:
+            readings = faults.disturb(readings)
         decision = self.stack.decide(tick, readings)
-        self.stage.heard(decision, readings)
+        if stage.watched:
+            stage.heard(decision, readings)
         if decision.events:
             self.ending.heard(decision)
-        return Moment(tick, self._truth, readings, decision, self.stage.take_events())
+        events = stage.take_events() if stage.fresh else ()
+        self.moment = Moment(tick, self._truth, readings, decision, events)
 
-    def record(self, moment: Moment, end: Event | None) -> None:
+    def record(self, end: Event | None) -> None:
         """Hand the moment to all who listen, with the end of the run where this is it."""
-        if end is not None:
-            moment = replace(moment, events=(*moment.events, end))
+        moment = self.moment if end is None else replace(self.moment, events=(*self.moment.events, end))
         for log in self.logs:
             log.append(moment)
 
-    def drive(self, moment: Moment) -> None:
+    def drive(self) -> None:
         """Let the wheels have the command, as far as the faults let them."""
-        self.robot.drive(self.faults.command(moment.tick, moment.decision.command))
+        command = self.moment.decision.command
+        self.robot.drive(self.faults.command(self.moment.tick, command) if self.faults.possible else command)

@@ -67,10 +67,13 @@ def assemble(prepared: Prepared, seed: int, printed: Path | None = None) -> Rig:
     for name, stage in stages.items():
         for body in (*world.bodies, *(robot.shape for robot in simulation.robots[name].others)):
             stage.note(Event(0, EventKind.OBJECT_SPAWNED, body.name, described(body)))
+    directors = tuple(director for director in _directors(prepared, streams, agents) if director.needed)
+    for stage in stages.values():
+        stage.watched = bool(directors)
     return Rig(
         simulation,
         tuple(agents.values()),
-        tuple(_directors(prepared, streams, agents)),
+        directors,
         clock.period(spec.physics.truth_rate),
     )
 

@@ -15,7 +15,7 @@ import numpy as np
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.shapes import Cylinder, Solid
 from simscen.loading.scenario import load_scenario
-from simscen.run.agent import Log
+from simscen.record.backlog import Log
 from simscen.run.lockstep import Rig
 from simscen.run.prepare import Prepared, lidar_height, prepare
 from simscen.run.simulate import simulate

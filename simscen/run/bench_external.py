@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from simscen.core.trace import Moment
 from simscen.loading.scenario import load_scenario
-from simscen.run.agent import Log
+from simscen.record.backlog import Log
 from simscen.run.bench import PATROL, SEED
 from simscen.run.external.serving import served
 from simscen.run.lockstep import Rig

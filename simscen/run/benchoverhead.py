@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 from simscen.core.result import RunKey
 from simscen.core.trace import Moment
 from simscen.loading.scenario import load_scenario
-from simscen.run.agent import Log
+from simscen.record.backlog import Log
 from simscen.run.bench import PATROL, SEED, Tell, nobody
 from simscen.run.figure import Figure, Figures
 from simscen.run.lockstep import Rig

@@ -35,6 +35,11 @@ class Director:
         ]
         self._ends: dict[int, int | None] = {}
 
+    @property
+    def needed(self) -> bool:
+        """Whether there is anything to direct."""
+        return bool(self._steps or self._starts)
+
     def direct(self) -> None:
         """Let happen what is due at this beat; the stage keeps the record."""
         for number, (step, firing) in enumerate(self._steps):

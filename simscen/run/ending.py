@@ -22,6 +22,8 @@ class Ending:
         self._limit = clock.ticks(time_limit)
         self._linger = clock.ticks(linger)
         self._over: int | None = 0 if idle else None
+        self.at = self._earliest()
+        """The tick before which the robot's part is not over, as far as known."""
 
     def heard(self, decision: Decision) -> None:
         """What the stack decided at a beat; tell each in which something happened."""
@@ -30,6 +32,10 @@ class Ending:
                 self._over = event.tick + self._linger
             elif event.kind == EventKind.GOAL_ACCEPTED:
                 self._over = None
+        self.at = self._earliest()
+
+    def _earliest(self) -> int:
+        return self._limit if self._over is None else min(self._over, self._limit)
 
     def reached(self, tick: int) -> Event | None:
         """The event that ends the robot's part at this beat, which samples the truth, or None."""

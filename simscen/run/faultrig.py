@@ -66,9 +66,11 @@ class FaultRig:
         self._mapped = set(mapped)
         self._faults, self._streams, self._setting, self._link, self._note = faults, streams, setting, link, note
         self._names = stream_names(faults)
+        self.possible = bool(faults)
+        """Whether it has any fault that may begin."""
         self._begun: Counter[int] = Counter()
         # By number of the fault and count of its activations: what one activation leaves behind, the next builds on.
-        self._active: dict[tuple[int, int], _Active] = {}
+        self.active: dict[tuple[int, int], _Active] = {}
         self._linked = False
         self._believed: tuple[int, Belief, Belief] | None = None
 
@@ -84,21 +86,21 @@ class FaultRig:
         disturbance: object = entry.fault.begin(chance, setting)
         if not isinstance(disturbance, Disturbance):
             self._broke(index, f"begins as {disturbance!r}, which is no Disturbance")
-        self._active[index, self._begun[index]] = _Active(index, entry.sensor, setting.kind, disturbance)
+        self.active[index, self._begun[index]] = _Active(index, entry.sensor, setting.kind, disturbance)
         self._linked = self._linked or setting.kind == COMMAND
         return setting.kind
 
     def end(self, index: int) -> int:
         """End it; what it leaves behind stays at work. Returns how many messages and commands it has touched."""
         key = index, self._begun[index]
-        active = self._active.pop(key)
+        active = self.active.pop(key)
         if rest := active.disturbance.end():
-            self._active[key] = _Active(index, active.sensor, active.kind, rest, over=True)
+            self.active[key] = _Active(index, active.sensor, active.kind, rest, over=True)
         return active.touched
 
     def disturb(self, readings: Readings) -> Readings:
         """The readings as the stack gets them."""
-        if not self._active:
+        if not self.active:
             return readings
         for active in self._at_work():
             if active.index in self._mapped:
@@ -112,7 +114,7 @@ class FaultRig:
     def command(self, tick: int, command: Twist) -> Twist:
         """The command as the wheels get it: what cmd_vel lets through, then what else befalls the wheels."""
         sends = self._link.sends(tick, command)
-        if not self._linked and not self._active:
+        if not self._linked and not self.active:
             if sends:
                 self._link.hear(tick, command)
             return command
@@ -128,7 +130,7 @@ class FaultRig:
 
     def belief(self, tick: int, belief: Belief) -> Belief:
         """What the navigator is told instead of a belief of the localizer."""
-        if not self._active or not any(active.kind == BELIEF for active in self._active.values()):
+        if not self.active or not any(active.kind == BELIEF for active in self.active.values()):
             return belief
         if self._believed is None or self._believed[:2] != (tick, belief):
             told = belief
@@ -139,9 +141,9 @@ class FaultRig:
         return self._believed[2]
 
     def _at_work(self) -> list[_Active]:
-        if not self._active:
+        if not self.active:
             return []
-        return [active for _, active in sorted(self._active.items(), key=lambda item: item[0])]
+        return [active for _, active in sorted(self.active.items(), key=lambda item: item[0])]
 
     def _late(self, active: _Active) -> Sequence[Reading]:
         late: object = active.disturbance.arriving()

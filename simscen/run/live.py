@@ -65,14 +65,19 @@ class LiveStage:
         self._clearance: float | None = None
         self._scanned: dict[str, int] = {}
         self._travelled = 0.0
-        self._due, self._orders = True, list[Callable[[int], None]]()
+        self._due = True
+        self.orders: list[Callable[[int], None]] = []
+        """What the stack is to be told at its next beat."""
         self._history: tuple[Event, ...] = ()
-        self._fresh: list[Event] = []
+        self.fresh: list[Event] = []
+        """What has been noted since `take_events` was last asked."""
+        self.watched = True
+        """Whether anybody looks at it; else it need not be told of beats and of what the stack does."""
 
     # what the lockstep tells it
 
     def begin_beat(self, truth: Truth | None, due: bool = True) -> None:
-        """Time has passed: see where the robot is now, by the truth where it was sampled, and what it has touched.
+        """Time has passed: see where the robot is now, by the truth where it was sampled.
 
         Where the beat is not `due` for this robot but for another, its stack hears orders at the next that is.
         """
@@ -80,18 +85,15 @@ class LiveStage:
         before = self._pose
         self._look(truth)
         self._travelled += math.hypot(self._pose.x - before.x, self._pose.y - before.y)
-        for collision in self._robot.collisions():
-            self.note(collision)
 
     def pass_on(self, tick: int) -> None:
         """Give the stack the orders that have waited for this beat of its own."""
-        if self._orders:
-            orders, self._orders = self._orders, []
-            for order in orders:
-                order(tick)
+        orders, self.orders = self.orders, []
+        for order in orders:
+            order(tick)
 
     def _order(self, order: Callable[[int], None]) -> None:
-        self._orders.append(order)
+        self.orders.append(order)
         if self._due:
             self.pass_on(self.tick)
 
@@ -110,11 +112,9 @@ class LiveStage:
         self._history += decision.events
 
     def take_events(self) -> tuple[Event, ...]:
-        """What has been noted since this was last asked."""
-        if not self._fresh:
-            return ()
-        fresh = tuple(sorted(self._fresh, key=lambda event: event.tick))
-        self._fresh.clear()
+        """What has been noted since this was last asked, in the order of its ticks."""
+        fresh = tuple(sorted(self.fresh, key=lambda event: event.tick))
+        self.fresh.clear()
         return fresh
 
     # what triggers see
@@ -301,7 +301,7 @@ class LiveStage:
     def note(self, event: Event) -> None:
         """Write an event to the log of this robot; one without a tick happened now."""
         stamped = event if event.tick else replace(event, tick=self.tick)
-        self._fresh.append(stamped)
+        self.fresh.append(stamped)
         self._history += (stamped,)
 
 

@@ -29,7 +29,6 @@ class Rig:
 def run_lockstep(rig: Rig) -> Event:
     """Run to the end; each robot's moments go to its logs. Returns the event that ended the run."""
     simulation, agents, directors = rig.simulation, rig.agents, rig.directors
-    endings = [agent.ending for agent in agents]
     while True:
         tick = simulation.tick
         for agent in agents:
@@ -37,14 +36,20 @@ def run_lockstep(rig: Rig) -> Event:
         for director in directors:
             director.direct()
 
-        due = [agent for agent in agents if agent.due]
-        moments = [agent.decide(tick) for agent in due]
-        end = None if tick % rig.truth_period else end_of(tick, endings)
-        for agent, moment in zip(due, moments, strict=True):
-            agent.record(moment, end)
+        over = tick % rig.truth_period == 0
+        for agent in agents:
+            if agent.due:
+                agent.decide(tick)
+            if tick < agent.ending.at:
+                over = False
+        end = end_of(tick, [agent.ending for agent in agents]) if over else None
+        for agent in agents:
+            if agent.due:
+                agent.record(end)
         if end is not None:
             return end
 
-        for agent, moment in zip(due, moments, strict=True):
-            agent.drive(moment)
+        for agent in agents:
+            if agent.due:
+                agent.drive()
         simulation.step(min([agent.next for agent in agents]) - tick)

@@ -8,7 +8,7 @@ from typing import Any
 
 from simscen.core.run import Run
 from simscen.judge.resultdata import to_json
-from simscen.run.agent import Log
+from simscen.record.backlog import Log
 from simscen.run.external.build import for_robot
 from simscen.run.logheader import log_header
 from simscen.run.prepare import Prepared

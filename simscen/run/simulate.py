@@ -17,9 +17,9 @@ from simscen.judge.several import together
 from simscen.loading.discovery import default_root
 from simscen.loading.plugins import plugins_of
 from simscen.loading.scenario import load_scenario
+from simscen.record.backlog import WAITS, Backlog, Log
 from simscen.record.recorder import Recorder
 from simscen.record.tracebuilder import TraceBuilder
-from simscen.run.agent import Log
 from simscen.run.assemble import assemble
 from simscen.run.blame import blamed
 from simscen.run.external.stack import ExternalStack
@@ -67,6 +67,8 @@ def _simulated(
     builders = {name: TraceBuilder(clock) for name in prepared.each}
     with ExitStack() as closing:
         recorder = log and closing.enter_context(Recorder(log, clock, log_header(prepared, seed)))
+        # Code of others may write into an array that it has handed out.
+        backlog = closing.enter_context(Backlog(0 if plugins_of(prepared.loaded) else clock.ticks(WAITS)))
         rig = assemble(prepared, seed, printed)
         closing.callback(rig.simulation.close)
         agents = dict(zip(prepared.each, rig.agents, strict=True))
@@ -77,10 +79,12 @@ def _simulated(
         for name, agent in agents.items():
             part = prepared.each[name]
             agent.stack.start(part.estimate, part.case.goals)
-            agent.logs = (builders[name], recorder.robots[name]) if recorder else (builders[name],)
-        first = rig.agents[0]
-        first.logs = (*first.logs, *(attach(rig, first.logs) if attach else ()))
+        logs = [(builders[name], recorder.robots[name]) if recorder else (builders[name],) for name in agents]
+        for agent, own in zip(rig.agents, logs, strict=True):
+            agent.logs = (backlog.before(*own),)
+        rig.agents[0].logs += tuple(attach(rig, logs[0])) if attach else ()
         end = run_lockstep(rig)
+        backlog.flush()
         for stack in externals.values():
             stack.end(end.name)
         for stack in externals.values():

@@ -50,10 +50,12 @@ def killed(folder: Path, seconds: float) -> Path:
         import os, signal, sys
         sys.path.insert(0, {str(HERE)!r})
         from moments import CLOCK, about, moments
+        from simscen.record.backlog import WAITS, Backlog
         from simscen.record.recorder import Recorder
         recorder = Recorder({str(folder / "run.mcap")!r}, CLOCK, about())
+        log = Backlog(CLOCK.ticks(WAITS)).before(recorder)
         for moment in moments({seconds}):
-            recorder.append(moment)
+            log.append(moment)
         os.kill(os.getpid(), signal.SIGKILL)
     """
     process = subprocess.run([sys.executable, "-c", code], check=False, cwd=HERE.parents[2], env=dict(os.environ))

@@ -49,8 +49,9 @@ def moments(tmp_path: Path, beats: int, stack: str = "", lidar: str = "", latenc
     for _ in range(beats):
         tick = rig.simulation.tick
         agent.look(tick)
-        taken.append(agent.decide(tick))
-        agent.drive(taken[-1])
+        agent.decide(tick)
+        taken.append(agent.moment)
+        agent.drive()
         rig.simulation.step(agent.timetable.until_next(tick))
     return taken
 

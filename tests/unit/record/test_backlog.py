@@ -1,0 +1,84 @@
+"""What waits to be written comes in its order, all of it, and also when a run breaks off."""
+
+import pytest
+from moments import moments
+
+from simscen.core.errors import RunError
+from simscen.core.trace import Moment
+from simscen.record.backlog import Backlog
+
+SOME = list(moments(2.0))
+
+
+class Heard:
+    """A log that keeps what it is told, with its name, in the order of all logs."""
+
+    def __init__(self, name: str, told: list[tuple[str, int]]) -> None:
+        self.name, self.told = name, told
+
+    def append(self, moment: Moment) -> None:
+        self.told.append((self.name, moment.tick))
+
+
+class Full:
+    """A log on a disk without room."""
+
+    def append(self, moment: Moment) -> None:
+        raise RunError("output", "no space left")
+
+
+@pytest.mark.parametrize("ticks", [0, 1, 60, 10_000])
+def test_all_that_is_told_comes_once_and_in_its_order(ticks: int) -> None:
+    told: list[tuple[str, int]] = []
+    backlog = Backlog(ticks)
+    robots = [backlog.before(Heard(name, told)) for name in "ab"]
+    for moment in SOME:
+        for robot in robots:
+            robot.append(moment)
+    backlog.flush()
+    backlog.flush()
+    assert told == [(name, moment.tick) for moment in SOME for name in "ab"]
+
+
+def test_nothing_waits_for_more_than_the_ticks_and_a_beat() -> None:
+    told: list[tuple[str, int]] = []
+    log = Backlog(48).before(Heard("", told))
+    for moment in SOME:
+        log.append(moment)
+        assert moment.tick - told[-1][1] <= 48
+
+
+def test_without_ticks_nothing_waits() -> None:
+    told: list[tuple[str, int]] = []
+    log = Backlog(0).before(Heard("", told))
+    for moment in SOME:
+        log.append(moment)
+        assert told[-1][1] == moment.tick
+
+
+def test_each_log_of_a_robot_is_told_all() -> None:
+    told: list[tuple[str, int]] = []
+    backlog = Backlog(60)
+    log = backlog.before(Heard("trace", told), Heard("log", told))
+    for moment in SOME:
+        log.append(moment)
+    backlog.flush()
+    for name in ("trace", "log"):
+        assert [tick for who, tick in told if who == name] == [moment.tick for moment in SOME]
+
+
+def test_what_waits_when_a_run_breaks_off_is_written() -> None:
+    told: list[tuple[str, int]] = []
+    with pytest.raises(ZeroDivisionError), Backlog(10_000) as backlog:
+        log = backlog.before(Heard("", told))
+        for moment in SOME:
+            log.append(moment)
+        raise ZeroDivisionError
+    assert told[-1][1] == SOME[-1].tick
+
+
+def test_why_a_run_broke_off_is_told_although_its_log_has_no_room_for_the_rest() -> None:
+    with pytest.raises(ZeroDivisionError), Backlog(10_000) as backlog:
+        backlog.until = 1
+        backlog.before(Full()).append(SOME[0])
+        raise ZeroDivisionError

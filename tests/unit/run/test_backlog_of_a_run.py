@@ -1,0 +1,56 @@
+"""Code of others may write into an array that it has handed out: what it says is written at once."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from simscen.core.trace import Moment
+from simscen.loading.scenario import load_scenario
+from simscen.run import simulate
+from simscen.run.prepare import prepare
+
+SCENARIO = """\
+simscen: 1
+world: {simscen: 1, walls: [{points: [[0, 0], [4, 0], [4, 4], [0, 4], [0, 0]]}]}
+robot: {pose: {x: 1, y: 1}}
+goals: [{pose: {x: 3, y: 3}}]
+stack: {localizer: {type: ground_truth}}
+time_limit: 0.5 s
+pass: [collisions: {max: 0}]
+"""
+
+
+class Lag:
+    """How many moments the trace is behind at most, when a listener is told of one."""
+
+    def __init__(self) -> None:
+        self.most = self.written = 0
+
+    def attach(self, rig: Any, own: Any) -> Any:
+        (trace,) = own
+        write = trace.append
+
+        def append(moment: Moment) -> None:
+            self.written = moment.tick
+            write(moment)
+
+        trace.append = append
+        return (self,)
+
+    def append(self, moment: Moment) -> None:
+        self.most = max(self.most, moment.tick - self.written)
+
+
+@pytest.mark.parametrize("others", [False, True])
+def test_moments_wait_unless_a_run_has_code_of_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, others: bool
+) -> None:
+    file = tmp_path / "short.scenario.yaml"
+    file.write_text(SCENARIO)
+    if others:
+        monkeypatch.setattr(simulate, "plugins_of", lambda loaded: ("a package",))
+    lag = Lag()
+    run = simulate.simulate(prepare(load_scenario(file, tmp_path)), attach=lag.attach)
+    assert (lag.most == 0) == others
+    assert run.trace.truth.ticks[-1] == run.trace.end
