@@ -38,6 +38,12 @@ class Beams:
         hit = np.flatnonzero(self.ranges < self.range_max)
         return self.ranges.take(hit) * self.towards.take(hit) + self.origin
 
+    def of_hits(self, chosen: npt.NDArray[np.bool_]) -> "Beams":
+        """Of those that hit something the `chosen` ones (m,) alone, and all others."""
+        kept = self.ranges >= self.range_max
+        kept[np.flatnonzero(~kept)[chosen]] = True
+        return Beams(self.ranges[kept], self.towards[kept], self.origin, self.range_max)
+
 
 def directions(scan: Scan) -> Plane:
     """Unit vectors (n,) along the beams of a scan, in the base frame; not to be written to."""

@@ -12,6 +12,7 @@ from simscen.stack.localizers.clusters import errors_about
 from simscen.stack.localizers.global_search import APART, GlobalSearch, View
 from simscen.stack.localizers.map_trust import MapTrust
 from simscen.stack.localizers.scan_memory import ScanMemory, travelled
+from simscen.stack.localizers.sure import AROUND, Sure
 
 RECENT, DOUBTFUL = 5, 0.6
 """Over so many scans that corrected the share of the beams that fit is averaged, and below this the robot may be lost.
@@ -28,8 +29,10 @@ place is elsewhere when they fit there so, and GOOD, and by BETTER better than w
 CHECKED, FITS = 1.5, 0.85
 """m, turns included, after each of which a robot that has a place is compared with its neighbourhood, if what it saw
 fits less than that."""
-NEAR_GOOD, NEAR_BETTER = 0.82, 0.04
-"""It is moved to a place nearby that fits so, so much better than where it is, and by PLAIN better than any other."""
+NEAR_GOOD = 0.82
+"""It is moved to a place nearby that fits so, BETTER than where it is, and by PLAIN better than any other; each fit
+less SHARPNESS for each e times that it is unlikely to have drifted there since it was last sure of its place. Rebuilt
+corridors fit a metre further on by chance, and better than where the robot is."""
 LIKELIER = 3.0
 """While a told place counts: the logarithm of how many times likelier another place nearby must be for a robot to be
 moved there, by what was told and all that was seen since."""
@@ -42,9 +45,7 @@ ASTRAY, BACK_GOOD, BACK_PLAIN = 20, 0.9, 0.1
 what it saw since says it is back if it fits so, and by so much better than anywhere else, in two searches that agree.
 Rooms that nobody mapped often look like one that somebody did, though less than that."""
 SHARPNESS = 0.02
-"""Of two places that fit so much better or worse, the better gets e times as many particles."""
-AROUND = (0.1, 0.1, 0.05)
-"""m, m, rad: standard deviations of particles around a place that was found."""
+"""Of two places that fit so much better or worse, the better is e times as likely, and gets as many more particles."""
 
 
 class Finder:
@@ -59,9 +60,10 @@ class Finder:
         """What was `told` counts for the first `settling` m, turns included."""
         self._search, self._trust, self._memory = search, trust, ScanMemory()
         self._known, self._told, self._settling = told.pose is not None, told, settling
-        self._begun: Pose2 | None = None
+        self._begun: Sure | None = None
+        self._sure: Sure | None = None
         self._fits: deque[float] = deque(maxlen=RECENT)
-        self._wait, self._driven, self._unchecked, self._doubted = 0.0, 0.0, 0.0, False
+        self._way, self._wait, self._driven, self._unchecked, self._doubted = 0.0, 0.0, 0.0, 0.0, False
         self._last: Pose2 | None = None
         self._suspected: tuple[Pose2, Pose2] | None = None
         self._since, self._astray = 0.0, 0
@@ -77,15 +79,20 @@ class Finder:
         if self._last is not None:
             self._driven += (moved := travelled(self._last, base))
             self._unchecked += moved
-            self._settling -= moved
+            self._way += moved
             self._since += moved
-        else:
-            self._begun = base
+        elif self._told.pose is not None:
+            std = np.maximum(self._told.std, AROUND)
+            self._begun = self._sure = Sure(self._told.pose, base, 0.0, std)
         self._last = base
         if not len(ends):
             return None
         here = np.array([believed])
-        if self._settling > 0 and (settled := self._as_told(base, here)) is not None:
+        if (
+            self._begun is not None
+            and self._way < self._settling
+            and (settled := self._as_told(self._begun, base, here)) is not None
+        ):
             return settled
         if (fit := self._trust.fit(here, ends, TELLING)) is not None:
             self._fits.append(fit)
@@ -98,34 +105,28 @@ class Finder:
             return None
         return self._sought(self._memory.about(base), base, here)
 
-    def _as_told(self, base: Pose2, here: Array) -> tuple[Array, Array] | None:
+    def _as_told(self, begun: Sure, base: Pose2, here: Array) -> tuple[Array, Array] | None:
         """Where the robot is by what it was told and all that it saw since, where particles settled elsewhere.
 
         A scan of a room whose furniture was moved fits another place of it, and the next scans, which show the same,
         confirm that. Seen together, and with the ways to what was seen, which must be free, they often do not.
         """
-        if self._told.pose is None or self._begun is None or not self._memory.length:
+        if not self._memory.length:
             return None
         view = self._memory.about(base)
         if not len(view.ends) or self._trust.fit(here, view.ends, TELLING) is None:
             return None
         if (fit := self._search.fit(here, view))[0] > FITS:
             return None
-        told = np.array(self._told.pose.compose(self._begun.between(base)))
-        poses, fits = self._search.near(view, told)
-        likely, own = self._likely(poses, fits, told), self._likely(here, fit, told)[0]
+        poses, fits = self._search.near(view, begun.expected(base))
+        likely = fits / SHARPNESS - begun.unlikely(poses, base, begun.way)
+        own = fit[0] / SHARPNESS - begun.unlikely(here, base, begun.way)[0]
         best = int(likely.argmax())
         off = errors_about(here[0], poses[best : best + 1])[0]
         if likely[best] - own < LIKELIER or (math.hypot(off[0], off[1]) < APART[0] and abs(off[2]) < APART[1]):
             return None
         self._fits.clear()
         return poses[best : best + 1], np.ones(1)
-
-    def _likely(self, poses: Array, fits: Array, told: Array) -> Array:
-        """The logarithm of how likely `poses` (n, 3) are that fit so: (n,), but for a constant."""
-        std = np.maximum(self._told.std, AROUND)
-        likely: Array = fits / SHARPNESS - 0.5 * np.square(errors_about(told, poses) / std).sum(axis=1)
-        return likely
 
     def _nearby(self, base: Pose2, here: Array) -> tuple[Array, Array] | None:
         """Where the robot is that is only somewhat off: it was told so, or drifted where there was no map."""
@@ -134,14 +135,28 @@ class Finder:
         self._unchecked, view = 0.0, self._memory.about(base)
         if not len(view.ends) or self._trust.fit(here, view.ends, TELLING) is None:
             return None
-        if (fit := float(self._search.fit(here, view)[0])) > FITS:
+        fit = float(self._reached(here, self._search.fit(here, view), base)[0])
+        if fit > FITS:
+            self._sure = Sure.at(here[0], base, self._way)
             return None
         poses, fits = self._search.near(view, here[0])
+        fits = self._reached(poses, fits, base)
+        order = np.argsort(-fits, kind="stable")
+        poses, fits = poses[order], fits[order]
         plain = len(fits) == 1 or fits[0] - fits[1] > PLAIN
-        if not plain or fits[0] < max(NEAR_GOOD, fit + NEAR_BETTER):
+        if not plain or fits[0] < max(NEAR_GOOD, fit + BETTER):
             return None
+        return self._found(poses[:1], base)
+
+    def _reached(self, poses: Array, fits: Array, base: Pose2) -> Array:
+        """How well `poses` (n, 3) fit, less what it takes to have drifted there."""
+        return fits if self._sure is None else fits - SHARPNESS * self._sure.unlikely(poses, base, self._way)
+
+    def _found(self, places: Array, base: Pose2) -> tuple[Array, Array]:
+        """The one of `places` (1, 3) with all particles."""
         self._fits.clear()
-        return poses[:1], np.ones(1)
+        self._sure = Sure.at(places[0], base, self._way)
+        return places, np.ones(1)
 
     def _in_doubt(self) -> bool:
         """Whether recent scans do not fit. When that begins, what was seen before may be of another place."""
@@ -160,6 +175,8 @@ class Finder:
         plain = len(fits) == 1 or fits[0] - fits[1] > clear
         if not self._known:
             self._known = plain and self._memory.length >= ENOUGH
+            if self._known:
+                self._sure = Sure.at(poses[0], base, self._way)
             shares = np.exp((fits - fits[0]) / SHARPNESS)
             return poses, shares / shares.sum()
         if plain and fits[0] > good and fits[0] > self._search.fit(here, view)[0] + BETTER:
@@ -168,9 +185,8 @@ class Finder:
                 self._suspected, self._since = (found, base), 0.0
             elif self._since >= AGREED:
                 self._suspected = None
-                self._fits.clear()
                 self._astray = 0
-                return poses[:1], np.ones(1)
+                return self._found(poses[:1], base)
         else:
             more = MOST_BETWEEN if self._astray >= ASTRAY else 2 * max(waited, BETWEEN)
             self._suspected, self._wait = None, min(MOST_BETWEEN, more)

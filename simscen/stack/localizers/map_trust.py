@@ -11,11 +11,14 @@ from simscen.stack.localizers.particles import Particles
 NEAR = 0.3
 """m: a beam fits that ends this near to what the map shows."""
 TOGETHER = 1.0
-"""m: particles all within this of their mean know where they are; others are not asked."""
+"""m: particles all within this of their mean know where they are; others are not asked what fits."""
 ASKED = 50
 """Particles."""
-TELLING = 0.1
-"""Share of the beams that must end where the map says anything, for it to be doubted."""
+TELLING = 0.1, 0.8
+"""Shares of the beams that end where the map says anything: up to the first a scan counts for nothing, from the second
+on in full. A few beams that reach back over the end of a map fit a wall of it from many places."""
+MOSTLY = 0.5
+"""Share of the particles."""
 _NOTHING, _FITS, _FITS_NOT = 0, 1, 2
 """What the map says of a beam that ends in a cell."""
 
@@ -24,7 +27,8 @@ class MapTrust:
     """The exponent of a scan's likelihood: small where the map does not show what is seen.
 
     Particles that are one narrow group are right about where they are, or the whole map must be searched; then beams
-    that do not fit are the map's fault, and those that do may fit by chance and pull the group astray.
+    that do not fit are the map's fault, and those that do may fit by chance and pull the group astray. Particles that
+    spread where there is no map are led astray by the first beams that touch it, so what nothing tells of never counts.
     """
 
     def __init__(self, field: DistanceField, beyond: npt.NDArray[np.bool_], none: float, full: float) -> None:
@@ -35,21 +39,41 @@ class MapTrust:
         self._field, self._none, self._full = field, none, full
         self._says = np.where(beyond, _NOTHING, np.where(field.table < NEAR, _FITS, _FITS_NOT)).astype(np.uint8)
 
-    def of(self, particles: Particles, ends: Plane) -> float:
-        """The exponent, 0 … 1, for beams that end at `ends` (b,) in the base frame."""
+    def of(self, particles: Particles, ends: Plane) -> tuple[float, npt.NDArray[np.bool_] | None]:
+        """The exponent, 0 … 1, for beams that end at `ends` (b,) in the base frame, and which of them count (b,).
+
+        None is all of them. Of a narrow group each beam counts that ends where the map says something for most
+        particles: what it has in unknown space, less than a hit and more than a miss, draws them into the map or out.
+        """
+        said = self._said(particles.poses[:: -(-len(particles.poses) // ASKED)], ends)
+        told, fitting = _told(said)
+        exponent = _between(told, *TELLING)
         if not particles.within(TOGETHER):
-            return 1.0
-        share = self.fit(particles.poses[:: -(-len(particles.poses) // ASKED)], ends, TELLING)
-        if share is None or share >= self._full:
-            return 1.0
-        return max(0.0, (share - self._none) / (self._full - self._none))
+            return exponent, None
+        counting = None if told == 1.0 else (said != _NOTHING).mean(axis=0) > MOSTLY
+        return exponent * _between(fitting, self._none, self._full), counting
 
     def fit(self, poses: Array, ends: Plane, telling: float) -> float | None:
         """The share of the beams that fit at `poses` (n, 3), of those that end where the map says anything.
 
         None when these are less than the share `telling`.
         """
-        said = self._says.take(self._field.cells_seen(poses, ends), mode="clip").ravel()
-        _, fit, fit_not = np.bincount(said, minlength=3).tolist()
-        told = fit + fit_not
-        return fit / told if told and told >= telling * len(said) else None
+        told, fitting = _told(self._said(poses, ends))
+        return fitting if told and told >= telling else None
+
+    def _said(self, poses: Array, ends: Plane) -> npt.NDArray[np.uint8]:
+        """What the map says of each beam at each pose: (n, b)."""
+        said: npt.NDArray[np.uint8] = self._says.take(self._field.cells_seen(poses, ends), mode="clip")
+        return said
+
+
+def _told(said: npt.NDArray[np.uint8]) -> tuple[float, float]:
+    """The share of the beams that end where the map says anything, and the share of those that fit."""
+    _, fit, fit_not = np.bincount(said.ravel(), minlength=3).tolist()
+    told = fit + fit_not
+    return told / max(said.size, 1), fit / max(told, 1)
+
+
+def _between(value: float, none: float, full: float) -> float:
+    """0 up to `none`, 1 from `full` on, in between in proportion."""
+    return 1.0 if value >= full else max(0.0, (value - none) / (full - none))

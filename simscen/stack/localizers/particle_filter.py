@@ -28,7 +28,7 @@ from simscen.stack.localizers.scan_memory import METRES_A_RAD
 CONVERGED_WITHIN = 0.5  # nav2_amcl's pf.dist_threshold, in m
 
 BELIEVE_WHEELS = 0.2
-"""Share of the particles that follow odometry where the scans say otherwise."""
+"""Share of the particles that get as far as odometry says where the scans say otherwise."""
 
 AT_ONCE = 0.2
 """What the first scan counts, of what it does when the robot has driven `settling_distance` m."""
@@ -65,14 +65,16 @@ class ParticleFilter:
     def follow(self, seen: Step, delta: Pose2) -> None:
         """Move each particle by its own copy of a motion that was seen; `delta` is what odometry reports of it.
 
-        Where the two differ wheels slip, or people walk along with the robot: then some particles believe
-        odometry, and the map decides, unless it does not show what is around.
+        Where the two differ wheels slip, or people walk along with the robot: then some particles get as far as
+        odometry says, and the map decides, unless it does not show what is around. How the robot turned walls show,
+        whoever walks beside it: wheels that slip in a turn would only find rebuilt rooms that fit by chance.
         """
         self._settle(delta)
         poses = moved(self.particles.poses, seen, self._chance)
         if self._trusted > 0 and not seen.agrees(delta):
             some = self._chance.random(len(poses)) < BELIEVE_WHEELS
-            poses[some] = self._motion.sample(self.particles.poses[some], delta, self._chance)
+            driven = Step(Pose2(delta.x, delta.y, seen.delta.yaw), seen.covariance)
+            poses[some] = moved(self.particles.poses[some], driven, self._chance)
         self.particles = Particles(poses, self.particles.weights)
 
     def _settle(self, delta: Pose2) -> None:
@@ -101,9 +103,10 @@ class ParticleFilter:
         spec, poses = self._spec, self.particles.poses
         beams = select_beams(scan, spec.max_beams, spec.laser_min_range, spec.farthest)
         if self._trust is not None and len(beams.ends):
-            self._trusted = self._trust.of(self.particles, beams.ends)
+            self._trusted, told = self._trust.of(self.particles, beams.ends)
             if self._trusted == 0:
                 return None
+            beams = beams if told is None else beams.of_hits(told)
         converged = spec.do_beamskip and self.particles.within(CONVERGED_WITHIN)
         counts = self._trusted * self._settled
         logarithm = counts * self._sensor.log_likelihood(poses, beams, converged)

@@ -16,10 +16,16 @@ START = Pose2(-2.5, -1.8, 0.6)
 OFF = Pose2(0.4, -0.3, 0.15)
 
 
-def found(off: Pose2, apart: float = 0.25, way: float = 2.0, settling: float = 0.0) -> list[Array]:
-    """Where a robot is put that was told START, drives some `way`, scans each so many m and believes to be `off`."""
+def found(
+    off: Pose2, apart: float = 0.25, way: float = 2.0, settling: float = 0.0, told: Pose2 = Pose2(0, 0, 0),
+    std: tuple[float, float, float] = (0.5, 0.5, 0.26),
+) -> list[Array]:  # fmt: skip
+    """Where a robot is put that starts at START, drives some `way`, scans each so many m and believes to be `off`.
+
+    It was `told` to be that far off, with standard deviations `std`.
+    """
     trust = MapTrust(obstacle_field(grid(), 2.0), beyond_the_map(grid()).ravel(), 0.45, 0.8)
-    finder, places = Finder(GlobalSearch(grid()), trust, Estimate(START), settling), []
+    finder, places = Finder(GlobalSearch(grid()), trust, Estimate(START.compose(told), std), settling), []
     for driven in np.arange(0.0, way, apart).tolist():
         base = Pose2(driven, 0.0, 0.0)
         pose = START.compose(base)
@@ -64,3 +70,10 @@ def test_a_robot_is_moved_far_only_when_searches_agree_over_two_metres() -> None
     assert found(away, way=3.0) == []
     (place,) = found(away, way=4.25)[:1]
     assert np.hypot(place[0], place[1]) < 0.1
+
+
+@pytest.mark.parametrize(("std", "moved"), [(0.1, False), (0.5, True)])
+def test_a_robot_is_moved_to_what_fits_elsewhere_only_if_it_may_have_been_that_wrong(std: float, moved: bool) -> None:
+    """A corridor that was rebuilt fits some way further on, and no robot that was sure 2 m ago has drifted there."""
+    off = Pose2(-0.7, 0.3, 0.0)
+    assert bool(found(off, told=off, std=(std, std, std / 2))) == moved

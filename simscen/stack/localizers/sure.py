@@ -1,0 +1,42 @@
+"""Where a robot can be: not far from where it last was sure to be, carried on by how it saw itself go."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from simscen.core.geometry import Array, Pose2
+from simscen.stack.localizers.clusters import errors_about
+
+AROUND = (0.1, 0.1, 0.05)
+"""m, m, rad: standard deviations of a robot about a place where it is sure to be."""
+DRIFT = (0.03, 0.03, 0.01)
+"""What it may drift by for each metre, turns included: more than scans do that are matched with each other, for along
+a corridor that looks the same everywhere the wheels have their way, and slip."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sure:
+    """A robot was at `pose` when its base was at `base` in a frame that drifts slowly, and had gone `way` m.
+
+    `std` (3,) are the standard deviations of that in m, m and rad.
+    """
+
+    pose: Pose2
+    base: Pose2
+    way: float
+    std: Array
+
+    @classmethod
+    def at(cls, pose: Array, base: Pose2, way: float) -> "Sure":
+        """Sure by what was seen."""
+        return cls(Pose2(*pose.tolist()), base, way, np.array(AROUND))
+
+    def expected(self, base: Pose2) -> Array:
+        """The pose (3,) where the robot is if it has not drifted."""
+        return np.array(self.pose.compose(self.base.between(base)))
+
+    def unlikely(self, poses: Array, base: Pose2, way: float) -> Array:
+        """The logarithm of how many times unlikelier than the expected pose each of `poses` (n, 3) is: (n,)."""
+        std = self.std + np.array(DRIFT) * (way - self.way)
+        far: Array = 0.5 * np.square(errors_about(self.expected(base), poses) / std).sum(axis=1)
+        return far

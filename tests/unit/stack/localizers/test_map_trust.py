@@ -1,0 +1,64 @@
+"""A scan counts as much as the map can tell of it, and beams that leave the map draw nobody."""
+
+import numpy as np
+import pytest
+
+from simscen.core.geometry import Array, Pose2
+from simscen.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from simscen.stack.localizers.beams import Beams
+from simscen.stack.localizers.distance_field import beyond_the_map
+from simscen.stack.localizers.likelihood_field import obstacle_field
+from simscen.stack.localizers.map_trust import MapTrust
+from simscen.stack.localizers.particles import Particles
+
+NEAR = np.array([[-0.1, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0]])
+"""A narrow group in the middle of the map."""
+SPREAD = np.array([[-2.0, 0.0, 0.0], [2.0, 0.0, 0.1], [0.0, 0.5, -0.1]])
+
+
+def trust() -> MapTrust:
+    """A hall of 20 x 4 m with walls above and below; nothing is known of what is on either side of it."""
+    cells = np.full((120, 800), UNKNOWN, dtype=np.int8)
+    cells[20:100, 200:600] = FREE
+    cells[[20, 99], 200:600] = OCCUPIED
+    grid = OccupancyGrid(cells, 0.05, Pose2(-20.0, -3.0, 0.0))
+    return MapTrust(obstacle_field(grid, 2.0), beyond_the_map(grid).ravel(), 0.45, 0.8)
+
+
+def asked(poses: Array, on_walls: int, in_the_open: int, beyond: int) -> tuple[float, list[bool] | None]:
+    """What so many beams are worth, and which of them count."""
+    walls = np.linspace(-1.0, 1.0, on_walls) + 1.9j
+    ends = np.concatenate((walls, np.full(in_the_open, 2.0 + 0.0j), np.full(beyond, 14.0 + 0.0j)))
+    exponent, counting = trust().of(Particles.equal(poses), ends)
+    return exponent, None if counting is None else counting.tolist()
+
+
+def test_a_scan_that_fits_counts_in_full_with_all_its_beams() -> None:
+    assert asked(NEAR, 20, 0, 0) == (1.0, None)
+
+
+@pytest.mark.parametrize(("on_walls", "in_the_open", "worth"), [(17, 3, 1.0), (12, 8, 3 / 7), (8, 12, 0.0)])
+def test_a_scan_of_which_few_beams_fit_counts_for_less(on_walls: int, in_the_open: int, worth: float) -> None:
+    assert asked(NEAR, on_walls, in_the_open, 0)[0] == pytest.approx(worth, abs=1e-9)
+
+
+@pytest.mark.parametrize("poses", [NEAR, SPREAD])
+def test_a_scan_that_hardly_touches_the_map_counts_for_nothing_even_if_that_fits(poses: Array) -> None:
+    """It counted in full, and drew particles that had spread on their way through unknown rooms back into the map."""
+    assert asked(poses, 2, 0, 30)[0] == 0.0
+
+
+def test_what_touches_the_map_with_some_of_its_beams_counts_in_part() -> None:
+    exponent, _ = asked(NEAR, 10, 0, 10)
+    assert exponent == pytest.approx(4 / 7, abs=1e-9)
+
+
+def test_beams_that_leave_the_map_are_not_compared() -> None:
+    assert asked(NEAR, 2, 1, 1)[1] == [True, True, True, False]
+
+
+def test_beams_that_hit_nothing_stay_when_some_of_the_others_are_left_out() -> None:
+    beams = Beams(np.array([1.0, 9.0, 2.0, 3.0]), np.ones(4, dtype=np.complex128), 0j, 9.0)
+    kept = beams.of_hits(np.array([True, False, True]))
+    assert kept.ranges.tolist() == [1.0, 9.0, 3.0]
+    assert kept.ends.tolist() == [1.0, 3.0]
