@@ -178,7 +178,8 @@ class Costmap:
         self._distance = self._inflation.metres.take(self._static_squared)
         self._revision += 1
         self._changed = None
-        self._touch_cells(np.argwhere(self._live.marked()))
+        if len(marked := self._live.cells):
+            self._touch(*self._frame.extent(marked))
 
     def _obstacles(self, window: Window) -> Mask:
         """Live obstacles in a window, without specks where they are noise."""
@@ -194,10 +195,9 @@ class Costmap:
             return
         frame = self._frame
         around = self._live.around(base, math.hypot(scan.mount.x, scan.mount.y))
-        rows, columns = self._unknown[around].nonzero()
-        if not len(rows):
+        cells = frame.within(around, np.flatnonzero(self._unknown[around]))
+        if not len(cells):
             return
-        cells = (rows + around[0].start) * frame.shape[1] + (columns + around[1].start)
         cells = cells[crossed(frame.points(cells), frame.resolution, scan, base, self._spec)]
         if len(cells):
             self._unknown[np.divmod(cells, frame.shape[1])] = False

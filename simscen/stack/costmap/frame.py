@@ -72,6 +72,13 @@ class Frame:
         column, row = (x - self.origin[0]) / self.resolution, (y - self.origin[1]) / self.resolution
         return 0 <= row < self.shape[0] and 0 <= column < self.shape[1]
 
+    def within(self, window: tuple[slice, slice], numbers: Numbers) -> Numbers:
+        """Cells of a window, which are given as numbers in it."""
+        (rows, columns), width = window, self.shape[1]
+        wide = max(1, columns.stop - columns.start)
+        cells: Numbers = numbers + numbers // wide * (width - wide) + (rows.start * width + columns.start)
+        return cells
+
     def window(self, low: tuple[int, int], high: tuple[int, int], margin: int) -> tuple[slice, slice]:
         """The cells from `low` to `high` (inclusive) and `margin` more on each side, cut off at the grid's edge."""
         return (

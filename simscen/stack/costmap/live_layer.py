@@ -73,6 +73,11 @@ class LiveLayer:
         both: Mask = self._scanned[window] | ~np.isnan(self._heights[window])
         return both
 
+    @property
+    def cells(self) -> Numbers:
+        """The same by number."""
+        return self._marks if self._heights is None else np.flatnonzero(self.marked())
+
     def on_scan(self, base: Pose2, scan: Scan, walls: Squared) -> Numbers:
         """Clear what the beams pass through, then mark what they hit; returns the cells that have changed."""
         spec, frame, scanned = self._spec, self._frame, self._scanned.reshape(-1)

@@ -7,6 +7,7 @@ which is the same question and a hundred times fewer cells.
 import cmath
 import math
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -27,14 +28,21 @@ class ScanAmongMoving(Scan):
 
 def hits(scan: Scan, base: Pose2, nearest: float, farthest: float) -> Plane:
     """Map points x + iy (n,) of the beams that hit something that stands, `nearest` to `farthest` metres away."""
+    points: Plane = _ends(scan, nearest, farthest) * cmath.rect(1.0, base.yaw)
+    points += _place(scan, base)
+    return points
+
+
+@lru_cache(maxsize=2)
+def _ends(scan: Scan, nearest: float, farthest: float) -> Plane:
+    """The same from the lidar, unturned: two costmaps take in each scan."""
     ranges = scan.ranges
     use = (ranges >= max(scan.range_min, nearest)) & (ranges <= min(scan.range_max, farthest))
     if isinstance(scan, ScanAmongMoving):
         use &= ~scan.moving
-    beams, turned = use.nonzero()[0], cmath.rect(1.0, base.yaw)
-    points: Plane = ranges.take(beams) * directions(scan).take(beams) * turned
-    points += _place(scan, base)
-    return points
+    beams = use.nonzero()[0]
+    ends: Plane = ranges.take(beams) * directions(scan).take(beams)
+    return ends
 
 
 def _place(scan: Scan, base: Pose2) -> complex:
