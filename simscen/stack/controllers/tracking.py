@@ -24,7 +24,7 @@ class PathTracker:
     next such cusp is looked at until the robot is there.
 
     Searches pass over what cannot be what they look for: so many metres along the path change the distance to the robot
-    by no more than that. A handful of points is looked at, in floats, which take less than arrays of thirty do.
+    by no more than that. A handful of points x + iy is looked at, which takes less than arrays of thirty do.
     """
 
     def __init__(self, path: Path) -> None:
@@ -33,8 +33,7 @@ class PathTracker:
         lengths = np.hypot(steps[:, 0], steps[:, 1])
         self.along = np.concatenate(([0.0], np.cumsum(lengths)))
         self._metres: list[float] = self.along.tolist()
-        self._x: list[float] = self.points[:, 0].tolist()
-        self._y: list[float] = self.points[:, 1].tolist()
+        self._places: list[complex] = (self.points[:, 0] + 1j * self.points[:, 1]).tolist()
         ahead = forward_steps(self.points)
         self._ends: list[int] = [*changes(ahead).tolist(), len(self.points) - 1]
         self._forward: list[bool] = [bool(ahead[max(0, end - 1)]) if len(ahead) else True for end in self._ends]
@@ -59,17 +58,15 @@ class PathTracker:
             self._nearest(pose)
 
     def _nearest(self, pose: Pose2) -> None:
-        x, y, metres, stop = self._x, self._y, self._metres, self._stop(SEARCH_AHEAD)
-        index, least, near = self.index, math.inf, math.inf
+        places, metres, stop, here = self._places, self._metres, self._stop(SEARCH_AHEAD), complex(pose.x, pose.y)
+        index, near = self.index, math.inf
         while index < stop:
-            dx, dy = x[index] - pose.x, y[index] - pose.y
-            square = dx * dx + dy * dy
-            if square < least:
-                self.index, least, near = index, square, math.sqrt(square)
+            away = abs(places[index] - here)
+            if away < near:
+                self.index, near = index, away
                 index += 1
             else:
-                farther = math.sqrt(square) - near - ROUNDING
-                index = bisect_left(metres, metres[index] + farther, index + 1, stop)
+                index = bisect_left(metres, metres[index] + away - near - ROUNDING, index + 1, stop)
 
     def ahead(self, metres: float) -> tuple[Array, Array]:
         """Points (n, 3) of this piece for so many metres, at least two where it has any, and metres (n,) to them."""
@@ -88,8 +85,8 @@ class PathTracker:
     @property
     def piece_end(self) -> tuple[float, float]:
         """Where this piece ends."""
-        end = self._ends[0]
-        return self._x[end], self._y[end]
+        end = self._places[self._ends[0]]
+        return end.real, end.imag
 
     def carrot(self, pose: Pose2, distance: float, beyond: bool = False) -> tuple[float, float]:
         """Where the piece leaves the circle of `distance` around the robot; its end if it does not leave.
@@ -108,17 +105,17 @@ class PathTracker:
                 x - pose.x, y - pose.y, x + 2 * more * math.cos(yaw) - pose.x, y + 2 * more * math.sin(yaw) - pose.y,
                 distance, pose,
             )  # fmt: skip
-        x, y = self._x[first], self._y[first]
+        x, y = (place := self._places[first]).real, place.imag
         if first == self.index:
             return x, y
-        ax, ay = self._x[first - 1], self._y[first - 1]
-        return _on_circle(ax - pose.x, ay - pose.y, x - pose.x, y - pose.y, distance, pose)
+        before = self._places[first - 1]
+        return _on_circle(before.real - pose.x, before.imag - pose.y, x - pose.x, y - pose.y, distance, pose)
 
     def _leaving(self, pose: Pose2, distance: float, last: int) -> int | None:
         """The first point ahead, up to the `last`, that is no nearer to the robot than this."""
-        x, y, metres, index = self._x, self._y, self._metres, self.index
+        places, metres, index, here = self._places, self._metres, self.index, complex(pose.x, pose.y)
         while index <= last:
-            near = math.hypot(x[index] - pose.x, y[index] - pose.y)
+            near = abs(places[index] - here)
             if near >= distance:
                 return index
             index = bisect_left(metres, metres[index] + distance - near - ROUNDING, index + 1, last + 1)
