@@ -33,9 +33,10 @@ class FaceLots:
         return self.faces[self.starts[number] : self.starts[number + 1]]
 
     def near(self, x: float, y: float, within: float) -> npt.NDArray[np.bool_]:
-        """Which lots have anything in the square that reaches so many metres to each side of a place."""
+        """Which lots may have anything within so many metres of a place."""
         place = (x, y)
-        found: npt.NDArray[np.bool_] = np.all((self.low - within <= place) & (self.high + within >= place), axis=1)
+        outside = np.maximum(np.maximum(self.low - place, place - self.high), 0.0)
+        found: npt.NDArray[np.bool_] = (outside * outside).sum(axis=1) <= within * within
         return found
 
 

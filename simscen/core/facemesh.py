@@ -22,8 +22,12 @@ FLAT = 1e-6
 
 def compact(vertices: Array, faces: Faces) -> Mesh:
     """Some faces with the vertices that they use."""
-    used, indices = np.unique(faces, return_inverse=True)
-    return Mesh(vertices[used], indices.reshape(-1, 3).astype(np.int32))
+    if faces.size < len(vertices) // 8:
+        used, indices = np.unique(faces, return_inverse=True)
+        return Mesh(vertices[used], indices.reshape(-1, 3).astype(np.int32))
+    needed = np.zeros(len(vertices), dtype=np.bool_)
+    needed[faces] = True
+    return Mesh(vertices[needed], (np.cumsum(needed, dtype=np.int32) - np.int32(1))[faces])
 
 
 def is_convex(mesh: Mesh) -> bool:

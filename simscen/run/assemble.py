@@ -187,10 +187,14 @@ class LiveRays:
         """Of what moves, the rays go through what is called as in `without`."""
         self._scene, self._robot, self._without = scene, robot, without
         self._meshes: dict[str, tuple[tuple[Solid, ...], TriangleMesh]] = {}
+        self._where: Mapping[str, Pose3] | None = None
 
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
         """See core.rays.RayCaster."""
-        self._scene.set_moving(self._placed())
+        where = self._robot.objects()
+        if where is not self._where:  # it is the same one for as long as nothing has moved
+            self._where = where
+            self._scene.set_moving(self._placed())
         return self._scene.cast(origins, directions, reach)
 
     def _placed(self) -> Mapping[str, tuple[TriangleMesh, Pose3]]:

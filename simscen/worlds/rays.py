@@ -1,31 +1,26 @@
 """Ray casting with Embree: one scene for what never moves, and one for each thing that does, in its own frame."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
-from embreex.mesh_construction import TriangleMesh as EmbreeMesh
 from embreex.rtcore import EmbreeDevice
-from embreex.rtcore_scene import EmbreeScene
 
-from simscen.core.facelots import FaceLots, lots_of
-from simscen.core.facemesh import compact
-from simscen.core.geometry import Array, Pose3, Vector, rotated
-from simscen.core.remembered import remembered
-from simscen.core.shapes import Mesh, TriangleMesh
+from simscen.core.geometry import Array, Pose3, Vector
+from simscen.core.shapes import TriangleMesh
+from simscen.worlds import raypart
+from simscen.worlds.raypart import Mover, Part, Singles, Window
 
-Singles = npt.NDArray[np.float32]
-Indices = npt.NDArray[np.int32]
 Numbers = npt.NDArray[np.int64]
 Placed = tuple[TriangleMesh, Pose3]
 
 FEW = 20_000
 """Triangles of a world that is taken as a whole, in 25 ms."""
-EDGE, AHEAD = 8.0, 8.0
-"""m of the squares that others are taken in, and beyond the reach of rays within which they are."""
-_NO_HIT = np.float32(1e30)
-"""Embree answers 1e37 for a ray that meets nothing."""
+_FARTHEST = 1e30
+"""m that a ray reaches at most, in single precision."""
+_BEYOND = 1.001
+"""Times its reach, where a ray ends that meets nothing within it."""
 
 
 class RayScene:
@@ -42,27 +37,30 @@ class RayScene:
         self._device: EmbreeDevice = static._device if isinstance(static, RayScene) else EmbreeDevice()
         if isinstance(static, RayScene):
             world = static._static
-            self._static: _Part | _Window = _Window(self._device, world.mesh) if isinstance(world, _Window) else world
+            self._static: Part | Window = Window(self._device, world.mesh) if isinstance(world, Window) else world
         else:
-            self._static = (_Window if len(static.faces) > FEW else _Part)(self._device, static)
-        self._parts: dict[int, _Part] = {}
-        self._bodies: Mapping[str, Placed] = {}
+            self._static = (Window if len(static.faces) > FEW else Part)(self._device, static)
+        self._parts: dict[int, Part] = {}
+        self._movers: dict[str, Mover] = {}
 
     def set_moving(self, bodies: Mapping[str, Placed]) -> None:
         """Say where the bodies are now: by name, the triangles in a body's frame and the pose of that frame."""
         known, self._parts = self._parts, {}
-        for mesh, _ in bodies.values():
-            if id(mesh) not in self._parts:
-                self._parts[id(mesh)] = known.get(id(mesh)) or _Part(self._device, mesh)
-        self._bodies = bodies
+        before, self._movers = self._movers, {}
+        for name, (mesh, pose) in bodies.items():
+            part = self._parts.get(id(mesh)) or known.get(id(mesh)) or Part(self._device, mesh)
+            self._parts[id(mesh)] = part
+            mover = before.get(name)
+            same = mover is not None and mover.part is part and mover.pose == pose
+            self._movers[name] = mover if mover is not None and same else Mover(part, pose)
 
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
         """See core.rays.RayCaster."""
-        static = self._static
-        if isinstance(static, _Window):
+        static, limit = self._static, min(reach, _FARTHEST)
+        if isinstance(static, Window):
             static = static.around(origins, reach)
-        distances, limit = static.distances(origins, directions), min(reach, _NO_HIT)
-        if self._bodies and len(origins):
+        distances = static.distances(origins, directions, limit * _BEYOND)
+        if self._movers and len(origins):
             self._shorten(origins, directions, distances, reach)
         answer = distances.astype(np.float64)
         answer[distances > limit] = np.inf
@@ -70,123 +68,50 @@ class RayScene:
 
     def _shorten(self, origins: Array, directions: Array, ends: Singles, reach: float) -> None:
         """Let rays end where they meet moving bodies; those are asked for that meet the sphere around one."""
-        place, far, one = origins[0].tolist(), min(float(ends.max()), reach), not origins.strides[0]
-        if not one:
-            far += float(np.linalg.norm(origins - origins[0], axis=1).max())
-        for mesh, pose in self._bodies.values():
-            part = self._parts[id(mesh)]
-            centre = part.middle_at(pose)
-            away = math.dist(centre, place) - part.radius
-            if away > far or not len(mesh.faces):
-                continue
-            if one:  # as a lidar's
-                way = [there - here for here, there in zip(place, centre, strict=True)]
-                rays = _in_cone(way, part.radius, directions)
-                rays = rays[ends[rays] >= away]
-            else:
-                rays = _meeting(centre - origins, part.radius, directions, ends)
-            if len(rays):
-                turn = pose.rotation()
-                found = part.distances((origins[rays] - pose.position) @ turn, directions[rays] @ turn)
-                ends[rays] = np.minimum(ends[rays], found)
-
-
-def _in_cone(way: list[float], radius: float, directions: Array) -> Numbers:
-    """The rays from one place that meet a sphere, whose middle is a `way` off; all where they begin inside of it."""
-    square = sum([part * part for part in way]) - radius * radius
-    chosen: Numbers = (directions @ way >= (math.sqrt(square) if square > 0 else -math.inf)).nonzero()[0]
-    return chosen
-
-
-def _meeting(ways: Array, radius: float, directions: Array, ends: Singles) -> Numbers:
-    """The rays that meet a sphere before they end; `ways` (n, 3) lead from where each begins to its middle."""
-    ahead = (ways * directions).sum(axis=1)
-    beside = (ways * ways).sum(axis=1) - ahead**2
-    chosen: Numbers = ((ahead >= -radius) & (ahead - radius <= ends) & (beside <= radius * radius)).nonzero()[0]
-    return chosen
-
-
-class _Part:
-    """One Embree scene of a mesh, about the middle of that mesh; `radius` is that of the sphere around it."""
-
-    def __init__(self, device: EmbreeDevice, mesh: TriangleMesh | Mesh, middle: Array | None = None) -> None:
-        """About a `middle` of something larger, if that is given."""
-        self.middle = _middle(mesh.vertices) if middle is None else middle
-        x, y, z = self.middle.tolist()
-        self._centre = (x, y, z)
-        corners = mesh.vertices - self.middle
-        # A little more, for rays that graze the furthest corner.
-        self.radius = 1.001 * float(np.linalg.norm(corners, axis=1).max(initial=0.0))
-        # Robust: without it rays may slip through the edge between two triangles.
-        self._scene = EmbreeScene(device, True)
-        if len(mesh.faces):
-            faces = np.ascontiguousarray(mesh.faces, dtype=np.int32)
-            EmbreeMesh(self._scene, np.ascontiguousarray(corners, dtype=np.float32), faces)
-
-    def middle_at(self, pose: Pose3) -> Vector:
-        """Where its middle is in the world, with its frame at a pose."""
-        x, y, z, i, j, k, w = pose
-        p, q, r = rotated((i, j, k, w), self._centre)
-        return x + p, y + q, z + r
-
-    def distances(self, origins: Array, directions: Array) -> Singles:
-        """Distances (n,) in the mesh's own frame, beyond _NO_HIT where nothing is hit."""
+        place = origins[0].tolist()
         if origins.strides[0]:
-            starts = np.subtract(origins, self.middle).astype(np.float32)
-        else:
-            starts = np.empty(origins.shape, np.float32)
-            starts[:] = origins[0] - self.middle
-        along = np.ascontiguousarray(directions, dtype=np.float32)
-        answer: Singles = self._scene.run(starts, along, query="DISTANCE")
-        return answer
+            reach += float(np.linalg.norm(origins - origins[0], axis=1).max())
+        movers = self._movers.values()
+        near = [mover for mover in movers if math.dist(mover.pose[:3], place) - mover.part.extent <= reach]
+        if not near:
+            return
+        meeting = _meeting if origins.strides[0] else _in_cones
+        for mover, met in zip(near, meeting(near, origins, directions, ends), strict=True):
+            rays: Numbers = met.nonzero()[0]
+            if len(rays):
+                starts = origins[rays] if origins.strides[0] else origins[: len(rays)]
+                ends[rays] = mover.distances(starts, directions[rays], ends[rays])
 
 
-class _Window:
-    """The world of a mesh about the place that rays were last cast from: of a large one most is out of their reach.
-
-    Embree takes a microsecond for each triangle, and some 200 bytes. Those around are where all of them would be.
-    """
-
-    def __init__(self, device: EmbreeDevice, mesh: TriangleMesh) -> None:
-        self.mesh = mesh
-        self._device, self._middle = device, _middle_of(mesh)
-        self._part: _Part | None = None
-        self._place, self._far = (0.0, 0.0), 0.0
-
-    def around(self, origins: Array, reach: float) -> _Part:
-        """A scene that holds all that rays from the origins (n, 3) may meet within their reach."""
-        x, y = origins[0, :2].tolist() if len(origins) else self._place
-        if len(origins) and origins.strides[0]:
-            reach += float(np.abs(origins[:, :2] - origins[0, :2]).max())
-        away = max(abs(x - self._place[0]), abs(y - self._place[1]))
-        if self._part is None or away + reach > self._far:
-            self._place, self._far = (x, y), reach + AHEAD
-            lots = _lots_of(self.mesh)
-            near = np.flatnonzero(lots.near(x, y, self._far)).tolist()
-            faces = np.concatenate([np.empty((0, 3), np.int32), *(lots.lot(number) for number in near)])
-            self._part = _Part(self._device, compact(self.mesh.vertices, faces), self._middle)
-        return self._part
+def _in_cones(movers: Sequence[Mover], origins: Array, directions: Array, ends: Singles) -> npt.NDArray[np.bool_]:
+    """Which rays (k, n) from one place meet the sphere around each mover; all where they begin inside of it."""
+    px, py, pz = origins[0].tolist()
+    ways, least, away = list[Vector](), list[tuple[float]](), list[tuple[float]]()
+    for mover in movers:
+        (x, y, z), radius = mover.middle, mover.part.radius
+        x, y, z = x - px, y - py, z - pz
+        square = x * x + y * y + z * z
+        outside = square - radius * radius
+        ways.append((x, y, z))
+        least.append((math.sqrt(outside) if outside > 0 else -math.inf,))
+        away.append((math.sqrt(square) - radius,))
+    chosen: npt.NDArray[np.bool_] = np.array(ways) @ directions.T >= np.array(least)
+    chosen &= ends >= np.array(away)
+    return chosen
 
 
-def _middle(vertices: Array) -> Array:
-    if not len(vertices):
-        return np.zeros(3)
-    middle: Array = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
-    return middle
+def _meeting(movers: Sequence[Mover], origins: Array, directions: Array, ends: Singles) -> npt.NDArray[np.bool_]:
+    """Which rays (k, n) from several places meet the sphere around each mover before they end."""
+    chosen = np.empty((len(movers), len(origins)), dtype=np.bool_)
+    for mover, met in zip(movers, chosen, strict=True):
+        ways, radius = mover.middle - origins, mover.part.radius
+        ahead = (ways * directions).sum(axis=1)
+        beside = (ways * ways).sum(axis=1) - ahead**2
+        met[:] = (ahead >= -radius) & (ahead - radius <= ends) & (beside <= radius * radius)
+    return chosen
 
 
 def ready(mesh: TriangleMesh) -> None:
     """Work out now what scenes of a world need to know of it."""
     if len(mesh.faces) > FEW:
-        _middle_of(mesh)
-        _lots_of(mesh)
-
-
-@remembered
-def _middle_of(mesh: TriangleMesh) -> Array:
-    return _middle(mesh.vertices)
-
-
-@remembered
-def _lots_of(mesh: TriangleMesh) -> FaceLots:
-    return lots_of(mesh.vertices, mesh.faces, EDGE)
+        raypart.ready(mesh)

@@ -1,0 +1,143 @@
+"""Embree scenes: of a mesh, of such a mesh where it is now, and of what is around in a large world."""
+
+import math
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+from embreex.mesh_construction import TriangleMesh as EmbreeMesh
+from embreex.rtcore import EmbreeDevice
+from embreex.rtcore_scene import EmbreeScene
+
+from simscen.core.facelots import FaceLots, lots_of
+from simscen.core.facemesh import compact
+from simscen.core.geometry import Array, Pose3, Vector, rotated
+from simscen.core.remembered import remembered
+from simscen.core.shapes import Mesh, TriangleMesh
+
+Singles = npt.NDArray[np.float32]
+
+EDGE, AHEAD = 4.0, 8.0
+"""m of the squares that large worlds are taken in, and beyond the reach of rays within which they are."""
+
+
+class Part:
+    """One Embree scene of a mesh, about the middle of that mesh.
+
+    `radius` is that of the sphere around it, `extent` how far it reaches from the origin of its frame.
+    """
+
+    def __init__(self, device: EmbreeDevice, mesh: TriangleMesh | Mesh, middle: Array | None = None) -> None:
+        """About a `middle` of something larger, if that is given."""
+        self.mesh = mesh
+        self.middle = middle_of(mesh.vertices) if middle is None else middle
+        x, y, z = self.middle.tolist()
+        self.centre = (x, y, z)
+        corners = mesh.vertices - self.middle
+        # A little more, for rays that graze the furthest corner.
+        self.radius = 1.001 * float(np.linalg.norm(corners, axis=1).max(initial=0.0))
+        self.extent = math.hypot(x, y, z) + self.radius
+        # Robust: without it rays may slip through the edge between two triangles.
+        self._scene = EmbreeScene(device, True)
+        if len(mesh.faces):
+            faces = np.ascontiguousarray(mesh.faces, dtype=np.int32)
+            EmbreeMesh(self._scene, np.ascontiguousarray(corners, dtype=np.float32), faces)
+
+    def distances(self, origins: Array, directions: Array, ends: float | Singles) -> Singles:
+        """Distances (n,) in the mesh's own frame; where nothing is hit before a ray ends, that of its end.
+
+        An array of `ends` becomes the answer.
+        """
+        if not origins.strides[0]:
+            return self.distances_from(origins[0], directions, ends)
+        return self._run(np.subtract(origins, self.middle).astype(np.float32), directions, ends)
+
+    def distances_from(self, place: Array, directions: Array, ends: float | Singles) -> Singles:
+        """The same of rays that all begin in one place (3,)."""
+        start = (place - self.middle).astype(np.float32)
+        return self._run(np.ndarray(directions.shape, np.float32, start, 0, (0, 4)), directions, ends)
+
+    def _run(self, starts: Singles, directions: Array, ends: float | Singles) -> Singles:
+        along = np.ascontiguousarray(directions, dtype=np.float32)
+        answer: Singles = self._scene.run(starts, along, ends, query="DISTANCE")
+        return answer
+
+
+class Mover:
+    """A part where it is now; what rays need to know of that is worked out once one may meet it."""
+
+    def __init__(self, part: Part, pose: Pose3) -> None:
+        """With its frame at a pose in the world."""
+        self.part, self.pose = part, pose
+
+    @cached_property
+    def middle(self) -> Vector:
+        """Where its middle is in the world."""
+        x, y, z, i, j, k, w = self.pose
+        p, q, r = rotated((i, j, k, w), self.part.centre)
+        return x + p, y + q, z + r
+
+    @cached_property
+    def _turn(self) -> Array:
+        return self.pose.rotation()
+
+    def distances(self, origins: Array, directions: Array, ends: Singles) -> Singles:
+        """As those of a part, in the world."""
+        turn, part = self._turn, self.part
+        if not origins.strides[0]:
+            return part.distances_from((origins[0] - self.pose[:3]) @ turn, directions @ turn, ends)
+        return part.distances((origins - self.pose[:3]) @ turn, directions @ turn, ends)
+
+
+class Window:
+    """The world of a mesh about the place that rays were last cast from: of a large one most is out of their reach.
+
+    Embree takes a microsecond for each triangle, and some 200 bytes. Those around are where all of them would be.
+    """
+
+    def __init__(self, device: EmbreeDevice, mesh: TriangleMesh) -> None:
+        self.mesh = mesh
+        self._device, self._middle = device, _middle_of(mesh)
+        self._part: Part | None = None
+        self._place, self._far = (0.0, 0.0), 0.0
+
+    def around(self, origins: Array, reach: float) -> Part:
+        """A scene that holds all that rays from the origins (n, 3) may meet within their reach."""
+        x, y = origins[0, :2].tolist() if len(origins) else self._place
+        if len(origins) and origins.strides[0]:
+            reach += float(np.linalg.norm(origins[:, :2] - origins[0, :2], axis=1).max())
+        dx, dy = x - self._place[0], y - self._place[1]
+        away = math.hypot(dx, dy)
+        if self._part is None or away + reach > self._far:
+            # Who has come from the last middle mostly goes on: half of what is taken beyond the reach lies before it.
+            onward = min(1.0, AHEAD / 2 / away) if self._part is not None and away > 0 else 0.0
+            self._place, self._far = (x + onward * dx, y + onward * dy), reach + AHEAD
+            lots = _lots_of(self.mesh)
+            near = np.flatnonzero(lots.near(*self._place, self._far)).tolist()
+            faces = np.concatenate([np.empty((0, 3), np.int32), *(lots.lot(number) for number in near)])
+            self._part = Part(self._device, compact(self.mesh.vertices, faces), self._middle)
+        return self._part
+
+
+def middle_of(vertices: Array) -> Array:
+    """The middle of the box around vertices (n, 3)."""
+    if not len(vertices):
+        return np.zeros(3)
+    middle: Array = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+    return middle
+
+
+def ready(mesh: TriangleMesh) -> None:
+    """Work out now what windows of a world need to know of it."""
+    _middle_of(mesh)
+    _lots_of(mesh)
+
+
+@remembered
+def _middle_of(mesh: TriangleMesh) -> Array:
+    return middle_of(mesh.vertices)
+
+
+@remembered
+def _lots_of(mesh: TriangleMesh) -> FaceLots:
+    return lots_of(mesh.vertices, mesh.faces, EDGE)
