@@ -171,8 +171,7 @@ class RegulatedPurePursuit(PathFollower):
             near = distance_at(costmap, pose.x, pose.y)
             if near < spec.cost_scaling_dist:
                 slow = min(slow, speed * spec.cost_scaling_gain * near / spec.cost_scaling_dist)
-        speed = min(speed, max(slow, spec.regulated_linear_scaling_min_speed))
-        return self._approaching(speed, pose)
+        return min(speed, self._approaching(max(slow, spec.regulated_linear_scaling_min_speed), pose))
 
     def _approaching(self, speed: float, pose: Pose2) -> float:
         """Slow down near the end of the path, or of a piece: by Nav2's ratio, never faster than the brakes allow."""
