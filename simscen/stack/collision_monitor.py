@@ -44,7 +44,7 @@ class CollisionMonitor:
         self._came: dict[str, tuple[int, int]] = {}
         self.hold_ticks = spec.hold_timeout * tick_rate or math.inf
         """For how long it may allow nothing until that is a failure."""
-        self._seen, self._oldest = dict.fromkeys(lidars, 0), 0
+        self._seen, self._oldest, self._began = dict.fromkeys(lidars, -math.inf), -math.inf, 0
         self._scans: dict[str, Seen] = {}
         self._moving, self._moves = nothing(), False
         corners = np.array(robot.footprint, dtype=np.float64)
@@ -59,9 +59,8 @@ class CollisionMonitor:
             self._half, self._mitre = robot.radius, 1.0
 
     def start(self, tick: int) -> None:
-        """Sources count as heard now."""
-        self._seen = dict.fromkeys(self._seen, tick)
-        self._oldest = tick
+        """A lidar that nobody has heard yet is silent, and has been since now."""
+        self._began = tick
 
     def on_scan(self, scan: Scan, odometry: Pose2, tick: int = 0) -> None:
         """A scan that came at `tick`, and where odometry was; one in which no beam answers is silence."""
@@ -78,13 +77,13 @@ class CollisionMonitor:
         self._moving, self._moves = moving, len(moving) > 0
 
     def silent(self, tick: int) -> bool:
-        """Whether a lidar has not been heard for `source_timeout`."""
+        """Whether a lidar has not been heard for `source_timeout`, or not at all: nobody drives off blind."""
         return tick - self._oldest > self._timeout and self._spec.enabled and bool(self._seen)
 
     def silence(self, tick: int) -> str:
         """Why the lidar that was heard longest ago is taken for silent."""
         name = min(self._seen, key=lambda sensor: self._seen[sensor])
-        limit, ago = f"source_timeout is {self._spec.source_timeout:g} s", (tick - self._seen[name]) / self._tick_rate
+        limit, ago = f"source_timeout is {self._spec.source_timeout:g} s", self._since(name, tick)
         came, taken = self._came.get(name, (None, 0))
         if came is None or (tick - came) > self._timeout:
             return f"lidar `{name}` has been silent for {ago:.2f} s; {limit}"
@@ -92,6 +91,10 @@ class CollisionMonitor:
             return f"lidar `{name}` has been blind for {ago:.2f} s, as no beam of its scans answers; {limit}"
         late = (came - taken) / self._tick_rate
         return f"scans of lidar `{name}` are {late:.2f} s old when they come; {limit}"
+
+    def _since(self, name: str, tick: int) -> float:
+        """For how many seconds the lidar has been silent."""
+        return (tick - max(self._seen[name], self._began)) / self._tick_rate
 
     def allow(self, wanted: Twist, odometry: Pose2) -> Twist:
         """The command, slowed down so that the first contact is at least `time_before_collision` away."""
