@@ -1,6 +1,7 @@
 """What keeps a robot from its goal: a closed passage, an occupied goal, something that it stands at."""
 
 import math
+from collections import Counter
 
 import numpy as np
 
@@ -32,7 +33,7 @@ def halted(trace: Trace, case: Case, tick: int) -> tuple[list[str], set[str]]:
         if "" in events or not events <= named:  # of what an event brought, one sentence is enough
             lines += told
             named |= events
-    return lines or _given_up(trace, story, tick), named
+    return [*(lines or _given_up(trace, story, tick)), *_failed_recoveries(trace, story, tick)], named
 
 
 def _story(trace: Trace, case: Case, tick: int) -> GoalStory | None:
@@ -82,6 +83,14 @@ def _given_up(trace: Trace, story: GoalStory, tick: int) -> list[str]:
         return []
     tried = [e.name for e in trace.of_kind(EventKind.RECOVERY_STARTED) if began(story) <= e.tick <= tick]
     return [f"it gave up and said: {message}" + (f"; {', '.join(tried)} had not helped" if tried else "")]
+
+
+def _failed_recoveries(trace: Trace, story: GoalStory, tick: int) -> list[str]:
+    """Recovery behaviours that came to nothing on the way to this goal, each with its code."""
+    ended = [e for e in trace.of_kind(EventKind.RECOVERY_ENDED) if began(story) <= e.tick <= tick]
+    failed = Counter(f"{e.name} with {code_of(e)}" for e in ended if e.data.get("outcome") == "failed")
+    told = (what if times == 1 else f"{what} {times} times" for what, times in failed.items())
+    return [f"what it tried failed, too: {', '.join(told)}"] if failed else []
 
 
 def _touching(trace: Trace, tick: int) -> list[str]:

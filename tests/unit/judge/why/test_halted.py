@@ -141,3 +141,18 @@ def test_where_nothing_else_is_known_its_stack_is_quoted_with_what_it_had_tried(
 
     assert told() == ["why: it gave up and said: no room to turn; spin, wait had not helped"]
     assert "said" not in "".join(told(*box(1, "crate", 5, 0, 0.6, 2.0, "crate falls")))
+
+
+def test_recoveries_that_failed_are_told_with_their_codes_whatever_else_is_known():
+    timeout = {"outcome": "failed", "error_code": 711, "error_name": "BACKUP_TIMEOUT", "message": "it took too long"}
+    blocked = {"outcome": "failed", "error_code": 703, "error_name": "SPIN_COLLISION_AHEAD", "message": "no room"}
+    tried = [
+        [3, "recovery.ended", "wait", {"outcome": "succeeded"}],
+        [4, "recovery.ended", "backup", timeout],
+        [5, "recovery.ended", "spin", blocked],
+        [6, "recovery.ended", "backup", timeout],
+        [1000, "recovery.ended", "spin", blocked],
+    ]
+    (nearest, line) = why("stuck", [*tried, *box(0, "crate", 4.7, 0, 0.4, 0.4)], case={**CASE, "passages": []})
+    assert nearest == "why: crate was 0.30 m from the robot"
+    assert line == "why: what it tried failed, too: backup with BACKUP_TIMEOUT 2 times, spin with SPIN_COLLISION_AHEAD"
