@@ -44,6 +44,13 @@ def test_wheels_that_stick_out_are_part_of_the_hull_and_hidden_ones_are_not():
     assert [solid.name for solid in robot_body(shipped("turtlebot")).hull].count("wheel") == 0
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_the_lidar_of_a_shipped_robot_sees_others_of_its_kind(name):
+    plane = shipped(name).sensors["lidar"].lidar.mount.z
+    tall = [(part.z, part.z + (part.box[2] if part.box else part.cylinder[1])) for part in shipped(name).body]
+    assert any(bottom + 0.02 <= plane <= top - 0.02 for bottom, top in tall)
+
+
 def test_two_wheels_get_casters_within_the_hull_of_which_one_carries():
     body = robot_body(shipped("amr"))
     lowest = sorted(caster.pose.z - caster.shape.radius for caster in body.casters if isinstance(caster.shape, Sphere))
