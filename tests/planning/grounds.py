@@ -7,6 +7,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from simscen.core.geometry import Array, Pose2
+from simscen.core.grid import OccupancyGrid
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.planners.rates import Rates
@@ -80,6 +81,29 @@ def maze(chance: np.random.Generator) -> tuple[Flatland, float, float]:
             if y + 1 < rows and frozenset(((x, y), (x, y + 1))) not in open_ and chance.random() > 0.1:
                 world.boxes.append((x * size, up - 0.05, right, up + 0.05))
     return world, columns * size, rows * size
+
+
+def large_maze(number: int, rooms: int, edge: int) -> OccupancyGrid:
+    """A perfect maze of so many rooms each way, drawn on cells of 5 cm: `edge` of them a room, two of them a wall."""
+    chance, shut = np.random.default_rng(number), [(0, 0)]
+    size = rooms * edge + 2
+    cells = np.zeros((size, size), dtype=np.int8)
+    for wall in range(0, size, edge):
+        cells[wall : wall + 2] = cells[:, wall : wall + 2] = 100
+    seen = {(0, 0)}
+    while shut:
+        x, y = shut[-1]
+        beside = [(x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)]
+        fresh = [c for c in beside if min(c) >= 0 and max(c) < rooms and c not in seen]
+        if not fresh:
+            shut.pop()
+            continue
+        u, v = fresh[chance.integers(len(fresh))]
+        seen.add((u, v))
+        shut.append((u, v))
+        low, left = min(y, v) * edge + 2, min(x, u) * edge + 2
+        cells[low : (max(y, v) + 1) * edge, left : (max(x, u) + 1) * edge] = 0
+    return OccupancyGrid(cells, 0.05, Pose2(0.0, 0.0))
 
 
 def view_of(

@@ -4,14 +4,17 @@ import math
 
 import numpy as np
 import pytest
-from grounds import ROBOT, cheapest, forest, maze, pair, rooms, view_of
+from grounds import ROBOT, cheapest, forest, large_maze, maze, pair, rooms, view_of
 
 from simscen.core.geometry import Pose2
+from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.planners import OmplPlanner as Spec
+from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.planners.ends import find_ends
 from simscen.stack.planners.ompl_planner import OmplPlanner
 from simscen.stack.planners.rates import Rates
-from simscen.testing.flatland import Flatland
+from simscen.stack.protocols import Surroundings
+from simscen.testing.flatland import RATE, Flatland
 
 GROUNDS = {"rooms": rooms, "forest": forest, "maze": maze}
 
@@ -47,6 +50,15 @@ def test_a_plan_takes_the_cheaper_one_of_two_ways_that_cost_nearly_the_same(kind
     start, goal = pair(rates, find_ends(rates, inside, inside, 0.5).reachable, chance)
     points = OmplPlanner(Spec(), ROBOT).plan(view, start, goal, seed).points
     assert rates.along(points[:, :2]) < 1.045 * cheapest(rates, start, goal)
+
+
+def test_the_way_through_a_maze_of_a_hundred_metres_is_found() -> None:
+    """There were too many samples for the iterations of one search: NO_VALID_PATH after 6 s, where there was a way."""
+    view = Costmap(CostmapSpec(), Surroundings(ROBOT, large_maze(1, 60, 33), RATE)).view
+    path = OmplPlanner(Spec(), ROBOT).plan(view, Pose2(0.8, 0.8), Pose2(98.3, 98.3), 1)
+    rates = Rates(view, ROBOT, 2.0, True)
+    assert np.isfinite(rates.at(path.points[:, :2])).all()
+    assert path.points[-1, :2] == pytest.approx((98.3, 98.3))
 
 
 def corridor_with_a_corner() -> Flatland:

@@ -24,7 +24,8 @@ from simscen.stack.protocols import CostmapView
 BLOCK, PRICED_BLOCK = 0.2, 0.15
 """Metres, about: the coarse grid's resolution."""
 MOST_BLOCKS, MOST_PRICED = 40_000, 20_000
-"""Larger maps get larger blocks: Dijkstra on 40 000 takes 10 ms."""
+"""Larger maps get larger blocks: Dijkstra on 40 000 takes 10 ms. None is wider than the robot, though, for in one that
+holds a wall both sides of the wall would be one place."""
 LEG = 30.0
 """Metres of a way that are searched in one go."""
 Mask = npt.NDArray[np.bool_]
@@ -39,7 +40,8 @@ class InformedSet:
     def __init__(self, rates: Rates, start: Point, goal: Point, priced: bool = False) -> None:
         """`priced`: by what ways cost, in metres of free ground, rather than by their lengths."""
         size, most = (PRICED_BLOCK, MOST_PRICED) if priced else (BLOCK, MOST_BLOCKS)
-        fewest = math.ceil(math.sqrt(rates.height * rates.width / most))
+        widest = max(1, int(2.0 * rates.inscribed / rates.resolution))
+        fewest = min(math.ceil(math.sqrt(rates.height * rates.width / most)), widest)
         self._factor = max(1, round(size / rates.resolution), fewest)
         self._size = self._factor * rates.resolution
         self._origin = rates.origin

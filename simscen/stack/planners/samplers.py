@@ -16,8 +16,11 @@ DENSITIES = (1, 2, 4, 8)
 """Samples to the metre of one search after the other, as multiples."""
 CORRIDORS = (0.05, 0.15, 1.0)
 """How much longer than the coarse grid's shortest way a way in the corridor may be (ratio), one after the other."""
-DEARER = 0.15
-"""How much more a way may cost than the cheapest over blocks (ratio) to be looked at: these err by a few per cent."""
+DEARER = (0.15, 0.05, 0.02)
+"""How much more a way may cost than the cheapest over blocks (ratio) to be looked at: these err by a few per cent. The
+lesser ones are for mazes of a hundred metres, where there are …"""
+MOST_SAMPLES = 4000
+"""… more samples than that, of which BIT* takes some ten iterations each."""
 REACH, FAR_REACH = 1.8, 2.3
 """Metres between samples up to which a straight way is tried: where a way over blocks is among them, and elsewhere."""
 ROOMY = 0.15
@@ -32,11 +35,13 @@ def uniform(rates: Rates, ends: Ends, _: int) -> Iterator[Legs]:
 
 def medial_axis(rates: Rates, ends: Ends, seed: int) -> Iterator[Legs]:
     """At samples on the medial axis and, thinly, in the open, where a way that costs little more than the cheapest can
-    pass, and along that one, as blocks tell; if these do not suffice, anywhere, more and more of them.
+    pass, and along that one, as blocks tell; if these do not suffice, in a corridor where there are too many for one
+    search, and then anywhere, more and more of them.
     """
-    whole = _whole(rates, ends)
-    first = _where_cheap(rates, ends, medial_axis_samples(rates.costmap, ends.reachable, seed))
-    yield iter((replace(whole, samples=first, reach=REACH),))
+    whole, samples = _whole(rates, ends), medial_axis_samples(rates.costmap, ends.reachable, seed)
+    yield iter((replace(whole, samples=_where_cheap(rates, ends, samples), reach=REACH),))
+    if len(samples) > MOST_SAMPLES:
+        yield from corridor(rates, ends, seed)
     for density in DENSITIES:
         samples = medial_axis_samples(rates.costmap, ends.reachable, seed, density)
         yield iter((replace(whole, samples=samples, reach=FAR_REACH / density),))
@@ -45,9 +50,14 @@ def medial_axis(rates: Rates, ends: Ends, seed: int) -> Iterator[Legs]:
 def _where_cheap(rates: Rates, ends: Ends, samples: Array) -> Array:
     """Those where a way that costs little more than the cheapest over blocks can pass, and points of that way."""
     informed = InformedSet(rates, ends.start, ends.goal, priced=True)
-    informed.narrow(DEARER)
+    held = samples
+    for slack in DEARER:
+        informed.narrow(slack)
+        held = samples[informed.holds(samples)]
+        if len(held) <= MOST_SAMPLES:
+            break
     way = informed.way(rates.costmap, rates.inscribed + ROOMY)
-    return np.vstack((samples[informed.holds(samples)], way[np.isfinite(rates.at(way))]))
+    return np.vstack((held, way[np.isfinite(rates.at(way))]))
 
 
 def corridor(rates: Rates, ends: Ends, _: int) -> Iterator[Legs]:
