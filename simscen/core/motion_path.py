@@ -9,6 +9,7 @@ from simscen.core.shapes import MotionPath
 FASTEST_EASED = 1.5
 """How much faster than evenly something is in the middle of a way that it is eased along."""
 Step = tuple[float, float, float]
+_made = tuple.__new__  # a pose without the calls of its class
 
 
 def pose_at(path: MotionPath, seconds: float) -> Pose2:
@@ -39,6 +40,7 @@ class Track:
         self._path, self._z = path, z
         self._first, self._last = path.times[0], path.times[-1]
         self._even = len(path.times) > 1 and path.ease == "linear"
+        self._once = path.mode == "once"
         self._begin, self._end = math.inf, -math.inf
 
     def at(self, seconds: float) -> Pose3:
@@ -46,15 +48,19 @@ class Track:
         path = self._path
         if not self._even:
             return Pose3.planar(pose_at(path, seconds), self._z)
-        local = min(max(_local(path, path.elapsed(seconds)), self._first), self._last)
+        running = seconds - path.start
+        local = path.phase + running if running > 0 else path.phase
+        if not self._once:
+            local = _local(path, local)
+        local = self._first if local < self._first else self._last if local > self._last else local
         if not self._begin <= local < self._end:
             self._enter(local)
         part = (local - self._begin) / self._lasts if self._lasts > 0 else 1.0
-        (x, y, yaw), dx, dy, turn = self._pose, self._dx, self._dy, self._turn
-        x, y = x + part * dx, y + part * dy
+        (x, y, yaw), turn = self._pose, self._turn
+        x, y = x + part * self._dx, y + part * self._dy
         if turn:
             return Pose3.planar(Pose2(x, y, wrap(yaw + part * turn)), self._z)
-        return Pose3(x, y, self._z, 0.0, 0.0, self._qz, self._qw)
+        return _made(Pose3, (x, y, self._z, 0.0, 0.0, self._qz, self._qw))
 
     def _enter(self, local: float) -> None:
         path, last = self._path, len(self._path.times) - 1

@@ -1,5 +1,7 @@
 """What of a run is kept: the recorder and the TraceBuilder ask here, so that log and Trace hold the same samples."""
 
+from collections.abc import Mapping
+
 from simscen.core.geometry import Pose3
 from simscen.core.motion import Twist
 from simscen.core.sensing import Odometry
@@ -23,6 +25,8 @@ class Thinning:
         self._commanded = 0
         self._objects: dict[str, tuple[int, Pose3]] = {}
         self._odometry: str | None = None
+        self._at_rest: Mapping[str, Pose3] | None = None
+        self._due = 0
 
     def keeps_command(self, tick: int, command: Twist) -> bool:
         """Whether the command of this beat is kept."""
@@ -39,12 +43,18 @@ class Thinning:
 
     def moved(self, tick: int, truth: Truth) -> dict[str, Pose3]:
         """The moving things whose pose is kept at this tick, by name."""
-        kept = {}
-        for name, pose in truth.objects.items():
+        kept, objects = dict[str, Pose3](), truth.objects
+        at_rest = objects is self._at_rest  # nothing has moved since the sample before
+        if at_rest and tick < self._due:
+            return kept
+        for name, pose in objects.items():
             last = self._objects.get(name)
             if last is None or last[1] != pose or tick - last[0] >= self._standstill_period:
                 self._objects[name] = (tick, pose)
                 kept[name] = pose
+        self._at_rest = objects
+        kept_at = min((self._objects[name][0] for name in objects), default=tick)
+        self._due = kept_at + self._standstill_period if at_rest else 0
         return kept
 
 

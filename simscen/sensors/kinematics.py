@@ -6,6 +6,7 @@ from simscen.core.motion import Twist
 from simscen.model.robot import Drive, Mecanum, Omnidirectional, SkidSteer
 
 Rolled = tuple[float, ...]
+_made = tuple.__new__  # a twist without the calls of its class
 Kinematics = Callable[[Rolled], Twist]
 
 
@@ -26,7 +27,7 @@ def kinematics_of(drive: Drive) -> Kinematics:
 def _sided(radius: float, separation: float) -> Kinematics:
     def motion(rolled: Rolled) -> Twist:
         left, right = rolled[0] * radius, rolled[1] * radius
-        return Twist((left + right) / 2, 0.0, (right - left) / separation)
+        return _made(Twist, ((left + right) / 2, 0.0, (right - left) / separation))
 
     return motion
 

@@ -10,6 +10,8 @@ from simscen.sensors.kinematics import kinematics_of
 from simscen.sensors.normals import Normals
 from simscen.sensors.sensor import SensorSetting
 
+_made = tuple.__new__  # poses and twists without the calls of their classes
+
 
 class WheelOdometrySensor:
     """Dead reckoning from where the robot was switched on, which is the origin of its odom frame.
@@ -35,7 +37,7 @@ class WheelOdometrySensor:
         step = self._noisy(self._motion(tuple([b - a for a, b in zip(before, rolled, strict=True)])))
         self._pose = pose = self._pose.compose(along_arc(step))
         vx, vy, wz = step
-        return Odometry(self.name, tick, pose, Twist(vx / seconds, vy / seconds, wz / seconds))
+        return Odometry(self.name, tick, pose, _made(Twist, (vx / seconds, vy / seconds, wz / seconds)))
 
     def _noisy(self, step: Twist) -> Twist:
         """Thrun, Burgard and Fox, Probabilistic Robotics, table 5.6, for increments."""
@@ -46,13 +48,13 @@ class WheelOdometrySensor:
         along, across, turn = self._normals.take(3)
         spread = self._spread * math.sqrt(driven)
         heading = math.sqrt(self._twist * turned + self._drift * driven)
-        return Twist(vx + spread * along, vy + (spread * across if vy else 0.0), wz + heading * turn)
+        return _made(Twist, (vx + spread * along, vy + (spread * across if vy else 0.0), wz + heading * turn))
 
 
 def along_arc(step: Twist) -> Pose2:
     """Where a motion at constant velocity leads (the exponential map of SE(2)): m, m, rad in the base frame."""
     vx, vy, turn = step
     if abs(turn) < 1e-9:
-        return Pose2(vx, vy, turn)
+        return _made(Pose2, (vx, vy, turn))
     sine, cosine = math.sin(turn) / turn, (1 - math.cos(turn)) / turn
-    return Pose2(vx * sine - vy * cosine, vx * cosine + vy * sine, turn)
+    return _made(Pose2, (vx * sine - vy * cosine, vx * cosine + vy * sine, turn))

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 import pybullet
@@ -21,8 +22,12 @@ FRICTION = 0.6
 """Of pushable things on the ground: about that of wood or cardboard on concrete."""
 Vector = tuple[float, float, float]
 Placing = tuple[Vector, tuple[float, float, float, float]]
+FALLING = 0.1 * GRAVITY
+"""m/s that what rests may gain within a tenth of a second."""
 NEVER = 2**62
 """A tick that never comes."""
+ABOUT = 2.0
+"""m farther than was asked for within which things are looked for, so that the others need not be looked at soon."""
 JUMP = 50.0
 """A script that asks for more m/s than this sets its body down elsewhere, rather than hurl it through the world."""
 
@@ -48,8 +53,6 @@ class Actor:
     surface: Mesh | None
     placed: tuple[Placing, Pose3] | None = None
     """What the engine last said of its centre of mass, and the pose that comes of it."""
-    sound: tuple[Placing, Pose3] | None = None
-    """What of that was last found not to be lost."""
     resting: bool = False
     """Whether it has not moved at all since the engine was asked before."""
     led: bool = False
@@ -69,6 +72,23 @@ class Actor:
         if self.path is None or self.led:
             return False
         return self.path.over(since) or since + seconds < self.path.start
+
+
+class _About(NamedTuple):
+    """The actors that at a tick were within a distance in metres of a place, and all that may be pushed unless asleep.
+
+    `asleep` is since when all of those have been lying still; None where they have not.
+    """
+
+    actors: tuple[Actor, ...]
+    place: Vector
+    distance: float
+    tick: int
+    asleep: int | None
+
+    def holds(self, place: Vector, distance: float, tick: int, step: float) -> bool:
+        """Whether no other can be within a distance of a place at a tick, moving `step` metres a tick at most."""
+        return math.dist(place, self.place) + step * (tick - self.tick) + distance <= self.distance
 
 
 class Actors:
@@ -94,6 +114,8 @@ class Actors:
         self._meeting: list[Actor] = []
         self._shaken_at = -1
         self._lying: Balls | None = None
+        self._moved: list[Actor] = []
+        self._about: dict[int, _About] = {}
 
     def add(self, body: Body, tick: int) -> None:
         """Put a body into the world; one of the same name makes way."""
@@ -179,6 +201,8 @@ class Actors:
         self._fastest = max((actor.speed for actor in self._travelling), default=0.0)
         self._pushable = [actor for actor in self._actors.values() if actor.pushable]
         self._looked_until, self._meeting, self._lying = -1, [], None
+        self._about.clear()
+        self._moved = list(self._pushable)
         for actor in self._pushable:
             engine.wake(self._client, actor.id)  # what lay on something that is gone has to fall
 
@@ -301,6 +325,7 @@ class Actors:
         actor.resting = actor.placed is not None and actor.placed[0] == said
         if actor.placed is None or not actor.resting:
             actor.placed = said, Pose3(*said[0], *said[1]).compose(actor.centre_from_base)
+            self._moved.append(actor)
         return actor.placed[1]
 
     def around(self, place: Vector, tick: int) -> str | None:
@@ -318,29 +343,47 @@ class Actors:
         if not self._pushable:
             return None
         self.poses(tick)
-        for actor in self._pushable:
-            if actor.placed is not None and actor.placed is not actor.sound:
+        moved, self._moved = self._moved, []
+        for actor in moved:
+            if actor.placed is not None:
                 place, turn = actor.placed[0]
                 if trouble := lost(f'object "{actor.body.name}"', *place, sum(turn)):
                     return trouble
-                actor.sound = actor.placed
         return None
 
-    def within(self, place: Vector, distance: float, tick: int) -> list[int]:
+    def within(self, place: Vector, distance: float, tick: int, by: int) -> list[int]:
         """The engine's numbers of those that may be as near to a place as a distance in metres, for it to be asked.
 
-        A scripted one is put where it is now if that is so near, or where the engine has had it until now: nobody is
-        to run into what has gone.
+        `by` is the number of the robot that asks. A scripted one is put where it is now if that is so near, or where
+        the engine has had it until now: nobody is to run into what has gone.
         """
         near, poses = list[int](), self.poses(tick)
-        for name, actor in self._actors.items():
-            pose, reach = poses[name], distance + actor.size
+        asleep = self._still_since if not self._pushable or self._asleep(tick) else None
+        about = self._about.get(by)
+        if (
+            about is None
+            or about.asleep != asleep
+            or not about.holds(place, distance, tick, self._fastest / self._rate)
+        ):
+            about = self._about[by] = self._look_about(place, distance + ABOUT, tick, asleep)
+        for actor in about.actors:
+            pose, reach = poses[actor.body.name], distance + actor.size
             is_near = math.dist(pose[:3], place) <= reach
             if actor.path is not None and (is_near or math.dist(actor.shown[:3], place) <= reach):
                 self._show(actor, pose)
             if is_near:
                 near.append(actor.id)
         return near
+
+    def _look_about(self, place: Vector, distance: float, tick: int, asleep: int | None) -> "_About":
+        poses = self.poses(tick)
+        actors = tuple(
+            actor
+            for name, actor in self._actors.items()
+            if (asleep is None and actor.pushable)
+            or min(math.dist(poses[name][:3], place), math.dist(actor.shown[:3], place)) <= distance + actor.size
+        )
+        return _About(actors, place, distance, tick, asleep)
 
     @property
     def loose(self) -> bool:
@@ -366,11 +409,12 @@ class Actors:
         if not self._pushable:
             return self._fastest
         self.poses(tick)
+        if self._asleep(tick):
+            return max(self._fastest, FALLING) * (2 if len(self._pushable) > 1 else 1)
         return max(self._fastest, *map(self._speed, self._pushable)) * (2 if len(self._pushable) > 1 else 1)
 
     def _speed(self, actor: Actor) -> float:
-        falling = 0.1 * GRAVITY  # what it may gain within that time
         if actor.resting:
-            return falling
+            return FALLING
         linear, angular = pybullet.getBaseVelocity(actor.id, physicsClientId=self._client)
-        return math.hypot(*linear) + math.hypot(*angular) * actor.size + falling
+        return math.hypot(*linear) + math.hypot(*angular) * actor.size + FALLING

@@ -25,8 +25,8 @@ AT_REST = 1e-6
 UNTIL_ASLEEP = 2.0
 """Seconds at rest after which Bullet lets a body lie until it is touched (btMultiBody's SLEEP_TIMEOUT)."""
 
-TERRAIN, GROUND, HULL, WHEEL = 128, 64, 32, 16
-"""Collision groups of uneven ground, of the plane and of a robot's parts; all else is in Bullet's own 1 and 2."""
+TERRAIN, GROUND, HULL, WHEEL, UNMOVED = 128, 64, 32, 16, 2
+"""Collision groups of uneven ground, of the plane, of a robot's parts, and Bullet's own of what nothing pushes."""
 EVERYTHING = -1
 
 PRIMITIVES = (Box, Cylinder, Sphere, Capsule)
@@ -214,6 +214,8 @@ def body(client: int, mass: float, shape: int, pose: Pose3, frame: Frame, fricti
         number, -1, lateralFriction=friction, restitution=0.0, linearDamping=0.0, angularDamping=0.0,
         physicsClientId=client,
     )  # fmt: skip
+    if mass == 0:  # Bullet would look at each step for where it touches the ground, though neither moves the other
+        touch(client, number, -1, UNMOVED, ~(UNMOVED | GROUND | TERRAIN))
     if mass > 0:
         pybullet.changeDynamics(number, -1, localInertiaDiagonal=moments, physicsClientId=client)
         pybullet.resetBasePositionAndOrientation(number, centre.position, centre.quaternion, physicsClientId=client)

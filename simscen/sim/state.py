@@ -6,6 +6,8 @@ from typing import NamedTuple, Protocol
 from simscen.core.geometry import Pose3, Vector
 from simscen.core.motion import Twist
 
+_made = tuple.__new__  # a twist without the calls of its class
+
 
 class State(NamedTuple):
     """The base frame in the world, and the velocity of its origin (m/s, rad/s) along the world's axes."""
@@ -21,7 +23,7 @@ class State(NamedTuple):
         x, y, z = -x, -y, -z
         p, q, r = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
         i, j, k = 2 * (y * h - z * g), 2 * (z * f - x * h), 2 * (x * g - y * f)
-        return Twist(a + w * p + y * r - z * q, b + w * q + z * p - x * r, h + w * k + x * j - y * i)
+        return _made(Twist, (a + w * p + y * r - z * q, b + w * q + z * p - x * r, h + w * k + x * j - y * i))
 
 
 class Now(Protocol):

@@ -16,6 +16,7 @@ from simscen.sim.terrain import ON_CASTERS, ON_WHEELS, Terrain
 from simscen.sim.undercarriage import Wheel, lowest, yielding
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+_made = tuple.__new__  # a state without the calls of its class
 KNUCKLE = 0.2
 """Mass of a steering knuckle over that of its wheel."""
 PIN = 0.001
@@ -91,15 +92,16 @@ class Vehicle:
 
     def state(self) -> State:
         """Where it is and how it moves now."""
-        position, turn = pybullet.getBasePositionAndOrientation(self.id, self._client)
-        (vx, vy, vz), (wx, wy, wz) = pybullet.getBaseVelocity(self.id, self._client)
+        (px, py, pz), turn = pybullet.getBasePositionAndOrientation(self.id, self._client)
+        (vx, vy, vz), angular = pybullet.getBaseVelocity(self.id, self._client)
         if self._level:
             x, y, z = rotated(turn, self._centre)
-            pose = Pose3(position[0] - x, position[1] - y, position[2] - z, *turn)
+            pose = _made(Pose3, (px - x, py - y, pz - z, *turn))
         else:
-            pose = Pose3(*position, *turn).compose(self._centre_from_base)
+            pose = Pose3(px, py, pz, *turn).compose(self._centre_from_base)
             x, y, z = rotated(pose.quaternion, self._centre)
-        return State(pose, (vx - (wy * z - wz * y), vy - (wz * x - wx * z), vz - (wx * y - wy * x)), (wx, wy, wz))
+        wx, wy, wz = angular
+        return _made(State, (pose, (vx - (wy * z - wz * y), vy - (wz * x - wx * z), vz - (wx * y - wy * x)), angular))
 
     def hold(self, friction: Callable[[float, float], float]) -> None:
         """Give each wheel the friction of the floor below it."""

@@ -10,7 +10,7 @@ from shapely.ops import unary_union
 
 from simscen.core.case import CLEARANCE_RANGE
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.shapes import Body, Cylinder, Extrusion, Solid
+from simscen.core.shapes import Body, Cylinder, Extrusion, MotionPath, Solid, Sphere
 
 RADIUS = 0.22  # of the turtlebot
 MILLIMETRE = 1e-3
@@ -63,6 +63,26 @@ def test_things_that_move_count_and_the_ground_does_not(simulate):
     assert simulation.truth().clearance == CLEARANCE_RANGE
     simulation.spawn(Body("prism", (Solid(Extrusion(((-0.1, -1), (0.1, -1), (0.1, 1), (-0.1, 1)), 0.5)),), Pose3(0.7)))
     assert simulation.truth().clearance == pytest.approx(0.6 - RADIUS, abs=MILLIMETRE)
+
+
+def test_things_that_come_from_afar_or_wake_there_count_as_soon_as_they_are_near(simulate):
+    """Those far off are left alone for a while: neither a script nor a push may bring one nearer unseen."""
+    way = MotionPath((0.0, 10.0), (Pose2(0.0, 9.0), Pose2(0.0, 1.0)))
+    cart = Body("cart", (box("cart", 0, 0, 0.4, 0.4),), Pose3(0.0, 9.0), path=way)
+    ball = Body("ball", (Solid(Sphere(0.15)),), Pose3(8.0, 0.0, 0.15), 1.0)
+    simulation, nearest = simulate(bodies=[cart, ball]), []
+    for tick in range(0, 240 * 12, 6):
+        if tick == 240 * 6:  # it has fallen asleep
+            simulation.push_object("ball", (-2.0, 0.0))
+        simulation.step(6)
+        truth = simulation.truth()
+        x, y = truth.objects["ball"].x, truth.objects["cart"].y
+        gap = min(x - 0.15 - RADIUS, y - 0.2 - RADIUS, CLEARANCE_RANGE)
+        nearest.append(gap)
+        if gap > 0.3:
+            assert truth.clearance == pytest.approx(gap, abs=5e-3)
+    assert min(nearest[: 40 * 6]) == CLEARANCE_RANGE
+    assert min(nearest) < 0.3
 
 
 def test_clearance_is_negative_where_hull_and_obstacle_overlap(simulate):
