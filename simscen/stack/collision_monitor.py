@@ -134,10 +134,9 @@ class CollisionMonitor:
         """
         going = complex(wanted.vx, wanted.vy)
         bent = abs(going) * abs(wanted.wz) * horizon * horizon / 2
-        moving, margin = self._moving, self._spec.stop_margin
-        rows = zip(moving.centres.tolist(), moving.velocities.tolist(), moving.radii.tolist(), strict=True)
-        for centre, velocity, radius in rows:
-            place, towards = complex(*centre), complex(*velocity) - going
+        margin = self._spec.stop_margin
+        for place, velocity, radius, *_ in self._moving.things:
+            towards = velocity - going
             square = towards.real * towards.real + towards.imag * towards.imag
             when = -(place * towards.conjugate()).real / square if square > 0.0 else 0.0
             near = abs(place + min(max(when, 0.0), horizon) * towards) - bent
@@ -151,7 +150,7 @@ class CollisionMonitor:
         The whole horizon where a robot that stood would be met as soon and as closely: to brake for that is no help.
         """
         times = self._times
-        centres = self._moving.at(times).transpose(1, 0, 2)
+        centres = self._moving.at(times)
         gaps = self._gaps_to(centres, wanted)
         met = (gaps[1:] < 0.0) & (gaps[1:] < gaps[0] - 1e-4)
         if not met.any():

@@ -87,7 +87,7 @@ class Footprint:
         `times` broadcast with them. Negative where they will meet; of a hull that is not round less than it is, by
         some centimetres. Things are so many standard deviations of their places wider.
         """
-        x, y, yaw = np.moveaxis(poses, -1, 0)
+        x, y, yaw = poses[..., 0], poses[..., 1], poses[..., 2]
         return np.asarray(self.discs.gap(moving, x, y, yaw, times, sigmas), dtype=np.float64)
 
     def _hull_free(self, costmap: CostmapView, poses: Array) -> Mask:
@@ -103,13 +103,15 @@ class Footprint:
 class Discs:
     """A row of equal discs along the base's x axis that covers the hull: `offsets` (k,) and their `radius`.
 
+    `reach` is how far from the base they reach; `centred` is whether it is one about the base, however that is turned.
+
     A check by discs is a few look-ups a pose, and errs to the safe side by a centimetre or two: for the controllers
     that compare thousands of trajectories.
     """
 
     def __init__(self, robot: RobotModel) -> None:
         if robot.radius is not None:
-            self.offsets, self.radius = np.zeros(1), robot.radius
+            self.offsets, self.radius, self.reach, self.centred = np.zeros(1), robot.radius, robot.radius, True
             return
         corners = np.array(robot.footprint, dtype=np.float64)
         (back, right), (front, left) = corners.min(axis=0), corners.max(axis=0)
@@ -118,10 +120,12 @@ class Discs:
         piece = (front - back) / count
         self.offsets = back + piece * (np.arange(count) + 0.5)
         self.radius = math.hypot(half, piece / 2)
+        self.reach = float(np.abs(self.offsets).max()) + self.radius
+        self.centred = self.offsets.tolist() == [0.0]
 
     def clearance(self, costmap: CostmapView, x: Reals, y: Reals, yaw: Reals) -> npt.NDArray[np.float32]:
         """Distance (…,) from the discs to the nearest lethal cell at poses (…,); negative in collision."""
-        if len(self.offsets) == 1 and self.offsets[0] == 0.0:
+        if self.centred:
             return np.asarray(distances(costmap, np.stack((x, y), axis=-1)) - np.float32(self.radius))
         cosine, sine = np.cos(yaw), np.sin(yaw)
         least: npt.NDArray[np.float32] | None = None
@@ -133,23 +137,29 @@ class Discs:
 
     def gap(self, moving: Moving, x: Reals, y: Reals, yaw: Reals, times: Reals, sigmas: float = 0.0) -> Reals:
         """Metres (…,) from the discs at poses (…,) to what moves, where it will be at `times`; see Moving.gap."""
-        least = [moving.gap(*at, times, sigmas) for at in self._placed(x, y, yaw)]
-        return np.asarray(np.min(least, axis=0) - self.radius)
+        least, *others = [moving.gap(*at, times, sigmas) for at in self._placed(x, y, yaw)]
+        for other in others:
+            np.minimum(least, other, out=least)
+        least -= self.radius
+        return least
 
     def nearness(
         self, moving: Moving, x: Reals, y: Reals, yaw: Reals, times: Reals, kept_off: float
     ) -> tuple[Reals, Mask]:
         """How near the discs at poses (…,) come to what moves, and which touch it; see Moving.nearness."""
-        near = [moving.nearness(*at, times, self.radius, kept_off) for at in self._placed(x, y, yaw)]
-        return np.max([one for one, _ in near], axis=0), np.any([touch for _, touch in near], axis=0)
+        places = self._placed(x, y, yaw)
+        (nearest, touched), *others = [moving.nearness(*at, times, self.radius, kept_off) for at in places]
+        for near, touch in others:
+            np.maximum(nearest, near, out=nearest)
+            touched |= touch
+        return nearest, touched
 
     def _placed(self, x: Reals, y: Reals, yaw: Reals) -> list[tuple[Reals, Reals]]:
         """The discs' middles."""
-        offsets = self.offsets.tolist()
-        if offsets == [0.0]:
+        if self.centred:
             return [(x, y)]
         cosine, sine = np.cos(yaw), np.sin(yaw)
-        return [(x + offset * cosine, y + offset * sine) for offset in offsets]
+        return [(x + offset * cosine, y + offset * sine) for offset in self.offsets.tolist()]
 
 
 def _inner_points(corners: Array, resolution: float, inscribed: float) -> Array:

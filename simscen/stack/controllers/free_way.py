@@ -4,17 +4,18 @@ import math
 
 import numpy as np
 
-from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry import Pose2
 from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import ErrorCode
 from simscen.stack.arcs import poses_along
 from simscen.stack.footprint import Footprint
 from simscen.stack.lookahead import time_free
+from simscen.stack.prediction.moving import WIDEST
 from simscen.stack.protocols import CostmapView, NavigationFailure
 
 CREEP = 0.1
 """m/s. When only slower than this would keep the time to collision, the way is blocked."""
-PARTS: Array = np.array((1.0, 0.75, 0.5, 0.25, 0.0))
+PARTS = (1.0, 0.75, 0.5, 0.25, 0.0)
 """Parts of a command at which it may let things pass that move."""
 MOMENT, SIGMAS = 0.1, 0.5
 """Seconds at most between two moments at which they are compared, and standard deviations by which they count wider."""
@@ -50,12 +51,20 @@ class FreeWay:
         Both on their ways: who crosses and will have gone is no reason to slow down, and before who will be there the
         robot slows, or stands. That is no failure, for what moves goes on.
         """
-        if not len(costmap.moving) or command == STOP:
+        if not costmap.moving.things or command == STOP:
+            return command
+        reach, speed = self._footprint.discs.reach + WIDEST, math.hypot(command.vx, command.vy)
+        near = costmap.moving.near(pose.x, pose.y, reach, speed, horizon)
+        if not near.things:
             return command
         times = np.linspace(0.0, horizon, max(1, math.ceil(horizon / MOMENT)) + 1)
-        arcs = poses_along(pose, command, np.multiply.outer(PARTS, times).ravel()).reshape(len(PARTS), -1, 3)
-        gaps = self._footprint.gap(costmap.moving, arcs, times, SIGMAS)
-        met = (gaps[:, 1:] < 0.0) & (gaps[:, 1:] < gaps[:, :1] - NEARER)
-        free = np.where(met.any(axis=1), met.argmax(axis=1), len(times))
-        part = float(PARTS[int(free.argmax())])
+        met_at = list[int]()
+        for part in PARTS:
+            gaps = self._footprint.gap(near, poses_along(pose, command, part * times), times, SIGMAS)
+            met = (gaps[1:] < 0.0) & (gaps[1:] < gaps[0] - NEARER)
+            if not met.any():
+                break
+            met_at.append(int(met.argmax()))
+        else:
+            part = PARTS[met_at.index(max(met_at))]
         return command if part == 1.0 else Twist(part * command.vx, part * command.vy, part * command.wz)

@@ -17,13 +17,14 @@ from simscen.core.motion import STOP, Twist
 from simscen.model.guards import Prediction
 from simscen.stack.footprint import Discs
 from simscen.stack.prediction.moving import WIDEST, Moving
-from simscen.stack.prediction.rollouts import HORIZON, TIMES, Repertoire, Rollouts, along_path, arc, joined
+from simscen.stack.prediction.rollouts import HORIZON, TIMES, Followed, Repertoire, Rollouts, arc, joined
 from simscen.stack.protocols import CostmapView, RobotModel
 
 ROOM = 0.25
 """Metres that the robot keeps off what moves, besides a standard deviation of where that will be."""
 SOON = 1.2
 """Seconds in which what may happen counts e times less."""
+SOONER: Array = np.exp(-TIMES / SOON)
 NEAR, HIT, LASTING = 3.0, 10.0, 1.0
 """Cost of coming too near at the worst moment, of being hit, and of being too near all the time."""
 WALL, WALL_ROOM = 8.0, 0.08
@@ -63,25 +64,24 @@ class Avoidance:
         twist: Twist,
         moving: Moving,
         costmap: CostmapView,
-        path: Array | None,
+        path: Followed | None,
         home: Pose2 | None = None,
     ) -> Twist:
         """The command to give for the one that is wanted; the same object where nothing is in its way.
 
-        All in one frame. `path` (n, 2) is what is followed; a robot that follows none belongs at `home`.
+        All in one frame. `path` is what is followed; a robot that follows none belongs at `home`.
         """
-        reach = self._robot.circumscribed_radius + WIDEST + self._speed * TIMES
-        near = moving.near(pose.x, pose.y, reach, TIMES)
-        if not len(near):
+        near = moving.near(pose.x, pose.y, self._robot.circumscribed_radius + WIDEST, self._speed, HORIZON)
+        if not near.things:
             self._last = None
             return wanted
-        own = self._own(wanted, pose, twist, path)
-        risk = self._risk(own, near)
-        if risk[0] <= (CALM if self._last is None else CALMER):
+        as_wanted = self._own(wanted, pose, twist, path, SLOWER[:1])
+        if self._risk(as_wanted, near)[0] <= (CALM if self._last is None else CALMER):
             self._last = None
             return wanted
+        own = self._own(wanted, pose, twist, path, SLOWER)
         ways = joined(own, self._repertoire.roll(pose, twist))
-        cost = np.concatenate((risk, self._risk(self._part(ways, len(own.x)), near)))
+        cost = self._risk(ways, near)
         cost += self._walls(ways, costmap) - PROGRESS * self._progress(ways, pose, path, home)
         cost += BACKWARD * np.clip(-ways.vx / self._speed, 0.0, None).mean(axis=1)
         cost[len(own.x) :] += OWN
@@ -92,21 +92,19 @@ class Avoidance:
         self._last = Twist(float(ways.commands[best, 0]), 0.0, float(ways.commands[best, 1]))
         return self._last
 
-    def _own(self, wanted: Twist, pose: Pose2, twist: Twist, path: Array | None) -> Rollouts:
+    def _own(
+        self, wanted: Twist, pose: Pose2, twist: Twist, path: Followed | None, parts: tuple[float, ...]
+    ) -> Rollouts:
+        """The controller's own way, at these parts of its speed."""
         if path is None or len(path) < 2 or wanted.vx == 0.0:
-            return arc(pose, wanted, SLOWER if wanted != STOP else (1.0,))
-        return along_path(pose, twist, path, wanted, SLOWER, self._robot)
-
-    @staticmethod
-    def _part(ways: Rollouts, first: int) -> Rollouts:
-        return Rollouts(ways.x[first:], ways.y[first:], ways.yaw[first:], ways.vx[first:], ways.commands[first:])
+            return arc(pose, wanted, parts if wanted != STOP else (1.0,))
+        return path.driven(pose, twist, wanted, parts, self._robot, not self._discs.centred)
 
     def _risk(self, ways: Rollouts, moving: Moving) -> Array:
         """What each way (n,) costs for what it comes near to."""
         worst, hit = self._discs.nearness(moving, ways.x, ways.y, ways.yaw, TIMES, ROOM)
-        soon = np.exp(-TIMES / SOON)
-        near = np.clip(worst, 0.0, 2.0) ** 2 * soon
-        risk: Array = NEAR * near.max(axis=1) + LASTING * near.mean(axis=1) + HIT * (hit * soon).max(axis=1)
+        near = np.minimum(np.maximum(worst, 0.0), 2.0) ** 2 * SOONER
+        risk: Array = NEAR * near.max(axis=1) + LASTING * near.mean(axis=1) + HIT * (hit * SOONER).max(axis=1)
         return risk
 
     def _walls(self, ways: Rollouts, costmap: CostmapView) -> Array:
@@ -119,15 +117,11 @@ class Avoidance:
         cost: Array = WALL * touched.max(axis=1)
         return cost
 
-    def _progress(self, ways: Rollouts, pose: Pose2, path: Array | None, home: Pose2 | None) -> Array:
+    def _progress(self, ways: Rollouts, pose: Pose2, path: Followed | None, home: Pose2 | None) -> Array:
         """How far (n,) each way gets, as a part of what full speed would do."""
         reach = self._speed * HORIZON
-        if path is not None and len(path):
-            dx, dy = path[:, 0] - pose.x, path[:, 1] - pose.y
-            here = int((dx * dx + dy * dy).argmin())
-            ahead = path[here:]
-            beyond = np.hypot(ahead[:, 0] - pose.x, ahead[:, 1] - pose.y) >= reach
-            x, y = ahead[int(beyond.argmax()) if beyond.any() else -1, :2].tolist()
+        if path is not None:
+            x, y = path.ahead(pose, reach)
         elif home is not None:
             x, y = home.x, home.y
         else:

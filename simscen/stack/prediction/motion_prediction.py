@@ -2,8 +2,6 @@
 
 import math
 
-import numpy as np
-
 from simscen.core.geometry import Pose2
 from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import Path
@@ -13,6 +11,7 @@ from simscen.stack.costmap.obstacle_layer import ScanAmongMoving
 from simscen.stack.prediction.avoidance import Avoidance
 from simscen.stack.prediction.moving import Moving, nothing
 from simscen.stack.prediction.rolled import Rolled
+from simscen.stack.prediction.rollouts import Followed
 from simscen.stack.prediction.standing import Standing
 from simscen.stack.prediction.tracker import Tracker
 from simscen.stack.protocols import CostmapView, RobotModel
@@ -39,6 +38,8 @@ class MotionPrediction:
         self._nothing = nothing(spec.acceleration)
         self._seeing: list[Tracker] = []
         self._foretold: tuple[int, Moving] | None = None
+        self._plan: Path | None = None
+        self._followed: Followed | None = None
         self.take = self._rolled.take
         """Takes in the wheels' odometry, or a turn rate."""
         self.calm = not self._trackers
@@ -77,20 +78,12 @@ class MotionPrediction:
 
     def _after(self, tick: int) -> Moving:
         seen = [tracker.moving.after((tick - tracker.tick) / self._rate) for tracker in self._seeing]
-        if len(seen) == 1:
-            return seen[0]
-        return Moving(
-            np.concatenate([each.centres for each in seen]),
-            np.concatenate([each.velocities for each in seen]),
-            np.concatenate([each.radii for each in seen]),
-            np.concatenate([each.covariances for each in seen]),
-            self._spec.acceleration,
-        )
+        return Moving.of([thing for each in seen for thing in each.things], self._spec.acceleration)
 
     def seen_from(self, tick: int, pose: Pose2) -> Moving:
         """What moves at a tick, in a frame in which the robot is at `pose` now."""
         moving = self.moving(tick)
-        return moving.seen_from(self._rolled.now.compose(pose.inverse())) if len(moving) else moving
+        return moving.seen_from(self._rolled.now.compose(pose.inverse())) if moving.things else moving
 
     def steer(
         self, tick: int, wanted: Twist, pose: Pose2, twist: Twist, costmap: CostmapView, plan: Path | None
@@ -98,8 +91,9 @@ class MotionPrediction:
         """The command to give for the one that is wanted; `pose`, `costmap` and `plan` are in one frame."""
         if not self._seeing:
             return wanted if self.calm else _cautious(wanted)
-        path = None if plan is None else plan.points[:, :2]
-        return self._avoidance.steer(wanted, pose, twist, self.seen_from(tick, pose), costmap, path)
+        if plan is not self._plan:
+            self._plan, self._followed = plan, None if plan is None else Followed(plan.points)
+        return self._avoidance.steer(wanted, pose, twist, self.seen_from(tick, pose), costmap, self._followed)
 
     def settle(self) -> None:
         """The robot drives: where it stands next is where it belongs."""

@@ -1,8 +1,9 @@
 """What moves: where it is, how fast and how sure that is, at a moment."""
 
+import cmath
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -18,38 +19,87 @@ Mask = npt.NDArray[np.bool_]
 Reals = npt.NDArray[np.floating]
 
 
-@dataclass(frozen=True, eq=False)
+class Thing(NamedTuple):
+    """An upright cylinder that moves: its middle (m) and its velocity (m/s) as x + iy, and its radius in m.
+
+    How sure these are is alike along all axes: variance of the place, covariance of both, variance of the velocity.
+    """
+
+    place: complex
+    velocity: complex
+    radius: float
+    place_variance: float
+    covariance: float
+    velocity_variance: float
+
+    def missed_by(self, here: complex, speed: float, seconds: float) -> float:
+        """Metres at least that its surface stays off whoever leaves `here` at `speed` for so long, whichever way."""
+        off, velocity = self.place - here, self.velocity
+        own = abs(velocity)
+        if speed >= own:
+            when = seconds
+        else:  # the nearer to `here`, the nearer; and the later, the farther may who left have come
+            along, aside = (off.conjugate() * velocity).real / own, abs((off.conjugate() * velocity).imag) / own
+            when = (aside * speed / math.sqrt(own * own - speed * speed) - along) / own
+            when = min(max(0.0, when), seconds)
+        return abs(off + velocity * when) - self.radius - speed * when
+
+
 class Moving:
     """Things that move, as upright cylinders, in one frame and at one moment.
 
-    `centres` (n, 2) in m, `velocities` (n, 2) in m/s, `radii` (n,) in m, `covariances` (n, 4, 4) of x, y, vx, vy in
-    that order. `acceleration` in m/s² is how fast velocities may change: what is not known of them grows with it.
+    `acceleration` in m/s² is how fast velocities may change: what is not known of them grows with it.
     """
 
-    centres: Array
-    velocities: Array
-    radii: Array
-    covariances: Array
-    acceleration: float
+    __slots__ = ("acceleration", "things")
+
+    def __init__(
+        self, centres: Array, velocities: Array, radii: Array, covariances: Array, acceleration: float
+    ) -> None:
+        """Of `centres` (n, 2) in m, `velocities` (n, 2) in m/s, `radii` (n,) in m.
+
+        `covariances` (n, 4, 4) are of x, y, vx, vy in that order; of the two axes, what is known less holds for both.
+        """
+        spreads = np.maximum(covariances[:, (0, 0, 2), (0, 2, 2)], covariances[:, (1, 1, 3), (1, 3, 3)])
+        rows = zip(centres.tolist(), velocities.tolist(), radii.tolist(), spreads.tolist(), strict=True)
+        self.things = tuple(Thing(complex(*at), complex(*goes), radius, *spread) for at, goes, radius, spread in rows)
+        self.acceleration = acceleration
+
+    @classmethod
+    def of(cls, things: Iterable[Thing], acceleration: float) -> "Moving":
+        """These things."""
+        moving = object.__new__(cls)
+        moving.things, moving.acceleration = tuple(things), acceleration
+        return moving
 
     def __len__(self) -> int:
-        return len(self.centres)
+        return len(self.things)
+
+    @property
+    def centres(self) -> Array:
+        """Their middles (n, 2) in m."""
+        return np.array([(each.place.real, each.place.imag) for each in self.things]).reshape(-1, 2)
+
+    @property
+    def velocities(self) -> Array:
+        """The same (n, 2) in m/s."""
+        return np.array([(each.velocity.real, each.velocity.imag) for each in self.things]).reshape(-1, 2)
+
+    @property
+    def radii(self) -> Array:
+        """Their radii (n,) in m."""
+        return np.array([each.radius for each in self.things])
+
+    @property
+    def covariances(self) -> Array:
+        """How sure that is: (n, 4, 4) of x, y, vx, vy in that order."""
+        spreads = [((place, both), (both, velocity)) for *_, place, both, velocity in self.things]
+        return np.kron(np.array(spreads).reshape(-1, 2, 2), np.eye(2))
 
     def at(self, times: Array) -> Array:
-        """Where they will be (n, times, 2) after `times` (m,) seconds, at constant velocity."""
-        moved: Array = self.centres[:, None, :] + self.velocities[:, None, :] * times[None, :, None]
+        """Where their middles will be (times, n, 2) after `times` (m,) seconds, at constant velocity."""
+        moved: Array = self.centres + self.velocities * times[:, None, None]
         return moved
-
-    def deviations(self, times: Array) -> Array:
-        """Standard deviation (n, times) in m of that, along the axis in which it is greatest."""
-        return np.array(list(self._spreads(times))).reshape(len(self), len(times))
-
-    def _spreads(self, times: Reals) -> Iterator[Reals]:
-        """The same of one after the other, at times of any shape."""
-        turned = (0.5 * self.acceleration * times**2) ** 2
-        for c in self.covariances:
-            xx, xv, vv = max(c[0, 0], c[1, 1]), max(c[0, 2], c[1, 3]), max(c[2, 2], c[3, 3])
-            yield np.sqrt(float(xx) + 2.0 * float(xv) * times + float(vv) * times**2 + turned)
 
     def gap(self, x: Reals, y: Reals, times: Reals, sigmas: float = 0.0) -> Reals:
         """Metres (…,) from points (…,) to the surface of what will be nearest at `times`, which broadcast with them.
@@ -57,8 +107,9 @@ class Moving:
         Things are so many standard deviations wider, up to WIDEST; inf where nothing moves.
         """
         least = np.full(np.broadcast_shapes(x.shape, times.shape), np.inf, x.dtype)
-        for gap, deviation in self._gaps(x, y, times):
-            np.minimum(least, gap - np.minimum(sigmas * deviation, WIDEST) if sigmas else gap, out=least)
+        for thing, gap in self._gaps(x, y, times):
+            wider = np.minimum(sigmas * self._deviation(thing, times), WIDEST) if sigmas else 0.0
+            np.minimum(least, gap - wider, out=least)
         return least
 
     def nearness(self, x: Reals, y: Reals, times: Reals, radius: float, kept_off: float) -> tuple[Reals, Mask]:
@@ -69,62 +120,64 @@ class Moving:
         """
         shape = np.broadcast_shapes(x.shape, times.shape)
         nearest, touched = np.full(shape, -np.inf, x.dtype), np.zeros(shape, np.bool_)
-        for gap, deviation in self._gaps(x, y, times):
+        for thing, gap in self._gaps(x, y, times):
             touched |= gap < radius + TOUCH
-            np.maximum(nearest, (radius - gap) / np.minimum(kept_off + deviation, WIDEST), out=nearest)
+            room = np.minimum(kept_off + self._deviation(thing, times), WIDEST)
+            np.maximum(nearest, (radius - gap) / room, out=nearest)
         nearest += 1.0
         return nearest, touched
 
-    def _gaps(self, x: Reals, y: Reals, times: Reals) -> Iterator[tuple[Reals, Reals]]:
-        """Of each thing, the metres to its surface, and the standard deviation of its place then."""
-        rows = zip(self.centres.tolist(), self.velocities.tolist(), self.radii.tolist(), strict=True)
-        for ((cx, cy), (vx, vy), radius), deviation in zip(rows, self._spreads(times), strict=True):
-            dx, dy = x - (cx + vx * times), y - (cy + vy * times)
+    def _deviation(self, thing: Thing, times: Reals) -> Reals:
+        """Standard deviation (…,) in m of where one will be, along any axis."""
+        turned = (0.5 * self.acceleration * times**2) ** 2
+        *_, variance, covariance, wanders = thing
+        return np.asarray(np.sqrt(variance + 2.0 * covariance * times + wanders * times**2 + turned))
+
+    def _gaps(self, x: Reals, y: Reals, times: Reals) -> Iterator[tuple[Thing, Reals]]:
+        """Of each thing, the metres (…,) to its surface."""
+        for thing in self.things:
+            place, velocity, radius, *_ = thing
+            dx, dy = x - (place.real + velocity.real * times), y - (place.imag + velocity.imag * times)
             dx *= dx
             dy *= dy
             dx += dy
             np.sqrt(dx, out=dx)
             dx -= radius
-            yield dx, deviation
+            yield thing, dx
 
-    def near(self, x: float, y: float, reach: Array, times: Array) -> "Moving":
-        """Those whose surface comes within `reach` (m,) of a point at one of the `times` (m,)."""
-        if not len(self):
-            return self
-        places = self.at(times)
-        off = np.hypot(places[:, :, 0] - x, places[:, :, 1] - y) - self.radii[:, None]
-        close = (off < reach).any(axis=1)
-        return self if close.all() else self.chosen(np.asarray(close))
+    def near(self, x: float, y: float, reach: float, speed: float, seconds: float) -> "Moving":
+        """Those whose surface may come within `reach` metres of who leaves a point at `speed`, in so many seconds."""
+        here = complex(x, y)
+        close = [each for each in self.things if each.missed_by(here, speed, seconds) < reach]
+        return self if len(close) == len(self.things) else Moving.of(close, self.acceleration)
 
     def seen_from(self, frame: Pose2) -> "Moving":
         """The same in another frame, which is at `frame` in this one."""
-        back = frame.inverse()
-        c, s = math.cos(back.yaw), math.sin(back.yaw)
-        both = np.array(((c, -s, 0.0, 0.0), (s, c, 0.0, 0.0), (0.0, 0.0, c, -s), (0.0, 0.0, s, c)))
-        centres, velocities = back.apply(self.centres), self.velocities @ both[:2, :2].T
-        return Moving(centres, velocities, self.radii, both @ self.covariances @ both.T, self.acceleration)
+        origin, turn = complex(frame.x, frame.y), cmath.rect(1.0, -frame.yaw)
+        return Moving.of(
+            [Thing((place - origin) * turn, goes * turn, *rest) for place, goes, *rest in self.things],
+            self.acceleration,
+        )
 
     def after(self, seconds: float) -> "Moving":
         """The same so many seconds later."""
-        step = np.eye(4)
-        step[0, 2] = step[1, 3] = seconds
-        centres, covariances = self.centres + self.velocities * seconds, step @ self.covariances @ step.T
-        return Moving(centres, self.velocities, self.radii, covariances, self.acceleration)
-
-    def chosen(self, which: Mask) -> "Moving":
-        """Those of them."""
-        return Moving(
-            self.centres[which],
-            self.velocities[which],
-            self.radii[which],
-            self.covariances[which],
-            self.acceleration,
-        )
+        later = [
+            Thing(
+                place + goes * seconds,
+                goes,
+                radius,
+                variance + seconds * (2.0 * covariance + seconds * wanders),
+                covariance + seconds * wanders,
+                wanders,
+            )
+            for place, goes, radius, variance, covariance, wanders in self.things
+        ]
+        return Moving.of(later, self.acceleration)
 
 
 def nothing(acceleration: float = 0.0) -> Moving:
     """Nothing moves."""
-    return Moving(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), np.zeros((0, 4, 4)), acceleration)
+    return Moving.of((), acceleration)
 
 
 NOTHING = nothing()

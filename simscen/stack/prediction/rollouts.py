@@ -84,35 +84,62 @@ def _ramped(now: float, first: Array, lasts: Array, then: Array, faster: float, 
     return ramped
 
 
-def along_path(
-    pose: Pose2, twist: Twist, path: Array, wanted: Twist, parts: tuple[float, ...], robot: RobotModel
-) -> Rollouts:
-    """What a controller would do that follows `path` (m, 2) from here, at these parts of the speed that it wants.
+class Followed:
+    """A path (n, 2) that a controller follows, as often as it is asked where that leads."""
 
-    A robot that turns in place first is taken to stand.
-    """
-    dx, dy = path[:, 0] - pose.x, path[:, 1] - pose.y
-    here = int((dx * dx + dy * dy).argmin())
-    ahead = path[here:]
-    off = np.array([pose.x, pose.y]) - ahead[0]
-    steps = np.diff(ahead, axis=0)
-    along = np.concatenate(([0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))))
-    speeds = np.array(parts)[:, None] * wanted.vx
-    rate = np.where(np.abs(speeds) >= abs(twist.vx), robot.linear_acceleration, robot.linear_deceleration)
-    vx = twist.vx + np.clip(speeds - twist.vx, -rate * TIMES, rate * TIMES)
-    came = np.clip(np.cumsum(vx, axis=1) * STEP, 0.0, along[-1])
-    fade = np.exp(-np.abs(np.cumsum(vx, axis=1) * STEP) / max(BACK_TO_PATH * abs(wanted.vx), 0.2))
-    x = np.interp(came, along, ahead[:, 0]) + off[0] * fade
-    y = np.interp(came, along, ahead[:, 1]) + off[1] * fade
-    later = np.minimum(came + 0.1, along[-1])
-    yaw = np.arctan2(
-        np.interp(later, along, ahead[:, 1]) - np.interp(later - 0.2, along, ahead[:, 1]),
-        np.interp(later, along, ahead[:, 0]) - np.interp(later - 0.2, along, ahead[:, 0]),
-    )
-    if wanted.vx < 0.0:
-        yaw = yaw + math.pi
-    commands = np.column_stack((np.array(parts) * wanted.vx, np.array(parts) * wanted.wz))
-    return Rollouts(x, y, yaw, vx, commands)
+    def __init__(self, path: Array) -> None:
+        self._x, self._y = np.ascontiguousarray(path[:, 0]), np.ascontiguousarray(path[:, 1])
+        steps = np.hypot(np.diff(self._x), np.diff(self._y))
+        self._along = np.concatenate(([0.0], np.cumsum(steps)))
+
+    def __len__(self) -> int:
+        return len(self._x)
+
+    def nearest(self, pose: Pose2) -> int:
+        """The number of its point nearest to a pose."""
+        dx, dy = self._x - pose.x, self._y - pose.y
+        dx *= dx
+        dy *= dy
+        dx += dy
+        return int(dx.argmin())
+
+    def ahead(self, pose: Pose2, reach: float) -> tuple[float, float]:
+        """Its first point beyond the one nearest to a pose that is so many metres off the pose; else its last."""
+        here = self.nearest(pose)
+        beyond = np.hypot(self._x[here:] - pose.x, self._y[here:] - pose.y) >= reach
+        number = here + int(beyond.argmax()) if beyond.any() else -1
+        return float(self._x[number]), float(self._y[number])
+
+    def driven(
+        self, pose: Pose2, twist: Twist, wanted: Twist, parts: tuple[float, ...], robot: RobotModel, turns: bool
+    ) -> Rollouts:
+        """What a controller would do that follows it from here, at these parts of the speed that it wants.
+
+        A robot that turns in place first is taken to stand. Headings are worked out where it `turns`, else 0.
+        """
+        here, along = self.nearest(pose), self._along
+        scale = np.array(parts)[:, None]
+        speeds = scale * wanted.vx
+        rate = np.where(np.abs(speeds) >= abs(twist.vx), robot.linear_acceleration, robot.linear_deceleration) * TIMES
+        vx = twist.vx + np.minimum(np.maximum(speeds - twist.vx, -rate), rate)
+        went = np.cumsum(vx, axis=1) * STEP
+        came = np.minimum(np.maximum(went, 0.0) + along[here], along[-1])
+        fade = np.exp(np.abs(went) / -max(BACK_TO_PATH * abs(wanted.vx), 0.2))
+        x = np.interp(came, along, self._x) + (pose.x - self._x[here]) * fade
+        y = np.interp(came, along, self._y) + (pose.y - self._y[here]) * fade
+        yaw = self._headings(came, here, wanted.vx < 0.0) if turns else np.zeros_like(x)
+        return Rollouts(x, y, yaw, vx, scale * (wanted.vx, wanted.wz))
+
+    def _headings(self, came: Array, here: int, backward: bool) -> Array:
+        """Headings (…,) where one has come so far along it, from the point `here` on."""
+        along, x, y = self._along, self._x, self._y
+        later = np.minimum(came + 0.1, along[-1])
+        before = np.maximum(later - 0.2, along[here])
+        yaw: Array = np.arctan2(
+            np.interp(later, along, y) - np.interp(before, along, y),
+            np.interp(later, along, x) - np.interp(before, along, x),
+        )
+        return yaw + math.pi if backward else yaw
 
 
 def arc(pose: Pose2, wanted: Twist, parts: tuple[float, ...]) -> Rollouts:

@@ -84,8 +84,9 @@ class Scene:
         rolled, moving = self.rolled, self.costmap.moving
         if not len(moving):
             return moving
-        reach = np.sqrt((rolled.x * rolled.x + rolled.y * rolled.y).max(axis=1)) + self.footprint.circumscribed
-        near = moving.near(self.pose.x, self.pose.y, reach + WIDEST, self.times)
+        gone, times = np.sqrt((rolled.x * rolled.x + rolled.y * rolled.y).max(axis=1)), self.times
+        reach, speed = self.footprint.circumscribed + WIDEST, float((gone / times).max())
+        near = moving.near(self.pose.x, self.pose.y, reach, speed, float(times[-1]))
         return near.seen_from(Pose2(self.pose.x, self.pose.y, 0.0)) if len(near) else near
 
     @cached_property
@@ -158,7 +159,7 @@ class Scene:
         discs: Discs = self.footprint.discs
         if not whole:
             return np.asarray(self._distance(spots) - np.float32(self.footprint.inscribed))
-        if len(discs.offsets) == 1 and discs.offsets[0] == 0.0:
+        if discs.centred:
             return np.asarray(self._distance(spots) - np.float32(discs.radius))
         cosine, sine = np.cos(yaw), np.sin(yaw)
         least = np.full(spots.x.shape, np.inf, np.float32)
