@@ -3,12 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from simscen.core.geometry import Array, Pose2
-from simscen.stack.prediction.clusters import Clusters, Indices, fitted
-from simscen.stack.prediction.kalman import corrected
-from simscen.stack.prediction.tracks import Track, Tracks
+from simscen.stack.prediction.clusters import BOTH, Clusters, fitted
+from simscen.stack.prediction.stance import Stance
+from simscen.stack.prediction.tracks import Track
 
 NOISE, RELATIVE, HALF_SEEN = 0.02, 0.004, 0.10
 """Standard deviation in m of a measured centre: near by, for each metre of range, and more where a piece is hidden."""
@@ -26,80 +24,72 @@ RADIUS_GAIN = 0.3
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """A scan in pieces, their `centres` (n, 2) in the odom frame in which the lidar is at `lidar`.
+    """A scan at a tick, in pieces, by a lidar that is at `lidar` in the odom frame.
 
-    Which of them (n,) stand where it was free, and which where something was hit before.
+    Which of them stand where it was free, and which where something was hit before.
     """
 
+    tick: int
     pieces: Clusters
-    centres: Array
-    lidar: Pose2
-    came: npt.NDArray[np.bool_]
-    stood: npt.NDArray[np.bool_]
+    lidar: Stance
+    came: list[bool]
+    stood: list[bool]
 
 
-def associate(tracks: Tracks, seen: Seen) -> set[int]:
+def associate(tracks: list[Track], seen: Seen) -> set[int]:
     """Give each track the piece nearest to where it should be, nearest pairs first; the pieces that were given."""
-    taken: set[int] = set()
-    if not len(tracks) or not len(seen.centres):
-        return taken
-    off, gate = _apart(tracks, seen)
+    pieces, lidar = seen.pieces, seen.lidar
+    if not tracks or not len(pieces.centres):
+        return set()
+    expected = lidar.into(np.array([track.place for track in tracks]))
+    off = np.abs(expected[:, None] - pieces.centres)
+    # Of what is half hidden, the middle of the visible part may be a radius off.
+    gate = np.multiply.outer([track.radius for track in tracks], pieces.edges != BOTH)
+    gate += np.array([(GATE + GATE_SIGMAS * track.place_deviation,) for track in tracks])
+    numbers, near = (off <= gate).nonzero()
+    order = off[numbers, near].argsort(kind="stable")
     given = dict[int, int]()
-    for track, piece in sorted(np.argwhere(off <= gate).tolist(), key=lambda pair: (off[pair[0], pair[1]], pair)):
-        if track not in given and piece not in taken:
+    taken = set[int]()
+    for number, piece in zip(numbers[order].tolist(), near[order].tolist(), strict=True):
+        if number not in given and piece not in taken:
             taken.add(piece)
-            given[track] = piece
+            given[number] = piece
     if given:
-        numbers = list(given)
-        places, deviations = _measured(tracks, numbers, seen, np.array(list(given.values())))
-        tracks.states[numbers], tracks.covariances[numbers] = corrected(
-            tracks.states[numbers], tracks.covariances[numbers], places, deviations
-        )
-        for number, piece in given.items():
-            tracks.note(number, bool(seen.came[piece]), bool(seen.stood[piece]), int(seen.pieces.edges[piece]))
+        _update([(tracks[number], piece) for number, piece in given.items()], seen)
     return taken
 
 
-def _apart(tracks: Tracks, seen: Seen) -> tuple[Array, Array]:
-    """Metres (tracks, pieces) between them, and how many there may be."""
-    states, covariances, centres = tracks.states, tracks.covariances, seen.centres
-    off = np.hypot(centres[None, :, 0] - states[:, None, 0], centres[None, :, 1] - states[:, None, 1])
-    spread = np.sqrt(np.maximum(covariances[:, 0, 0], covariances[:, 1, 1]))
-    radii = np.array([track.radius for track in tracks.known])
-    # Of what is half hidden, the middle of the visible part may be a radius off.
-    return off, GATE + GATE_SIGMAS * spread[:, None] + np.where(seen.pieces.whole[None, :], 0.0, radii[:, None])
-
-
-def _measured(tracks: Tracks, numbers: list[int], seen: Seen, which: Indices) -> tuple[Array, Array]:
-    """Where the middles of tracks are seen (n, 2), in the odom frame, as these pieces; and the standard deviations."""
+def _update(given: list[tuple[Track, int]], seen: Seen) -> None:
+    """Tracks are seen as these pieces."""
     pieces, lidar = seen.pieces, seen.lidar
-    whole, radii = pieces.whole[which], np.array([tracks.known[number].radius for number in numbers])
-    radii = np.where(whole, radii + RADIUS_GAIN * (pieces.radii[which] - radii), radii)
-    for number, radius in zip(numbers, radii.tolist(), strict=True):
-        tracks.known[number].radius = radius
-    expected = lidar.inverse().apply(tracks.states[numbers, :2])
-    centres = fitted(pieces, which, np.where(whole[:, None], pieces.centres[which], expected), radii)
-    deviations = NOISE + RELATIVE * np.hypot(centres[:, 0], centres[:, 1]) + np.where(whole, 0.0, HALF_SEEN)
-    return lidar.apply(centres), deviations
+    edges, centres, radii = pieces.edges.tolist(), pieces.centres.tolist(), pieces.radii.tolist()
+    guesses = list[complex]()
+    for track, piece in given:
+        if edges[piece] == BOTH:
+            track.radius += RADIUS_GAIN * (radii[piece] - track.radius)
+            guesses.append(centres[piece])
+        else:
+            guesses.append(lidar.into(track.place))
+    which, sizes = np.array([piece for _, piece in given]), np.array([track.radius for track, _ in given])
+    found = fitted(pieces, which, np.array(guesses), sizes).tolist()
+    for (track, piece), centre in zip(given, found, strict=True):
+        hidden = 0.0 if edges[piece] == BOTH else HALF_SEEN
+        track.correct(lidar.out(centre), NOISE + RELATIVE * abs(centre) + hidden)
+        track.note(seen.tick, seen.came[piece], seen.stood[piece], edges[piece])
 
 
-def begin(tracks: Tracks, seen: Seen, taken: set[int]) -> None:
+def begin(tracks: list[Track], seen: Seen, taken: set[int]) -> None:
     """Tracks of pieces that no track has taken and that stand where it was free."""
-    pieces, come = seen.pieces, seen.came
+    pieces = seen.pieces
     # Among moving things others may, of which a thing that passed hid that they were not there before.
-    if any(track.moving for track in tracks.known):
-        come = come | (pieces.radii >= LEAST_RADIUS)
-    new = [piece for piece in np.flatnonzero(come).tolist() if piece not in taken]
-    if not new:
-        return
-    begun = [Track(_first_radius(pieces, piece), seen.centres[piece].copy(), fast_at=tracks.tick) for piece in new]
-    deviations = NOISE + RELATIVE * np.hypot(*pieces.centres[new].T) + FIRST_SEEN
-    tracks.begin(begun, seen.centres[new], deviations)
-    for number, piece in enumerate(new, start=len(tracks) - len(new)):
-        tracks.note(number, bool(seen.came[piece]), bool(seen.stood[piece]), 0)
-
-
-def _first_radius(pieces: Clusters, piece: int) -> float:
-    """Of what is half hidden more may be there than is seen."""
-    radius = float(pieces.radii[piece])
-    return radius if pieces.whole[piece] else max(radius, HALF_RADIUS)
+    least = LEAST_RADIUS if any(track.moving for track in tracks) else np.inf
+    for piece, (radius, came) in enumerate(zip(pieces.radii.tolist(), seen.came, strict=True)):
+        if piece in taken or not (came or radius >= least):
+            continue
+        centre = complex(pieces.centres[piece])
+        # Of what is half hidden more may be there than is seen.
+        size = radius if pieces.edges[piece] == BOTH else max(radius, HALF_RADIUS)
+        deviation = NOISE + RELATIVE * abs(centre) + FIRST_SEEN
+        track = Track.begun(seen.tick, seen.lidar.out(centre), deviation, size)
+        track.note(seen.tick, came, seen.stood[piece], 0)
+        tracks.append(track)

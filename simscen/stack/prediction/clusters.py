@@ -15,78 +15,88 @@ MISSED = 2
 VALLEY = 0.1
 """Metres by which the range must rise between two things that touch, as the scan sees them."""
 BOTH = 2
+"""Edges of what is seen whole."""
 STEP_APART = 1e3
 """Metres: more than any beam sees."""
+STEEPEST = math.radians(80.0)
+"""Half the angle that a piece fills at most, as far as its radius is concerned."""
+OUTWARD = np.array(((-1,), (1,)))
 FEWEST = 3
 """Hits of a piece that is looked at."""
 STEPS = 4
 """Of Gauss-Newton: from half a radius off, a circle is found to a millimetre."""
 
 Indices = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
+Places = npt.NDArray[np.complex128]
+"""Points (n,) as complex numbers, x + iy: to turn them is one multiplication."""
 
 
 @dataclass(frozen=True, eq=False)
 class Clusters:
     """Pieces of a scan, in the lidar's frame.
 
-    Piece k is the hits `first[k]` … `last[k]` of `points` (m, 2), which beam `beams` (m,) made. `centres` (n, 2) and
-    `radii` (n,) are of the cylinders that fill the same angle at the same distance. `edges` (n,): at how many
-    of its two ends nothing nearer stands, nor the scan ends; at both, all of it is seen.
+    Piece k is the hits `first[k]` … `last[k]` of `places` (m,). `centres` (n,) and `radii` (n,) are of the cylinders
+    that fill the same angle at the same distance. `edges` (n,): at how many of its two ends nothing nearer stands, nor
+    the scan ends; at BOTH, all of it is seen.
     """
 
-    points: Array
-    beams: Indices
+    places: Places
     first: Indices
     last: Indices
-    centres: Array
+    centres: Places
     radii: Array
     edges: Indices
 
-    @property
-    def whole(self) -> npt.NDArray[np.bool_]:
-        """Which (n,) are seen from edge to edge."""
-        return np.asarray(self.edges == BOTH)
-
-    @property
-    def places(self) -> npt.NDArray[np.complex128]:
-        """The hits (m,) as complex numbers."""
-        return self.points.view(np.complex128)[:, 0]
+    def counts(self, which: Mask) -> tuple[Indices, Array]:
+        """How many (n,) of each piece's hits these (m,) are, and the share."""
+        total = np.zeros(len(which) + 1, np.int64)
+        np.cumsum(which, out=total[1:])
+        count = total[self.last + 1] - total[self.first]
+        return count, count / (self.last - self.first + 1)
 
 
-def clusters(ranges: Array, angles: Array, least: float, most: float, largest: float, full_circle: bool) -> Clusters:
+def clusters(
+    ranges: Array, places: Places, start: float, step: float, least: float, most: float, largest: float
+) -> Clusters:
     """The pieces of a scan of beams that answer between `least` and `most` metres, none with a radius over `largest`.
 
-    A circle's first and last piece are not joined: what lies behind the robot across the seam is two.
+    The first beam goes along `start`, the next `step` rad further; `places` (n,) are what they hit. A circle's first
+    and last piece are not joined: what lies behind the robot across the seam is two.
     """
-    with np.errstate(invalid="ignore"):
-        beams = np.flatnonzero((ranges >= least) & (ranges <= most))
-        seen = np.where(ranges >= least, ranges, 0.0)
-    r, a = ranges[beams], angles[beams]
-    points = np.empty((len(r), 2))
-    points[:, 0], points[:, 1] = r * np.cos(a), r * np.sin(a)
-    step = abs(float(angles[1] - angles[0])) if len(angles) > 1 else 0.0
+    beams = ((ranges >= least) & (ranges <= most)).nonzero()[0]
     if len(beams) < FEWEST:
         none = np.zeros(0, dtype=np.int64)
-        return Clusters(points, beams, none, none, np.zeros((0, 2)), np.zeros(0), none)
-    off = points[1:] - points[:-1]
-    apart = np.hypot(off[:, 0], off[:, 1])
-    together = (apart <= np.maximum(GAP, SPARSE * step * np.minimum(r[1:], r[:-1]))) & (
-        beams[1:] - beams[:-1] <= MISSED + 1
-    )
-    breaks = np.flatnonzero(~together)
-    first, last = _parted(r, np.concatenate(([0], breaks + 1)), np.concatenate((breaks, [len(beams) - 1])))
-    long = last - first + 1 >= FEWEST
-    first, last = first[long], last[long]
-    half = (a[last] - a[first] + step) / 2
-    nearest = np.minimum.reduceat(r, np.column_stack((first, last + 1)).ravel().clip(max=len(r) - 1))[::2]
-    sine = np.sin(np.minimum(np.abs(half), math.radians(80.0)))
+        return Clusters(np.zeros(0, np.complex128), none, none, np.zeros(0, np.complex128), np.zeros(0), none)
+    r, hits, wide = ranges[beams], places[beams], abs(step)
+    gap = np.minimum(r[1:], r[:-1])
+    gap *= SPARSE * wide
+    apart = np.abs(hits[1:] - hits[:-1]) > np.maximum(gap, GAP, out=gap)
+    if beams[-1] - beams[0] >= len(beams):
+        apart |= beams[1:] - beams[:-1] > MISSED + 1
+    first, last = _parted(r, *_between(apart.nonzero()[0], len(r)))
+    ends = beams[np.array((first, last))]
+    count = last - first + 1
+    sine = np.sin(np.minimum((ends[1] - ends[0] + 1) * (0.5 * wide), STEEPEST))
+    bounds = np.empty(2 * len(first), np.int64)
+    bounds[::2], bounds[1::2] = first, last + 1
+    nearest = np.minimum.reduceat(np.concatenate((r, r[-1:])), bounds)[::2]
     radii = nearest * sine / (1.0 - sine)
-    small = radii <= largest
-    first, last, nearest, radii = first[small], last[small], nearest[small], radii[small]
-    middle, away = (a[first] + a[last]) / 2, nearest + radii
-    centres = np.column_stack((away * np.cos(middle), away * np.sin(middle)))
-    edges = _clear(seen, beams[first] - 1, r[first], full_circle) + _clear(seen, beams[last] + 1, r[last], full_circle)
-    return Clusters(points, beams, first, last, centres, radii, edges)
+    few = ((radii <= largest) & (count >= FEWEST)).nonzero()[0]
+    first, last, radii, ends = first[few], last[few], radii[few], ends[:, few]
+    middle = start + (0.5 * step) * (ends[0] + ends[1])
+    centres = (nearest[few] + radii) * np.exp(1j * middle)
+    full = abs(len(ranges) * wide - 2 * math.pi) < wide
+    edges = _clear(ranges, ends, full)
+    return Clusters(hits, first, last, centres, radii, edges)
+
+
+def _between(breaks: Indices, count: int) -> tuple[Indices, Indices]:
+    """First and last of so many hits in a row that is parted after these (k,)."""
+    first, last = np.zeros(len(breaks) + 1, np.int64), np.empty(len(breaks) + 1, np.int64)
+    np.add(breaks, 1, out=first[1:])
+    last[:-1], last[-1] = breaks, count - 1
+    return first, last
 
 
 def _parted(ranges: Array, first: Indices, last: Indices) -> tuple[Indices, Indices]:
@@ -95,11 +105,14 @@ def _parted(ranges: Array, first: Indices, last: Indices) -> tuple[Indices, Indi
     Along one convex thing it falls to its nearest point and then rises, whatever its shape.
     """
     # Of all pieces at once, each a step below or above the one before: so none knows of the others.
-    steps = np.repeat(STEP_APART * np.arange(len(first)), last - first + 1)
-    before = np.minimum.accumulate(ranges - steps) + steps
-    after = np.minimum.accumulate((ranges + steps)[::-1])[::-1] - steps
-    rise = np.maximum.reduceat(ranges - np.maximum(before, after), first)
-    cut = (rise > VALLEY) & (last - first + 1 >= 2 * FEWEST)
+    count = last - first + 1
+    steps = np.repeat(STEP_APART * np.arange(len(first)), count)
+    after = ranges + steps
+    after -= np.minimum.accumulate(after[::-1])[::-1]
+    before = np.subtract(ranges, steps, out=steps)
+    before -= np.minimum.accumulate(before)
+    rise = np.maximum.reduceat(np.minimum(before, after, out=before), first)
+    cut = (rise > VALLEY) & (count >= 2 * FEWEST)
     if not cut.any():
         return first, last
     parted = list(zip(first[~cut].tolist(), last[~cut].tolist(), strict=True))
@@ -120,31 +133,33 @@ def _parted(ranges: Array, first: Indices, last: Indices) -> tuple[Indices, Indi
     return pieces[:, 0], pieces[:, 1]
 
 
-def _clear(seen: Array, beam: Indices, edge: Array, full_circle: bool) -> Indices:
-    """1 where the beam beside an edge goes on beyond it, else 0."""
-    inside = (beam >= 0) & (beam < len(seen))
-    return np.asarray((inside | full_circle) & (seen[beam % len(seen)] > edge), dtype=np.int64)
+def _clear(ranges: Array, ends: Indices, full_circle: bool) -> Indices:
+    """At how many of their two ends (2, n), beams of `ranges`, the beam beside pieces (n,) goes on beyond them."""
+    beside = ends + OUTWARD
+    beyond = ranges[beside % len(ranges)] > ranges[ends]
+    if not full_circle:
+        beyond &= (beside >= 0) & (beside < len(ranges))
+    return np.asarray(np.add(beyond[0], beyond[1], dtype=np.int64))
 
 
-def fitted(pieces: Clusters, which: Indices, centres: Array, radii: Array) -> Array:
-    """The centres (n, 2) of the circles of these radii (n,) that fit the arcs of `which` (n,) pieces best.
+def fitted(pieces: Clusters, which: Indices, centres: Places, radii: Array) -> Places:
+    """The centres (k,) of the circles of these radii (k,) that fit the arcs of `which` (k,) pieces best.
 
-    `centres` (n, 2) are a first guess.
+    `centres` (k,) are a first guess.
     """
     first, count = pieces.first[which], pieces.last[which] - pieces.first[which] + 1
     begin = np.cumsum(count) - count
     owner = np.repeat(np.arange(len(which)), count)
     at = pieces.places[np.arange(len(owner)) + (first - begin)[owner]]
-    place, radius = centres[:, 0] + 1j * centres[:, 1], radii[owner]
+    radius = radii[owner]
+    half = 0.52 * count  # a little more than a half: a short arc says little of how the circle lies across, there, stay
     for _ in range(STEPS):
-        off = place[owner] - at
-        distance = np.maximum(np.abs(off), 1e-6)
-        towards = off / distance
+        off = centres[owner] - at
+        distance = np.abs(off)
+        towards = off / np.maximum(distance, 1e-6, out=distance)
         # Of unit vectors x + iy the squares add up to x² - y² + 2ixy, the squared lengths to their number.
-        square = np.add.reduceat(towards * towards, begin)
-        # A short arc says little of how the circle lies across: there, stay.
-        xx, yy, xy = (1.04 * count + square.real) / 2, (1.04 * count - square.real) / 2, square.imag / 2
-        miss = np.add.reduceat(towards * (distance - radius), begin)
-        across = yy * miss.real - xy * miss.imag + 1j * (xx * miss.imag - xy * miss.real)
-        place = place - across / (xx * yy - xy * xy)
-    return np.column_stack((place.real, place.imag))
+        square = np.add.reduceat(towards * towards, begin) / 2
+        distance -= radius
+        miss = np.add.reduceat(towards * distance, begin)
+        centres = centres - (half * miss - square * miss.conj()) / (half * half - (square * square.conj()).real)
+    return centres

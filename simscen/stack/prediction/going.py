@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 from simscen.model.guards import Prediction
 from simscen.stack.prediction.clusters import BOTH
-from simscen.stack.prediction.tracks import LATELY, Track, Tracks
+from simscen.stack.prediction.tracks import LATELY, Track
 
 SURE, TRAVELLED, HITS = 3.0, 0.15, 3
 """A track moves when its speed is so many standard deviations, now or over its last updates, and it has come so far in
@@ -35,71 +35,65 @@ like any other, for who turns round stands a moment, too; and until nobody expec
 """
 
 
-def _slides(tracks: Tracks, track: Track) -> bool:
-    """Whether it has not once stood where it had been free, for some updates, and nothing at all moves.
-
-    So does a wall of which the robot sees another part at each moment. What does move begins anew when it comes.
-    """
-    if track.moved or len(track.lately) < UNCOME or any(each.came for each in list(track.lately)[-UNCOME:]):
-        return False
-    return not any(each.moving for each in tracks.known)
-
-
 class Going:
     """Looks at tracks after each scan."""
 
     def __init__(self, spec: Prediction, tick_rate: int) -> None:
         self._spec, self._rate = spec, tick_rate
 
-    def settle(self, tracks: Tracks, number: int) -> None:
-        """Note whether a track moves."""
-        track, least = tracks.known[number], self._spec.min_speed
-        vx, vy = tracks.states[number, 2:].tolist()
-        speed, noise = math.hypot(vx, vy), tracks.speed_deviation(number)
+    def settle(self, track: Track, tick: int, tracks: list[Track]) -> None:
+        """Note whether a track moves, by the scan of a tick; `tracks` are all."""
+        least, speed = self._spec.min_speed, abs(track.velocity)
         if speed > least:
-            track.fast_at = tracks.tick
+            track.fast_at = tick
         if track.moving:
-            track.moving = (tracks.tick - track.fast_at) / self._rate <= STOOD
-        elif track.moved and speed > max(least, noise) and track.hit_at == tracks.tick:
+            track.moving = (tick - track.fast_at) / self._rate <= STOOD
+        elif speed <= least:
+            return
+        elif track.moved and speed > track.speed_deviation and track.hit_at == tick:
             track.moving = not track.lately[-1].stood  # it comes back over ground where it has just been
-        elif speed > least:
-            track.moving = track.moved = self._goes(tracks, number, speed, noise)
+        else:
+            track.moving = track.moved = self._goes(track, tick, speed, tracks)
 
-    def ended(self, tracks: Tracks, number: int, visible: Callable[[int], bool]) -> bool:
+    def ended(self, track: Track, tick: int, tracks: list[Track], visible: Callable[[Track], bool]) -> bool:
         """Whether a track is followed no more; `visible` says whether the lidar sees past its place."""
-        track = tracks.known[number]
-        unseen = (tracks.tick - track.hit_at) / self._rate
-        rests = REMEMBERED if track.moved else RESTED
-        rested = not track.moving and (tracks.tick - track.fast_at) / self._rate > rests
-        impossible = math.hypot(*tracks.states[number, 2:].tolist()) >= FASTEST
-        if impossible or rested or _slides(tracks, track) or tracks.place_deviation(number) > UNSURE_PLACE:
+        unseen = (tick - track.hit_at) / self._rate
+        if abs(track.velocity) >= FASTEST or track.place_deviation > UNSURE_PLACE:
             return True
-        if unseen == 0.0 or not track.moving:
-            return unseen > ENDS_UNSURE
-        return unseen > (ENDS_UNSEEN if visible(number) else ENDS_HIDDEN)
+        if track.moving:
+            return unseen > ENDS_UNSEEN and (unseen > ENDS_HIDDEN or visible(track))
+        rested = (tick - track.fast_at) / self._rate > (REMEMBERED if track.moved else RESTED)
+        return rested or unseen > ENDS_UNSURE or _slides(track, tracks)
 
-    def _goes(self, tracks: Tracks, number: int, speed: float, noise: float) -> bool:
+    def _goes(self, track: Track, tick: int, speed: float, tracks: list[Track]) -> bool:
         """Whether what is that fast is not only noise, nor something that stands and of which more comes into view."""
-        track, least = tracks.known[number], self._spec.min_speed
-        x, y, vx, vy = tracks.states[number].tolist()
-        lately, first = track.lately, track.lately[0]
-        dx, dy = x - first.x, y - first.y
-        way, seconds = math.hypot(dx, dy), (tracks.tick - first.tick) / self._rate
-        if dx * vx + dy * vy <= 0.0:
+        least, lately, first = self._spec.min_speed, track.lately, track.lately[0]
+        come = track.place - first.place
+        if (come.conjugate() * track.velocity).real <= 0.0:
             return False
-        whole = sum(each.edges == BOTH for each in lately)
-        sure = speed > SURE * noise
+        way, seconds, whole = abs(come), (tick - first.tick) / self._rate, sum(each.edges == BOTH for each in lately)
+        sure = speed > SURE * track.speed_deviation
         # Over the last updates, both ends may be off; and of what is half seen, more may come into view.
-        unsure = SURE * math.sqrt(2.0) * tracks.place_deviation(number)
+        unsure = SURE * math.sqrt(2.0) * track.place_deviation
         went = way > max(least * seconds, unsure) and 2 * whole > len(lately)
         if (sure or went) and sum(each.came for each in lately) >= max(HITS, MOSTLY * len(lately)):
             return way > TRAVELLED
         # Without that, only beside something else that moves: it may have hidden the place.
-        if not sure or speed < TWICE * least or not any(each.moving for each in tracks.known):
+        if not sure or speed < TWICE * least or not any(each.moving for each in tracks):
             return False
         if sum(each.stood for each in lately) > STOOD_OFTEN * len(lately):
             return False
-        far = math.dist((x, y), track.born.tolist()) > 2 * self._spec.max_radius + FAR
+        far = abs(track.place - track.born) > 2 * self._spec.max_radius + FAR
         if far and len(lately) == LATELY and sum(each.edges > 0 for each in lately) >= MOSTLY * LATELY:
             return True
         return whole >= SEEN_WHOLE and way > FARTHER
+
+
+def _slides(track: Track, tracks: list[Track]) -> bool:
+    """Whether it has not once stood where it had been free, for some updates, and nothing at all moves.
+
+    So does a wall of which the robot sees another part at each moment. What does move begins anew when it comes.
+    """
+    if track.moved or len(track.lately) < UNCOME or any(each.came for each in list(track.lately)[-UNCOME:]):
+        return False
+    return not any(each.moving for each in tracks)

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.sensing import Scan
+from simscen.stack.prediction.clusters import Indices, Mask, Places
 
 MARGIN, RELATIVE = 0.25, 0.02
 """Metres, and share of the range, by which an earlier beam must have gone farther."""
@@ -33,9 +33,6 @@ KEPT = 64
 """Scans at most."""
 FARTHEST = 1e5
 """Metres: how far a beam saw that met nothing."""
-
-Places = npt.NDArray[np.complex128]
-"""Points (n,) as complex numbers, x + iy: to turn them is one multiplication."""
 
 
 @dataclass(frozen=True)
@@ -110,15 +107,34 @@ class Earlier:
     lengths: Array
     free: Array
 
-    def looked(self, places: Places, lidar: Pose2) -> tuple[npt.NDArray[np.int64], Array]:
-        """The beam (n,) that went towards each place that was seen by a lidar at `lidar`, and its distance in m."""
+    def looked(self, places: Places, lidar: Pose2) -> "Looked":
+        """What it saw of places (n,) that are given as a lidar at `lidar` sees them."""
         moved, view = self.lidar.between(lidar), self.view
         into = places * cmath.rect(1.0, moved.yaw - view.middle)
         into += complex(moved.x, moved.y) * cmath.rect(1.0, -view.middle)
         beam = np.arctan2(into.imag, into.real)
         beam *= 1.0 / view.increment
         beam += view.centre + 0.5
-        return beam.astype(np.int64), np.abs(into)
+        return Looked(self, beam.astype(np.int64), np.abs(into))
+
+
+@dataclass(frozen=True, eq=False)
+class Looked:
+    """The beams (n,) of an earlier scan that went towards places, and how far away these were in m."""
+
+    earlier: Earlier
+    beam: Indices
+    distance: Array
+
+    def appeared(self) -> Mask:
+        """Which of them were free then. What is farther away than FARTHEST never was."""
+        return np.asarray(self.earlier.free[self.beam - self.earlier.view.beside] > self.distance)
+
+    def stood(self) -> Mask:
+        """Which of them were hit then, too."""
+        lengths, beam, distance = self.earlier.lengths, self.beam, self.distance
+        near = np.abs(lengths[np.stack((beam - 1, beam, beam + 1))] - distance).min(axis=0)
+        return np.asarray(near < SAME + SAME_RELATIVE * distance)
 
 
 class SeenThrough:
@@ -139,27 +155,7 @@ class SeenThrough:
         lengths = view.lengths(scan)
         self._scans.append(Earlier(scan.tick, lidar, view, lengths, view.free(lengths)))
 
-    def appeared(self, tick: int, places: Places, lidar: Pose2) -> npt.NDArray[np.bool_]:
-        """Which of the places (n,), seen at `tick` and in the frame of a lidar at `lidar`, were free about AGO before.
-
-        What is farther away than FARTHEST never was.
-        """
-        old = self._asked(tick)
-        if old is None:
-            return np.zeros(len(places), dtype=bool)
-        beam, distance = old.looked(places, lidar)
-        return old.free[beam - old.view.beside] > distance
-
-    def stood(self, tick: int, places: Places, lidar: Pose2) -> npt.NDArray[np.bool_]:
-        """Which of the places (n,) were hit about AGO before, too."""
-        old = self._asked(tick)
-        if old is None:
-            return np.ones(len(places), dtype=bool)
-        beam, distance = old.looked(places, lidar)
-        near = np.abs(old.lengths[beam[:, None] + np.arange(-1, 2)] - distance[:, None]).min(axis=1)
-        return np.asarray(near < SAME + SAME_RELATIVE * distance)
-
-    def _asked(self, tick: int) -> Earlier | None:
+    def before(self, tick: int) -> Earlier | None:
         """The scan of about AGO before; None while there is none of AT_LEAST."""
         scans, ago = self._scans, tick - self._ago
         while len(scans) > 1 and scans[1].tick <= ago:

@@ -5,21 +5,22 @@ continues it; a track that keeps its speed for some updates, by more than noise 
 nothing continues ends: soon where the lidar sees through the place, later where something hides it.
 """
 
+import cmath
 import math
 from functools import partial
 
 import numpy as np
-import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.sensing import Scan
 from simscen.model.guards import Prediction
 from simscen.stack.prediction.association import Seen, associate, begin
-from simscen.stack.prediction.clusters import Clusters, clusters
+from simscen.stack.prediction.clusters import Mask, Places, clusters
 from simscen.stack.prediction.going import Going
-from simscen.stack.prediction.moving import Moving, nothing
-from simscen.stack.prediction.seen_through import FARTHEST, SeenThrough
-from simscen.stack.prediction.tracks import Tracks
+from simscen.stack.prediction.moving import Moving, Thing, nothing
+from simscen.stack.prediction.seen_through import FARTHEST, Earlier, SeenThrough
+from simscen.stack.prediction.stance import Stance
+from simscen.stack.prediction.tracks import Track
 
 CHECKED = 120
 """Beams of a scan that are looked at while nothing moves; all, when what one of these hits has appeared."""
@@ -38,13 +39,14 @@ class Tracker:
     def __init__(self, spec: Prediction, tick_rate: int) -> None:
         self._spec, self._rate = spec, tick_rate
         self._memory = SeenThrough(tick_rate)
-        self._angles: Array = np.zeros(0)
         self._every = 1
         self._towards = self._towards_some = np.zeros(0, dtype=np.complex128)
-        self._tracks, self._going = Tracks(), Going(spec, tick_rate)
+        self._tracks, self._going = list[Track](), Going(spec, tick_rate)
+        self.tick = 0
+        """When the newest scan was taken."""
         self.began: int | None = None
         """When the first scan was taken."""
-        self.hits: npt.NDArray[np.bool_] | None = None
+        self.hits: Mask | None = None
         """Which beams of the newest scan hit something that moves; None when none does."""
         self._nothing = nothing(spec.acceleration)
         self.moving = self._nothing
@@ -55,110 +57,104 @@ class Tracker:
         """Whether anything moves."""
         return self.moving is not self._nothing
 
-    @property
-    def tick(self) -> int:
-        """When the newest scan was taken."""
-        return self._tracks.tick
-
     def on_scan(self, scan: Scan, odometry: Pose2) -> None:
         """Take a scan in that was taken with the base at `odometry`."""
         lidar = odometry.compose(scan.mount)
-        if len(self._angles) != len(scan.ranges):
+        if len(self._towards) != len(scan.ranges):
             self._look_along(scan)
         if self.began is None:
             self.began = scan.tick
-        self._tracks.forecast(scan.tick, (scan.tick - self.tick) / self._rate, self._spec.acceleration)
+        seconds, self.tick = (scan.tick - self.tick) / self._rate, scan.tick
+        if seconds > 0:
+            for track in self._tracks:
+                track.predict(seconds, self._spec.acceleration)
         self.hits, self.moving = None, self._nothing
-        if len(self._tracks) or self._suspicious(scan, lidar):
-            self._follow(scan, lidar)
+        before = self._memory.before(scan.tick)
+        if self._tracks or (before is not None and self._suspicious(scan, lidar, before)):
+            self._follow(scan, lidar, before)
         self._memory.remember(scan, lidar)
 
     def _look_along(self, scan: Scan) -> None:
         """Note where the beams go, and which are looked at while nothing moves."""
-        self._angles = scan.angles()
-        self._every = max(1, len(self._angles) // CHECKED)
-        self._towards = np.exp(1j * self._angles)
+        self._every = max(1, len(scan.ranges) // CHECKED)
+        self._towards = np.exp(1j * scan.angles())
         self._towards_some = self._towards[:: self._every].copy()
 
-    def _suspicious(self, scan: Scan, lidar: Pose2) -> bool:
+    def _suspicious(self, scan: Scan, lidar: Pose2, before: Earlier) -> bool:
         """Whether so many neighbouring beams hit what has appeared that it may be a thing."""
-        some = scan.ranges[:: self._every]
-        if not len(self._appeared(scan, some, self._towards_some, lidar)):
+        ranges, most = scan.ranges[:: self._every], self._farthest(scan)
+        come = before.looked(_ends(ranges, self._towards_some), lidar).appeared()
+        if not come.any() or not (come & (ranges >= scan.range_min) & (ranges <= most)).any():
             return False
-        beams = self._appeared(scan, scan.ranges, self._towards, lidar)
+        come = before.looked(_ends(scan.ranges, self._towards), lidar).appeared()
+        beams = (come & (scan.ranges >= scan.range_min) & (scan.ranges <= most)).nonzero()[0]
         return len(beams) >= FEW and bool((beams[FEW - 1 :] - beams[: 1 - FEW]).min() * APPEARED <= FEW)
-
-    def _appeared(
-        self, scan: Scan, ranges: Array, towards: npt.NDArray[np.complex128], lidar: Pose2
-    ) -> npt.NDArray[np.int64]:
-        """Which beams of these ranges hit what has appeared."""
-        # What a beam that met nothing shows is farther off than anything was seen; nan is taken for that.
-        places = np.fmin(np.fmax(ranges, 0.0), 2 * FARTHEST) * towards
-        beams = self._memory.appeared(scan.tick, places, lidar).nonzero()[0]
-        if not len(beams):
-            return beams
-        hit = ranges[beams]
-        return beams[(hit >= scan.range_min) & (hit <= self._farthest(scan))]
 
     def _farthest(self, scan: Scan) -> float:
         return min(scan.range_max, self._spec.max_range)
 
-    def _follow(self, scan: Scan, lidar: Pose2) -> None:
-        tracks, seen = self._tracks, self._seen(scan, lidar)
-        visible = partial(self._visible, scan, lidar)
+    def _follow(self, scan: Scan, lidar: Pose2, before: Earlier | None) -> None:
+        tracks, ends, going, tick = self._tracks, _ends(scan.ranges, self._towards), self._going, scan.tick
+        seen = self._seen(scan, ends, lidar, before)
         begin(tracks, seen, associate(tracks, seen))
-        keep = []
-        for number in range(len(tracks)):
-            self._going.settle(tracks, number)
-            if not self._going.ended(tracks, number, visible):
-                keep.append(number)
-        tracks.keep(keep)
-        which = [number for number, track in enumerate(tracks.known) if track.moving]
-        if which:
-            self._tell(which)
-            self._mark(scan, lidar)
+        visible = partial(self._visible, scan, seen.lidar)
+        followed = list[Track]()
+        for track in tracks:
+            going.settle(track, tick, tracks)
+            if not going.ended(track, tick, tracks, visible):
+                followed.append(track)
+        self._tracks = followed
+        if moving := [track for track in followed if track.moving]:
+            self._tell(moving, scan, ends, seen.lidar)
 
-    def _seen(self, scan: Scan, lidar: Pose2) -> Seen:
+    def _seen(self, scan: Scan, ends: Places, lidar: Pose2, before: Earlier | None) -> Seen:
         """The scan in pieces, and what an earlier one saw where they are."""
-        step = scan.angle_increment
-        full = abs(len(scan.ranges) * abs(step) - 2 * math.pi) < abs(step)
-        pieces = clusters(scan.ranges, self._angles, scan.range_min, self._farthest(scan), self._spec.max_radius, full)
-        count, share = self._shares(pieces, self._memory.appeared(scan.tick, pieces.places, lidar))
-        came = (count >= FEW) & (share >= APPEARED)
-        stood = np.zeros(len(came), dtype=bool)
-        if any(track.moved for track in self._tracks.known):  # else nobody asks
-            stood = self._shares(pieces, self._memory.stood(scan.tick, pieces.places, lidar))[1] > STANDS
-        return Seen(pieces, lidar.apply(pieces.centres), lidar, came, stood)
+        pieces = clusters(
+            scan.ranges,
+            ends,
+            scan.angle_min,
+            scan.angle_increment,
+            scan.range_min,
+            self._farthest(scan),
+            self._spec.max_radius,
+        )
+        came = stood = [False] * len(pieces.first)
+        if before is not None and came:
+            looked = before.looked(pieces.places, lidar)
+            count, share = pieces.counts(looked.appeared())
+            came = ((count >= FEW) & (share >= APPEARED)).tolist()
+            if any(track.moved for track in self._tracks):  # else nobody asks
+                stood = (pieces.counts(looked.stood())[1] > STANDS).tolist()
+        return Seen(scan.tick, pieces, Stance.of(lidar), came, stood)
 
     @staticmethod
-    def _shares(pieces: Clusters, which: npt.NDArray[np.bool_]) -> tuple[Array, Array]:
-        """How many (n,) of each piece's hits these are, and the share."""
-        total = np.concatenate(([0], np.cumsum(which)))
-        count = total[pieces.last + 1] - total[pieces.first]
-        return count, count / (pieces.last - pieces.first + 1)
-
-    def _visible(self, scan: Scan, lidar: Pose2, number: int) -> bool:
+    def _visible(scan: Scan, lidar: Stance, track: Track) -> bool:
         """Whether the lidar sees past the place where the middle of a track should be."""
-        x, y = lidar.inverse().apply(self._tracks.states[number : number + 1, :2])[0].tolist()
-        turn = (math.atan2(y, x) - scan.angle_min) % (2 * math.pi)
-        beam = round(turn / scan.angle_increment)
-        return 0 <= beam < len(scan.ranges) and bool(scan.ranges[beam] > math.hypot(x, y))
+        off = lidar.into(track.place)
+        beam = round((cmath.phase(off) - scan.angle_min) % (2 * math.pi) / scan.angle_increment)
+        return 0 <= beam < len(scan.ranges) and bool(scan.ranges[beam] > abs(off))
 
-    def _tell(self, which: list[int]) -> None:
-        """Note what moves."""
-        tracks = self._tracks
-        states, radii = tracks.states[which], np.array([max(tracks.known[number].radius, BODY) for number in which])
-        self.moving = Moving(states[:, :2], states[:, 2:], radii, tracks.covariances[which], self._spec.acceleration)
+    def _tell(self, moving: list[Track], scan: Scan, ends: Places, lidar: Stance) -> None:
+        """Note what moves, and which beams hit it."""
+        things = [
+            Thing(
+                each.place,
+                each.velocity,
+                max(each.radius, BODY),
+                each.variance,
+                each.covariance,
+                each.velocity_variance,
+            )
+            for each in moving
+        ]
+        self.moving = Moving.of(things, self._spec.acceleration)
+        hits = np.zeros(len(ends), dtype=np.bool_)
+        for thing in things:
+            hits |= np.abs(ends - lidar.into(thing.place)) <= self._spec.margin + thing.radius
+        self.hits = hits & (scan.ranges >= scan.range_min) & (scan.ranges <= scan.range_max)
 
-    def _mark(self, scan: Scan, lidar: Pose2) -> None:
-        """Note which beams hit what moves."""
-        moving = self.moving
-        with np.errstate(invalid="ignore"):
-            use = np.flatnonzero((scan.ranges >= scan.range_min) & (scan.ranges <= scan.range_max))
-        r, a = scan.ranges[use], self._angles[use]
-        points = lidar.apply(np.column_stack((r * np.cos(a), r * np.sin(a))))
-        off = np.hypot(points[:, None, 0] - moving.centres[None, :, 0], points[:, None, 1] - moving.centres[None, :, 1])
-        room = self._spec.margin + moving.radii
-        belongs = np.zeros(len(scan.ranges), dtype=bool)
-        belongs[use] = (off <= room[None, :]).any(axis=1)
-        self.hits = belongs
+
+def _ends(ranges: Array, towards: Places) -> Places:
+    """Where beams (n,) end: of one that met nothing farther off than anything was seen, of nan where the lidar is."""
+    ends: Places = np.fmin(np.fmax(ranges, 0.0), 2 * FARTHEST) * towards
+    return ends
