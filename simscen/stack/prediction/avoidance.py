@@ -16,8 +16,8 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.motion import STOP, Twist
 from simscen.model.guards import Prediction
 from simscen.stack.footprint import Discs
-from simscen.stack.prediction.moving import WIDEST, Moving
-from simscen.stack.prediction.rollouts import HORIZON, TIMES, Followed, Repertoire, Rollouts, arc, joined
+from simscen.stack.prediction.moving import WIDEST, Moving, Reals
+from simscen.stack.prediction.rollouts import HORIZON, TIMES, Followed, Repertoire, Rollouts, arc
 from simscen.stack.protocols import CostmapView, RobotModel
 
 ROOM = 0.25
@@ -38,6 +38,8 @@ CALMER = 0.01
 """… and below which it is given back to it."""
 SLOWER = (1.0, 0.75, 0.5, 0.25, 0.0)
 """Parts of the controller's speed that are tried on its own way."""
+AT_ONCE, ROUNDING = 64, 1e-9
+"""Ways that are looked at together, and what sums in another order may differ by."""
 NEARLY_ROUND = 0.15
 """Metres between its inscribed and its circumscribed radius up to which a robot is taken for round."""
 
@@ -79,18 +81,63 @@ class Avoidance:
         if self._risk(as_wanted, near)[0] <= (CALM if self._last is None else CALMER):
             self._last = None
             return wanted
-        own = self._own(wanted, pose, twist, path, SLOWER)
-        ways = joined(own, self._repertoire.roll(pose, twist))
-        cost = self._risk(ways, near)
-        cost += self._walls(ways, costmap) - PROGRESS * self._progress(ways, pose, path, home)
-        cost += BACKWARD * np.clip(-ways.vx / self._speed, 0.0, None).mean(axis=1)
-        cost[len(own.x) :] += OWN
-        if self._last is not None:
-            change = np.abs(ways.commands[:, 0] - self._last.vx) / self._speed
-            cost += CHANGE * (change + np.abs(ways.commands[:, 1] - self._last.wz) / 3.0)
-        best = int(cost.argmin())
-        self._last = Twist(float(ways.commands[best, 0]), 0.0, float(ways.commands[best, 1]))
+        self._last = self._best(self._own(wanted, pose, twist, path, SLOWER), pose, twist, near, costmap, path, home)
         return self._last
+
+    def _best(
+        self,
+        own: Rollouts,
+        pose: Pose2,
+        twist: Twist,
+        moving: Moving,
+        costmap: CostmapView,
+        path: Followed | None,
+        home: Pose2 | None,
+    ) -> Twist:
+        """The command that begins the way which costs least; the first of several that cost the same.
+
+        Risks are worked out for the ways that could be it by what they cost besides, the cheapest first.
+        """
+        fan, goal = self._repertoire.roll(pose, twist), self._goal(pose, path, home)
+        everything = np.arange(len(fan.commands))
+        soon = np.s_[:, 1]
+        room = max(self._room(each, costmap, soon).max() for each in (own, fan.ways(everything, 2)))
+        least = min(WALL_ROOM, float(room))
+        cost = self._cost(own, pose, goal, moving, costmap, least, 0.0)
+        number = int(cost.argmin())
+        best, command = (float(cost[number]), -1), own.commands[number]
+        free = OWN + self._change(fan.commands) - PROGRESS * self._progress(*fan.ends, pose, goal)
+        free += BACKWARD * self._backward(fan.vx)[fan.speed]
+        order = free.argsort(kind="stable")
+        for first in range(0, len(order), AT_ONCE):
+            which = order[first : first + AT_ONCE]
+            if free[which[0]] > best[0] + ROUNDING:
+                break
+            cost = self._cost(fan.ways(which), pose, goal, moving, costmap, least, OWN)
+            found = float(cost.min())
+            number = int(which[cost == found].min())
+            if (found, number) < best:
+                best, command = (found, number), fan.commands[number]
+        return Twist(float(command[0]), 0.0, float(command[1]))
+
+    def _cost(
+        self,
+        ways: Rollouts,
+        pose: Pose2,
+        goal: tuple[float, float],
+        moving: Moving,
+        costmap: CostmapView,
+        least: float,
+        other: float,
+    ) -> Array:
+        """What each way (n,) costs; `least` metres are kept off walls, `other` is added to all."""
+        cost = self._risk(ways, moving)
+        progress = self._progress(ways.x[:, -1], ways.y[:, -1], pose, goal)
+        cost += self._walls(ways, costmap, least) - PROGRESS * progress
+        cost += BACKWARD * self._backward(ways.vx)
+        cost += other
+        cost += self._change(ways.commands)
+        return cost
 
     def _own(
         self, wanted: Twist, pose: Pose2, twist: Twist, path: Followed | None, parts: tuple[float, ...]
@@ -107,25 +154,35 @@ class Avoidance:
         risk: Array = NEAR * near.max(axis=1) + LASTING * near.mean(axis=1) + HIT * (hit * SOONER).max(axis=1)
         return risk
 
-    def _walls(self, ways: Rollouts, costmap: CostmapView) -> Array:
-        """What each way (n,) costs for what stands in it."""
-        some = slice(1, None, 2)
-        gap = self._discs.clearance(costmap, ways.x[:, some], ways.y[:, some], ways.yaw[:, some])
-        start = float(gap[:, 0].max(initial=-math.inf))
-        least = min(WALL_ROOM, start)
-        touched = (gap < least) * np.exp(-TIMES[some] / (2 * SOON))
+    def _walls(self, ways: Rollouts, costmap: CostmapView, least: float) -> Array:
+        """What each way (n,) costs for what stands in it, nearer than `least` metres."""
+        touched = (self._room(ways, costmap, np.s_[:, 1::2]) < least) * np.exp(-TIMES[1::2] / (2 * SOON))
         cost: Array = WALL * touched.max(axis=1)
         return cost
 
-    def _progress(self, ways: Rollouts, pose: Pose2, path: Followed | None, home: Pose2 | None) -> Array:
-        """How far (n,) each way gets, as a part of what full speed would do."""
-        reach = self._speed * HORIZON
+    def _room(self, ways: Rollouts, costmap: CostmapView, some: tuple[slice, int | slice]) -> Reals:
+        """Metres from ways to what stands, of some of their moments."""
+        return np.asarray(self._discs.clearance(costmap, ways.x[some], ways.y[some], ways.yaw[some]))
+
+    def _goal(self, pose: Pose2, path: Followed | None, home: Pose2 | None) -> tuple[float, float]:
+        """Where it is to get."""
         if path is not None:
-            x, y = path.ahead(pose, reach)
-        elif home is not None:
-            x, y = home.x, home.y
-        else:
-            x, y = pose.x, pose.y
-        before = math.hypot(x - pose.x, y - pose.y)
-        gain: Array = (before - np.hypot(ways.x[:, -1] - x, ways.y[:, -1] - y)) / reach
+            return path.ahead(pose, self._speed * HORIZON)
+        return (pose.x, pose.y) if home is None else (home.x, home.y)
+
+    def _progress(self, x: Array, y: Array, pose: Pose2, goal: tuple[float, float]) -> Array:
+        """How far (n,) ways get that end at x and y (n,), as a part of what full speed would do."""
+        before = math.hypot(goal[0] - pose.x, goal[1] - pose.y)
+        gain: Array = (before - np.hypot(x - goal[0], y - goal[1])) / (self._speed * HORIZON)
         return gain
+
+    def _backward(self, vx: Array) -> Array:
+        """How much speeds (n, moments) go backward, as a part of full speed."""
+        return np.asarray(np.maximum(-vx / self._speed, 0.0).mean(axis=1))
+
+    def _change(self, commands: Array) -> Array:
+        """What commands (n, 2) cost for being others than the last one."""
+        if self._last is None:
+            return np.zeros(len(commands))
+        change = np.abs(commands[:, 0] - self._last.vx) / self._speed
+        return np.asarray(CHANGE * (change + np.abs(commands[:, 1] - self._last.wz) / 3.0))

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.motion import Twist
@@ -60,19 +61,53 @@ class Repertoire:
                 np.abs(plan[:, 3]) >= np.abs(plan[:, 4]) * robot.turning_radius
             )
             plan = plan[able]
-        self._plan = plan
+        self.commands: Array = plan[:, :2]
+        """What begins each way (n, 2)."""
+        self._speeds, self._speed = np.unique(plan[:, (0, 2, 3)], axis=0, return_inverse=True)
+        self._turns, self._turn = np.unique(plan[:, (1, 2, 4)], axis=0, return_inverse=True)
 
-    def roll(self, pose: Pose2, twist: Twist) -> Rollouts:
+    def roll(self, pose: Pose2, twist: Twist) -> "Fan":
         """All of it, from here."""
-        plan, robot = self._plan, self._robot
-        first_v, first_w, lasts, then_v, then_w = (plan[:, k : k + 1] for k in range(5))
-        vx = _ramped(twist.vx, first_v, lasts, then_v, robot.linear_acceleration, robot.linear_deceleration)
-        wz = _ramped(twist.wz, first_w, lasts, then_w, robot.angular_acceleration, robot.angular_acceleration)
+        robot, speeds, turns = self._robot, self._speeds, self._turns
+        first, lasts, then = (speeds[:, k : k + 1] for k in range(3))
+        vx = _ramped(twist.vx, first, lasts, then, robot.linear_acceleration, robot.linear_deceleration)
+        first, lasts, then = (turns[:, k : k + 1] for k in range(3))
+        wz = _ramped(twist.wz, first, lasts, then, robot.angular_acceleration, robot.angular_acceleration)
         yaw = pose.yaw + np.cumsum(wz, axis=1) * STEP
         middle = yaw - 0.5 * STEP * wz
-        x = pose.x + np.cumsum(vx * np.cos(middle), axis=1) * STEP
-        y = pose.y + np.cumsum(vx * np.sin(middle), axis=1) * STEP
-        return Rollouts(x, y, yaw, vx, plan[:, :2])
+        return Fan(pose, vx, yaw, np.cos(middle), np.sin(middle), self._speed, self._turn, self.commands)
+
+
+@dataclass(frozen=True, eq=False)
+class Fan:
+    """Many ways, of few courses of the speed and few of the turn rate: `speed` and `turn` (n,) are each one's numbers.
+
+    Speeds `vx` (k, moments), headings `yaw` and the cosines and sines of those in between (m, moments).
+    """
+
+    pose: Pose2
+    vx: Array
+    yaw: Array
+    cosine: Array
+    sine: Array
+    speed: npt.NDArray[np.intp]
+    turn: npt.NDArray[np.intp]
+    commands: Array
+
+    @property
+    def ends(self) -> tuple[Array, Array]:
+        """x and y (n,) at their ends, but for rounding."""
+        speed, turn, (x, y, _) = self.speed, self.turn, self.pose
+        along, aside = self.vx @ self.cosine.T, self.vx @ self.sine.T
+        return x + along[speed, turn] * STEP, y + aside[speed, turn] * STEP
+
+    def ways(self, which: npt.NDArray[np.intp], moments: int = len(TIMES)) -> Rollouts:
+        """Some of them (k,), for so many moments."""
+        some, turn = np.s_[:, :moments], self.turn[which]
+        vx = self.vx[some][self.speed[which]]
+        x = self.pose.x + np.cumsum(vx * self.cosine[some][turn], axis=1) * STEP
+        y = self.pose.y + np.cumsum(vx * self.sine[some][turn], axis=1) * STEP
+        return Rollouts(x, y, self.yaw[some][turn], vx, self.commands[which])
 
 
 def _ramped(now: float, first: Array, lasts: Array, then: Array, faster: float, slower: float) -> Array:
@@ -151,9 +186,3 @@ def arc(pose: Pose2, wanted: Twist, parts: tuple[float, ...]) -> Rollouts:
     x = pose.x + np.cumsum(vx * np.cos(middle), axis=1) * STEP
     y = pose.y + np.cumsum(vx * np.sin(middle), axis=1) * STEP
     return Rollouts(x, y, yaw, vx, np.column_stack((scale * wanted.vx, scale * wanted.wz)))
-
-
-def joined(first: Rollouts, second: Rollouts) -> Rollouts:
-    """Both."""
-    names = ("x", "y", "yaw", "vx", "commands")
-    return Rollouts(*(np.concatenate((getattr(first, name), getattr(second, name))) for name in names))

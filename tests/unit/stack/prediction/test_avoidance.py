@@ -18,7 +18,11 @@ from simscen.model.localizers import GroundTruth
 from simscen.model.mppi import Mppi
 from simscen.model.stack import StackSpec
 from simscen.stack.collision_monitor import CollisionMonitor
+from simscen.stack.prediction import avoidance
+from simscen.stack.prediction.avoidance import Avoidance
 from simscen.stack.prediction.moving import Moving
+from simscen.stack.prediction.rollouts import Followed
+from simscen.stack.protocols import CostmapView, RobotModel
 from simscen.testing.flatland import RATE, Drive, Flatland, box_robot, drive
 
 Disc = tuple[float, float, float]
@@ -118,6 +122,28 @@ def test_where_nothing_moves_switching_it_off_changes_nothing() -> None:
     with_it, without = (start(near, controller=slow, enabled=on, world=world).run(15.0) for on in (True, False))
     assert with_it.result == "SUCCEEDED"
     assert with_it.commands == without.commands
+
+
+@pytest.mark.parametrize("robot", [box_robot(), box_robot(length=1.0, width=0.4)], ids=["all but round", "long"])
+def test_what_looks_at_the_cheapest_ways_only_finds_the_way_that_is_cheapest_of_all(
+    robot: RobotModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    chance = np.random.default_rng(2)
+    costmap = CostmapView(np.zeros((200, 200), np.uint8), np.full((200, 200), 2.0, np.float32), 0.05, (-5.0, -5.0))
+    costmap.distance[:, 120:] = np.maximum(2.0 - 0.05 * np.arange(80), 0.0)
+    path = Followed(np.column_stack((np.arange(0.0, 8.0, 0.05), np.zeros(160))))
+    given = list[list[Twist]]()
+    drawn = [(chance.normal(0, 2, (3, 2)), chance.normal(0, 1, (3, 2)), chance.uniform(0, 1, 3)) for _ in range(24)]
+    for at_once in (avoidance.AT_ONCE, 10**6):
+        monkeypatch.setattr(avoidance, "AT_ONCE", at_once)
+        avoids, commands = Avoidance(Prediction(), robot, 1.0), list[Twist]()
+        for places, speeds, (x, vx, wz) in drawn:
+            moving = Moving(places, speeds, np.full(3, 0.3), np.tile(0.01 * np.eye(4), (3, 1, 1)), 1.0)
+            wanted, twist = Twist(1.0, 0.0, 0.1), Twist(float(vx), 0.0, float(wz))
+            commands.append(avoids.steer(wanted, Pose2(float(x), 0.1, 0.2), twist, moving, costmap, path))
+        given.append(commands)
+    assert given[0] == given[1]
+    assert sum(command != Twist(1.0, 0.0, 0.1) for command in given[0]) > 6
 
 
 def test_the_collision_monitor_brakes_by_the_relative_velocity_and_only_where_braking_helps() -> None:
