@@ -78,12 +78,21 @@ class Template:
 
 @lru_cache(maxsize=256)
 def packer_of(parts: "tuple[bytes | Slot, ...]") -> Callable[..., bytes]:
-    """What packs constants and fields into bytes: it takes the fields in the order in which they come first.
+    """What packs constants and fields into bytes: it takes the fields in the order in which they come first."""
+    return _made(parts, "pack", ())
 
-    It is made as Python's named tuples are, from text in which nothing but the names of fields varies: everything then
-    goes through a single call of `struct`.
+
+@lru_cache(maxsize=256)
+def writer_of(parts: "tuple[bytes | Slot, ...]") -> Callable[..., None]:
+    """What packs constants and fields into a buffer: it takes the buffer, an offset in it, and the fields as above."""
+    return _made(parts, "pack_into", ("buffer", "offset"))
+
+
+def _made(parts: "tuple[bytes | Slot, ...]", how: str, where: tuple[str, ...]) -> Callable[..., Any]:
+    """It is made as Python's named tuples are, from text in which nothing but the names of fields varies: everything
+    then goes through a single call of `struct`.
     """
-    codes, arguments, known = "<", [], dict[str, Any]()
+    codes, arguments, known = "<", [*where], dict[str, Any]()
     for constant, group in groupby(parts, lambda part: isinstance(part, bytes)):
         if constant:
             data = b"".join(part for part in group if isinstance(part, bytes))
@@ -95,9 +104,9 @@ def packer_of(parts: "tuple[bytes | Slot, ...]") -> Callable[..., bytes]:
             slots = [part for part in group if isinstance(part, Slot)]
             codes += "".join(slot.codes for slot in slots)
             arguments += [slot.field for slot in slots]
-    fields = dict.fromkeys(field_names(parts))
-    text = f"lambda {', '.join(fields)}: pack({', '.join(arguments)})"
-    made: Callable[..., bytes] = eval(text, {**known, "pack": struct.Struct(codes).pack})
+    taken = *where, *dict.fromkeys(field_names(parts))
+    text = f"lambda {', '.join(taken)}: {how}({', '.join(arguments)})"
+    made: Callable[..., Any] = eval(text, {**known, how: getattr(struct.Struct(codes), how)})
     return made
 
 

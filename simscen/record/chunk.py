@@ -10,43 +10,55 @@ from simscen.record.cdr import Slot, Template
 HEAD = 31
 """Bytes of a record before its message."""
 _MESSAGE = int(Opcode.MESSAGE)
-_pack_head = struct.Struct("<BQHIQQ").pack
+_pack_head = struct.Struct("<BQHIQQ").pack_into
 
 
 class Chunk:
-    """Records that will be compressed together, in the order they came. `full` is called when it has reached `limit`
-    bytes, and empties it.
+    """Records that will be compressed together, in the order they came, each written to where it stays.
+
+    `full` is called when it has reached `limit` bytes, and empties it.
     """
 
     def __init__(self, limit: int, full: Callable[[], None]) -> None:
         self.limit, self.full = limit, full
         self.size = 0
-        self.parts: list[bytes] = []
+        self.view = memoryview(bytearray(2 * limit))
+        """Its records, and room behind them."""
         self.spoken: list[Channel] = []
         """The channels that have a message in it, in the order of their first."""
 
     def put(self, record: bytes) -> None:
         """Add a schema or a channel."""
-        self.parts.append(record)
-        self.size += len(record)
+        end = self.size + len(record)
+        self.reach(end)
+        self.view[self.size : end] = record
+        self.size = end
+
+    def reach(self, end: int) -> None:
+        """See to it that there is room up to `end`."""
+        if end > len(self.view):
+            larger = memoryview(bytearray(2 * end))
+            larger[: self.size] = self.content()
+            self.view = larger
 
     def __bool__(self) -> bool:
         """Whether it holds messages; a chunk without any says nothing that the summary does not."""
         return bool(self.spoken)
 
-    def content(self) -> bytes:
+    def content(self) -> memoryview:
         """All records."""
-        return b"".join(self.parts)
+        return self.view[: self.size]
 
     def span(self) -> tuple[int, int]:
         """The times of the first and the last message; messages come in the order of their time."""
-        return min(channel.entries[0] for channel in self.spoken), max(channel.entries[-2] for channel in self.spoken)
+        spoken = self.spoken
+        return min([channel.entries[0] for channel in spoken]), max([channel.entries[-2] for channel in spoken])
 
     def clear(self) -> None:
         """Begin the next one."""
         for channel in self.spoken:
             channel.entries.clear()
-        self.size, self.parts, self.spoken = 0, [], []
+        self.size, self.spoken = 0, []
 
 
 class Channel:
@@ -59,12 +71,17 @@ class Channel:
     def write(self, time: int, data: bytes) -> None:
         """Add a message at `time` nanoseconds."""
         chunk, length = self.chunk, len(data)
+        at = chunk.size
+        end = at + HEAD + length
+        if end > len(chunk.view):
+            chunk.reach(end)
+        _pack_head(chunk.view, at, _MESSAGE, 22 + length, self.number, 0, time, time)
+        chunk.view[at + HEAD : end] = data
         if not self.entries:
             chunk.spoken.append(self)
-        self.entries += (time, chunk.size)
-        chunk.parts += (_pack_head(_MESSAGE, 22 + length, self.number, 0, time, time), data)
-        chunk.size += HEAD + length
-        if chunk.size > chunk.limit:
+        self.entries += (time, at)
+        chunk.size = end
+        if end > chunk.limit:
             chunk.full()
 
     def record(self, message: Template) -> "list[bytes | Slot]":
@@ -72,13 +89,8 @@ class Channel:
         head = struct.pack("<BQHI", _MESSAGE, 22 + len(message.buffer), self.number, 0)
         return [head, Slot("Q", "time"), Slot("Q", "time"), *message.parts]
 
-    @property
-    def count(self) -> int:
-        """How many messages of it are in the chunk."""
-        return len(self.entries) // 2
-
     def index(self) -> bytes:
         """The MessageIndex record of the chunk for this channel."""
-        size = 8 * len(self.entries)
-        head = Opcode.MESSAGE_INDEX, 6 + size, self.number, size
-        return struct.pack(f"<BQHI{len(self.entries)}Q", *head, *self.entries)
+        entries = self.entries
+        size = 8 * len(entries)
+        return struct.pack(f"<BQHI{len(entries)}Q", Opcode.MESSAGE_INDEX, 6 + size, self.number, size, *entries)

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
-from simscen.record.cdr import Slot, Template, field_names, packer_of
+from simscen.record.cdr import Slot, Template, field_names, writer_of
 from simscen.record.chunk import HEAD, Channel
 from simscen.record.schemas import MessageType, load
 from simscen.record.topics import CLOCK, Topic, qos
@@ -106,15 +106,16 @@ class _AtOnce(Together):
             return
         chunk = self._chunk
         at = chunk.size
-        if at + self._room > chunk.limit:
+        end = at + self._room
+        if end > chunk.limit:
             super().write(time, *fields)
             return
+        self._pack(chunk.view, at, time, *fields)
+        chunk.size = end
         for channel, offset in self._places:
             if not channel.entries:
                 chunk.spoken.append(channel)
             channel.entries += (time, at + offset)
-        chunk.parts.append(self._pack(time, *fields))
-        chunk.size = at + self._room
 
     def _lay_out(self) -> None:
         parts: list[bytes | Slot] = []
@@ -124,7 +125,7 @@ class _AtOnce(Together):
             self._places.append((channel, self._room))
             self._room += HEAD + len(message.buffer)
             self._chunk = channel.chunk
-        self._pack = packer_of(tuple(parts))
+        self._pack = writer_of(tuple(parts))
 
 
 class Namespaced:
