@@ -17,6 +17,7 @@ from simscen.core.world import BuiltWorld
 from simscen.criteria.base import Criterion
 from simscen.loading.disturbances import disturbances_of
 from simscen.loading.loaded import LoadedScenario
+from simscen.loading.plugins import plugins_of
 from simscen.model.anystack import AnyStack
 from simscen.model.localizers import Amcl, OdometryOnly
 from simscen.model.robot import RobotSpec
@@ -29,6 +30,7 @@ from simscen.run.robotways import in_the_way
 from simscen.run.worldsource import load_map, load_robot, load_world
 from simscen.sim.alone import NAMELESS
 from simscen.sim.robot_body import RobotBody
+from simscen.spec.registry import Entry
 from simscen.triggers.clearance_below import ClearanceBelow
 from simscen.worlds.build import build
 from simscen.worlds.meshing import fuse
@@ -59,6 +61,8 @@ class Prepared:
     """What of the built world's mesh is in the robot's way; the same where it is all of it."""
     mapped: tuple[int, ...] = ()
     """The numbers of the faults that have changed the map."""
+    plugins: tuple[Entry, ...] = ()
+    """What it takes from installed packages."""
     robots: Mapping[str, "Prepared"] = field(default_factory=dict)
 
     @property
@@ -101,7 +105,7 @@ def prepare(loaded: LoadedScenario, world_of: BuildWorld = build_world, legs: Fi
         parts[name] = _prepared(view, known, legs)
     reach = max(part.case.clearance_range for part in parts.values())
     parts = {name: replace(part, case=replace(part.case, clearance_range=reach)) for name, part in parts.items()}
-    return replace(next(iter(parts.values())), loaded=loaded, robots=parts)
+    return replace(next(iter(parts.values())), loaded=loaded, robots=parts, plugins=plugins_of(loaded))
 
 
 def _prepared(loaded: LoadedScenario, world_of: BuildWorld, legs: FindLegs) -> Prepared:
@@ -139,6 +143,7 @@ def _prepared(loaded: LoadedScenario, world_of: BuildWorld, legs: FindLegs) -> P
         estimate=estimate_of(spec.own, start),
         case=with_ways(case, built, obstacles, legs),
         obstacles=obstacles,
+        plugins=plugins_of(loaded),
     )
 
 

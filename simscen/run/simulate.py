@@ -15,7 +15,6 @@ from simscen.judge.result import result_of
 from simscen.judge.resultdata import to_json
 from simscen.judge.several import together
 from simscen.loading.discovery import default_root
-from simscen.loading.plugins import plugins_of
 from simscen.loading.scenario import load_scenario
 from simscen.record.backlog import WAITS, Backlog, Log
 from simscen.record.recorder import Recorder
@@ -53,7 +52,7 @@ def simulate(
     except (RunError, InvalidInput, MemoryError):
         raise
     except Exception as error:  # the boundary to code of others, which can raise anything
-        if (whose := blamed(error, plugins_of(prepared.loaded))) is None:
+        if (whose := blamed(error, prepared.plugins)) is None:
             raise
         traceback.print_exc()  # into the run's own log: what its author wants to see
         raise whose from error
@@ -68,7 +67,7 @@ def _simulated(
     with ExitStack() as closing:
         recorder = log and closing.enter_context(Recorder(log, clock, log_header(prepared, seed)))
         # Code of others may write into an array that it has handed out.
-        backlog = closing.enter_context(Backlog(0 if plugins_of(prepared.loaded) else clock.ticks(WAITS)))
+        backlog = closing.enter_context(Backlog(0 if prepared.plugins else clock.ticks(WAITS)))
         rig = assemble(prepared, seed, printed)
         closing.callback(rig.simulation.close)
         agents = dict(zip(prepared.each, rig.agents, strict=True))

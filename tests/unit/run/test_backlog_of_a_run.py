@@ -1,5 +1,6 @@
 """Code of others may write into an array that it has handed out: what it says is written at once."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -7,8 +8,9 @@ import pytest
 
 from simscen.core.trace import Moment
 from simscen.loading.scenario import load_scenario
-from simscen.run import simulate
 from simscen.run.prepare import prepare
+from simscen.run.simulate import simulate
+from simscen.spec.registry import Entry
 
 SCENARIO = """\
 simscen: 1
@@ -43,14 +45,12 @@ class Lag:
 
 
 @pytest.mark.parametrize("others", [False, True])
-def test_moments_wait_unless_a_run_has_code_of_others(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, others: bool
-) -> None:
+def test_moments_wait_unless_a_run_has_code_of_others(tmp_path: Path, others: bool) -> None:
     file = tmp_path / "short.scenario.yaml"
     file.write_text(SCENARIO)
-    if others:
-        monkeypatch.setattr(simulate, "plugins_of", lambda loaded: ("a package",))
+    package = Entry("planner", "theirs", "theirs:Planner", distribution="theirs", version="1.0")
+    prepared = replace(prepare(load_scenario(file, tmp_path)), plugins=(package,) if others else ())
     lag = Lag()
-    run = simulate.simulate(prepare(load_scenario(file, tmp_path)), attach=lag.attach)
+    run = simulate(prepared, attach=lag.attach)
     assert (lag.most == 0) == others
     assert run.trace.truth.ticks[-1] == run.trace.end
