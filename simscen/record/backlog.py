@@ -7,7 +7,7 @@ from typing import Protocol
 from simscen.core.errors import RunError
 from simscen.core.trace import Moment
 
-WAITS = 0.5
+WAITS = 0.4
 """Seconds for which the moments of a run wait: with its last chunk, less than a log may lose when it is killed."""
 
 

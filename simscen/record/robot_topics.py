@@ -42,7 +42,8 @@ class RobotTopics:
             self._sensors.correct(Pose3.planar(decision.belief.map_from_odom))
         self._sensors.write(now, moment.readings)
         self._stack.write(now, tick, decision)
-        self._scene.write(now, moment.events)
+        if moment.events or not self._scene.begun:
+            self._scene.write(now, moment.events)
         if moment.events or decision.events:
             for event in (*moment.events, *decision.events):
                 self._events.write(now, event)

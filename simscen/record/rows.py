@@ -17,24 +17,27 @@ from simscen.core.trace import Trace
 
 
 class Series:
-    """A signal in the making: a tick and `width` numbers a row, packed as they come."""
+    """A signal in the making: a tick and `width` numbers a row, which `pack` makes a part of `rows`.
+
+    Ticks are exact in a double for a million years of simulated time.
+    """
 
     def __init__(self, width: int) -> None:
         self._width = width + 1
-        self._pack = struct.Struct(f"{width + 1}d").pack
-        self._rows = bytearray()
+        self.pack = struct.Struct(f"{width + 1}d").pack
+        self.rows = bytearray()
 
     def add(self, tick: int, *values: float) -> None:
-        """Append a row. Ticks are exact in a double for a million years of simulated time."""
-        self._rows += self._pack(tick, *values)
+        """Append a row."""
+        self.rows += self.pack(tick, *values)
 
     def extend(self, ticks: Ticks, values: Array) -> None:
         """Append rows: ticks (n,) and values (n, width)."""
-        self._rows += np.column_stack((ticks, values)).tobytes()
+        self.rows += np.column_stack((ticks, values)).tobytes()
 
     def columns(self) -> tuple[Ticks, Array]:
         """Ticks (n,) and values (n, width)."""
-        table = np.frombuffer(bytes(self._rows)).reshape(-1, self._width)
+        table = np.frombuffer(bytes(self.rows)).reshape(-1, self._width)
         return table[:, 0].astype(np.int64), table[:, 1:]
 
 

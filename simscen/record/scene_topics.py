@@ -42,19 +42,18 @@ class SceneTopics:
         self._things: dict[str, Event] = {}
         own = (zone for zone in scenery.zones if zone.robot == robot)
         self._zones: dict[tuple[str, str], Zone] = {(zone.filter, zone.region): zone for zone in own}
-        self._begun = False
+        self.begun = False
+        """Whether anything was written; from then on it need be told only of beats in which something happened."""
 
     def write(self, now: int, events: Sequence[Event]) -> None:
         """Take in what happened in a beat, at `now` nanoseconds."""
-        if self._begun and not events:
-            return
         came = [self._change_things(event) for event in events]
         switched = [self._switch(event) for event in events]
-        if any(came) or not self._begun:
+        if any(came) or not self.begun:
             self._out.publish(topics.THINGS, now, marker_array(self._shown_things()))
-        if any(switched) or not self._begun:
+        if any(switched) or not self.begun:
             self._out.publish(topics.SCENE, now, marker_array(self._shown_scene()))
-        self._begun = True
+        self.begun = True
 
     def _change_things(self, event: Event) -> bool:
         if event.kind == EventKind.OBJECT_SPAWNED:

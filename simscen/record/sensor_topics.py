@@ -1,9 +1,8 @@
 """What the robot was told: /scan, /odom, /imu, bumpers and pictures."""
 
 import re
-from collections.abc import Mapping
-
-from typing_extensions import assert_never
+from collections.abc import Callable, Mapping
+from typing import Any
 
 from simscen.core.geometry import Pose3
 from simscen.core.sensing import Bump, Image, Imu, Odometry, Readings, Scan
@@ -46,12 +45,19 @@ class SensorTopics:
         self._out, self._time, self._thinning = out, time, thinning
         self._topics: dict[tuple[str, str], Topic] = {}
         self._lines: dict[tuple[str, str], Line] = {}
+        self._imus: dict[str, Together] = {}
         self._owns: tuple[Together, Together] | None = None
+        self._takers: dict[type, Callable[[int, Any], None]] = {
+            Odometry: self._write_odometry,
+            Scan: self._write_scan,
+            Imu: self._write_imu,
+            Bump: self._write_bump,
+            Image: self._write_image,
+        }
         self._plain: set[str] = set()
         self._scans: dict[str, LaserScanPacker] = {}
         self._names = names or frames.RobotFrames()
         self._odometry = pack.odometry(self._names.odom, self._names.base).packer()
-        self._imu = pack.imu(self._names.base).packer()
         self._transforms = TransformsPacker()
         self._mounts = dict(mounts)
         self._correction: Pose3 | None = None
@@ -65,21 +71,7 @@ class SensorTopics:
     def write(self, now: int, readings: Readings) -> None:
         """Write the readings of a beat at `now` nanoseconds."""
         for reading in readings:
-            match reading:
-                case Odometry():
-                    self._write_odometry(now, reading)
-                case Scan():
-                    self._write_scan(now, reading)
-                case Imu():
-                    turn, force = reading.angular_velocity, reading.linear_acceleration
-                    data = self._imu(self._time.stamp(reading.tick), turn, force)
-                    self._line("Imu", reading.sensor).write(now, data)
-                case Bump():
-                    self._line("Bump", reading.sensor).write(now, _PRESSED if reading.pressed else _FREE)
-                case Image():
-                    self._write_image(now, reading)
-                case _:
-                    assert_never(reading)
+            self._takers[type(reading)](now, reading)
 
     def topic_of(self, reading: Odometry | Scan) -> Topic:
         """The topic on which a reading is written."""
@@ -116,6 +108,16 @@ class SensorTopics:
             self._mounts[scan.sensor] = Pose3.planar(scan.mount)
             self._publish_mounts(now)
         self._line("Scan", scan.sensor).write(now, packer(self._time.stamp(scan.tick), scan))
+
+    def _write_imu(self, now: int, imu: Imu) -> None:
+        together = self._imus.get(imu.sensor)
+        if together is None:
+            topic = self._topic(imu.sensor, *_PLAIN["Imu"])
+            together = self._imus[imu.sensor] = self._out.together([(topic, pack.imu(self._names.base))])
+        together.write(now, self._time.stamp(imu.tick), imu.angular_velocity, imu.linear_acceleration)
+
+    def _write_bump(self, now: int, bump: Bump) -> None:
+        self._line("Bump", bump.sensor).write(now, _PRESSED if bump.pressed else _FREE)
 
     def _write_image(self, now: int, image: Image) -> None:
         frame, stamp = self._names.of_sensor(image.sensor), self._time.stamp(image.tick)

@@ -20,11 +20,10 @@ class StackTopics:
 
     def __init__(self, out: Out, time: SimTime, thinning: Thinning, names: RobotFrames) -> None:
         self._out, self._time, self._thinning, self._names = out, time, thinning, names
-        self._belief = pack.pose_with_covariance(frames.MAP).packer()
         self._particles = ParticleCloudPacker(frames.MAP)
         self._path = PathPacker(frames.MAP)
-        self._command = pack.twist().packer()
-        self._commands, self._beliefs = out.line(topics.COMMAND), out.line(topics.BELIEF)
+        self._command = out.together([(topics.COMMAND, pack.twist())])
+        self._belief = out.together([(topics.BELIEF, pack.pose_with_covariance(frames.MAP))])
         self._particle_times = Throttle(time.rate, PARTICLE_RATE)
         self._poses_times = Throttle(time.rate, POSES_RATE)
         self._local_plan_times = Throttle(time.rate, LOCAL_PLAN_RATE)
@@ -44,14 +43,14 @@ class StackTopics:
             stamp = self._time.stamp(tick)
             self._out.publish(topic, now, pack_many.occupancy_grid(self._names.of(costmap.frame), stamp, costmap.grid))
         if self._thinning.keeps_command(tick, decision.command):
-            self._commands.write(now, self._command(decision.command))
+            self._command.write(now, decision.command)
         for line in decision.lines:
             self._out.publish(topics.ROSOUT, now, pack_rare.log(self._time.stamp(tick), *line))
 
     def _write_belief(self, now: int, tick: int, belief: Belief) -> None:
         stamp = self._time.stamp(tick)
         pose = Pose3.planar(belief.pose)
-        self._beliefs.write(now, self._belief(stamp, pose, belief.covariance.ravel().tolist()))
+        self._belief.write(now, stamp, pose, belief.covariance.ravel().tolist())
         if len(belief.particles) and self._particle_times.passes(tick):
             self._out.publish(topics.PARTICLES, now, self._particles(stamp, belief.particles))
         if len(belief.particles) and self._poses_times.passes(tick):

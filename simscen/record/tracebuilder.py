@@ -27,19 +27,22 @@ class TraceBuilder:
 
     def append(self, moment: Moment) -> None:
         """Take in one beat: appends a few numbers, computes nothing."""
-        tick, truth, decision, rows = moment.tick, moment.truth, moment.decision, self._rows
+        tick, truth, decision = moment.tick, moment.truth, moment.decision
+        rows, thinning = self._rows, self._thinning
         if truth is not None:
-            self._truth.add(tick, *truth.pose, *truth.twist, truth.clearance)
+            series = self._truth
+            series.rows += series.pack(tick, *truth.pose, *truth.twist, truth.clearance)
             if truth.objects:
-                for name, pose in self._thinning.moved(tick, truth).items():
+                for name, pose in thinning.moved(tick, truth).items():
                     rows.object(name).add(tick, *pose)
         for reading in moment.readings:
             if isinstance(reading, Odometry):
-                if self._thinning.keeps_odometry(reading):
-                    self._odometry.add(tick, *reading.pose)
+                if thinning.keeps_odometry(reading):
+                    series = self._odometry
+                    series.rows += series.pack(tick, *reading.pose)
             elif isinstance(reading, Scan):
                 rows.scans.append(tick)
-        if self._thinning.keeps_command(tick, decision.command):
+        if thinning.keeps_command(tick, decision.command):
             rows.command.add(tick, *decision.command)
         if decision.belief is not None:
             xx, xy, xa, _, yy, ya, _, _, aa = decision.belief.covariance.ravel().tolist()

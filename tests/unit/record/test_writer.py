@@ -4,6 +4,8 @@ import io
 import random
 
 import pytest
+from mcap import records
+from mcap.data_stream import RecordBuilder
 from mcap.reader import NonSeekingReader, make_reader
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
@@ -80,6 +82,33 @@ def test_a_changed_byte_anywhere_in_the_data_is_noticed() -> None:
     data[data.index(b"hello")] ^= 1
     with pytest.raises(ValueError, match="crc"):
         list(StreamReader(io.BytesIO(data), validate_crcs=True).records)
+
+
+def test_chunks_and_their_index_are_packed_as_the_library_packs_them() -> None:
+    data, kinds = ours(), (records.Chunk, records.ChunkIndex, records.MessageIndex)
+    theirs = []
+    for record in StreamReader(io.BytesIO(data), emit_chunks=True).records:
+        if isinstance(record, kinds):
+            builder = RecordBuilder()
+            record.write(builder)
+            theirs.append(builder.end())
+    assert len(theirs) > 2 * len(kinds)
+    assert all(packed in data for packed in theirs)
+
+
+def test_a_message_larger_than_a_chunk_is_a_chunk_with_what_came_before() -> None:
+    stream = io.BytesIO()
+    writer = McapWriter(stream, "ros2", "simscen", chunk_size=1000)
+    channel = writer.channel("/t", TEXT, {})
+    said = [b"small", random.Random(1).randbytes(10_000), random.Random(2).randbytes(30_000), b"after"]
+    for time, data in enumerate(said):
+        channel.write(time, data)
+    writer.finish()
+    reader = make_reader(io.BytesIO(stream.getvalue()), validate_crcs=True)
+    assert [message.data for _, _, message in reader.iter_messages()] == said
+    summary = reader.get_summary()
+    assert summary is not None
+    assert [chunk.message_start_time for chunk in summary.chunk_indexes] == [0, 2, 3]
 
 
 def test_a_file_without_messages_is_sound() -> None:
