@@ -19,6 +19,9 @@ from simscen.stack.prediction.clusters import Indices, Mask, Places
 
 MARGIN, RELATIVE = 0.25, 0.02
 """Metres, and share of the range, by which an earlier beam must have gone farther."""
+SLIPPED = (0.05, 0.1, 0.15)
+"""Parts of the way between two scans for which the wheels may have turned in vain. What has come must have been free by
+each of them: posts beside the way of a fast robot seem to hop from one to the next when all come along a little."""
 AGO, AT_LEAST = 1.0, 0.2
 """Seconds: the age of the scan that is asked, and while none is so old the least. At 0.25 m/s a thing near by comes
 as far as the margin in that time."""
@@ -115,7 +118,12 @@ class Earlier:
         beam = np.arctan2(into.imag, into.real)
         beam *= 1.0 / view.increment
         beam += view.centre + 0.5
-        return Looked(self, beam.astype(np.int64), np.abs(into))
+        return Looked(self, beam.astype(np.int64), np.abs(into), places, lidar)
+
+    def short_of(self, lidar: Pose2, part: float) -> Pose2:
+        """Where a later lidar is if so great a part of its way since then was none."""
+        x, y, yaw = lidar
+        return Pose2(x + part * (self.lidar.x - x), y + part * (self.lidar.y - y), yaw)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,9 +133,18 @@ class Looked:
     earlier: Earlier
     beam: Indices
     distance: Array
+    places: Places
+    lidar: Pose2
 
     def appeared(self) -> Mask:
-        """Which of them were free then. What is farther away than FARTHEST never was."""
+        """Which of them were free then, by each of SLIPPED. What is farther away than FARTHEST never was."""
+        free, earlier = self._free(), self.earlier
+        for part in SLIPPED if free.any() else ():
+            some = free.nonzero()[0]
+            free[some] = earlier.looked(self.places[some], earlier.short_of(self.lidar, part))._free()
+        return free
+
+    def _free(self) -> Mask:
         return np.asarray(self.earlier.free[self.beam - self.earlier.view.beside] > self.distance)
 
     def stood(self) -> Mask:

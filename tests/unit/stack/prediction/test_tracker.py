@@ -191,6 +191,24 @@ def test_nothing_moves_while_odometry_drifts(view: float, beams: int) -> None:
     assert claims(Watch(lambda _: [], tour, drifted, walls=room(), view=view, beams=beams), 12.0) == 0
 
 
+def test_posts_beside_a_fast_way_do_not_move_while_wheels_slip_by_a_tenth() -> None:
+    """Where a post is, a beam went by before that by odometry went just where the post stands."""
+    chance = np.random.default_rng(3)
+    posts = Flatland()
+    posts.discs += [
+        (x, side * float(chance.uniform(1.2, 4.5)), 0.075) for x in np.arange(-2, 24, 0.3) for side in (-1, 1)
+    ]
+
+    def straight(t: float) -> Pose2:
+        return Pose2(2.0 * t, 0.0, 0.1 * math.sin(2.0 * t))
+
+    def slipping(t: float) -> Pose2:
+        return Pose2(2.2 * t, 0.0, straight(t).yaw)
+
+    assert claims(Watch(lambda _: [], straight, walls=posts), 8.0) == 0
+    assert claims(Watch(lambda _: [], straight, slipping, walls=posts), 8.0) == 0
+
+
 def test_a_scan_that_is_garbage_moves_nothing_and_breaks_nothing() -> None:
     tracker = Tracker(Prediction(), RATE)
     chance = np.random.default_rng(1)
