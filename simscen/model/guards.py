@@ -32,6 +32,9 @@ class VelocitySmoother(Spec):
     """Of each component of its velocity; default: what the controller commands."""
     max_angular_velocity: PositiveAngularSpeed | None = None
     """Of its turn rate; default: what the controller commands."""
+    counter_turn_slip: bool = True
+    """Whether the turn is taken off the command that wheels of which one side slips more add to it, as the gyroscope
+    shows; with the localizer `ekf` only. Nav2 does not."""
 
 
 class CollisionMonitor(Spec):

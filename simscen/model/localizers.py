@@ -25,6 +25,9 @@ Noise = Annotated[float, Field(ge=0, le=100)]
 class LocalizerSpec(Typed):
     """What knows where the robot is."""
 
+    fuses_odometry: ClassVar[bool] = False
+    """Whether it never jumps, and so is the odom frame itself, as robot_localization is that publishes odom→base."""
+
 
 AMCL_PARAMETERS: Mapping[str, Mapping[str, object]] = {
     "default": {},
@@ -148,6 +151,7 @@ class Ekf(LocalizerSpec):
     """Odometry and gyroscope in an extended Kalman filter; no map, so it drifts."""
 
     component: ClassVar[str] = "simscen.stack.localizers.build:ekf"
+    fuses_odometry: ClassVar[bool] = True
     type: Literal["ekf"]
     translation_noise: Annotated[NonNegativeLength, Field(le=100)] = 0.02
     """Standard deviation of the position after one metre."""

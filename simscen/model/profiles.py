@@ -50,6 +50,7 @@ NAV2: Values = {
     },
     "velocity_smoother": {
         "max_accel": 3.0, "max_decel": 3.0, "max_angular_accel": 3.5, "max_velocity": 0.5, "max_angular_velocity": 2.0,
+        "counter_turn_slip": False,
     },
     "prediction": {"enabled": False},
     "collision_monitor": {

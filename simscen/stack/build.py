@@ -111,6 +111,8 @@ def reference_stack(spec: StackSpec, setting: Setting) -> ReferenceStack:
         MotionPrediction(spec.prediction, robot, surroundings.lidars, surroundings.tick_rate, controller.full_speed),
         period,
         latency["localizer"],
+        spec.localizer.fuses_odometry,
+        spec.velocity_smoother.counter_turn_slip,
     )
 
 

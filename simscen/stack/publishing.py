@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -32,7 +33,10 @@ NOTHING_NEW: Published = (None, None, ())
 class Publishing:
     """Picks what is new."""
 
-    def __init__(self, tick_rate: int, localizer: Localizer, controller: Controller) -> None:
+    def __init__(
+        self, tick_rate: int, localizer: Localizer, controller: Controller, local_frame: Literal["map", "odom"] = "odom"
+    ) -> None:
+        """`local_frame` is what the local costmap is in."""
         self._localizer, self._controller, self._tick_rate = localizer, controller, tick_rate
         self._belief_period = math.ceil(tick_rate / BELIEF_RATE)
         self._local_plan_period = math.ceil(tick_rate / LOCAL_PLAN_RATE)
@@ -40,7 +44,7 @@ class Publishing:
         """The tick from which on the belief is told without a scan."""
         self._local_plan_due = self._local_plan_period
         self._plan: Path | None = None
-        self._wide, self._near = _Drawn("global", "map", GLOBAL_RATE), _Drawn("local", "odom", LOCAL_RATE)
+        self._wide, self._near = _Drawn("global", "map", GLOBAL_RATE), _Drawn("local", local_frame, LOCAL_RATE)
 
     def belief(self, tick: int) -> Belief:
         """The belief; asked with each scan, and without one at BELIEF_RATE."""

@@ -23,6 +23,7 @@ from simscen.stack.protocols import Controller, Localizer, NavigationFailure, Su
 from simscen.stack.publishing import NOTHING_NEW, Published, Publishing
 from simscen.stack.standstill import Standstill
 from simscen.stack.tasks import Task
+from simscen.stack.turn_slip import TurnSlip
 from simscen.stack.underway import Underway
 from simscen.stack.zones import SpeedFilter
 
@@ -46,7 +47,13 @@ class ReferenceStack:
         prediction: MotionPrediction,
         control_period: int,
         localizer_latency: int = 0,
+        fuses_odometry: bool = False,
+        counters_turn_slip: bool = False,
     ) -> None:
+        """`fuses_odometry`: what the localizer believes is the odom frame, and not what the wheels alone say.
+
+        `counters_turn_slip`: what wheels and localizer do not agree on is taken off the command.
+        """
         self._speed_filter = SpeedFilter(surroundings)
         self._localizer, self._costmaps, self._controller = localizer, costmaps, controller
         self._whereabouts = localizer if isinstance(localizer, TellsPose) else None
@@ -54,7 +61,11 @@ class ReferenceStack:
         self._prediction = prediction
         self._tick_rate, self._lidars = surroundings.tick_rate, frozenset(surroundings.lidars)
         self._control_period = control_period
-        self._publishing = Publishing(surroundings.tick_rate, localizer, controller)
+        self._publishing = Publishing(
+            surroundings.tick_rate, localizer, controller, "map" if fuses_odometry else "odom"
+        )
+        self._fuses_odometry = fuses_odometry
+        self._turn_slip = TurnSlip() if fuses_odometry and counters_turn_slip else None
         self._matched = Underway[Scan](localizer_latency)
         self._events: list[Event] = []
         self._moves = False
@@ -125,6 +136,8 @@ class ReferenceStack:
         if scanned or (tick >= self._publishing.belief_due and (readings or controls)):
             belief = self._publishing.belief(tick)
         sent = self._commands.sent
+        if self._turn_slip is not None:
+            sent = self._turn_slip.countered(sent)
         if belief is None and plan is None and local_plan is None and not costmaps and not self._events:
             if sent is not self._nothing.command:
                 self._nothing = Decision(sent)
@@ -134,14 +147,18 @@ class ReferenceStack:
 
     def _step(self, tick: int) -> Published:
         """What is done at the controller's rate."""
-        where = self._whereabouts
-        pose = self._localizer.belief.pose if where is None else where.pose
+        pose = self._where()
         frames = Frames(pose, self._odometry.now if self._odometry else pose)
         self._update_costmaps(tick, frames)
         if not self._prediction.calm or self._moves:
             self._foretell(tick, frames)
         self._control(tick, frames)
         return self._publishing.news(tick, frames, self.plan, self._costmaps)
+
+    def _where(self) -> Pose2:
+        """Where the robot believes itself."""
+        where = self._whereabouts
+        return self._localizer.belief.pose if where is None else where.pose
 
     def _take(self, tick: int, readings: Readings) -> bool:
         """Hand the readings on; whether there was a scan among them."""
@@ -183,7 +200,12 @@ class ReferenceStack:
             return
         if reading.sensor != TRUTH and not self._wheels:
             self._wheels, self._odometry = True, OdometryHistory(self._tick_rate)
-        if believable(reading.twist) and self._odometry.add(reading.tick, reading.pose):
+        pose = reading.pose
+        if self._fuses_odometry:
+            pose = self._where()
+        if self._turn_slip is not None:
+            self._turn_slip.learn(reading.pose, pose)
+        if believable(reading.twist) and self._odometry.add(reading.tick, pose):
             self._twist = reading.twist
             self._prediction.take(reading)
 

@@ -67,7 +67,7 @@ class EkfLocalizer:
             self._measure(step)
             self._predict(motion(self._spec, self._filter.x, step), moved(self._filter.x, step))
         self._readings.clear()
-        self._map_from_odom = self._pose.compose(odometry.pose.inverse())
+        self._map_from_odom = self.pose.compose(odometry.pose.inverse())
 
     def on_scan(self, scan: Scan) -> None:
         """Nothing."""
@@ -83,10 +83,11 @@ class EkfLocalizer:
         """The state at the newest odometry."""
         covariance: Array = self._filter.P[:RATE, :RATE].copy()
         tick = self._last.tick if self._last is not None else 0
-        return Belief(self._pose, (covariance + covariance.T) / 2, self._map_from_odom, updated=tick)
+        return Belief(self.pose, (covariance + covariance.T) / 2, self._map_from_odom, updated=tick)
 
     @property
-    def _pose(self) -> Pose2:
+    def pose(self) -> Pose2:
+        """That of the belief."""
         x, y, yaw = self._filter.x[:RATE].tolist()
         return Pose2(x, y, wrap(yaw))
 

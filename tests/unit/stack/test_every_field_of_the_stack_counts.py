@@ -150,6 +150,7 @@ ELSEWHERE = {
     "nav2_params": "tests/unit/loading/test_nav2_params.py",
     "latency": "`robot` is what the robot's file says: tests/unit/run/test_latency.py",
     "clear_entirely": "tests/unit/stack/behaviors/test_motions.py, tests/unit/stack/test_navigator.py",
+    "counter_turn_slip": "tests/unit/stack/test_slipping_wheels.py",
     "xy_goal_tolerance": "whoever makes goals reads it: tests/unit/run/test_goal_tolerances.py",
     "yaw_goal_tolerance": "the same",
 }  # fmt: skip

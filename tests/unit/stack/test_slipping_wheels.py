@@ -1,0 +1,81 @@
+"""Wheels of which one side slips turn the robot, and their odometry does not know it; its gyroscope does."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from simscen.core.geometry import Pose2
+from simscen.core.motion import Twist
+from simscen.core.navigation import Goal
+from simscen.core.sensing import Imu, Odometry, Readings
+from simscen.core.trace import Decision
+from simscen.model.guards import VelocitySmoother
+from simscen.model.localizers import Ekf
+from simscen.model.stack import StackSpec
+from simscen.stack.turn_slip import MOST, TurnSlip
+from simscen.testing.flatland import Drive, Flatland, drive
+
+BEND = 0.3
+"""1/m: how much more to the left the ground turns the robot than its wheels."""
+ROOM = Flatland().room(14, 2.6)
+
+
+class Slipping:
+    """Between a robot and its stack: the ground bends what is driven, odometry tells what the wheels did."""
+
+    def __init__(self, drive: Drive) -> None:
+        self.drive, self.stack = drive, drive.stack
+        self._before, self._told = drive.pose, drive.pose
+
+    def decide(self, tick: int, readings: Readings) -> Decision:
+        """A beat."""
+        step = self._before.between(self.drive.pose)
+        self._before = self.drive.pose
+        self._told = self._told.compose(Pose2(step.x, step.y, step.yaw - BEND * step.x))
+        imu = Imu("imu", tick, (0.0, 0.0, self.drive.twist.wz), (0.0, 0.0, 9.81))
+        told = tuple(replace(one, pose=self._told) if isinstance(one, Odometry) else one for one in readings)
+        decision = self.stack.decide(tick, (imu, *told))
+        vx, vy, wz = decision.command
+        return replace(decision, command=Twist(vx, vy, wz + BEND * vx))
+
+
+def slipping(**smoothed: bool) -> Drive:
+    """Straight through a room, for 11 m."""
+    spec = StackSpec(localizer=Ekf(type="ekf", rotation_noise=0.5), velocity_smoother=VelocitySmoother(**smoothed))
+    d = drive(ROOM, Pose2(1.0, 1.3), Goal("g", Pose2(12.0, 1.3)), spec=spec, odometry=("odom",))
+    d.stack = Slipping(d)
+    return d.run(15.0)
+
+
+def test_the_local_costmap_is_where_wheels_and_gyroscope_agree_and_not_where_the_wheels_turned_to() -> None:
+    d = slipping()
+    view = d.stack.stack.inner._costmaps.near.view
+    cells = np.argwhere(view.costs == 254)
+    seen = (cells[:, ::-1] + 0.5) * view.resolution + view.origin
+    assert len(seen) > 20
+    assert np.abs(ROOM.distance(seen)).max() < 0.15
+
+
+def test_a_robot_whose_wheels_slip_on_one_side_drives_on_its_plan_and_not_beside_it() -> None:
+    assert beside(slipping()) < 0.06 < 0.1 < beside(slipping(counter_turn_slip=False))
+
+
+def beside(d: Drive) -> float:
+    """Metres, at most."""
+    return max(abs(pose.y - 1.3) for pose in d.track if 4.0 < pose.x < 11.0)
+
+
+def test_a_command_is_countered_by_as_much_as_was_seen_and_no_broken_sensor_makes_it_more() -> None:
+    slip, wheels, fused = TurnSlip(), Pose2(0.0, 0.0, 0.0), Pose2(5.0, 5.0, 2.0)
+    assert slip.countered(Twist(1.0, 0.0, 0.2)) == Twist(1.0, 0.0, 0.2)
+    for _ in range(200):
+        wheels, fused = wheels.compose(Pose2(0.02, 0.0, 0.01)), fused.compose(Pose2(0.02, 0.0, 0.014))
+        slip.learn(wheels, fused)
+    assert math.isclose(slip.countered(Twist(1.0, 0.0, 0.5)).wz, 0.3, abs_tol=1e-3)
+    assert math.isclose(slip.countered(Twist(-1.0, 0.0, 0.5)).wz, 0.7, abs_tol=1e-3)
+    assert slip.countered(Twist(0.0, 0.0, 0.5)) == Twist(0.0, 0.0, 0.5)
+    for _ in range(200):
+        wheels, fused = wheels.compose(Pose2(0.02, 0.0, 0.0)), fused.compose(Pose2(0.02, 0.0, 1.0))
+        slip.learn(wheels, fused)
+    assert slip.countered(Twist(1.0, 0.0, 0.0)).wz == -MOST
