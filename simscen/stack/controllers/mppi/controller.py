@@ -23,7 +23,7 @@ from simscen.stack.controllers.mppi.judgement import Judgement
 from simscen.stack.controllers.mppi.limits import in_order, mppi_limits
 from simscen.stack.controllers.mppi.rollouts import VX, VY, WZ, Rollouts, delay, integrated, predicted
 from simscen.stack.controllers.mppi.scene import Scene
-from simscen.stack.controllers.mppi.sequence import PAST, later, smoothed, within_limits
+from simscen.stack.controllers.mppi.sequence import PAST, later, smoothed, weights, within_limits
 from simscen.stack.protocols import CostmapView, NavigationFailure
 from simscen.stack.setting import Setting
 
@@ -137,12 +137,8 @@ class MppiController(PathFollower):
         velocities = predicted(now, controls, limits, dt)
         delay(velocities, self._sent, self._delays)
         costs, all_hit = self._judgement.costs(seen(integrated(velocities, self._pose.yaw, dt)))
-        for axis, deviation in enumerate(self._std.tolist()):
-            if deviation > 0.0:
-                costs += spec.gamma / deviation**2 * (self._sequence[axis] @ self._noise[axis])
-        weights = np.exp((costs.min() - costs) / spec.temperature)
-        weights /= weights.sum()
-        average = controls @ weights.astype(np.float32)
+        deviations: list[float] = self._std.tolist()
+        average = controls @ weights(costs, self._sequence, self._noise, deviations, spec.gamma, spec.temperature)
         average = smoothed(average, self._sent[:, -PAST:], spec.sgf_order)
         self._sequence = within_limits(average, now, limits, dt)
         return not all_hit

@@ -1,8 +1,11 @@
 """The control sequence that MPPI keeps and improves (axes, steps)."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
+from simscen.core.geometry import Array
 from simscen.stack.controllers.limits import Limits
 from simscen.stack.controllers.mppi.limits import in_order
 from simscen.stack.controllers.mppi.rollouts import VX, WZ
@@ -17,6 +20,21 @@ TOO_SHORT = 21
 """Steps from which on a sequence is smoothed."""
 PAST = 4
 """Commands of the past that the filter sees."""
+
+
+def weights(
+    costs: Array, sequence: Floats, noise: Floats, deviations: Sequence[float], gamma: float, temperature: float
+) -> Floats:
+    """What the samples (n,) weigh in their average: exp(-cost / temperature), the energy of their controls included.
+
+    `noise` (axes, steps, n) of these standard deviations lies about the sequence; what it draws it away from is dear.
+    """
+    total = costs.copy()
+    for axis, deviation in enumerate(deviations):
+        if deviation > 0.0:
+            total += gamma / deviation**2 * (sequence[axis] @ noise[axis])
+    shares = np.exp((total.min() - total) / temperature)
+    return np.asarray(shares / shares.sum(), np.float32)
 
 
 def smoothed(sequence: Floats, past: Floats, order: int) -> Floats:
