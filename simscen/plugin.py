@@ -69,7 +69,6 @@ if TYPE_CHECKING:
     )
     from simscen.spec.references import GoalName, MaskFile, MovableName, ObjectName, RegionName
     from simscen.stack.footprint import Footprint, distances
-    from simscen.stack.journal import Task
     from simscen.stack.prediction.moving import Moving
     from simscen.stack.protocols import (
         Behavior,
@@ -85,6 +84,7 @@ if TYPE_CHECKING:
         SwitchesZones,
     )
     from simscen.stack.setting import Setting
+    from simscen.stack.tasks import Task
     from simscen.triggers.base import Condition
 
 __all__ = [
@@ -293,7 +293,7 @@ _WHERE = {
         "Footprint",
         "distances",
     ),
-    "simscen.stack.journal": ("Task",),
+    "simscen.stack.tasks": ("Task",),
     "simscen.stack.prediction.moving": ("Moving",),
     "simscen.sensors.sensor": (
         "Sensor",

@@ -19,7 +19,7 @@ DWB_CRITICS = {
     "Twirling": "twirling_scale",
 }  # fmt: skip
 """DWB's critics by what weighs them here."""
-DWB_CRITICS_OF_NO_WEIGHT = ("Oscillation",)
+DWB_CRITICS_OF_NO_WEIGHT = ("Oscillation", "ObstacleFootprint")
 """Those that forbid rather than weigh, and are always asked here."""
 MPPI_CRITICS = (
     "ConstraintCritic", "CostCritic", "ObstaclesCritic", "GoalCritic", "GoalAngleCritic", "PathAlignCritic",

@@ -105,7 +105,7 @@ def reference_stack(spec: StackSpec, setting: Setting) -> ReferenceStack:
         costmaps,
         controller,
         navigator,
-        Task(setting.stop_on_failure, clock, setting.mode),
+        Task(setting.stop_on_failure, clock=clock, mode=setting.mode),
         commands,
         monitor,
         MotionPrediction(spec.prediction, robot, surroundings.lidars, surroundings.tick_rate, controller.full_speed),

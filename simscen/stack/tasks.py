@@ -14,7 +14,7 @@ class Task:
     Goals that are passed (`via`) and the one after them are one action: they fail, are canceled and preempted together.
     """
 
-    def __init__(self, stop_on_failure: bool, clock: Clock | None = None, mode: Mode = "navigate_to_pose") -> None:
+    def __init__(self, stop_on_failure: bool, *, clock: Clock | None = None, mode: Mode = "navigate_to_pose") -> None:
         """`clock` says how many ticks the goals' `wait` takes; default: as many as the default clock's."""
         self._stop_on_failure = stop_on_failure
         self._clock, self._mode = clock or Clock(), mode

@@ -27,7 +27,7 @@ class ToldGoals:
 
     def __init__(self, stop_on_failure: bool, tick_rate: int, mode: Mode = "navigate_to_pose") -> None:
         self._events: list[Event] = []
-        self._task = Task(stop_on_failure, Clock(tick_rate), mode)
+        self._task = Task(stop_on_failure, clock=Clock(tick_rate), mode=mode)
         self._rate = tick_rate
         self._dropped: set[str] = set()
 

@@ -206,7 +206,7 @@ amcl:
       acc_lim_y: 0.0
       decel_lim_y: 0.0
       vy_samples: 0
-      critics: ["RotateToGoal", "Oscillation", "BaseObstacle", "PathDist", "GoalDist", "PreferForward"]
+      critics: ["RotateToGoal", "Oscillation", "BaseObstacle", "ObstacleFootprint", "PathDist", "GoalDist", "PreferForward"]
       PathDist.scale: 30.0
 global_costmap:
   global_costmap:
@@ -236,6 +236,7 @@ def test_a_file_of_humble_is_read_as_humble_meant_it(tmp_path: Path) -> None:
     assert (stack.failure_tolerance, stack.progress_checker.movement_time_allowance) == (0.7, 25.0)
     assert stack.goal_checker.yaw_goal_tolerance == 0.4
     assert (drives.type, drives.acc_lim_y, drives.decel_lim_y, drives.vy_samples) == ("dwb", 0.0, 0.0, 0)
+    assert drives.base_obstacle_scale == 0.02
     assert (drives.path_dist_scale, drives.path_align_scale, drives.goal_align_scale) == (30.0, 0.0, 0.0)
     assert (stack.costmap.obstacle_max_range, stack.recovery.simulate_ahead_time) == (4.0, 1.5)
     assert (stack.collision_monitor.enabled, stack.collision_monitor.min_points) == (False, 4)

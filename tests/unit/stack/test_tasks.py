@@ -31,7 +31,7 @@ class Client:
 
 
 def task(*goals: Goal, stop: bool = True, mode="navigate_to_pose") -> tuple[Client, list[Event]]:
-    begun = Task(stop, Clock(100), mode)
+    begun = Task(stop, clock=Clock(100), mode=mode)
     begun.start(goals)
     client = Client(begun)
     return client, client.journal
@@ -166,3 +166,11 @@ def test_codes_of_several_poses_have_the_names_of_those_of_one():
 def test_a_goal_in_another_frame_is_the_same_but_for_its_pose() -> None:
     goal = Goal("there", Pose2(1, 2, 3), 0.1, 0.2, 30.0, True, 4.0)
     assert goal.at(Pose2(5, 6, 7)) == replace(goal, pose=Pose2(5, 6, 7))
+
+
+def test_a_task_keeps_no_list_of_others_and_says_so_to_who_hands_it_one():
+    with pytest.raises(TypeError):
+        Task(True, [])
+    begun = Task(True)
+    begun.start((Goal("a", Pose2(1, 0)),))
+    assert [event.kind for event in begun.next(0)] == ["goal.accepted"]

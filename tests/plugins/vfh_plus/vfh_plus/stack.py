@@ -46,8 +46,8 @@ class VfhPlusStack:
         self._radius = setting.robot.circumscribed_radius + spec.safety
         self._top = min(spec.top_speed or DEFAULT_SPEED, setting.robot.max_linear)
         self._forbidden = np.concatenate([np.empty((0, 2)), *map(inside, self._surroundings.keepout)])
-        self._journal: list[Event] = []
-        self._task = Task(setting.stop_on_failure, self._journal, clock, setting.mode)
+        self._events: list[Event] = []
+        self._task = Task(setting.stop_on_failure, clock=clock, mode=setting.mode)
         self._memory = Memory(clock.ticks(spec.memory), 2.0 * spec.active_radius)
         self._restart(Estimate(None))
 
@@ -70,11 +70,11 @@ class VfhPlusStack:
 
     def preempt(self, tick: int, goal: Goal) -> None:
         """Drive to this goal first."""
-        self._task.preempt(tick, goal)
+        self._events += self._task.preempt(tick, goal)
 
     def cancel(self, tick: int) -> None:
         """Cancel the current goal and all after it."""
-        self._task.cancel(tick)
+        self._events += self._task.cancel(tick)
         self._command = STOP
 
     @property
@@ -93,7 +93,7 @@ class VfhPlusStack:
         plan = self.plan
         if tick % self._period == 0:
             self._command = self._control(tick)
-        events, self._journal[:] = tuple(self._journal), []
+        events, self._events = tuple(self._events), []
         news = self.plan if self.plan is not plan else None
         return Decision(self._command, self._belief(tick), news, None, events)
 
@@ -115,7 +115,8 @@ class VfhPlusStack:
         return Belief(self._pose, np.diag(np.square(spread)), self._map_from_odom or self._start, updated=tick)
 
     def _control(self, tick: int) -> Twist:
-        goal = self._task.next(tick)
+        self._events += self._task.next(tick)
+        goal = self._task.goal
         if goal is None:
             self._begin(None)
             return STOP
@@ -138,12 +139,12 @@ class VfhPlusStack:
         off = wrap(goal.pose.yaw - self._pose.yaw)
         if abs(off) > 0.4 * goal.yaw_tolerance:
             return Twist(0.0, 0.0, math.copysign(min(max(1.5 * abs(off), 0.2), 1.0, self._robot.max_angular), off))
-        self._task.reached(tick)
+        self._events += self._task.reached(tick)
         self._begin(None)
         return STOP
 
     def _fail(self, tick: int, code: ErrorCode, why: str) -> Twist:
-        self._task.failed(tick, code, why)
+        self._events += self._task.failed(tick, code, why)
         self._begin(None)
         return STOP
 
@@ -169,7 +170,7 @@ class VfhPlusStack:
         turns = np.arctan2(*np.diff(way, axis=0).T[::-1])
         self.plan = Path(np.column_stack((way, np.append(turns, goal.pose.yaw))), tick)
         made = {"reason": reason, "length": round(self.plan.length(), 6)}
-        self._journal.append(Event(tick, EventKind.PLAN_MADE, "", made))
+        self._events.append(Event(tick, EventKind.PLAN_MADE, "", made))
 
     def _ahead(self) -> Array:
         """What is left of the way."""
