@@ -1,0 +1,59 @@
+"""Something crosses the robot's way: it is hit where nobody heeds what is predicted, and each who does saves it."""
+
+from typing import Any
+
+import pytest
+
+from simscen.core.geometry import Pose2
+from simscen.core.navigation import Goal
+from simscen.model.stack import StackSpec
+from simscen.stack.frames import Frames
+from simscen.stack.prediction.moving import nothing
+from simscen.testing.flatland import RATE, Flatland, drive, round_robot
+
+CONTROLLERS: dict[str, dict[str, Any]] = {
+    "regulated_pure_pursuit": {},
+    "dwb": {"vx_samples": 8, "vtheta_samples": 9},
+    "mppi": {"batch_size": 300},
+}
+
+
+def least(heed: str, controller: str = "regulated_pure_pursuit") -> float:
+    """The least clearance of a robot whose avoidance is off, where only the controller or the monitor is told."""
+    world, grid = Flatland().room(7, 8), Flatland().room(7, 8).grid((-0.5, -0.5, 7.5, 8.5))
+    own = {"type": controller, **CONTROLLERS[controller]}
+    spec = StackSpec.model_validate({"localizer": {"type": "ground_truth"}, "controller": own})
+    goal = Goal("beyond", Pose2(6.0, 4.0))
+    driven = drive(world, Pose2(1.0, 4.0), goal, robot=round_robot(), grid=grid, spec=spec)
+    stack = driven.stack.inner
+    stack._prediction.steer = lambda tick, command, *seen: command
+    told = stack._foretell
+
+    def foretell(tick: int, frames: Frames) -> None:
+        told(tick, frames)
+        if heed != "monitor":
+            stack._monitor.on_moving(nothing())
+        if heed != "controller":
+            stack._costmaps.near.moving = nothing()
+
+    stack._foretell = foretell
+    world.discs.append((4.5, 0.5, 0.3))
+    nearest = 9.0
+    while driven.tick < 10.5 * RATE:
+        world.discs[-1] = (4.5, min(max(4.0 - 0.8 * (6.5 - driven.tick / RATE), 0.5), 7.5), 0.3)
+        driven.step()
+        nearest = min(nearest, world.clearance(driven.robot, driven.pose))
+    return nearest
+
+
+def test_where_nobody_heeds_what_is_predicted_it_is_met() -> None:
+    assert least("nobody") < 0.0
+
+
+def test_the_collision_monitor_alone_brakes_for_it() -> None:
+    assert least("monitor") > 0.0
+
+
+@pytest.mark.parametrize("controller", CONTROLLERS)
+def test_each_controller_alone_lets_it_pass(controller: str) -> None:
+    assert least("controller", controller) > 0.0
