@@ -206,7 +206,7 @@ amcl:
       acc_lim_y: 0.0
       decel_lim_y: 0.0
       vy_samples: 0
-      critics: ["RotateToGoal", "Oscillation", "BaseObstacle", "ObstacleFootprint", "PathDist", "GoalDist", "PreferForward"]
+      critics: [RotateToGoal, Oscillation, BaseObstacle, ObstacleFootprint, PathDist, GoalDist, PreferForward]
       PathDist.scale: 30.0
 global_costmap:
   global_costmap:
