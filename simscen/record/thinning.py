@@ -53,8 +53,9 @@ class Thinning:
                 self._objects[name] = (tick, pose)
                 kept[name] = pose
         self._at_rest = objects
-        kept_at = min((self._objects[name][0] for name in objects), default=tick)
-        self._due = kept_at + self._standstill_period if at_rest else 0
+        self._due = 0
+        if at_rest:
+            self._due = min([self._objects[name][0] for name in objects], default=tick) + self._standstill_period
         return kept
 
 
