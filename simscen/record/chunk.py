@@ -77,10 +77,10 @@ class Channel:
             chunk.reach(end)
         _pack_head(chunk.view, at, _MESSAGE, 22 + length, self.number, 0, time, time)
         chunk.view[at + HEAD : end] = data
+        chunk.size = end
         if not self.entries:
             chunk.spoken.append(self)
         self.entries += (time, at)
-        chunk.size = end
         if end > chunk.limit:
             chunk.full()
 
