@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from simscen.core.geometry import Pose2, Pose3
+from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.shapes import Cylinder, Solid
 from simscen.loading.scenario import load_scenario
 from simscen.record.backlog import Log
@@ -138,10 +138,11 @@ def bare_patrol(prepared: Prepared, simulated: float) -> float:
     """CPU seconds that PyBullet takes to step and scan as often in the same world, and nothing else."""
     lidar = next(sensor.lidar for sensor in prepared.robot.sensors.values() if sensor.lidar)
     bare = BareWorld(prepared.built.mesh, prepared.body, prepared.start, triangulate)
+    around = _circle(lidar.beams)
     begun = time.process_time()
     for _ in range(round(simulated * lidar.rate)):
         bare.step(round(240 / lidar.rate))
-        bare.scan(lidar.beams, lidar.max_range, lidar_height(prepared.robot))
+        bare.scan(around, lidar.min_range, lidar.max_range, lidar_height(prepared.robot))
     cpu = time.process_time() - begun
     bare.close()
     return cpu
@@ -153,8 +154,8 @@ def measure_field(obstacles: int) -> Field:
     solids = cylinders(obstacles)
     mesh, start, height = fuse(solids), Pose2(0.0, 0.0, 0.0), lidar_height(prepared.robot)
     rays = RayScene(mesh)
-    angles = np.linspace(-np.pi, np.pi, BEAMS, endpoint=False)
-    directions = np.column_stack((np.cos(angles), np.sin(angles), np.zeros(BEAMS)))
+    around = _circle(BEAMS)
+    directions = np.column_stack((around, np.zeros(BEAMS)))
     origins = np.tile([0.0, 0.0, height], (BEAMS, 1))
     fused = BareWorld(mesh, prepared.body, start, triangulate)
     bare = BareWorld(solids, prepared.body, start, triangulate)
@@ -162,12 +163,18 @@ def measure_field(obstacles: int) -> Field:
         obstacles,
         scan_ms=1e3 * _each(lambda: rays.cast(origins, directions), 200),
         step_us=1e6 * _each(lambda: fused.step(1), 2000),
-        bare_scan_ms=1e3 * _each(lambda: bare.scan(BEAMS, 30.0, height), 10),
+        bare_scan_ms=1e3 * _each(lambda: bare.scan(around, 0.12, 30.0, height), 10),
         bare_step_us=1e6 * _each(lambda: bare.step(1), 500),
     )
     fused.close()
     bare.close()
     return field
+
+
+def _circle(beams: int) -> Array:
+    """Directions (beams, 2) all around."""
+    angles = np.linspace(-np.pi, np.pi, beams, endpoint=False)
+    return np.column_stack((np.cos(angles), np.sin(angles)))
 
 
 def cylinders(count: int) -> list[Solid]:

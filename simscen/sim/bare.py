@@ -1,12 +1,11 @@
 """PyBullet as one would use it without simscen: what a run is compared with in `simscen bench`."""
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 import pybullet
 
-from simscen.core.geometry import Pose2
+from simscen.core.geometry import Array, Pose2
 from simscen.core.shapes import Solid, TriangleMesh
 from simscen.sim import engine
 from simscen.sim.clients import Clients
@@ -38,14 +37,16 @@ class BareWorld:
         for _ in range(ticks):
             pybullet.stepSimulation(self._client)
 
-    def scan(self, beams: int, reach: float, height: float) -> None:
-        """Cast one full circle of rays."""
-        angles = np.linspace(-math.pi, math.pi, beams, endpoint=False)
-        start = [self._pose.x, self._pose.y, height]
-        ends = np.column_stack(
-            (start[0] + reach * np.cos(angles), start[1] + reach * np.sin(angles), np.full(beams, height))
-        )
-        pybullet.rayTestBatch([start] * beams, ends.tolist(), physicsClientId=self._client)
+    def scan(self, directions: Array, least: float, reach: float, height: float) -> None:
+        """Cast rays along `directions` (n, 2), of length 1, between two ranges.
+
+        From the least on, as one does it so that no ray begins in the lidar's own housing: there PyBullet would try
+        each against it, which is a third of the time that a scan takes.
+        """
+        here = (self._pose.x, self._pose.y)
+        starts, ends = np.full((2, len(directions), 3), height)
+        starts[:, :2], ends[:, :2] = here + least * directions, here + reach * directions
+        pybullet.rayTestBatch(starts.tolist(), ends.tolist(), physicsClientId=self._client)
 
     def close(self) -> None:
         """Leave the engine."""
