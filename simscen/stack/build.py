@@ -81,6 +81,7 @@ def reference_stack(spec: StackSpec, setting: Setting) -> ReferenceStack:
         robot.inscribed_radius,
         steered=robot.turning_radius > 0.0,
         latency=latency["planner"],
+        speed=controller.full_speed,
     )
     navigator = Navigator(
         plans,

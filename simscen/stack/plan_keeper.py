@@ -11,6 +11,7 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.navigation import ErrorCode, Goal, Path
 from simscen.model.planners import PlannerSpec
 from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.prediction.foreseen import foreseen, meets
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner
 from simscen.stack.replanning import PlanInForce
 
@@ -20,6 +21,8 @@ MISSED_PERIOD = 1.0
 """Seconds that a car follows a plan before it may find that it has missed it."""
 BETTER_PERIOD = 2.0
 """Seconds between two looks for a shorter way after obstacles have gone."""
+MOVING_PERIOD = 0.5
+"""Seconds between two plans around what moves."""
 RECONSIDER = 2
 """Every which step the plan is looked at: 10 Hz at the default rate, twice as often as Nav2's costmap is updated."""
 USUAL_RATE, THROUGH_POSES_RATE = 1.0, 0.333
@@ -48,10 +51,12 @@ class PlanKeeper:
         radius: float,
         steered: bool = False,
         latency: int = 0,
+        speed: float = 0.5,
     ) -> None:
-        """`latency`: ticks from the question to the plan."""
+        """`latency`: ticks from the question to the plan; `speed`: m/s at which it will be driven."""
         self._spec, self.planner, self._costmap = spec, planner, costmap
         self._plan_seed, self._radius, self._steered, self._latency = plan_seed, radius, steered, latency
+        self._speed = speed
         self._plans = 0
         self._via: tuple[Goal, ...] = ()
         self.reset(0.0)
@@ -60,6 +65,7 @@ class PlanKeeper:
         """A new goal."""
         self.drop("goal")
         self._checked, self._adopted, self._looked, self._most = -1, now, now, 0
+        self._bent, self._minded = False, now
         self._partial, self._origin = False, (0.0, 0.0)
         self._steps, self._cautious = 0, False
 
@@ -105,7 +111,7 @@ class PlanKeeper:
         reason = self._must_replan(now, pose, plan)
         if reason:
             self._ask(tick, goal, pose, reason)
-        elif wish := self._may_replan(now, plan):
+        elif wish := self._moved(now, pose, plan) or self._may_replan(now, plan):
             self._ask(tick, goal, pose, wish, wished=True)
 
     def _ask(self, tick: int, goal: Goal, pose: Pose2, reason: str, wished: bool = False) -> None:
@@ -128,7 +134,7 @@ class PlanKeeper:
             if asked.wished:
                 return ()  # it was only a look: the plan that is being followed is still good
             raise asked.answer
-        if asked.wished and asked.reason != "tight" and (self.plan is None or not self.plan.worse_than(asked.answer)):
+        if asked.reason == "better" and (self.plan is None or not self.plan.worse_than(asked.answer)):
             return ()
         self._partial, self._origin = asked.partial, asked.origin
         return (self._adopt(tick, now, asked.answer, asked.reason),)
@@ -147,6 +153,16 @@ class PlanKeeper:
         if plan.blocked(view):
             return "blocked"
         return "window" if self._partial and view.origin != self._origin else ""
+
+    def _moved(self, now: float, pose: Pose2, plan: PlanInForce) -> str:
+        """Why what moves calls for another plan: this one meets it, or leads around where it was to be met."""
+        moving = self._costmap.moving
+        if not (self._bent or len(moving)) or now - self._minded < MOVING_PERIOD or self._spec.replanning == "rate":
+            return ""
+        if not self._bent and not meets(moving, pose, plan.ahead[::4, :2], self._speed, self._radius):
+            return ""
+        self._minded = now
+        return "moving"
 
     def _may_replan(self, now: float, plan: PlanInForce) -> str:
         """Why there may be a better plan by now; "" if nothing speaks for it."""
@@ -168,17 +184,20 @@ class PlanKeeper:
     def _compute(self, tick: int, goal: Goal, pose: Pose2) -> Path:
         """One path through all that is to be passed; where it turns from one to the next, it heads for the next."""
         legs, start = list[Array](), pose
+        seen = self._costmap.view
+        view = foreseen(seen, pose, self._speed, self._radius)
+        self._bent = view is not seen
         for stop in (*self._via, goal):
-            points = self._leg(stop, start)
+            points = self._leg(view, stop, start)
             legs.append(points)
             start = Pose2(*points[-1].tolist())
             if self._partial:
                 break
         return Path(np.concatenate([*(leg[:-1] for leg in legs[:-1]), legs[-1]]), tick)
 
-    def _leg(self, goal: Goal, start: Pose2) -> Array:
+    def _leg(self, view: CostmapView, goal: Goal, start: Pose2) -> Array:
         self._plans += 1
-        view, aim = self._costmap.view, self._costmap.aim(start, goal.pose)
+        aim = self._costmap.aim(start, goal.pose)
         self._partial, self._origin = aim is not goal.pose, view.origin
         path = self._planned(view, start, aim, self._plan_seed(self._plans))
         x, y, yaw = path.points[-1].tolist()
@@ -204,7 +223,7 @@ class PlanKeeper:
     def _adopt(self, tick: int, now: float, path: Path, reason: str) -> Event:
         view = self._costmap.view
         self.plan = PlanInForce(path, self._radius, view)
-        self._adopted = self._looked = now
+        self._adopted = self._looked = self._minded = now
         self._checked, self._most = view.revision, self._costmap.obstacle_cells
         made: dict[str, Value] = {"reason": reason, "length": round(path.length(), 6)}
         return Event(tick, EventKind.PLAN_MADE, "", made)

@@ -130,9 +130,9 @@ class CostmapView:
     change; `inflation_radius` is how far in metres an obstacle's costs reach. The arrays may be windows on a costmap
     that goes on living: they hold until its next update.
 
-    `moving` is what motion prediction says of things that move, now and in this frame; nothing of them is in the costs.
-    `Footprint.gap` says how near a robot will come to them. Empty where nothing moves, where nobody predicts, and on
-    the global costmap: what moves will have gone before a robot gets far.
+    `moving` is what motion prediction says of things that move, now and in this frame; `Footprint.gap` says how near a
+    robot will come to them. Empty where nothing moves and where nobody predicts. Nothing of them is in the costs, but
+    for the view that a planner is shown: there, cells are dearer at which a robot would meet them.
     """
 
     costs: npt.NDArray[np.uint8]

@@ -218,11 +218,12 @@ class ReferenceStack:
         self._costmaps.update(tick, frames, self._odometry)
 
     def _foretell(self, tick: int, frames: Frames) -> None:
-        """Tell the collision monitor and the controller what moves, each in its frame."""
+        """Tell the collision monitor, the controller and the planner what moves, each in its frame."""
         around = self._prediction.seen_from(tick, HERE)
         self._moves = len(around) > 0
         self._monitor.on_moving(around)
         self._costmaps.near.moving = self._prediction.seen_from(tick, frames.odometry)
+        self._costmaps.wide.moving = self._prediction.seen_from(tick, frames.pose)
 
     def _control(self, tick: int, frames: Frames) -> None:
         """See to the goals, and to the command that is wanted."""

@@ -12,6 +12,7 @@ from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.planners import OmplPlanner as PlannerSpec
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.plan_keeper import PlanKeeper
+from simscen.stack.prediction.moving import NOTHING, Moving
 from simscen.stack.protocols import CostmapView, NavigationFailure, Surroundings
 from simscen.testing.flatland import RATE, Flatland, round_robot
 
@@ -192,3 +193,33 @@ def test_where_there_is_no_roomier_way_the_tight_one_is_tried_again() -> None:
     bench.script.plan = plan
     assert bench.steps(2) == ["recovery"]
     assert room == [False, False, True]
+
+
+def across(y: float, vy: float) -> Moving:
+    """Someone at (2, y) who walks along y."""
+    at, velocity = np.array([[2.0, y]]), np.array([[0.0, vy]])
+    return Moving(at, velocity, np.array([0.3]), np.diag((1e-4,) * 4)[None], 0.3)
+
+
+def test_a_plan_that_meets_what_moves_is_made_anew_twice_a_second_until_nothing_does() -> None:
+    bench = Bench()
+    assert bench.steps(20) == ["goal"]
+    bench.costmap.moving = across(5.0, -1.0)  # at (2, 3) in 2 s, as the robot is
+    assert bench.steps(20) == ["moving", "moving"]
+    bench.costmap.moving = NOTHING
+    assert bench.steps(40) == ["moving"]  # straight again
+
+
+def test_who_walks_away_is_no_reason_for_another_plan() -> None:
+    bench = Bench()
+    assert bench.steps(20) == ["goal"]
+    bench.costmap.moving = across(4.5, 1.0)
+    assert bench.steps(40) == []
+
+
+def test_where_no_way_around_what_moves_is_found_the_plan_stays() -> None:
+    bench = Bench()
+    assert bench.steps(20) == ["goal"]
+    bench.costmap.moving, bench.script.broken = across(5.0, -1.0), True
+    assert bench.steps(20) == []
+    assert bench.keeper.plan is not None

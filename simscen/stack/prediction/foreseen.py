@@ -1,0 +1,64 @@
+"""A costmap on which what moves is where it will be when the robot gets there, so that plans pass behind it.
+
+A cell has no time, but a robot that drives to it has: the straight way at full speed. Each cell is as dear as what
+moves will be near it then, so of a crossing's whole way only the part is marked at which both would meet.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.geometry import Array, Pose2
+from simscen.stack.planners.rates import MAX_NON_OBSTACLE
+from simscen.stack.prediction.avoidance import ROOM
+from simscen.stack.prediction.moving import Moving
+from simscen.stack.prediction.rollouts import HORIZON
+from simscen.stack.protocols import CostmapView
+
+FORGETS = 2.0
+"""Seconds in which what will be counts e times less: at constant velocity, nobody goes on for ever."""
+BLOCK = 0.2
+"""Metres, about: the edge of what is marked alike."""
+
+
+def foreseen(costmap: CostmapView, robot: Pose2, speed: float, radius: float) -> CostmapView:
+    """The same with costs, at most MAX_NON_OBSTACLE, where a robot at `robot` that drives at `speed` would meet what
+    moves: no way is shut. `radius` is the robot's. The same object where nothing moves.
+    """
+    if not len(costmap.moving):
+        return costmap
+    size, (height, width) = costmap.resolution, costmap.costs.shape
+    factor = max(1, round(BLOCK / size))
+    low, high, middles = [], [], []
+    for at, corner, cells in ((robot.y, costmap.origin[1], height), (robot.x, costmap.origin[0], width)):
+        first = max(0, math.floor((at - speed * HORIZON - corner) / size))
+        last = min(cells, math.ceil((at + speed * HORIZON - corner) / size))
+        low.append(first)
+        high.append(max(first, last))
+        middles.append(corner + size * (first + factor * (np.arange(-(-max(0, last - first) // factor)) + 0.5)))
+    x, y = np.meshgrid(middles[1], middles[0])
+    dear = _dear(costmap.moving, x, y, np.hypot(x - robot.x, y - robot.y) / speed, radius)
+    window = slice(low[0], high[0]), slice(low[1], high[1])
+    cells = dear.repeat(factor, axis=0).repeat(factor, axis=1)[: high[0] - low[0], : high[1] - low[1]]
+    costs = costmap.costs.copy()
+    np.maximum(costs[window], cells, out=costs[window])
+    return replace(costmap, costs=costs)
+
+
+def _dear(moving: Moving, x: Array, y: Array, times: Array, radius: float) -> npt.NDArray[np.uint8]:
+    near, _ = moving.nearness(x, y, times, radius, ROOM)
+    cost = MAX_NON_OBSTACLE * np.clip(near, 0.0, 1.0) * np.exp(-times / FORGETS)
+    return np.where(times > HORIZON, 0.0, cost).astype(np.uint8)
+
+
+def meets(moving: Moving, robot: Pose2, way: Array, speed: float, radius: float) -> bool:
+    """Whether a robot at `robot` that drives along `way` (n, 2) at `speed` comes too near to what moves."""
+    if not len(moving):
+        return False
+    steps = np.hypot(*np.diff(np.vstack(((robot.x, robot.y), way)), axis=0).T)
+    times = np.cumsum(steps) / speed
+    soon = times < HORIZON
+    near, _ = moving.nearness(way[soon, 0], way[soon, 1], times[soon], radius, ROOM)
+    return bool((near > 0.0).any())

@@ -1,0 +1,64 @@
+import numpy as np
+import pytest
+
+from simscen.core.geometry import Pose2
+from simscen.model.planners import OmplPlanner as Spec
+from simscen.stack.planners.ompl_planner import OmplPlanner
+from simscen.stack.prediction.foreseen import foreseen, meets
+from simscen.stack.prediction.moving import Moving
+from simscen.stack.protocols import CostmapView
+from simscen.testing.flatland import round_robot
+
+ROBOT = Pose2(0.0, 0.0)
+SPEED, RADIUS = 1.0, 0.22
+SURE = np.diag((1e-4, 1e-4, 1e-4, 1e-4))[None]
+
+
+def crossing(x: float, y: float, vy: float) -> Moving:
+    return Moving(np.array([[x, y]]), np.array([[0.0, vy]]), np.array([0.3]), SURE, 0.3)
+
+
+def ground(moving: Moving, resolution: float = 0.05) -> CostmapView:
+    cells = round(12 / resolution), round(12 / resolution)
+    costs, distance = np.zeros(cells, np.uint8), np.full(cells, 2.0, np.float32)
+    return CostmapView(costs, distance, resolution, (-6.0, -6.0), moving=moving)
+
+
+def cost_at(view: CostmapView, x: float, y: float) -> int:
+    return int(view.costs[int((y + 6.0) / view.resolution), int((x + 6.0) / view.resolution)])
+
+
+@pytest.mark.parametrize("resolution", [0.05, 0.03, 0.25])
+def test_what_crosses_is_marked_where_it_will_be_when_the_robot_gets_there(resolution: float) -> None:
+    """It stands at (2, 2) and crosses the robot's way, 2 m ahead, in 2 s: the robot is there then."""
+    view = foreseen(ground(crossing(2.0, 2.0, -1.0), resolution), ROBOT, SPEED, RADIUS)
+    assert cost_at(view, 2.0, 0.0) > 50
+    assert cost_at(view, 2.0, 2.0) == 0  # where it is now
+    assert cost_at(view, 2.0, 1.2) == 0  # behind it: it has gone by then
+    assert cost_at(view, 0.0, -2.0) == 0
+    assert view.costs.max() < 253  # dear, never shut
+
+
+def test_nothing_is_marked_where_nothing_moves_or_too_far_off_to_tell() -> None:
+    still = ground(crossing(50.0, 50.0, 0.0).chosen(np.array([False])))
+    assert foreseen(still, ROBOT, SPEED, RADIUS) is still
+    far = foreseen(ground(crossing(5.0, 5.0, -1.0)), ROBOT, SPEED, RADIUS)
+    assert not far.costs.any()
+    assert not foreseen(ground(crossing(2.0, 2.0, -1.0)), Pose2(40.0, 0.0), SPEED, RADIUS).costs.any()
+
+
+def test_a_plan_passes_behind_who_would_be_there_first() -> None:
+    for vy in (-1.0, 1.0):
+        view = foreseen(ground(crossing(2.0, -1.6 * vy, vy)), ROBOT, SPEED, RADIUS)
+        points = OmplPlanner(Spec(), round_robot(RADIUS)).plan(view, ROBOT, Pose2(4.5, 0.0), 1).points
+        beside = points[np.abs(points[:, 0] - 2.0) < 0.1, 1]
+        assert (np.sign(beside) == -np.sign(vy)).all()
+        assert np.abs(beside).min() > 0.3
+
+
+def test_a_way_meets_what_will_be_there_then_and_nothing_else() -> None:
+    way = np.column_stack((np.linspace(0.1, 4.5, 45), np.zeros(45)))
+    assert meets(crossing(2.0, 2.0, -1.0), ROBOT, way, SPEED, RADIUS)
+    assert not meets(crossing(2.0, 2.0, 1.0), ROBOT, way, SPEED, RADIUS)
+    assert not meets(crossing(2.0, 0.9, -2.0), ROBOT, way, SPEED, RADIUS)  # it will have gone
+    assert not meets(crossing(2.0, 2.0, -1.0), ROBOT, way[:0], SPEED, RADIUS)
