@@ -9,7 +9,7 @@ import pytest
 from simscen.core.geometry import Pose2
 from simscen.core.motion import STOP
 from simscen.core.navigation import Goal
-from simscen.core.sensing import Scan
+from simscen.core.sensing import Readings, Scan
 from simscen.model.latency import Latency
 from simscen.model.localizers import GroundTruth
 from simscen.model.stack import StackSpec
@@ -17,6 +17,7 @@ from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.frames import Frames
 from simscen.stack.odometry_history import OdometryHistory
 from simscen.stack.protocols import Surroundings
+from simscen.stack.reference import ReferenceStack
 from simscen.stack.underway import Underway
 from simscen.testing.flatland import CONTROL, ODOMETRY, RATE, Drive, Flatland, drive, round_robot
 
@@ -120,3 +121,24 @@ def test_what_is_under_way_is_there_after_its_time_and_in_order() -> None:
     assert underway.take() == "b"
     assert underway.due == math.inf
     assert not underway.busy(8)
+
+
+def test_readings_of_motion_that_wait_for_the_next_step_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    def driven() -> Drive:
+        return start(Flatland(discs=[(4.0, 1.0, 0.3)])).run(8.0)
+
+    waited = list[bool]()
+    can_wait = ReferenceStack._can_wait
+
+    def noted(self: ReferenceStack, tick: int, readings: Readings) -> bool:
+        waited.append(can_wait(self, tick, readings))
+        return waited[-1]
+
+    monkeypatch.setattr(ReferenceStack, "_can_wait", noted)
+    waiting = driven()
+    assert sum(waited) > 100
+    monkeypatch.setattr(ReferenceStack, "_can_wait", lambda *_: False)
+    heard_at_once = driven()
+    assert waiting.log == heard_at_once.log
+    assert waiting.commands == heard_at_once.commands
+    assert waiting.track == heard_at_once.track
