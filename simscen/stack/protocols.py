@@ -83,7 +83,7 @@ class Localizer(Protocol):
         ...
 
     def on_odometry(self, odometry: Odometry) -> None:
-        """Take a step of dead reckoning."""
+        """Take a step of dead reckoning; several may come one after the other before anybody asks for the belief."""
         ...
 
     def on_scan(self, scan: Scan) -> None:
