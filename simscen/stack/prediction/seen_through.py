@@ -22,6 +22,8 @@ MARGIN, RELATIVE = 0.25, 0.02
 SLIPPED = (0.05, 0.1, 0.15)
 """Parts of the way between two scans for which the wheels may have turned in vain. What has come must have been free by
 each of them: posts beside the way of a fast robot seem to hop from one to the next when all come along a little."""
+LEFT = 1.0 - np.array(SLIPPED)[:, None]
+"""What is left of the way then."""
 AGO, AT_LEAST = 1.0, 0.2
 """Seconds: the age of the scan that is asked, and while none is so old the least. At 0.25 m/s a thing near by comes
 as far as the margin in that time."""
@@ -112,40 +114,44 @@ class Earlier:
 
     def looked(self, places: Places, lidar: Pose2) -> "Looked":
         """What it saw of places (n,) that are given as a lidar at `lidar` sees them."""
-        moved, view = self.lidar.between(lidar), self.view
-        into = places * cmath.rect(1.0, moved.yaw - view.middle)
-        into += complex(moved.x, moved.y) * cmath.rect(1.0, -view.middle)
-        beam = np.arctan2(into.imag, into.real)
-        beam *= 1.0 / view.increment
-        beam += view.centre + 0.5
-        return Looked(self, beam.astype(np.int64), np.abs(into), places, lidar)
+        moved, ahead = self.lidar.between(lidar), self.view.middle
+        turned = places * cmath.rect(1.0, moved.yaw - ahead)
+        way = complex(moved.x, moved.y) * cmath.rect(1.0, -ahead)
+        return Looked(self, turned, way, *self.towards(turned + way))
 
-    def short_of(self, lidar: Pose2, part: float) -> Pose2:
-        """Where a later lidar is if so great a part of its way since then was none."""
-        x, y, yaw = lidar
-        return Pose2(x + part * (self.lidar.x - x), y + part * (self.lidar.y - y), yaw)
+    def towards(self, places: Places) -> tuple[Indices, Array]:
+        """The beams (…,) that went towards places as it sees them, turned to its middle, and how far off these are."""
+        beam = np.arctan2(places.imag, places.real)
+        beam *= 1.0 / self.view.increment
+        beam += self.view.centre + 0.5
+        return beam.astype(np.int64), np.abs(places)
+
+    def through(self, beam: Indices, distance: Array) -> Mask:
+        """Whether beams (…,) went beyond what is so far off."""
+        return np.asarray(self.free[beam - self.view.beside] > distance)
 
 
 @dataclass(frozen=True, eq=False)
 class Looked:
-    """The beams (n,) of an earlier scan that went towards places, and how far away these were in m."""
+    """The beams (n,) of an earlier scan that went towards places, and how far away these were in m.
+
+    `turned` are the places as seen from where the lidar is now, with the earlier one's headings, and `way` is from the
+    one to the other.
+    """
 
     earlier: Earlier
+    turned: Places
+    way: complex
     beam: Indices
     distance: Array
-    places: Places
-    lidar: Pose2
 
     def appeared(self) -> Mask:
         """Which of them were free then, by each of SLIPPED. What is farther away than FARTHEST never was."""
-        free, earlier = self._free(), self.earlier
-        for part in SLIPPED if free.any() else ():
-            some = free.nonzero()[0]
-            free[some] = earlier.looked(self.places[some], earlier.short_of(self.lidar, part))._free()
+        earlier, free = self.earlier, self.earlier.through(self.beam, self.distance)
+        some = free.nonzero()[0]
+        if len(some):
+            free[some] = earlier.through(*earlier.towards(self.turned[some] + LEFT * self.way)).all(axis=0)
         return free
-
-    def _free(self) -> Mask:
-        return np.asarray(self.earlier.free[self.beam - self.earlier.view.beside] > self.distance)
 
     def stood(self) -> Mask:
         """Which of them were hit then, too."""
