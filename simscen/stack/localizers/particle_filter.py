@@ -33,6 +33,9 @@ BELIEVE_WHEELS = 0.2
 AT_ONCE = 0.2
 """What the first scan counts, of what it does when the robot has driven `settling_distance` m."""
 
+_STRAY, _ANYWHERE = 1.0, 2.0
+"""Marks of what descends from particles that recovery put anywhere, and of these themselves."""
+
 
 class ParticleFilter:
     """Particles that are moved by odometry and weighed by scans; it knows neither time nor frames but the map's."""
@@ -53,6 +56,7 @@ class ParticleFilter:
         self.particles = self._anywhere.begin(estimate, self._bound.most, self._chance)
         self._recovery = Recovery(self._spec.recovery_alpha_slow, self._spec.recovery_alpha_fast, self._sensor.strays)
         self._put_anywhere: npt.NDArray[np.bool_] | None = None
+        self._strays: npt.NDArray[np.bool_] | None = None
         self._corrections, self._trusted = 0, 1.0
         self._settled = AT_ONCE if estimate.pose is not None and self._spec.settling_distance > 0 else 1.0
 
@@ -90,7 +94,8 @@ class ParticleFilter:
         """Put all particles about `poses` (k, 3), each with its share (k,); and where they say the robot is then."""
         drawn = around_places(poses, shares, self._bound.most, self._chance)
         self.particles = Particles.equal(drawn)
-        self._put_anywhere, self._settled = None, 1.0
+        self._put_anywhere = self._strays = None
+        self._settled = 1.0
         return summarise(self.particles, self._sensor.peak)
 
     def correct(self, scan: Scan) -> tuple[Pose2, Array] | None:
@@ -147,20 +152,30 @@ class ParticleFilter:
         if self._few_suffice and self._recovery.share == 0 and in_touch(self.particles):
             chosen = systematic(self.particles.weights, self._bound.least, self._chance)
             self.particles = Particles.equal(self.particles.poses.T.take(chosen, axis=1).T)
+            self._strays = None
             return
+        if self._recovery.share == 0:
+            self._strays = None
+        if self._strays is not None:
+            weights = self.particles.weights.copy()
+            weights[self._strays] *= self._recovery.kept(float(weights[self._strays].sum()))
+            self.particles = self.particles.weighted(weights / weights.sum())
         drawn = adaptive(self._draw, self._bound).T.copy()
-        self._put_anywhere = drawn[3] > 0
+        self._put_anywhere, self._strays = drawn[3] == _ANYWHERE, drawn[3] > 0
         self.particles = Particles.equal(drawn[:3].T)
 
     def _draw(self, count: int) -> Array:
         """Poses in random order: most from the particles, the recovery's share from anywhere.
 
-        Rows (count, 4): x, y, yaw, and 1 for anywhere.
+        Rows (count, 4): x, y, yaw, and _ANYWHERE, or _STRAY for what descends from such.
         """
         drawn = np.zeros((count, 4))
-        drawn[:, :3] = self.particles.poses[systematic(self.particles.weights, count, self._chance)]
+        chosen = systematic(self.particles.weights, count, self._chance)
+        drawn[:, :3] = self.particles.poses[chosen]
+        if self._strays is not None:
+            drawn[self._strays[chosen], 3] = _STRAY
         if (share := self._recovery.share) > 0:
             lost = self._chance.random(count) < share
             drawn[lost, :3] = self._anywhere.draw(int(lost.sum()), self._chance)
-            drawn[lost, 3] = 1
+            drawn[lost, 3] = _ANYWHERE
         return self._chance.permutation(drawn)

@@ -13,6 +13,7 @@ PROBES = 200
 """Poses from anywhere that each scan is compared with."""
 KNOWS_NOTHING = 0.1
 """The share of places that explain the scans as well as the particles do, from which on they may be lost."""
+SCANS = 4.0
 _MOST = 50.0
 """No logarithm of how much likelier counts for more, so that its exponential is a number."""
 
@@ -26,7 +27,9 @@ class Recovery:
     averaged is how many times likelier it is at the particles than there. Particles are put anywhere while the fast
     average is below the slow one *and* at least KNOWS_NOTHING of the places of the map explained the recent scans
     better than the particles; and never more than the share `most` with one scan: where weights are flat, scans weed
-    them out slowly, and the third of the particles that averages soon ask for would take a good cloud apart.
+    them out slowly, and the third of the particles that averages soon ask for would take a good cloud apart. So would
+    a few with each of many scans: all that stray, descendants included, are at most what SCANS scans put anywhere, and
+    make room for new ones. When they are right the averages soon say that nobody is lost, and then nothing bounds them.
 
     nav2_amcl sets both averages to zero when it put particles anywhere ("to avoid spiraling off into complete
     randomness"), which ends a recovery after a few dozen of them. Nothing spirals here: particles that were put
@@ -58,6 +61,11 @@ class Recovery:
         if slow <= 0 or self._better.value < KNOWS_NOTHING:
             return 0.0
         return min(self._most, max(0.0, 1 - fast / slow))
+
+    def kept(self, straying: float) -> float:
+        """What share of the particles that stray is kept beside new ones, if these weigh `straying` (0 … 1)."""
+        room = min(1.0, SCANS * self._most) - self.share
+        return 1.0 if straying <= room else max(0.0, room / straying)
 
 
 class RunningAverage:

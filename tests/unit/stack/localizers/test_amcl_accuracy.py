@@ -50,12 +50,11 @@ def test_people_moved_furniture_and_slipping_wheels_do_not_make_recovery_throw_a
     assert measure.among_people(measure.RECOVERING, SEEDS_AMONG_PEOPLE, 40.0).max() <= 1.5
 
 
-_TAKEN_APART = pytest.mark.xfail(strict=True, reason="recovery makes it 2.3 m wrong for a few seconds; 0.8 m without")
-
-
-@pytest.mark.parametrize("world", [pytest.param("clutter", marks=_TAKEN_APART), "pillars"])
-def test_recovery_does_not_take_a_good_cloud_apart_with_what_it_puts_anywhere_at_once(world: str) -> None:
-    """Errors of 5 and 16 m when a share as large as the averages asked for went anywhere with each scan."""
+@pytest.mark.parametrize("world", ["clutter", "pillars"])
+def test_recovery_does_not_take_a_good_cloud_apart_with_what_it_puts_anywhere(world: str) -> None:
+    """Errors of 5 and 16 m when as large a share as the averages asked for went anywhere with each scan, of 2.3 m in
+    the former when a twentieth did, and went on straying: 80 % of the particles after ten seconds.
+    """
     (drive,) = (one for one in drives("crowded", "likelihood_field", [12], [world]))
     assert off(drive).max() < 1.0
 

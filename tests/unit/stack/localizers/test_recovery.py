@@ -58,6 +58,16 @@ def test_no_more_particles_are_put_anywhere_than_the_sensor_model_bears() -> Non
     assert free.share > 0.5
 
 
+def test_all_that_stray_are_at_most_what_a_few_scans_put_anywhere() -> None:
+    """A twentieth with each of many scans put eight of ten particles of a good cloud elsewhere within seconds."""
+    recovery = Recovery(0.001, 0.1, 0.05)
+    for likelihood in [6.0] * 50 + [0.8] * 50:
+        recovery.observe(np.log(likelihood), ANYWHERE)
+    assert recovery.share == 0.05
+    assert recovery.kept(0.1) == 1.0
+    assert recovery.kept(0.6) == pytest.approx(0.25)
+
+
 def test_with_nav2s_default_of_zero_nobody_asks() -> None:
     assert not Recovery(0.0, 0.0).wanted
     assert Recovery(0.001, 0.1).wanted
