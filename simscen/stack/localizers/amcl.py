@@ -11,7 +11,7 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.sensing import Imu, Odometry, Scan
 from simscen.model.localizers import Amcl
 from simscen.stack.localizers.clusters import spread, summarise
-from simscen.stack.localizers.finder import Finder
+from simscen.stack.localizers.finder import STILL, Finder
 from simscen.stack.localizers.global_search import GlobalSearch
 from simscen.stack.localizers.map_trust import MapTrust
 from simscen.stack.localizers.motion_models import MotionModel
@@ -75,6 +75,7 @@ class AmclLocalizer:
         self._matcher = ScanMatcher() if self._spec.match_scans else None
         self._scatter = Scatter() if self._spec.covariance == "scatter" and self._matcher is not None else None
         self._matched: tuple[str, Pose2] | None = None
+        self._torn = STILL
         self._due: dict[str, bool] = {}
         self._waiting: dict[str, Scan] = {}
         self._belief: Belief | None = None
@@ -133,8 +134,11 @@ class AmclLocalizer:
     def _correct(self, scan: Scan, odometry: Pose2, delta: Pose2 | None) -> None:
         """Move the particles by what was driven since the last correction, and weigh them by a scan."""
         matched = None if self._matcher is None else self._matched_step(self._matcher, scan, odometry)
+        self._torn = STILL
         if delta is not None and matched is not None:
             self._filter.follow(matched, delta)
+            if not matched.agrees(delta):
+                self._torn = delta.between(matched.delta)
             if self._scatter is not None:
                 self._scatter.compare(matched.delta, delta)
         elif delta is not None:
@@ -165,7 +169,7 @@ class AmclLocalizer:
         limits = self._spec.laser_min_range, self._spec.farthest
         base = self._base(odometry)
         believed = self._correction.map_from_odom.compose(odometry)
-        if (places := finder.places(scan, base, believed, limits)) is not None:
+        if (places := finder.places(scan, base, believed, limits, self._torn)) is not None:
             self._correction = _Correction(*self._filter.put(*places), odometry, scan.tick)
             self._moved_to, self._belief = odometry, None
             self._scatter = None if self._scatter is None else Scatter()

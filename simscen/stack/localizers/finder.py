@@ -12,7 +12,7 @@ from simscen.stack.localizers.clusters import errors_about
 from simscen.stack.localizers.global_search import APART, GlobalSearch, View
 from simscen.stack.localizers.map_trust import MapTrust
 from simscen.stack.localizers.scan_memory import ScanMemory, travelled
-from simscen.stack.localizers.sure import AROUND, Sure
+from simscen.stack.localizers.sure import AROUND, Sure, drifted
 
 RECENT, DOUBTFUL = 5, 0.6
 """Over so many scans that corrected the share of the beams that fit is averaged, and below this the robot may be lost.
@@ -29,10 +29,12 @@ place is elsewhere when they fit there so, and GOOD, and by BETTER better than w
 CHECKED, FITS = 1.5, 0.85
 """m, turns included, after each of which a robot that has a place is compared with its neighbourhood, if what it saw
 fits less than that."""
-NEAR_GOOD = 0.82
-"""It is moved to a place nearby that fits so, BETTER than where it is, and by PLAIN better than any other; each fit
-less SHARPNESS for each e times that it is unlikely to have drifted there since it was last sure of its place. Rebuilt
-corridors fit a metre further on by chance, and better than where the robot is."""
+NEAR_GOOD, NEAR_BETTER = 0.82, 0.04
+"""It is moved to a place nearby that fits so and BETTER than where it is, or more than FITS and so much better, and by
+PLAIN better than any other. Each fit counts less by SHARPNESS for each e times that it is unlikely to have drifted
+there since it was last sure of its place: rebuilt corridors fit a metre further on by chance, better than here."""
+UNREACHED = 0.1
+"""At most: where it was sure it may have been wrong."""
 LIKELIER = 3.0
 """While a told place counts: the logarithm of how many times likelier another place nearby must be for a robot to be
 moved there, by what was told and all that was seen since."""
@@ -46,6 +48,7 @@ what it saw since says it is back if it fits so, and by so much better than anyw
 Rooms that nobody mapped often look like one that somebody did, though less than that."""
 SHARPNESS = 0.02
 """Of two places that fit so much better or worse, the better is e times as likely, and gets as many more particles."""
+STILL = Pose2(0.0, 0.0, 0.0)
 
 
 class Finder:
@@ -63,27 +66,36 @@ class Finder:
         self._begun: Sure | None = None
         self._sure: Sure | None = None
         self._fits: deque[float] = deque(maxlen=RECENT)
-        self._way, self._wait, self._driven, self._unchecked, self._doubted = 0.0, 0.0, 0.0, 0.0, False
+        self._drift, self._way, self._wait, self._driven, self._unchecked, self._doubted = (
+            np.zeros(3),
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            False,
+        )
         self._last: Pose2 | None = None
         self._suspected: tuple[Pose2, Pose2] | None = None
         self._since, self._astray = 0.0, 0
 
     def places(
-        self, scan: Scan, base: Pose2, believed: Pose2, limits: tuple[float, float]
+        self, scan: Scan, base: Pose2, believed: Pose2, limits: tuple[float, float], torn: Pose2 = STILL
     ) -> tuple[Array, Array] | None:
         """Poses (k, 3) where the robot may be and the share of each (k,); None to leave it where it is believed to be.
 
-        `base` is where it was when it took the scan, in a frame that drifts; `limits` are the ranges that count.
+        `base` is where it was when it took the scan, in a frame that drifts; `limits` are the ranges that count. What
+        its scans and its wheels say of how it came there since the last scan is `torn` apart, where they do not agree.
         """
         ends = self._memory.add(scan, base, *limits)
         if self._last is not None:
             self._driven += (moved := travelled(self._last, base))
             self._unchecked += moved
             self._way += moved
+            self._drift = self._drift + drifted(moved, torn)
             self._since += moved
         elif self._told.pose is not None:
             std = np.maximum(self._told.std, AROUND)
-            self._begun = self._sure = Sure(self._told.pose, base, 0.0, std)
+            self._begun = self._sure = Sure(self._told.pose, base, self._drift, std)
         self._last = base
         if not len(ends):
             return None
@@ -119,8 +131,8 @@ class Finder:
         if (fit := self._search.fit(here, view))[0] > FITS:
             return None
         poses, fits = self._search.near(view, begun.expected(base))
-        likely = fits / SHARPNESS - begun.unlikely(poses, base, begun.way)
-        own = fit[0] / SHARPNESS - begun.unlikely(here, base, begun.way)[0]
+        likely = fits / SHARPNESS - begun.unlikely(poses, base, begun.drift)
+        own = fit[0] / SHARPNESS - begun.unlikely(here, base, begun.drift)[0]
         best = int(likely.argmax())
         off = errors_about(here[0], poses[best : best + 1])[0]
         if likely[best] - own < LIKELIER or (math.hypot(off[0], off[1]) < APART[0] and abs(off[2]) < APART[1]):
@@ -137,25 +149,28 @@ class Finder:
             return None
         fit = float(self._reached(here, self._search.fit(here, view), base)[0])
         if fit > FITS:
-            self._sure = Sure.at(here[0], base, self._way)
+            self._sure = Sure.at(here[0], base, self._drift)
             return None
         poses, fits = self._search.near(view, here[0])
         fits = self._reached(poses, fits, base)
         order = np.argsort(-fits, kind="stable")
         poses, fits = poses[order], fits[order]
         plain = len(fits) == 1 or fits[0] - fits[1] > PLAIN
-        if not plain or fits[0] < max(NEAR_GOOD, fit + BETTER):
+        better = NEAR_BETTER if fits[0] > FITS else BETTER
+        if not plain or fits[0] < max(NEAR_GOOD, fit + better):
             return None
         return self._found(poses[:1], base)
 
     def _reached(self, poses: Array, fits: Array, base: Pose2) -> Array:
         """How well `poses` (n, 3) fit, less what it takes to have drifted there."""
-        return fits if self._sure is None else fits - SHARPNESS * self._sure.unlikely(poses, base, self._way)
+        if self._sure is None:
+            return fits
+        return fits - np.minimum(SHARPNESS * self._sure.unlikely(poses, base, self._drift), UNREACHED)
 
     def _found(self, places: Array, base: Pose2) -> tuple[Array, Array]:
         """The one of `places` (1, 3) with all particles."""
         self._fits.clear()
-        self._sure = Sure.at(places[0], base, self._way)
+        self._sure = Sure.at(places[0], base, self._drift)
         return places, np.ones(1)
 
     def _in_doubt(self) -> bool:
@@ -176,7 +191,7 @@ class Finder:
         if not self._known:
             self._known = plain and self._memory.length >= ENOUGH
             if self._known:
-                self._sure = Sure.at(poses[0], base, self._way)
+                self._sure = Sure.at(poses[0], base, self._drift)
             shares = np.exp((fits - fits[0]) / SHARPNESS)
             return poses, shares / shares.sum()
         if plain and fits[0] > good and fits[0] > self._search.fit(here, view)[0] + BETTER:
