@@ -27,6 +27,8 @@ RECONSIDER = 2
 """Every which step the plan is looked at: 10 Hz at the default rate, twice as often as Nav2's costmap is updated."""
 USUAL_RATE, THROUGH_POSES_RATE = 1.0, 0.333
 """Hz at which Nav2's default trees plan anew."""
+NEARBY = 4.0
+"""Metres of plan left within which Nav2's default trees (IsGoalNearby, ValidatePath) keep one that is not blocked."""
 CAUTION = (0.10, 0.05)
 """Metres of room beyond what is needed that plans keep, if they can, once the robot could not follow one: where it is
 as tight as belief, map and scan are uncertain, the same way would end the same again."""
@@ -145,9 +147,13 @@ class PlanKeeper:
             return "missed"
         if self._via and not self._partial and plan.remaining() < AT_ITS_END:
             return "missed"
-        if self._spec.replanning == "rate":
-            return "rate" if now - self._looked >= 1.0 / self._rate else ""
         view = self._costmap.view
+        if self._spec.replanning == "rate":
+            if now - self._looked < 1.0 / self._rate:
+                return ""
+            self._looked = now
+            near = plan.remaining() < NEARBY and not self._partial
+            return "" if near and not plan.blocked(view) else "rate"
         if view.revision == self._checked:
             return ""
         if plan.blocked(view):

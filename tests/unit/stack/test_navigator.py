@@ -265,9 +265,8 @@ def test_a_task_that_has_ended_can_be_given_a_new_goal() -> None:
 def test_replanning_at_a_rate_replans_at_that_rate() -> None:
     d = start(
         rooms(), spec=StackSpec(localizer=TRUTH, planner=OmplPlanner(replanning="rate", replanning_rate=0.5))
-    ).run(60)
-    assert d.result == "SUCCEEDED"
-    assert reasons(d).count("rate") == pytest.approx(d.tick / 480, abs=2)
+    ).run(10)
+    assert reasons(d).count("rate") == pytest.approx(d.tick / 480, abs=1)
 
 
 def test_nav2_replans_through_poses_at_a_third_of_its_usual_rate() -> None:

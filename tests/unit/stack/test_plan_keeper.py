@@ -58,11 +58,11 @@ class Bench:
         self.now = 0.0
         self.keeper = PlanKeeper(PlannerSpec(**options), self.script, self.costmap, lambda k: 100 + k, 0.22)
 
-    def steps(self, count: int) -> list[object]:
+    def steps(self, count: int, goal: Goal = GOAL) -> list[object]:
         """Reasons of the plans made in so many steps of the navigator."""
         before = len(self.journal)
         for _ in range(count):
-            self.journal += self.keeper.step(0, self.now, GOAL, HERE)
+            self.journal += self.keeper.step(0, self.now, goal, HERE)
             self.now += 0.05
         return [event.data["reason"] for event in self.journal[before:]]
 
@@ -129,6 +129,14 @@ def test_a_look_for_a_better_plan_that_fails_is_no_failure() -> None:
 def test_at_a_rate_it_replans_whatever_happens() -> None:
     bench = Bench(replanning="rate", replanning_rate=2.0)
     assert bench.steps(40) == ["goal", "rate", "rate", "rate"]
+
+
+def test_at_a_rate_a_plan_that_is_nearly_over_is_made_anew_only_once_it_is_blocked() -> None:
+    """IsGoalNearby and ValidatePath of Nav2's default trees."""
+    bench, near = Bench(replanning="rate", replanning_rate=2.0), Goal("near", Pose2(4.5, 3.0))
+    assert bench.steps(40, near) == ["goal"]
+    bench.see((3.0, 3.0, 0.3))
+    assert bench.steps(12, near) == ["rate"]
 
 
 def test_a_plan_that_ends_too_far_from_the_goal_means_that_the_goal_is_occupied() -> None:
