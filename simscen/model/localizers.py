@@ -165,6 +165,9 @@ class Ekf(LocalizerSpec):
     """Standard deviation of how far the bias has wandered after a second."""
     wheel_slip: Probability = 0.0
     """Standard deviation of the share of its way by which a robot slips; a slip lasts about a second."""
+    match_scans: bool = False
+    """Correct how far odometry says that the robot came by how each scan fits those of the last metres: a laser scan
+    matcher beside wheels and gyroscope. The covariance stays that of the wheels."""
 
 
 class GroundTruth(LocalizerSpec):

@@ -17,9 +17,11 @@ DWA = {"success": 0.850, "collisions": 0.056, "timeouts": 0.094, "score": 0.159}
 
 START, GOAL = Pose2(-2.25, 3.0, 1.57), Pose2(-2.25, 13.0, 1.57)
 
-LOCALIZER = "{type: ekf, rotation_noise: 0.5}"
+WHEELS = "type: ekf, rotation_noise: 0.5"
 """As the Jackal's own robot_localization: wheels for the way, the gyroscope for turns, of which skidding wheels know
 little."""
+LOCALIZER = f"{{{WHEELS}, match_scans: true}}"
+"""The same with a laser scan matcher beside it: what stands tells how far the robot came when its wheels slip."""
 COSTMAP = "{obstacle_max_range: 8 m, raytrace_max_range: 10 m, update_frequency: 10 Hz}"
 TUNED = f"""\
   localizer: {LOCALIZER}
@@ -31,6 +33,8 @@ TUNED = f"""\
     regulated_linear_scaling_min_radius: 2 m
 """
 """The stack's parameters for the speed of the challenge."""
+AMONG_MOVING = TUNED.replace(LOCALIZER, f"{{{WHEELS}}}")
+"""The same where all that a lidar sees may move, and so says nothing of the robot's way."""
 DEFAULT = f"  localizer: {LOCALIZER}\n"
 """No parameter changed: 0.5 m/s."""
 CONTROLLERS = {

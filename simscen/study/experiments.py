@@ -73,7 +73,7 @@ def dynamic_fields(folder: Path, numbers: Sequence[int]) -> list[Experiment]:
         for number in numbers:
             stem = f"dynamic/field_{number}_at_{speed:.2f}"
             world = written(folder / f"{stem}.world.yaml", _moving_world_text(movers.dynamic_field(number, speed)))
-            text = barn.scenario(f"dynamic field {number}", world.name, movers.START, movers.GOAL)
+            text = barn.scenario(f"dynamic field {number}", world.name, movers.START, movers.GOAL, barn.AMONG_MOVING)
             length = movers.START.distance(movers.GOAL)
             drives.append(Drive(written(folder / f"{stem}.scenario.yaml", text), [number], length))
         experiments.append(Experiment(dynamic_name(speed), tuple(drives), folder, mapless=True))

@@ -13,6 +13,7 @@ from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.sensing import Imu, Odometry, Scan
 from simscen.model.localizers import Ekf
 from simscen.stack.localizers.dead_reckoning import start_of
+from simscen.stack.localizers.laser_odometry import LaserOdometry
 from simscen.stack.localizers.slip_model import AHEAD, BIAS, LEVER, RATE, Model, Step, motion, moved, rates
 from simscen.stack.odometry_history import believable
 
@@ -55,6 +56,7 @@ class EkfLocalizer:
         self._readings: list[float] = []
         self._speed, self._slipped = 0.0, False
         self._map_from_odom = pose
+        self._laser = LaserOdometry(self._tick_rate) if self._spec.match_scans else None
 
     def on_odometry(self, odometry: Odometry) -> None:
         """Take a step along the heading that both sensors agree on."""
@@ -67,10 +69,18 @@ class EkfLocalizer:
             self._measure(step)
             self._predict(motion(self._spec, self._filter.x, step), moved(self._filter.x, step))
         self._readings.clear()
+        if self._laser is not None:
+            self._laser.reckon(odometry.tick, self.pose)
         self._map_from_odom = self.pose.compose(odometry.pose.inverse())
 
     def on_scan(self, scan: Scan) -> None:
-        """Nothing."""
+        """Correct how far the robot came, where scans are matched."""
+        if self._laser is None or self._last is None:
+            return
+        x, y = self._laser.correction(scan)
+        self._filter.x[0] += x
+        self._filter.x[1] += y
+        self._map_from_odom = self.pose.compose(self._last.pose.inverse())
 
     def on_imu(self, imu: Imu) -> None:
         """Keep the turn rate until the next odometry."""

@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
@@ -24,15 +25,15 @@ ROOM = Flatland().room(14, 2.6)
 class Slipping:
     """Between a robot and its stack: the ground bends what is driven, odometry tells what the wheels did."""
 
-    def __init__(self, drive: Drive) -> None:
-        self.drive, self.stack = drive, drive.stack
+    def __init__(self, drive: Drive, in_vain: float = 0.0) -> None:
+        self.drive, self.stack, self._in_vain = drive, drive.stack, in_vain
         self._before, self._told = drive.pose, drive.pose
 
     def decide(self, tick: int, readings: Readings) -> Decision:
         """A beat."""
         step = self._before.between(self.drive.pose)
         self._before = self.drive.pose
-        self._told = self._told.compose(Pose2(step.x, step.y, step.yaw - BEND * step.x))
+        self._told = self._told.compose(Pose2(step.x * (1 + self._in_vain), step.y, step.yaw - BEND * step.x))
         imu = Imu("imu", tick, (0.0, 0.0, self.drive.twist.wz), (0.0, 0.0, 9.81))
         told = tuple(replace(one, pose=self._told) if isinstance(one, Odometry) else one for one in readings)
         decision = self.stack.decide(tick, (imu, *told))
@@ -65,6 +66,20 @@ def test_a_robot_whose_wheels_slip_on_one_side_drives_on_its_plan_and_not_beside
 def beside(d: Drive) -> float:
     """Metres, at most."""
     return max(abs(pose.y - 1.3) for pose in d.track if 4.0 < pose.x < 11.0)
+
+
+@pytest.mark.parametrize("matched, off", [(False, 0.7), (True, 0.1)])
+def test_scans_tell_an_ekf_how_far_a_robot_came_whose_wheels_turn_in_vain(matched: bool, off: float) -> None:
+    """Wheels that count a tenth too much, for 8 m."""
+    spec = StackSpec(localizer=Ekf(type="ekf", rotation_noise=0.5, match_scans=matched))
+    world = Flatland().room(14, 6)
+    world.discs += [(2.0 + 2.0 * k, 1.5 if k % 2 else 4.5, 0.2) for k in range(6)]
+    d = drive(world, Pose2(1.0, 3.0), Goal("g", Pose2(12.9, 3.0)), spec=spec, odometry=("odom",))
+    d.stack = Slipping(d, in_vain=0.1)
+    while d.pose.x < 9.0:
+        d.step()
+    believed = d.stack.stack.inner._localizer.belief.pose
+    assert abs(believed.distance(d.pose) - off) < 0.15
 
 
 def test_a_command_is_countered_by_as_much_as_was_seen_and_no_broken_sensor_makes_it_more() -> None:
