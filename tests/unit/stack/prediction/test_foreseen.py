@@ -5,7 +5,7 @@ from simscen.core.geometry import Pose2
 from simscen.model.planners import OmplPlanner as Spec
 from simscen.stack.planners.ompl_planner import OmplPlanner
 from simscen.stack.prediction.foreseen import foreseen, meets
-from simscen.stack.prediction.moving import Moving
+from simscen.stack.prediction.moving import NOTHING, Moving
 from simscen.stack.protocols import CostmapView
 from simscen.testing.flatland import round_robot
 
@@ -40,7 +40,7 @@ def test_what_crosses_is_marked_where_it_will_be_when_the_robot_gets_there(resol
 
 
 def test_nothing_is_marked_where_nothing_moves_or_too_far_off_to_tell() -> None:
-    still = ground(crossing(50.0, 50.0, 0.0).chosen(np.array([False])))
+    still = ground(NOTHING)
     assert foreseen(still, ROBOT, SPEED, RADIUS) is still
     far = foreseen(ground(crossing(5.0, 5.0, -1.0)), ROBOT, SPEED, RADIUS)
     assert not far.costs.any()
