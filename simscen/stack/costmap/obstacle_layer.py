@@ -75,17 +75,18 @@ def crossed(points: Plane, resolution: float, scan: Scan, base: Pose2, spec: Cos
     is tested against the beam nearest to its centre, which crosses it if any does.
     """
     first, step, half = base.yaw + scan.mount.yaw + scan.angle_min, scan.angle_increment, resolution / 2
-    away = points - _place(scan, base)
-    seen = away * cmath.rect(1.0, -first)
-    beam, ranges = _nearest_beams(np.arctan2(seen.imag, seen.real), scan)
-    near = (np.abs(seen) * math.cos(step / 2) + half <= ranges).nonzero()[0]  # most lie behind what their beams hit
+    seen = (points - _place(scan, base)) * cmath.rect(1.0, -first)
+    distance, bearing = np.abs(seen), np.arctan2(seen.imag, seen.real)
+    beam, ranges = _nearest_beams(bearing, scan)
+    near = (distance * math.cos(step / 2) + half <= ranges).nonzero()[0]  # most lie behind what their beams hit
     if not len(near):
         return near
-    length = _shown_free(ranges.take(near), scan, spec)
-    beams = directions(scan).take(beam.take(near), mode="wrap") * cmath.rect(1.0, base.yaw)
-    place = away.take(near) * beams.conj()  # seen along the beam
-    along, reach = place.real, half * (np.abs(beams.real) + np.abs(beams.imag))
-    passed = (np.abs(place.imag) <= reach) & (along <= length - half) & (along >= spec.raytrace_min_range)
+    distance, bearing, length = distance[near], bearing[near], _shown_free(ranges[near], scan, spec)
+    off = np.remainder(bearing - beam[near] * step + math.pi, 2 * math.pi) - math.pi
+    direction = first + bearing - off
+    reach = half * (np.abs(np.cos(direction)) + np.abs(np.sin(direction)))
+    along = distance * np.cos(off)
+    passed = (np.abs(distance * np.sin(off)) <= reach) & (along <= length - half) & (along >= spec.raytrace_min_range)
     crossed_by: Numbers = near[passed]
     return crossed_by
 
