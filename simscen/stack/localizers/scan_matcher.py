@@ -15,7 +15,6 @@ import numpy as np
 
 from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.sensing import Scan
-from simscen.stack.localizers.beams import Plane
 from simscen.stack.localizers.particles import columns, wrapped
 from simscen.stack.localizers.surfaces import Surface, surfaces_of
 
@@ -39,52 +38,60 @@ COARSEST = 0.04
 """rad between two beams: of a lidar whose beams are further apart nobody can tell which points are of one surface."""
 AGREES = (0.03, 0.1, 0.03, 0.1)
 """m, and of each metre; rad, and of each rad: within this the match and odometry say the same."""
-INFLATED, FLOOR = 0.5, np.diag(np.square((0.004, 0.003, 0.0015)))
+INFLATED, FLOOR = 0.5, (0.004**2, 0.003**2, 0.0015**2)
 """Of the covariance that the match itself gives, and what is added (m, m, rad): neighbouring frames share the errors of
 their surfaces."""
 
 
+Symmetric = tuple[float, float, float, float, float, float]
+"""The upper triangle of a symmetric matrix (3, 3) by rows: nine numbers are too few for arrays."""
+Equations = tuple[tuple[float, float, float, float], ...]
+"""Normal equations of x, y and yaw, right-hand side last, in units of 1 / SIGMA²."""
+
+
 class _Reference:
-    """What earlier scans saw, to match a new one with."""
+    """What earlier scans saw, to match a new one with.
 
-    def __init__(self, frames: Iterable[Surface]) -> None:
-        from scipy.spatial import cKDTree
+    Of so few points each is compared with each, in one product and one `argmax`: a tree takes longer to build.
+    """
 
-        points = np.concatenate([*(frame.points for frame in frames), _NOWHERE])
-        self._normals = np.concatenate([*(frame.normals for frame in frames), _NOWHERE])
-        self._along = (points * self._normals.conj()).real
-        self._tree = cKDTree(_coordinates(points[:-1]), balanced_tree=False, compact_nodes=False)
+    def __init__(self, frames: Iterable[Surface], middle: complex) -> None:
+        """`middle` is about where the robot is, so that squares are small however far it went."""
+        seen = list(frames)
+        self._points = np.concatenate([frame.points for frame in seen])
+        self._normals = np.concatenate([frame.normals for frame in seen])
+        self._middle, around = middle, self._points - middle
+        # a·b - b²/2 is greatest for the b that is nearest to a
+        self._compared = np.empty((3, len(around)))
+        self._compared[0], self._compared[1] = around.real, around.imag
+        self._compared[2] = (around * around.conj()).real * -0.5
 
-    def pull(self, own: Surface, pose: Pose2, gate: float) -> Array | None:
-        """How a scan that is placed at `pose` is drawn: the normal equations (4, 4), the right-hand side last.
+    def pull(self, own: Surface, pose: Pose2, gate: float) -> Equations | None:
+        """How a scan that is placed at `pose` is drawn: its normal equations.
 
         None when too few points have a neighbour within `gate` m that faces as they do.
         """
         turn = cmath.rect(1.0, pose.yaw)
         about = own.points * turn
         ends = about + complex(pose.x, pose.y)
-        nearest = self._tree.query(_coordinates(ends), distance_upper_bound=gate)[1]
-        normals = self._normals.take(nearest)
-        alike = (own.normals * turn * normals.conj()).real > ALIKE
-        if np.count_nonzero(alike) < LEAST:
+        compared = np.ones((len(ends), 3))
+        compared[:, :2] = (ends - self._middle).view(np.float64).reshape(-1, 2)
+        nearest = (compared @ self._compared).argmax(axis=1)
+        gap = self._points.take(nearest)
+        gap -= ends
+        against = self._normals.take(nearest).conj()
+        matched = (own.normals * turn * against).real > ALIKE
+        matched &= np.abs(gap) < gate
+        if np.count_nonzero(matched) < LEAST:
             return None
-        normals *= alike
-        against = normals.conj()
+        against *= matched
         slope = np.empty((4, len(ends)))
-        slope[0], slope[1] = normals.real, normals.imag
-        slope[2] = -(about * against).imag
-        slope[3] = self._along.take(nearest) * alike - (ends * against).real
-        equations: Array = slope @ slope.T / SIGMA**2
+        slope[0] = against.real
+        np.negative(against.imag, out=slope[1])
+        np.negative((about * against).imag, out=slope[2])
+        slope[3] = (gap * against).real
+        equations: Equations = tuple(map(tuple, (slope @ slope.T).tolist()))
         return equations
-
-
-_NOWHERE: Plane = np.zeros(1, dtype=np.complex128)
-"""What a point without a neighbour is matched with: it faces nothing."""
-
-
-def _coordinates(points: Plane) -> Array:
-    """Points (n,) as rows (n, 2)."""
-    return points.view(np.float64).reshape(-1, 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,39 +137,60 @@ class ScanMatcher:
             return None
         seen = surfaces_of(scan)
         found = self._matched(seen, guess) if len(seen.points) and any(len(f.points) for f in self._frames) else None
-        pose, information = found or (self.pose.compose(guess), np.eye(3))
-        self._frames.append(seen.thinned(REFERENCE).placed(pose))
-        last, self.pose = self.pose, pose
-        if found is None:
-            return None
-        c, s = math.cos(last.yaw), math.sin(last.yaw)
-        turned = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-        covariance = turned @ np.linalg.inv(information * (1 / INFLATED)) @ turned.T + FLOOR
-        return Step(last.between(pose), covariance)
+        last, self.pose = self.pose, found[0] if found else self.pose.compose(guess)
+        self._frames.append(seen.thinned(REFERENCE).placed(self.pose))
+        return Step(last.between(self.pose), _seen_from(last.yaw, found[1])) if found else None
 
-    def _matched(self, seen: Surface, guess: Pose2) -> tuple[Pose2, Array] | None:
-        """The pose in the matcher's frame and its information (3, 3)."""
-        reference, own = _Reference(self._frames), seen.thinned(MATCHED)
+    def _matched(self, seen: Surface, guess: Pose2) -> tuple[Pose2, Symmetric] | None:
+        """The pose in the matcher's frame, and the inverse of its information, which is in units of 1 / SIGMA²."""
         guessed = pose = self.pose.compose(guess)
-        trust, gate, last = self._trust(guess), 0, len(GATES) - 1
+        reference, own = _Reference(self._frames, complex(pose.x, pose.y)), seen.thinned(MATCHED)
+        (place, heading), gate, last = _trust(guess), 0, len(GATES) - 1
         for _ in range(ITERATIONS):
-            if (normal_equations := reference.pull(own, pose, GATES[gate])) is None:
+            if (equations := reference.pull(own, pose, GATES[gate])) is None:
                 return None
-            towards = (guessed.x - pose.x, guessed.y - pose.y, wrap(guessed.yaw - pose.yaw))
-            information = normal_equations[:3, :3] + trust
-            dx, dy, turn = np.linalg.solve(information, normal_equations[:3, 3] + trust @ towards).tolist()
+            (xx, xy, xa, right), (_, yy, ya, up), (_, _, aa, around), _ = equations
+            inverse = _inverse((xx + place, xy, xa, yy + place, ya, aa + heading))
+            right += place * (guessed.x - pose.x)
+            up += place * (guessed.y - pose.y)
+            around += heading * wrap(guessed.yaw - pose.yaw)
+            xx, xy, xa, yy, ya, aa = inverse
+            dx = xx * right + xy * up + xa * around
+            dy = xy * right + yy * up + ya * around
+            turn = xa * right + ya * up + aa * around
             pose = Pose2(pose.x + dx, pose.y + dy, pose.yaw + turn)
             step = math.hypot(dx, dy), abs(turn)
             if gate == last and _within(step, STILL):
                 break
             gate = last if _within(step, SETTLED) else min(gate + 1, last)
-        return pose, information
+        return pose, inverse
 
-    def _trust(self, guess: Pose2) -> Array:
-        """The information (3, 3) of the guess."""
-        far, turned = math.hypot(guess.x, guess.y), abs(guess.yaw)
-        place, heading = DOUBT[0] * far + DOUBT[1], DOUBT[2] * turned + DOUBT[3]
-        return np.diag([place**-2, place**-2, heading**-2])
+
+def _trust(guess: Pose2) -> tuple[float, float]:
+    """What is known by the guess of each coordinate of the place and of the heading, in units of 1 / SIGMA²."""
+    far, turned = math.hypot(guess.x, guess.y), abs(guess.yaw)
+    return (SIGMA / (DOUBT[0] * far + DOUBT[1])) ** 2, (SIGMA / (DOUBT[2] * turned + DOUBT[3])) ** 2
+
+
+def _inverse(matrix: Symmetric) -> Symmetric:
+    """That of a positive definite matrix."""
+    xx, xy, xa, yy, ya, aa = matrix
+    of_xx, of_xy, of_xa = yy * aa - ya * ya, xa * ya - xy * aa, xy * ya - xa * yy
+    each = 1 / (xx * of_xx + xy * of_xy + xa * of_xa)
+    rest = (xx * aa - xa * xa) * each, (xy * xa - xx * ya) * each, (xx * yy - xy * xy) * each
+    return of_xx * each, of_xy * each, of_xa * each, *rest
+
+
+def _seen_from(yaw: float, inverse: Symmetric) -> Array:
+    """The covariance (3, 3) of a step, in the frame of a base with heading `yaw`."""
+    c, s, scale = math.cos(yaw), math.sin(yaw), INFLATED * SIGMA**2
+    xx, xy, xa, yy, ya, aa = (scale * value for value in inverse)
+    crossed = c * s * (yy - xx) + (c * c - s * s) * xy
+    ahead, left = c * xa + s * ya, c * ya - s * xa
+    along, aside = c * c * xx + 2 * c * s * xy + s * s * yy, s * s * xx - 2 * c * s * xy + c * c * yy
+    return np.array((
+        (along + FLOOR[0], crossed, ahead), (crossed, aside + FLOOR[1], left), (ahead, left, aa + FLOOR[2]),
+    ))  # fmt: skip
 
 
 def _within(step: tuple[float, float], limits: tuple[float, float]) -> bool:
