@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -35,6 +35,14 @@ class Truth(NamedTuple):
     twist: Twist
     clearance: float
     objects: Mapping[str, Pose3] = MappingProxyType({})
+
+
+class Late(Protocol):
+    """A sample of the truth that is worked out when somebody asks for it."""
+
+    def truth(self) -> Truth:
+        """All of it."""
+        ...
 
 
 class LogLine(NamedTuple):
@@ -70,15 +78,21 @@ class Decision:
 class Moment:
     """One beat of the lockstep: truth, what the robot was told (faults applied), what it decided, what happened.
 
-    `truth` is None on beats between two truth samples. `events` are the world's and the scenario's; the stack's own
+    `sample` is None on beats between two truth samples. `events` are the world's and the scenario's; the stack's own
     stay in `decision.events`. A trace holds both, in that order.
     """
 
     tick: int
-    truth: Truth | None
+    sample: Truth | Late | None
     readings: Readings
     decision: Decision
     events: tuple[Event, ...] = ()
+
+    @property
+    def truth(self) -> Truth | None:
+        """How the robot really is; None on beats between two samples."""
+        sample = self.sample
+        return sample if sample is None or isinstance(sample, Truth) else sample.truth()
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field, replace
 
 from simscen.core.events import Event
-from simscen.core.trace import Moment, Truth
+from simscen.core.trace import Late, Moment, Truth
 from simscen.record.backlog import Log
 from simscen.run.ending import Ending
 from simscen.run.faultrig import FaultRig
@@ -31,18 +31,21 @@ class Agent:
     """Whether anything is due for it at this beat."""
     next: int = field(default=0, init=False)
     """The tick of its next beat."""
-    _truth: Truth | None = field(default=None, init=False)
+    _sample: Truth | Late | None = field(default=None, init=False)
     moment: Moment = field(init=False)
     """What it made of its last beat."""
 
     def look(self, tick: int) -> None:
         """Where the robot is now, and what it has touched."""
-        self._truth = self.robot.truth() if tick % self.truth_period == 0 else None
         self.due = tick == self.next
         if self.due:
             self.next += self.timetable.until_next(tick)
+        sampled = tick % self.truth_period == 0
         if self.stage.watched:
-            self.stage.begin_beat(self._truth, self.due)
+            self._sample = truth = self.robot.truth() if sampled else None
+            self.stage.begin_beat(truth, self.due)
+        else:
+            self._sample = self.robot.sample(self.truth_period) if sampled else None
         for collision in self.robot.collisions():
             self.stage.note(collision)
 
@@ -60,7 +63,7 @@ class Agent:
         if decision.events:
             self.ending.heard(decision)
         events = stage.take_events() if stage.fresh else ()
-        self.moment = Moment(tick, self._truth, readings, decision, events)
+        self.moment = Moment(tick, self._sample, readings, decision, events)
 
     def record(self, end: Event | None) -> None:
         """Hand the moment to all who listen, with the end of the run where this is it."""

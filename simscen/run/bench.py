@@ -123,7 +123,8 @@ def _watched(watch: Stopwatch, rig: Rig, own: Sequence[Log]) -> Sequence[Log]:
     (agent,) = rig.agents
     watch.watch("physics", rig.simulation, "step")
     watch.watch("physics", agent.robot, "drive")
-    watch.watch("truth and contacts", agent.robot, "truth", "collisions")
+    watch.watch("truth and contacts", agent.robot, "truth", "sample", "collisions")
+    watch.watch("truth and contacts", agent.robot.samples, "settle")
     watch.watch("sensors", agent.senses, "read")
     if isinstance(agent.stack, InstalledStack) and isinstance(agent.stack.inner, ReferenceStack):
         for name, component, methods in agent.stack.inner.components:

@@ -375,6 +375,24 @@ class Actors:
                 near.append(actor.id)
         return near
 
+    def gap(self, place: Vector, distance: float, tick: int, by: int) -> float | None:
+        """How much farther than a distance from a place, in metres, `within` would have to look to find anybody.
+
+        None where what is pushed or led may come from anywhere soon. `within` was asked just now.
+        """
+        about, poses = self._about[by], self.poses(tick)
+        if self._pushable or any(actor.led for actor in self._travelling):
+            return None
+        gap = about.distance - math.dist(place, about.place) - self.come_in(tick - about.tick)
+        for actor in about.actors:
+            away = min(math.dist(poses[actor.body.name][:3], place), math.dist(actor.shown[:3], place))
+            gap = min(gap, away - actor.size)
+        return gap - distance
+
+    def come_in(self, ticks: int) -> float:
+        """How far in metres any script moves anything in so many ticks, at most."""
+        return self._fastest * ticks / self._rate
+
     def _look_about(self, place: Vector, distance: float, tick: int, asleep: int | None) -> "_About":
         poses = self.poses(tick)
         actors = tuple(

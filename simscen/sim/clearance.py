@@ -4,6 +4,7 @@ import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import pybullet
 
@@ -13,7 +14,7 @@ from simscen.sim.actors import Actors
 from simscen.sim.drives import Base
 from simscen.sim.outline import extremes
 from simscen.sim.outline import reach as reach_of
-from simscen.sim.proximity import Proximity
+from simscen.sim.proximity import Proximity, motion
 from simscen.sim.robot_body import RobotBody
 from simscen.sim.state import State
 
@@ -25,6 +26,14 @@ ROUNDED = 0.05
 """m that shapes may extend further than their corners, which is where sizes come from."""
 
 Vector = tuple[float, float, float]
+
+
+class _Alone(NamedTuple):
+    """When and where it was measured that anything that moves is farther than what stands, by a `gap` in metres."""
+
+    tick: int
+    pose: Pose3
+    gap: float
 
 
 class Clearance:
@@ -78,6 +87,7 @@ class Clearance:
         """Something was put into or taken out of the world, or set down elsewhere: measure anew."""
         self._distance = 0.0
         self._measured_at, self.no_contact_before = -1, 0
+        self._alone: _Alone | None = None
         self._actors.undisturbed(self._base.id, until=-1)
         self.enclosed_by: str | None = None
         """The solid that the robot is wholly inside of, where it touches no surface."""
@@ -87,7 +97,7 @@ class Clearance:
     def shaken(self, tick: int) -> None:
         """A push will change the robot's velocity during the step from `tick` on: how it moves now says nothing."""
         self._shaken_at = tick
-        self._measured_at, self.no_contact_before = -1, tick
+        self._measured_at, self.no_contact_before, self._alone = -1, tick, None
         self._actors.undisturbed(self._base.id, until=tick)
 
     def measure(self, tick: int) -> float:
@@ -108,7 +118,32 @@ class Clearance:
         free = min(HORIZON, max(0.0, gap - TOLERANCE) / self._fastest(tick))
         self.no_contact_before = tick + (math.floor(free * self._rate) if tick != self._shaken_at else 0)
         self._actors.undisturbed(self._base.id, until=self.no_contact_before)
+        self._alone = None
+        if not (self.others or self.unsure) and self._ways is self._proximity:
+            farther = self._actors.gap(pose[:3], self._distance + self.size, tick, self._base.id)
+            self._alone = None if farther is None else _Alone(tick, pose, farther)
         return self._distance
+
+    def can_wait(self, tick: int, ticks: int, pose: Pose3) -> bool:
+        """Whether `standing` will do for `measure` at `tick`, which is now, and nothing is touched for so many ticks.
+
+        Told by how far the robot has come since the last measurement, without another.
+        """
+        if self._alone is None:
+            return False
+        since, before, gap = self._alone
+        moved = motion(before, pose, self._radius, self._height)
+        # It may have come nearer to what moves, and gone from what stands.
+        if gap - 2 * moved - self._actors.come_in(tick - since) <= 0:
+            return False
+        if tick + ticks > self.no_contact_before:
+            free = min(HORIZON, max(0.0, self._distance - moved - TOLERANCE) / self._fastest(tick))
+            self.no_contact_before = max(self.no_contact_before, tick + math.floor(free * self._rate))
+        return tick + ticks <= self.no_contact_before
+
+    def standing(self, pose: Pose3) -> float:
+        """What `measure` gave for a robot at `pose` at a tick for which it could wait."""
+        return min(self._reach, self._ways.distance(pose))
 
     def _search(self, tick: int, pose: Pose3, standing: Proximity) -> float:
         nearest, place = min(self._reach, standing.distance(pose)), pose[:3]

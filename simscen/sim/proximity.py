@@ -59,7 +59,7 @@ class Proximity:
         come nearer than the nearest, and the nearest no farther than it may have gone: what is asked costs time for
         each triangle within reach.
         """
-        moved = _motion(self._pose, pose, self._radius, self._height)
+        moved = motion(self._pose, pose, self._radius, self._height)
         self._travelled += moved
         self._pose = pose
         if math.dist(pose[:2], self._centre) > STRIDE:
@@ -165,7 +165,7 @@ class Proximity:
         CLIENTS.give_back(self._client)
 
 
-def _motion(before: Pose3, after: Pose3, radius: float, height: float) -> float:
+def motion(before: Pose3, after: Pose3, radius: float, height: float) -> float:
     """The most that any point within `radius` of the base's axis and `height` of its origin has moved, in metres."""
     _, _, _, ax, ay, az, aw = before
     _, _, _, bx, by, bz, bw = after

@@ -11,7 +11,7 @@ from simscen.core.events import Event
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.motion import Twist
 from simscen.core.shapes import Body, TriangleMesh
-from simscen.core.trace import Truth
+from simscen.core.trace import Late, Truth
 from simscen.sim.actors import Actors
 from simscen.sim.camera import picture
 from simscen.sim.clearance import Clearance
@@ -21,7 +21,8 @@ from simscen.sim.film import Film
 from simscen.sim.floor import Floor
 from simscen.sim.lost import lost
 from simscen.sim.robot_body import RobotBody
-from simscen.sim.state import Seen
+from simscen.sim.samples import Samples
+from simscen.sim.state import Seen, State
 from simscen.sim.terrain import Terrain, stands
 from simscen.sim.walls import Walls
 
@@ -82,6 +83,11 @@ class Scene:
         for robot in self.robots.values():
             robot.shaken()
 
+    def settle(self) -> None:
+        """Something is about to be put into or taken out of the world, or moved: see what is before."""
+        for robot in self.robots.values():
+            robot.samples.settle()
+
     def changed(self) -> None:
         """Something was put into or taken out of the world, or set down elsewhere."""
         for robot in self.robots.values():
@@ -118,6 +124,7 @@ class Robot:
         self.clearance = Clearance(
             scene.client, scene.rate, static, obstacles, uneven, body, self.base, self._seen, scene.actors, reach
         )
+        self.samples = Samples(self.clearance, scene.actors)
         self._names: dict[int, str | None] = {}
 
     def drive(self, command: Twist) -> None:
@@ -126,15 +133,32 @@ class Robot:
 
     def truth(self) -> Truth:
         """The robot as it really is. Raises RunError when the physics has lost it or anything else."""
-        scene, state, tick = self._scene, self._seen(), self._scene.tick
-        (x, y, z, i, j, k, w), (vx, vy, vz), (wx, wy, wz) = pose, _, _ = state
-        trouble = lost(self._who, x, y, z, i + j + k + w + vx + vy + vz + wx + wy + wz) or scene.actors.lost(tick)
+        tick = self._scene.tick
+        return self._truth(tick, self._sound(tick))
+
+    def sample(self, ticks: int) -> Truth | Late:
+        """The same, to be looked at later; it is asked again after so many ticks. Raises as `truth`."""
+        tick = self._scene.tick
+        state = self._sound(tick)
+        if not self._contacts.touching and self.clearance.can_wait(tick, ticks, state.pose):
+            return self.samples.take(tick, state)
+        self.samples.settle()
+        return self._truth(tick, state)
+
+    def _sound(self, tick: int) -> State:
+        """Its state. Raises RunError when the physics has lost it or anything else."""
+        (x, y, z, i, j, k, w), (vx, vy, vz), (wx, wy, wz) = state = self._seen()
+        actors = self._scene.actors
+        trouble = lost(self._who, x, y, z, i + j + k + w + vx + vy + vz + wx + wy + wz) or actors.lost(tick)
         if trouble is not None:
-            raise RunError("diverged", f"simulation diverged at t={tick / scene.rate:.3f} s: {trouble}")
+            raise RunError("diverged", f"simulation diverged at t={tick / self._scene.rate:.3f} s: {trouble}")
+        return state
+
+    def _truth(self, tick: int, state: State) -> Truth:
         clearance = self.clearance.measure(tick)
         if self._contacts.touched(tick):
             clearance = min(clearance, 0.0)  # surfaces that press on each other may be a hair apart
-        return Truth(pose, state.twist, clearance, self.objects())
+        return Truth(state.pose, state.twist, clearance, self.objects())
 
     def collisions(self) -> tuple[Event, ...]:
         """collision.started and collision.ended since last asked.
@@ -256,5 +280,6 @@ class Robot:
         return stands(self._scene.terrain.names, self.base.rolling, other, link, up)
 
     def close(self) -> None:
-        """Give back what it has of engines of its own."""
+        """Give back what it has of engines of its own, and look at none any more."""
+        self.samples.settle()
         self.clearance.close()

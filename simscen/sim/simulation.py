@@ -173,21 +173,25 @@ class Simulation:
 
     def spawn(self, body: Body) -> None:
         """Put a body into the world."""
+        self._scene.settle()
         self._scene.actors.add(self._scene.terrain.lifted(body), self.tick)
         self._scene.changed()
 
     def remove(self, name: str) -> None:
         """Take a body out of the world; unknown names are ignored."""
+        self._scene.settle()
         self._scene.actors.remove(name)
         self._scene.changed()
 
     def move(self, name: str, path: MotionPath) -> None:
         """Let a body follow a path that begins now. Raises KeyError for an unknown name."""
+        self._scene.settle()
         self._scene.actors.move(name, path, self.tick)
         self._scene.changed()
 
     def place(self, name: str, pose: Pose2) -> None:
         """Set a body down somewhere else, at rest; no path moves it any more. Raises KeyError for an unknown name."""
+        self._scene.settle()
         self._scene.actors.place(name, pose, self.tick)
         self._scene.changed()
 
@@ -214,6 +218,7 @@ class Simulation:
 
     def come(self, body: Body, speed: float) -> None:
         """Let a round body come that `follow` will move, never faster than `speed` in m/s."""
+        self._scene.settle()
         path = MotionPath((0.0,), (body.pose.plane,))
         self._scene.actors.add(replace(body, path=path), self.tick)
         self._scene.actors.follow(body.name, path, speed, self.tick)

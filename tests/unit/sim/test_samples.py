@@ -1,0 +1,35 @@
+"""Samples of the truth that are looked at later are those that would have been seen at once."""
+
+import pytest
+from playground import box
+
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.shapes import Body, Box, MotionPath, Solid
+from simscen.core.trace import Truth
+
+PASSING = MotionPath((0.0, 6.0), (Pose2(4.0, 4.0), Pose2(2.0, -1.0)))
+CRATE = Body("crate", (Solid(Box((0.3, 0.3, 0.3))),), Pose3(2.2, 1.2, 0.15))
+
+
+@pytest.mark.parametrize("mass", [0.0, 5.0])
+def test_samples_looked_at_later_are_those_of_the_moment(simulate, mass: float) -> None:
+    solids = [box("near", 1.5, 0.8, 0.4, 0.3), box("far", 3.5, -0.9, 0.4, 0.3), box("ahead", 6.0, 0.0, 0.4, 4.0)]
+    cart = Body("cart", (box("cart", 0, 0, 0.4, 0.4),), Pose3(4.0, 4.0), path=PASSING)
+    asked, waiting = (simulate(solids=solids, bodies=[cart], drive=(0.5, 0.0, 0.05)) for _ in range(2))
+    seen, late = [], []
+    for beat in range(480):
+        for simulation in (asked, waiting):
+            if beat == 100:
+                simulation.spawn(Body("crate", CRATE.solids, CRATE.pose, mass))
+            elif beat == 203:
+                simulation.place("crate", Pose2(2.2, 2.0))
+            elif beat == 305:
+                simulation.remove("crate")
+            simulation.step(6)
+        seen.append(asked.truth())
+        late.append(waiting.robot.sample(6))
+    collisions = asked.collisions()
+    assert [event.tick for event in waiting.collisions()] == [event.tick for event in collisions] != []
+    waited = sum(not isinstance(sample, Truth) for sample in late)
+    assert 0 < waited < len(late)
+    assert [sample if isinstance(sample, Truth) else sample.truth() for sample in late] == seen
