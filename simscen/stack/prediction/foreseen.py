@@ -13,7 +13,7 @@ import numpy.typing as npt
 from simscen.core.geometry import Array, Pose2
 from simscen.stack.planners.rates import MAX_NON_OBSTACLE
 from simscen.stack.prediction.avoidance import ROOM
-from simscen.stack.prediction.moving import Moving
+from simscen.stack.prediction.moving import WIDEST, Moving
 from simscen.stack.prediction.rollouts import HORIZON
 from simscen.stack.protocols import CostmapView
 
@@ -55,7 +55,8 @@ def _dear(moving: Moving, x: Array, y: Array, times: Array, radius: float) -> np
 
 def meets(moving: Moving, robot: Pose2, way: Array, speed: float, radius: float) -> bool:
     """Whether a robot at `robot` that drives along `way` (n, 2) at `speed` comes too near to what moves."""
-    if not len(moving):
+    moving = moving.near(robot.x, robot.y, radius + WIDEST, speed, HORIZON)
+    if not moving.things:
         return False
     steps = np.hypot(*np.diff(np.vstack(((robot.x, robot.y), way)), axis=0).T)
     times = np.cumsum(steps) / speed

@@ -71,12 +71,13 @@ class Going:
         come = track.place - first.place
         if (come.conjugate() * track.velocity).real <= 0.0:
             return False
-        way, seconds, whole = abs(come), (tick - first.tick) / self._rate, sum(each.edges == BOTH for each in lately)
-        sure = speed > SURE * track.speed_deviation
+        way, seconds, sure = abs(come), (tick - first.tick) / self._rate, speed > SURE * track.speed_deviation
         # Over the last updates, both ends may be off; and of what is half seen, more may come into view.
-        unsure = SURE * math.sqrt(2.0) * track.place_deviation
-        went = way > max(least * seconds, unsure) and 2 * whole > len(lately)
-        if (sure or went) and sum(each.came for each in lately) >= max(HITS, MOSTLY * len(lately)):
+        went = way > max(least * seconds, SURE * math.sqrt(2.0) * track.place_deviation)
+        if not (sure or went):
+            return False
+        whole = sum(each.edges == BOTH for each in lately)
+        if (sure or 2 * whole > len(lately)) and sum(each.came for each in lately) >= max(HITS, MOSTLY * len(lately)):
             return way > TRAVELLED
         # Without that, only beside something else that moves: it may have hidden the place.
         if not sure or speed < TWICE * least or not any(each.moving for each in tracks):
@@ -94,6 +95,6 @@ def _slides(track: Track, tracks: list[Track]) -> bool:
 
     So does a wall of which the robot sees another part at each moment. What does move begins anew when it comes.
     """
-    if track.moved or len(track.lately) < UNCOME or any(each.came for each in list(track.lately)[-UNCOME:]):
+    if track.moved or track.uncome < UNCOME:
         return False
     return not any(each.moving for each in tracks)

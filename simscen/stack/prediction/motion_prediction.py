@@ -38,6 +38,7 @@ class MotionPrediction:
         self._nothing = nothing(spec.acceleration)
         self._seeing: list[Tracker] = []
         self._foretold: tuple[int, Moving] | None = None
+        self._told: tuple[Moving, Pose2, Pose2, Moving] | None = None
         self._plan: Path | None = None
         self._followed: Followed | None = None
         self.take = self._rolled.take
@@ -83,7 +84,12 @@ class MotionPrediction:
     def seen_from(self, tick: int, pose: Pose2) -> Moving:
         """What moves at a tick, in a frame in which the robot is at `pose` now."""
         moving = self.moving(tick)
-        return moving.seen_from(self._rolled.now.compose(pose.inverse())) if moving.things else moving
+        if not moving.things:
+            return moving
+        now, told = self._rolled.now, self._told
+        if told is None or told[0] is not moving or told[1] is not now or told[2] is not pose:
+            self._told = told = moving, now, pose, moving.seen_from(now.compose(pose.inverse()))
+        return told[3]
 
     def steer(
         self, tick: int, wanted: Twist, pose: Pose2, twist: Twist, costmap: CostmapView, plan: Path | None

@@ -28,21 +28,22 @@ class Rolled:
         self._turned, self._turns = 0.0, 0
         self._waiting: deque[Odometry | Imu] = deque(maxlen=WAITING)
         self._poses = deque([(-1, 0.0, 0.0, 0.0)])
+        self._now = _pose(self._poses[-1])
         self.take: Callable[[Odometry | Imu], None] = self._waiting.append
         """Takes a reading in; there are eighty a second, so that is all that it does."""
 
     @property
     def now(self) -> Pose2:
-        """The newest pose; the origin before there is any."""
+        """The newest pose, the same object until there is another; the origin before there is any."""
         self._add_up()
-        return _pose(self._poses[-1])
+        return self._now
 
     def at(self, tick: int) -> Pose2:
         """The newest pose up to a tick; the oldest known before that."""
         self._add_up()
         poses = self._poses
         if poses[-1][0] <= tick:
-            return _pose(poses[-1])
+            return self._now
         return _pose(next((each for each in reversed(poses) if each[0] <= tick), poses[0]))
 
     def _add_up(self) -> None:
@@ -71,6 +72,7 @@ class Rolled:
             last, turned, turns = reading, 0.0, 0
         self._last, self._turned, self._turns = last, turned, turns
         self._waiting.clear()
+        self._now = _pose(self._poses[-1])
         while self._poses[0][0] < newest - KEPT * self._rate:
             self._poses.popleft()
 

@@ -36,6 +36,8 @@ class Track(Point):
     lately: deque[Update] = field(default_factory=lambda: deque(maxlen=LATELY))
     moving: bool = False
     moved: bool = False
+    uncome: int = 0
+    """Its last updates in which it has not stood where it had been free."""
 
     @classmethod
     def begun(cls, tick: int, place: complex, deviation: float, radius: float) -> "Track":
@@ -50,6 +52,7 @@ class Track(Point):
     def note(self, tick: int, came: bool, stood: bool, edges: int) -> None:
         """Note that it was hit."""
         self.lately.append(Update(tick, self.place, came, stood, edges))
+        self.uncome = 0 if came else self.uncome + 1
 
     @property
     def place_deviation(self) -> float:
