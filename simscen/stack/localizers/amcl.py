@@ -66,11 +66,8 @@ class AmclLocalizer:
         self._filter.begin(estimate)
         settling = self._spec.settling_distance
         self._finder = None if self._search is None else Finder(*self._search, estimate, settling)
-        if estimate.pose is None:
-            pose, covariance = summarise(self._filter.particles)
-        else:
-            pose, covariance = estimate.pose, np.diag(np.square(estimate.std))
-        self._correction = _Correction(pose, covariance, Pose2(0, 0, 0), 0)
+        self._told = estimate
+        self.__dict__.pop("_correction", None)
         self._moved_to: Pose2 | None = None
         self._matcher = ScanMatcher() if self._spec.match_scans else None
         self._scatter = Scatter() if self._spec.covariance == "scatter" and self._matcher is not None else None
@@ -79,6 +76,15 @@ class AmclLocalizer:
         self._due: dict[str, bool] = {}
         self._waiting: dict[str, Scan] = {}
         self._belief: Belief | None = None
+
+    @cached_property
+    def _correction(self) -> _Correction:
+        """The newest; before there is any, what was told. Particles anywhere take 4 ms to sum up, if anyone asks."""
+        if self._told.pose is None:
+            pose, covariance = summarise(self._filter.particles)
+        else:
+            pose, covariance = self._told.pose, np.diag(np.square(self._told.std))
+        return _Correction(pose, covariance, Pose2(0, 0, 0), 0)
 
     def on_odometry(self, odometry: Odometry) -> None:
         """Carry the pose on, and use scans that waited for this odometry."""
