@@ -24,7 +24,12 @@ class TurnSlip:
         self._before: tuple[Pose2, Pose2] | None = None
 
     def learn(self, wheels: Pose2, fused: Pose2) -> None:
-        """Where the wheels say the robot is, each step along what they turned, and where it is taken to be."""
+        """Where the wheels say the robot is, each step along what they turned, and where it is taken to be.
+
+        Numbers that are not finite, as of a broken sensor, teach nothing.
+        """
+        if not math.isfinite(wheels.x + wheels.y + wheels.yaw + fused.yaw):
+            return
         before, self._before = self._before, (wheels, fused)
         if before is None:
             return
