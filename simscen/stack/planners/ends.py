@@ -40,14 +40,14 @@ def find_ends(rates: Rates, start: Pose2, goal: Pose2, tolerance: float) -> Ends
     _possible(rates, start, ErrorCode.START_OUTSIDE_MAP, ErrorCode.START_OCCUPIED, "start")
     _possible(rates, goal, ErrorCode.GOAL_OUTSIDE_MAP, ErrorCode.GOAL_OCCUPIED, "goal")
     free = rates.free
-    begin = next((place for place in _near(rates, free, start, ESCAPE) if _open(rates, start, place)), None)
+    begin = next((place for place in near(rates, free, start, ESCAPE) if _open(rates, start, place)), None)
     if begin is None:
         raise NavigationFailure(ErrorCode.START_OCCUPIED, f"no free place within {ESCAPE} m of the start")
-    if next(_near(rates, free, goal, tolerance), None) is None:
+    if next(near(rates, free, goal, tolerance), None) is None:
         raise NavigationFailure(ErrorCode.GOAL_OCCUPIED, f"no room for the robot within {tolerance} m of the goal")
     pieces, _ = label(free)
     reachable = pieces == pieces[_cell(rates, begin)]
-    end = next(_near(rates, reachable, goal, tolerance), None)
+    end = next(near(rates, reachable, goal, tolerance), None)
     if end is None:
         raise NavigationFailure(ErrorCode.NO_VALID_PATH, "start and goal are not connected")
     return Ends(begin, end, reachable)
@@ -68,12 +68,11 @@ def _cell(rates: Rates, point: tuple[float, float]) -> tuple[int, int]:
     )
 
 
-def _near(rates: Rates, free: npt.NDArray[np.bool_], pose: Pose2, within: float) -> Iterator[tuple[float, float]]:
-    """The point itself if its cell is free, else the centres of free cells at most `within` away, nearest first."""
+def near(rates: Rates, free: npt.NDArray[np.bool_], pose: Pose2, within: float) -> Iterator[tuple[float, float]]:
+    """The point itself if its cell is free, then the centres of free cells at most `within` away, nearest first."""
     row, column = _cell(rates, (pose.x, pose.y))
     if free[row, column]:
         yield pose.x, pose.y
-        return
     reach = math.ceil(within / rates.resolution)
     top, left = max(0, row - reach), max(0, column - reach)
     cells = np.argwhere(free[top : row + reach + 1, left : column + reach + 1]) + np.array((top, left))

@@ -26,6 +26,8 @@ BLOCK, PRICED_BLOCK = 0.2, 0.15
 MOST_BLOCKS, MOST_PRICED = 40_000, 20_000
 """Larger maps get larger blocks: Dijkstra on 40 000 takes 10 ms. None is wider than the robot, though, for in one that
 holds a wall both sides of the wall would be one place."""
+SPARSE = 0.45
+"""Metres between the places of a way where there is room: every third block, or every one on a large map."""
 LEG = 30.0
 """Metres of a way that are searched in one go."""
 Mask = npt.NDArray[np.bool_]
@@ -68,20 +70,28 @@ class InformedSet:
 
     def holds(self, points: Array) -> Mask:
         """Which of the points (n, 2) lie in the set."""
-        columns, rows = ((points - self._origin) / self._size).astype(np.int64).T
-        held: Mask = np.frombuffer(self._inside, dtype=bool)[rows * self._width + columns]
+        held: Mask = np.frombuffer(self._inside, dtype=bool)[self._blocks(points)]
         return held
+
+    def through(self, points: Array) -> Array:
+        """How long the shortest ways through each of the points (n, 2) are, or what they cost."""
+        return np.asarray(self._sum[self._blocks(points)])
+
+    def _blocks(self, points: Array) -> npt.NDArray[np.int64]:
+        columns, rows = ((points - self._origin) / self._size).astype(np.int64).T
+        return np.asarray(rows * self._width + columns)
 
     def way(self, costmap: CostmapView, roomy: float) -> Array:
         """The places (n, 2) with most room in the blocks of the way itself, but those of its ends; where there is as
-        much as `roomy` metres, every third only.
+        much as `roomy` metres, those `SPARSE` metres apart only.
         """
         blocks = [int(self._before[0, self._end])]
         while blocks[-1] >= 0:
             blocks.append(int(self._before[0, blocks[-1]]))
         between = np.array(blocks[:-2], dtype=np.int64)
         rows, columns = roomiest(costmap.distance, np.column_stack(np.divmod(between, self._width)), self._factor)
-        kept = (costmap.distance[rows, columns] < roomy) | (np.arange(len(rows)) % 3 == 0)
+        every = max(1, round(SPARSE / self._size))
+        kept = (costmap.distance[rows, columns] < roomy) | (np.arange(len(rows)) % every == 0)
         places: Array = (np.column_stack((columns, rows))[kept] + 0.5) * costmap.resolution + self._origin
         return places
 

@@ -1,6 +1,8 @@
 """Plans poses rather than points: Dubins and Reeds-Shepp paths for cars, SE(2) for long hulls."""
 
 import math
+from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
@@ -9,13 +11,16 @@ from simscen.core.navigation import ErrorCode, Path
 from simscen.model.planners import OmplPlanner as PlannerSpec
 from simscen.stack.cusps import cusps
 from simscen.stack.footprint import Footprint
-from simscen.stack.planners.ends import find_ends
+from simscen.stack.planners.ends import find_ends, near
+from simscen.stack.planners.escapes import escapes
 from simscen.stack.planners.field import Field
 from simscen.stack.planners.informed_set import InformedSet
 from simscen.stack.planners.pose_search import Space, Valid, search_poses
-from simscen.stack.planners.rates import Rates
+from simscen.stack.planners.rates import NO_INFORMATION, Rates
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
 
+PLANE_ONLY = ("bit_star", "aorrtc")
+"""RRT-Connect stands in for them: over poses OMPL's AORRTC (2.0.1) calls a path of the goal alone an exact solution."""
 TIGHTEST = 0.2
 """Metres: the arcs of a long robot that could turn in place, but should not have to."""
 ROOM_TO_STEER = 1.15
@@ -33,6 +38,8 @@ ATTEMPTS = (
 """Slack of the informed set, room, share of the iterations. Cars need wider sets than discs: they swing out."""
 TRIES = 6
 """Searches in all once there is a path: trees over poses make detours, and each takes only milliseconds."""
+DEEPER = 0.01
+"""Metres that a hull may sink further into what it touches while it gets away: the costmap tells no less."""
 CUSP = 1.0
 """Metres that a change of direction counts as: about what a car could drive while it stops and steers round."""
 
@@ -43,27 +50,27 @@ class PosePlanner:
     def __init__(self, spec: PlannerSpec, robot: RobotModel, footprint: Footprint, space: Space) -> None:
         self._spec, self._robot, self._footprint, self._space = spec, robot, footprint, space
         self._inscribed = robot.inscribed_radius
-        self._type = "rrt_connect" if spec.type == "bit_star" else spec.type
+        self._type = "rrt_connect" if spec.type in PLANE_ONLY else spec.type
         self._turning_radius = max(ROOM_TO_STEER * robot.turning_radius, TIGHTEST)
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
         """A path of poses in the map frame, 5 cm apart; the easiest of a few searches."""
-        field = Field(costmap)
         rates = Rates(costmap, self._robot, self._spec.cost_travel_multiplier, self._spec.allow_unknown)
+        field = Field(costmap if self._spec.allow_unknown else self._shut(costmap))
         ends = find_ends(rates, start, goal, self._spec.tolerance)
-        self._hull_fits(costmap, start, ErrorCode.START_OCCUPIED, "start")
-        goal = Pose2(*ends.goal, goal.yaw)
-        self._hull_fits(costmap, goal, ErrorCode.GOAL_OCCUPIED, "goal")
-        informed = InformedSet(rates, ends.start, ends.goal)
+        goal = self._fitting(costmap, goal, near(rates, ends.reachable, goal, self._spec.tolerance))
+        away = self._led_away(rates, start)
+        begin = Pose2(*away[-1].tolist())
+        informed = InformedSet(rates, (begin.x, begin.y), (goal.x, goal.y))
         for slack, room, share in ATTEMPTS:
             informed.narrow(slack)
-            valid = self._valid(field, informed, room, (start, goal))
+            valid = self._valid(field, informed, room, (begin, goal))
             iterations = max(1, round(share * self._spec.max_iterations))
             found: list[Array] = []
             while True:
                 seed += 1
                 poses = search_poses(
-                    self._type, self._space, self._turning_radius, informed.bounds(), start, goal, valid, seed,
+                    self._type, self._space, self._turning_radius, informed.bounds(), begin, goal, valid, seed,
                     iterations,
                 )  # fmt: skip
                 if poses is None:
@@ -72,18 +79,49 @@ class PosePlanner:
                 if len(found) == TRIES:
                     break
             if found:
-                return Path(min(found, key=lambda poses: _effort(rates, poses)))
+                best = min(found, key=lambda poses: _effort(rates, poses))
+                return Path(np.concatenate((away[:-1], best)))
         message = f"{self._type}: no path in {self._spec.max_iterations} iterations"
         raise NavigationFailure(ErrorCode.NO_VALID_PATH, message)
 
-    def _hull_fits(self, costmap: CostmapView, pose: Pose2, code: ErrorCode, what: str) -> None:
-        if not self._footprint.free(costmap, np.array([pose]))[0]:
-            raise NavigationFailure(code, f"the robot does not fit at the {what} ({pose.x:.2f}, {pose.y:.2f})")
+    def _shut(self, costmap: CostmapView) -> CostmapView:
+        """The costmap with no room for the robot where nothing is known."""
+        least = np.minimum(costmap.distance, np.float32(self._inscribed))
+        return replace(costmap, distance=np.where(costmap.costs == NO_INFORMATION, least, costmap.distance))
+
+    def _fitting(self, costmap: CostmapView, goal: Pose2, places: Iterable[tuple[float, float]]) -> Pose2:
+        """The goal at the first of the places where the whole hull fits, with its heading kept."""
+        poses = np.array([(*place, goal.yaw) for place in places])
+        free = self._footprint.free(costmap, poses)
+        if not free.any():
+            within = f"within {self._spec.tolerance} m of the goal ({goal.x:.2f}, {goal.y:.2f})"
+            raise NavigationFailure(ErrorCode.GOAL_OCCUPIED, f"the robot does not fit {within}")
+        return Pose2(*poses[free.argmax()].tolist())
+
+    def _led_away(self, rates: Rates, start: Pose2) -> Array:
+        """Poses (n, 3) from the start to the nearest one where the whole hull fits: the start alone if it fits there.
+
+        A start where it touches something is left on the shortest arc that leads no deeper.
+        """
+        costmap, best = rates.costmap, None
+        for arc in escapes(self._space, self._turning_radius, start):
+            free = self._footprint.free(costmap, arc) & np.isfinite(rates.at(arc[:, :2]))
+            clear = int(free.argmax())
+            if not free[clear] or (best is not None and clear + 1 >= len(best)):
+                continue
+            rooms = self._footprint.clearance(costmap, arc[: clear + 1])
+            if (rooms >= rooms[0] - DEEPER).all():
+                best = arc[: clear + 1]
+        if best is None:
+            message = f"the robot does not fit at the start ({start.x:.2f}, {start.y:.2f}) nor can it get away"
+            raise NavigationFailure(ErrorCode.START_OCCUPIED, message)
+        return best
 
     def _valid(self, field: Field, informed: InformedSet, room: float, ends: tuple[Pose2, Pose2]) -> Valid:
         """Whether a pose is in the informed set and clear of obstacles; near the ends without the extra room."""
         offsets = self._footprint.discs.offsets.tolist()
-        tight, roomy = self._footprint.discs.radius, self._footprint.discs.radius + room
+        roomy = self._footprint.discs.radius + room
+        sure = self._footprint.discs.radius + math.sqrt(2.0) * field.resolution  # from middle to middle of two cells
         inner = self._inscribed
         at, has, free, costmap = field.at, informed.has, self._footprint.free, field.costmap
 
@@ -92,11 +130,9 @@ class PosePlanner:
                 return False
             cosine, sine = math.cos(yaw), math.sin(yaw)
             least = min(at(x + offset * cosine, y + offset * sine) for offset in offsets)
-            if least > roomy:
-                return True
-            if min(math.hypot(x - end.x, y - end.y) for end in ends) > 2 * roomy:
+            if least <= roomy and min(math.hypot(x - end.x, y - end.y) for end in ends) > 2 * roomy:
                 return False
-            return least > tight or bool(free(costmap, np.array([(x, y, yaw)]))[0])
+            return least > sure or bool(free(costmap, np.array([(x, y, yaw)]))[0])
 
         return valid
 

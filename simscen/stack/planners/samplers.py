@@ -16,11 +16,10 @@ DENSITIES = (1, 2, 4, 8)
 """Samples to the metre of one search after the other, as multiples."""
 CORRIDORS = (0.05, 0.15, 1.0)
 """How much longer than the coarse grid's shortest way a way in the corridor may be (ratio), one after the other."""
-DEARER = (0.15, 0.05, 0.02)
-"""How much more a way may cost than the cheapest over blocks (ratio) to be looked at: these err by a few per cent. The
-lesser ones are for mazes of a hundred metres, where there are …"""
-MOST_SAMPLES = 4000
-"""… more samples than that, of which BIT* takes some ten iterations each."""
+DEARER = 0.15
+"""How much more a way may cost than the cheapest over blocks (ratio) to be looked at: these err by a few per cent."""
+MOST_SAMPLES = 3000
+"""Where there are more, those on the cheapest ways: BIT* takes some ten iterations for each."""
 REACH, FAR_REACH = 1.8, 2.3
 """Metres between samples up to which a straight way is tried: where a way over blocks is among them, and elsewhere."""
 ROOMY = 0.15
@@ -50,12 +49,10 @@ def medial_axis(rates: Rates, ends: Ends, seed: int) -> Iterator[Legs]:
 def _where_cheap(rates: Rates, ends: Ends, samples: Array) -> Array:
     """Those where a way that costs little more than the cheapest over blocks can pass, and points of that way."""
     informed = InformedSet(rates, ends.start, ends.goal, priced=True)
-    held = samples
-    for slack in DEARER:
-        informed.narrow(slack)
-        held = samples[informed.holds(samples)]
-        if len(held) <= MOST_SAMPLES:
-            break
+    informed.narrow(DEARER)
+    held = samples[informed.holds(samples)]
+    if len(held) > MOST_SAMPLES:
+        held = held[np.argsort(informed.through(held), kind="stable")[:MOST_SAMPLES]]
     way = informed.way(rates.costmap, rates.inscribed + ROOMY)
     return np.vstack((held, way[np.isfinite(rates.at(way))]))
 

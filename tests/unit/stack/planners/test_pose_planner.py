@@ -1,0 +1,91 @@
+"""Plans of cars and long hulls: their ends, what is not known, and where a robot is stuck."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from simscen.core.geometry import Pose2
+from simscen.core.navigation import ErrorCode
+from simscen.model.costmaps import Costmap as CostmapSpec
+from simscen.model.planners import OmplPlanner as Spec
+from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.footprint import Footprint
+from simscen.stack.planners.build import ompl_planner
+from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel, Surroundings
+from simscen.testing.flatland import RATE, Flatland, box_robot, setting
+
+CAR = RobotModel(box_robot(0.9, 0.4).footprint, None, 1.0, 1.0, 0.0, 1.5, 2.0, 2.0, 3.0, turning_radius=0.8)
+OMNI = replace(CAR, turning_radius=0.0, max_lateral=1.0, holonomic=True)
+
+
+def hall(*boxes: tuple[float, float, float, float], robot: RobotModel = CAR) -> CostmapView:
+    world = Flatland().room(9, 6)
+    world.boxes += boxes
+    return Costmap(CostmapSpec(), Surroundings(robot, world.grid((-0.5, -0.5, 9.5, 6.5)), RATE)).view
+
+
+def planned(view: CostmapView, start: Pose2, goal: Pose2, robot: RobotModel = CAR, **options: object) -> np.ndarray:
+    return ompl_planner(Spec(max_iterations=5000, **options), setting(robot)).plan(view, start, goal, 1).points
+
+
+def hits(view: CostmapView, points: np.ndarray, robot: RobotModel = CAR) -> np.ndarray:
+    return ~Footprint(robot, view.resolution).free(view, points)
+
+
+def test_a_goal_where_only_the_inscribed_circle_fits_is_moved_to_where_the_hull_does() -> None:
+    view, goal = hall(), Pose2(8.7, 3.0, 0.0)  # 0.3 m from a wall; the nose is 0.45 m ahead
+    assert hits(view, np.array([goal]))[0]
+    points = planned(view, Pose2(2.0, 2.0, 0.0), goal)
+    assert not hits(view, points).any()
+    assert np.hypot(*(points[-1, :2] - goal[:2])) <= 0.5 and points[-1, 2] == pytest.approx(0.0, abs=1e-6)
+    with pytest.raises(NavigationFailure) as failed:
+        planned(view, Pose2(2.0, 2.0, 0.0), goal, tolerance=0.1)
+    assert failed.value.code is ErrorCode.GOAL_OCCUPIED
+
+
+@pytest.mark.parametrize("start", [Pose2(8.62, 3.0, 0.0), Pose2(3.0, 0.26, 0.15)])
+def test_a_car_whose_hull_touches_something_is_led_away_from_it(start: Pose2) -> None:
+    """The nose in a wall, and a flank along one: it was START_OCCUPIED at once."""
+    view = hall()
+    footprint = Footprint(CAR, view.resolution)
+    points = planned(view, start, Pose2(2.0, 4.0, 0.0))
+    touching = hits(view, points)
+    away = int(np.argmin(touching))
+    assert touching[0] and not touching[away:].any() and points[0] == pytest.approx(start)
+    assert np.hypot(*np.diff(points[: away + 1, :2], axis=0).T).sum() <= 0.55
+    rooms = footprint.clearance(view, points[: away + 1])
+    assert rooms.min() > rooms[0] - 0.02  # no deeper on the way
+
+
+def test_a_holonomic_long_hull_is_led_away_sideways() -> None:
+    view = hall(robot=OMNI)
+    points = planned(view, Pose2(3.0, 0.18, 0.0), Pose2(3.0, 4.0, 0.0), OMNI)
+    touching = hits(view, points, OMNI)
+    assert touching[0] and not touching[int(np.argmin(touching)) :].any()
+
+
+def test_a_hull_that_is_shut_in_cannot_start() -> None:
+    stakes = ((2.65, 2.4, 2.7, 2.75), (2.65, 3.25, 2.7, 3.6), (3.3, 2.4, 3.35, 2.75), (3.3, 3.25, 3.35, 3.6))
+    pocket = (*stakes, (2.45, 2.6, 2.6, 3.4), (3.4, 2.6, 3.55, 3.4))
+    with pytest.raises(NavigationFailure) as failed:
+        planned(hall(*pocket), Pose2(3.0, 3.0, 0.0), Pose2(7.0, 3.0, 0.0))
+    assert failed.value.code is ErrorCode.START_OCCUPIED
+
+
+def test_without_allow_unknown_no_pose_lies_where_it_is_not_known() -> None:
+    view = hall()
+    view.costs[31:112, 80:110] = 255
+    points = planned(view, Pose2(2.0, 3.0, 0.0), Pose2(7.0, 3.0, 0.0), allow_unknown=False)
+    columns, rows = ((points[:, i] - view.origin[i]) / view.resolution for i in (0, 1))
+    assert (view.costs[rows.astype(int), columns.astype(int)] != 255).all()
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_aorrtc_does_not_say_that_it_is_there_where_it_has_found_nothing(seed: int) -> None:
+    """OMPL calls a path of the start alone an exact solution."""
+    robot = replace(CAR, footprint=box_robot(0.35, 0.2).footprint, turning_radius=0.3)
+    view = hall((4.0, 0.0, 4.1, 4.5), (6.0, 1.5, 6.1, 6.0), robot=robot)
+    start, goal = Pose2(1.0, 1.0, -2.1), Pose2(8.0, 5.0, 2.6)
+    points = ompl_planner(Spec(type="aorrtc"), setting(robot)).plan(view, start, goal, seed).points
+    assert np.hypot(*(points[-1, :2] - goal[:2])) < 1e-6
