@@ -57,9 +57,7 @@ def narrowest_of(field: ClearanceField, ends: tuple[Pose2, Pose2], radius: float
     place: Array = grid.centre_of(cell[None])[0]
     least = clearance[tuple(cell)]
     if least < UNRESOLVED * grid.resolution:
-        walls = grid.centre_of(np.argwhere(np.abs(clearance - least) < AS_THICK * grid.resolution))
-        x, y = walls[np.argmin(np.linalg.norm(walls - np.mean([ends[0][:2], ends[1][:2]], axis=0), axis=1))].tolist()
-        return Gap(x, y, 0.0)
+        return Gap(*_thinnest(clearance, grid, ends), 0.0)
     return _measured(field, place, 4 * radius)
 
 
@@ -106,6 +104,27 @@ def _joint(clearance: Array, level: float, first: tuple[int, ...], last: tuple[i
             found.append((parts[last] not in joined, cells[len(cells) // 2]))
     cell: npt.NDArray[np.int64] = min(found, key=lambda joint: joint[0])[1] if found else np.argwhere(joints)[0]
     return cell
+
+
+def _thinnest(clearance: Array, grid: OccupancyGrid, ends: tuple[Pose2, Pose2]) -> tuple[float, float]:
+    """The middle of the thinnest wall between the part of the first end and that of the other.
+
+    A way out of one part and into the other by a thinner wall would have to get through two.
+    """
+    from scipy import ndimage
+
+    places = np.array([end[:2] for end in ends])
+    walls = clearance < UNRESOLVED * grid.resolution
+    parts, _ = ndimage.label(~walls, structure=np.ones((3, 3)))
+    away: list[Array] = []
+    for row, column in grid.cell_of(places).tolist():
+        part = parts == parts[row, column] if parts[row, column] else np.zeros_like(walls)
+        part[row, column] = True
+        away.append(ndimage.distance_transform_edt(~part))
+    depth = np.where(walls, np.maximum(*away), np.inf)
+    middles = grid.centre_of(np.argwhere(depth < depth.min() + AS_THICK))
+    x, y = middles[np.argmin(np.linalg.norm(middles - places.mean(axis=0), axis=1))].tolist()
+    return x, y
 
 
 def _measured(field: ClearanceField, place: Array, reach: float) -> Gap:
