@@ -74,10 +74,10 @@ def test_a_scenario_that_asks_for_it_has_the_latencies_of_its_robot(tmp_path: Pa
     assert lateness(taken, Scan) == {12}
     assert lateness(taken, Odometry) == {0, 2}  # the truth of the localizer is never late
     first = next(moment.tick for moment in taken if moment.decision.command.vx > 0)
-    assert first == 24 + 2
+    assert first == 12 + 24 + 2  # it begins when its lidar has been heard
     unasked = moments(tmp_path, 60, "", ", latency: 30 ms", latency)
     assert lateness(unasked, Scan) == {7}
-    assert next(moment.tick for moment in unasked if moment.decision.command.vx > 0) == 0
+    assert next(moment.tick for moment in unasked if moment.decision.command.vx > 0) == 12
 
 
 @pytest.mark.parametrize("said", [", latency: {}", ", latency: robot", ", latency: {planner: 0 s, controller: 1 ms}"])

@@ -32,7 +32,7 @@ def test_the_drive_of_a_shipped_robot_is_found_in_its_description(infer, name):
 
 def test_the_lidar_sits_on_its_link_or_on_top(infer):
     text = describe(robot_body(shipped("amr")))
-    assert infer(text).sensors["lidar"].lidar.mount.z == pytest.approx(0.32 + 0.02)
+    assert infer(text).sensors["lidar"].lidar.mount.z == pytest.approx(0.38 + 0.02)
     link = (
         '<link name="base_scan"/><joint name="s" type="fixed"><parent link="base_link"/><child link="base_scan"/>'
         '<origin xyz="0.3 0.1 0.25" rpy="0 0 0.5"/></joint></robot>'
