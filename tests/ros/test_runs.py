@@ -17,7 +17,7 @@ NODES = Path(__file__).with_name("nodes")
 SCENARIOS = [
     pytest.param("navigation/goal", marks=pytest.mark.long),
     pytest.param("navigation/patrol", marks=pytest.mark.long),
-    "obstacles/pallet_on_plan",
+    pytest.param("obstacles/pallet_on_plan", marks=pytest.mark.long),
 ]
 
 
