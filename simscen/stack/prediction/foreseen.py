@@ -25,7 +25,7 @@ BLOCK = 0.2
 
 def foreseen(costmap: CostmapView, robot: Pose2, speed: float, radius: float) -> CostmapView:
     """The same with costs, at most MAX_NON_OBSTACLE, where a robot at `robot` that drives at `speed` would meet what
-    moves: no way is shut. `radius` is the robot's. The same object where nothing moves.
+    moves: no way is shut. `radius` is the robot's. The same object where it would meet nothing.
     """
     if not len(costmap.moving):
         return costmap
@@ -40,6 +40,8 @@ def foreseen(costmap: CostmapView, robot: Pose2, speed: float, radius: float) ->
         middles.append(corner + size * (first + factor * (np.arange(-(-max(0, last - first) // factor)) + 0.5)))
     x, y = np.meshgrid(middles[1], middles[0])
     dear = _dear(costmap.moving, x, y, np.hypot(x - robot.x, y - robot.y) / speed, radius)
+    if not dear.any():
+        return costmap
     window = slice(low[0], high[0]), slice(low[1], high[1])
     cells = dear.repeat(factor, axis=0).repeat(factor, axis=1)[: high[0] - low[0], : high[1] - low[1]]
     costs = costmap.costs.copy()
