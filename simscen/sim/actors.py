@@ -2,16 +2,16 @@
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from dataclasses import replace
 
 import numpy as np
 import pybullet
 
 from simscen.core.geometry import Pose2, Pose3, wrap
 from simscen.core.motion_path import Track, top_speed
-from simscen.core.shapes import Body, Mesh, MotionPath
+from simscen.core.shapes import Body, MotionPath
 from simscen.sim import engine
+from simscen.sim.actor import About, Actor, Placing, Vector
 from simscen.sim.enclosure import winds_around
 from simscen.sim.encounters import HORIZON, Balls, encounters
 from simscen.sim.inertia import GRAVITY, of_solids
@@ -20,8 +20,6 @@ from simscen.sim.outline import reach
 
 FRICTION = 0.6
 """Of pushable things on the ground: about that of wood or cardboard on concrete."""
-Vector = tuple[float, float, float]
-Placing = tuple[Vector, tuple[float, float, float, float]]
 FALLING = 0.1 * GRAVITY
 """m/s that what rests may gain within a tenth of a second."""
 NEVER = 2**62
@@ -30,65 +28,6 @@ ABOUT = 2.0
 """m farther than was asked for within which things are looked for, so that the others need not be looked at soon."""
 JUMP = 50.0
 """A script that asks for more m/s than this sets its body down elsewhere, rather than hurl it through the world."""
-
-
-@dataclass
-class Actor:
-    """A body in the engine: `shown` is where the engine has it, `path` began at tick `since`.
-
-    `speed` is the fastest that any part of it ever moves along its path, in m/s, `size` how far from its origin it
-    extends, and `radius` how far from its axis, in metres. Where the engine has it as a surface without an inside,
-    `surface` is that, in the body's frame.
-    """
-
-    id: int
-    body: Body
-    centre_from_base: Pose3
-    shown: Pose3
-    path: MotionPath | None
-    since: int
-    speed: float
-    size: float
-    radius: float
-    surface: Mesh | None
-    placed: tuple[Placing, Pose3] | None = None
-    """What the engine last said of its centre of mass, and the pose that comes of it."""
-    resting: bool = False
-    """Whether it has not moved at all since the engine was asked before."""
-    led: bool = False
-    """Whether it may be given another path at any time."""
-    track: Track | None = None
-    """Its path as it is asked for."""
-    scripted: dict[int, Pose3] = field(default_factory=dict)
-    """Where its path has it at the ticks that were asked for last."""
-
-    @property
-    def pushable(self) -> bool:
-        """Whether the engine moves it, rather than a script or nothing."""
-        return self.body.mass > 0 and self.path is None
-
-    def parked(self, since: float, seconds: float) -> bool:
-        """Whether its path, set off `since` seconds ago, leaves it where it is for so many more."""
-        if self.path is None or self.led:
-            return False
-        return self.path.over(since) or since + seconds < self.path.start
-
-
-class _About(NamedTuple):
-    """The actors that at a tick were within a distance in metres of a place, and all that may be pushed unless asleep.
-
-    `asleep` is since when all of those have been lying still; None where they have not.
-    """
-
-    actors: tuple[Actor, ...]
-    place: Vector
-    distance: float
-    tick: int
-    asleep: int | None
-
-    def holds(self, place: Vector, distance: float, tick: int, step: float) -> bool:
-        """Whether no other can be within a distance of a place at a tick, moving `step` metres a tick at most."""
-        return math.dist(place, self.place) + step * (tick - self.tick) + distance <= self.distance
 
 
 class Actors:
@@ -115,7 +54,7 @@ class Actors:
         self._shaken_at = -1
         self._lying: Balls | None = None
         self._moved: list[Actor] = []
-        self._about: dict[int, _About] = {}
+        self._about: dict[int, About] = {}
 
     def add(self, body: Body, tick: int) -> None:
         """Put a body into the world; one of the same name makes way."""
@@ -393,7 +332,7 @@ class Actors:
         """How far in metres any script moves anything in so many ticks, at most."""
         return self._fastest * ticks / self._rate
 
-    def _look_about(self, place: Vector, distance: float, tick: int, asleep: int | None) -> "_About":
+    def _look_about(self, place: Vector, distance: float, tick: int, asleep: int | None) -> About:
         poses = self.poses(tick)
         actors = tuple(
             actor
@@ -401,7 +340,7 @@ class Actors:
             if (asleep is None and actor.pushable)
             or min(math.dist(poses[name][:3], place), math.dist(actor.shown[:3], place)) <= distance + actor.size
         )
-        return _About(actors, place, distance, tick, asleep)
+        return About(actors, place, distance, tick, asleep)
 
     @property
     def loose(self) -> bool:
