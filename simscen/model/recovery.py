@@ -125,7 +125,7 @@ class Recovery(Spec):
     """What is done in turn, by name or with parameters of its own."""
     clear_entirely: bool = False
     """Whether all of the global costmap is cleared, as in Nav2, or as much as the local one reaches: a dead end that is
-    forgotten is driven into again."""
+    forgotten is driven into again. When planning fails it is cleared each time, not ever more rarely."""
     spin_dist: Angle = 1.57
     """How far it turns."""
     wait_duration: Duration = 5.0

@@ -12,6 +12,7 @@ from simscen.model.stack import InProcessStack, StackSpec
 from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.commands import Commands
 from simscen.stack.costmap.costmaps import Costmaps
+from simscen.stack.forgetting import Forgetting
 from simscen.stack.installed.behavior import InstalledBehavior
 from simscen.stack.installed.controller import InstalledController
 from simscen.stack.installed.goal_checker import InstalledGoalChecker
@@ -92,6 +93,7 @@ def reference_stack(spec: StackSpec, setting: Setting) -> ReferenceStack:
         costmaps,
         setting.control_period,
         spec.failure_tolerance,
+        Forgetting(always=spec.recovery.clear_entirely),
     )
     monitor = CollisionMonitor(spec.collision_monitor, robot, surroundings.lidars, surroundings.tick_rate)
     commands = Commands(

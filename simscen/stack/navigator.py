@@ -1,11 +1,11 @@
 """Drives to a goal, past poses on the way: the replanning and recovery of Nav2's trees as a state machine.
 
 Without errors one step is: check the goal, check the plan, ask the controller. When planning fails, first the global
-costmap is cleared, and when control fails the local one, and the same is tried again (the per-context recoveries of
-Nav2's tree); when it fails again, the next behaviour of the round robin is run. A plan that is found makes good a
-failure to plan; control has one retry until the next recovery, for its action goes on until the goal. After
-`number_of_retries` behaviours the goal has failed with the code of the last failure. A goal outside the map or inside a
-mapped wall fails after the first retry: no recovery changes that.
+costmap is cleared (how much of it: `Forgetting`), and when control fails the local one, and the same is tried again
+(the per-context recoveries of Nav2's tree); when it fails again, the next behaviour of the round robin is run. A plan
+that is found makes good a failure to plan; control has one retry until the next recovery, for its action goes on until
+the goal. After `number_of_retries` behaviours the goal has failed with the code of the last failure. A goal outside the
+map or inside a mapped wall fails after the first retry: no recovery changes that.
 """
 
 from typing import NamedTuple
@@ -14,6 +14,7 @@ from simscen.core.events import Event, EventKind, Value
 from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import ErrorCode, Goal
 from simscen.stack.costmap.costmaps import Costmaps
+from simscen.stack.forgetting import Forgetting
 from simscen.stack.frames import Frames
 from simscen.stack.local_path import LocalPath
 from simscen.stack.plan_keeper import PlanKeeper
@@ -47,13 +48,14 @@ class Navigator:
         costmaps: Costmaps,
         period: float,
         failure_tolerance: float,
+        forgetting: Forgetting,
     ) -> None:
         """`period` between two steps and `failure_tolerance` in seconds; -1 bears a failing controller for ever."""
         self.plans = plans
         """Who sees to the plan that is being followed."""
         self._controller, self._recovery = controller, recovery
         self._goal_checker, self._progress, self._costmaps = goal_checker, progress, costmaps
-        self._path = LocalPath(controller)
+        self._path, self._forgetting = LocalPath(controller), forgetting
         self._period, self._failure_tolerance = period, failure_tolerance
         self._clock = 0.0
         self.goal: Goal | None = None
@@ -73,6 +75,7 @@ class Navigator:
         self.goal = goal
         self._forget()
         self._recovery.reset()
+        self._forgetting.reset()
         self._goal_checker.reset()
         self._progress.reset()
 
@@ -138,7 +141,11 @@ class Navigator:
             retry, self._controlled_again = not self._controlled_again, True
         if retry:
             self._trouble_since = None
-            (self._costmaps.wide if planning else self._costmaps.near).clear()
+            if planning:
+                to_go = frames.pose.distance(goal.pose)
+                self._costmaps.clear_global(entirely=self._forgetting.entirely(self._clock, to_go))
+            else:
+                self._costmaps.near.clear()
             self.plans.drop("recovery")
             return Step(events=events)
         if self._hopeless(goal, failure):

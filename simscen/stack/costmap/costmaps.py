@@ -81,6 +81,10 @@ class Costmaps:
         self.wide.clear(self._reach)
         self.near.clear()
 
+    def clear_global(self, *, entirely: bool) -> None:
+        """Forget live obstacles in the global costmap alone: all but those in sight, or as far as `clear_around`."""
+        self.wide.clear(math.inf if entirely else self._reach)
+
     def _paint_zones(self, frames: Frames) -> None:
         """Keepout zones where they belong in the odom frame by now."""
         mask, known = self._zones.masks.keepout, self._odom_from_map

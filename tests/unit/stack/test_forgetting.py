@@ -1,0 +1,63 @@
+"""Clearing finds ways that have opened, and does not keep a robot from learning that there is none."""
+
+import pytest
+
+from simscen.core.geometry import Pose2
+from simscen.core.navigation import Goal
+from simscen.model.localizers import GroundTruth
+from simscen.model.recovery import Recovery
+from simscen.model.stack import StackSpec
+from simscen.stack.forgetting import Forgetting
+from simscen.testing.flatland import Drive, Flatland, drive
+
+FAR = Goal("far", Pose2(10.0, 3.0), timeout=150.0)
+ACROSS = (6.0, 0.05, 6.2, 5.95)
+
+
+def in_a_hall(seconds: float, *, entirely: bool = False) -> Drive:
+    """A wall drops across a hall of 6 m while the robot is on its way; its lidar marks what is within 2.5 m."""
+    world = Flatland().room(12, 6)
+    grid = world.grid((-0.5, -0.5, 12.5, 6.5))
+    spec = StackSpec(localizer=GroundTruth(type="ground_truth"), recovery=Recovery(clear_entirely=entirely))
+    d = drive(world, Pose2(3.0, 3.0), FAR, grid=grid, spec=spec).run(2.0)
+    world.boxes.append(ACROSS)
+    return d.run(seconds)
+
+
+def test_a_wall_across_a_hall_whose_ends_are_never_in_sight_together_ends_with_no_valid_path_soon() -> None:
+    d = in_a_hall(60)
+    assert [event.data["error_name"] for event in d.kinds("goal.failed")] == ["NO_VALID_PATH"]
+    assert d.tick / 240 < 40
+    assert d.least > 0.02
+
+
+def test_nav2s_tree_forgets_all_each_time() -> None:
+    assert not in_a_hall(45, entirely=True).kinds("goal.failed")
+
+
+def test_a_door_that_was_seen_shut_and_has_opened_out_of_sight_is_driven_to() -> None:
+    """The way back is forgotten for the second time within ten seconds of the first, or a little later."""
+    mapped = Flatland().room(8, 8)
+    mapped.boxes += [(3.9, 0.0, 4.0, 1.0), (3.9, 2.0, 4.0, 6.0), (3.9, 7.0, 4.0, 8.0)]  # two doors
+    world = Flatland([*mapped.boxes, lower := (3.9, 1.0, 4.0, 2.0), (3.9, 6.0, 4.0, 7.0)])
+    goal, grid = Goal("g", Pose2(6.0, 1.5), timeout=120.0), mapped.grid((-0.5, -0.5, 8.5, 8.5))
+    d = drive(world, Pose2(2.0, 1.5), goal, grid=grid)
+    while d.pose.y < 4.0:
+        d.run(0.1)
+    world.boxes.remove(lower)
+    assert d.run(120).result == "SUCCEEDED"
+
+
+def test_all_is_forgotten_at_first_and_then_ever_more_rarely() -> None:
+    forgetting = Forgetting(always=False)
+    assert [t for t in range(100) if forgetting.entirely(float(t), 5.0)] == [0, 10, 30, 70]
+    forgetting.reset()
+    assert forgetting.entirely(100.0, 5.0)
+
+
+@pytest.mark.parametrize(("to_go", "again"), [(4.5, False), (3.9, True)])
+def test_who_has_come_a_metre_nearer_may_forget_at_once(to_go: float, again: bool) -> None:
+    forgetting = Forgetting(always=False)
+    assert forgetting.entirely(0.0, 5.0)
+    assert forgetting.entirely(1.0, to_go) == again
+    assert not forgetting.entirely(2.0, to_go)
