@@ -14,7 +14,8 @@ from simscen.core.sensing import Imu, Odometry, Scan
 from simscen.model.localizers import Ekf
 from simscen.stack.localizers.dead_reckoning import start_of
 from simscen.stack.localizers.laser_odometry import LaserOdometry
-from simscen.stack.localizers.slip_model import AHEAD, BIAS, LEVER, RATE, Model, Step, motion, moved, rates
+from simscen.stack.localizers.slip_model import AHEAD, BIAS, LEVER, PUSHED, RATE, Model, Step, motion, moved, rates
+from simscen.stack.localizers.wheel_watch import WheelWatch
 from simscen.stack.odometry_history import believable
 
 # No robot turns faster than this, in rad/s: a gyroscope that says so is broken.
@@ -22,8 +23,6 @@ _FASTEST = 100.0
 # rad/s. Encoders that say "nothing" have seen less than a tick of theirs, not nothing: without this floor wheels that
 # are locked, or stand on a turntable, would be believed whatever the gyroscope says.
 _LEAST_RATE_NOISE = 0.002
-# Of the squared innovation over its variance: a wheel that fits no worse by chance once in 10 000 steps.
-_GATE = 15.1
 # It measures the turn rate and its own bias.
 _GYRO = np.zeros((1, 7))
 _GYRO[0, [RATE, BIAS]] = 1.0
@@ -55,6 +54,7 @@ class EkfLocalizer:
         self._last: Odometry | None = None
         self._readings: list[float] = []
         self._speed, self._slipped = 0.0, False
+        self._watch = WheelWatch()
         self._map_from_odom = pose
         self._laser = LaserOdometry(self._tick_rate) if self._spec.match_scans else None
 
@@ -107,11 +107,14 @@ class EkfLocalizer:
         held = Step(pose, seconds, speed)
         if not self._readings:
             return held
-        disagreement = self._turning - float(self._filter.x[BIAS]) - pose.yaw / seconds
-        variance = self._wheel_noise(held) + self._gyro_noise + float(self._filter.P[BIAS, BIAS])
-        if disagreement**2 <= _GATE * variance:
+        turn = self._turning - float(self._filter.x[BIAS])
+        innovation, noise = turn - pose.yaw / seconds, self._wheel_noise(held) + self._gyro_noise
+        unseen = self._watch.slipped(innovation, noise, float(self._filter.P[BIAS, BIAS]), seconds)
+        if unseen == 0.0:
             return held
-        return Step(pose, seconds, max(self._speed, speed, LEVER * abs(disagreement)), slips=True)
+        pushed = PUSHED if abs(turn) > abs(pose.yaw / seconds) else 0.0
+        fast = max(self._speed, speed, LEVER * abs(innovation), pushed)
+        return Step(pose, seconds, fast, slips=True, unseen=unseen)
 
     def _measure(self, step: Step) -> None:
         """The turn rate of this step, out of odometry's turn, where the wheels hold, and the gyroscope's readings."""

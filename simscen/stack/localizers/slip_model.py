@@ -17,6 +17,10 @@ UNKNOWN_RATE = 10.0
 """rad/s: where the wheels slip, nothing is known of the turn rate before the gyroscope measures it."""
 LEVER = 0.1
 """Metres from the middle of a robot to what it turns about when its wheels slip."""
+SHARE = 0.7
+"""Standard deviation of that share, ahead and aside: uniform up to all of it is 0.58, always all of it 1."""
+PUSHED = 0.3
+"""m/s: a robot that turns more than its wheels do is moved by something else: a slope, a person, its own momentum."""
 
 
 @dataclass(frozen=True)
@@ -24,12 +28,14 @@ class Step:
     """What the wheels say of a step: its pose in the base frame, and how long it took in seconds.
 
     `fast`: in m/s, what shares of slip are of. `slips`: the gyroscope has found out that the wheels do not hold.
+    `unseen`: seconds for which they have not by its end and nobody knew.
     """
 
     pose: Pose2
     seconds: float
     fast: float
     slips: bool = False
+    unseen: float = 0.0
 
     @property
     def length(self) -> float:
@@ -55,7 +61,7 @@ def rates(spec: Ekf, step: Step, noise: float, slipped: bool) -> Model:
     q[BIAS, BIAS] = spec.gyro_bias_walk**2 * step.seconds
     if step.slips != slipped:
         f[AHEAD, AHEAD] = f[ASIDE, ASIDE] = 0.0
-        q[AHEAD, AHEAD], q[ASIDE, ASIDE] = (1.0, 1.0) if step.slips else (spec.wheel_slip**2, 0.0)
+        q[AHEAD, AHEAD], q[ASIDE, ASIDE] = (SHARE**2, SHARE**2) if step.slips else (spec.wheel_slip**2, 0.0)
     elif not step.slips:
         f[AHEAD, AHEAD] = math.exp(-step.seconds / SLIP_LASTS)
         q[AHEAD, AHEAD] = spec.wheel_slip**2 * (1.0 - f[AHEAD, AHEAD] ** 2)
@@ -77,7 +83,7 @@ def motion(spec: Ekf, state: Array, step: Step) -> Model:
     f, q = np.eye(7), np.zeros((7, 7))
     f[:2, YAW] = -dy, dx
     f[:3, RATE] = -dy * step.seconds / 2, dx * step.seconds / 2, step.seconds
-    slid = step.fast * step.seconds
+    slid = step.fast * (step.unseen or step.seconds)
     f[:2, AHEAD], f[:2, ASIDE] = (c * slid, s * slid), (-s * slid, c * slid)
     if step.length > 0:
         wheels = c * step.pose.x - s * step.pose.y, s * step.pose.x + c * step.pose.y
