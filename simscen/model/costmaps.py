@@ -7,6 +7,7 @@ from pydantic import Field
 from simscen.spec.base import Ranged, Spec, by_default
 from simscen.spec.quantities import (
     Frequency,
+    NonNegativeAngle,
     NonNegativeLength,
     PositiveLength,
 )
@@ -44,6 +45,9 @@ class Costmap(Ranged):
     """Beams clear cells from this distance on."""
     min_obstacle_height: NonNegativeLength = 0.05
     """Of what a camera sees, lower things are the ground. Lidars see at their own height, whatever this says."""
+    max_ground_slope: Annotated[NonNegativeAngle, Field(le=1)] = 0.2
+    """What a camera sees to rise from the robot's feet on no steeper than this is the ground; 0: heights are above the
+    plane on which the robot stands, and a ramp is an obstacle, as in Nav2."""
     max_obstacle_height: NonNegativeLength = 2.0
     """Of what a camera sees, higher things are not in the way."""
     inf_is_valid: bool = True
@@ -84,6 +88,8 @@ class LocalCostmap(Spec):
     """Beams clear cells from this distance on."""
     min_obstacle_height: NonNegativeLength | None = None
     """Of what a camera sees, lower things are the ground."""
+    max_ground_slope: Annotated[NonNegativeAngle, Field(le=1)] | None = None
+    """What a camera sees to rise no steeper than this is the ground."""
     max_obstacle_height: NonNegativeLength | None = None
     """Of what a camera sees, higher things are not in the way."""
     inf_is_valid: bool | None = None

@@ -14,7 +14,8 @@ BY_TYPE = ("localizer", "planner", "controller", "goal_checker")
 """The sections whose `type` says which parameters there are; below, the first type is the one that is left out."""
 _SEEN: Values = {
     "obstacle_max_range": 2.5, "obstacle_min_range": 0.0, "raytrace_max_range": 3.0, "raytrace_min_range": 0.0,
-    "max_obstacle_height": 2.0, "min_obstacle_height": 0.0, "inf_is_valid": False,
+    "max_obstacle_height": 2.0, "min_obstacle_height": 0.0, "max_ground_slope": 0.0,
+    "inf_is_valid": False,
     "inflation_radius": 0.70, "cost_scaling_factor": 3.0, "resolution": 0.05,
 }  # fmt: skip
 _PLANNING: Values = {"tolerance": 0.5, "allow_unknown": True, "replanning": "rate", "cautious": False}

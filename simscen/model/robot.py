@@ -5,6 +5,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
+from simscen.core.geometry import Pose3
 from simscen.core.mecanum import MecanumWheels
 from simscen.core.readings import READINGS
 from simscen.model.latency import RobotLatency
@@ -172,6 +173,23 @@ class Mount(Spec):
     yaw: Angle = 0.0
     """Where it looks, anticlockwise from straight ahead."""
 
+    @property
+    def pose(self) -> Pose3:
+        """The sensor's frame in the base frame."""
+        return Pose3.from_rpy(self.x, self.y, self.z, 0.0, 0.0, self.yaw)
+
+
+class CameraMount(Mount):
+    """Where a camera sits, and how far it looks down."""
+
+    pitch: Annotated[Angle, Field(ge=-1.6, le=1.6)] = 0.0
+    """How far it looks down; negative: up."""
+
+    @property
+    def pose(self) -> Pose3:
+        """The sensor's frame in the base frame: turned, then tilted, as in URDF."""
+        return Pose3.from_rpy(self.x, self.y, self.z, 0.0, self.pitch, self.yaw)
+
 
 class SensorSpec(Component):
     """A sensor: what it says, and how often. Its component is called with a simscen.sensors.sensor.SensorSetting."""
@@ -278,8 +296,8 @@ class Camera(SensorSpec):
     """Horizontal."""
     max_range: PositiveLength = 10.0
     """What is further has no depth."""
-    mount: Mount = by_default()
-    """Where it sits on the robot."""
+    mount: CameraMount = by_default()
+    """Where it sits on the robot, and how far it looks down."""
 
 
 class Sensor(Choice):

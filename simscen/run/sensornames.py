@@ -16,8 +16,4 @@ def sensor_kinds(prepared: Prepared) -> dict[str, str]:
 def sensor_frames(robot: RobotSpec) -> dict[str, Pose3]:
     """Where sensors that look somewhere sit on the base."""
     mounts = {name: getattr(sensor.chosen, "mount", None) for name, sensor in robot.sensors.items()}
-    return {
-        name: Pose3.from_rpy(mount.x, mount.y, mount.z, 0.0, 0.0, mount.yaw)
-        for name, mount in mounts.items()
-        if isinstance(mount, Mount)
-    }
+    return {name: mount.pose for name, mount in mounts.items() if isinstance(mount, Mount)}

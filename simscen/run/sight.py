@@ -40,8 +40,7 @@ class SensorSight:
         return Image(self._name, self._now(), *seen)
 
     def _placed(self, error: Pose3 | None) -> Pose3:
-        mount = self._mount
-        thought = Pose3.from_rpy(mount.x, mount.y, mount.z, 0.0, 0.0, mount.yaw)
+        thought = self._mount.pose
         return thought if error is None else thought.compose(error)
 
 

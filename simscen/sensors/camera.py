@@ -1,6 +1,5 @@
 """A colour and depth camera; its pictures come from the engine's renderer."""
 
-from simscen.core.geometry import Pose3
 from simscen.core.sensing import Image
 from simscen.model.robot import Camera
 from simscen.sensors.sensor import SensorSetting
@@ -11,8 +10,7 @@ class CameraSensor:
 
     def __init__(self, spec: Camera, setting: SensorSetting) -> None:
         self.name, self.period, self._spec, self._view = setting.name, setting.period, spec, setting.view
-        mount = spec.mount
-        self._mount = Pose3.from_rpy(mount.x, mount.y, mount.z, 0.0, 0.0, mount.yaw)
+        self._mount = spec.mount.pose
 
     def read(self, tick: int) -> Image:
         """Take a picture."""

@@ -6,6 +6,7 @@ so that looking over a low box or under a table top clears neither.
 
 import math
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,25 +15,39 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.sensing import Image
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.costmap.frame import Cells, Frame
+from simscen.stack.costmap.ground import above_ground
 from simscen.stack.costmap.static_layer import Mask
 
 Heights = npt.NDArray[np.float32]
 
 
-def heights_seen(image: Image, base: Pose2, frame: Frame, spec: CostmapSpec) -> tuple[Cells, Heights]:
-    """Cells (n, 2) in which the camera sees something that is no ground, and at what height (n,) above it."""
+class Shown(NamedTuple):
+    """What a picture shows: cells (n, 2) with something that is no ground, at what height (n,), and where ground is."""
+
+    cells: Cells
+    heights: Heights
+    ground: Cells
+
+
+def shown(image: Image, base: Pose2, frame: Frame, spec: CostmapSpec, known: Mask) -> Shown:
+    """What the camera sees, from a robot at `base`; `known` are the cells that have been ground before."""
     across, up = _slopes(image.depth.shape, image.field_of_view)
     depth = image.depth.astype(np.float64)
-    used = np.isfinite(depth) & (depth <= spec.obstacle_max_range) & (depth > 0.0)
-    depth, across, up = depth[used], across[used], up[used]
-    points = image.mount.apply(np.column_stack((depth, depth * across, depth * up)))
-    away = np.hypot(points[:, 0] - image.mount.x, points[:, 1] - image.mount.y)
-    counts = (points[:, 2] >= spec.min_obstacle_height) & (points[:, 2] <= spec.max_obstacle_height)
+    depth[~((depth <= spec.obstacle_max_range) & (depth > 0.0))] = np.nan
+    points = image.mount.apply(np.stack((depth, depth * across, depth * up), axis=-1))
+    away, heights = np.hypot(points[..., 0] - image.mount.x, points[..., 1] - image.mount.y), points[..., 2]
+    cells = frame.cells(base.apply(np.nan_to_num(points[..., :2].reshape(-1, 2))))
+    inside = frame.inside(cells) & np.isfinite(heights).reshape(-1)
+    cells[~inside] = 0
+    if spec.max_ground_slope > 0.0:
+        before = (known[cells[:, 0], cells[:, 1]] & inside).reshape(heights.shape)
+        above, level = above_ground(away, heights, spec.max_ground_slope, spec.min_obstacle_height, before)
+    else:
+        above, level = heights, np.zeros(heights.shape, dtype=bool)
+    counts = (above >= spec.min_obstacle_height) & (above <= spec.max_obstacle_height)
     counts &= (away >= spec.obstacle_min_range) & (away <= spec.obstacle_max_range)
-    points = points[counts]
-    cells = frame.cells(base.apply(points[:, :2]))
-    inside = frame.inside(cells)
-    return cells[inside], points[inside, 2].astype(np.float32)
+    marked = counts.reshape(-1) & inside
+    return Shown(cells[marked], heights.reshape(-1)[marked].astype(np.float32), cells[level.reshape(-1) & inside])
 
 
 def seen_through(cells: Cells, heights: Heights, frame: Frame, image: Image, base: Pose2, spec: CostmapSpec) -> Mask:

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from simscen.core.geometry import Array, Pose2
 from simscen.core.sensing import Image, Scan
 from simscen.model.costmaps import Costmap as CostmapSpec
-from simscen.stack.costmap.depth_layer import Heights, heights_seen, seen_through
+from simscen.stack.costmap.depth_layer import Heights, seen_through, shown
 from simscen.stack.costmap.frame import Cells, Frame, Numbers
 from simscen.stack.costmap.inflation_layer import Squared
 from simscen.stack.costmap.obstacle_layer import crossed, hits, in_view
@@ -18,6 +18,7 @@ from simscen.stack.costmap.static_layer import Mask
 BESIDE_A_WALL = 2
 """Hits within one cell (squared distance 2) of a mapped wall are the wall itself: marking them would tell nothing."""
 NONE: Numbers = np.zeros(0, dtype=np.int64)
+NOWHERE: Mask = np.zeros((0, 0), dtype=bool)
 Window = tuple[slice, slice]
 
 
@@ -33,6 +34,7 @@ class LiveLayer:
         self._frame = frame
         self._scanned: Mask = np.zeros(frame.shape, dtype=bool)
         self._heights: Heights | None = None
+        self._ground: Mask = NOWHERE
         self._marks: Numbers = NONE
 
     def forget_around(self, base: Pose2, metres: float) -> None:
@@ -65,6 +67,7 @@ class LiveLayer:
         self._marks = np.flatnonzero(self._scanned)
         if self._heights is not None:
             self._heights = carried(self._heights, before, frame, np.nan)
+            self._ground = carried(self._ground, before, frame, False)
 
     def marked(self, window: Window = (slice(None), slice(None))) -> Mask:
         """The cells in which something is."""
@@ -106,15 +109,17 @@ class LiveLayer:
         """Clear what the camera sees through, then mark what it sees; returns the cells that may have changed."""
         if self._heights is None:
             self._heights = np.full(self._frame.shape, np.nan, dtype=np.float32)
+            self._ground = np.zeros(self._frame.shape, dtype=bool)
         marked = np.argwhere(~np.isnan(self._heights))
         heights = self._heights[marked[:, 0], marked[:, 1]]
         gone = seen_through(marked, heights, self._frame, image, base, self._spec)
         gone |= self._under_robot(self._frame.centres(marked), base)
         _set(self._heights, marked[gone], np.nan)
-        cells, heights = heights_seen(image, base, self._frame, self._spec)
-        shown = (_get(walls, cells) > BESIDE_A_WALL) & ~self._under_robot(self._frame.centres(cells), base)
-        cells = cells[shown]
-        self._heights[cells[:, 0], cells[:, 1]] = heights[shown]
+        cells, heights, ground = shown(image, base, self._frame, self._spec, self._ground)
+        _set(self._ground, ground, True)
+        fresh = (_get(walls, cells) > BESIDE_A_WALL) & ~self._under_robot(self._frame.centres(cells), base)
+        cells = cells[fresh]
+        self._heights[cells[:, 0], cells[:, 1]] = heights[fresh]
         return np.concatenate((marked[gone], cells))
 
     def around(self, base: Pose2, mount: float) -> Window:

@@ -190,11 +190,13 @@ def no_map(spec: StackSpec) -> Iterator[object]:
 
 
 class Camera:
-    """A depth picture: a box that is 8 to 12 cm high, and a lamp that hangs 0.85 m above the ground."""
+    """A depth picture: a box that is 8 cm high, a lamp that hangs 0.85 m above the ground, and a ramp on the right."""
 
     def __init__(self) -> None:
         depth = np.full((24, 32), np.inf, np.float32)
         depth[19:22, 12:20], depth[0:2, 4:10] = 0.7, 1.2
+        down = (np.arange(12, 24) - 11.5) / (16 / np.tan(0.6))
+        depth[12:, 24:] = (0.328 / (down + 0.14))[:, None]
         self._image = Image("camera", 0, np.zeros((24, 32, 3), np.uint8), depth, Pose3(0.1, 0.0, 0.3), 1.2)
 
     def __call__(self, tick: int, readings: Readings) -> Readings:

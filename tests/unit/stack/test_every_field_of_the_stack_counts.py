@@ -69,6 +69,7 @@ def of_planner(kind: str) -> dict[str, tuple[tuple[Said, Scene], ...]]:
 LOST: Said = {"parameters": "nav2", "laser_model_type": "likelihood_field_prob", "update_min_d": 0.05}
 SMALL: Said = {**TRUTH, "costmap": {"rolling_size": 8.0}}
 SEEN = ((TRUTH, scenes.through), (SMALL, scenes.no_map), (TRUTH, scenes.seen_by_a_camera))
+SEEN_BY_A_CAMERA = ("min_obstacle_height", "max_obstacle_height", "max_ground_slope")
 DENOISE = {"enabled": True, "minimal_group_size": 6}
 PARTS = [
     Part(("localizer",), localizers.Amcl, ((amcl(), scenes.moved), (amcl(match_scans=False), scenes.moved)), {
@@ -90,7 +91,7 @@ PARTS = [
     Part(("localizer",), localizers.Ekf, (({"localizer": {"type": "ekf"}}, scenes.slipped),)),
     Part(("costmap",), costmaps.Costmap, SEEN, {
         "rolling_size": ((SMALL, scenes.no_map),),
-        **dict.fromkeys(("min_obstacle_height", "max_obstacle_height"), ((TRUTH, scenes.seen_by_a_camera),)),
+        **dict.fromkeys(SEEN_BY_A_CAMERA, ((TRUTH, scenes.seen_by_a_camera),)),
         **dict.fromkeys(("raytrace_min_range", "inf_is_valid", "track_unknown_space"), ((SMALL, scenes.no_map),)),
     }, {"min_obstacle_height": [0.3], "obstacle_min_range": [1.0], "raytrace_min_range": [2.0]}),
     Part(("costmap", "denoise_layer"), costmaps.DenoiseLayer, (
@@ -99,7 +100,7 @@ PARTS = [
         "enabled": (({**TRUTH, "costmap": {"denoise_layer": {"minimal_group_size": 20}}}, scenes.through),)}),
     Part(("local_costmap",), costmaps.LocalCostmap, SEEN, {
         **dict.fromkeys(("raytrace_min_range", "inf_is_valid"), ((SMALL, scenes.no_map),)),
-        **dict.fromkeys(("min_obstacle_height", "max_obstacle_height"), ((TRUTH, scenes.seen_by_a_camera),)),
+        **dict.fromkeys(SEEN_BY_A_CAMERA, ((TRUTH, scenes.seen_by_a_camera),)),
     }, {
         "denoise_layer": [{"enabled": True, "minimal_group_size": 20}], "obstacle_min_range": [1.0],
         "raytrace_min_range": [2.0],

@@ -1,0 +1,102 @@
+"""A depth camera takes a slope for ground, and what stands on it for an obstacle."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.sensing import Image
+from simscen.model.costmaps import Costmap as Spec
+from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.protocols import Surroundings
+from simscen.testing.flatland import RATE, round_robot
+
+WIDTH, HEIGHT, VIEW = 64, 48, 1.2
+FOCAL = WIDTH / 2 / math.tan(VIEW / 2)
+LEVEL, TILTED = Pose3(0.2, 0.0, 0.45), Pose3.from_rpy(0.1, 0.05, 0.8, 0.0, 0.5, 0.2)
+Ground = tuple[tuple[float, float], ...]
+"""Corners (x, z) of what the ground is like along x; upright where two of them share an x."""
+
+
+def image(ground: Ground, mount: Pose3) -> Image:
+    """What the camera sees of the ground, and of nothing else: where each pixel's line of sight meets each piece."""
+    column, row = np.meshgrid(np.arange(WIDTH), np.arange(HEIGHT))
+    left, up = (WIDTH / 2 - 0.5 - column) / FOCAL, (HEIGHT / 2 - 0.5 - row) / FOCAL
+    ways = np.dstack((np.ones_like(left), left, up)).reshape(-1, 3) @ mount.rotation().T
+    depth = np.full(len(ways), np.inf)
+    for (x1, z1), (x2, z2) in pairwise(ground):
+        normal = np.array([z1 - z2, 0.0, x2 - x1])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            away = (np.array([x1, 0.0, z1]) - np.array(mount.position)) @ normal / (ways @ normal)
+            hit = np.array(mount.position) + away[:, None] * ways
+        along = (hit[:, 0] - x1) * (x2 - x1) + (hit[:, 2] - z1) * (z2 - z1)
+        met = (away > 0) & (along >= 0) & (along <= (x2 - x1) ** 2 + (z2 - z1) ** 2)
+        depth = np.where(met & (away < depth), away, depth)
+    seen = depth.reshape(HEIGHT, WIDTH).astype(np.float32)
+    return Image("camera", 0, np.zeros((HEIGHT, WIDTH, 3), np.uint8), seen, mount, VIEW)
+
+
+def marked(ground: Ground, mount: Pose3, **options: float) -> np.ndarray:
+    """How far ahead (n,) the middle of the costmap is marked."""
+    spec = Spec(rolling_size=8.0, track_unknown_space=False, **options)
+    map_ = Costmap(spec, Surroundings(round_robot(), None, RATE))
+    map_.update(Pose2(0.0, 0.0), image(ground, mount))
+    view = map_.view
+    points = (np.argwhere(view.costs == 254)[:, ::-1] + 0.5) * view.resolution + view.origin
+    return points[np.abs(points[:, 1]) < 0.3][:, 0]
+
+
+def ramp(degrees: float, start: float, height: float = 0.3) -> Ground:
+    top = start + height / math.tan(math.radians(degrees))
+    return ((-1.0, 0.0), (start, 0.0), (top, height), (9.0, height))
+
+
+@pytest.mark.parametrize("mount", [LEVEL, TILTED], ids=["level", "tilted"])
+@pytest.mark.parametrize("degrees", [2, 5, 8])
+@pytest.mark.parametrize("start", [0.4, 1.5])
+def test_a_ramp_ahead_is_ground(mount: Pose3, degrees: float, start: float) -> None:
+    assert not len(marked(ramp(degrees, start), mount))
+
+
+@pytest.mark.parametrize("mount", [LEVEL, TILTED], ids=["level", "tilted"])
+def test_the_ground_that_rises_where_a_slope_ends_is_ground(mount: Pose3) -> None:
+    """A robot that drives down sees the level ground rise ahead of it; one that drives up sees it fall away."""
+    assert not len(marked(((-1.0, 0.0), (0.8, 0.0), (9.0, 8.2 * math.tan(0.14))), mount))
+    assert not len(marked(((-1.0, 0.0), (0.8, 0.0), (9.0, -8.2 * math.tan(0.14))), mount))
+
+
+@pytest.mark.parametrize("mount", [LEVEL, TILTED], ids=["level", "tilted"])
+@pytest.mark.parametrize("away", [0.8, 1.3])
+@pytest.mark.parametrize("height", [0.1, 0.15])
+def test_a_kerb_is_an_obstacle_with_level_ground_behind_it(mount: Pose3, away: float, height: float) -> None:
+    seen = marked(((-1.0, 0.0), (away, 0.0), (away, height), (9.0, height)), mount)
+    assert away - 0.06 < seen.min() < away + 0.15  # the level camera sees no ground nearer than 1.1 m
+
+
+def test_what_stands_on_a_ramp_or_is_steeper_than_one_is_an_obstacle() -> None:
+    up = math.tan(math.radians(6))
+    box = ((-1.0, 0.0), (0.4, 0.0), (1.4, up), (1.4, up + 0.15), (1.7, up + 0.15), (1.7, 1.3 * up), (3.0, 2.6 * up))
+    seen = marked(box, LEVEL)
+    assert seen.min() == pytest.approx(1.4, abs=0.06)
+    assert len(marked(ramp(20, 0.8), LEVEL))
+
+
+def test_without_a_slope_that_is_ground_all_that_is_higher_is_marked_as_in_nav2() -> None:
+    assert len(marked(ramp(5, 1.0), LEVEL, max_ground_slope=0.0))
+
+
+def test_a_short_ramp_that_was_seen_from_afar_stays_ground_when_all_of_it_is_too_near_to_be_seen() -> None:
+    """And a step as high, which nobody saw before, is an obstacle."""
+    map_ = Costmap(Spec(rolling_size=8.0, track_unknown_space=False), Surroundings(round_robot(), None, RATE))
+    for away in (1.5, 1.0, 0.5, 0.3):
+        map_.update(Pose2(1.5 - away, 0.0), image(ramp(8, away, 0.08), LEVEL))
+        assert not (map_.view.costs == 254).any()
+    assert len(marked(ramp(8, 0.3, 0.08), LEVEL))
+
+
+def test_a_box_whose_foot_is_below_the_picture_is_an_obstacle() -> None:
+    box = ((-1.0, 0.0), (0.95, 0.0), (0.95, 0.13), (1.05, 0.13), (1.05, 0.0), (9.0, 0.0))
+    seen = marked(box, LEVEL)
+    assert seen.min() == pytest.approx(0.95, abs=0.06)
