@@ -9,7 +9,7 @@ from simscen.core.chance import Streams
 from simscen.core.events import Event, EventKind
 from simscen.core.geometry import Array, Pose3
 from simscen.core.sensing import Odometry
-from simscen.core.shapes import Body, Solid, TriangleMesh
+from simscen.core.shapes import Body, Shape, TriangleMesh
 from simscen.core.surface import Patch
 from simscen.core.time import Clock
 from simscen.model.anystack import ExternalStackSpec
@@ -186,36 +186,39 @@ class LiveRays:
     def __init__(self, scene: RayScene, robot: Robot, without: frozenset[str] = frozenset()) -> None:
         """Of what moves, the rays go through what is called as in `without`."""
         self._scene, self._robot, self._without = scene, robot, without
-        self._meshes: dict[str, tuple[tuple[Solid, ...], TriangleMesh]] = {}
+        self._bodies: Mapping[str, Body] | None = None
+        self._meshes: dict[str, TriangleMesh] = {}
         self._where: Mapping[str, Pose3] | None = None
 
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
         """See core.rays.RayCaster."""
-        where = self._robot.objects()
+        robot = self._robot
+        if robot.bodies is not self._bodies:  # it is the same one for as long as nothing comes or goes
+            self._meshes, self._bodies = self._surfaces(robot.bodies), robot.bodies
+            self._where = None
+        where = robot.objects()
         if where is not self._where:  # it is the same one for as long as nothing has moved
             self._where = where
-            self._scene.set_moving(self._placed())
+            self._scene.set_moving({name: (mesh, where[name]) for name, mesh in self._meshes.items()})
         return self._scene.cast(origins, directions, reach)
 
-    def _placed(self) -> Mapping[str, tuple[TriangleMesh, Pose3]]:
-        placed, known = dict[str, tuple[TriangleMesh, Pose3]](), self._meshes
-        for name, (body, pose) in self._robot.moving().items():
+    def _surfaces(self, bodies: Mapping[str, Body]) -> dict[str, TriangleMesh]:
+        """By name, the surface of each, which is the same one for all that are alike: a row of chairs is built once."""
+        before = self._bodies or {}
+        known = [(_parts(before[name]), mesh) for name, mesh in self._meshes.items()]
+        meshes = dict[str, TriangleMesh]()
+        for name, body in bodies.items():
             if name not in self._without:
-                before = known.get(name)
-                if before is None or before[0] is not body.solids:
-                    before = known[name] = (body.solids, self._fused(body))
-                placed[name] = before[1], pose
-        if len(known) > len(placed):
-            self._meshes = {name: known[name] for name in placed}
-        return placed
+                parts = _parts(body)
+                alike = next((surface for others, surface in known if others == parts), None)
+                meshes[name] = fuse(body.solids) if alike is None else alike
+                known.append((parts, meshes[name]))
+        return meshes
 
-    def _fused(self, body: Body) -> TriangleMesh:
-        """Its surface, which is the same one for all that are alike: a row of chairs is built once."""
-        shapes = [(solid.shape, solid.pose) for solid in body.solids]
-        for solids, mesh in self._meshes.values():
-            if len(solids) == len(shapes) and shapes == [(solid.shape, solid.pose) for solid in solids]:
-                return mesh
-        return fuse(body.solids)
+
+def _parts(body: Body) -> list[tuple[Shape, Pose3]]:
+    """What it is made of, whatever that is called."""
+    return [(solid.shape, solid.pose) for solid in body.solids]
 
 
 class TruthSensor:

@@ -4,13 +4,15 @@ import math
 
 import numpy as np
 
-from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry import Array, Pose2, rotated
 from simscen.core.sensing import Scan
 from simscen.model.robot import Lidar
 from simscen.sensors.sensor import SensorSetting
 
 CERTAIN = 10.0
 """Standard deviations that noise never exceeds."""
+AT_ONCE = 8
+"""Scans whose noise is drawn at once."""
 
 
 class LidarSensor:
@@ -29,14 +31,15 @@ class LidarSensor:
         angles = self._first + self._increment * np.arange(spec.beams, dtype=np.float64)
         self._directions = _directions(angles + spec.mount.yaw)
         self._reach = spec.max_range + CERTAIN * spec.noise
-        self._lens = np.array([spec.mount.x, spec.mount.y, spec.mount.z])
+        self._lens = spec.mount.x, spec.mount.y, spec.mount.z
+        self._ahead, self._next = np.empty((0, spec.beams)), 0
 
     def read(self, tick: int) -> Scan:
         """One scan. inf: nothing within range; nan: something nearer than the lidar can measure."""
         pose = self._view.base_pose()
-        base_from_world = pose.rotation().T
-        directions = self._directions @ base_from_world
-        lens = self._lens @ base_from_world + pose[:3]
+        directions = self._directions @ pose.rotation().T
+        x, y, z = rotated(pose[3:], self._lens)
+        lens = np.array((pose.x + x, pose.y + y, pose.z + z))
         origins = np.ndarray(directions.shape, np.float64, lens, 0, (0, 8))  # one place for all rays
         ranges = self._measured(self._rays.cast(origins, directions, self._reach))
         spec = self._spec
@@ -45,17 +48,20 @@ class LidarSensor:
     def _measured(self, distances: Array) -> Array:
         """What the electronics make of true distances."""
         spec = self._spec
-        if spec.noise > 0:
-            ranges = self._chance.normal(0.0, spec.noise, len(distances))
-            ranges += distances
-            ranges /= spec.resolution
-        else:
-            ranges = distances / spec.resolution
+        ranges = (distances + self._noise() if spec.noise > 0 else distances) / spec.resolution
         np.rint(ranges, out=ranges)
         ranges *= spec.resolution
         ranges[ranges > spec.max_range] = np.inf
         ranges[ranges < spec.min_range] = np.nan
         return ranges
+
+    def _noise(self) -> Array:
+        """That of a scan, in metres; drawn ahead for several, as single draws would give it."""
+        if self._next == len(self._ahead):
+            self._ahead, self._next = self._chance.normal(0.0, self._spec.noise, (AT_ONCE, self._spec.beams)), 0
+        self._next += 1
+        noise: Array = self._ahead[self._next - 1]
+        return noise
 
 
 def _directions(angles: Array) -> Array:

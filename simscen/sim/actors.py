@@ -247,6 +247,10 @@ class Actors:
         """Everything and where it is, by name in order."""
         return {name: (self._actors[name].body, pose) for name, pose in self.poses(tick).items()}
 
+    def bodies(self) -> dict[str, Body]:
+        """Everything, by name in order."""
+        return {name: actor.body for name, actor in self._actors.items()}
+
     def _pose(self, actor: Actor, tick: int) -> Pose3:
         if actor.path is not None:
             there = actor.scripted.get(tick)

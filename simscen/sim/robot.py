@@ -118,6 +118,8 @@ class Robot:
         self._who = f'robot "{name}"' if name else "the robot"
         self.others: tuple[Robot, ...] = ()
         """The other robots, by name."""
+        self.bodies: Mapping[str, Body] = {}
+        """Everything that may move by name, the same one for as long as nothing comes or goes."""
         self.shape = Body(name, body.solid, Pose3.planar(pose), body.mass)
         self._contacts = Contacts(scene.rate)
         uneven = bool(scene.terrain and self.base.rolling)
@@ -173,9 +175,8 @@ class Robot:
         return {**poses, **{robot.name: robot.base_pose() for robot in self.others}} if self.others else poses
 
     def moving(self) -> Mapping[str, tuple[Body, Pose3]]:
-        """The same with their bodies: what a scene of rays needs."""
-        placed = self._scene.actors.placed(self._scene.tick)
-        return {**placed, **{robot.name: (robot.shape, robot.base_pose()) for robot in self.others}}
+        """The same with their bodies."""
+        return {name: (self.bodies[name], pose) for name, pose in self.objects().items()}
 
     def base_pose(self) -> Pose3:
         """The robot's base frame in the world."""
@@ -241,6 +242,7 @@ class Robot:
         scene = self._scene
         self.others = tuple(robot for robot in scene.robots.values() if robot is not self)
         self.clearance.others = [robot.clearance for robot in self.others]
+        self.bodies = {**scene.actors.bodies(), **{robot.name: robot.shape for robot in self.others}}
         others = {robot.base.id: robot.name for robot in self.others}
         self._names = {**dict.fromkeys(scene.walls.bodies), **scene.terrain.names, **scene.actors.ids(), **others}
         self.clearance.forget()

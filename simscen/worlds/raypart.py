@@ -1,7 +1,6 @@
 """Embree scenes: of a mesh, of such a mesh where it is now, and of what is around in a large world."""
 
 import math
-from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -48,13 +47,12 @@ class Part:
 
         An array of `ends` becomes the answer.
         """
-        if not origins.strides[0]:
-            return self.distances_from(origins[0], directions, ends)
         return self._run(np.subtract(origins, self.middle).astype(np.float32), directions, ends)
 
-    def distances_from(self, place: Array, directions: Array, ends: float | Singles) -> Singles:
-        """The same of rays that all begin in one place (3,)."""
-        start = (place - self.middle).astype(np.float32)
+    def distances_from(self, place: Vector, directions: Array, ends: float | Singles) -> Singles:
+        """The same of rays that all begin in one place."""
+        (x, y, z), (mx, my, mz) = place, self.centre
+        start = np.array((x - mx, y - my, z - mz), dtype=np.float32)
         return self._run(np.ndarray(directions.shape, np.float32, start, 0, (0, 4)), directions, ends)
 
     def _run(self, starts: Singles, directions: Array, ends: float | Singles) -> Singles:
@@ -69,24 +67,38 @@ class Mover:
     def __init__(self, part: Part, pose: Pose3) -> None:
         """With its frame at a pose in the world."""
         self.part, self.pose = part, pose
+        self._middle: Vector | None = None
+        self._rotation: Array | None = None
 
-    @cached_property
+    @property
     def middle(self) -> Vector:
         """Where its middle is in the world."""
-        x, y, z, i, j, k, w = self.pose
-        p, q, r = rotated((i, j, k, w), self.part.centre)
-        return x + p, y + q, z + r
+        if self._middle is None:
+            x, y, z, i, j, k, w = self.pose
+            p, q, r = rotated((i, j, k, w), self.part.centre)
+            self._middle = x + p, y + q, z + r
+        return self._middle
 
-    @cached_property
+    @property
     def _turn(self) -> Array:
-        return self.pose.rotation()
+        if self._rotation is None:
+            self._rotation = self.pose.rotation()
+        return self._rotation
+
+    def away(self, place: Vector) -> float:
+        """How far in metres from a place in the world the nearest of it may be."""
+        return math.dist(self.pose[:3], place) - self.part.extent
 
     def distances(self, origins: Array, directions: Array, ends: Singles) -> Singles:
         """As those of a part, in the world."""
-        turn, part = self._turn, self.part
-        if not origins.strides[0]:
-            return part.distances_from((origins[0] - self.pose[:3]) @ turn, directions @ turn, ends)
-        return part.distances((origins - self.pose[:3]) @ turn, directions @ turn, ends)
+        turn = self._turn
+        return self.part.distances((origins - self.pose[:3]) @ turn, directions @ turn, ends)
+
+    def distances_from(self, place: Vector, directions: Array, ends: Singles) -> Singles:
+        """The same of rays that all begin in one place."""
+        (px, py, pz), (x, y, z, i, j, k, w) = place, self.pose
+        seen = rotated((-i, -j, -k, w), (px - x, py - y, pz - z))
+        return self.part.distances_from(seen, directions @ self._turn, ends)
 
 
 class Window:
@@ -101,11 +113,9 @@ class Window:
         self._part: Part | None = None
         self._place, self._far = (0.0, 0.0), 0.0
 
-    def around(self, origins: Array, reach: float) -> Part:
-        """A scene that holds all that rays from the origins (n, 3) may meet within their reach."""
-        x, y = origins[0, :2].tolist() if len(origins) else self._place
-        if len(origins) and origins.strides[0]:
-            reach += float(np.linalg.norm(origins[:, :2] - origins[0, :2], axis=1).max())
+    def around(self, place: Vector, reach: float) -> Part:
+        """A scene that holds all that rays from a place may meet within their reach."""
+        x, y, _ = place
         dx, dy = x - self._place[0], y - self._place[1]
         away = math.hypot(dx, dy)
         if self._part is None or away + reach > self._far:

@@ -1,7 +1,8 @@
 """Ray casting with Embree: one scene for what never moves, and one for each thing that does, in its own frame."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from weakref import WeakValueDictionary
 
 import numpy as np
 import numpy.typing as npt
@@ -40,75 +41,84 @@ class RayScene:
             self._static: Part | Window = Window(self._device, world.mesh) if isinstance(world, Window) else world
         else:
             self._static = (Window if len(static.faces) > FEW else Part)(self._device, static)
-        self._parts: dict[int, Part] = {}
+        self._parts = WeakValueDictionary[int, Part]()
         self._movers: dict[str, Mover] = {}
 
     def set_moving(self, bodies: Mapping[str, Placed]) -> None:
         """Say where the bodies are now: by name, the triangles in a body's frame and the pose of that frame."""
-        known, self._parts = self._parts, {}
         before, self._movers = self._movers, {}
         for name, (mesh, pose) in bodies.items():
-            part = self._parts.get(id(mesh)) or known.get(id(mesh)) or Part(self._device, mesh)
-            self._parts[id(mesh)] = part
             mover = before.get(name)
-            same = mover is not None and mover.part is part and mover.pose == pose
-            self._movers[name] = mover if mover is not None and same else Mover(part, pose)
+            if mover is None or mover.part.mesh is not mesh:
+                mover = Mover(self._part_of(mesh), pose)
+            elif mover.pose != pose:
+                mover = Mover(mover.part, pose)
+            self._movers[name] = mover
+
+    def _part_of(self, mesh: TriangleMesh) -> Part:
+        """The scene of a mesh, which is one for all that are alike; those of what is gone are forgotten with it."""
+        part = self._parts.get(id(mesh))
+        if part is None:
+            part = self._parts[id(mesh)] = Part(self._device, mesh)
+        return part
 
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
         """See core.rays.RayCaster."""
-        static, limit = self._static, min(reach, _FARTHEST)
-        if isinstance(static, Window):
-            static = static.around(origins, reach)
-        distances = static.distances(origins, directions, limit * _BEYOND)
-        if self._movers and len(origins):
-            self._shorten(origins, directions, distances, reach)
+        limit = min(reach, _FARTHEST)
+        if not len(origins):
+            return np.empty(0)
+        if not origins.strides[0]:
+            x, y, z = origins[0].tolist()
+            distances = self._from_one((x, y, z), directions, reach, limit * _BEYOND)
+        else:
+            distances = self._from_each(origins, directions, reach, limit * _BEYOND)
         answer = distances.astype(np.float64)
         answer[distances > limit] = np.inf
         return answer
 
-    def _shorten(self, origins: Array, directions: Array, ends: Singles, reach: float) -> None:
-        """Let rays end where they meet moving bodies; those are asked for that meet the sphere around one."""
-        place = origins[0].tolist()
-        if origins.strides[0]:
-            reach += float(np.linalg.norm(origins - origins[0], axis=1).max())
-        movers = self._movers.values()
-        near = [mover for mover in movers if math.dist(mover.pose[:3], place) - mover.part.extent <= reach]
+    def _from_one(self, place: Vector, directions: Array, reach: float, end: float) -> Singles:
+        """Where rays that all begin in one place meet anything, as those of a scan: with as few operations as may be.
+
+        A moving body is asked for the rays within the cone about the sphere around it.
+        """
+        static = self._static.around(place, reach) if isinstance(self._static, Window) else self._static
+        ends = static.distances_from(place, directions, end)
+        near = [mover for mover in self._movers.values() if mover.away(place) <= reach]
         if not near:
-            return
-        meeting = _meeting if origins.strides[0] else _in_cones
-        for mover, met in zip(near, meeting(near, origins, directions, ends), strict=True):
-            rays: Numbers = met.nonzero()[0]
+            return ends
+        px, py, pz = place
+        ways = [(x - px, y - py, z - pz) for x, y, z in [mover.middle for mover in near]]
+        for mover, (x, y, z), along in zip(near, ways, np.array(ways) @ directions.T, strict=True):
+            square, radius = x * x + y * y + z * z, mover.part.radius
+            outside = square - radius * radius
+            rays: Numbers = (along >= (math.sqrt(outside) if outside > 0 else -math.inf)).nonzero()[0]
             if len(rays):
-                starts = origins[rays] if origins.strides[0] else origins[: len(rays)]
-                ends[rays] = mover.distances(starts, directions[rays], ends[rays])
+                before = ends.take(rays)
+                if before.max() >= math.sqrt(square) - radius:
+                    ends[rays] = mover.distances_from(place, directions.take(rays, axis=0), before)
+        return ends
+
+    def _from_each(self, origins: Array, directions: Array, reach: float, end: float) -> Singles:
+        """Where rays meet anything that begin in places of their own."""
+        x, y, z = origins[0].tolist()
+        reach += float(np.linalg.norm(origins - (x, y, z), axis=1).max())
+        static = self._static.around((x, y, z), reach) if isinstance(self._static, Window) else self._static
+        ends = static.distances(origins, directions, end)
+        for mover in self._movers.values():
+            if mover.away((x, y, z)) <= reach:
+                rays: Numbers = _meeting(mover, origins, directions, ends).nonzero()[0]
+                if len(rays):
+                    ends[rays] = mover.distances(origins[rays], directions[rays], ends[rays])
+        return ends
 
 
-def _in_cones(movers: Sequence[Mover], origins: Array, directions: Array, ends: Singles) -> npt.NDArray[np.bool_]:
-    """Which rays (k, n) from one place meet the sphere around each mover; all where they begin inside of it."""
-    px, py, pz = origins[0].tolist()
-    ways, least, away = list[Vector](), list[tuple[float]](), list[tuple[float]]()
-    for mover in movers:
-        (x, y, z), radius = mover.middle, mover.part.radius
-        x, y, z = x - px, y - py, z - pz
-        square = x * x + y * y + z * z
-        outside = square - radius * radius
-        ways.append((x, y, z))
-        least.append((math.sqrt(outside) if outside > 0 else -math.inf,))
-        away.append((math.sqrt(square) - radius,))
-    chosen: npt.NDArray[np.bool_] = np.array(ways) @ directions.T >= np.array(least)
-    chosen &= ends >= np.array(away)
-    return chosen
-
-
-def _meeting(movers: Sequence[Mover], origins: Array, directions: Array, ends: Singles) -> npt.NDArray[np.bool_]:
-    """Which rays (k, n) from several places meet the sphere around each mover before they end."""
-    chosen = np.empty((len(movers), len(origins)), dtype=np.bool_)
-    for mover, met in zip(movers, chosen, strict=True):
-        ways, radius = mover.middle - origins, mover.part.radius
-        ahead = (ways * directions).sum(axis=1)
-        beside = (ways * ways).sum(axis=1) - ahead**2
-        met[:] = (ahead >= -radius) & (ahead - radius <= ends) & (beside <= radius * radius)
-    return chosen
+def _meeting(mover: Mover, origins: Array, directions: Array, ends: Singles) -> npt.NDArray[np.bool_]:
+    """Which rays (n,) from several places meet the sphere around a mover before they end."""
+    ways, radius = mover.middle - origins, mover.part.radius
+    ahead = (ways * directions).sum(axis=1)
+    beside = (ways * ways).sum(axis=1) - ahead**2
+    met: npt.NDArray[np.bool_] = (ahead >= -radius) & (ahead - radius <= ends) & (beside <= radius * radius)
+    return met
 
 
 def ready(mesh: TriangleMesh) -> None:
