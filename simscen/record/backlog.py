@@ -1,5 +1,6 @@
 """Moments that wait until several can be written at once."""
 
+from collections.abc import Callable
 from contextlib import suppress
 from types import TracebackType
 from typing import Protocol
@@ -7,8 +8,8 @@ from typing import Protocol
 from simscen.core.errors import RunError
 from simscen.core.trace import Moment
 
-WAITS = 0.4
-"""Seconds for which the moments of a run wait: with its last chunk, less than a log may lose when it is killed."""
+WAITS = 0.9
+"""Seconds for which the moments of a run wait: less than a log of twenty may lose when it is killed."""
 
 
 class Log(Protocol):
@@ -26,9 +27,10 @@ class Backlog:
     takes twice as long as for the second of two moments in a row. What waits is lost when the process is killed.
     """
 
-    def __init__(self, ticks: int) -> None:
-        """0: nothing waits."""
+    def __init__(self, ticks: int, then: Callable[[], None] | None = None) -> None:
+        """0: nothing waits. `then` is called when all that waited has been handed on."""
         self.waiting: list[tuple[tuple[Log, ...], Moment]] = []
+        self._then = then
         self.ticks, self.until = ticks, 0
 
     def before(self, *logs: Log) -> Log:
@@ -41,6 +43,8 @@ class Backlog:
         for number in range(max((len(logs) for logs, _ in waiting), default=0)):
             for logs, moment in waiting:
                 logs[number].append(moment)
+        if self._then is not None:
+            self._then()
 
     def __enter__(self) -> "Backlog":
         return self

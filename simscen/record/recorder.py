@@ -48,6 +48,11 @@ class Recorder:
         """Write one beat of the only robot."""
         (robot,) = self.robots.values()
         robot.append(moment)
+        self.settle()
+
+    def settle(self) -> None:
+        """No moment comes for a while: see to it that a killed run keeps those that came."""
+        self._writer.settle()
 
     def close(self, end_tick: int, result: str = "", stack: Mapping[str, str] | None = None) -> None:
         """Write the end of the run, its result (JSON) and what external stacks were, then give the file its name."""

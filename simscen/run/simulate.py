@@ -67,7 +67,8 @@ def _simulated(
     with ExitStack() as closing:
         recorder = log and closing.enter_context(Recorder(log, clock, log_header(prepared, seed)))
         # Code of others may write into an array that it has handed out.
-        backlog = closing.enter_context(Backlog(0 if prepared.plugins else clock.ticks(WAITS)))
+        waits, settle = 0 if prepared.plugins else clock.ticks(WAITS), recorder.settle if recorder else None
+        backlog = closing.enter_context(Backlog(waits, settle))
         rig = assemble(prepared, seed, printed)
         closing.callback(rig.simulation.close)
         agents = dict(zip(prepared.each, rig.agents, strict=True))

@@ -1,5 +1,7 @@
 """What waits to be written comes in its order, all of it, and also when a run breaks off."""
 
+from itertools import pairwise
+
 import pytest
 from moments import moments
 
@@ -54,6 +56,16 @@ def test_without_ticks_nothing_waits() -> None:
     for moment in SOME:
         log.append(moment)
         assert told[-1][1] == moment.tick
+
+
+def test_logs_may_settle_each_time_that_all_which_waited_has_come() -> None:
+    told: list[tuple[str, int]] = []
+    settled: list[int] = []
+    log = Backlog(48, lambda: settled.append(told[-1][1])).before(Heard("", told))
+    for moment in SOME:
+        log.append(moment)
+    assert settled == sorted(set(settled))
+    assert all(later - earlier == 48 for earlier, later in pairwise(settled))
 
 
 def test_each_log_of_a_robot_is_told_all() -> None:

@@ -23,7 +23,7 @@ MESSAGES = [(1 + i % 3, 1000 * (i // 2), random.Random(i).randbytes(300)) for i 
 
 def ours() -> bytes:
     stream = io.BytesIO()
-    writer = McapWriter(stream, "ros2", "simscen")
+    writer = McapWriter(stream, "ros2", "simscen", chunk_size=1 << 16)
     channels = [writer.channel(f"/t{n}", TEXT, {"key": str(n)}) for n in range(3)]
     writer.attach("a.txt", "text/plain", b"hello")
     writer.note("facts", {"seed": "7"})
