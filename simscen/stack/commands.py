@@ -19,6 +19,7 @@ class Commands:
         """`period` of the controller in ticks; `latency` of controller and monitor in ticks."""
         self._smoother, self._monitor, self._period = smoother, monitor, period
         self._wanted, self._allowed = Underway[tuple[Twist, int]](latency[0]), Underway[Twist](latency[1])
+        self._at_once: tuple[Twist, int] | None = None
         self._asked, self._free_at = 0, 0
         self.latency = latency[0]
         """Ticks that the controller takes for a command."""
@@ -29,7 +30,7 @@ class Commands:
 
     def busy(self, tick: int) -> bool:
         """Whether the controller still works on its last command."""
-        return self._wanted.busy(tick)
+        return self.late and self._wanted.busy(tick)
 
     def periods(self, tick: int) -> int:
         """How many of its periods the controller has taken since it was last asked, or since the robot was stopped."""
@@ -37,19 +38,26 @@ class Commands:
 
     def want(self, tick: int, wanted: Twist, periods: int) -> None:
         """What the controller makes of what it was told at this tick, so many of its periods after the last time."""
-        self._wanted.put(tick, (wanted, periods))
         self._asked = tick
+        if self.late:
+            self._wanted.put(tick, (wanted, periods))
+        else:
+            self._at_once = wanted, periods
 
     def stop(self, tick: int) -> None:
         """Stop at once; what is under way counts no more."""
         self._wanted.clear()
         self._allowed.clear()
+        self._at_once = None
         self._smoother.reset(STOP)
         self._asked = self._free_at = tick
         self.sent = STOP
 
     def step(self, tick: int, odometry: Pose2) -> None:
         """Time has come to this tick, and the robot to this pose in the odom frame."""
+        if self._at_once is not None:
+            self.sent = self._guarded(tick, *self._at_once, odometry)
+            self._at_once = None
         while tick >= self._wanted.due:
             self._allowed.put(tick, self._guarded(tick, *self._wanted.take(), odometry))
         while tick >= self._allowed.due:

@@ -43,16 +43,17 @@ def _clearly_free(radius: float, costmap: CostmapView, pose: Pose2, twist: Twist
     """
     vx, vy, wz = twist
     speed, turns = math.hypot(vx, vy), abs(wz) >= NO_TURN
-    cosine, sine = math.cos(pose.yaw), math.sin(pose.yaw)
-    slack = radius + 1.4143 * costmap.resolution
+    cosine, sine, resolution = math.cos(pose.yaw), math.sin(pose.yaw), costmap.resolution
+    slack = radius + 1.4143 * resolution
     time, at_x, at_y = 0.0, pose.x, pose.y
     while True:
         room = distance_at(costmap, at_x, at_y) - slack
-        if room <= costmap.resolution and (room <= 0.0 or speed > 0.0):
+        if room <= resolution and (room <= 0.0 or speed > 0.0):
             return False
         if time >= horizon or speed == 0.0:
             return True
-        time = min(horizon, time + room / speed)
+        time += room / speed
+        time = min(time, horizon)
         forward, left = (math.sin(wz * time) / wz, (1.0 - math.cos(wz * time)) / wz) if turns else (time, 0.0)
         x, y = vx * forward - vy * left, vx * left + vy * forward
         at_x, at_y = pose.x + cosine * x - sine * y, pose.y + sine * x + cosine * y

@@ -1,7 +1,7 @@
 """Where odometry was at any recent tick, as tf knows it: a scan that comes late was taken from there."""
 
 import math
-from bisect import bisect_left, bisect_right
+from bisect import bisect_left
 
 from simscen.core.geometry import Pose2
 
@@ -22,14 +22,16 @@ class OdometryHistory:
 
     def __init__(self, tick_rate: int) -> None:
         self._span, self._most = KEPT * tick_rate, (KEPT + 1) * tick_rate
-        self._ticks: list[int] = []
-        self._poses: list[Pose2] = []
+        self._readings: list[tuple[int, Pose2]] = []
         self._newest: float = -math.inf
+        self._full: float = -math.inf
         self.now = Pose2(0.0, 0.0)
         """The newest pose; the origin before there is any."""
 
-    def __bool__(self) -> bool:
-        return bool(self._poses)
+    @property
+    def begun(self) -> bool:
+        """Whether there is any."""
+        return self._full > -math.inf
 
     def add(self, tick: int, pose: Pose2) -> bool:
         """Take a reading in; False when it is of no use: not a place, or not newer than the last one."""
@@ -37,18 +39,20 @@ class OdometryHistory:
         here = -_LARGEST < x < _LARGEST and -_LARGEST < y < _LARGEST and -_LARGEST < yaw < _LARGEST
         if tick <= self._newest or not here:
             return False
-        ticks = self._ticks
-        ticks.append(tick)
-        self._poses.append(pose)
         self._newest, self.now = tick, pose
-        if ticks[0] < tick - self._most:
-            old = self._first()
-            del ticks[:old], self._poses[:old]
+        self._readings.append((tick, pose))
+        if tick > self._full:
+            self._forget()
         return True
+
+    def _forget(self) -> None:
+        """Throw away what is too old, and note when the oldest of the rest will be."""
+        del self._readings[: self._first()]
+        self._full = self._readings[0][0] + self._most
 
     def _first(self) -> int:
         """Where what counts still begins."""
-        return bisect_left(self._ticks, self._newest - self._span)
+        return bisect_left(self._readings, (self._newest - self._span,))
 
     def reaches(self, tick: int) -> bool:
         """Whether there is odometry at `tick` or later."""
@@ -59,23 +63,24 @@ class OdometryHistory:
         if tick >= self._newest:
             return self.now
         first = self._first()
-        return self._poses[max(first, bisect_right(self._ticks, tick, first) - 1)]
+        return self._readings[max(first, bisect_left(self._readings, (tick + 1,), first) - 1)][1]
 
     def at(self, tick: int) -> Pose2 | None:
         """The pose at `tick`, interpolated along a constant twist's chord; None before the oldest, after the newest."""
         if tick == self._newest:
             return self.now
         first = self._first()
-        after = bisect_left(self._ticks, tick, first)
-        if after == len(self._ticks):
+        after = bisect_left(self._readings, (tick,), first)
+        if after == len(self._readings):
             return None
-        if self._ticks[after] == tick:
-            return self._poses[after]
+        then, there = self._readings[after]
+        if then == tick:
+            return there
         if after == first:
             return None
-        share = (tick - self._ticks[after - 1]) / (self._ticks[after] - self._ticks[after - 1])
-        before = self._poses[after - 1]
-        step = before.between(self._poses[after])
+        earlier, before = self._readings[after - 1]
+        share = (tick - earlier) / (then - earlier)
+        step = before.between(there)
         return before.compose(Pose2(share * step.x, share * step.y, share * step.yaw))
 
     def then(self, now: Pose2, tick: int) -> Pose2:

@@ -90,14 +90,14 @@ class PlanKeeper:
         self._via = via
         if self.plan is None and self._asked is None:
             self._ask(tick, goal, pose, self._reason)
-        made = self._hear(tick, now)
+        made: tuple[Event, ...] = () if self._asked is None else self._hear(tick, now)
         self._steps += 1
         if made or self.plan is None or self._steps % RECONSIDER:
             return made
         self.plan.locate(pose)
         if self._asked is None:
             self._reconsider(tick, now, goal, pose, self.plan)
-        return self._hear(tick, now)
+        return made if self._asked is None else self._hear(tick, now)
 
     @property
     def waiting(self) -> int:

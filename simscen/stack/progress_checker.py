@@ -22,9 +22,10 @@ class ProgressChecker:
     def stuck(self, pose: Pose2, seconds: float) -> bool:
         """Whether the allowance is over; `seconds` is a clock that stands still while the robot may not move."""
         start = self._from
-        if start is None or math.hypot(pose.x - start.x, pose.y - start.y) >= self._radius or self._turned(start, pose):
+        if (
+            start is None
+            or math.hypot(pose.x - start.x, pose.y - start.y) >= self._radius
+            or (self._angle is not None and abs(wrap(pose.yaw - start.yaw)) >= self._angle)
+        ):
             self._from, self._since = pose, seconds
         return seconds - self._since > self._allowance
-
-    def _turned(self, before: Pose2, now: Pose2) -> bool:
-        return self._angle is not None and abs(wrap(now.yaw - before.yaw)) >= self._angle

@@ -92,5 +92,5 @@ class _Drawn:
         if view.revision == self.revision:
             return None
         self.revision = view.revision
-        grid = OccupancyGrid(_PUBLISHED[view.costs], view.resolution, Pose2(*view.origin))
+        grid = OccupancyGrid(_PUBLISHED.take(view.costs), view.resolution, Pose2(*view.origin))
         return CostGrid(self.name, self.frame, grid)

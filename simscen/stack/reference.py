@@ -170,7 +170,7 @@ class ReferenceStack:
     def _step(self, tick: int) -> Published:
         """What is done at the controller's rate."""
         pose = self._where()
-        frames = Frames(pose, self._odometry.now if self._odometry else pose)
+        frames = Frames(pose, self._odometry.now if self._odometry.begun else pose)
         self._update_costmaps(tick, frames)
         if not self._prediction.calm or self._moves:
             self._foretell(tick, frames)
@@ -239,7 +239,8 @@ class ReferenceStack:
             self._costmaps.set_zones(self._zones)
             self._speed_filter.set_zones(self._zones)
             self._zones = None
-        self._costmaps.update(tick, frames, self._odometry)
+        if tick >= self._costmaps.next:
+            self._costmaps.update(tick, frames, self._odometry)
 
     def _foretell(self, tick: int, frames: Frames) -> None:
         """Tell the collision monitor, the controller and the planner what moves, each in its frame."""
@@ -251,19 +252,21 @@ class ReferenceStack:
 
     def _control(self, tick: int, frames: Frames) -> None:
         """See to the goals, and to the command that is wanted."""
-        if self._task.goal is None:
+        goal = self._task.goal
+        if goal is None:
             self._events += self._task.next(tick)
-        if (goal := self._task.goal) is not None and goal.via:
+            goal = self._task.goal
+        if goal is not None and goal.via:
             goal = self._pass(tick, frames.pose)
         if goal is None:
             self._stand(tick, frames.pose)
             return
         if self._prediction.stands:
             self._prediction.settle()
-        *via, last = (goal, *self._task.ahead) if goal.via else (goal,)
-        if self._navigator.goal is not last:
-            self._navigator.pursue(last)
-        self._navigator.via = tuple(via)
+        leg = (goal, *self._task.ahead) if goal.via else (goal,)
+        if self._navigator.goal is not leg[-1]:
+            self._navigator.pursue(leg[-1])
+        self._navigator.via = leg[:-1]
         if goal.timeout is not None and tick - self._task.since > goal.timeout * self._tick_rate:
             self._give_up(tick, NavigationFailure(ErrorCode.NAVIGATE_TIMEOUT, f"{goal.timeout:g} s are over"))
         elif self._monitor.silent(tick):

@@ -23,6 +23,8 @@ SOON = 4.0
 """Metres of plan ahead whose room counts."""
 
 
+UNSEEN = 0.5
+"""Metres that the robot may come before its place on the plan is looked for though nobody has asked for it."""
 STRAYED, AT_END = 0.2, 0.03
 """Metres beside its plan, or from its end, at which a car needs another: it cannot turn back on the spot."""
 
@@ -32,12 +34,27 @@ class PlanInForce:
 
     def __init__(self, path: Path, radius: float, costmap: CostmapView) -> None:
         self.path, self._radius = path, radius
-        self._track = PathTracker(path)
+        self._followed = PathTracker(path)
+        self._pose: Pose2 | None = None
+        self._located = Pose2(*path.points[0].tolist())
         self._room = self._rooms(costmap, 0)
 
     def locate(self, pose: Pose2) -> None:
-        """Note where the robot is."""
-        self._track.locate(pose)
+        """Note where the robot is. Its place on the plan is looked for when somebody asks, which mostly nobody does."""
+        self._pose, (x, y, _) = pose, self._located
+        if self._followed.has_cusps or abs(pose.x - x) + abs(pose.y - y) > UNSEEN:
+            self._look(pose)
+
+    def _look(self, pose: Pose2) -> None:
+        self._followed.locate(pose)
+        self._located, self._pose = pose, None
+
+    @property
+    def _track(self) -> PathTracker:
+        """The plan, and where the robot is on it."""
+        if self._pose is not None:
+            self._look(self._pose)
+        return self._followed
 
     @property
     def ahead(self) -> Array:

@@ -1,7 +1,7 @@
 """Where the robot is on its path, and what lies ahead."""
 
 import math
-from bisect import bisect_left, bisect_right
+from bisect import bisect_right
 
 import numpy as np
 
@@ -24,7 +24,8 @@ class PathTracker:
     next such cusp is looked at until the robot is there.
 
     Searches pass over what cannot be what they look for: so many metres along the path change the distance to the robot
-    by no more than that. A handful of points x + iy is looked at, which takes less than arrays of thirty do.
+    by no more than that, and so many points are no more metres than that many of the longest steps. A handful of points
+    x + iy is looked at, which takes less than arrays of thirty do.
     """
 
     def __init__(self, path: Path) -> None:
@@ -34,6 +35,8 @@ class PathTracker:
         self.along = np.concatenate(([0.0], np.cumsum(lengths)))
         self._metres: list[float] = self.along.tolist()
         self._places: list[complex] = (self.points[:, 0] + 1j * self.points[:, 1]).tolist()
+        self._most = 1.0 / (float(lengths.max(initial=0.0)) + ROUNDING)
+        """Points for each metre, at least."""
         ahead = forward_steps(self.points)
         self._ends: list[int] = [*changes(ahead).tolist(), len(self.points) - 1]
         self._forward: list[bool] = [bool(ahead[max(0, end - 1)]) if len(ahead) else True for end in self._ends]
@@ -43,6 +46,11 @@ class PathTracker:
     def length(self) -> float:
         """Length of the path in metres."""
         return self._metres[-1]
+
+    @property
+    def has_cusps(self) -> bool:
+        """Whether there is another piece behind this one."""
+        return len(self._ends) > 1
 
     @property
     def forward(self) -> bool:
@@ -58,15 +66,15 @@ class PathTracker:
             self._nearest(pose)
 
     def _nearest(self, pose: Pose2) -> None:
-        places, metres, stop, here = self._places, self._metres, self._stop(SEARCH_AHEAD), complex(pose.x, pose.y)
-        index, near = self.index, math.inf
-        while index < stop:
+        places, metres, most, here = self._places, self._metres, self._most, complex(pose.x, pose.y)
+        index = nearest = self.index
+        end, far, near = self._ends[0], metres[index] + SEARCH_AHEAD, math.inf
+        while index <= end and metres[index] <= far:
             away = abs(places[index] - here)
             if away < near:
-                self.index, near = index, away
-                index += 1
-            else:
-                index = bisect_left(metres, metres[index] + away - near - ROUNDING, index + 1, stop)
+                nearest, near = index, away
+            index += int((away - near) * most) or 1
+        self.index = nearest
 
     def ahead(self, metres: float) -> tuple[Array, Array]:
         """Points (n, 3) of this piece for so many metres, at least two where it has any, and metres (n,) to them."""
@@ -94,10 +102,10 @@ class PathTracker:
         Interpolated between points, so that the carrot glides (RPP's circleSegmentIntersection). `beyond` prolongs
         the piece in the direction it ends in, so that the robot comes in straight (interpolate_curvature_after_goal).
         """
-        last = min(self._stop(2 * distance + 0.5), self._ends[0])
-        first = self._leaving(pose, distance, last)
+        far = self._metres[self.index] + 2 * distance + 0.5
+        first = self._leaving(pose, distance, far)
         if first is None:
-            x, y, yaw = self.points[last].tolist()
+            x, y, yaw = self.points[min(bisect_right(self._metres, far), self._ends[0])].tolist()
             if not beyond:
                 return x, y
             more = distance if self.forward else -distance
@@ -111,14 +119,15 @@ class PathTracker:
         before = self._places[first - 1]
         return _on_circle(before.real - pose.x, before.imag - pose.y, x - pose.x, y - pose.y, distance, pose)
 
-    def _leaving(self, pose: Pose2, distance: float, last: int) -> int | None:
-        """The first point ahead, up to the `last`, that is no nearer to the robot than this."""
-        places, metres, index, here = self._places, self._metres, self.index, complex(pose.x, pose.y)
-        while index <= last:
+    def _leaving(self, pose: Pose2, distance: float, far: float) -> int | None:
+        """The first point of the piece, up to the first that is `far` along the path, no nearer to the robot."""
+        places, metres, most, here = self._places, self._metres, self._most, complex(pose.x, pose.y)
+        index, end = self.index, self._ends[0]
+        while index <= end and (index == 0 or metres[index - 1] <= far):
             near = abs(places[index] - here)
             if near >= distance:
                 return index
-            index = bisect_left(metres, metres[index] + distance - near - ROUNDING, index + 1, last + 1)
+            index += int((distance - near) * most) or 1
         return None
 
     def _stop(self, metres: float) -> int:

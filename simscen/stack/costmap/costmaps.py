@@ -1,7 +1,6 @@
 """The two costmaps of a stack, as in Nav2: a global one to plan on, and a local one to drive by."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -45,6 +44,8 @@ class Costmaps:
         self._zones = Zones(surroundings.keepout, (), surroundings.masks)
         self._odom_from_map: Pose2 | None = None
         self._painted = False
+        self.next: float = 0
+        """The tick before which an update has nothing to do."""
 
     def see(self, seen: Scan | Image) -> None:
         """A reading, to be taken in with the next update."""
@@ -62,11 +63,14 @@ class Costmaps:
 
     def update(self, tick: int, frames: Frames, odometry: OdometryHistory) -> None:
         """Feed the newest reading of each sensor to the costmaps that are due, seen from where it was taken."""
-        for base, seen, _ in self._wide.take(tick, frames, frames.pose, odometry):
-            self.wide.update(base, seen)
-        for base, seen, then in self._near.take(tick, frames, frames.odometry, odometry):
-            self._paint_zones(then)
-            self.near.update(base, seen)
+        if tick >= self._wide.next:
+            for base, seen, _ in self._wide.take(tick, frames, frames.pose, odometry):
+                self.wide.update(base, seen)
+        if tick >= self._near.next:
+            for base, seen, then in self._near.take(tick, frames, frames.odometry, odometry):
+                self._paint_zones(then)
+                self.near.update(base, seen)
+        self.next = min(self._wide.next, self._near.next)
 
     def clear(self) -> None:
         """Forget every live obstacle but those that the newest scans show (Nav2's ClearEntireCostmap of both)."""
@@ -105,12 +109,14 @@ class _Rhythm:
     def __init__(self, period: int, latency: int) -> None:
         self._period, self._updated = max(period, latency), -period
         self._underway = Underway[_View](latency)
+        self.next: float = 0
+        """The tick before which there is nothing to take."""
         self.seen: dict[str, Scan | Image] = {}
 
     def due(self, tick: int) -> bool:
         return tick - self._updated >= self._period
 
-    def take(self, tick: int, frames: Frames, base: Pose2, odometry: OdometryHistory) -> Sequence["_View"]:
+    def take(self, tick: int, frames: Frames, base: Pose2, odometry: OdometryHistory) -> list["_View"]:
         """What has been taken in by now; without any reading an update waits for one. The robot is at `base` now."""
         if self.seen and self.due(tick):
             self._updated = tick
@@ -118,11 +124,10 @@ class _Rhythm:
                 if isinstance(one, Image) or not _blind(one):
                     self._underway.put(tick, (odometry.then(base, one.tick), one, frames))
             self.seen.clear()
-        if tick < self._underway.due:
-            return ()
         there: list[_View] = []
         while tick >= self._underway.due:
             there.append(self._underway.take())
+        self.next = min(self._updated + self._period, self._underway.due)
         return there
 
 

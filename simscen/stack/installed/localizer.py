@@ -48,11 +48,12 @@ class InstalledLocalizer(Watched):
 
 
 def checked_belief(watched: Watched, belief: object, before: Belief | None = None) -> Belief:
-    """A belief of finite numbers in the right shapes; particles of the one `before` are not looked at again."""
+    """A belief of finite numbers in the right shapes; what it has of the one `before` is not looked at again."""
     if not isinstance(belief, Belief):
         watched.broke(f"believes {type(belief).__name__} instead of a Belief")
     watched.checked_pose(belief.pose, "believes to be at")
-    watched.checked_pose(belief.map_from_odom, "puts the odom frame at")
+    if before is None or belief.map_from_odom is not before.map_from_odom:
+        watched.checked_pose(belief.map_from_odom, "puts the odom frame at")
     if not _is_table(belief.covariance, 3) or len(belief.covariance) != 3:
         watched.broke("believes with a covariance that is no finite array (3, 3)")
     known = before is not None and belief.particles is before.particles and not belief.particles.flags.writeable

@@ -5,6 +5,7 @@ import numpy as np
 from simscen.core.belief import Belief, Estimate
 from simscen.core.events import Event, EventKind
 from simscen.core.grid import OccupancyGrid
+from simscen.core.motion import Twist
 from simscen.core.navigation import Goal, Path
 from simscen.core.sensing import Readings
 from simscen.core.trace import CostGrid, Decision
@@ -25,6 +26,7 @@ class InstalledStack(Watched):
         super().__init__("stack", spec, setting, Stack)
         self._last: Decision | None = None
         self._belief: Belief | None = None
+        self._command: Twist | None = None
 
     def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:
         """Localise at the estimate, then drive to the goals in order."""
@@ -74,7 +76,8 @@ class InstalledStack(Watched):
     def _checked(self, decision: object, tick: int) -> Decision:
         if not isinstance(decision, Decision):
             self.broke(f"decided {type(decision).__name__} instead of a Decision")
-        self.checked_twist(decision.command)
+        if decision.command is not self._command:
+            self._command = self.checked_twist(decision.command)
         if decision.belief is not None:
             self._belief = checked_belief(self, decision.belief, self._belief)
         if decision.plan is not None:
