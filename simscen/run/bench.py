@@ -111,10 +111,12 @@ def _taken_apart(prepared: Prepared, cpu: float) -> dict[str, float]:
 def timed_run(prepared: Prepared, watch: Stopwatch | None = None) -> tuple[float, float, float]:
     """Simulated, CPU and wall seconds of one run, from setting up to the verdicts; `watch` takes it apart."""
     gc.collect()
+    gc.freeze()  # as what hands out runs does: what was here before them is not looked through for garbage
     with TemporaryDirectory() as folder:
         begun, begun_wall = time.process_time(), time.perf_counter()
         run = simulate(prepared, SEED, log=Path(folder, "run.mcap"), attach=partial(_watched, watch) if watch else None)
         cpu, wall = time.process_time() - begun, time.perf_counter() - begun_wall
+    gc.unfreeze()
     return run.result.simulated, cpu, wall
 
 
