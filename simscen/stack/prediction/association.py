@@ -45,8 +45,14 @@ def associate(tracks: list[Track], seen: Seen) -> set[int]:
     off = np.abs(expected[:, None] - pieces.centres)
     # Of what is half hidden, the middle of the visible part may be a radius off.
     gate = np.multiply.outer([track.radius for track in tracks], pieces.edges != BOTH)
+    near_by = gate + GATE
     gate += np.array([(GATE + GATE_SIGMAS * track.place_deviation,) for track in tracks])
-    numbers, near = (off <= gate).nonzero()
+    possible = off <= gate
+    stands = np.array(seen.stood) > np.array(seen.came)
+    if stands.any():  # what stands continues what has stood there: nothing hops from one post to the next
+        last = lidar.into(np.array([track.lately[-1].place for track in tracks]))
+        possible &= ~stands | (np.abs(last[:, None] - pieces.centres) <= near_by)
+    numbers, near = possible.nonzero()
     order = off[numbers, near].argsort(kind="stable")
     given = dict[int, int]()
     taken = set[int]()
@@ -84,7 +90,7 @@ def begin(tracks: list[Track], seen: Seen, taken: set[int]) -> None:
     # Among moving things others may, of which a thing that passed hid that they were not there before.
     least = LEAST_RADIUS if any(track.moving for track in tracks) else np.inf
     for piece, (radius, came) in enumerate(zip(pieces.radii.tolist(), seen.came, strict=True)):
-        if piece in taken or not (came or radius >= least):
+        if piece in taken or not (came or (radius >= least and not seen.stood[piece])):
             continue
         centre = complex(pieces.centres[piece])
         # Of what is half hidden more may be there than is seen.

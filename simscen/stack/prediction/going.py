@@ -41,8 +41,11 @@ class Going:
     def __init__(self, spec: Prediction, tick_rate: int) -> None:
         self._spec, self._rate = spec, tick_rate
 
-    def settle(self, track: Track, tick: int, tracks: list[Track]) -> None:
-        """Note whether a track moves, by the scan of a tick; `tracks` are all."""
+    def settle(self, track: Track, tick: int, tracks: list[Track], left: Callable[[Track], bool]) -> None:
+        """Note whether a track moves, by the scan of a tick; `tracks` are all.
+
+        `left` says whether nothing still stands where it was.
+        """
         least, speed = self._spec.min_speed, abs(track.velocity)
         if speed > least:
             track.fast_at = tick
@@ -53,7 +56,7 @@ class Going:
         elif track.moved and speed > track.speed_deviation and track.hit_at == tick:
             track.moving = not track.lately[-1].stood  # it comes back over ground where it has just been
         else:
-            track.moving = track.moved = self._goes(track, tick, speed, tracks)
+            track.moving = track.moved = self._goes(track, tick, speed, tracks) and left(track)
 
     def ended(self, track: Track, tick: int, tracks: list[Track], visible: Callable[[Track], bool]) -> bool:
         """Whether a track is followed no more; `visible` says whether the lidar sees past its place."""
@@ -63,7 +66,7 @@ class Going:
         if track.moving:
             return unseen > ENDS_UNSEEN and (unseen > ENDS_HIDDEN or visible(track))
         rested = (tick - track.fast_at) / self._rate > (REMEMBERED if track.moved else RESTED)
-        return rested or unseen > ENDS_UNSURE or _slides(track, tracks)
+        return rested or unseen > ENDS_UNSURE or (not track.moved and (track.stands >= HITS or _slides(track, tracks)))
 
     def _goes(self, track: Track, tick: int, speed: float, tracks: list[Track]) -> bool:
         """Whether what is that fast is not only noise, nor something that stands and of which more comes into view."""
@@ -78,7 +81,7 @@ class Going:
             return False
         whole = sum(each.edges == BOTH for each in lately)
         if (sure or 2 * whole > len(lately)) and sum(each.came for each in lately) >= max(HITS, MOSTLY * len(lately)):
-            return way > TRAVELLED
+            return way > TRAVELLED and lately[-1].came
         # Without that, only beside something else that moves: it may have hidden the place.
         if not sure or speed < TWICE * least or not any(each.moving for each in tracks):
             return False
@@ -95,6 +98,4 @@ def _slides(track: Track, tracks: list[Track]) -> bool:
 
     So does a wall of which the robot sees another part at each moment. What does move begins anew when it comes.
     """
-    if track.moved or track.uncome < UNCOME:
-        return False
-    return not any(each.moving for each in tracks)
+    return track.uncome >= UNCOME and not any(each.moving for each in tracks)

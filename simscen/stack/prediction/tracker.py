@@ -5,10 +5,6 @@ continues it; a track that keeps its speed for some updates, by more than noise 
 nothing continues ends: soon where the lidar sees through the place, later where something hides it.
 """
 
-import cmath
-import math
-from functools import partial
-
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
@@ -19,7 +15,7 @@ from simscen.stack.prediction.clusters import Mask, Places, clusters
 from simscen.stack.prediction.going import Going
 from simscen.stack.prediction.moving import Moving, Thing, nothing
 from simscen.stack.prediction.seen_through import FARTHEST, Earlier, SeenThrough
-from simscen.stack.prediction.stance import Stance
+from simscen.stack.prediction.sight import Sight
 from simscen.stack.prediction.tracks import Track
 
 CHECKED = 120
@@ -94,24 +90,25 @@ class Tracker:
         return min(scan.range_max, self._spec.max_range)
 
     def _follow(self, scan: Scan, lidar: Pose2, before: Earlier | None) -> None:
-        tracks, ends, going, tick = self._tracks, _ends(scan.ranges, self._towards), self._going, scan.tick
-        seen = self._seen(scan, ends, lidar, before)
+        tracks, going, tick = self._tracks, self._going, scan.tick
+        sight = Sight(scan, _ends(scan.ranges, self._towards), lidar, before)
+        seen = self._seen(sight)
         begin(tracks, seen, associate(tracks, seen))
-        visible = partial(self._visible, scan, seen.lidar)
         followed = list[Track]()
         for track in tracks:
-            going.settle(track, tick, tracks)
-            if not going.ended(track, tick, tracks, visible):
+            going.settle(track, tick, tracks, sight.left)
+            if not going.ended(track, tick, tracks, sight.past):
                 followed.append(track)
         self._tracks = followed
         if moving := [track for track in followed if track.moving]:
-            self._tell(moving, scan, ends, seen.lidar)
+            self._tell(moving, sight)
 
-    def _seen(self, scan: Scan, ends: Places, lidar: Pose2, before: Earlier | None) -> Seen:
+    def _seen(self, sight: Sight) -> Seen:
         """The scan in pieces, and what an earlier one saw where they are."""
+        scan, before = sight.scan, sight.before
         pieces = clusters(
             scan.ranges,
-            ends,
+            sight.ends,
             scan.angle_min,
             scan.angle_increment,
             scan.range_min,
@@ -120,22 +117,16 @@ class Tracker:
         )
         came = stood = [False] * len(pieces.first)
         if before is not None and came:
-            looked = before.looked(pieces.places, lidar)
+            looked = before.looked(pieces.places, sight.at)
             count, share = pieces.counts(looked.appeared())
             came = ((count >= FEW) & (share >= APPEARED)).tolist()
-            if any(track.moved for track in self._tracks):  # else nobody asks
+            if self._tracks:  # else nobody asks
                 stood = (pieces.counts(looked.stood())[1] > STANDS).tolist()
-        return Seen(scan.tick, pieces, Stance.of(lidar), came, stood)
+        return Seen(scan.tick, pieces, sight.lidar, came, stood)
 
-    @staticmethod
-    def _visible(scan: Scan, lidar: Stance, track: Track) -> bool:
-        """Whether the lidar sees past the place where the middle of a track should be."""
-        off = lidar.into(track.place)
-        beam = round((cmath.phase(off) - scan.angle_min) % (2 * math.pi) / scan.angle_increment)
-        return 0 <= beam < len(scan.ranges) and bool(scan.ranges[beam] > abs(off))
-
-    def _tell(self, moving: list[Track], scan: Scan, ends: Places, lidar: Stance) -> None:
+    def _tell(self, moving: list[Track], sight: Sight) -> None:
         """Note what moves, and which beams hit it."""
+        scan, ends, lidar = sight.scan, sight.ends, sight.lidar
         things = [
             Thing(
                 each.place,

@@ -37,7 +37,9 @@ class Track(Point):
     moving: bool = False
     moved: bool = False
     uncome: int = 0
-    """Its last updates in which it has not stood where it had been free."""
+    """Its last updates in which it has not stood where it had been free, …"""
+    stands: int = 0
+    """… and in which it stood where something had been hit before."""
 
     @classmethod
     def begun(cls, tick: int, place: complex, deviation: float, radius: float) -> "Track":
@@ -53,6 +55,7 @@ class Track(Point):
         """Note that it was hit."""
         self.lately.append(Update(tick, self.place, came, stood, edges))
         self.uncome = 0 if came else self.uncome + 1
+        self.stands = self.stands + 1 if stood and not came else 0
 
     @property
     def place_deviation(self) -> float:

@@ -210,6 +210,33 @@ def test_posts_beside_a_fast_way_do_not_move_while_wheels_slip_by_a_tenth() -> N
     assert claims(Watch(lambda _: [], straight, slipping, walls=posts), 8.0) == 0
 
 
+@pytest.mark.parametrize("gap", [0.4, 0.55, 0.7])
+def test_what_is_put_down_before_a_row_of_posts_and_taken_away_again_does_not_hop_to_the_next(gap: float) -> None:
+    """It has stood where it was free, and a post stands within reach of where a track without speed may be."""
+    posts = Flatland(discs=[(3.0 + 0.05 * k, gap * k, 0.1) for k in range(1, 8)])
+    watch = Watch(lambda t: [(3.0, 0.0, 0.1)] if 1.0 <= t < 2.0 else [], walls=posts)
+    assert claims(watch, 4.0) == 0
+
+
+def test_posts_do_not_move_when_the_robot_skids_aside_and_its_wheels_do_not_know() -> None:
+    """By 0.12 m within half a second, there and back, while it swings: nearly all of them stand where it was free."""
+    chance = np.random.default_rng(39)
+    posts = Flatland()
+    posts.discs += [
+        (x, side * float(chance.uniform(0.4, 2.5)), 0.075) for x in np.arange(-2, 8, 0.2) for side in (-1, 1)
+    ]
+
+    def swinging(t: float) -> Pose2:
+        return Pose2(1.0 - math.cos(0.4 * t), 0.0, 0.5 * math.sin(1.3 * t))
+
+    def skidding(t: float) -> Pose2:
+        pose = swinging(t)
+        aside = float(np.interp(t % 5.0, [0.5, 1.0, 3.0, 3.5], [0.0, 0.12, 0.12, 0.0]))
+        return Pose2(1.05 * pose.x, aside, 1.01 * pose.yaw)
+
+    assert claims(Watch(lambda _: [], swinging, skidding, walls=posts), 8.0) == 0
+
+
 def test_the_last_piece_of_a_scan_is_as_near_as_its_last_hit() -> None:
     ranges, step = np.array([50.0] * 10 + [2.0, 1.95, 1.9]), 0.01
     pieces = clusters(ranges, ranges * np.exp(1j * step * np.arange(13)), 0.0, step, 0.1, 10.0, 1.0)
