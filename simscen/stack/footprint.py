@@ -34,6 +34,16 @@ def distance_at(costmap: CostmapView, x: float, y: float) -> float:
     return distance.item(row, column) if 0 <= row < height and 0 <= column < width else 0.0
 
 
+def lethal_near(costmap: CostmapView, x: float, y: float, metres: float) -> Array:
+    """The middles (n, 2) of the lethal cells in a square of so many metres to each side of a point."""
+    left, low = costmap.origin
+    first = [max(0, math.floor((at - metres - edge) / costmap.resolution)) for at, edge in ((y, low), (x, left))]
+    last = [max(0, math.ceil((at + metres - edge) / costmap.resolution)) for at, edge in ((y, low), (x, left))]
+    near = np.argwhere(costmap.distance[first[0] : last[0], first[1] : last[1]] <= 0.0) + np.array(first)
+    cells: Array = np.array((left, low)) + (near[:, ::-1] + 0.5) * costmap.resolution
+    return cells
+
+
 class Footprint:
     """Checks many poses at once.
 
@@ -52,7 +62,17 @@ class Footprint:
         inner = _inner_points(corners, resolution, self.inscribed)
         self._hull = np.concatenate((_edge_points(corners, resolution), inner))
         self._depth = _depths(corners, self._hull).astype(np.float32)
-        self.discs = Discs(robot)
+        self._corners, self.discs = corners, Discs(robot)
+
+    def gaps(self, points: Array, poses: Array) -> Array:
+        """How far (n, k) the hull's edge at poses (n, 3) is from points (k, 2); negative where they are inside."""
+        cosine, sine = np.cos(poses[:, 2, None]), np.sin(poses[:, 2, None])
+        x, y = points[None, :, 0] - poses[:, 0, None], points[None, :, 1] - poses[:, 1, None]
+        if self._round:
+            return np.asarray(np.hypot(x, y) - self.circumscribed)
+        seen = np.stack((cosine * x + sine * y, cosine * y - sine * x), axis=-1).reshape(-1, 2)
+        away = np.where(_inside(self._corners, seen), -1.0, 1.0) * _depths(self._corners, seen)
+        return np.asarray(away.reshape(x.shape))
 
     def free(self, costmap: CostmapView, poses: Array) -> Mask:
         """Which of the poses (n, 3) hit nothing."""
@@ -168,12 +188,18 @@ def _inner_points(corners: Array, resolution: float, inscribed: float) -> Array:
     low, high = corners.min(axis=0), corners.max(axis=0)
     axes = [np.arange(a + spacing, b, spacing) for a, b in zip(low.tolist(), high.tolist(), strict=True)]
     points = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
-    inside = np.zeros(len(points), dtype=bool)
+    inside = _inside(corners, points)
+    return np.asarray(points[inside & (np.hypot(points[:, 0], points[:, 1]) > inscribed - resolution)])
+
+
+def _inside(corners: Array, points: Array) -> Mask:
+    """Which of the points (n, 2) lie in the polygon."""
+    inside: Mask = np.zeros(len(points), dtype=bool)
     for (ax, ay), (bx, by) in zip(corners.tolist(), np.roll(corners, -1, axis=0).tolist(), strict=True):
         if ay != by:
             crosses = (ay > points[:, 1]) != (by > points[:, 1])
             inside ^= crosses & (points[:, 0] < ax + (points[:, 1] - ay) / (by - ay) * (bx - ax))
-    return np.asarray(points[inside & (np.hypot(points[:, 0], points[:, 1]) > inscribed - resolution)])
+    return inside
 
 
 def _depths(corners: Array, points: Array) -> Array:

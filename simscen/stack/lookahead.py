@@ -3,11 +3,12 @@
 import math
 
 import numpy as np
+import numpy.typing as npt
 
-from simscen.core.geometry import Pose2
+from simscen.core.geometry import Array, Pose2
 from simscen.core.motion import Twist
 from simscen.stack.arcs import NO_TURN, poses_along
-from simscen.stack.footprint import Footprint, distance_at
+from simscen.stack.footprint import Footprint, distance_at, distances, lethal_near
 from simscen.stack.protocols import CostmapView
 
 
@@ -15,7 +16,8 @@ def time_free(footprint: Footprint, costmap: CostmapView, pose: Pose2, twist: Tw
     """Seconds until the first collision at this velocity; `horizon` when there is none before.
 
     A robot that seems to be in collision already (its map or its belief is off by a few centimetres) may move as long
-    as that brings it no more than half a cell nearer to the obstacle: otherwise it could never get out.
+    as that brings what it is in no more than half a cell further in: otherwise it could never get out. Into nothing
+    else, though: who touches a post with one side may not back into the next.
     """
     if _clearly_free(footprint.circumscribed, costmap, pose, twist, horizon):
         return horizon
@@ -24,15 +26,20 @@ def time_free(footprint: Footprint, costmap: CostmapView, pose: Pose2, twist: Tw
     times = np.linspace(0.0, horizon, steps)
     poses = poses_along(pose, twist, times)
     blocked = ~footprint.free(costmap, poses)
+    if blocked[0]:
+        blocked = _worse(footprint, costmap, poses)
     if not blocked.any():
         return horizon
-    if blocked[0]:
-        clearance = footprint.clearance(costmap, poses)
-        worse = clearance < clearance[0] - 0.5 * costmap.resolution
-        blocked &= worse
-        if not blocked.any():
-            return horizon
     return float(times[max(0, int(blocked.argmax()) - 1)])
+
+
+def _worse(footprint: Footprint, costmap: CostmapView, poses: Array) -> npt.NDArray[np.bool_]:
+    """Which of the poses (n, 3) are further in a lethal cell than the first one, or in another."""
+    reach = footprint.circumscribed + float(np.hypot(*(poses[:, :2] - poses[0, :2]).T).max()) + costmap.resolution
+    gaps = footprint.gaps(lethal_near(costmap, poses[0, 0].item(), poses[0, 1].item(), reach), poses)
+    further = gaps < np.minimum(gaps[0] - 0.5 * costmap.resolution, 0.0)
+    off = distances(costmap, poses[:, :2]) <= 0.0
+    return np.asarray(further.any(axis=1) | (off & ~off[0]))
 
 
 def _clearly_free(radius: float, costmap: CostmapView, pose: Pose2, twist: Twist, horizon: float) -> bool:
