@@ -145,7 +145,7 @@ class Navigator:
                 to_go = frames.pose.distance(goal.pose)
                 self._costmaps.clear_global(entirely=self._forgetting.entirely(self._clock, to_go))
             else:
-                self._costmaps.near.clear()
+                self._costmaps.clear_local()
             self.plans.drop("recovery")
             return Step(events=events)
         if self._hopeless(goal, failure):

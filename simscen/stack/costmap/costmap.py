@@ -101,15 +101,16 @@ class Costmap:
         if self._tracks:
             self._learn(base, seen)
 
-    def clear(self, within: float = math.inf) -> None:
+    def clear(self, within: float = math.inf, unseen: float = BEYOND_HULL) -> None:
         """Forget every live obstacle `within` so many metres of the robot along x and y, but those that it sees now.
 
-        Nav2's ClearEntireCostmap, or ClearCostmapAroundRobot. What is close to the hull where no lidar looks is kept:
-        that nobody sees it does not tell that it has gone, and the next thing a robot does may be to back up.
+        Nav2's ClearEntireCostmap, or ClearCostmapAroundRobot. What is `unseen`, where no lidar looks, so many metres
+        beyond the hull at most, is kept: that nobody sees it does not tell that it has gone, and the next thing a robot
+        does may be to back up.
         """
         newest = list(self._newest.values())
         scans = [(base, seen) for base, seen in newest if isinstance(seen, Scan)]
-        blind = self._surroundings.robot.circumscribed_radius + BEYOND_HULL
+        blind = self._surroundings.robot.circumscribed_radius + unseen
         kept = self._live.out_of_view(scans[-1][0], blind, scans) if scans else None
         if newest and math.isfinite(within):
             self._live.forget_around(newest[-1][0], within)

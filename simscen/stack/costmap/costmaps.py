@@ -75,7 +75,7 @@ class Costmaps:
     def clear(self) -> None:
         """Forget every live obstacle but those that the newest scans show (Nav2's ClearEntireCostmap of both)."""
         self.wide.clear()
-        self.near.clear()
+        self.clear_local()
 
     def clear_around(self) -> None:
         """The same as far from the robot as the local costmap reaches (Nav2's ClearCostmapAroundRobot).
@@ -83,7 +83,11 @@ class Costmaps:
         What lies farther off is in no controller's way, and who forgets a dead end drives into it again.
         """
         self.wide.clear(self._reach)
-        self.near.clear()
+        self.clear_local()
+
+    def clear_local(self) -> None:
+        """The same in the local costmap alone; all of what no lidar looks at stays: by that one the robot backs out."""
+        self.near.clear(unseen=self._reach)
 
     def clear_global(self, *, entirely: bool) -> None:
         """Forget live obstacles in the global costmap alone: all but those in sight, or as far as `clear_around`."""

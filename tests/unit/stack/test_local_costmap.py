@@ -122,3 +122,16 @@ def test_keepout_zones_stand_in_the_local_costmap_where_the_robot_believes_them_
         inside = points[(points[:, 1] > 0.1) & (points[:, 1] < 0.38)]
         assert inside[:, 0].min() == pytest.approx(3.0 - shift, abs=0.06)
         assert inside[:, 0].max() == pytest.approx(3.4 - shift, abs=0.06)
+
+
+def test_a_robot_that_backs_out_does_not_forget_what_stands_behind_it_where_its_lidar_does_not_look() -> None:
+    """A post that it has passed is a metre behind the hull, in the blind quarter of a lidar of 270 degrees."""
+    world = Flatland(discs=[(2.0, 0.45, 0.05)])
+    grid = Flatland().grid((-0.5, -2.0, 9.5, 2.0))
+    d = drive(world, Pose2(0.5, 0.0), Goal("g", Pose2(8.0, 0.0)), grid=grid, field_of_view=1.5 * math.pi)
+    while d.pose.x < 3.2:
+        d.run(0.1)
+    kept = costmaps(d)
+    for forget in (kept.clear_local, kept.clear_around, kept.clear):
+        forget()
+        assert np.hypot(*(lethal(kept.near.view) - (2.0, 0.45)).T).min() < 0.1

@@ -204,6 +204,17 @@ def test_clearing_keeps_what_stands_close_behind_the_robot_where_no_lidar_looks(
     assert at(map_, 3.22, 3.0)[0] != 254
 
 
+def test_clearing_keeps_as_much_of_what_no_lidar_looks_at_as_it_is_told() -> None:
+    world = Flatland([], [(1.4, 3.0, 0.1)]).room(8, 6)
+    map_ = costmap(Flatland().room(8, 6))
+    map_.update(Pose2(2.0, 3.0), scan_of(world, Pose2(2.0, 3.0)))
+    full = scan_of(Flatland().room(8, 6), Pose2(3.9, 3.0))
+    ahead = replace(full, ranges=full.ranges[45:-45], angle_min=full.angle_min + 45 * full.angle_increment)
+    map_.update(Pose2(3.9, 3.0), ahead)
+    map_.clear(unseen=3.0)
+    assert at(map_, 1.48, 3.0)[0] == 254
+
+
 def test_clearing_around_the_robot_keeps_what_was_seen_farther_off() -> None:
     world = Flatland([], [(4.0, 3.0, 0.1), (2.0, 4.2, 0.1)]).room(8, 6)
     map_ = costmap(Flatland().room(8, 6))
