@@ -167,6 +167,7 @@ _BEHAVIORS: dict[str, type[BaseModel]] = {
     "spin": recovery.Spin,
     "wait": recovery.Wait,
     "backup": recovery.BackUp,
+    "retrace": recovery.Retrace,
 }
 _STACK_FILES: dict[str, type[BaseModel]] = {
     "stack file": stackfile.StackFileSpec,

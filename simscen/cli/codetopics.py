@@ -29,7 +29,7 @@ NAV2 = {
     ErrorCode.STOP_ON_MISSED_WAYPOINT: "A waypoint was missed, and that ends the task.",
     ErrorCode.SPIN_TIMEOUT: "A spin did not end in the time that it may take.",
     ErrorCode.SPIN_COLLISION_AHEAD: "A spin would have turned the robot into an obstacle.",
-    ErrorCode.BACKUP_TIMEOUT: "Backing up did not end in the time that it may take: something holds the robot.",
+    ErrorCode.BACKUP_TIMEOUT: "Backing up, straight or the way it came, took too long: something holds the robot.",
     ErrorCode.BACKUP_INVALID_INPUT: "The robot was told to back up and cannot drive backward.",
     ErrorCode.BACKUP_COLLISION_AHEAD: "Backing up would have led into an obstacle.",
     ErrorCode.NAVIGATE_UNKNOWN: "Navigation failed for a reason that it does not tell.",

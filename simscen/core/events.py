@@ -18,7 +18,7 @@ class EventKind(str, Enum):
     NAVIGATION_ENDED = "navigation.ended"  # result; error_code, error_name
     PLAN_MADE = "plan.made"  # goal; reason (goal, blocked, …), length
     PLAN_FAILED = "plan.failed"  # error_code, error_name, message
-    RECOVERY_STARTED = "recovery.started"  # behaviour: spin, wait, backup, clear_costmap; error_code, error_name
+    RECOVERY_STARTED = "recovery.started"  # behaviour: clear_costmap, spin, wait, …; error_code, error_name
     RECOVERY_ENDED = "recovery.ended"  # behaviour; outcome
     ROBOT_HELD = "robot.held"  # what it waits for: collision_monitor, planner, controller; message: why
     ROBOT_RELEASED = "robot.released"  # what it waited for

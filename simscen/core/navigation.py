@@ -11,7 +11,7 @@ import numpy as np
 from simscen.core.geometry import Array, Pose2
 from simscen.core.oftenmade import often_made
 
-RecoveryBehavior = Literal["clear_costmap", "spin", "wait", "backup"]
+RecoveryBehavior = Literal["clear_costmap", "spin", "wait", "backup", "retrace"]
 """The behaviours of a recovery, with Nav2's names."""
 
 ReplanReason = Literal["blocked", "missed", "tight", "better", "window", "recovery", "rate"]

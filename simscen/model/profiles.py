@@ -44,8 +44,9 @@ NAV2: Values = {
     },
     "progress_checker": {"required_movement_radius": 0.5, "movement_time_allowance": 10.0},
     "recovery": {
-        "number_of_retries": 6,
+        "number_of_retries": 6, "retries_since_progress": False,
         "planner_codes": ["PLANNER_UNKNOWN", "PLANNER_TIMEOUT", "NO_VALID_PATH"],
+        "behaviors": ["clear_costmap", "spin", "wait", "backup"],
         "clear_entirely": True, "backup_partial": False, "spin_dist": 1.57, "wait_duration": 5.0, "backup_dist": 0.30,
         "backup_speed": 0.15, "simulate_ahead_time": 2.0, "max_rotational_vel": 1.0,
     },

@@ -74,6 +74,22 @@ class BackUp(BehaviorSpec):
     """Whether it backs up as far as there is room, where that is less; often it is enough to turn. Nav2 does not."""
 
 
+class Retrace(BehaviorSpec):
+    """Drive back the way it came, turns included, until there is room to turn. Nav2 has nothing like it.
+
+    Backs up straight where nobody knows that way.
+    """
+
+    component: ClassVar[str] = "simscen.stack.behaviors.retrace:Retrace"
+    type: Literal["retrace"] = "retrace"
+    backup_dist: NonNegativeLength = 0.30
+    """How far it drives back at least."""
+    retrace_dist: NonNegativeLength = 1.0
+    """How far at most: beyond `backup_dist` only until it has room to turn in place."""
+    backup_speed: PositiveSpeed = 0.15
+    """How fast it drives back."""
+
+
 class ClearCostmap(BehaviorSpec):
     """Forget live obstacles that are not seen any more."""
 
@@ -87,6 +103,7 @@ _Behaviors = Annotated[
     Annotated[Spin, Tag("spin")]
     | Annotated[Wait, Tag("wait")]
     | Annotated[BackUp, Tag("backup")]
+    | Annotated[Retrace, Tag("retrace")]
     | Annotated[ClearCostmap, Tag("clear_costmap")],
     Field(discriminator="type"),
 ]
@@ -106,6 +123,9 @@ class Recovery(Spec):
 
     number_of_retries: Annotated[int, Field(ge=0, le=100)] = 6
     """How often a goal is tried again before it fails."""
+    retries_since_progress: bool = True
+    """Whether that is counted anew, and the first behaviour is next, once the robot is a metre nearer to its goal than
+    at any recovery before. Nav2 counts for the whole goal."""
     planner_codes: Annotated[list[PlannerCode], Field(max_length=20)] = [
         "PLANNER_UNKNOWN",
         "START_OUTSIDE_MAP",
@@ -118,9 +138,9 @@ class Recovery(Spec):
     Nav2 gives up where start or goal are occupied, though what occupies them may go."""
     behaviors: Annotated[list[Behavior], Field(max_length=20)] = [
         "clear_costmap",
+        "retrace",
         "spin",
         "wait",
-        "backup",
     ]
     """What is done in turn, by name or with parameters of its own."""
     clear_entirely: bool = False
@@ -136,6 +156,8 @@ class Recovery(Spec):
     """How fast it backs up."""
     backup_partial: bool = True
     """Whether it backs up as far as there is room, where that is less; often it is enough to turn. Nav2 does not."""
+    retrace_dist: NonNegativeLength = 1.0
+    """How far it drives back the way it came: beyond `backup_dist` only until it has room to turn in place."""
     simulate_ahead_time: PositiveDuration = 2.0
     """How far ahead it looks for collisions."""
     max_rotational_vel: PositiveAngularSpeed = 1.0
@@ -162,6 +184,7 @@ _SHIPPED: dict[str, type[BehaviorSpec]] = {
     "spin": Spin,
     "wait": Wait,
     "backup": BackUp,
+    "retrace": Retrace,
 }
 
 
@@ -171,4 +194,5 @@ BEHAVIORS = {
     "spin": _HERE + "Spin",
     "wait": _HERE + "Wait",
     "backup": _HERE + "BackUp",
+    "retrace": _HERE + "Retrace",
 }

@@ -21,6 +21,7 @@ from simscen.stack.installed.planner import InstalledPlanner
 from simscen.stack.installed.stack import InstalledStack
 from simscen.stack.installed.watched import made
 from simscen.stack.navigator import Navigator
+from simscen.stack.odometry_history import WAY, OdometryHistory
 from simscen.stack.plan_keeper import PlanKeeper
 from simscen.stack.prediction.motion_prediction import MotionPrediction
 from simscen.stack.progress_checker import ProgressChecker
@@ -72,7 +73,8 @@ def reference_stack(spec: StackSpec, setting: Setting) -> ReferenceStack:
     )
     controller: Controller = made(InstalledController, spec.controller, driving)
     costmaps = Costmaps(spec, surroundings, controller.full_speed * spec.controller.looks_ahead, latency["costmap"])
-    driving = replace(driving, clear_costmap=costmaps.clear, clear_around=costmaps.clear_around)
+    odometry = OdometryHistory(surroundings.tick_rate, way=WAY)
+    driving = replace(driving, clear_costmap=costmaps.clear, clear_around=costmaps.clear_around, way=odometry.way)
     planning = replace(driving, name="planner", resolution=costmaps.wide.view.resolution)
     plans = PlanKeeper(
         spec.planner,
@@ -112,6 +114,7 @@ def reference_stack(spec: StackSpec, setting: Setting) -> ReferenceStack:
         commands,
         monitor,
         MotionPrediction(spec.prediction, robot, surroundings.lidars, surroundings.tick_rate, controller.full_speed),
+        odometry,
         period,
         latency["localizer"],
         spec.localizer.fuses_odometry,

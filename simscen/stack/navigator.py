@@ -152,7 +152,7 @@ class Navigator:
             return Step(failure=failure, events=events)
         self.plans.drop("recovery")
         self._replanned, self._controlled_again, self._trouble_since = False, False, None
-        self._behavior = self._recovery.next()
+        self._behavior = self._recovery.next(frames.pose.distance(goal.pose))
         if self._behavior is None:
             return Step(failure=failure, events=events)
         self._behavior_since = self._clock

@@ -7,6 +7,8 @@ from simscen.core.geometry import Pose2
 
 KEPT = 10
 """s of readings: what tf2 keeps."""
+WAY = 60
+"""s of the way that a stack remembers having come: longer than a robot that is stuck waits between two tries."""
 # No odometry frame is this far from its origin; squares of what a broken encoder may say would overflow.
 _LARGEST = 1e6
 
@@ -20,8 +22,13 @@ def believable(values: tuple[float, float, float]) -> bool:
 class OdometryHistory:
     """The poses of one odometry of the last KEPT seconds, by tick; what is older is thrown away a second at a time."""
 
-    def __init__(self, tick_rate: int) -> None:
-        self._span, self._most = KEPT * tick_rate, (KEPT + 1) * tick_rate
+    def __init__(self, tick_rate: int, way: float = KEPT) -> None:
+        """`way`: seconds for which poses are remembered beyond that, as the way that the robot came."""
+        self._span, self._way, self._most = KEPT * tick_rate, way * tick_rate, (way + 1) * tick_rate
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin anew, with another odometry."""
         self._readings: list[tuple[int, Pose2]] = []
         self._newest: float = -math.inf
         self._full: float = -math.inf
@@ -42,17 +49,21 @@ class OdometryHistory:
         self._newest, self.now = tick, pose
         self._readings.append((tick, pose))
         if tick > self._full:
-            self._forget()
+            self._throw_away()
         return True
 
-    def _forget(self) -> None:
+    def _throw_away(self) -> None:
         """Throw away what is too old, and note when the oldest of the rest will be."""
-        del self._readings[: self._first()]
+        del self._readings[: bisect_left(self._readings, (self._newest - self._way,))]
         self._full = self._readings[0][0] + self._most
 
     def _first(self) -> int:
         """Where what counts still begins."""
         return bisect_left(self._readings, (self._newest - self._span,))
+
+    def way(self) -> list[Pose2]:
+        """The poses that the robot came by, the oldest first."""
+        return [pose for _, pose in self._readings]
 
     def reaches(self, tick: int) -> bool:
         """Whether there is odometry at `tick` or later."""

@@ -1,5 +1,6 @@
 """The recovery branch of Nav2's default tree: a round robin of behaviours, a limited number of times."""
 
+import math
 from collections.abc import Sequence
 from typing import get_args
 
@@ -9,13 +10,18 @@ from simscen.stack.protocols import Behavior, NavigationFailure
 PLANNER_CODES = frozenset(get_args(PlannerCode))
 
 
+NEARER = 1.0
+"""Metres by which a robot must have come nearer to its goal than at any recovery before, for that to be progress."""
+
+
 class RoundRobin:
     """Hands out behaviours in turn until the retries have been used; a new goal gets a full number again."""
 
     def __init__(self, behaviors: Sequence[Behavior], spec: Recovery) -> None:
         self._behaviors, self._retries = tuple(behaviors), spec.number_of_retries
         self._incurable = PLANNER_CODES.difference(spec.planner_codes)
-        self._next, self._used = 0, 0
+        self._anew = spec.retries_since_progress
+        self._next, self._used, self._nearest = 0, 0, math.inf
 
     def helps(self, failure: NavigationFailure) -> bool:
         """Whether clearing and behaviours may help after such a failure."""
@@ -23,10 +29,13 @@ class RoundRobin:
 
     def reset(self) -> None:
         """A new goal; the turn goes on where it was, as in Nav2."""
-        self._used = 0
+        self._used, self._nearest = 0, math.inf
 
-    def next(self) -> Behavior | None:
-        """The next behaviour; None when the retries are used up."""
+    def next(self, to_go: float) -> Behavior | None:
+        """The next behaviour, with the goal `to_go` metres away; None when the retries are used up."""
+        if self._anew and to_go <= self._nearest - NEARER and self._used:
+            self._used = self._next = 0
+        self._nearest = min(self._nearest, to_go)
         if not self._behaviors or self._used >= self._retries:
             return None
         behavior = self._behaviors[self._next % len(self._behaviors)]

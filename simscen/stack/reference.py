@@ -47,6 +47,7 @@ class ReferenceStack:
         commands: Commands,
         monitor: CollisionMonitor,
         prediction: MotionPrediction,
+        odometry: OdometryHistory,
         control_period: int,
         localizer_latency: int = 0,
         fuses_odometry: bool = False,
@@ -73,7 +74,7 @@ class ReferenceStack:
         self._moves = False
         self._tick = 0
         self._twist = STOP
-        self._odometry, self._wheels = OdometryHistory(surroundings.tick_rate), False
+        self._odometry, self._wheels = odometry, False
         self._zones: Zones | None = None
         self._standstill = Standstill(surroundings.tick_rate)
         self._nothing = Decision(STOP)
@@ -223,7 +224,8 @@ class ReferenceStack:
         if reading.sensor == TRUTH and self._wheels:
             return
         if reading.sensor != TRUTH and not self._wheels:
-            self._wheels, self._odometry = True, OdometryHistory(self._tick_rate)
+            self._wheels = True
+            self._odometry.forget()
         pose = reading.pose
         if self._fuses_odometry:
             pose = self._where()

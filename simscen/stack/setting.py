@@ -1,6 +1,6 @@
 """What a component of a stack is installed in."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from simscen.core.belief import Estimate
 from simscen.core.chance import Streams
+from simscen.core.geometry import Pose2
 from simscen.core.goalnames import Mode
 from simscen.core.grid import OccupancyGrid
 from simscen.core.time import Clock
@@ -33,6 +34,8 @@ class Setting:
     mode:             Nav2's action that takes the goals; what it means stands in the goals, as `via` and `wait`
     clear_costmap:    forgets live obstacles that are not seen any more (for a behaviour)
     clear_around:     the same, as far from the robot as the local costmap reaches
+    way:              the poses that the robot came by in the last minute, the oldest first, in the odom frame (for a
+                      behaviour)
     heard:            what stands between the localizer and all who ask it; here, nothing (for the reference stack)
     """
 
@@ -46,6 +49,7 @@ class Setting:
     mode: Mode = "navigate_to_pose"
     clear_costmap: Callable[[], None] = lambda: None
     clear_around: Callable[[], None] = lambda: None
+    way: Callable[[], Sequence[Pose2]] = tuple
     heard: Callable[[Localizer], Localizer] = lambda localizer: localizer
 
     def named(self, name: str) -> "Setting":

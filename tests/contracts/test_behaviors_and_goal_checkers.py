@@ -3,7 +3,7 @@
 import pytest
 
 from simscen.model.checkers import SimpleGoalChecker
-from simscen.model.recovery import BackUp, ClearCostmap, Spin, Wait
+from simscen.model.recovery import BackUp, ClearCostmap, Retrace, Spin, Wait
 from simscen.testing import Promise, promises_of
 
 SPECS = {
@@ -11,6 +11,7 @@ SPECS = {
     "spin the other way": Spin(spin_dist=-3.0, max_rotational_vel=0.5),
     "wait": Wait(),
     "backup": BackUp(),
+    "retrace": Retrace(),
     "clear_costmap": ClearCostmap(),
     "simple": SimpleGoalChecker(),
     "forgetful": SimpleGoalChecker(stateful=False),

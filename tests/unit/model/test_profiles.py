@@ -23,6 +23,7 @@ NAV2_PARAMS = {
     "costmap.raytrace_max_range": 3.0, "costmap.inflation_radius": 0.7, "costmap.cost_scaling_factor": 3.0,
     "costmap.inf_is_valid": False,
     "planner.type": "navfn", "planner.tolerance": 0.5, "planner.allow_unknown": True,
+    "recovery.behaviors": ["clear_costmap", "spin", "wait", "backup"], "recovery.retries_since_progress": False,
     "recovery.simulate_ahead_time": 2.0, "recovery.max_rotational_vel": 1.0,
     "velocity_smoother.max_velocity": 0.5, "velocity_smoother.max_angular_velocity": 2.0,
     "velocity_smoother.max_accel": 3.0, "velocity_smoother.max_decel": 3.0, "velocity_smoother.max_angular_accel": 3.5,

@@ -140,6 +140,18 @@ def wedged(spec: StackSpec) -> Iterator[object]:
     yield from steps(begin(world, Pose2(1.3, 2.0), spec, Pose2(4.0, 2.0), robot=box_robot(0.8, 0.3)), 4.0)
 
 
+def in_a_corridor(spec: StackSpec) -> Iterator[object]:
+    """Something shuts a corridor in which a long robot that came a metre cannot turn; later it goes."""
+    door = (2.9, 1.5, 3.0, 2.5)
+    world = room((0.0, 2.3, 2.9, 2.4), (0.0, 1.6, 2.9, 1.7))
+    d = begin(world, Pose2(0.8, 2.0), spec, Pose2(4.0, 2.0), robot=box_robot(0.8, 0.3, 1.0))
+    yield from steps(d, 2.0)
+    world.boxes.append(door)
+    yield from steps(d, 9.0)
+    world.boxes.remove(door)
+    yield from steps(d, 2.0)
+
+
 def walled_in(spec: StackSpec) -> Iterator[object]:
     """The goal is near a wall, in one, or off the map; or the robot is."""
     inside, outside, wall = Pose2(1.0, 2.0), Pose2(9.0, 1.0), Pose2(2.95, 0.8)

@@ -18,6 +18,7 @@ from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.guards import CollisionMonitor as MonitorSpec
 from simscen.model.guards import VelocitySmoother as SmootherSpec
 from simscen.model.recovery import Recovery
+from simscen.model.recovery import Wait as WaitSpec
 from simscen.stack.arcs import poses_along
 from simscen.stack.behaviors.motions import Wait
 from simscen.stack.collision_monitor import CollisionMonitor
@@ -249,6 +250,22 @@ def test_a_robot_in_collision_may_move_out_but_not_further_in() -> None:
     assert time_free(footprint, view, Pose2(1.85, 0), Twist(0.5), 1.0) < 0.2
 
 
+def with_posts(*posts: tuple[float, float]) -> CostmapView:
+    """Nothing but lethal cells of 5 cm, their middles there."""
+    views = [with_a_post(*post) for post in posts]
+    return replace(views[0], distance=np.minimum.reduce([view.distance for view in views]))
+
+
+@pytest.mark.parametrize("robot", [box_robot(0.42, 0.42), round_robot(0.21)])
+def test_who_touches_one_thing_may_not_drive_into_another(robot: RobotModel) -> None:
+    """It seems to be 4 cm deep in a post at its left, and backs up: to the post behind it, no further."""
+    footprint, beside, behind = Footprint(robot, 0.05), (0.025, 0.175), (-0.375, 0.025)
+    back = Twist(-0.15, 0.0, 0.0)
+    assert time_free(footprint, with_posts(beside), Pose2(0, 0), back, 2.0) == 2.0
+    assert not footprint.free(with_posts(beside), np.zeros((1, 3)))[0]
+    assert time_free(footprint, with_posts(beside, behind), Pose2(0, 0), back, 2.0) == pytest.approx(1.0, abs=0.3)
+
+
 def test_a_footprint_collides_where_its_edge_or_its_inside_is_on_something() -> None:
     robot = box_robot(1.0, 0.4)
     view = view_of(Flatland(discs=[(2.0, 0.0, 0.05)]), robot)
@@ -295,10 +312,20 @@ def test_recoveries_are_handed_out_in_turn_until_the_retries_are_used_up() -> No
             self.name = name
 
     robin = RoundRobin([Named("a"), Named("b"), Named("c")], Recovery(number_of_retries=4))
-    assert [b.name for b in iter(robin.next, None)] == ["a", "b", "c", "a"]
+    assert [b.name for b in iter(lambda: robin.next(5.0), None)] == ["a", "b", "c", "a"]
     robin.reset()
-    assert robin.next().name == "b"
-    assert RoundRobin([], Recovery(number_of_retries=3)).next() is None
+    assert robin.next(5.0).name == "b"
+    assert RoundRobin([], Recovery(number_of_retries=3)).next(5.0) is None
+
+
+@pytest.mark.parametrize(
+    ("anew", "there_are"), [(True, [True, True, False, True, True, False]), (False, [True, True, *[False] * 4])]
+)
+def test_the_retries_count_anew_for_who_has_come_a_metre_nearer(anew: bool, there_are: list[bool]) -> None:
+    robin = RoundRobin(
+        [Wait(WaitSpec(), setting(round_robot()))], Recovery(number_of_retries=2, retries_since_progress=anew)
+    )
+    assert [robin.next(to_go) is not None for to_go in (5.0, 6.0, 4.5, 3.4, 8.0, 3.4)] == there_are
 
 
 @pytest.mark.parametrize(

@@ -117,7 +117,8 @@ PARTS = [
         **dict.fromkeys(("spin_dist", "max_rotational_vel"), ((recovery("spin"), scenes.shut),)),
         "simulate_ahead_time": ((recovery("backup", backup_partial=False), scenes.shut),),
         "backup_partial": ((recovery("backup"), scenes.shut),),
-    }, {"behaviors": [["wait"], ["spin"], ["backup"], ["clear_costmap"]]}),
+        "retrace_dist": ((recovery("retrace"), scenes.in_a_corridor),),
+    }, {"behaviors": [["wait"], ["spin"], ["backup"], ["clear_costmap"], ["retrace"]]}),
     Part(("recovery", "behaviors", 0), behaviors.Spin, (
         (recovery({"type": "spin"}), scenes.shut),), {
         "simulate_ahead_time": ((recovery({"type": "spin"}), scenes.wedged),)}, {"simulate_ahead_time": [0.3]}),
@@ -126,6 +127,8 @@ PARTS = [
         (recovery({"type": "backup"}), scenes.shut),
         (recovery({"type": "backup", "backup_partial": False}), scenes.shut),
     )),
+    Part(("recovery", "behaviors", 0), behaviors.Retrace, ((recovery({"type": "retrace"}), scenes.in_a_corridor),), {
+        "backup_dist": ((recovery({"type": "retrace"}), scenes.shut),)}),
     Part(("velocity_smoother",), guards.VelocitySmoother, ((TRUTH, scenes.through), (TRUTH, scenes.arriving))),
     Part(("collision_monitor",), guards.CollisionMonitor, (
         (TRUTH, scenes.silent), (BLIND, scenes.seen_by_one), (BLIND, scenes.through))),
@@ -151,6 +154,7 @@ ELSEWHERE = {
     "nav2_params": "tests/unit/loading/test_nav2_params.py",
     "latency": "`robot` is what the robot's file says: tests/unit/run/test_latency.py",
     "clear_entirely": "tests/unit/stack/behaviors/test_motions.py, tests/unit/stack/test_navigator.py",
+    "retries_since_progress": "tests/unit/stack/test_checks_and_limits.py",
     "counter_turn_slip": "tests/unit/stack/test_slipping_wheels.py",
     "xy_goal_tolerance": "whoever makes goals reads it: tests/unit/run/test_goal_tolerances.py",
     "yaw_goal_tolerance": "the same",

@@ -71,10 +71,10 @@ def test_a_door_that_is_shut_is_waited_for_with_recoveries_and_passed_when_it_op
     assert d.least > 0.02
 
 
-def test_recoveries_come_in_nav2s_order_and_end_after_the_retries() -> None:
+def test_recoveries_come_in_turn_and_end_after_the_retries() -> None:
     d = start(rooms(DOOR), grid=rooms()).run(90)
     assert [e.name for e in d.kinds("recovery.started")] == [
-        "clear_costmap", "spin", "wait", "backup", "clear_costmap", "spin",
+        "clear_costmap", "retrace", "spin", "wait", "clear_costmap", "retrace",
     ]  # fmt: skip
     assert codes(d) == ["NO_VALID_PATH"]
     assert d.result == "FAILED"

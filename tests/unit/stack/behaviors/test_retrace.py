@@ -1,0 +1,136 @@
+"""Who is wedged drives out the way it came."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from simscen.core.geometry import Pose2
+from simscen.core.motion import STOP, Twist
+from simscen.core.navigation import ErrorCode
+from simscen.model import recovery as model
+from simscen.model.costmaps import Costmap as CostmapSpec
+from simscen.stack.arcs import poses_along
+from simscen.stack.behaviors.motions import BackUp, Spin
+from simscen.stack.behaviors.retrace import Retrace
+from simscen.stack.behaviors.trail import Trail
+from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.protocols import Behavior, CostmapView, NavigationFailure, RobotModel, Surroundings
+from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot, setting
+
+LONG = box_robot(0.42, 0.42)
+POSTS = ((0.29, -0.03, 0.05), (-0.4, 0.17, 0.05))
+"""Discs (x, y, radius) between which a robot at the origin can neither turn nor back up straight as Nav2's does."""
+
+
+def view_of(robot: RobotModel, world: Flatland) -> CostmapView:
+    return Costmap(CostmapSpec(), Surroundings(robot, world.grid((-3.0, -3.0, 3.0, 3.0)), RATE)).view
+
+
+def driven(*legs: tuple[Twist, float]) -> list[Pose2]:
+    """The way of a robot, 40 poses a second, that ends at the origin: each velocity for so many seconds."""
+    pose, way = Pose2(0.0, 0.0), [Pose2(0.0, 0.0)]
+    for twist, seconds in legs:
+        steps = poses_along(pose, twist, np.arange(1, round(40 * seconds) + 1) / 40)
+        way += [Pose2(*each) for each in steps.tolist()]
+        pose = way[-1]
+    home = way[-1].inverse()
+    return [home.compose(each) for each in way]
+
+
+IN = driven((Twist(0.3, 0.0, 0.0), 2.0), (Twist(0.2, 0.0, -0.8), 1.0), (Twist(0.0, 0.0, -0.5), 0.4))
+"""Straight, round a bend to the right, and a little turn on the spot."""
+
+
+def behavior(robot: RobotModel, way: list[Pose2], **said: float) -> Retrace:
+    return Retrace(model.Retrace(**said), replace(setting(robot), way=lambda: way))
+
+
+def run(behavior: Behavior, view: CostmapView, slip: float = 1.0) -> list[Pose2]:
+    """Do as it says until it is done: the poses. Of each turn the base makes the part `slip`."""
+    poses = [Pose2(0.0, 0.0)]
+    behavior.start(poses[0])
+    for beat in range(400):
+        command = behavior.step(poses[-1], view, 0.05 * beat)
+        if command is None:
+            return poses
+        moved = Twist(command.vx, command.vy, slip * command.wz)
+        poses.append(Pose2(*poses_along(poses[-1], moved, np.array([0.05]))[0].tolist()))
+    raise AssertionError("it never ends")
+
+
+@pytest.mark.parametrize("slip", [1.0, 0.7])
+def test_a_robot_askew_between_posts_that_can_neither_turn_nor_back_up_drives_out_the_way_it_came(slip: float) -> None:
+    world = Flatland(discs=list(POSTS))
+    view = view_of(LONG, world)
+    for stuck in (Spin(model.Spin(), setting(LONG)), BackUp(model.BackUp(backup_partial=False), setting(LONG))):
+        with pytest.raises(NavigationFailure):
+            run(stuck, view)
+    poses = run(behavior(LONG, IN), view, slip)
+    assert min(world.clearance(LONG, pose) for pose in poses) > 0.0
+    assert min(poses[-1].distance(came) for came in IN) < 0.1
+    assert world.distance(np.array([poses[-1][:2]]))[0] > LONG.circumscribed_radius - view.resolution / 2
+    assert abs(poses[-1].yaw) > 0.3
+
+
+def test_it_turns_back_what_it_turned_on_the_spot() -> None:
+    poses = run(behavior(LONG, IN), view_of(LONG, Flatland()))
+    turned = next(pose for pose in poses if pose.yaw > 0.15)
+    assert turned.distance(poses[0]) < 0.03
+
+
+def test_in_the_open_it_ends_after_the_distance_of_a_backup_and_in_a_corridor_after_its_own() -> None:
+    straight = driven((Twist(0.5, 0.0, 0.0), 6.0))
+    corridor = Flatland([(-3.0, 0.27, 3.0, 0.4), (-3.0, -0.4, 3.0, -0.27)])
+    assert run(behavior(LONG, straight), view_of(LONG, Flatland()))[-1].x == pytest.approx(-0.30, abs=0.03)
+    assert run(behavior(LONG, straight), view_of(LONG, corridor))[-1].x == pytest.approx(-1.0, abs=0.03)
+    shorter = behavior(LONG, straight, retrace_dist=0.5)
+    assert run(shorter, view_of(LONG, corridor))[-1].x == pytest.approx(-0.5, abs=0.03)
+
+
+def test_where_nobody_knows_the_way_it_backs_up_straight() -> None:
+    end = run(behavior(LONG, []), view_of(LONG, Flatland()))[-1]
+    assert (end.x, end.y, end.yaw) == pytest.approx((-0.30, 0.0, 0.0), abs=0.03)
+
+
+def test_a_base_that_strafed_in_strafes_out() -> None:
+    base = replace(LONG, max_lateral=0.5)
+    end = run(behavior(base, driven((Twist(0.0, 0.3, 0.0), 3.0))), view_of(base, Flatland()))[-1]
+    assert (end.x, end.y, end.yaw) == pytest.approx((0.0, -0.30, 0.0), abs=0.03)
+
+
+def test_what_has_come_to_stand_on_the_way_ends_it_there_or_fails_it_at_once() -> None:
+    straight = driven((Twist(0.5, 0.0, 0.0), 6.0))
+    end = run(behavior(LONG, straight), view_of(LONG, Flatland([(-0.6, -1.0, -0.4, 1.0)])))[-1]
+    assert -0.19 < end.x < -0.05
+    with pytest.raises(NavigationFailure) as failed:
+        run(behavior(LONG, straight), view_of(LONG, Flatland([(-0.6, -1.0, -0.26, 1.0)])))
+    assert failed.value.code == ErrorCode.BACKUP_COLLISION_AHEAD
+
+
+def test_it_fails_with_the_codes_of_backing_up() -> None:
+    slow, view = behavior(LONG, IN), view_of(LONG, Flatland())
+    slow.start(Pose2(0.0, 0.0))
+    with pytest.raises(NavigationFailure) as failed:
+        slow.step(Pose2(0.0, 0.0), view, 10.1)
+    assert failed.value.code == ErrorCode.BACKUP_TIMEOUT
+    with pytest.raises(NavigationFailure) as failed:
+        run(behavior(replace(LONG, max_reverse=0.0), IN), view)
+    assert failed.value.code == ErrorCode.BACKUP_INVALID_INPUT
+
+
+def test_a_trail_goes_back_by_small_steps_without_what_was_to_and_fro() -> None:
+    to_and_fro = driven((Twist(0.5, 0, 0), 2.0), (Twist(-0.2, 0, 0), 1.0), (STOP, 5.0), (Twist(0.2, 0, 0), 1.0))
+    trail = Trail(to_and_fro, to_and_fro[-1], 0.3, 2.0)
+    assert trail.driven[-1] == pytest.approx(trail.poses[0, 0] - trail.poses[-1, 0], abs=0.01)
+    assert np.diff(trail.poses[:, 0]).max() < 0.0
+    assert np.diff(trail.along).max() < 0.1
+
+
+def test_a_round_robot_retraces_too() -> None:
+    way = driven((Twist(0.3, 0.0, 0.6), 2.0))
+    end = run(behavior(round_robot(), way), view_of(round_robot(), Flatland()))[-1]
+    assert min(end.distance(came) for came in way) < 0.03
+    assert end.yaw == pytest.approx(-0.6, abs=0.1)
+    assert math.hypot(end.x, end.y) == pytest.approx(0.30, abs=0.03)
