@@ -1,7 +1,7 @@
 """Things that move: by a script, or because they are pushed."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +17,7 @@ from simscen.sim.encounters import HORIZON, Balls, encounters
 from simscen.sim.inertia import GRAVITY, of_solids
 from simscen.sim.lost import lost
 from simscen.sim.outline import reach
+from simscen.sim.settled import Settling
 
 FRICTION = 0.6
 """Of pushable things on the ground: about that of wood or cardboard on concrete."""
@@ -144,6 +145,19 @@ class Actors:
         self._moved = list(self._pushable)
         for actor in self._pushable:
             engine.wake(self._client, actor.id)  # what lay on something that is gone has to fall
+
+    def settling(self) -> Settling:
+        """Looks at all that can be pushed, for `lay`."""
+        return Settling(self._client, [actor.id for actor in self._pushable])
+
+    def lay(self, at_rest: Collection[int]) -> None:
+        """Let those sleep after the next step that are at rest, by the engine's numbers; others wake what they touch.
+
+        Who has asked where they are has to ask again after that step.
+        """
+        for number in at_rest:
+            engine.lay(self._client, number)
+        self._posed_at = None
 
     def shaken(self, tick: int) -> None:
         """Something is pushed during the step from `tick` on: how fast things are now says nothing about it."""

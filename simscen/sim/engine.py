@@ -228,6 +228,12 @@ def wake(client: int, number: int) -> None:
     pybullet.changeDynamics(number, -1, activationState=awake, sleepThreshold=AT_REST, physicsClientId=client)
 
 
+def lay(client: int, number: int) -> None:
+    """Let a body that is at rest sleep after the next step, as if it had been so for UNTIL_ASLEEP."""
+    asleep = pybullet.ACTIVATION_STATE_ENABLE_SLEEPING | pybullet.ACTIVATION_STATE_SLEEP
+    pybullet.changeDynamics(number, -1, activationState=asleep, sleepThreshold=AT_REST, physicsClientId=client)
+
+
 def fixed(client: int, shape: int) -> int:
     """A body that never moves; it sleeps, for Bullet looks anew at what lies upon something that is awake."""
     number = body(client, 0.0, shape, Pose3(), ((0.0, 0.0, 0.0), Pose3()), 1.0)

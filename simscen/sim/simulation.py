@@ -19,6 +19,7 @@ from simscen.sim.contacts import Before
 from simscen.sim.film import Film
 from simscen.sim.robot import Robot, Scene
 from simscen.sim.robot_body import RobotBody
+from simscen.sim.settled import EVERY, LOOKS
 from simscen.sim.terrain import Terrain
 from simscen.sim.walls import Walls
 
@@ -76,8 +77,13 @@ class Simulation:
             actors.add(terrain.lifted(thing), 0)
         if not walls.complete:
             self._put_up_walls(SETTLING)
-        for _ in range(SETTLING):
+        settling = actors.settling()
+        for tick in range(1 - SETTLING, 1):
+            if tick == 0:
+                actors.lay(settling.at_rest())
             pybullet.stepSimulation(client)
+            if -EVERY * LOOKS <= tick < 0 and tick % EVERY == 0:
+                settling.look()
         for name, robot in self.robots.items():
             robot.settled(robots[name].pose)
         self._each = tuple(self.robots.values())

@@ -60,11 +60,8 @@ def test_a_cart_pushes_a_crate_along(simulate):
 
 def test_a_pushed_crate_comes_to_rest_by_friction(simulate):
     """v²/2µg with the friction of both: 0.6 on the ground's 1.0."""
-    import pybullet
-
     simulation = simulate(bodies=[Body("crate", CRATE, Pose3(2.0), mass=10.0)])
-    (number,) = [k for k, name in simulation.robot._names.items() if name == "crate"]
-    pybullet.resetBaseVelocity(number, (1.0, 0, 0), (0, 0, 0), physicsClientId=simulation._scene.client)
+    simulation.push_object("crate", (10.0, 0.0))
     simulation.step(480)
     assert simulation.object_pose("crate").x - 2.0 == pytest.approx(1 / (2 * 0.6 * 9.81), rel=0.15)
 

@@ -97,7 +97,11 @@ def test_ruling_contacts_out_gives_the_events_and_the_clearance_of_asking_at_eve
     monkeypatch.setattr("simscen.sim.clearance.HORIZON", -1.0)
     polled = run()
     assert EventKind.COLLISION_STARTED in kinds(polled[0])
-    assert ruled_out == polled
+    assert ruled_out[0] == polled[0]
+    # Something long at rest is not asked where it is when somebody only comes near, which lets it creep so much.
+    assert ruled_out[1] == [
+        (tick, pytest.approx(clearance, abs=1e-6), pressed) for tick, clearance, pressed in polled[1]
+    ]
     assert [sample for sample in polled[1] if sample[2] and sample[1] > 0] == []
 
 

@@ -1,5 +1,7 @@
 """What lies still costs nothing, and is awake the moment that anything touches it."""
 
+import math
+
 import pybullet
 import pytest
 from playground import box
@@ -7,6 +9,7 @@ from playground import box
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.motion import Twist
 from simscen.core.shapes import Body, MotionPath, Solid, Sphere
+from simscen.sim.settled import Settling
 
 CRATE = (box("crate", 0, 0, 0.4, 0.4, 0.4),)
 BALL = (Solid(Sphere(0.1), Pose3(z=0.1), "ball"),)
@@ -32,6 +35,40 @@ def test_what_rests_does_not_creep(simulate):
     before = simulation.object_pose("crate")
     run(simulation, 20 * 240)
     assert simulation.object_pose("crate") == before
+
+
+def test_what_rests_when_a_run_begins_sleeps_from_its_first_tick_on(simulate):
+    simulation = simulate(bodies=[Body("crate", CRATE, Pose3(2.0), 5.0), Body("ball", BALL, Pose3(3.0), 1.0)])
+    before = engine_pose(simulation, "crate"), engine_pose(simulation, "ball")
+    run(simulation, 60)
+    assert (engine_pose(simulation, "crate"), engine_pose(simulation, "ball")) == before
+
+
+def test_what_only_begins_to_tip_over_when_a_run_begins_does_tip_over(simulate):
+    """0.2 mrad beyond its balance, at less than 1 mm/s for the first quarter of a second."""
+    plank, lean = (box("plank", 0, 0, 0.2, 0.2, 2.0),), math.atan2(0.1, 1.0) + 2e-4
+    pose = Pose3.from_rpy(3.0, 0.0, 0.1 * math.sin(lean), 0.0, lean, 0.0)
+    simulation = simulate(bodies=[Body("plank", plank, pose, 5.0)])
+    run(simulation, LONG)
+    assert simulation.object_pose("plank").apply([[0.0, 0.0, 2.0]])[0, 2] < 0.5
+
+
+@pytest.mark.parametrize(
+    ("speeds", "rests"),
+    [
+        ([4e-5, 1e-5, 9e-5, 8e-5, 9e-5], True),
+        ([1e-5, 2e-5, 3e-5, 4e-5, 5e-5], False),
+        ([2e-3, 1e-3, 5e-4, 1e-4, 5e-5], False),
+        ([0.0, 0.0, 0.0, 0.0, 0.0], True),
+    ],
+)
+def test_what_rests_is_slow_at_every_look_and_not_faster_at_each(monkeypatch, speeds, rests):
+    seen = iter(speeds)
+    monkeypatch.setattr(pybullet, "getBaseVelocity", lambda *_: ((next(seen), 0.0, 0.0), (0.0, 0.0, 0.0)))
+    settling = Settling(0, [7])
+    for _ in speeds:
+        settling.look()
+    assert settling.at_rest() == ({7} if rests else set())
 
 
 def test_what_rolls_slowly_rolls_on(simulate):
