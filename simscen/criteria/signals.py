@@ -109,17 +109,19 @@ def drive(trace: Trace) -> Drive:
     """
     poses, carried = truth(trace), set(jumps(trace))
     kept, lengths = [0], [0.0]
-    xs, ys = poses.values[:, 0].tolist(), poses.values[:, 1].tolist()
-    for k in range(1, len(xs)):
-        step = math.hypot(xs[k] - xs[kept[-1]], ys[k] - ys[kept[-1]])
-        if k in carried:
-            kept.append(k)
-            lengths.append(0.0)
-        elif step >= SMALLEST_MOVE:
-            kept.append(k)
-            lengths.append(step)
-    if not xs:
+    points = poses.values[:, :2].tolist()
+    if not points:
         return Drive(np.empty(0, dtype=np.int64), np.empty(0))
+    last = points[0]
+    for k, point in enumerate(points[1:], start=1):
+        step = math.dist(point, last)
+        if k in carried:
+            step = 0.0
+        elif step < SMALLEST_MOVE:
+            continue
+        kept.append(k)
+        lengths.append(step)
+        last = point
     return Drive(poses.ticks[kept], np.cumsum(lengths))
 
 

@@ -1,6 +1,5 @@
 """Moments that wait until several can be written at once."""
 
-from collections.abc import Callable
 from contextlib import suppress
 from types import TracebackType
 from typing import Protocol
@@ -20,6 +19,14 @@ class Log(Protocol):
         ...
 
 
+class Settling(Protocol):
+    """Keeps something back as long as more comes."""
+
+    def settle(self) -> None:
+        """Nothing comes for a while."""
+        ...
+
+
 class Backlog:
     """Keeps the moments of all robots in their order, and hands them on when the oldest has waited for so many ticks.
 
@@ -27,10 +34,10 @@ class Backlog:
     takes twice as long as for the second of two moments in a row. What waits is lost when the process is killed.
     """
 
-    def __init__(self, ticks: int, then: Callable[[], None] | None = None) -> None:
-        """0: nothing waits. `then` is called when all that waited has been handed on."""
+    def __init__(self, ticks: int, file: Settling | None = None) -> None:
+        """0: nothing waits. The `file` behind the logs is told each time that all which waited has been handed on."""
         self.waiting: list[tuple[tuple[Log, ...], Moment]] = []
-        self._then = then
+        self._file = file
         self.ticks, self.until = ticks, 0
 
     def before(self, *logs: Log) -> Log:
@@ -38,13 +45,13 @@ class Backlog:
         return _Robot(self, logs)
 
     def flush(self) -> None:
-        """Hand on all that waits, to one log after the other."""
+        """Hand on all that waits."""
         waiting, self.waiting = self.waiting, []
-        for number in range(max((len(logs) for logs, _ in waiting), default=0)):
-            for logs, moment in waiting:
-                logs[number].append(moment)
-        if self._then is not None:
-            self._then()
+        for logs, moment in waiting:
+            for log in logs:
+                log.append(moment)
+        if self._file is not None:
+            self._file.settle()
 
     def __enter__(self) -> "Backlog":
         return self

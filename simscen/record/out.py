@@ -80,6 +80,10 @@ class Publisher:
         """For messages of which much is written, always at one time, one behind the other."""
         return _AtOnce(self, messages)
 
+    def settle(self) -> None:
+        """Nothing comes for a while."""
+        self._writer.settle()
+
     def channel(self, topic: Topic) -> Channel:
         """The channel of a topic."""
         channel = self._channels.get(topic.name)
@@ -148,6 +152,10 @@ class Namespaced:
     def together(self, messages: Layouts) -> Together:
         """For messages of which much is written, always at one time, one behind the other."""
         return self._out.together([(self._named(topic), message) for topic, message in messages])
+
+    def settle(self) -> None:
+        """Nothing comes for a while."""
+        self._out.settle()
 
     def _named(self, topic: Topic) -> Topic:
         return topic if topic == CLOCK else topic._replace(name=f"/{self._robot}{topic.name}")

@@ -52,7 +52,7 @@ class Recorder:
 
     def settle(self) -> None:
         """No moment comes for a while: see to it that a killed run keeps those that came."""
-        self._writer.settle()
+        next(iter(self.robots.values())).settle()
 
     def close(self, end_tick: int, result: str = "", stack: Mapping[str, str] | None = None) -> None:
         """Write the end of the run, its result (JSON) and what external stacks were, then give the file its name."""

@@ -6,7 +6,7 @@ from simscen.core.trace import Moment
 from simscen.record import frames, pack_many, pack_rare, topics
 from simscen.record.event_topics import EventTopics
 from simscen.record.header import LogHeader
-from simscen.record.out import Out
+from simscen.record.out import Namespaced, Publisher
 from simscen.record.scene_topics import SceneTopics
 from simscen.record.sensor_topics import SensorTopics
 from simscen.record.simtime import SimTime
@@ -19,9 +19,19 @@ class RobotTopics:
     """Eats the moments of a robot in the order of their ticks, and writes them to `out`; the time only with `clock`."""
 
     def __init__(
-        self, out: Out, time: SimTime, about: LogHeader, scenery: Scenery, robot: str = "", clock: bool = True
+        self,
+        out: Publisher | Namespaced,
+        time: SimTime,
+        about: LogHeader,
+        scenery: Scenery,
+        robot: str = "",
+        clock: bool = True,
     ) -> None:
-        self._time, thinning, names = time, Thinning(time.rate), frames.RobotFrames(robot)
+        self._time, names = time, frames.RobotFrames(robot)
+        self.thinning = thinning = Thinning(time.rate)
+        """What is kept; who keeps the same asks it, too."""
+        self.settle = out.settle
+        """To be called when nothing comes for a while."""
         if about.map is not None:
             out.publish(topics.MAP, 0, pack_many.occupancy_grid(frames.MAP, (0, 0), about.map))
         if about.robot_description:

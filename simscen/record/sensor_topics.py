@@ -86,18 +86,19 @@ class SensorTopics:
         stamp, pose = self._time.stamp(odometry.tick), Pose3.planar(odometry.pose)
         if not self._thinning.keeps_odometry(odometry):
             self._line("Odometry", odometry.sensor).write(now, self._odometry(stamp, pose, odometry.twist))
-        elif self._correction is None:
-            self._own(odometry)[0].write(now, stamp, pose, odometry.twist)
+            return
+        alone, both = self._owns or self._own(odometry)
+        if self._correction is None:
+            alone.write(now, stamp, pose, odometry.twist)
         else:
-            self._own(odometry)[1].write(now, stamp, pose, odometry.twist, self._correction)
+            both.write(now, stamp, pose, odometry.twist, self._correction)
 
     def _own(self, odometry: Odometry) -> tuple[Together, Together]:
         """What writes the robot's own odometry, with what it says on /tf: alone, and with the correction."""
-        if self._owns is None:
-            layout = self.topic_of(odometry), pack.odometry(self._names.odom, self._names.base)
-            links = (self._names.odom, self._names.base, "pose"), (frames.MAP, self._names.odom, "correction")
-            alone, both = ((topics.TF, pack.transforms(those)) for those in (links[:1], links))
-            self._owns = self._out.together((layout, alone)), self._out.together((layout, both))
+        layout = self.topic_of(odometry), pack.odometry(self._names.odom, self._names.base)
+        links = (self._names.odom, self._names.base, "pose"), (frames.MAP, self._names.odom, "correction")
+        without, with_it = ((topics.TF, pack.transforms(those)) for those in (links[:1], links))
+        self._owns = self._out.together((layout, without)), self._out.together((layout, with_it))
         return self._owns
 
     def _write_scan(self, now: int, scan: Scan) -> None:

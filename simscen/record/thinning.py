@@ -16,6 +16,7 @@ class Thinning:
 
     A command is kept when it differs from the last one, and else 20 times a second. The pose of a moving thing is
     kept when it has changed, and else once a second. Of several odometries the first that speaks is the robot's.
+    Whoever asks again about the tick that was last asked about is told the same.
     """
 
     def __init__(self, rate: int) -> None:
@@ -23,17 +24,21 @@ class Thinning:
         self._standstill_period = max(1, rate // STANDSTILL_RATE)
         self._command: Twist | None = None
         self._commanded = 0
+        self._asked = -1
         self._objects: dict[str, tuple[int, Pose3]] = {}
         self._odometry: str | None = None
         self._at_rest: Mapping[str, Pose3] | None = None
         self._due = 0
+        self._moved_at = -1
+        self._moved: dict[str, Pose3] = {}
 
     def keeps_command(self, tick: int, command: Twist) -> bool:
         """Whether the command of this beat is kept."""
-        if command == self._command and tick - self._commanded < self._command_period:
-            return False
-        self._command, self._commanded = command, tick
-        return True
+        if tick != self._asked:
+            self._asked = tick
+            if command != self._command or tick - self._commanded >= self._command_period:
+                self._command, self._commanded = command, tick
+        return self._commanded == tick
 
     def keeps_odometry(self, odometry: Odometry) -> bool:
         """Whether this is the robot's own odometry."""
@@ -43,6 +48,11 @@ class Thinning:
 
     def moved(self, tick: int, truth: Truth) -> dict[str, Pose3]:
         """The moving things whose pose is kept at this tick, by name."""
+        if tick != self._moved_at:
+            self._moved_at, self._moved = tick, self._kept(tick, truth)
+        return self._moved
+
+    def _kept(self, tick: int, truth: Truth) -> dict[str, Pose3]:
         kept, objects = dict[str, Pose3](), truth.objects
         at_rest = objects is self._at_rest  # nothing has moved since the sample before
         if at_rest and tick < self._due:

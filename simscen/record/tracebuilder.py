@@ -18,9 +18,10 @@ class TraceBuilder:
     over the log's quaternions, which costs them at most a last bit.
     """
 
-    def __init__(self, clock: Clock) -> None:
+    def __init__(self, clock: Clock, thinning: Thinning | None = None) -> None:
+        """`thinning` is that of a log which is told of each moment next, so that what is kept is worked out once."""
         self._clock = clock
-        self._thinning = Thinning(clock.rate)
+        self._thinning = Thinning(clock.rate) if thinning is None else thinning
         self._rows = Rows()
         self._truth, self._odometry, self._belief = Series(11), Series(3), Series(9)
         """Pose, twist and clearance; x, y, yaw; the same with a covariance: they become rows at the end."""
@@ -30,17 +31,19 @@ class TraceBuilder:
         tick, truth, decision = moment.tick, moment.truth, moment.decision
         rows, thinning = self._rows, self._thinning
         if truth is not None:
+            pose, twist, clearance, objects = truth
             series = self._truth
-            series.rows += series.pack(tick, *truth.pose, *truth.twist, truth.clearance)
-            if truth.objects:
+            series.rows += series.pack(tick, *pose, *twist, clearance)
+            if objects:
                 for name, pose in thinning.moved(tick, truth).items():
-                    rows.object(name).add(tick, *pose)
+                    series = rows.object(name)
+                    series.rows += series.pack(tick, *pose)
         for reading in moment.readings:
-            if isinstance(reading, Odometry):
+            if type(reading) is Odometry:
                 if thinning.keeps_odometry(reading):
                     series = self._odometry
                     series.rows += series.pack(tick, *reading.pose)
-            elif isinstance(reading, Scan):
+            elif type(reading) is Scan:
                 rows.scans.append(tick)
         if thinning.keeps_command(tick, decision.command):
             rows.command.add(tick, *decision.command)

@@ -132,8 +132,8 @@ def _watched(watch: Stopwatch, rig: Rig, own: Sequence[Log]) -> Sequence[Log]:
         for name, component, methods in agent.stack.inner.components:
             watch.watch(name, component, *methods)
     watch.watch("navigator", agent.stack, "decide")
-    for name, listener in zip(("trace", "log"), own, strict=True):
-        watch.watch(name, listener, "append")
+    for name, listener, methods in zip(("trace", "log"), own, (("append",), ("append", "settle")), strict=True):
+        watch.watch(name, listener, *methods)
     return ()
 
 

@@ -63,12 +63,13 @@ def _simulated(
 ) -> Run:
     prepared = with_faulty_map(prepared, seed)
     clock = Clock(prepared.spec.physics.tick_rate)
-    builders = {name: TraceBuilder(clock) for name in prepared.each}
     with ExitStack() as closing:
         recorder = log and closing.enter_context(Recorder(log, clock, log_header(prepared, seed)))
         # Code of others may write into an array that it has handed out.
-        waits, settle = 0 if prepared.plugins else clock.ticks(WAITS), recorder.settle if recorder else None
-        backlog = closing.enter_context(Backlog(waits, settle))
+        waits, written = 0 if prepared.plugins else clock.ticks(WAITS), recorder.robots if recorder else {}
+        backlog = closing.enter_context(Backlog(waits, next(iter(written.values()), None)))
+        kept = {name: one.thinning for name, one in written.items()}
+        builders = {name: TraceBuilder(clock, kept.get(name)) for name in prepared.each}
         rig = assemble(prepared, seed, printed)
         closing.callback(rig.simulation.close)
         agents = dict(zip(prepared.each, rig.agents, strict=True))
@@ -79,7 +80,7 @@ def _simulated(
         for name, agent in agents.items():
             part = prepared.each[name]
             agent.stack.start(part.estimate, part.case.goals)
-        logs = [(builders[name], recorder.robots[name]) if recorder else (builders[name],) for name in agents]
+        logs = [(builders[name], written[name]) if written else (builders[name],) for name in agents]
         for agent, own in zip(rig.agents, logs, strict=True):
             agent.logs = (backlog.before(*own),)
         rig.agents[0].logs += tuple(attach(rig, logs[0])) if attach else ()

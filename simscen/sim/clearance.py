@@ -14,7 +14,7 @@ from simscen.sim.actors import Actors
 from simscen.sim.drives import Base
 from simscen.sim.outline import extremes
 from simscen.sim.outline import reach as reach_of
-from simscen.sim.proximity import Proximity, motion
+from simscen.sim.proximity import Came, Proximity, motion
 from simscen.sim.robot_body import RobotBody
 from simscen.sim.state import State
 
@@ -29,10 +29,9 @@ Vector = tuple[float, float, float]
 
 
 class _Alone(NamedTuple):
-    """When and where it was measured that anything that moves is farther than what stands, by a `gap` in metres."""
+    """When it was measured that anything that moves is farther than what stands, by a `gap` in metres."""
 
     tick: int
-    pose: Pose3
     gap: float
 
 
@@ -88,6 +87,8 @@ class Clearance:
         self._distance = 0.0
         self._measured_at, self.no_contact_before = -1, 0
         self._alone: _Alone | None = None
+        self._there, self._moved = Pose3(), 0.0
+        """Where the robot was last asked about since then, and how far it had come, in metres."""
         self._actors.undisturbed(self._base.id, until=-1)
         self.enclosed_by: str | None = None
         """The solid that the robot is wholly inside of, where it touches no surface."""
@@ -121,29 +122,33 @@ class Clearance:
         self._alone = None
         if not (self.others or self.unsure) and self._ways is self._proximity:
             farther = self._actors.gap(pose[:3], self._distance + self.size, tick, self._base.id)
-            self._alone = None if farther is None else _Alone(tick, pose, farther)
+            self._alone = None if farther is None else _Alone(tick, farther)
+            self._there, self._moved = pose, 0.0
         return self._distance
 
-    def can_wait(self, tick: int, ticks: int, pose: Pose3) -> bool:
-        """Whether `standing` will do for `measure` at `tick`, which is now, and nothing is touched for so many ticks.
+    def can_wait(self, tick: int, ticks: int, pose: Pose3) -> Came | None:
+        """How the robot came here, if `standing` will do for `measure` at `tick`, which is now, and nothing is touched
+        for so many ticks; else None.
 
-        Told by how far the robot has come since the last measurement, without another.
+        Told by how far it has come since the last measurement, without another; it is asked once for each sample.
         """
         if self._alone is None:
-            return False
-        since, before, gap = self._alone
-        moved = motion(before, pose, self._radius, self._height)
+            return None
+        since, gap = self._alone
+        before, self._there = self._there, pose
+        step = motion(before, pose, self._radius, self._height)
+        self._moved = moved = self._moved + step
         # It may have come nearer to what moves, and gone from what stands.
         if gap - 2 * moved - self._actors.come_in(tick - since) <= 0:
-            return False
+            return None
         if tick + ticks > self.no_contact_before:
             free = min(HORIZON, max(0.0, self._distance - moved - TOLERANCE) / self._fastest(tick))
             self.no_contact_before = max(self.no_contact_before, tick + math.floor(free * self._rate))
-        return tick + ticks <= self.no_contact_before
+        return (before, step) if tick + ticks <= self.no_contact_before else None
 
-    def standing(self, pose: Pose3) -> float:
-        """What `measure` gave for a robot at `pose` at a tick for which it could wait."""
-        return min(self._reach, self._ways.distance(pose))
+    def standing(self, pose: Pose3, came: Came) -> float:
+        """What `measure` gave for a robot that came so to `pose`, at a tick for which it could wait."""
+        return min(self._reach, self._ways.distance(pose, came))
 
     def _search(self, tick: int, pose: Pose3, standing: Proximity) -> float:
         nearest, place = min(self._reach, standing.distance(pose)), pose[:3]

@@ -32,6 +32,9 @@ NO_PLACE, NO_TURN = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
 NOISE = 0.005
 """m farther than the nearest may have gone within which it is measured; what lies farther costs time."""
 
+Came = tuple[Pose3, float]
+"""From where, and how far any point of a robot has moved at most since, in metres."""
+
 
 class Proximity:
     """The solids of a static world, as seen from one robot. `reach` is how far it looks, in metres."""
@@ -52,14 +55,19 @@ class Proximity:
         self._distance = math.inf
         self._pose, self._centre = Pose3(), (math.inf, math.inf)
 
-    def distance(self, pose: Pose3) -> float:
+    def distance(self, pose: Pose3, came: Came | None = None) -> float:
         """Distance in metres from the robot, with its base at `pose`, to the nearest solid; inf beyond the reach.
+
+        `came` is how it got there, if that is known, and counts if it began where the robot was last measured.
 
         The distance to a part changes at most by what the robot moves, so only those are measured again that may have
         come nearer than the nearest, and the nearest no farther than it may have gone: what is asked costs time for
         each triangle within reach.
         """
-        moved = motion(self._pose, pose, self._radius, self._height)
+        if came is not None and came[0] is self._pose:
+            moved = came[1]
+        else:
+            moved = motion(self._pose, pose, self._radius, self._height)
         self._travelled += moved
         self._pose = pose
         if math.dist(pose[:2], self._centre) > STRIDE:

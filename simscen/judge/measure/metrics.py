@@ -42,9 +42,10 @@ class Measures:
 def measure(trace: Trace, case: Case) -> Measures:
     """All metrics of judge.measure.table. Raises BrokenTrace when a signal is not finite."""
     check_finite(trace)
+    way = drive(trace)
     found: Values = {
-        **_navigation(trace, case),
-        **way_metrics(trace),
+        **_navigation(trace, case, way.length),
+        **way_metrics(trace, way),
         **_motion(trace, case),
         **_clearance(trace),
         **person_metrics(trace, case),
@@ -72,8 +73,7 @@ def barn_score(success: bool, seconds: float, reference_length: float) -> float:
     return optimal / min(max(seconds, 2 * optimal), 8 * optimal) if success else 0.0
 
 
-def _navigation(trace: Trace, case: Case) -> Values:
-    length = drive(trace).length
+def _navigation(trace: Trace, case: Case, length: float) -> Values:
     shortest, unknown = shortest_way(trace, case)
     success, seconds = _success(trace, case), _time_to_goal(trace, case)
     found: Values = {"success": float(success), "path_length": length, "time_to_goal": seconds}

@@ -5,7 +5,7 @@ import numpy as np
 from simscen.core.events import EventKind
 from simscen.core.geometry import Array, wrap_array
 from simscen.core.trace import Trace
-from simscen.criteria.signals import Drive, drive, jumps, truth
+from simscen.criteria.signals import Drive, jumps, truth
 
 RESAMPLED = 0.3
 """Metres between the points of which curvature is taken; nearer ones are noise (bench-mr)."""
@@ -14,9 +14,8 @@ Values = dict[str, float | str]
 """Numbers by name; a text says why there is none."""
 
 
-def way_metrics(trace: Trace) -> Values:
-    """Turns and curvature of the true way; being set down elsewhere is no part of it."""
-    way = drive(trace)
+def way_metrics(trace: Trace, way: Drive) -> Values:
+    """Turns and curvature of the true way, which the robot drove so; being set down elsewhere is no part of it."""
     legs = legs_of(trace, way)
     turned = heading_change(trace)
     return {

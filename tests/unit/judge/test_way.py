@@ -24,7 +24,8 @@ def driven(points, events=(), plans=()):
 
 
 def shape(*points, **words):
-    return way_metrics(driven(points, **words))
+    trace = driven(points, **words)
+    return way_metrics(trace, drive(trace))
 
 
 def placed(before):
@@ -102,7 +103,7 @@ def test_without_a_true_pose_there_is_no_shape():
     trace = replace(
         sketch({"seconds": 1, "truth": [[0, 0, 0]]}), truth=Samples(np.empty(0, np.int64), np.empty((0, 3)))
     )
-    metrics = way_metrics(trace)
+    metrics = way_metrics(trace, drive(trace))
     assert metrics["aol"] == "the robot never drove"
     assert metrics["heading_change"] == 0.0
     assert "too short a way" in metrics["max_curvature"]
@@ -117,7 +118,7 @@ def test_being_turned_while_set_down_is_no_change_of_heading(before, turned):
 def test_being_set_down_before_the_first_sample_changes_nothing():
     trace = driven([(0, 0, 0), (0, 0, 0.1), (0, 0, 0.3)], [[0, "robot.placed"]])
     late = replace(trace, truth=Samples(trace.truth.ticks + 1, trace.truth.values))
-    assert way_metrics(late)["heading_change"] == pytest.approx(0.3)
+    assert way_metrics(late, drive(late))["heading_change"] == pytest.approx(0.3)
 
 
 def plan(sample, *yaws):

@@ -53,7 +53,7 @@ def killed(folder: Path, seconds: float) -> Path:
         from simscen.record.backlog import WAITS, Backlog
         from simscen.record.recorder import Recorder
         recorder = Recorder({str(folder / "run.mcap")!r}, CLOCK, about())
-        log = Backlog(CLOCK.ticks(WAITS), recorder.settle).before(recorder.robots[""])
+        log = Backlog(CLOCK.ticks(WAITS), recorder).before(recorder.robots[""])
         for moment in moments({seconds}):
             log.append(moment)
         os.kill(os.getpid(), signal.SIGKILL)
