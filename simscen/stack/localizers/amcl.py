@@ -20,6 +20,9 @@ from simscen.stack.localizers.scan_matcher import ScanMatcher, Step
 from simscen.stack.localizers.scatter import Scatter
 from simscen.stack.odometry_history import OdometryHistory
 
+SURE_AFTER = 8
+"""Corrections in a row in which nothing was amiss, after which a robot is sure of its place."""
+
 
 @dataclass(frozen=True, eq=False)
 class _Correction:
@@ -72,7 +75,7 @@ class AmclLocalizer:
         self._matcher = ScanMatcher() if self._spec.match_scans else None
         self._scatter = Scatter() if self._spec.covariance == "scatter" and self._matcher is not None else None
         self._matched: tuple[str, Pose2] | None = None
-        self._torn = STILL
+        self._torn, self._calm = STILL, 0
         self._due: dict[str, bool] = {}
         self._waiting: dict[str, Scan] = {}
         self._belief: Belief | None = None
@@ -141,9 +144,10 @@ class AmclLocalizer:
         """Move the particles by what was driven since the last correction, and weigh them by a scan."""
         matched = None if self._matcher is None else self._matched_step(self._matcher, scan, odometry)
         self._torn = STILL
+        agreed = False
         if delta is not None and matched is not None:
             self._filter.follow(matched, delta)
-            if not matched.agrees(delta):
+            if not (agreed := matched.agrees(delta)):
                 self._torn = delta.between(matched.delta)
             if self._scatter is not None:
                 self._scatter.compare(matched.delta, delta)
@@ -160,6 +164,8 @@ class AmclLocalizer:
             carried = last.map_from_odom.compose(odometry) if matched is None else last.pose.compose(matched.delta)
             covariance = spread(self._filter.particles, carried)
             self._correction = _Correction(carried, covariance, odometry, self._correction.tick)
+        calm = agreed and answer is not None and self._filter.sure
+        self._calm = self._calm + 1 if calm else 0
 
     def _matched_step(self, matcher: ScanMatcher, scan: Scan, odometry: Pose2) -> Step | None:
         """The motion since the last correction as the first lidar saw it; None where it did not see it."""
@@ -175,9 +181,10 @@ class AmclLocalizer:
         limits = self._spec.laser_min_range, self._spec.farthest
         base = self._base(odometry)
         believed = self._correction.map_from_odom.compose(odometry)
-        if (places := finder.places(scan, base, believed, limits, self._torn)) is not None:
+        fit = self._filter.fitting if self._calm else None
+        if (places := finder.places(scan, base, believed, limits, self._torn, fit)) is not None:
             self._correction = _Correction(*self._filter.put(*places), odometry, scan.tick)
-            self._moved_to, self._belief = odometry, None
+            self._moved_to, self._belief, self._calm = odometry, None, 0
             self._scatter = None if self._scatter is None else Scatter()
 
     def _base(self, odometry: Pose2) -> Pose2:
@@ -187,4 +194,7 @@ class AmclLocalizer:
         return self._matcher.pose.compose(self._matched[1].between(odometry))
 
     def _moved_enough(self, delta: Pose2) -> bool:
-        return math.hypot(delta.x, delta.y) > self._spec.update_min_d or abs(delta.yaw) > self._spec.update_min_a
+        """By the thresholds; by more of a robot that is sure of its place, of which the next scan says little new."""
+        times = self._spec.sure_update_factor if self._calm >= SURE_AFTER else 1.0
+        far, turned = times * self._spec.update_min_d, times * self._spec.update_min_a
+        return math.hypot(delta.x, delta.y) > far or abs(delta.yaw) > turned

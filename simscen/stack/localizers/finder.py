@@ -79,12 +79,14 @@ class Finder:
         self._since, self._astray = 0.0, 0
 
     def places(
-        self, scan: Scan, base: Pose2, believed: Pose2, limits: tuple[float, float], torn: Pose2 = STILL
-    ) -> tuple[Array, Array] | None:
+        self, scan: Scan, base: Pose2, believed: Pose2, limits: tuple[float, float], torn: Pose2 = STILL,
+        fit: float | None = None,
+    ) -> tuple[Array, Array] | None:  # fmt: skip
         """Poses (k, 3) where the robot may be and the share of each (k,); None to leave it where it is believed to be.
 
         `base` is where it was when it took the scan, in a frame that drifts; `limits` are the ranges that count. What
         its scans and its wheels say of how it came there since the last scan is `torn` apart, where they do not agree.
+        `fit` is the share of the beams that fit where it is believed to be, if anyone knows.
         """
         ends = self._memory.add(scan, base, *limits)
         if self._last is not None:
@@ -106,7 +108,9 @@ class Finder:
             and (settled := self._as_told(self._begun, base, here)) is not None
         ):
             return settled
-        if (fit := self._trust.fit(here, ends, TELLING)) is not None:
+        if fit is None:
+            fit = self._trust.fit(here, ends, TELLING)
+        if fit is not None:
             self._fits.append(fit)
         self._astray = self._astray + 1 if fit is None else 0
         if self._known and (near := self._nearby(base, here)) is not None:

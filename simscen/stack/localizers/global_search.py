@@ -51,12 +51,6 @@ class View:
     ends: Plane
     passed: Plane
 
-    @classmethod
-    def of(cls, ends: Plane, lidar: Plane) -> "View":
-        """What beams show that go from where the `lidar` (n,) was to `ends` (n,)."""
-        ways = ends - lidar
-        return cls(ends, np.concatenate([lidar + ways * share for share in SHARES]))
-
     def thinned(self, count: int) -> "View":
         """At most `count` of each, evenly chosen."""
         return View(_evenly(self.ends, count), _evenly(self.passed, count))

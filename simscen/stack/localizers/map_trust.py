@@ -1,5 +1,7 @@
 """How much a map is worth where the robot is: rooms are rebuilt, furniture is moved, and nobody draws it anew."""
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
@@ -23,6 +25,15 @@ _NOTHING, _FITS, _FITS_NOT = 0, 1, 2
 """What the map says of a beam that ends in a cell."""
 
 
+class Worth(NamedTuple):
+    """The `exponent` of a scan's likelihood, 0 … 1; the share of its beams that are `fitting`, of those that end where
+    the map says anything; and which of them count (b,), None for all."""
+
+    exponent: float
+    fitting: float
+    counting: npt.NDArray[np.bool_] | None
+
+
 class MapTrust:
     """The exponent of a scan's likelihood: small where the map does not show what is seen.
 
@@ -39,19 +50,19 @@ class MapTrust:
         self._field, self._none, self._full = field, none, full
         self._says = np.where(beyond, _NOTHING, np.where(field.table < NEAR, _FITS, _FITS_NOT)).astype(np.uint8)
 
-    def of(self, particles: Particles, ends: Plane) -> tuple[float, npt.NDArray[np.bool_] | None]:
-        """The exponent, 0 … 1, for beams that end at `ends` (b,) in the base frame, and which of them count (b,).
+    def of(self, particles: Particles, ends: Plane) -> Worth:
+        """What beams are worth that end at `ends` (b,) in the base frame.
 
-        None is all of them. Of a narrow group each beam counts that ends where the map says something for most
+        Of a narrow group each beam counts that ends where the map says something for most
         particles: what it has in unknown space, less than a hit and more than a miss, draws them into the map or out.
         """
         said = self._said(particles.poses[:: -(-len(particles.poses) // ASKED)], ends)
         told, fitting = _told(said)
         exponent = _between(told, *TELLING)
         if not particles.within(TOGETHER):
-            return exponent, None
+            return Worth(exponent, fitting, None)
         counting = None if told == 1.0 else (said != _NOTHING).mean(axis=0) > MOSTLY
-        return exponent * _between(fitting, self._none, self._full), counting
+        return Worth(exponent * _between(fitting, self._none, self._full), fitting, counting)
 
     def fit(self, poses: Array, ends: Plane, telling: float) -> float | None:
         """The share of the beams that fit at `poses` (n, 3), of those that end where the map says anything.

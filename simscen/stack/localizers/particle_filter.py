@@ -33,6 +33,9 @@ BELIEVE_WHEELS = 0.2
 AT_ONCE = 0.2
 """What the first scan counts, of what it does when the robot has driven `settling_distance` m."""
 
+SURE = 0.9
+"""Share of a scan's beams that must fit for nothing to be amiss."""
+
 _STRAY, _ANYWHERE = 1.0, 2.0
 """Marks of what descends from particles that recovery put anywhere, and of these themselves."""
 
@@ -57,8 +60,16 @@ class ParticleFilter:
         self._recovery = Recovery(self._spec.recovery_alpha_slow, self._spec.recovery_alpha_fast, self._sensor.strays)
         self._put_anywhere: npt.NDArray[np.bool_] | None = None
         self._strays: npt.NDArray[np.bool_] | None = None
-        self._corrections, self._trusted = 0, 1.0
+        self._corrections, self._trusted, self._together = 0, 1.0, False
+        self.fitting = 0.0
+        """The share of the last scan's beams that fit at the particles, as far as the map says anything of them."""
         self._settled = AT_ONCE if estimate.pose is not None and self._spec.settling_distance > 0 else 1.0
+
+    @property
+    def sure(self) -> bool:
+        """Whether the map showed nearly all that the last scan saw, and the particles were one narrow group."""
+        known = self._trusted == 1.0 and self.fitting >= SURE and self._settled == 1.0
+        return known and self._together and self._recovery.share == 0
 
     def move(self, delta: Pose2) -> None:
         """Move each particle by its own noisy copy of a motion that odometry reports in the base frame."""
@@ -108,7 +119,7 @@ class ParticleFilter:
         spec, poses = self._spec, self.particles.poses
         beams = select_beams(scan, spec.max_beams, spec.laser_min_range, spec.farthest)
         if self._trust is not None and len(beams.ends):
-            self._trusted, told = self._trust.of(self.particles, beams.ends)
+            self._trusted, self.fitting, told = self._trust.of(self.particles, beams.ends)
             if self._trusted == 0:
                 return None
             beams = beams if told is None else beams.of_hits(told)
@@ -126,6 +137,7 @@ class ParticleFilter:
         weights = weights / total if total > 0 else np.full(len(poses), 1 / len(poses))
         self.particles = self.particles.weighted(weights)
         answer = summarise(self.particles, self._sensor.peak) if total > 0 else None
+        self._together = in_touch(self.particles)
         self._resample()
         return answer
 

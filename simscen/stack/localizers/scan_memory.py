@@ -9,7 +9,7 @@ import numpy as np
 from simscen.core.geometry import Pose2, wrap
 from simscen.core.sensing import Scan
 from simscen.stack.localizers.beams import Plane, directions, evenly
-from simscen.stack.localizers.global_search import REACH, View
+from simscen.stack.localizers.global_search import REACH, SHARES, View
 
 REMEMBERED = 6.0
 """m driven: what is older is forgotten, for by then raw odometry bends it."""
@@ -21,14 +21,19 @@ METRES_A_RAD = 0.5
 """What a turn counts as: it shows a lidar something new, too."""
 
 
+_ALONG = np.array([[share] for share in (*SHARES, 1.0)])
+
+
 @dataclass(frozen=True, eq=False)
 class _Kept:
-    """Beams that ended at `ends` (n,) about the base, which was at `odometry`, after `driven` m, turns included."""
+    """What beams `saw`, after `driven` m, turns included: (m, n), points that they passed, and last of all their ends.
+
+    In the frame that drifts, in which the base was at `odometry`: so that all are seen from anywhere at once.
+    """
 
     odometry: Pose2
     driven: float
-    ends: Plane
-    lidar: complex
+    saw: Plane
 
 
 class ScanMemory:
@@ -52,7 +57,9 @@ class ScanMemory:
                 return ends
         else:
             driven = 0.0
-        self._kept.append(_Kept(odometry, driven, ends, complex(scan.mount.x, scan.mount.y)))
+        lidar = complex(scan.mount.x, scan.mount.y)
+        saw = (_ALONG * (ends - lidar) + lidar) * cmath.rect(1.0, odometry.yaw) + complex(odometry.x, odometry.y)
+        self._kept.append(_Kept(odometry, driven, saw))
         while driven - self._kept[0].driven > REMEMBERED:
             self._kept.popleft()
         return ends
@@ -64,13 +71,10 @@ class ScanMemory:
 
     def about(self, odometry: Pose2) -> View:
         """All that was seen, about a base at `odometry`."""
-        ends, lidars = [], []
-        for one in self._kept:
-            x, y, yaw = odometry.between(one.odometry)
-            turn, place = cmath.rect(1.0, yaw), complex(x, y)
-            ends.append(one.ends * turn + place)
-            lidars.append(np.full(len(one.ends), one.lidar * turn + place))
-        return View.of(np.concatenate(ends), np.concatenate(lidars))
+        saw = np.concatenate([one.saw for one in self._kept], axis=1)
+        saw -= complex(odometry.x, odometry.y)
+        saw *= cmath.rect(1.0, -odometry.yaw)
+        return View(saw[-1], saw[:-1].ravel())
 
 
 def travelled(before: Pose2, after: Pose2) -> float:

@@ -156,6 +156,7 @@ ELSEWHERE = {
     "clear_entirely": "tests/unit/stack/behaviors/test_motions.py, tests/unit/stack/test_navigator.py",
     "retries_since_progress": "tests/unit/stack/test_checks_and_limits.py",
     "counter_turn_slip": "tests/unit/stack/test_slipping_wheels.py",
+    "sure_update_factor": "tests/unit/stack/localizers/test_amcl.py",
     "xy_goal_tolerance": "whoever makes goals reads it: tests/unit/run/test_goal_tolerances.py",
     "yaw_goal_tolerance": "the same",
 }  # fmt: skip

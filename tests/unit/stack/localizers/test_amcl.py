@@ -1,6 +1,7 @@
 """AMCL keeps Nav2's rhythm and stays sane whatever its sensors say."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -8,15 +9,16 @@ from pydantic import ValidationError
 
 from simscen.core.belief import Belief, Estimate
 from simscen.core.chance import Streams
-from simscen.core.geometry import Pose2
+from simscen.core.geometry import Array, Pose2
 from simscen.core.grid import UNKNOWN
 from simscen.core.motion import Twist
 from simscen.core.sensing import Odometry, Scan
 from simscen.model.localizers import Amcl
+from simscen.stack.localizers.amcl import SURE_AFTER
 from simscen.stack.localizers.build import amcl
 from simscen.stack.protocols import Localizer
 from simscen.stack.setting import Setting
-from simscen.testing.room import BEAMS, cast, drive, grid, localizer, scan, surroundings
+from simscen.testing.room import BEAMS, ODOMETRY_PERIOD, cast, drive, grid, localizer, run, scan, surroundings
 
 START = Pose2(-2.5, -1.8, 0.6)
 DEFAULT = Amcl()
@@ -59,6 +61,41 @@ def test_the_first_scan_corrects_although_nothing_has_moved() -> None:
 def test_a_scan_corrects_only_after_enough_motion(step: Pose2, corrects: bool) -> None:
     belief = moved(started(), 24, step)
     assert belief.updated == (24 if corrects else 0)
+
+
+def steps_between_corrections(spec: Amcl, seconds: float) -> Array:
+    """How far and by how much (k, 2) a robot drove and turned from one correction to the next."""
+    driven = drive(seconds)
+    beliefs = run(localizer(spec, Estimate(Pose2(*driven.truth[0]), (0.1, 0.1, 0.05)), 1), driven, 1)
+    rows = np.unique([belief.updated for belief in beliefs]) // ODOMETRY_PERIOD
+    poses = [Pose2(*row) for row in driven.truth[rows]]
+    return np.array([(before.distance(now), abs(before.between(now).yaw)) for before, now in pairwise(poses)])
+
+
+def test_a_robot_that_is_sure_of_its_place_looks_at_a_scan_after_twice_the_motion() -> None:
+    sure, always = (
+        steps_between_corrections(Amcl(sure_update_factor=factor, settling_distance=0.0), 30.0) for factor in (2.0, 1.0)
+    )
+    told = always / (DEFAULT.update_min_d, DEFAULT.update_min_a)
+    assert (told.max(axis=1) < 1.6).all()
+    twice = sure[SURE_AFTER:] / (DEFAULT.update_min_d, DEFAULT.update_min_a)
+    assert (twice.max(axis=1) > 1.9).all()
+    assert (twice.max(axis=1) < 2.6).all()
+    assert sure[: SURE_AFTER - 1] == pytest.approx(always[: SURE_AFTER - 1])
+
+
+def test_a_robot_whose_scan_does_not_show_the_map_looks_at_the_next_one_as_soon_as_any() -> None:
+    subject = localizer(Amcl(settling_distance=0.0), Estimate(START, (0.05, 0.05, 0.02)), 1)
+    updated = []
+    for k in range(SURE_AFTER + 8):
+        step, strange = Pose2(0.0, 0.0, 0.26 * k), k == SURE_AFTER + 4
+        here = seen(START.compose(step), 24 * k)
+        subject.on_odometry(odometry(24 * k, step))
+        subject.on_scan(replace(here, ranges=np.full_like(here.ranges, 1.2)) if strange else here)
+        updated.append(subject.belief.updated // 24)
+    later = SURE_AFTER + 5
+    assert updated[: SURE_AFTER + 3] == [*range(SURE_AFTER + 1), SURE_AFTER, SURE_AFTER + 2]
+    assert updated[later:] == list(range(later, len(updated)))
 
 
 def test_between_corrections_odometry_carries_the_pose_and_uncertainty_grows() -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.stack.localizers.global_search import ANSWERS, GlobalSearch, View, distinct
+from simscen.stack.localizers.global_search import ANSWERS, SHARES, GlobalSearch, View, distinct
 from simscen.stack.localizers.scan_memory import REMEMBERED, ScanMemory, ends_of
 from simscen.testing.room import BEAMS, cast, grid, scan
 
@@ -14,7 +14,7 @@ PLACES = (Pose2(-2.5, -1.8, 0.6), Pose2(3.0, 1.8, -2.8), Pose2(-4.0, 2.9, 1.9))
 def scanned(pose: Pose2) -> View:
     ranges = cast(np.array([pose]), -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS))[0]
     ends = ends_of(scan(ranges), 0.0, 100.0)
-    return View.of(ends, np.zeros_like(ends))
+    return View(ends, np.concatenate([ends * share for share in SHARES]))
 
 
 @pytest.mark.parametrize("pose", PLACES)

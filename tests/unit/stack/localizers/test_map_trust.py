@@ -29,7 +29,7 @@ def asked(poses: Array, on_walls: int, in_the_open: int, beyond: int) -> tuple[f
     """What so many beams are worth, and which of them count."""
     walls = np.linspace(-1.0, 1.0, on_walls) + 1.9j
     ends = np.concatenate((walls, np.full(in_the_open, 2.0 + 0.0j), np.full(beyond, 14.0 + 0.0j)))
-    exponent, counting = trust().of(Particles.equal(poses), ends)
+    exponent, _, counting = trust().of(Particles.equal(poses), ends)
     return exponent, None if counting is None else counting.tolist()
 
 
