@@ -75,7 +75,7 @@ class AmclLocalizer:
         self._matcher = ScanMatcher() if self._spec.match_scans else None
         self._scatter = Scatter() if self._spec.covariance == "scatter" and self._matcher is not None else None
         self._matched: tuple[str, Pose2] | None = None
-        self._torn, self._calm = STILL, 0
+        self._torn, self._calm, self._glances = STILL, 0, 0
         self._due: dict[str, bool] = {}
         self._waiting: dict[str, Scan] = {}
         self._belief: Belief | None = None
@@ -133,7 +133,7 @@ class AmclLocalizer:
         if odometry is None or not scan.range_max > 0:
             return
         delta = None if self._moved_to is None else self._moved_to.between(odometry)
-        if delta is not None and self._moved_enough(delta):
+        if delta is not None and self._worth_looking(scan, odometry, delta):
             self._due = dict.fromkeys(self._due, True)
         if self._due.get(scan.sensor, True):
             self._correct(scan, odometry, delta)
@@ -165,7 +165,7 @@ class AmclLocalizer:
             covariance = spread(self._filter.particles, carried)
             self._correction = _Correction(carried, covariance, odometry, self._correction.tick)
         calm = agreed and answer is not None and self._filter.sure
-        self._calm = self._calm + 1 if calm else 0
+        self._calm, self._glances = self._calm + 1 if calm else 0, 0
 
     def _matched_step(self, matcher: ScanMatcher, scan: Scan, odometry: Pose2) -> Step | None:
         """The motion since the last correction as the first lidar saw it; None where it did not see it."""
@@ -193,8 +193,19 @@ class AmclLocalizer:
             return odometry
         return self._matcher.pose.compose(self._matched[1].between(odometry))
 
-    def _moved_enough(self, delta: Pose2) -> bool:
-        """By the thresholds; by more of a robot that is sure of its place, of which the next scan says little new."""
-        times = self._spec.sure_update_factor if self._calm >= SURE_AFTER else 1.0
+    def _worth_looking(self, scan: Scan, odometry: Pose2, delta: Pose2) -> bool:
+        """Whether the robot moved by the thresholds; who is sure of its place by more, unless a scan is a surprise.
+
+        From the thresholds on one scan for each half of them is compared with the map where odometry says that the
+        robot is: wheels may slip.
+        """
+        if not self._moved_by(1.0 + self._glances / 2, delta):
+            return False
+        if self._calm < SURE_AFTER or self._moved_by(self._spec.sure_update_factor, delta):
+            return True
+        self._glances += 1
+        return self._filter.surprised(scan, self._correction.map_from_odom.compose(odometry))
+
+    def _moved_by(self, times: float, delta: Pose2) -> bool:
         far, turned = times * self._spec.update_min_d, times * self._spec.update_min_a
         return math.hypot(delta.x, delta.y) > far or abs(delta.yaw) > turned

@@ -98,6 +98,19 @@ def test_a_robot_whose_scan_does_not_show_the_map_looks_at_the_next_one_as_soon_
     assert updated[later:] == list(range(later, len(updated)))
 
 
+def test_who_is_sure_looks_again_at_once_when_the_wheels_slip() -> None:
+    """A scan is compared with the map where odometry says that the robot is, which takes a tenth of a correction."""
+    subject = localizer(Amcl(settling_distance=0.0), Estimate(START, (0.05, 0.05, 0.02)), 1)
+    for k in range(SURE_AFTER + 1):
+        moved(subject, 24 * k, Pose2(0.0, 0.0, 0.26 * k))
+    tick, said = 24 * (SURE_AFTER + 1), Pose2(0.0, 0.0, 0.26 * (SURE_AFTER + 1))
+    slipped = said.compose(Pose2(0.3, 0.0, 0.0))
+    subject.on_odometry(odometry(tick, said))
+    subject.on_scan(seen(START.compose(slipped), tick))
+    assert subject.belief.updated == tick
+    assert np.hypot(*(np.array(START.compose(slipped)) - subject.belief.pose)[:2]) < 0.1
+
+
 def test_between_corrections_odometry_carries_the_pose_and_uncertainty_grows() -> None:
     subject = started()
     before = subject.belief
