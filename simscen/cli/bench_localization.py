@@ -10,8 +10,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from simscen.cli.bench_columns import aligned, broken, fits, named
+from simscen.cli.bench_told import tell
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import NothingSelected
+from simscen.loading.messages import quoted
+from simscen.report.look import look_of
 
 if TYPE_CHECKING:
     from simscen.study.indoor.campaign import Interval, Row, Share
@@ -45,21 +49,20 @@ def command(
 
     names = [name for name in PARAMETERS if not only or any(part.casefold() in name.casefold() for part in only)]
     if not names:
-        raise NothingSelected("no parameters are called so; there are: " + ", ".join(PARAMETERS))
+        raise NothingSelected("no parameters are called so; there are: " + ", ".join(map(quoted, PARAMETERS)))
     trials: dict[str, list[Trial]] = {name: [] for name in names}
     numbers = range(first, first + buildings)
     for done, of_one in enumerate(drive(numbers, names, min(buildings, workers or len(os.sched_getaffinity(0)))), 1):
         for name, some in of_one.items():
             trials[name] += some
             _tell(name, some)
-        if sys.stderr.isatty():
-            print(f"{done} of {buildings} buildings", end="\r", file=sys.stderr, flush=True)
+        tell(f"{done} of {buildings} buildings" if done < buildings else "")
     rows = [summed_up(name, some) for name, some in trials.items()]
     if format_ is Format.JSON:
         logs = {name: [asdict(trial) for trial in some] for name, some in trials.items()}
         print(json.dumps({"rows": [asdict(row) for row in rows], "logs": logs}, indent=2))
     else:
-        print_text(as_text(rows))
+        print_text(as_text(rows, look_of(sys.stdout, os.environ).columns))
 
 
 def _tell(name: str, trials: "Sequence[Trial]") -> None:
@@ -68,6 +71,7 @@ def _tell(name: str, trials: "Sequence[Trial]") -> None:
     for one in trials:
         if not well(one):
             place = f"building {one.building}, log {one.number}, {one.circumstance}"
+            tell("")
             found = "not found" if one.found is None else f"found after {one.found:.1f} s"
             print_text(f"{name}: {place}: up to {one.largest:.1f} m off, {found}", sys.stderr)
 
@@ -79,23 +83,24 @@ SHARES = {
 """What circumstances are called in the table."""
 
 
-def as_text(rows: "Sequence[Row]") -> str:
-    """A line for each set of parameters, then how sure each was."""
+def as_text(rows: "Sequence[Row]", columns: int | None = None) -> str:
+    """A line for each set of parameters, then how sure each was; in at most so many `columns`."""
     head = ("parameters", *SHARES.values(), "median error", "ms a scan", "slowest")
-    table: list[tuple[str, ...]] = [head]
-    table += [
-        (
-            row.parameters,
-            *(_share(row.shares[name]) for name in SHARES),
-            f"{row.median:.3f} m{_between(row.median_interval)}",
-            f"{row.ms:.1f}",
-            f"{row.slowest_ms:.0f}",
-        )
-        for row in rows
-    ]
-    widths = [max(len(line[column]) for line in table) for column in range(len(head))]
-    lines = ["  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in table]
-    return "\n".join([*lines, "", *(line for row in rows for line in _belief(row))])
+    table = [_cells(row) for row in rows]
+    lines = aligned([head, *table], str.ljust)
+    if columns is not None and not fits(lines, columns):
+        lines = [line for row in table for line in named(head, row, columns)]
+    return "\n".join(broken([*lines, "", *(line for row in rows for line in _belief(row))], columns))
+
+
+def _cells(row: "Row") -> tuple[str, ...]:
+    return (
+        row.parameters,
+        *(_share(row.shares[name]) for name in SHARES),
+        f"{row.median:.3f} m{_between(row.median_interval)}",
+        f"{row.ms:.1f}",
+        f"{row.slowest_ms:.0f}",
+    )
 
 
 def _share(share: "Share") -> str:

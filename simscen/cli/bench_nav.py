@@ -8,7 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from simscen.cli.diagnostics import as_text as problems_as_text
+from simscen.cli.diagnostics import from_here, harmless, print_text
 from simscen.core.errors import Exit, NothingSelected
+from simscen.report.look import look_of
 
 if TYPE_CHECKING:
     from simscen.study.experiment import Experiment
@@ -48,10 +51,16 @@ def command(
     lost: Annotated[int, typer.Option(min=0, max=10_000, help="How often the robot does not know where it is.")] = 50,
     stack: Annotated[
         Path | None,
-        typer.Option(help="A *.stack.yaml: every drive once more with its parameters on top, and what that changes."),
+        typer.Option(
+            help="A *.stack.yaml, or a parameter file of Nav2: every drive once more with its parameters on top, and "
+            "what that changes."
+        ),
     ] = None,
     workers: Annotated[int | None, typer.Option("--workers", "-j", min=1, max=256, help="Default: all cores.")] = None,
     out: Annotated[Path | None, typer.Option(help="Output folder, new or empty.")] = None,
+    resume: Annotated[
+        Path | None, typer.Option(help="Go on in this output folder: only runs that have no verdict yet.")
+    ] = None,
     format_: Annotated[Format, typer.Option("--format", help="What to print.")] = Format.TEXT,
 ) -> None:
     """Measure how well the reference stack drives, and print one line for each experiment.
@@ -60,17 +69,18 @@ def command(
     buildings, sensors that fail, ramps, two robots in a corridor, Nav2's own system test, corner cases and
     localisation. Intervals are by bootstrap over worlds. Worlds of BARN and Nav2 are no part of simscen: say where you
     have them. What is not there is skipped, which is said on standard error, as is every run that did not come out
-    well, with the command that repeats it. Exit code 0, or 3 when a run could not be completed.
+    well, with the command that repeats it. Interrupted, it prints what there is by then; with the same options and
+    --resume it goes on. Exit code 0, or 3 when a run could not be completed.
     """
     from simscen.cli.bench_offers import Sizes, offers
-    from simscen.cli.bench_run import drive, measured
+    from simscen.cli.bench_run import drive, driven, measured
     from simscen.cli.bench_table import as_json, as_text
-    from simscen.run.outfolder import make_folder
+    from simscen.cli.runsession import output_folder
     from simscen.study.versus import versus
 
-    folder = make_folder(out)
+    folder, journal = output_folder(out, resume)
     made = folder / "generated"
-    made.mkdir()
+    made.mkdir(exist_ok=True)
     experiments: list[Experiment] = []
     for offer in offers(barn, nav2, project, made, Sizes(first, seeds, fields, dynamic, goals, lost)):
         whole = _named(offer.name, only)
@@ -83,13 +93,20 @@ def command(
     if not experiments:
         raise NothingSelected("no experiment is called so, or its data is not here")
     others = [] if stack is None else with_stack(stack, experiments, made, project)
-    trials = drive([*experiments, *others], folder, workers or len(os.sched_getaffinity(0)))
-    rows = [measured(one, runs) for one, runs in zip([*experiments, *others], trials, strict=True)]
+    all_of_them = [*experiments, *others]
+    trials, stopped = drive(all_of_them, journal, workers or len(os.sched_getaffinity(0)))
+    rows = [measured(one, done) for one, runs in zip(all_of_them, trials, strict=True) if (done := driven(runs))]
     pairs = [
         versus(one.name, before, after)
         for one, before, after in zip(experiments if others else [], trials, trials[len(experiments) :], strict=False)
+        if driven(before) and driven(after)
     ]
-    print(as_json(rows, pairs) if format_ is Format.JSON else as_text(rows, pairs))
+    columns = look_of(sys.stdout, os.environ).columns
+    print_text(as_json(rows, pairs) if format_ is Format.JSON else as_text(rows, pairs, columns))
+    if stopped:
+        count = f"{sum(len(driven(runs)) for runs in trials)} of {sum(map(len, trials))} runs"
+        print_text(f"simscen: interrupted: {count}; go on with --resume {harmless(str(folder))}", sys.stderr)
+        sys.exit(stopped)
     if any(row.tally.errors for row in rows):
         sys.exit(Exit.INCOMPLETE)
 
@@ -100,8 +117,8 @@ def with_stack(file: Path, experiments: list["Experiment"], made: Path, project:
     from simscen.study.variants import varied
 
     choice = load_stack_file(file.name.split(".")[0], str(file), file, project)
-    for note in choice.notes:
-        print(note, file=sys.stderr)
+    if choice.notes:
+        print_text(problems_as_text(from_here(choice.notes, project)), sys.stderr)
     said = choice.section.plain if choice.section else {}
     return [
         varied(one, f"{one.name}, {choice.name}", said, made / "with_stack" / str(number))

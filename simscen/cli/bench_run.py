@@ -6,17 +6,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from simscen.cli.bench_told import tell
+from simscen.cli.diagnostics import print_text
+from simscen.cli.interrupts import signals_interrupt
 from simscen.cli.runsession import WARM_PROCESS
 from simscen.cli.select import checked
-from simscen.core.errors import InvalidInput
+from simscen.cli.work import begin
+from simscen.core.errors import Exit, InvalidInput
 from simscen.core.result import Outcome, RunKey
 from simscen.core.sessionevents import RunFinished, SessionEvent
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import load_scenario
 from simscen.loading.sense.neverhappens import top_speed
 from simscen.record.replay import read_log
+from simscen.report.journal import Journal
 from simscen.report.line import text_of
 from simscen.report.lines import Naming, finished
+from simscen.report.sessions import UNDECIDED
 from simscen.run.outfolder import run_folder
 from simscen.run.process.jobs import Job
 from simscen.run.session import Options, run_session
@@ -51,18 +57,39 @@ class Measured:
     localized: Localized | None = None
 
 
-def drive(experiments: Sequence[Experiment], out: Path, workers: int) -> list[list[Trial]]:
-    """Do all runs of each experiment, and tell of progress and of what went wrong on stderr. Raises InvalidInput."""
-    jobs, owners = _planned(experiments, out)
-    options = Options(workers=workers, wall_limit=PATIENCE)
-    answers, _ = run_session(jobs, options, WARM_PROCESS, _Progress(len(jobs), {job.key: job for job in jobs}))
-    of = {answer.key: answer for answer in answers}
+def drive(experiments: Sequence[Experiment], journal: Journal, workers: int) -> tuple[list[list[Trial]], Exit | None]:
+    """Do all runs of each experiment that the journal has no verdict on, and tell of progress and of what went wrong on
+    stderr.
+
+    Returns all runs of each, and the exit code of an interrupt where there was one. Raises InvalidInput.
+    """
+    jobs, owners = _planned(experiments, journal.folder)
+    work = begin(journal, jobs, workers)
+    progress = _Progress(len(jobs), len(work.kept), {job.key: job for job in jobs})
+
+    def listen(event: SessionEvent) -> None:
+        journal(event)
+        progress(event)
+
+    with signals_interrupt():
+        answers, stopped = run_session(work.jobs, Options(workers=workers, wall_limit=PATIENCE), WARM_PROCESS, listen)
+    tell("")
+    of = {answer.key: answer for answer in (*work.kept, *answers)}
     trials: list[list[Trial]] = [[] for _ in experiments]
     for job in jobs:
         number, drive = owners[job.key]
         world, speed = drive.world or str(drive.file), _top_speed(job.scenario)
         trials[number].append(Trial(of[job.key], drive.reference_length, world, speed))
-    return trials
+    return trials, stopped
+
+
+def driven(trials: Sequence[Trial]) -> list[Trial]:
+    """Those that no interrupt has kept from being driven to their end."""
+    return [trial for trial in trials if not _undecided(trial.run)]
+
+
+def _undecided(run: RunFinished) -> bool:
+    return run.result.error is not None and run.result.error.kind in UNDECIDED
 
 
 Owner = tuple[int, Drive]
@@ -108,19 +135,19 @@ def repeat_command(job: Job) -> str:
 class _Progress:
     """A counter on a terminal; each run that was not passed in full."""
 
-    def __init__(self, total: int, jobs: dict[RunKey, Job]) -> None:
-        self._total, self._jobs, self._done = total, jobs, 0
+    def __init__(self, total: int, done: int, jobs: dict[RunKey, Job]) -> None:
+        self._total, self._jobs, self._done = total, jobs, done
 
     def __call__(self, event: SessionEvent) -> None:
         """Take one event of the session."""
-        if not isinstance(event, RunFinished):
+        if not isinstance(event, RunFinished) or _undecided(event):
             return
         self._done += 1
         if event.outcome is not Outcome.PASSED:
+            tell("")
             told = replace(event, again=repeat_command(self._jobs[event.key]))
-            print(*(text_of(line) for line in finished(told, Naming(every_seed=True))), sep="\n", file=sys.stderr)
-        if sys.stderr.isatty():
-            print(f"{self._done} of {self._total} runs", end="\r", file=sys.stderr, flush=True)
+            print_text("\n".join(text_of(line) for line in finished(told, Naming(every_seed=True))), sys.stderr)
+        tell(f"{self._done} of {self._total} runs" if self._done < self._total else "")
 
 
 def measured(experiment: Experiment, trials: list[Trial]) -> Measured:

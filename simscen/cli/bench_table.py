@@ -4,6 +4,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import asdict
 
+from simscen.cli.bench_columns import aligned, broken, fits, named, stacked
 from simscen.cli.bench_run import Localized, Measured
 from simscen.study.barn import DWA
 from simscen.study.tally import Row
@@ -28,21 +29,23 @@ HEAD = (
 )
 
 
-def as_text(rows: Sequence[Measured], pairs: Sequence[Versus] = ()) -> str:
-    """Aligned columns; what another stack changes; published figures of another simulator as a footnote."""
-    table: list[tuple[str, ...]] = [HEAD]
-    for measured in rows:
-        table.append(_cells(measured.tally))
-    widths = [max(len(row[column]) for row in table) for column in range(len(HEAD))]
-    lines = [_aligned(row, widths) for row in table]
+def as_text(rows: Sequence[Measured], pairs: Sequence[Versus] = (), columns: int | None = None) -> str:
+    """Aligned columns; what another stack changes; published figures of another simulator as a footnote.
+
+    Where a line would be longer than so many `columns`, an experiment has one for its name and one for its numbers.
+    """
+    table = [HEAD, *(_cells(measured.tally) for measured in rows)]
+    lines = aligned(table)
+    if columns is not None and not fits(lines, columns):
+        lines = stacked(table, columns)
     for measured in rows:
         if measured.localized is not None:
             lines += ["", *_belief(measured.tally.case, measured.localized)]
     if pairs:
-        lines += ["", *_versus(pairs)]
+        lines += ["", *_versus(pairs, columns)]
     if any(measured.tally.case.startswith("BARN") for measured in rows):
         lines += ["", PUBLISHED]
-    return "\n".join(lines)
+    return "\n".join(broken(lines, columns))
 
 
 def as_json(rows: Sequence[Measured], pairs: Sequence[Versus] = ()) -> str:
@@ -51,15 +54,20 @@ def as_json(rows: Sequence[Measured], pairs: Sequence[Versus] = ()) -> str:
     return json.dumps({**told, "versus": [asdict(pair) for pair in pairs]} if pairs else told, indent=2)
 
 
-def _versus(pairs: Sequence[Versus]) -> list[str]:
+def _versus(pairs: Sequence[Versus], columns: int | None) -> list[str]:
+    """A line for each pair of experiments, or where that is too long each number with what it is."""
+    changes = [_changes(pair) for pair in pairs]
+    lines = aligned([VERSUS, *changes])
+    if columns is None or fits(lines, columns):
+        return lines
+    return [VERSUS[0], *(line for row in changes for line in named(VERSUS, row, columns))]
+
+
+def _changes(pair: Versus) -> tuple[str, ...]:
     """What the other stack changes in the same drives, pair by pair."""
-    table: list[tuple[str, ...]] = [VERSUS]
-    for pair in pairs:
-        forms = ((pair.success, ".3f"), (pair.seconds, ".1f"), (pair.sct, ".3f"), (pair.score, ".3f"))
-        changes = (_change(difference, form) for difference, form in forms)
-        table.append((pair.case, f"{pair.pairs}", f"{pair.better}", f"{pair.worse}", *changes))
-    widths = [max(len(row[column]) for row in table) for column in range(len(VERSUS))]
-    return [_aligned(row, widths) for row in table]
+    forms = ((pair.success, ".3f"), (pair.seconds, ".1f"), (pair.sct, ".3f"), (pair.score, ".3f"))
+    changes = (_change(difference, form) for difference, form in forms)
+    return (pair.case, f"{pair.pairs}", f"{pair.better}", f"{pair.worse}", *changes)
 
 
 def _change(difference: Difference | None, form: str) -> str:
@@ -89,11 +97,6 @@ def _cells(row: Row) -> tuple[str, ...]:
 
 def _or_none(value: float | None, form: str, unit: str = "") -> str:
     return "-" if value is None else f"{value:{form}}{unit}"
-
-
-def _aligned(row: tuple[str, ...], widths: list[int]) -> str:
-    first, *rest = zip(row, widths, strict=True)
-    return "  ".join((first[0].ljust(first[1]), *(cell.rjust(width) for cell, width in rest))).rstrip()
 
 
 def _belief(case: str, localized: Localized) -> list[str]:

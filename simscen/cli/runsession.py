@@ -81,7 +81,7 @@ def session(asked: Asked, observer: Observer | None = None) -> Exit:
         options = replace(options, only=_last_failed(scenarios, asked))
     inputs = {file for each in scenarios for file in (*each.files.values(), *each.read)}
     require_writable(asked.junit, asked.out or asked.resume, inputs)
-    folder, journal = _output_folder(asked.out, asked.resume)
+    folder, journal = output_folder(asked.out, asked.resume)
     used = {"plugins": packages_of(plugins_of_all(scenarios)), "stacks": commands_of(scenarios)}
     reports = Reports(folder, asked.junit, asked.junit_family.value, used=used)
     reports.begin()
@@ -139,7 +139,7 @@ def _kept(journal: Journal) -> bool:
     return journal.error is None
 
 
-def _output_folder(out: Path | None, resume: Path | None) -> tuple[Path, Journal]:
+def output_folder(out: Path | None, resume: Path | None) -> tuple[Path, Journal]:
     """The folder and its journal, locked. Raises UsageError before anything in it is touched."""
     if resume is not None and out is not None:
         raise UsageError("--out and --resume exclude each other")

@@ -27,10 +27,12 @@ from simscen.loading.stackchoice import REFERENCE, StackChoice
 from simscen.model.anystack import ExternalStackSpec
 from simscen.spec.registry import entries, find
 
+YAML = (".yaml", ".yml")
 STACK_HELP = (
     "Run every scenario with this stack instead of its own: a command that speaks the stack protocol, a *.stack.yaml "
-    "file, `reference`, another type of stack, or a name in the user's configuration. Of several robots, it drives "
-    "each; NAME='COMMAND' where a robot's stack is `external: NAME` only says what that runs. "
+    "file, a parameter file of Nav2, `reference`, another type of stack, or a name in the user's configuration. Of "
+    "several robots, it drives each; NAME='COMMAND' where a robot's stack is `external: NAME` only says what that "
+    "runs. "
 )
 if TYPE_CHECKING:
     from simscen.loading.userconfig import UserConfig
@@ -135,7 +137,7 @@ def _choice(text: str, root: Path, world_path: Sequence[Path], stacks: Stacks) -
     value = value if equals else name
     if value == REFERENCE or (_NAME.fullmatch(value) and find("stack", value)):
         return StackChoice(name, value, type=value)
-    if value.endswith(STACK):
+    if value.endswith(STACK) or (value.endswith(YAML) and Path(value).is_file()):
         from simscen.loading.stackfile import load_stack_file
 
         try:

@@ -69,6 +69,14 @@ def read_nav2_parameters(path: Path, shown: str = "") -> Nav2Parameters | list[P
     return Nav2Parameters(shown, nodes, places, text, notes)
 
 
+def tells_nodes(text: str, shown: str) -> bool:
+    """Whether it is a parameter file of Nav2, rather than one of ours."""
+    if PARAMETERS not in text:
+        return False
+    tree, _ = compose(text, shown, last_wins=True)
+    return isinstance(tree, Fields) and "simscen" not in tree.entries and any(_nodes(tree, ""))
+
+
 def _nodes(node: Node, name: str) -> Iterator[tuple[str, Fields]]:
     """Every node of the file and its parameters; namespaces around it do not count."""
     for key, entry in node.entries.items() if isinstance(node, Fields) else ():

@@ -5,10 +5,12 @@ cylinders that it has no map of; any contact ends the run.
 """
 
 import csv
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from simscen.core.errors import UsageError
 from simscen.core.geometry import Pose2
 
 TIME_LIMIT = 100.0
@@ -73,17 +75,29 @@ class BarnWorld:
 
 
 def barn_worlds(folder: Path) -> list[BarnWorld]:
-    """The worlds that are in a folder, as its scenarios.csv lists them. Raises OSError or ValueError."""
-    with (folder / "scenarios.csv").open(newline="", encoding="utf-8") as file:
-        return list(_listed(folder, csv.DictReader(file)))
+    """The worlds that are in a folder, as its scenarios.csv lists them. Raises UsageError where that is not usable."""
+    file = folder / "scenarios.csv"
+    try:
+        with file.open(newline="", encoding="utf-8") as lines:
+            worlds = list(_listed(file, csv.DictReader(lines)))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise UsageError(f"cannot read the list of BARN's worlds: {error}") from error
+    if not worlds:
+        raise UsageError(f"{file}: lists no worlds")
+    return worlds
 
 
-def _listed(folder: Path, rows: Iterable[dict[str, str]]) -> Iterable[BarnWorld]:
-    for row in rows:
+def _listed(file: Path, rows: Iterable[dict[str, str]]) -> Iterable[BarnWorld]:
+    for number, row in enumerate(rows, start=2):
         try:
-            yield BarnWorld(folder / f"world_{int(row['world'])}.world", float(row["ref_path_len"]))
-        except (KeyError, TypeError) as error:
-            raise ValueError(f"{folder / 'scenarios.csv'}: no column {error}") from error
+            world, length = int(row["world"]), float(row["ref_path_len"])
+        except KeyError as error:
+            raise UsageError(f"{file}: no column {error}") from error
+        except (TypeError, ValueError) as error:
+            raise UsageError(f"{file}, line {number}: {error}") from error
+        if not 0.0 < length < math.inf:
+            raise UsageError(f"{file}, line {number}: a path is longer than 0 m, not {length:g}")
+        yield BarnWorld(file.parent / f"world_{world}.world", length)
 
 
 def scenario(name: str, world: str, start: Pose2 = START, goal: Pose2 = GOAL, stack: str = TUNED) -> str:

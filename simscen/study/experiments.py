@@ -26,7 +26,7 @@ LOCALIZATIONS = ("tour", "told 0.5 m and 20° off", "start unknown", "kidnapped"
 def barn_challenge(
     folder: Path, dataset: Path, seeds: Sequence[int], variant: str = "", stack: str = barn.TUNED
 ) -> Experiment:
-    """The worlds of the dataset with these lines below `stack:`. Raises OSError or ValueError when it is unusable."""
+    """The worlds of the dataset with these lines below `stack:`. Raises UsageError when it is unusable."""
     name = f"BARN, {variant}" if variant else "BARN"
     drives = []
     for world in barn.barn_worlds(dataset):

@@ -13,12 +13,16 @@ def bench(*options: str) -> "subprocess.CompletedProcess[str]":
     return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
 
 
-def test_it_drives_an_experiment_and_prints_its_numbers(tmp_path: Path) -> None:
+def test_it_drives_an_experiment_and_prints_its_numbers_and_resumed_it_drives_no_run_again(tmp_path: Path) -> None:
     done = bench("--only", "narrow doorway", "--seeds", "1", "--out", str(tmp_path / "out"), "--format", "json")
     assert done.returncode == 0, done.stderr
     (row,) = json.loads(done.stdout)["experiments"]
     assert (row["tally"]["case"], row["tally"]["runs"]) == ("narrow doorway", 1)
-    assert (tmp_path / "out/runs/scenarios/corner_cases/narrow_doorway/seed-1/run.mcap").is_file()
+    log = tmp_path / "out/runs/scenarios/corner_cases/narrow_doorway/seed-1/run.mcap"
+    written = log.stat().st_mtime_ns
+    again = bench("--only", "narrow doorway", "--seeds", "1", "--resume", str(tmp_path / "out"), "--format", "json")
+    assert (again.returncode, again.stdout) == (0, done.stdout)
+    assert log.stat().st_mtime_ns == written
 
 
 def test_data_that_is_not_here_is_skipped_aloud_and_an_unknown_experiment_is_an_error(tmp_path: Path) -> None:

@@ -24,6 +24,29 @@ def test_with_another_stack_no_run_of_an_experiment_is_taken_for_one_of_another(
     assert len({job.folder for job in jobs}) == 4
 
 
+NAV2 = """\
+controller_server:
+  ros__parameters:
+    controller_plugins: [FollowPath]
+    FollowPath: {plugin: "nav2_regulated_pure_pursuit_controller::RegulatedPurePursuitController", lookahead_dist: 0.77}
+    unheard_of: 3
+"""
+
+
+def test_a_parameter_file_of_nav2_is_a_stack_file_and_what_means_nothing_of_it_is_told_as_in_validate(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text(NAV2, encoding="utf-8")
+    (other,) = with_stack(file, [hall(tmp_path / "made")], tmp_path / "made", tmp_path)
+    jobs, _ = _planned([other], tmp_path / "out")
+    stack = jobs[0].scenario.spec.stack
+    assert stack.controller.type == "regulated_pure_pursuit"
+    assert stack.controller.lookahead_dist == 0.77
+    assert "mine.yaml:5:" in (told := capsys.readouterr().err)
+    assert "warning[SC341] controller_server: nothing here is like unheard_of (5)" in told
+
+
 def test_experiments_whose_runs_have_one_name_are_not_driven(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="ramp_1"):
         _planned([hall(tmp_path / "wide"), hall(tmp_path / "narrow")], tmp_path / "out")

@@ -1,7 +1,12 @@
 import json
+from dataclasses import replace
 
+from simscen.cli.bench_localization import SHARES
+from simscen.cli.bench_localization import as_text as localization
 from simscen.cli.bench_run import Localized, Measured
 from simscen.cli.bench_table import as_json, as_text
+from simscen.study.indoor.campaign import SURE, Share
+from simscen.study.indoor.campaign import Row as Numbers
 from simscen.study.tally import Row
 from simscen.study.versus import Difference, Versus
 
@@ -38,8 +43,41 @@ def test_below_the_table_stand_beliefs_then_what_a_stack_changes_then_what_other
     assert as_text([Measured(BARN), Measured(TOUR, KNOWN)], [SLOWER]) == TABLE
 
 
+NARROW = """\
+experiment
+  runs  success  95 % interval  collision  timeout  failed   time  path    SCT  score
+BARN
+    30    0.967  0.833 … 0.994      0.033    0.000   0.000  7.2 s  1.03  0.710  0.476
+
+same drives, with and without
+BARN
+  pairs 30  better 0  worse 3  success -0.100 (-0.200 … +0.000)  seconds +1.5
+    SCT -0.050  score -0.020 (-0.030 … -0.010)
+
+BARN's own figures for DWA at 0.5 m/s, in another simulator and all 50 worlds: success
+  0.850, collisions 0.056, timeouts 0.094, score 0.159"""
+LONG = "BARN, regulated pure pursuit at 0.5 m/s, with nav2_params"
+
+
+def test_on_a_narrow_terminal_no_line_is_longer_than_it_and_no_number_is_torn_off() -> None:
+    assert as_text([Measured(BARN)], [SLOWER], columns=86) == NARROW
+    shown = as_text([Measured(replace(BARN, case=LONG)), Measured(TOUR, KNOWN)], [SLOWER], columns=80)
+    assert max(map(len, shown.splitlines())) <= 80
+    assert as_text([Measured(BARN)], [SLOWER], columns=200) == as_text([Measured(BARN)], [SLOWER])
+
+
 def test_the_json_holds_every_number() -> None:
     told = json.loads(as_json([Measured(BARN), Measured(TOUR, KNOWN)]))
     assert told["experiments"][0]["tally"]["score"] == 0.476
     assert told["experiments"][1]["localized"]["anees"] == {"5.0": 0.02, "10.0": 2.5}
     assert told["dwa_published"]["success"] == 0.85
+
+
+def test_the_table_of_localization_fits_a_narrow_terminal() -> None:
+    shares = {name: Share(9, 10, (0.7, 1.0)) for name in SHARES}
+    nees, limits = dict.fromkeys(SURE, (1.0,) * 5), dict.fromkeys(SURE, (0.9, 6.34))
+    row = Numbers("Nav2's, likelihood_field_prob", shares, 0.029, (0.021, 0.042), nees, limits, 1.5, 189.0)
+    lines = localization([row], columns=80).splitlines()
+    assert max(map(len, lines)) <= 80
+    assert lines[:2] == [row.parameters, "  tracked 9 of 10 (0.70 … 1.00)  start unknown 9 of 10 (0.70 … 1.00)"]
+    assert localization([row]).splitlines()[1].startswith("Nav2's, likelihood_field_prob  9 of 10 (0.70 … 1.00)  ")

@@ -2,6 +2,7 @@ from pathlib import Path
 
 import pytest
 
+from simscen.core.errors import UsageError
 from simscen.loading.scenario import load_scenario
 from simscen.study.barn import barn_worlds, scenario
 
@@ -17,9 +18,26 @@ def test_a_scenario_of_the_challenge_is_valid(tmp_path: Path) -> None:
     assert loaded.spec.time_limit == 100.0
 
 
-def test_an_unusable_list_of_worlds_is_named(tmp_path: Path) -> None:
-    (tmp_path / "scenarios.csv").write_text("world,length\n1,12\n")
-    with pytest.raises(ValueError, match=r"scenarios\.csv: no column 'ref_path_len'"):
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("world,length\n1,12\n", "no column 'ref_path_len'"),
+        ("world,ref_path_len\n1,12\n2,far\n", "line 3: could not convert string to float: 'far'"),
+        ("world,ref_path_len\n1\n", "line 2: "),
+        ("world,ref_path_len\n1,-3\n", "line 2: a path is longer than 0 m, not -3"),
+        ("world,ref_path_len\n", "lists no worlds"),
+    ],
+)
+def test_an_unusable_list_of_worlds_is_named(tmp_path: Path, text: str, said: str) -> None:
+    (tmp_path / "scenarios.csv").write_text(text)
+    with pytest.raises(UsageError) as raised:
+        barn_worlds(tmp_path)
+    assert f"{tmp_path / 'scenarios.csv'}" in str(raised.value)
+    assert said in str(raised.value)
+
+
+def test_a_folder_without_a_list_of_worlds_is_named(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"cannot read the list of BARN's worlds: .*scenarios\.csv"):
         barn_worlds(tmp_path)
 
 
