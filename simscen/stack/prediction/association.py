@@ -81,7 +81,7 @@ def _update(given: list[tuple[Track, int]], seen: Seen) -> None:
     for (track, piece), centre in zip(given, found, strict=True):
         hidden = 0.0 if edges[piece] == BOTH else HALF_SEEN
         track.correct(lidar.out(centre), NOISE + RELATIVE * abs(centre) + hidden)
-        track.note(seen.tick, seen.came[piece], seen.stood[piece], edges[piece])
+        track.note(seen.tick, seen.came[piece], seen.stood[piece], edges[piece], track.place_deviation)
 
 
 def begin(tracks: list[Track], seen: Seen, taken: set[int]) -> None:
@@ -94,8 +94,8 @@ def begin(tracks: list[Track], seen: Seen, taken: set[int]) -> None:
             continue
         centre = complex(pieces.centres[piece])
         # Of what is half hidden more may be there than is seen.
-        size = radius if pieces.edges[piece] == BOTH else max(radius, HALF_RADIUS)
-        deviation = NOISE + RELATIVE * abs(centre) + FIRST_SEEN
-        track = Track.begun(seen.tick, seen.lidar.out(centre), deviation, size)
-        track.note(seen.tick, came, seen.stood[piece], 0)
+        whole, noise = pieces.edges[piece] == BOTH, NOISE + RELATIVE * abs(centre)
+        size = radius if whole else max(radius, HALF_RADIUS)
+        track = Track.begun(seen.tick, seen.lidar.out(centre), noise + FIRST_SEEN, size)
+        track.note(seen.tick, came, seen.stood[piece], 0, noise if whole else noise + HALF_SEEN)
         tracks.append(track)

@@ -33,6 +33,24 @@ Places = npt.NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)
+class Runs:
+    """Hits of a scan, of which neighbours that are not far apart make a run: things that stand apart.
+
+    `ranges` and `places` (m,) are of the hits, which `beams` made; a run is the hits `first[k]` … `last[k]`.
+    """
+
+    beams: Indices
+    ranges: Array
+    places: Places
+    first: Indices
+    last: Indices
+
+    def most(self, which: Mask) -> int:
+        """How many of a run's hits these (m,) are at most."""
+        return int(np.add.reduceat(which, self.first, dtype=np.int64).max()) if len(which) else 0
+
+
+@dataclass(frozen=True, eq=False)
 class Clusters:
     """Pieces of a scan, in the lidar's frame.
 
@@ -56,43 +74,48 @@ class Clusters:
         return count, count / (self.last - self.first + 1)
 
 
-def clusters(
-    ranges: Array, places: Places, start: float, step: float, least: float, most: float, largest: float
-) -> Clusters:
-    """The pieces of a scan of beams that answer between `least` and `most` metres, none with a radius over `largest`.
+def runs(ranges: Array, places: Places, step: float, least: float, most: float) -> Runs:
+    """The runs of a scan of beams that answer between `least` and `most` metres, each `step` rad further.
 
-    The first beam goes along `start`, the next `step` rad further; `places` (n,) are what they hit. A circle's first
-    and last piece are not joined: what lies behind the robot across the seam is two.
+    `places` (n,) are what they hit. A circle's first and last run are not joined: what lies behind the robot across the
+    seam is two.
     """
     beams = ((ranges >= least) & (ranges <= most)).nonzero()[0]
+    r, hits = ranges[beams], places[beams]
+    gap = np.minimum(r[1:], r[:-1])
+    gap *= SPARSE * abs(step)
+    apart = np.abs(hits[1:] - hits[:-1]) > np.maximum(gap, GAP, out=gap)
+    if len(beams) and beams[-1] - beams[0] >= len(beams):
+        apart |= beams[1:] - beams[:-1] > MISSED + 1
+    return Runs(beams, r, hits, *_between(apart.nonzero()[0], len(r)))
+
+
+def clusters(found: Runs, scanned: Array, start: float, step: float, largest: float) -> Clusters:
+    """The pieces of a scan of ranges `scanned` in which these runs were found, none with a radius over `largest`.
+
+    The first beam goes along `start`, the next `step` rad further.
+    """
+    beams, r, wide = found.beams, found.ranges, abs(step)
     if len(beams) < FEWEST:
         none = np.zeros(0, dtype=np.int64)
-        return Clusters(np.zeros(0, np.complex128), none, none, np.zeros(0, np.complex128), np.zeros(0), none)
-    r, hits, wide = ranges[beams], places[beams], abs(step)
-    gap = np.minimum(r[1:], r[:-1])
-    gap *= SPARSE * wide
-    apart = np.abs(hits[1:] - hits[:-1]) > np.maximum(gap, GAP, out=gap)
-    if beams[-1] - beams[0] >= len(beams):
-        apart |= beams[1:] - beams[:-1] > MISSED + 1
-    first, last = _parted(r, *_between(apart.nonzero()[0], len(r)))
+        return Clusters(found.places[:0], none, none, found.places[:0], np.zeros(0), none)
+    first, last = _parted(r, found.first, found.last)
     ends = beams[np.array((first, last))]
-    count = last - first + 1
     sine = np.sin(np.minimum((ends[1] - ends[0] + 1) * (0.5 * wide), STEEPEST))
-    bounds = np.empty(2 * len(first), np.int64)
-    bounds[::2], bounds[1::2] = first, last + 1
-    nearest = np.minimum.reduceat(np.concatenate((r, r[-1:])), bounds)[::2]
+    nearest = np.minimum.reduceat(r, first)
     radii = nearest * sine / (1.0 - sine)
-    few = ((radii <= largest) & (count >= FEWEST)).nonzero()[0]
+    few = ((radii <= largest) & (last - first + 1 >= FEWEST)).nonzero()[0]
     first, last, radii, ends = first[few], last[few], radii[few], ends[:, few]
     middle = start + (0.5 * step) * (ends[0] + ends[1])
     centres = (nearest[few] + radii) * np.exp(1j * middle)
-    full = abs(len(ranges) * wide - 2 * math.pi) < wide
-    edges = _clear(ranges, ends, full)
-    return Clusters(hits, first, last, centres, radii, edges)
+    full = abs(len(scanned) * wide - 2 * math.pi) < wide
+    return Clusters(found.places, first, last, centres, radii, _clear(scanned, ends, full))
 
 
 def _between(breaks: Indices, count: int) -> tuple[Indices, Indices]:
     """First and last of so many hits in a row that is parted after these (k,)."""
+    if not count:
+        return breaks, breaks
     first, last = np.zeros(len(breaks) + 1, np.int64), np.empty(len(breaks) + 1, np.int64)
     np.add(breaks, 1, out=first[1:])
     last[:-1], last[-1] = breaks, count - 1

@@ -76,7 +76,7 @@ class Going:
             return False
         way, seconds, sure = abs(come), (tick - first.tick) / self._rate, speed > SURE * track.speed_deviation
         # Over the last updates, both ends may be off; and of what is half seen, more may come into view.
-        went = way > max(least * seconds, SURE * math.sqrt(2.0) * track.place_deviation)
+        went = way > max(least * seconds, SURE * math.hypot(first.deviation, track.place_deviation))
         if not (sure or went):
             return False
         whole = sum(each.edges == BOTH for each in lately)

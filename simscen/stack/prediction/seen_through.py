@@ -24,9 +24,11 @@ SLIPPED = (0.05, 0.1, 0.15)
 each of them: posts beside the way of a fast robot seem to hop from one to the next when all come along a little."""
 LEFT = 1.0 - np.array(SLIPPED)[:, None]
 """What is left of the way then."""
-AGO, AT_LEAST = 1.0, 0.2
-"""Seconds: the age of the scan that is asked, and while none is so old the least. At 0.25 m/s a thing near by comes
-as far as the margin in that time."""
+AGO, AT_LEAST = 0.9, 0.2
+"""Seconds: the least age of the scan that is asked, and while none is so old the least. At 0.25 m/s a thing near by
+comes as far as the margin in that time."""
+EVERY = 0.19
+"""Seconds at least between two that are kept."""
 FEWEST_BEAMS = 3
 """Of a scan that can tell."""
 TURNED = 0.02
@@ -59,6 +61,11 @@ class View:
         return max(1, math.ceil(TURNED / self.increment))
 
     @cached_property
+    def around(self) -> Indices:
+        """From the number of a beam in `free` to those of the one before it, of itself and of the next in `lengths`."""
+        return self.beside + np.array(((-1,), (0,), (1,)))
+
+    @cached_property
     def more(self) -> int:
         """Beams that are added at either end, so that every direction is one's."""
         behind = 0 if self.full else max(0, math.ceil(math.pi / self.increment - self.count / 2))
@@ -71,8 +78,8 @@ class View:
 
     @cached_property
     def centre(self) -> float:
-        """… and what that is in beams, those that are added included."""
-        return self.more + (self.count - 1) / 2
+        """… and what that is in beams, those that are added at one end included, but `beside` of them."""
+        return self.more - self.beside + (self.count - 1) / 2
 
     def lengths(self, scan: Scan) -> Array:
         """How far away (n,) the beams of a scan saw, and what is added at either end."""
@@ -120,7 +127,9 @@ class Earlier:
         return Looked(self, turned, way, *self.towards(turned + way))
 
     def towards(self, places: Places) -> tuple[Indices, Array]:
-        """The beams (…,) that went towards places as it sees them, turned to its middle, and how far off these are."""
+        """The beams (…,), by their numbers in `free`, that went towards places as it sees them, turned to its middle, and
+        how far off these are.
+        """
         beam = np.arctan2(places.imag, places.real)
         beam *= 1.0 / self.view.increment
         beam += self.view.centre + 0.5
@@ -128,7 +137,7 @@ class Earlier:
 
     def through(self, beam: Indices, distance: Array) -> Mask:
         """Whether beams (…,) went beyond what is so far off."""
-        return np.asarray(self.free[beam - self.view.beside] > distance)
+        return np.asarray(self.free[beam] > distance)
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,9 +164,10 @@ class Looked:
 
     def stood(self) -> Mask:
         """Which of them were hit then, too."""
-        lengths, beam, distance = self.earlier.lengths, self.beam, self.distance
-        near = np.abs(lengths[np.stack((beam - 1, beam, beam + 1))] - distance).min(axis=0)
-        return np.asarray(near < SAME + SAME_RELATIVE * distance)
+        off = self.earlier.lengths[self.beam + self.earlier.view.around]
+        off -= self.distance
+        near = np.abs(off, out=off).min(axis=0)
+        return np.asarray(near < SAME + SAME_RELATIVE * self.distance)
 
 
 class SeenThrough:
@@ -165,11 +175,14 @@ class SeenThrough:
 
     def __init__(self, tick_rate: int) -> None:
         self._ago, self._at_least = round(AGO * tick_rate), round(AT_LEAST * tick_rate)
+        self._every = round(EVERY * tick_rate)
         self._scans: deque[Earlier] = deque(maxlen=KEPT)
         self._view = View(0, 0.0, 0.0)
 
     def remember(self, scan: Scan, lidar: Pose2) -> None:
         """Keep a scan; `lidar` is where it was taken."""
+        if self._scans and 0 <= scan.tick - self._scans[-1].tick < self._every:
+            return
         view, count = self._view, len(scan.ranges)
         if count < FEWEST_BEAMS or scan.angle_increment <= 0.0:
             return

@@ -11,7 +11,7 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.sensing import Scan
 from simscen.model.guards import Prediction
 from simscen.stack.prediction.association import Seen, associate, begin
-from simscen.stack.prediction.clusters import Mask, Places, clusters
+from simscen.stack.prediction.clusters import Mask, Places, clusters, runs
 from simscen.stack.prediction.going import Going
 from simscen.stack.prediction.moving import Moving, Thing, nothing
 from simscen.stack.prediction.seen_through import FARTHEST, Earlier, SeenThrough
@@ -67,7 +67,7 @@ class Tracker:
         self.hits, self.moving = None, self._nothing
         before = self._memory.before(scan.tick)
         if self._tracks or (before is not None and self._suspicious(scan, lidar, before)):
-            self._follow(scan, lidar, before)
+            self._follow(Sight(scan, _ends(scan.ranges, self._towards), lidar, before))
         self._memory.remember(scan, lidar)
 
     def _look_along(self, scan: Scan) -> None:
@@ -77,22 +77,19 @@ class Tracker:
         self._towards_some = self._towards[:: self._every].copy()
 
     def _suspicious(self, scan: Scan, lidar: Pose2, before: Earlier) -> bool:
-        """Whether so many neighbouring beams hit what has appeared that it may be a thing."""
-        ranges, most = scan.ranges[:: self._every], self._farthest(scan)
+        """Whether one of the beams that are looked at hits what has appeared."""
+        ranges = scan.ranges[:: self._every]
         come = before.looked(_ends(ranges, self._towards_some), lidar).appeared()
-        if not come.any() or not (come & (ranges >= scan.range_min) & (ranges <= most)).any():
-            return False
-        come = before.looked(_ends(scan.ranges, self._towards), lidar).appeared()
-        beams = (come & (scan.ranges >= scan.range_min) & (scan.ranges <= most)).nonzero()[0]
-        return len(beams) >= FEW and bool((beams[FEW - 1 :] - beams[: 1 - FEW]).min() * APPEARED <= FEW)
+        return bool(come.any()) and bool((come & (ranges >= scan.range_min) & (ranges <= self._farthest(scan))).any())
 
     def _farthest(self, scan: Scan) -> float:
         return min(scan.range_max, self._spec.max_range)
 
-    def _follow(self, scan: Scan, lidar: Pose2, before: Earlier | None) -> None:
-        tracks, going, tick = self._tracks, self._going, scan.tick
-        sight = Sight(scan, _ends(scan.ranges, self._towards), lidar, before)
+    def _follow(self, sight: Sight) -> None:
         seen = self._seen(sight)
+        if seen is None:
+            return
+        tracks, going, tick = self._tracks, self._going, sight.scan.tick
         begin(tracks, seen, associate(tracks, seen))
         followed = list[Track]()
         for track in tracks:
@@ -103,22 +100,18 @@ class Tracker:
         if moving := [track for track in followed if track.moving]:
             self._tell(moving, sight)
 
-    def _seen(self, sight: Sight) -> Seen:
-        """The scan in pieces, and what an earlier one saw where they are."""
+    def _seen(self, sight: Sight) -> Seen | None:
+        """The scan in pieces, and what an earlier one saw where they are; None where no track is nor can begin."""
         scan, before = sight.scan, sight.before
-        pieces = clusters(
-            scan.ranges,
-            sight.ends,
-            scan.angle_min,
-            scan.angle_increment,
-            scan.range_min,
-            self._farthest(scan),
-            self._spec.max_radius,
-        )
+        found = runs(scan.ranges, sight.ends, scan.angle_increment, scan.range_min, self._farthest(scan))
+        looked = None if before is None or not len(found.beams) else before.looked(found.places, sight.at)
+        appeared = None if looked is None else looked.appeared()
+        if not self._tracks and (appeared is None or found.most(appeared) < FEW):
+            return None
+        pieces = clusters(found, scan.ranges, scan.angle_min, scan.angle_increment, self._spec.max_radius)
         came = stood = [False] * len(pieces.first)
-        if before is not None and came:
-            looked = before.looked(pieces.places, sight.at)
-            count, share = pieces.counts(looked.appeared())
+        if looked is not None and appeared is not None and came:
+            count, share = pieces.counts(appeared)
             came = ((count >= FEW) & (share >= APPEARED)).tolist()
             if self._tracks:  # else nobody asks
                 stood = (pieces.counts(looked.stood())[1] > STANDS).tolist()
@@ -146,6 +139,6 @@ class Tracker:
 
 
 def _ends(ranges: Array, towards: Places) -> Places:
-    """Where beams (n,) end: of one that met nothing farther off than anything was seen, of nan where the lidar is."""
-    ends: Places = np.fmin(np.fmax(ranges, 0.0), 2 * FARTHEST) * towards
+    """Where beams (n,) end: of one that met nothing, or says nothing, farther off than anything was seen."""
+    ends: Places = np.fmin(ranges, 2 * FARTHEST) * towards
     return ends

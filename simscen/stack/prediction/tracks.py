@@ -16,11 +16,12 @@ FIRST_SPEED = 1.5
 class Update(NamedTuple):
     """When and where a track was hit; whether it stood where it had been free, or where something had been hit before.
 
-    `edges` is how many of its two ends were seen.
+    `deviation` is the standard deviation in m of the place, along any axis, `edges` how many of its two ends were seen.
     """
 
     tick: int
     place: complex
+    deviation: float
     came: bool
     stood: bool
     edges: int
@@ -51,9 +52,9 @@ class Track(Point):
         """When it was last hit."""
         return self.lately[-1].tick
 
-    def note(self, tick: int, came: bool, stood: bool, edges: int) -> None:
-        """Note that it was hit."""
-        self.lately.append(Update(tick, self.place, came, stood, edges))
+    def note(self, tick: int, came: bool, stood: bool, edges: int, deviation: float) -> None:
+        """Note that it was hit, and how well its place is known by that, in m."""
+        self.lately.append(Update(tick, self.place, deviation, came, stood, edges))
         self.uncome = 0 if came else self.uncome + 1
         self.stands = self.stands + 1 if stood and not came else 0
 

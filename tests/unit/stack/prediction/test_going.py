@@ -12,7 +12,7 @@ def track(*came: bool) -> Track:
     found.velocity = 0.5 + 0j
     for step, one in enumerate(came):
         found.fast_at = RATE // 10 * step
-        found.note(found.fast_at, one, False, 1)
+        found.note(found.fast_at, one, False, 1, 0.03)
     return found
 
 

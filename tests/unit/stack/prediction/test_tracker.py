@@ -9,7 +9,7 @@ import pytest
 from simscen.core.geometry import Pose2
 from simscen.core.sensing import Scan
 from simscen.model.guards import Prediction
-from simscen.stack.prediction.clusters import clusters
+from simscen.stack.prediction.clusters import clusters, runs
 from simscen.stack.prediction.tracker import Tracker
 from simscen.testing.flatland import RATE, Flatland
 
@@ -239,7 +239,8 @@ def test_posts_do_not_move_when_the_robot_skids_aside_and_its_wheels_do_not_know
 
 def test_the_last_piece_of_a_scan_is_as_near_as_its_last_hit() -> None:
     ranges, step = np.array([50.0] * 10 + [2.0, 1.95, 1.9]), 0.01
-    pieces = clusters(ranges, ranges * np.exp(1j * step * np.arange(13)), 0.0, step, 0.1, 10.0, 1.0)
+    found = runs(ranges, ranges * np.exp(1j * step * np.arange(13)), step, 0.1, 10.0)
+    pieces = clusters(found, ranges, 0.0, step, 1.0)
     sine = math.sin(1.5 * step)
     assert pieces.radii.tolist() == pytest.approx([1.9 * sine / (1.0 - sine)])
     assert abs(pieces.centres[0]) == pytest.approx(1.9 + pieces.radii[0])
