@@ -41,22 +41,27 @@ def associate(tracks: list[Track], seen: Seen) -> set[int]:
     pieces, lidar = seen.pieces, seen.lidar
     if not tracks or not len(pieces.centres):
         return set()
-    expected = lidar.into(np.array([track.place for track in tracks]))
-    off = np.abs(expected[:, None] - pieces.centres)
+    expected = [lidar.into(track.place) for track in tracks]
+    gates = [GATE + GATE_SIGMAS * track.place_deviation for track in tracks]
     # Of what is half hidden, the middle of the visible part may be a radius off.
-    gate = np.multiply.outer([track.radius for track in tracks], pieces.edges != BOTH)
-    near_by = gate + GATE
-    gate += np.array([(GATE + GATE_SIGMAS * track.place_deviation,) for track in tracks])
-    possible = off <= gate
-    stands = np.array(seen.stood) > np.array(seen.came)
-    if stands.any():  # what stands continues what has stood there: nothing hops from one post to the next
-        last = lidar.into(np.array([track.lately[-1].place for track in tracks]))
-        possible &= ~stands | (np.abs(last[:, None] - pieces.centres) <= near_by)
-    numbers, near = possible.nonzero()
-    order = off[numbers, near].argsort(kind="stable")
+    most = [gate + track.radius for gate, track in zip(gates, tracks, strict=True)]
+    off = np.abs(np.array(expected)[:, None] - pieces.centres)
+    numbers, near = (off <= np.array(most)[:, None]).nonzero()
+    possible = list[tuple[float, int, int]]()
+    for number, piece, far in zip(numbers.tolist(), near.tolist(), off[numbers, near].tolist(), strict=True):
+        track, hidden = tracks[number], pieces.edges[piece] != BOTH
+        reach = gates[number] + track.radius * hidden
+        if seen.stood[piece] and not seen.came[piece]:
+            # What stands continues what has stood there: nothing hops from one post to the next.
+            last = abs(lidar.into(track.lately[-1].place) - pieces.centres[piece])
+            if last > GATE + track.radius * hidden:
+                continue
+        if far <= reach:
+            possible.append((far, number, piece))
+    possible.sort()
     given = dict[int, int]()
     taken = set[int]()
-    for number, piece in zip(numbers[order].tolist(), near[order].tolist(), strict=True):
+    for _, number, piece in possible:
         if number not in given and piece not in taken:
             taken.add(piece)
             given[number] = piece

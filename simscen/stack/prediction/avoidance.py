@@ -77,12 +77,22 @@ class Avoidance:
         if not near.things:
             self._last = None
             return wanted
+        if self._clear(wanted, pose, twist, near, path):
+            self._last = None
+            return wanted
         as_wanted = self._own(wanted, pose, twist, path, SLOWER[:1])
         if self._risk(as_wanted, near)[0] <= (CALM if self._last is None else CALMER):
             self._last = None
             return wanted
         self._last = self._best(self._own(wanted, pose, twist, path, SLOWER), pose, twist, near, costmap, path, home)
         return self._last
+
+    def _clear(self, wanted: Twist, pose: Pose2, twist: Twist, moving: Moving, path: Followed | None) -> bool:
+        """Whether the controller's own way is told at once to come near nothing: most that is in sight stays off."""
+        if path is None or len(path) < 2 or wanted.vx == 0.0:
+            return False
+        place, speed, off = path.course(pose, twist, wanted, self._robot)
+        return moving.surely_off(place, speed, self._discs.reach + off, ROOM, HORIZON)
 
     def _best(
         self,

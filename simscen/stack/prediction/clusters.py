@@ -23,8 +23,8 @@ STEEPEST = math.radians(80.0)
 OUTWARD = np.array(((-1,), (1,)))
 FEWEST = 3
 """Hits of a piece that is looked at."""
-STEPS = 4
-"""Of Gauss-Newton: from half a radius off, a circle is found to a millimetre."""
+STEPS, ENOUGH = 4, 3e-3
+"""Of Gauss-Newton: from half a radius off, a circle is found to a millimetre; metres of a step that is the last."""
 
 Indices = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
@@ -184,5 +184,8 @@ def fitted(pieces: Clusters, which: Indices, centres: Places, radii: Array) -> P
         square = np.add.reduceat(towards * towards, begin) / 2
         distance -= radius
         miss = np.add.reduceat(towards * distance, begin)
-        centres = centres - (half * miss - square * miss.conj()) / (half * half - (square * square.conj()).real)
+        change = (half * miss - square * miss.conj()) / (half * half - (square * square.conj()).real)
+        centres = centres - change
+        if np.abs(change).max() < ENOUGH:
+            break
     return centres

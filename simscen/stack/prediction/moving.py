@@ -2,7 +2,7 @@
 
 import cmath
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +12,8 @@ from simscen.core.geometry import Array, Pose2
 
 WIDEST = 0.8
 """Metres by which what is not known of a place widens it at most."""
+AHEAD, LEAST = 0.5, 0.05
+"""Seconds that are passed over at once at most where all keep clear of each other, and at least, to be worth it."""
 TOUCH = 0.03
 """Metres: whoever comes nearer is taken to touch."""
 
@@ -31,6 +33,12 @@ class Thing(NamedTuple):
     place_variance: float
     covariance: float
     velocity_variance: float
+
+    def deviation(self, seconds: float, acceleration: float) -> float:
+        """Standard deviation in m of where it will be, along any axis, if its velocity may change so fast in m/s²."""
+        *_, variance, covariance, wanders = self
+        turned = 0.5 * acceleration * seconds * seconds
+        return math.sqrt(variance + seconds * (2.0 * covariance + wanders * seconds) + turned * turned)
 
     def missed_by(self, here: complex, speed: float, seconds: float) -> float:
         """Metres at least that its surface stays off whoever leaves `here` at `speed` for so long, whichever way."""
@@ -126,6 +134,23 @@ class Moving:
             np.maximum(nearest, (radius - gap) / room, out=nearest)
         nearest += 1.0
         return nearest, touched
+
+    def surely_off(
+        self, place: Callable[[float], complex], speed: float, reach: float, kept_off: float, seconds: float
+    ) -> bool:
+        """Whether a disc of radius `reach` at `place(t)`, no faster than `speed`, has a `nearness` of 0 at most for so
+        many seconds; False where that is not told at once.
+        """
+        for thing in self.things:
+            closing, time = max(speed + abs(thing.velocity), 1e-3), 0.0
+            while time < seconds:
+                off = abs(thing.place + thing.velocity * time - place(time))
+                room = min(kept_off + thing.deviation(min(time + AHEAD, seconds), self.acceleration), WIDEST)
+                spare = (off - thing.radius - reach - room) / closing
+                if spare < LEAST:
+                    return False
+                time += min(spare, AHEAD)
+        return True
 
     def _deviation(self, thing: Thing, times: Reals) -> Reals:
         """Standard deviation (…,) in m of where one will be, along any axis."""

@@ -1,6 +1,8 @@
 """Where the robot may be in the next seconds: what it can do, moment by moment."""
 
 import math
+from bisect import bisect_right
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -126,6 +128,8 @@ class Followed:
         self._x, self._y = np.ascontiguousarray(path[:, 0]), np.ascontiguousarray(path[:, 1])
         steps = np.hypot(np.diff(self._x), np.diff(self._y))
         self._along = np.concatenate(([0.0], np.cumsum(steps)))
+        self._lengths: list[float] = self._along.tolist()
+        self._places: list[complex] = (self._x + 1j * self._y).tolist()
 
     def __len__(self) -> int:
         return len(self._x)
@@ -164,6 +168,35 @@ class Followed:
         y = np.interp(came, along, self._y) + (pose.y - self._y[here]) * fade
         yaw = self._headings(came, here, wanted.vx < 0.0) if turns else np.zeros_like(x)
         return Rollouts(x, y, yaw, vx, scale * (wanted.vx, wanted.wz))
+
+    def course(
+        self, pose: Pose2, twist: Twist, wanted: Twist, robot: RobotModel
+    ) -> tuple[Callable[[float], complex], float, float]:
+        """Where (x + iy) `driven` is after so many seconds at the whole of the speed, told at once for any of them.
+
+        With that the greatest speed in m/s, and how far off in m the moments of `driven` may be.
+        """
+        here, now, then = self.nearest(pose), twist.vx, wanted.vx
+        rate = robot.linear_acceleration if abs(then) >= abs(now) else robot.linear_deceleration
+        ramp, rate = abs(then - now) / rate, math.copysign(rate, then - now)
+        begun, end = self._lengths[here], self._lengths[-1]
+        off, fades = complex(pose.x, pose.y) - self._places[here], max(BACK_TO_PATH * abs(then), 0.2)
+
+        def place(seconds: float) -> complex:
+            early = min(seconds, ramp)
+            went = (now + 0.5 * rate * early) * early + then * (seconds - early)
+            return self._at(min(max(went, 0.0) + begun, end)) + off * math.exp(-abs(went) / fades)
+
+        wider = 1.0 + abs(off) / fades
+        return place, max(abs(now), abs(then)) * wider, 0.5 * STEP * abs(then - now) * wider
+
+    def _at(self, length: float) -> complex:
+        """Its place so far along it."""
+        lengths, places = self._lengths, self._places
+        after = min(max(bisect_right(lengths, length), 1), len(lengths) - 1)
+        before, piece = lengths[after - 1], lengths[after] - lengths[after - 1]
+        part = (length - before) / piece if piece > 0.0 else 0.0
+        return places[after - 1] + part * (places[after] - places[after - 1])
 
     def _headings(self, came: Array, here: int, backward: bool) -> Array:
         """Headings (…,) where one has come so far along it, from the point `here` on."""

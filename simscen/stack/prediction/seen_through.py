@@ -127,8 +127,9 @@ class Earlier:
         return Looked(self, turned, way, *self.towards(turned + way))
 
     def towards(self, places: Places) -> tuple[Indices, Array]:
-        """The beams (…,), by their numbers in `free`, that went towards places as it sees them, turned to its middle, and
-        how far off these are.
+        """The beams (…,) that went towards places as it sees them, turned to its middle, and how far off these are.
+
+        Beams have their numbers in `free`.
         """
         beam = np.arctan2(places.imag, places.real)
         beam *= 1.0 / self.view.increment

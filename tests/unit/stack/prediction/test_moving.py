@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose2
+from simscen.core.motion import Twist
 from simscen.stack.prediction.moving import Moving, Thing
+from simscen.stack.prediction.rollouts import HORIZON, TIMES, Followed
+from simscen.testing.flatland import round_robot
 
 
 def test_what_is_told_to_come_no_nearer_comes_no_nearer_whichever_way_one_goes() -> None:
@@ -29,3 +32,26 @@ def test_arrays_are_what_it_was_made_of_and_turn_with_the_frame() -> None:
     step = np.eye(4) + 2.0 * np.eye(4, k=2)
     assert seen.covariances == pytest.approx(step @ spread @ step.T)
     assert Moving.of((), 1.0).centres.shape == (0, 2) and Moving.of((), 1.0).covariances.shape == (0, 4, 4)
+
+
+def test_what_is_told_at_once_to_stay_off_a_way_stays_off_it_at_each_moment() -> None:
+    """Robots that brake, speed up and drive backward, beside a bent path, among things on all sides."""
+    chance, robot, clear, off = np.random.default_rng(7), round_robot(), 0, 0
+    along = np.linspace(0.0, 5.0, 101)
+    for _ in range(300):
+        path = Followed(np.column_stack((along, np.sin(along * chance.uniform(0.0, 2.0)))))
+        here = Pose2(
+            float(chance.uniform(-0.3, 3.0)), float(chance.uniform(-0.4, 0.4)), float(chance.uniform(-3.0, 3.0))
+        )
+        twist, wanted = (Twist(float(chance.uniform(-0.5, 0.5)), 0.0, 0.0) for _ in range(2))
+        thing = Thing(complex(*chance.uniform(-4, 4, 2)), complex(*chance.uniform(-1, 1, 2)), 0.3, 0.01, 0.0, 0.02)
+        moving = Moving.of((thing,), 1.5)
+        place, speed, apart = path.course(here, twist, wanted, robot)
+        way = path.driven(here, twist, wanted, (1.0,), robot, turns=False)
+        assert np.abs(way.x[0] + 1j * way.y[0] - [place(time) for time in TIMES]).max() <= apart + 1e-9
+        near = moving.nearness(way.x, way.y, TIMES, 0.22, 0.25)[0].max()
+        if moving.surely_off(place, speed, 0.22 + apart, 0.25, HORIZON):
+            clear += 1
+            assert near <= 0.0
+        off += near <= 0.0
+    assert clear > 0.8 * off > 100
