@@ -33,16 +33,18 @@ def test_it_keeps_its_promise(promise: Promise) -> None:
     promise.check()
 
 
-@pytest.mark.parametrize("kind", ["reeds_shepp", "dubins"])
-def test_a_car_is_never_asked_to_turn_tighter_than_it_can(kind: str) -> None:
-    contract = PlannerContract(Spec(state_space=kind), CAR)
-    points = contract.planned(contract.built(), contract.view(), 1)
-    step = np.hypot(*np.diff(points[:, :2], axis=0).T)
-    turn = np.abs((np.diff(points[:, 2]) + np.pi) % (2 * np.pi) - np.pi)
-    moving = step > 1e-6
-    too_tight = turn[moving] > step[moving] / CAR.turning_radius * 1.1 + 0.02
-    assert too_tight.sum() <= (0 if kind == "dubins" else 4)  # a step across a cusp goes there and back
-    heading = np.arctan2(*np.diff(points[:, :2], axis=0).T[::-1])
-    off = np.abs((heading - points[:-1, 2] + np.pi) % (2 * np.pi) - np.pi)
-    along = off < 0.2 if kind == "dubins" else (off < 0.2) | (off > np.pi - 0.2)
-    assert (~along[moving]).sum() <= (0 if kind == "dubins" else 4)
+@pytest.mark.parametrize("kind", ["bit_star", "aorrtc", "rrt_star", "kpiece"])
+@pytest.mark.parametrize("space", ["reeds_shepp", "dubins"])
+def test_a_car_is_never_asked_to_turn_tighter_than_it_can(space: str, kind: str) -> None:
+    """Not on the step either on which it changes its direction."""
+    contract = PlannerContract(Spec(type=kind, state_space=space, max_iterations=2000, improving_iterations=100), CAR)
+    for seed in (1, 2, 3):
+        points = contract.planned(contract.built(), contract.view(), seed)
+        step = np.hypot(*np.diff(points[:, :2], axis=0).T)
+        turn = np.abs((np.diff(points[:, 2]) + np.pi) % (2 * np.pi) - np.pi)
+        assert (turn <= step / CAR.turning_radius + 1e-3).all()
+        moving = step > 1e-3
+        heading = np.arctan2(*np.diff(points[:, :2], axis=0).T[::-1])
+        off = np.abs((heading - points[:-1, 2] + np.pi) % (2 * np.pi) - np.pi)
+        along = off < 0.1 if space == "dubins" else (off < 0.1) | (off > np.pi - 0.1)
+        assert along[moving].all()

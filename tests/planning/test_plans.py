@@ -10,9 +10,12 @@ from simscen.core.geometry import Pose2
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.planners import OmplPlanner as Spec
 from simscen.stack.costmap.costmap import Costmap
+from simscen.stack.planners import informed_set, samplers
 from simscen.stack.planners.ends import find_ends
 from simscen.stack.planners.ompl_planner import OmplPlanner
 from simscen.stack.planners.rates import Rates
+from simscen.stack.planners.search import search
+from simscen.stack.planners.tube import eased
 from simscen.stack.protocols import Surroundings
 from simscen.testing.flatland import RATE, Flatland
 
@@ -59,6 +62,25 @@ def test_the_way_through_a_maze_of_fifty_metres_is_found() -> None:
     rates = Rates(view, ROBOT, 2.0, True)
     assert np.isfinite(rates.at(path.points[:, :2])).all()
     assert path.points[-1, :2] == pytest.approx((53.3, 53.3))
+
+
+@pytest.mark.parametrize("number", [2, 3])
+def test_in_a_maze_of_large_blocks_and_too_many_samples_the_first_search_finds_the_cheapest_way(
+    number: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One of a hundred metres has them: places on the way over its blocks lay too far apart to be joined, and the
+    corridor was searched instead, for seconds. This one has fifteen metres, and may have few blocks and samples.
+    """
+    monkeypatch.setattr(informed_set, "MOST_PRICED", 2500)
+    monkeypatch.setattr(samplers, "MOST_SAMPLES", 300)
+    view = Costmap(CostmapSpec(), Surroundings(ROBOT, large_maze(number, 11, 27), RATE)).view
+    rates, start, goal = Rates(view, ROBOT, 2.0, True), Pose2(0.7, 0.7), Pose2(14.15, 14.15)
+    least = cheapest(rates, start, goal)
+    for seed in range(3):
+        (first,) = next(samplers.medial_axis(rates, find_ends(rates, start, goal, 0.5), seed))
+        points = search("bit_star", first, seed, 20_000, 0)
+        assert points is not None
+        assert rates.along(eased(rates, np.array(points))) < 1.05 * least
 
 
 def corridor_with_a_corner() -> Flatland:

@@ -5,6 +5,7 @@ import numpy as np
 from simscen.core.geometry import Array, Pose2
 from simscen.core.navigation import ErrorCode, Path
 from simscen.model.planners import Navfn, Smac2d
+from simscen.stack.planners.corners import around_corners
 from simscen.stack.planners.ends import Ends, find_ends
 from simscen.stack.planners.finish import SPACING, spaced, with_headings
 from simscen.stack.planners.nearby import nearby
@@ -55,10 +56,17 @@ class GridPlanner:
     def _plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, _: int) -> Path:
         rates = Rates(costmap, self._robot, self._multiplier, self._allow_unknown)
         ends = find_ends(rates, start, goal, self._tolerance)
-        cells = self._over(rates, ends)
-        way = np.vstack((ends.start, cells[1:-1], ends.goal))
-        way = smoothed(rates, way) if self._smooth else way
+        way = self._finished(rates, ends, self._over(rates, ends))
         return Path(with_headings(spaced(np.vstack(((start.x, start.y), way)), SPACING), goal))
+
+    def _finished(self, rates: Rates, ends: Ends, cells: Array) -> Array:
+        """From start to goal over the cells, smoothed, if that leads through nothing."""
+        way = np.vstack((ends.start, cells[1:-1], ends.goal))
+        for points in (smoothed(rates, way), way) if self._smooth else (way,):
+            led = around_corners(rates, spaced(points, SPACING))
+            if led is not None:
+                return led
+        return np.vstack((ends.start, cells, ends.goal))  # no move between middles of cells cuts a corner
 
     def _over(self, rates: Rates, ends: Ends) -> Array:
         """The middles (n, 2) of the cells of the cheapest way."""

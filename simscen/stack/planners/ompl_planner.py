@@ -5,6 +5,7 @@ import numpy as np
 from simscen.core.geometry import Array, Pose2
 from simscen.core.navigation import ErrorCode, Path
 from simscen.model.planners import OmplPlanner as PlannerSpec
+from simscen.stack.planners.corners import around_corners
 from simscen.stack.planners.ends import Ends, find_ends
 from simscen.stack.planners.finish import SPACING, spaced, with_headings
 from simscen.stack.planners.nearby import nearby
@@ -13,6 +14,9 @@ from simscen.stack.planners.samplers import SAMPLERS, Legs
 from simscen.stack.planners.search import Point, search
 from simscen.stack.planners.tube import eased
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
+
+FINE = 0.125
+"""Cells between two looks of a second search, where the first one's way led over what lay between its looks."""
 
 
 class OmplPlanner:
@@ -36,19 +40,28 @@ class OmplPlanner:
 
     def _way(self, rates: Rates, ends: Ends, seed: int) -> Array:
         """What the first search finds that finds a way."""
-        found: Array | None = None
-        for number, legs in enumerate(self._sampler(rates, ends, seed)):
-            points = self._whole_way(ends, legs, seed + number)
-            if points is None:
-                continue
-            way = np.array(points)
-            found = spaced(eased(rates, way) if self._spec.simplify else way, SPACING)
-            if np.isfinite(rates.at(found)).all():  # else a corner was cut between two looks, by a hair
+        for stride in (rates.stride, FINE * rates.resolution):
+            rates.stride, rejected = stride, False
+            for number, legs in enumerate(self._sampler(rates, ends, seed)):
+                points = self._whole_way(ends, legs, seed + number)
+                if points is None:
+                    continue
+                way = self._finished(rates, np.array(points))
+                if way is not None:
+                    return way
+                rejected = True
+            if not rejected:
                 break
-        if found is None:
-            message = f"{self._spec.type}: no path in {self._spec.max_iterations} iterations"
-            raise NavigationFailure(ErrorCode.NO_VALID_PATH, message)
-        return found
+        message = f"{self._spec.type}: no path in {self._spec.max_iterations} iterations"
+        raise NavigationFailure(ErrorCode.NO_VALID_PATH, message)
+
+    def _finished(self, rates: Rates, points: Array) -> Array | None:
+        """The way eased and led around corners; None where it passes something between two looks of the search."""
+        if self._spec.simplify:
+            way = around_corners(rates, spaced(eased(rates, points), SPACING))
+            if way is not None:
+                return way
+        return around_corners(rates, spaced(points, SPACING))
 
     def _whole_way(self, ends: Ends, legs: Legs, seed: int) -> list[Point] | None:
         points = [ends.start]

@@ -15,7 +15,7 @@ from simscen.stack.planners.ends import find_ends, near
 from simscen.stack.planners.escapes import escapes
 from simscen.stack.planners.field import Field
 from simscen.stack.planners.informed_set import InformedSet
-from simscen.stack.planners.pose_search import Space, Valid, search_poses
+from simscen.stack.planners.pose_search import SPACING, Space, Valid, search_poses
 from simscen.stack.planners.rates import NO_INFORMATION, Rates
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
 
@@ -28,16 +28,20 @@ ROOM_TO_STEER = 1.15
 ROOM, LESS_ROOM = 0.10, 0.05
 """Metres beyond the hull that are kept where that is possible: belief and map are off by as much at times."""
 ATTEMPTS = (
-    (0.15, ROOM, 0.1),
-    (0.3, ROOM, 0.1),
-    (0.15, LESS_ROOM, 0.1),
-    (0.3, LESS_ROOM, 0.1),
-    (0.3, 0.0, 0.2),
-    (2.0, 0.0, 0.4),
+    (0.15, ROOM, 0.1, SPACING),
+    (0.3, ROOM, 0.1, SPACING),
+    (0.15, LESS_ROOM, 0.1, SPACING),
+    (0.3, LESS_ROOM, 0.1, SPACING),
+    (0.3, 0.0, 0.2, SPACING),
+    (2.0, 0.0, 0.4, SPACING),
+    (2.0, 0.0, 0.4, SPACING / 10),
 )
-"""Slack of the informed set, room, share of the iterations. Cars need wider sets than discs: they swing out."""
+"""Slack of the informed set, room, share of the iterations, metres between looks. Cars need wider sets than discs: they
+swing out."""
 TRIES = 6
 """Searches in all once there is a path: trees over poses make detours, and each takes only milliseconds."""
+LOOKS = 50
+"""Poses from one of an answer to the next at which the hull is looked at in the end."""
 DEEPER = 0.01
 """Metres that a hull may sink further into what it touches while it gets away: the costmap tells no less."""
 CUSP = 1.0
@@ -62,27 +66,34 @@ class PosePlanner:
         away = self._led_away(rates, start)
         begin = Pose2(*away[-1].tolist())
         informed = InformedSet(rates, (begin.x, begin.y), (goal.x, goal.y))
-        for slack, room, share in ATTEMPTS:
+        for slack, room, share, looks in ATTEMPTS:
             informed.narrow(slack)
             valid = self._valid(field, informed, room, (begin, goal))
             iterations = max(1, round(share * self._spec.max_iterations))
             found: list[Array] = []
-            while True:
+            for _ in range(TRIES):
                 seed += 1
                 poses = search_poses(
                     self._type, self._space, self._turning_radius, informed.bounds(), begin, goal, valid, seed,
-                    iterations,
+                    iterations, looks,
                 )  # fmt: skip
                 if poses is None:
                     break
                 found.append(np.array(poses))
-                if len(found) == TRIES:
-                    break
-            if found:
-                best = min(found, key=lambda poses: _effort(rates, poses))
-                return Path(np.concatenate((away[:-1], best)))
+            for easiest in sorted(found, key=lambda poses: _effort(rates, poses)):
+                if self._clear(rates, easiest):
+                    return Path(np.concatenate((away[:-1], easiest)))
         message = f"{self._type}: no path in {self._spec.max_iterations} iterations"
         raise NavigationFailure(ErrorCode.NO_VALID_PATH, message)
+
+    def _clear(self, rates: Rates, poses: Array) -> bool:
+        """Whether the whole hull has room on all of the way: a search looks at it every 5 cm."""
+        part = np.arange(LOOKS) / LOOKS
+        yaw = np.unwrap(poses[:, 2])
+        unwrapped = np.column_stack((poses[:, :2], yaw))
+        between = unwrapped[:-1, None] + part[:, None] * np.diff(unwrapped, axis=0)[:, None]
+        whole = np.vstack((between.reshape(-1, 3), unwrapped[-1:]))
+        return bool(self._footprint.free(rates.costmap, whole).all() and np.isfinite(rates.at(whole[:, :2])).all())
 
     def _shut(self, costmap: CostmapView) -> CostmapView:
         """The costmap with no room for the robot where nothing is known."""

@@ -44,7 +44,8 @@ class Rates:
         self._per_metre = 1.0 / costmap.resolution
         padded: Any = np.append(rates.reshape(-1), np.full(self.width + 1, np.inf, dtype=np.float32))
         self._look: Any = memoryview(padded)  # answers in a tenth of numpy's time for a scalar
-        self.stride = max(STEP * costmap.resolution, STRIDE * robot.inscribed_radius)
+        coarse = STRIDE * robot.inscribed_radius if allow_unknown else 0.0  # a single cell may be unknown
+        self.stride = max(STEP * costmap.resolution, coarse)
         self._asked: tuple[float, float, float, float] | None = None
         self._answer = 0.0
 
