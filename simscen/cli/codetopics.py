@@ -36,6 +36,15 @@ NAV2 = {
     ErrorCode.NAVIGATE_TIMEOUT: "The goal took longer than its `timeout`.",
 }
 """Error code → what has happened."""
+OF_OTHERS = frozenset({
+    ErrorCode.FOLLOW_PATH_UNKNOWN, ErrorCode.TF_ERROR, ErrorCode.INVALID_PATH, ErrorCode.CONTROLLER_TIMED_OUT,
+    ErrorCode.PLANNER_UNKNOWN, ErrorCode.PLANNER_TIMEOUT, ErrorCode.NO_VIAPOINTS_GIVEN,
+    ErrorCode.FOLLOW_WAYPOINTS_UNKNOWN, ErrorCode.TASK_EXECUTOR_FAILED, ErrorCode.NO_VALID_WAYPOINTS,
+    ErrorCode.BACKUP_INVALID_INPUT, ErrorCode.NAVIGATE_UNKNOWN,
+})  # fmt: skip
+"""Codes with which nothing in the reference stack ends: its planners and controllers have no clock, its planners hand
+on no empty path, every robot can drive backward, and goals are checked before a run."""
+BY_OTHERS = "The reference stack never ends with it; Nav2, other external stacks and installed components may."
 
 JUNIT = {
     "crashed": "The process of the run ended before it was done.",
@@ -60,9 +69,9 @@ JUNIT = {
 def code_topics() -> list[Topic]:
     """Nav2's error codes, JUnit's error types and exit codes."""
     nav2 = [
-        Topic("error code", code.name, None, f"Nav2's error code {int(code)}.\n\n{text}",
+        Topic("error code", code.name, None, f"Nav2's error code {int(code)}.\n\n{_told(code)}",
               f"error_code: {{code: {code.name}}}", alias=str(int(code)))
-        for code, text in NAV2.items()
+        for code in NAV2
     ]  # fmt: skip
     told = "The run could not be completed: a JUnit `<error>`, and exit code 3."
     junit = [Topic("error type", kind, None, f"{text}\n\n{told}") for kind, text in JUNIT.items()]
@@ -70,3 +79,7 @@ def code_topics() -> list[Topic]:
         Topic("exit code", f"exit {code.value}", None, text, alias=f"{code.value}") for code, text in EXITS.items()
     ]
     return [*nav2, *junit, *exits]
+
+
+def _told(code: ErrorCode) -> str:
+    return f"{NAV2[code]} {BY_OTHERS}" if code in OF_OTHERS else NAV2[code]

@@ -9,7 +9,7 @@ from simscen.spec.base import Spec
 from simscen.spec.bytype import ByType
 from simscen.spec.component import Typed
 from simscen.spec.quantities import (
-    Angle,
+    PositiveAngle,
     PositiveDuration,
     PositiveLength,
     Quantity,
@@ -39,7 +39,7 @@ class ProgressChecker(Spec):
 
     required_movement_radius: PositiveLength = 0.5
     """How far it must move within the time allowed."""
-    required_movement_angle: Angle | None = None
+    required_movement_angle: PositiveAngle | None = None
     """Or how far it must turn, where that counts as progress."""
     movement_time_allowance: PositiveDuration = 10.0
     """In how long; then driving fails with FAILED_TO_MAKE_PROGRESS."""

@@ -1,7 +1,10 @@
+from pathlib import Path
+
 import pytest
 
+import simscen as package
 from simscen.cli import explain, explainable
-from simscen.cli.codetopics import NAV2
+from simscen.cli.codetopics import NAV2, OF_OTHERS
 from simscen.cli.explain import explained
 from simscen.cli.explainable import known_names
 from simscen.core.errors import Exit
@@ -35,6 +38,14 @@ def test_one_name_may_mean_several_things(simscen) -> None:
 
 def test_codes_are_explained(simscen) -> None:
     assert simscen("explain", "sc012").out == "SC012\n  A key is not known there.\n"
+
+
+def test_a_code_with_which_nothing_in_the_reference_stack_ends_is_told_as_one_of_others(simscen) -> None:
+    assert "The reference stack never ends with it" in simscen("explain", "107").out.replace("\n  ", " ")
+    stack = Path(package.__file__).parent / "stack"
+    sources = [path.read_text(encoding="utf-8") for path in stack.rglob("*.py")]
+    named = {code for code in ErrorCode if any(f"ErrorCode.{code.name}" in text for text in sources)}
+    assert set(ErrorCode) - named - {ErrorCode.NONE} <= OF_OTHERS
 
 
 @pytest.mark.parametrize(("name", "hint"), [("collision_s", "did you mean"), ("zzzzzz", "lists what there is")])
