@@ -8,7 +8,7 @@ from simscen.core.events import Event
 from simscen.core.geometry import Pose2
 from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import ErrorCode, Goal, Path
-from simscen.core.sensing import Image, Imu, Odometry, Readings, Scan
+from simscen.core.sensing import Bump, Image, Imu, Odometry, Readings, Scan
 from simscen.core.trace import Decision
 from simscen.core.zones import Zones
 from simscen.stack.collision_monitor import CollisionMonitor
@@ -29,8 +29,8 @@ from simscen.stack.zones import SpeedFilter
 
 HERE = Pose2(0.0, 0.0)
 """Of the robot in its own frame."""
-MOTION = frozenset((Odometry, Imu))
-"""What tells how the robot moves, and nothing else."""
+MOTION = frozenset((Odometry, Imu, Bump))
+"""What tells how the robot moves and nothing else, or is not listened to."""
 
 
 class ReferenceStack:
