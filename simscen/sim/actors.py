@@ -1,7 +1,8 @@
 """Things that move: by a script, or because they are pushed."""
 
+import itertools
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -245,6 +246,22 @@ class Actors:
         self._posed_at = tick
         return self._poses
 
+    def scripted(self, ticks: Sequence[int]) -> Iterable[Mapping[str, Pose3]]:
+        """`poses` at several ticks in a row, while nothing moves but by a script."""
+        now = self.poses(ticks[-1]) if self._posed_at is None else self._poses
+        if not self._travelling:
+            return itertools.repeat(now, len(ticks))
+        names = [actor.body.name for actor in self._travelling]
+        rows = [self._track(actor).row([(tick - actor.since) / self._rate for tick in ticks])
+                for actor in self._travelling]  # fmt: skip
+        return [{**now, **dict(zip(names, column, strict=True))} for column in zip(*rows, strict=True)]
+
+    def _track(self, actor: Actor) -> Track:
+        if actor.track is None:
+            assert actor.path is not None
+            actor.track = Track(actor.path, actor.body.pose.z)
+        return actor.track
+
     def _asleep(self, tick: int) -> bool:
         """Whether all that can be pushed has long been lying, so that the engine lets it lie, and nobody touched it.
 
@@ -271,9 +288,7 @@ class Actors:
             if there is None:
                 if len(actor.scripted) > 1:
                     actor.scripted.clear()
-                if actor.track is None:
-                    actor.track = Track(actor.path, actor.body.pose.z)
-                actor.scripted[tick] = there = actor.track.at((tick - actor.since) / self._rate)
+                actor.scripted[tick] = there = self._track(actor).at((tick - actor.since) / self._rate)
             return there
         if not actor.body.mass > 0:
             actor.resting = True

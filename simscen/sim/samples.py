@@ -48,7 +48,7 @@ class Samples:
         if not self._waiting:
             return
         waiting, self._waiting = self._waiting, []
-        standing, poses = self._clearance.standing, self._actors.poses
-        for sample in waiting:
+        standing, placed = self._clearance.standing, self._actors.scripted([sample.tick for sample in waiting])
+        for sample, objects in zip(waiting, placed, strict=True):
             state = sample.state
-            sample.made = _made(Truth, (state.pose, state.twist, standing(state.pose, sample.came), poses(sample.tick)))
+            sample.made = _made(Truth, (state.pose, state.twist, standing(state.pose, sample.came), objects))
