@@ -24,8 +24,8 @@ class Chunk:
         self.size = 0
         self.view = memoryview(bytearray(2 * limit))
         """Its records, and room behind them."""
-        self.spoken: list[Channel] = []
-        """The channels that have a message in it, in the order of their first."""
+        self.channels: list[Channel] = []
+        """All that write into it, in the order of their numbers."""
 
     def put(self, record: bytes) -> None:
         """Add a schema or a channel."""
@@ -43,7 +43,11 @@ class Chunk:
 
     def __bool__(self) -> bool:
         """Whether it holds messages; a chunk without any says nothing that the summary does not."""
-        return bool(self.spoken)
+        return bool(self.spoken())
+
+    def spoken(self) -> "list[Channel]":
+        """The channels that have a message in it."""
+        return [channel for channel in self.channels if channel.entries]
 
     def content(self) -> memoryview:
         """All records."""
@@ -51,14 +55,14 @@ class Chunk:
 
     def span(self) -> tuple[int, int]:
         """The times of the first and the last message; messages come in the order of their time."""
-        spoken = self.spoken
+        spoken = self.spoken()
         return min([channel.entries[0] for channel in spoken]), max([channel.entries[-2] for channel in spoken])
 
     def clear(self) -> None:
         """Begin the next one."""
-        for channel in self.spoken:
+        for channel in self.channels:
             channel.entries.clear()
-        self.size, self.spoken = 0, []
+        self.size = 0
 
 
 class Channel:
@@ -67,19 +71,18 @@ class Channel:
     def __init__(self, number: int, chunk: Chunk) -> None:
         self.number, self.chunk = number, chunk
         self.entries: list[int] = []
+        chunk.channels.append(self)
 
     def write(self, time: int, data: bytes) -> None:
         """Add a message at `time` nanoseconds."""
         chunk, length = self.chunk, len(data)
         at = chunk.size
         end = at + HEAD + length
-        if end > len(chunk.view):
+        if end > chunk.limit:
             chunk.reach(end)
         _pack_head(chunk.view, at, _MESSAGE, 22 + length, self.number, 0, time, time)
         chunk.view[at + HEAD : end] = data
         chunk.size = end
-        if not self.entries:
-            chunk.spoken.append(self)
         self.entries += (time, at)
         if end > chunk.limit:
             chunk.full()

@@ -117,8 +117,6 @@ class _AtOnce(Together):
         self._pack(chunk.view, at, time, *fields)
         chunk.size = end
         for channel, offset in self._places:
-            if not channel.entries:
-                chunk.spoken.append(channel)
             channel.entries += (time, at + offset)
 
     def _lay_out(self) -> None:

@@ -45,9 +45,9 @@ class RobotTopics:
     def append(self, moment: Moment) -> None:
         """Write one beat; every message of it carries the beat's simulated time."""
         tick, decision = moment.tick, moment.decision
-        now = self._time.nanoseconds(tick)
-        if moment.truth is not None:
-            self._truth.write(now, tick, moment.truth)
+        now, truth = self._time.nanoseconds(tick), moment.truth
+        if truth is not None:
+            self._truth.write(now, tick, truth)
         if decision.belief is not None:
             self._sensors.correct(Pose3.planar(decision.belief.map_from_odom))
         self._sensors.write(now, moment.readings)

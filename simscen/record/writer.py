@@ -131,14 +131,14 @@ class McapWriter:
 
     def _finish_chunk(self) -> None:
         chunk, at = self._chunk, self._written
-        content, (start, end) = chunk.content(), chunk.span()
+        content, spoken, (start, end) = chunk.content(), chunk.spoken(), chunk.span()
         packed, size = self._compress(content), len(content)
         head = _CHUNK.pack(
             Opcode.CHUNK, 44 + len(packed), start, end, size, zlib.crc32(content), 4, b"zstd", len(packed)
         )
         parts, places = [head, packed], list[int]()
         length = past = len(head) + len(packed)
-        for channel in chunk.spoken:
+        for channel in spoken:
             index = channel.index()
             parts.append(index)
             places += (channel.number, at + past)
@@ -146,7 +146,7 @@ class McapWriter:
             self._counts[channel.number] += len(channel.entries) // 2
         self._chunks.append(
             struct.pack(
-                f"<BQ4QI{'HQ' * len(chunk.spoken)}QI4s2Q",
+                f"<BQ4QI{'HQ' * len(spoken)}QI4s2Q",
                 *(Opcode.CHUNK_INDEX, 68 + 5 * len(places), start, end, at, length),
                 *(5 * len(places), *places, past - length, 4, b"zstd", len(packed), size),
             )

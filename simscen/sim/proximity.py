@@ -101,15 +101,13 @@ class Proximity:
         if pairs is None:
             pairs = self._pairs[part] = list(itertools.product(self._hull, self._build(part)))
         place, turn, client = self._pose[:3], self._pose[3:], self._client
-        # In the order of PyBullet's manual: names would cost a fifth of the call. Body B has a place of its own.
-        points = [
-            point[8]
-            for hull, body in pairs
+        nearest = math.inf
+        for hull, body in pairs:
+            # In the order of PyBullet's manual: names would cost a fifth of the call. Body B has a place of its own.
             for point in pybullet.getClosestPoints(
                 -1, body, within, -1, -1, hull, -1, place, NO_PLACE, turn, NO_TURN, client
-            )
-        ]
-        nearest: float = min(points, default=math.inf)
+            ):
+                nearest = min(nearest, point[8])
         self._bounds[part] = min(nearest, within) + self._travelled
         return nearest
 

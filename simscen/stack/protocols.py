@@ -8,7 +8,7 @@ Promises are written as *given … then …* and tested in tests/contracts on ev
 """
 
 from dataclasses import dataclass, field, replace
-from typing import Protocol, runtime_checkable
+from typing import Protocol, TypeGuard
 
 import numpy as np
 import numpy.typing as npt
@@ -100,7 +100,6 @@ class Localizer(Protocol):
         ...
 
 
-@runtime_checkable
 class TellsPose(Protocol):
     """What a localizer that ships can do besides: say where the robot is, and not how sure that is.
 
@@ -111,6 +110,11 @@ class TellsPose(Protocol):
     def pose(self) -> Pose2:
         """That of the belief, to the last digit."""
         ...
+
+
+def tells_pose(localizer: object) -> TypeGuard[TellsPose]:
+    """Whether a localizer does. Its class is asked: it would itself work the pose out, of particles anywhere in ms."""
+    return hasattr(type(localizer), "pose")
 
 
 LETHAL = 254

@@ -19,7 +19,7 @@ from simscen.stack.localizers.ground_truth import TRUTH
 from simscen.stack.navigator import Navigator
 from simscen.stack.odometry_history import OdometryHistory, believable
 from simscen.stack.prediction.motion_prediction import MotionPrediction
-from simscen.stack.protocols import Controller, Localizer, NavigationFailure, Surroundings, TellsPose
+from simscen.stack.protocols import Controller, Localizer, NavigationFailure, Surroundings, tells_pose
 from simscen.stack.publishing import NOTHING_NEW, Published, Publishing
 from simscen.stack.standstill import Standstill
 from simscen.stack.tasks import Task
@@ -59,7 +59,7 @@ class ReferenceStack:
         """
         self._speed_filter = SpeedFilter(surroundings)
         self._localizer, self._costmaps, self._controller = localizer, costmaps, controller
-        self._whereabouts = localizer if isinstance(localizer, TellsPose) else None
+        self._whereabouts = localizer if tells_pose(localizer) else None
         self._navigator, self._task, self._commands, self._monitor = navigator, task, commands, monitor
         self._prediction = prediction
         self._tick_rate, self._lidars = surroundings.tick_rate, frozenset(surroundings.lidars)
