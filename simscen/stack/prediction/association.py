@@ -1,10 +1,11 @@
 """Which piece of a scan continues which track, and which begins one."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from simscen.stack.prediction.clusters import BOTH, Clusters, fitted
+from simscen.stack.prediction.clusters import BOTH, Piece, Places, fitted
 from simscen.stack.prediction.stance import Stance
 from simscen.stack.prediction.tracks import Track
 
@@ -24,39 +25,39 @@ RADIUS_GAIN = 0.3
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """A scan at a tick, in pieces, by a lidar that is at `lidar` in the odom frame.
+    """A scan at a tick, in pieces of its hits `places` (m,), by a lidar that is at `lidar` in the odom frame.
 
     Which of them stand where it was free, and which where something was hit before.
     """
 
     tick: int
-    pieces: Clusters
+    places: Places
+    pieces: list[Piece]
     lidar: Stance
     came: list[bool]
     stood: list[bool]
+
+    def stands(self, piece: int) -> bool:
+        """Whether one stands where it stood before."""
+        return self.stood[piece] and not self.came[piece]
 
 
 def associate(tracks: list[Track], seen: Seen) -> set[int]:
     """Give each track the piece nearest to where it should be, nearest pairs first; the pieces that were given."""
     pieces, lidar = seen.pieces, seen.lidar
-    if not tracks or not len(pieces.centres):
+    if not tracks or not pieces:
         return set()
-    expected = [lidar.into(track.place) for track in tracks]
+    expected = np.array([lidar.into(track.place) for track in tracks])
     gates = [GATE + GATE_SIGMAS * track.place_deviation for track in tracks]
-    # Of what is half hidden, the middle of the visible part may be a radius off.
-    most = [gate + track.radius for gate, track in zip(gates, tracks, strict=True)]
-    off = np.abs(np.array(expected)[:, None] - pieces.centres)
-    numbers, near = (off <= np.array(most)[:, None]).nonzero()
+    off = np.abs(expected[:, None] - np.array([piece.centre for piece in pieces]))
+    most = np.array([gate + track.radius for gate, track in zip(gates, tracks, strict=True)])
+    numbers, near = (off <= most[:, None]).nonzero()
     possible = list[tuple[float, int, int]]()
     for number, piece, far in zip(numbers.tolist(), near.tolist(), off[numbers, near].tolist(), strict=True):
-        track, hidden = tracks[number], pieces.edges[piece] != BOTH
-        reach = gates[number] + track.radius * hidden
-        if seen.stood[piece] and not seen.came[piece]:
-            # What stands continues what has stood there: nothing hops from one post to the next.
-            last = abs(lidar.into(track.lately[-1].place) - pieces.centres[piece])
-            if last > GATE + track.radius * hidden:
-                continue
-        if far <= reach:
+        track, (_, _, centre, _, edges) = tracks[number], pieces[piece]
+        # Of what is half hidden, the middle of the visible part may be a radius off.
+        hidden = track.radius if edges != BOTH else 0.0
+        if far <= gates[number] + hidden and (not seen.stands(piece) or _stood(track, centre, lidar, hidden)):
             possible.append((far, number, piece))
     possible.sort()
     given = dict[int, int]()
@@ -70,37 +71,41 @@ def associate(tracks: list[Track], seen: Seen) -> set[int]:
     return taken
 
 
+def _stood(track: Track, centre: complex, lidar: Stance, hidden: float) -> bool:
+    """Whether what stands there is what the track was hit at: nothing hops from one post to the next."""
+    return abs(lidar.into(track.lately[-1].place) - centre) <= GATE + hidden
+
+
 def _update(given: list[tuple[Track, int]], seen: Seen) -> None:
     """Tracks are seen as these pieces."""
-    pieces, lidar = seen.pieces, seen.lidar
-    edges, centres, radii = pieces.edges.tolist(), pieces.centres.tolist(), pieces.radii.tolist()
-    guesses = list[complex]()
-    for track, piece in given:
-        if edges[piece] == BOTH:
-            track.radius += RADIUS_GAIN * (radii[piece] - track.radius)
-            guesses.append(centres[piece])
+    lidar = seen.lidar
+    pieces, guesses = [seen.pieces[number] for _, number in given], list[complex]()
+    for (track, _), piece in zip(given, pieces, strict=True):
+        if piece.edges == BOTH:
+            track.radius += RADIUS_GAIN * (piece.radius - track.radius)
+            guesses.append(piece.centre)
         else:
             guesses.append(lidar.into(track.place))
-    which, sizes = np.array([piece for _, piece in given]), np.array([track.radius for track, _ in given])
-    found = fitted(pieces, which, np.array(guesses), sizes).tolist()
-    for (track, piece), centre in zip(given, found, strict=True):
-        hidden = 0.0 if edges[piece] == BOTH else HALF_SEEN
+    arcs = [seen.places[piece.first : piece.last + 1] for piece in pieces]
+    found = fitted(arcs, [track.radius for track, _ in given], guesses)
+    for (track, number), centre in zip(given, found, strict=True):
+        edges = seen.pieces[number].edges
+        hidden = 0.0 if edges == BOTH else HALF_SEEN
         track.correct(lidar.out(centre), NOISE + RELATIVE * abs(centre) + hidden)
-        track.note(seen.tick, seen.came[piece], seen.stood[piece], edges[piece], track.place_deviation)
+        track.note(seen.tick, seen.came[number], seen.stood[number], edges, track.place_deviation)
 
 
 def begin(tracks: list[Track], seen: Seen, taken: set[int]) -> None:
     """Tracks of pieces that no track has taken and that stand where it was free."""
-    pieces = seen.pieces
     # Among moving things others may, of which a thing that passed hid that they were not there before.
-    least = LEAST_RADIUS if any(track.moving for track in tracks) else np.inf
-    for piece, (radius, came) in enumerate(zip(pieces.radii.tolist(), seen.came, strict=True)):
-        if piece in taken or not (came or (radius >= least and not seen.stood[piece])):
+    least = LEAST_RADIUS if any(track.moving for track in tracks) else math.inf
+    for number, (_, _, centre, radius, edges) in enumerate(seen.pieces):
+        came, stood = seen.came[number], seen.stood[number]
+        if number in taken or not (came or (radius >= least and not stood)):
             continue
-        centre = complex(pieces.centres[piece])
         # Of what is half hidden more may be there than is seen.
-        whole, noise = pieces.edges[piece] == BOTH, NOISE + RELATIVE * abs(centre)
+        whole, noise = edges == BOTH, NOISE + RELATIVE * abs(centre)
         size = radius if whole else max(radius, HALF_RADIUS)
         track = Track.begun(seen.tick, seen.lidar.out(centre), noise + FIRST_SEEN, size)
-        track.note(seen.tick, came, seen.stood[piece], 0, noise if whole else noise + HALF_SEEN)
+        track.note(seen.tick, came, stood, 0, noise if whole else noise + HALF_SEEN)
         tracks.append(track)

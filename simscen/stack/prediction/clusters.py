@@ -1,7 +1,10 @@
 """A scan in pieces: runs of neighbouring beams that hit the same thing, and the cylinder that would look like that."""
 
+import cmath
 import math
 from dataclasses import dataclass
+from itertools import accumulate
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +23,6 @@ STEP_APART = 1e3
 """Metres: more than any beam sees."""
 STEEPEST = math.radians(80.0)
 """Half the angle that a piece fills at most, as far as its radius is concerned."""
-OUTWARD = np.array(((-1,), (1,)))
 FEWEST = 3
 """Hits of a piece that is looked at."""
 STEPS, ENOUGH = 4, 3e-3
@@ -50,28 +52,23 @@ class Runs:
         return int(np.add.reduceat(which, self.first, dtype=np.int64).max()) if len(which) else 0
 
 
-@dataclass(frozen=True, eq=False)
-class Clusters:
-    """Pieces of a scan, in the lidar's frame.
+class Piece(NamedTuple):
+    """A piece of a scan, in the lidar's frame: the hits `first` … `last`.
 
-    Piece k is the hits `first[k]` … `last[k]` of `places` (m,). `centres` (n,) and `radii` (n,) are of the cylinders
-    that fill the same angle at the same distance. `edges` (n,): at how many of its two ends nothing nearer stands, nor
-    the scan ends; at BOTH, all of it is seen.
+    `centre` (x + iy) and `radius` in m are of the cylinder that fills the same angle at the same distance. `edges`: at
+    how many of its two ends nothing nearer stands, nor the scan ends; at BOTH, all of it is seen.
     """
 
-    places: Places
-    first: Indices
-    last: Indices
-    centres: Places
-    radii: Array
-    edges: Indices
+    first: int
+    last: int
+    centre: complex
+    radius: float
+    edges: int
 
-    def counts(self, which: Mask) -> tuple[Indices, Array]:
-        """How many (n,) of each piece's hits these (m,) are, and the share."""
-        total = np.zeros(len(which) + 1, np.int64)
-        np.cumsum(which, out=total[1:])
-        count = total[self.last + 1] - total[self.first]
-        return count, count / (self.last - self.first + 1)
+    @property
+    def hits(self) -> int:
+        """How many these are."""
+        return self.last - self.first + 1
 
 
 def runs(ranges: Array, places: Places, step: float, least: float, most: float) -> Runs:
@@ -90,26 +87,43 @@ def runs(ranges: Array, places: Places, step: float, least: float, most: float) 
     return Runs(beams, r, hits, *_between(apart.nonzero()[0], len(r)))
 
 
-def clusters(found: Runs, scanned: Array, start: float, step: float, largest: float) -> Clusters:
+def clusters(found: Runs, scanned: Array, start: float, step: float, largest: float) -> list[Piece]:
     """The pieces of a scan of ranges `scanned` in which these runs were found, none with a radius over `largest`.
 
     The first beam goes along `start`, the next `step` rad further.
     """
-    beams, r, wide = found.beams, found.ranges, abs(step)
+    beams, wide = found.beams, abs(step)
     if len(beams) < FEWEST:
-        none = np.zeros(0, dtype=np.int64)
-        return Clusters(found.places[:0], none, none, found.places[:0], np.zeros(0), none)
-    first, last = _parted(r, found.first, found.last)
-    ends = beams[np.array((first, last))]
-    sine = np.sin(np.minimum((ends[1] - ends[0] + 1) * (0.5 * wide), STEEPEST))
-    nearest = np.minimum.reduceat(r, first)
-    radii = nearest * sine / (1.0 - sine)
-    few = ((radii <= largest) & (last - first + 1 >= FEWEST)).nonzero()[0]
-    first, last, radii, ends = first[few], last[few], radii[few], ends[:, few]
-    middle = start + (0.5 * step) * (ends[0] + ends[1])
-    centres = (nearest[few] + radii) * np.exp(1j * middle)
-    full = abs(len(scanned) * wide - 2 * math.pi) < wide
-    return Clusters(found.places, first, last, centres, radii, _clear(scanned, ends, full))
+        return []
+    first, last = _parted(found.ranges, found.first, found.last)
+    nearest = np.minimum.reduceat(found.ranges, first).tolist()
+    full, pieces = abs(len(scanned) * wide - 2 * math.pi) < wide, list[Piece]()
+    begin, end = beams[first].tolist(), beams[last].tolist()
+    for one, other, near, low, high in zip(first.tolist(), last.tolist(), nearest, begin, end, strict=True):
+        if other - one + 1 < FEWEST:
+            continue
+        sine = math.sin(min((high - low + 1) * (0.5 * wide), STEEPEST))
+        radius = near * sine / (1.0 - sine)
+        if radius <= largest:
+            centre = cmath.rect(near + radius, start + (0.5 * step) * (low + high))
+            edges = _clear(scanned, low, low - 1, full) + _clear(scanned, high, high + 1, full)
+            pieces.append(Piece(one, other, centre, radius, edges))
+    return pieces
+
+
+def _clear(ranges: Array, beam: int, beside: int, full_circle: bool) -> bool:
+    """Whether the beam beside another goes on beyond it."""
+    if not 0 <= beside < len(ranges):
+        if not full_circle:
+            return False
+        beside %= len(ranges)
+    return bool(ranges[beside] > ranges[beam])
+
+
+def counts(pieces: list[Piece], which: Mask) -> list[int]:
+    """How many of each piece's hits these are, of all (m,)."""
+    total = [0, *np.cumsum(which).tolist()]
+    return [total[piece.last + 1] - total[piece.first] for piece in pieces]
 
 
 def _between(breaks: Indices, count: int) -> tuple[Indices, Indices]:
@@ -156,36 +170,27 @@ def _parted(ranges: Array, first: Indices, last: Indices) -> tuple[Indices, Indi
     return pieces[:, 0], pieces[:, 1]
 
 
-def _clear(ranges: Array, ends: Indices, full_circle: bool) -> Indices:
-    """At how many of their two ends (2, n), beams of `ranges`, the beam beside pieces (n,) goes on beyond them."""
-    beside = ends + OUTWARD
-    beyond = ranges[beside % len(ranges)] > ranges[ends]
-    if not full_circle:
-        beyond &= (beside >= 0) & (beside < len(ranges))
-    return np.asarray(np.add(beyond[0], beyond[1], dtype=np.int64))
-
-
-def fitted(pieces: Clusters, which: Indices, centres: Places, radii: Array) -> Places:
-    """The centres (k,) of the circles of these radii (k,) that fit the arcs of `which` (k,) pieces best.
-
-    `centres` (k,) are a first guess.
-    """
-    first, count = pieces.first[which], pieces.last[which] - pieces.first[which] + 1
-    begin = np.cumsum(count) - count
-    owner = np.repeat(np.arange(len(which)), count)
-    at = pieces.places[np.arange(len(owner)) + (first - begin)[owner]]
-    radius = radii[owner]
-    half = 0.52 * count  # a little more than a half: a short arc says little of how the circle lies across, there, stay
+def fitted(arcs: list[Places], radii: list[float], centres: list[complex]) -> list[complex]:
+    """The centres of the circles of these radii that fit arcs, points (n,) each, best; `centres` are a first guess."""
+    lengths = [len(arc) for arc in arcs]
+    at, owner, radius = np.concatenate(arcs), np.arange(len(arcs)).repeat(lengths), np.repeat(radii, lengths)
+    begin = [0, *accumulate(lengths[:-1])]
     for _ in range(STEPS):
-        off = centres[owner] - at
+        off = np.array(centres)[owner]
+        off -= at
         distance = np.abs(off)
-        towards = off / np.maximum(distance, 1e-6, out=distance)
+        off /= np.maximum(distance, 1e-6, out=distance)
         # Of unit vectors x + iy the squares add up to x² - y² + 2ixy, the squared lengths to their number.
-        square = np.add.reduceat(towards * towards, begin) / 2
+        squares = np.add.reduceat(off * off, begin).tolist()
         distance -= radius
-        miss = np.add.reduceat(towards * distance, begin)
-        change = (half * miss - square * miss.conj()) / (half * half - (square * square.conj()).real)
-        centres = centres - change
-        if np.abs(change).max() < ENOUGH:
+        misses = np.add.reduceat(off * distance, begin).tolist()
+        most = 0.0
+        for number, (twice, miss, count) in enumerate(zip(squares, misses, lengths, strict=True)):
+            # A little more than a half: a short arc says little of how the circle lies across; there, stay.
+            half, square = 0.52 * count, twice / 2
+            change = (half * miss - square * miss.conjugate()) / (half * half - abs(square) ** 2)
+            centres[number] -= change
+            most = max(most, abs(change))
+        if most < ENOUGH:
             break
     return centres

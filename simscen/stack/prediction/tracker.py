@@ -11,7 +11,7 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.sensing import Scan
 from simscen.model.guards import Prediction
 from simscen.stack.prediction.association import Seen, associate, begin
-from simscen.stack.prediction.clusters import Mask, Places, clusters, runs
+from simscen.stack.prediction.clusters import Mask, Places, clusters, counts, runs
 from simscen.stack.prediction.going import Going
 from simscen.stack.prediction.moving import Moving, Thing, nothing
 from simscen.stack.prediction.seen_through import FARTHEST, Earlier, SeenThrough
@@ -109,13 +109,14 @@ class Tracker:
         if not self._tracks and (appeared is None or found.most(appeared) < FEW):
             return None
         pieces = clusters(found, scan.ranges, scan.angle_min, scan.angle_increment, self._spec.max_radius)
-        came = stood = [False] * len(pieces.first)
-        if looked is not None and appeared is not None and came:
-            count, share = pieces.counts(appeared)
-            came = ((count >= FEW) & (share >= APPEARED)).tolist()
+        came = stood = [False] * len(pieces)
+        if looked is not None and appeared is not None and pieces:
+            come = counts(pieces, appeared)
+            came = [count >= max(FEW, APPEARED * piece.hits) for count, piece in zip(come, pieces, strict=True)]
             if self._tracks:  # else nobody asks
-                stood = (pieces.counts(looked.stood())[1] > STANDS).tolist()
-        return Seen(scan.tick, pieces, sight.lidar, came, stood)
+                stayed = counts(pieces, looked.stood())
+                stood = [count > STANDS * piece.hits for count, piece in zip(stayed, pieces, strict=True)]
+        return Seen(scan.tick, found.places, pieces, sight.lidar, came, stood)
 
     def _tell(self, moving: list[Track], sight: Sight) -> None:
         """Note what moves, and which beams hit it."""

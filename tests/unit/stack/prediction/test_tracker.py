@@ -240,10 +240,10 @@ def test_posts_do_not_move_when_the_robot_skids_aside_and_its_wheels_do_not_know
 def test_the_last_piece_of_a_scan_is_as_near_as_its_last_hit() -> None:
     ranges, step = np.array([50.0] * 10 + [2.0, 1.95, 1.9]), 0.01
     found = runs(ranges, ranges * np.exp(1j * step * np.arange(13)), step, 0.1, 10.0)
-    pieces = clusters(found, ranges, 0.0, step, 1.0)
+    (piece,) = clusters(found, ranges, 0.0, step, 1.0)
     sine = math.sin(1.5 * step)
-    assert pieces.radii.tolist() == pytest.approx([1.9 * sine / (1.0 - sine)])
-    assert abs(pieces.centres[0]) == pytest.approx(1.9 + pieces.radii[0])
+    assert piece.radius == pytest.approx(1.9 * sine / (1.0 - sine))
+    assert abs(piece.centre) == pytest.approx(1.9 + piece.radius)
 
 
 def test_a_scan_that_is_garbage_moves_nothing_and_breaks_nothing() -> None:
