@@ -35,12 +35,19 @@ def command(
         Path | None, typer.Option(help="Take the `stack:` of this file; `pass:` is all else that it needs.")
     ] = None,
     reference: Annotated[
-        str | None, typer.Option(help="The topic of the reference pose; default: what the log itself calls the truth.")
+        str | None,
+        typer.Option(
+            help="The topic of the reference pose, or two frames of /tf as map:base_link; default: what the log itself "
+            "calls the truth."
+        ),
     ] = None,
-    odom: Annotated[str, typer.Option(help="The topic of the odometry.")] = "/odom",
+    odom: Annotated[
+        str, typer.Option(help="The topic of the odometry, or two frames of /tf as odom:base_link.")
+    ] = "/odom",
     scan: Annotated[str, typer.Option(help="The topic of the scans.")] = "/scan",
     start: Annotated[
-        str | None, typer.Option(help="X,Y,YAW in m and rad, or unknown; default: where the reference begins.")
+        str | None,
+        typer.Option(help="X,Y,YAW in m and rad, or unknown; default: where the reference begins, else /initialpose."),
     ] = None,
     lost: Annotated[float, typer.Option(min=0.01, help="Metres off from which on the robot is lost.")] = 1.0,
     seed: Annotated[int, typer.Option(min=1, max=LARGEST_SEED, help="Of the localizer's chance.")] = 1,
@@ -122,9 +129,11 @@ def _estimate(start: str | None, sensed: Sensed) -> Estimate:
     if start == "unknown":
         return Estimate(None)
     if start is None:
-        if not len(sensed.truth):
+        if len(sensed.truth):
+            return Estimate(Pose2(*sensed.truth[0].tolist()))
+        if sensed.told is None:
             raise UsageError("the log has no reference pose to begin with: say --start X,Y,YAW or --start unknown")
-        return Estimate(Pose2(*sensed.truth[0].tolist()))
+        return Estimate(sensed.told)
     try:
         x, y, yaw = (float(part) for part in start.split(","))
     except ValueError as error:

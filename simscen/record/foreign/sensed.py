@@ -24,13 +24,15 @@ from simscen.record.replay import DAMAGE, invalid
 class Sensed:
     """`readings` in the order in which the robot received them; `truth` (n, 3) x, y, yaw in the map at `ticks` (n,).
 
-    Ticks are of 1/TICK_RATE s, from the log's first reading on. `notes` are what is odd about the log.
+    Ticks are of 1/TICK_RATE s, from the log's first reading on. `notes` are what is odd about the log. `told` is where
+    the robot was when the odometry began, by the first thing that somebody told it.
     """
 
     readings: Sequence[Odometry | Scan]
     ticks: Ticks
     truth: Array
     notes: Sequence[str] = ()
+    told: Pose2 | None = None
 
 
 def read_sensed(path: Path, odometry: str, scan: str, reference: str | None) -> Sensed:
@@ -75,7 +77,16 @@ def _sensed(rows: Rows) -> Sensed:
     ticks = np.array(sorted(truth), dtype=np.int64)
     poses = np.array([truth[int(one)] for one in ticks], dtype=np.float64).reshape(-1, 3)
     readings = [one for *_, one in told]
-    return Sensed(readings, ticks, poses, [*rows.notes, *_odd(readings)])
+    return Sensed(readings, ticks, poses, [*rows.notes, *_odd(readings)], _told(rows))
+
+
+def _told(rows: Rows) -> Pose2 | None:
+    """Where the robot was when the odometry began, if it has driven as that says until it was told where it is."""
+    if not rows.initial:
+        return None
+    first = min(rows.initial, key=lambda one: one.order)
+    near = min(rows.odometry, key=lambda one: abs(one.time - first.time))
+    return Pose2(*first.pose).compose(Pose2(*near.pose).between(Pose2(*rows.odometry[0].pose)))
 
 
 def _odd(readings: Sequence[Odometry | Scan]) -> Iterator[str]:

@@ -15,12 +15,13 @@ from simscen.record.foreign.bagfolder import messages_of
 from simscen.record.foreign.mcapfile import Raw
 from simscen.record.foreign.mounts import Mount, mount_of
 from simscen.record.foreign.sensedrows import FURTHEST, Range, Rows, Stamped, Triple, usable
+from simscen.record.foreign.sensedtf import HeardTf, Said, frames_of
 from simscen.record.foreign.unusable import Unusable
 from simscen.record.simtime import SECOND
 
 _SCAN, _TRANSFORMS = "sensor_msgs/msg/LaserScan", "tf2_msgs/msg/TFMessage"
-Said = tuple[int, int, Any]
-"""When a message was logged in ns, its place in the log, and what it says."""
+INITIAL = "/initialpose"
+"""Where RViz and robots tell AMCL where it is."""
 
 
 @dataclass
@@ -30,16 +31,23 @@ class _Heard:
     odometry: list[Said] = field(default_factory=list)
     scans: list[Said] = field(default_factory=list)
     truth: list[Said] = field(default_factory=list)
+    initial: list[Said] = field(default_factory=list)
     links: dict[str, messages.Posed] = field(default_factory=dict)
+    tf: HeardTf = field(default_factory=HeardTf)
     topics: dict[str, str] = field(default_factory=dict)
 
 
 def ros_rows(path: Path, odometry: str, scan: str, reference: str | None) -> Rows:
     """The rows of an MCAP file or a rosbag2 folder, in the order of logging, at the times of their headers.
 
-    Without a `reference`, the truth of simscen's own logs is one. The lidar's mount is what /tf_static says.
+    Without a `reference`, the truth of simscen's own logs is one. The lidar's mount is what /tf_static says. Odometry
+    and reference are those of a topic, or of two frames as `odom:base_link` what /tf says.
     """
     heard = _heard(path, odometry, scan, reference or topics.TRUTH.name)
+    if frames := frames_of(odometry):
+        heard.odometry = heard.tf.between(*frames)
+    if reference is not None and (frames := frames_of(reference)):
+        heard.truth = heard.tf.between(*frames)
     known = f"its topics: {', '.join(sorted(heard.topics)[:12]) or 'none'}"
     rows = Rows(hint=f"{known}; name others with --odom, --scan and --reference")
     if reference is not None and not heard.truth:
@@ -51,19 +59,25 @@ def ros_rows(path: Path, odometry: str, scan: str, reference: str | None) -> Row
     by_log = bool(unstamped)
     rows.odometry += _poses(odometry, heard.odometry, by_log, rows.notes)
     rows.truth += _poses(reference or "the truth", heard.truth, by_log, rows.notes)
+    rows.initial += _poses(INITIAL, heard.initial, by_log, rows.notes)
     rows.scans += _scans(scan, heard, by_log, rows.notes)
-    frames = sorted({one.frame for *_, one in heard.truth if one.frame != "map"})
-    if frames:
-        rows.notes.append(f"{reference} is told in frame {', '.join(frames)!r}; it is taken for that of the map")
+    others = sorted({one.frame for *_, one in heard.truth if one.frame != "map"})
+    if others:
+        rows.notes.append(f"{reference} is told in frame {', '.join(others)!r}; it is taken for that of the map")
     return rows
 
 
 def _heard(path: Path, odometry: str, scan: str, truth: str) -> _Heard:
-    wanted = {odometry, scan, truth, topics.TF_STATIC.name}
+    told = any(map(frames_of, (odometry, truth)))
+    wanted = {odometry, scan, truth, topics.TF_STATIC.name, INITIAL, *([topics.TF.name] if told else [])}
     stream, heard = messages_of(path, wanted), _Heard()
     for order, raw in enumerate(stream):
-        if raw.topic == topics.TF_STATIC.name:
-            heard.links.update({one.child: one for one in _read(raw, {_TRANSFORMS: messages.transforms})})
+        if raw.topic in (topics.TF_STATIC.name, topics.TF.name):
+            links, static = _read(raw, {_TRANSFORMS: messages.transforms}), raw.topic == topics.TF_STATIC.name
+            heard.tf.add(raw.time, order, links, static)
+            heard.links.update({one.child: one for one in links if static})
+        elif raw.topic == INITIAL:
+            heard.initial.append((raw.time, order, _read(raw, messages.POSES)))
         elif raw.topic == scan:
             heard.scans.append((raw.time, order, _read(raw, {_SCAN: messages.laser_scan})))
         elif raw.topic in (odometry, truth):

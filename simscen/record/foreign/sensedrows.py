@@ -34,11 +34,15 @@ class Range:
 
 @dataclass
 class Rows:
-    """What a log says; `hint` is what helps where something is missing, `notes` are what is odd."""
+    """What a log says; `hint` is what helps where something is missing, `notes` are what is odd.
+
+    `initial` is where the robot was told to be.
+    """
 
     odometry: list[Stamped] = field(default_factory=list)
     scans: list[Range] = field(default_factory=list)
     truth: list[Stamped] = field(default_factory=list)
+    initial: list[Stamped] = field(default_factory=list)
     hint: str = ""
     notes: list[str] = field(default_factory=list)
 

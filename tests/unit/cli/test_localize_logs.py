@@ -19,6 +19,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 from foreign_logs import BEGIN, LATENCY, SECOND, STORE, Said, T, header, pose, write_bag, write_mcap
 from recorded_drives import drive, ranges_at, write_map
 
+from simscen.core.geometry import Pose2
+
 GIVEN = ("--map", "room.yaml", "--robot", "turtlebot")
 HUNG = math.pi
 
@@ -110,6 +112,56 @@ def test_the_same_drive_gives_the_same_figures_from_every_kind_of_ros_log(simsce
     assert found[0]["error"]["max"] < 0.2
     assert found[0]["lost"] == []
     assert all(one["error_over_time"] == found[0]["error_over_time"] for one in found)
+
+
+def link(child: str, parent: str, time: int, at: Pose2) -> Any:
+    """tf2_msgs/TFMessage with one transform of the plane."""
+    where = T["geometry_msgs/msg/Transform"](
+        translation=T["geometry_msgs/msg/Vector3"](x=at.x, y=at.y, z=0.0), rotation=pose(*at).orientation
+    )
+    one = T["geometry_msgs/msg/TransformStamped"](header=header(time, parent), child_frame_id=child, transform=where)
+    return T["tf2_msgs/msg/TFMessage"](transforms=[one])
+
+
+def told_by_tf() -> Iterable[Said]:
+    """The same drive by a robot that has neither /odom nor /gt: map → odom → base_link."""
+    for message in said():
+        if message.topic in ("/tf_static", "/scan"):
+            yield message
+    for t, there, odom in drive():
+        time, at = BEGIN + round(t * SECOND), Pose2(*odom)
+        yield Said("/tf", time + LATENCY - 2, link("odom", "map", time, Pose2(*there).compose(at.inverse())))
+        yield Said("/tf", time + LATENCY - 1, link("base_link", "odom", time, at))
+
+
+def test_odometry_and_reference_are_what_tf_says_of_two_frames(simscen, tmp_path: Path) -> None:
+    write_map(tmp_path)
+    write_bag(tmp_path / "topics", said())
+    write_bag(tmp_path / "tf", sorted(told_by_tf(), key=lambda one: one.time))
+    by_topics = localized(simscen, "topics")
+    ended = simscen("localize", "tf", *GIVEN, "--odom", "odom:base_link", "--reference", "map:base_link", "--json")
+    by_tf = json.loads(ended.out)
+    assert by_tf["scans"] == by_topics["scans"]
+    assert by_tf["error"] == pytest.approx(by_topics["error"], abs=1e-6)
+    ended = simscen("localize", "tf", *GIVEN, "--odom", "odom:base", "--reference", "map:base_link")
+    assert ended.code == 2
+    assert "tf does not connect odom with base; frames: base_link, laser, map, odom" in ended.err
+
+
+def test_without_a_reference_the_robot_begins_where_initialpose_says(simscen, tmp_path: Path) -> None:
+    """Also where that was told on the way: the odometry leads back to the beginning."""
+    write_map(tmp_path)
+    without = [message for message in said() if message.topic != "/gt"]
+    t, there, _ = drive()[60]
+    time = BEGIN + round(t * SECOND)
+    where = T["geometry_msgs/msg/PoseWithCovariance"](pose=pose(*there), covariance=np.zeros(36))
+    told = T["geometry_msgs/msg/PoseWithCovarianceStamped"](header=header(time, "map"), pose=where)
+    write_bag(tmp_path / "told", [*without, Said("/initialpose", time + LATENCY, told)])
+    write_bag(tmp_path / "untold", without)
+    ended = simscen("localize", "told", *GIVEN, "--json")
+    x, y, _ = drive()[-1][1]
+    assert json.loads(ended.out)["end"][:2] == pytest.approx([x, y], abs=0.15)
+    assert simscen("localize", "untold", *GIVEN).code == 2
 
 
 @pytest.mark.parametrize(
