@@ -1,6 +1,6 @@
 """Samples of the truth that nobody has looked at yet: what comes of the engine's numbers can wait.
 
-Who looks is the log, some 0.4 s later: what works samples out has left the processor's caches after each beat, so that
+Who looks is the log, up to 0.9 s later: what works samples out has left the processor's caches after each beat, so that
 several in a row take half the time.
 """
 
