@@ -45,7 +45,7 @@ def test_where_the_robot_was_is_told_in_the_frame_in_which_it_is_told_where_it_i
 
 def test_before_any_reading_it_is_at_the_origin() -> None:
     nothing = history()
-    assert not nothing
+    assert not nothing.begun
     assert nothing.held(5) == nothing.now == Pose2(0.0, 0.0)
     assert nothing.then(Pose2(1, 2, 0.3), 5) == pytest.approx(Pose2(1, 2, 0.3))
     assert nothing.at(0) is None
@@ -72,3 +72,15 @@ def test_a_reading_that_is_not_newer_is_refused(tick: int) -> None:
 def test_a_reading_that_is_not_a_place_is_refused(bad: float, part: int) -> None:
     given = history((10, Pose2(1, 1, 0)))
     assert not given.add(20, Pose2(*(bad if part == k else 0.0 for k in range(3))))
+
+
+def test_the_way_reaches_farther_back_than_what_can_be_looked_up_and_begins_anew_with_another_odometry() -> None:
+    kept = OdometryHistory(RATE, way=60)
+    for tick in range(0, 1000, 10):
+        kept.add(tick, Pose2(0.1 * tick, 0.0, 0.0))
+    assert 990 - 61 * RATE <= kept.way()[0].x / 0.1 <= 990 - 60 * RATE
+    assert kept.way()[-1] == kept.now
+    assert kept.at(990 - KEPT * RATE - 1) is None
+    kept.forget()
+    assert not kept.way()
+    assert kept.add(5, Pose2(1.0, 0.0, 0.0))
