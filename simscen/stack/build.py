@@ -65,16 +65,17 @@ def reference_stack(spec: StackSpec, setting: Setting) -> ReferenceStack:
         surroundings = replace(surroundings, map=surroundings.map.refined(spec.costmap.resolution))
     robot, period = surroundings.robot, clock.period(spec.controller_frequency)
     latency = _ticks(spec, clock)
+    odometry = OdometryHistory(surroundings.tick_rate, way=WAY)
     driving = replace(
         setting,
         surroundings=surroundings,
         name="controller",
         resolution=spec.local_costmap.completed(spec.costmap).resolution,
+        way=odometry.way,
     )
     controller: Controller = made(InstalledController, spec.controller, driving)
     costmaps = Costmaps(spec, surroundings, controller.full_speed * spec.controller.looks_ahead, latency["costmap"])
-    odometry = OdometryHistory(surroundings.tick_rate, way=WAY)
-    driving = replace(driving, clear_costmap=costmaps.clear, clear_around=costmaps.clear_around, way=odometry.way)
+    driving = replace(driving, clear_costmap=costmaps.clear, clear_around=costmaps.clear_around)
     planning = replace(driving, name="planner", resolution=costmaps.wide.view.resolution)
     plans = PlanKeeper(
         spec.planner,

@@ -40,7 +40,7 @@ class RegulatedPurePursuit(PathFollower):
         super().__init__(spec.desired_linear_vel, robot)
         self._spec, self._robot, self._free_way = spec, robot, FreeWay(footprint)
         self._goal_pose = GoalPose(robot, spec.rotate_to_heading_angular_vel, spec.max_angular_accel, period)
-        self._turning = TurningRoom(footprint)
+        self._turning = TurningRoom(setting)
         self._arc: tuple[Pose2, Twist] | None = None
 
     def begin(self) -> None:

@@ -14,9 +14,9 @@ from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.arcs import poses_along
 from simscen.stack.behaviors.motions import BackUp, Spin
 from simscen.stack.behaviors.retrace import Retrace
-from simscen.stack.behaviors.trail import Trail
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.protocols import Behavior, CostmapView, NavigationFailure, RobotModel, Surroundings
+from simscen.stack.trail import Trail
 from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot, setting
 
 LONG = box_robot(0.42, 0.42)

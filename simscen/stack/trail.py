@@ -26,6 +26,8 @@ class Trail:
         back = self._without_loops(self._thinned(np.array([pose, *reversed(way)], dtype=np.float64)))
         x, y, yaw = back[-1].tolist()
         end = (x - length * math.cos(yaw), y - length * math.sin(yaw), yaw)
+        self.known = len(self._even(back))
+        """How many of the poses it really came by."""
         self.poses = self._even(np.concatenate((back, [end])))
         self.along = np.concatenate(([0.0], np.cumsum(self.apart(self.poses[1:], self.poses[:-1]))))
         steps = np.hypot(np.diff(self.poses[:, 0]), np.diff(self.poses[:, 1]))

@@ -1,0 +1,135 @@
+"""Which velocity leads a robot back the way it came."""
+
+import math
+from itertools import product
+
+import numpy as np
+
+from simscen.core.geometry import Array, Pose2
+from simscen.core.motion import STOP, Twist
+from simscen.stack.arcs import poses_along
+from simscen.stack.footprint import Mask, lethal_near
+from simscen.stack.protocols import CostmapView, RobotModel
+from simscen.stack.setting import Setting
+from simscen.stack.trail import Trail
+
+AHEAD = 1.0
+"""Seconds for which each command is tried out: 15 cm at Nav2's backup_speed."""
+TIMES: Array = np.linspace(0.0, AHEAD, 11)
+AT_LEAST = 3
+"""Tenths of it for which one must be free, where none is for all."""
+SLACK = 0.3
+"""Cells by which it may come nearer to something than it came on its way."""
+OFF = 2.0
+"""Metres of the way that are worth as much as a metre less beside it."""
+GAIN = 0.01
+"""Metres that a command must be worth more than to stand."""
+WINDOW = 0.5
+"""Metres of the way ahead among which the robot looks for where it is."""
+SPEEDS = (-1.0, -0.5, 0.0, 0.5)
+"""Parts of the speed; forward, too, for a way may have had cusps."""
+RATES = (0.0, 0.07, -0.07, 0.15, -0.15, 0.3, -0.3, 0.5, -0.5, 0.8, -0.8)
+"""rad/s."""
+SIDEWAYS = (0.0, 0.5, -0.5, 1.0, -1.0)
+"""Parts of the speed, for a base that can."""
+
+
+class WayBack:
+    """Leads back the way that a robot came, turns included; straight where nobody knows it.
+
+    Who is askew between two posts can neither turn nor leave straight; but he came in, so he can go out. Each step it
+    tries a few velocities on the local costmap, and takes the one that gets the robot farthest back while it keeps to
+    the way: wheels that slip do not lead it off.
+    """
+
+    def __init__(self, setting: Setting, speed: float) -> None:
+        """`speed`: m/s at most; less where the base cannot reverse as fast."""
+        self._footprint, self._way = setting.footprint, setting.way
+        self.speed = min(speed, setting.robot.max_reverse)
+        """m/s; 0 for a robot without a reverse gear."""
+        self._commands = _possible(setting.robot, self.speed)
+        there = np.array([AHEAD])
+        self._ends = np.stack([poses_along(Pose2(0.0, 0.0), each, there)[0] for each in (*self._commands, STOP)])
+
+    def start(self, pose: Pose2, length: float) -> None:
+        """Begin from this pose in the odom frame, to go back so many metres at most."""
+        lever = self._footprint.circumscribed
+        self._trail, self._at = Trail(self._way(), pose, lever, length + self.speed * AHEAD), 0
+
+    def locate(self, pose: Pose2) -> None:
+        """Note where the robot is; it never goes forward again."""
+        ahead = self._ahead()
+        self._at += int(self._trail.apart(self._trail.poses[ahead], np.array(pose)).argmin())
+
+    @property
+    def driven(self) -> float:
+        """Metres that the base has come back."""
+        return float(self._trail.driven[self._at])
+
+    @property
+    def moved(self) -> float:
+        """Metres that its hull has, which a turn moves, too."""
+        return float(self._trail.along[self._at])
+
+    def _ahead(self) -> slice:
+        along = self._trail.along
+        return slice(self._at, int(np.searchsorted(along, along[self._at] + WINDOW, side="right")))
+
+    def command(self, pose: Pose2, costmap: CostmapView, partly: bool = False) -> Twist | None:
+        """The command that gets it farthest back of those that are free; `partly`: else of those that are for a moment.
+
+        None where to stand is as good.
+        """
+        *worth, standing = self._worth(pose).tolist()
+        better = sorted((k for k, gets in enumerate(worth) if gets > standing + GAIN), key=lambda k: -worth[k])
+        for_now: Twist | None = None
+        for command in (self._commands[k] for k in better):
+            blocked = self._blocked(pose, poses_along(pose, command, TIMES), costmap)
+            if not blocked.any():
+                return command
+            if partly and for_now is None and blocked.argmax() > AT_LEAST:
+                for_now = command
+        return for_now
+
+    def _blocked(self, pose: Pose2, poses: Array, costmap: CostmapView) -> Mask:
+        """Which of the poses (n, 3) are in something, and further than the robot is now, or was on its way here.
+
+        It came, so that what seems to stand there by less than a cell does not; but in what it drove through by more
+        something has come to stand since.
+        """
+        blocked: Mask = ~self._footprint.free(costmap, poses)
+        if not blocked.any():
+            return blocked
+        edge = costmap.resolution
+        cells = lethal_near(costmap, pose.x, pose.y, self._footprint.circumscribed + self.speed * AHEAD + edge)
+        known = self._trail.poses[self._ahead()][: max(0, self._trail.known - self._at)]
+        came = self._footprint.gaps(cells, known).min(axis=0, initial=edge)
+        now = self._footprint.gaps(cells, np.array([pose]))[0]
+        least = np.minimum(np.where(came < -edge, edge, came), np.maximum(now, -edge / 2))
+        nearer = self._footprint.gaps(cells, poses) < np.minimum(least - SLACK * edge, edge / math.sqrt(2.0))
+        return np.asarray(blocked & nearer.any(axis=1))
+
+    def _worth(self, pose: Pose2) -> Array:
+        """How far back (commands + 1,) each leads, less what it leads beside the way; last, what standing does."""
+        cosine, sine = math.cos(pose.yaw), math.sin(pose.yaw)
+        ends = np.column_stack((
+            pose.x + cosine * self._ends[:, 0] - sine * self._ends[:, 1],
+            pose.y + sine * self._ends[:, 0] + cosine * self._ends[:, 1],
+            pose.yaw + self._ends[:, 2],
+        ))  # fmt: skip
+        ahead = self._ahead()
+        off = self._trail.apart(ends[:, None], self._trail.poses[None, ahead])
+        worth: Array = (self._trail.along[ahead] - OFF * off).max(axis=1)
+        return worth
+
+
+def _possible(robot: RobotModel, speed: float) -> list[Twist]:
+    """What such a base may be told at that speed."""
+    commands = list[Twist]()
+    for part, side, rate in product(SPEEDS, SIDEWAYS if robot.max_lateral > 0.0 else (0.0,), RATES):
+        fastest = robot.max_angular
+        if robot.turning_radius > 0.0:
+            fastest = min(fastest, abs(part) * speed / robot.turning_radius)
+        turn = max(-fastest, min(rate, fastest))
+        commands.append(Twist(part * speed, side * min(speed, robot.max_lateral), turn))
+    return [each for each in dict.fromkeys(commands) if each != STOP]
