@@ -8,8 +8,9 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array
 from simscen.core.passage import Passage, Point
+from simscen.ways.polyline import resampled
 from simscen.worlds.clearance import ClearanceField
-from simscen.worlds.taut import length, resample
+from simscen.worlds.taut import length
 
 WIDEST = 4.0
 """Metres: no wider passage is looked at."""
@@ -27,7 +28,7 @@ def passages(way: Array, goal: str, field: ClearanceField) -> tuple[Passage, ...
     """The passages of a way (n, 2) to `goal`, in its direction; widths are exact to some 2 cm."""
     if field.outline is None:
         return ()
-    points = resample(way, max(SPACING, length(way) / MOST))
+    points = resampled(way, max(SPACING, length(way) / MOST))
     found: dict[tuple[int, int], float] = {}
     for point in points:
         places = ((pair, _crossed(field.outline.data[list(pair)], points)) for pair in _pairs(point, field))

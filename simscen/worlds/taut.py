@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from simscen.core.geometry import Array
+from simscen.ways.polyline import resampled
 from simscen.worlds.clearance import ClearanceField
 
 SETTLED = 0.001
@@ -23,7 +24,7 @@ def tighten(way: Array, field: ClearanceField, radius: float) -> Array:
     allowed = radius - 0.1 * field.grid.resolution
     for _ in range(MOST_ROUNDS):
         before = length(way)
-        way = _slide(resample(_straighten(way, field, allowed), field.grid.resolution), field, radius)
+        way = _slide(resampled(_straighten(way, field, allowed), field.grid.resolution), field, radius)
         if length(way) > (1 - SETTLED) * before:
             break
     return _straighten(way, field, allowed)
@@ -39,14 +40,6 @@ def is_clear(a: Array, b: Array, field: ClearanceField, allowed: float) -> bool:
     count = 2 + math.ceil(2 * math.dist(a, b) / field.grid.resolution)
     line = a + np.linspace(0.0, 1.0, count)[:, None] * (b - a)
     return bool(field.keeps(line, allowed).all())
-
-
-def resample(way: Array, spacing: float) -> Array:
-    """The same way with points at most `spacing` metres apart."""
-    steps = np.linalg.norm(np.diff(way, axis=0), axis=1)
-    along = np.concatenate(([0.0], np.cumsum(steps)))
-    wanted = np.linspace(0.0, along[-1], 1 + max(1, math.ceil(along[-1] / spacing)))
-    return np.column_stack((np.interp(wanted, along, way[:, 0]), np.interp(wanted, along, way[:, 1])))
 
 
 def _straighten(way: Array, field: ClearanceField, allowed: float) -> Array:

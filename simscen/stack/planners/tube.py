@@ -13,9 +13,12 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array
 from simscen.stack.planners.rates import STEP, Rates
+from simscen.ways.polyline import resampled
 
 ROUNDS = ((0.3, 0.4, 9), (0.3, 0.2, 9), (0.25, 0.12, 7), (0.2, 0.06, 7))
 """Metres between stations, metres to either side, points across."""
+LEAST_LEGS = 2
+"""So that there is a station to move."""
 SMOOTHINGS, MOST_RISE = 8, 1.003
 """Passes that take out what the points' own spacing leaves, and how much dearer (ratio) the path may get by them."""
 Costs = npt.NDArray[np.float32]
@@ -27,7 +30,7 @@ def eased(rates: Rates, points: Array) -> Array:
     cost = rates.along(points)
     for station, side, across in ROUNDS:
         for stride in (rates.stride, STEP * rates.resolution):
-            other = _through(rates, _stations(points, station), np.linspace(-side, side, across), stride)
+            other = _through(rates, resampled(points, station, LEAST_LEGS), np.linspace(-side, side, across), stride)
             if math.isfinite(moved := rates.along(other)):
                 break
         if moved < cost:
@@ -37,7 +40,7 @@ def eased(rates: Rates, points: Array) -> Array:
 
 def _cut_short(rates: Rates, points: Array) -> Array:
     """From each kept point straight on to the farthest that it costs no more to go straight to, found by doubling."""
-    places = _stations(points, ROUNDS[0][0])
+    places = resampled(points, ROUNDS[0][0], LEAST_LEGS)
     rows = places.tolist()
     cost = [0.0]
     for (ax, ay), (bx, by) in pairwise(rows):
@@ -55,13 +58,6 @@ def _cut_short(rates: Rates, points: Array) -> Array:
             near, step = far, 2 * step
         kept.append(near)
     return places[kept]
-
-
-def _stations(points: Array, spacing: float) -> Array:
-    """The path with points evenly spaced, about so many metres apart."""
-    along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
-    wanted = np.linspace(0.0, along[-1], max(3, math.ceil(along[-1] / spacing) + 1))
-    return np.column_stack((np.interp(wanted, along, points[:, 0]), np.interp(wanted, along, points[:, 1])))
 
 
 def _through(rates: Rates, stations: Array, offsets: Array, stride: float) -> Array:
