@@ -70,7 +70,7 @@ class ParticleFilter:
     @property
     def sure(self) -> bool:
         """Whether the map showed nearly all that the last scan saw, and the particles were one narrow group."""
-        known = self._trusted == 1.0 and self.fitting >= SURE and self._settled == 1.0
+        known = self._trusted == 1.0 and self.fitting >= SURE
         return known and self._together and self._recovery.share == 0
 
     def surprised(self, scan: Scan, pose: Pose2) -> bool:

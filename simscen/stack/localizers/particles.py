@@ -1,5 +1,6 @@
 """A weighted set of poses, and the two ways to begin one: around a guess, or anywhere."""
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -40,8 +41,10 @@ class Particles:
 
     @cached_property
     def extent(self) -> tuple[float, float, float]:
-        """How far they lie apart in x, y and yaw, which does not know that -π is π."""
+        """How far they lie apart in x, y and yaw, about -π as elsewhere."""
         dx, dy, turned = (self.poses.max(axis=0) - self.poses.min(axis=0)).tolist()
+        if turned > math.pi:
+            turned = min(turned, float(np.ptp(self.poses[:, 2] % (2 * math.pi))))
         return dx, dy, turned
 
     @cached_property
