@@ -22,8 +22,6 @@ from simscen.stack.odometry_history import OdometryHistory
 
 SURE_AFTER = 8
 """Corrections in a row in which nothing was amiss, after which a robot is sure of its place."""
-GLANCE = 1.25
-"""Times update_min_d and update_min_a: after so much it compares a scan with the map."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +75,7 @@ class AmclLocalizer:
         self._matcher = ScanMatcher() if self._spec.match_scans else None
         self._scatter = Scatter() if self._spec.covariance == "scatter" and self._matcher is not None else None
         self._matched: tuple[str, Pose2] | None = None
-        self._torn, self._calm, self._glanced = STILL, 0, False
+        self._torn, self._calm, self._glances = STILL, 0, 0
         self._due: dict[str, bool] = {}
         self._waiting: dict[str, Scan] = {}
         self._belief: Belief | None = None
@@ -167,7 +165,7 @@ class AmclLocalizer:
             covariance = spread(self._filter.particles, carried)
             self._correction = _Correction(carried, covariance, odometry, self._correction.tick)
         calm = agreed and answer is not None and self._filter.sure
-        self._calm, self._glanced = self._calm + 1 if calm else 0, False
+        self._calm, self._glances = self._calm + 1 if calm else 0, 0
 
     def _matched_step(self, matcher: ScanMatcher, scan: Scan, odometry: Pose2) -> Step | None:
         """The motion since the last correction as the first lidar saw it; None where it did not see it."""
@@ -198,14 +196,15 @@ class AmclLocalizer:
     def _worth_looking(self, scan: Scan, odometry: Pose2, delta: Pose2) -> bool:
         """Whether the robot moved by the thresholds; who is sure of its place by more, unless a scan is a surprise.
 
-        On the way one scan is compared with the map where odometry says that the robot is: wheels may slip.
+        On the way, at the thresholds and halfway to twice of them, one scan each is compared with the map where odometry
+        says that the robot is: wheels may slip.
         """
         sure = self._calm >= SURE_AFTER
         if self._moved_by(self._spec.sure_update_factor if sure else 1.0, delta):
             return True
-        if not sure or self._glanced or not self._moved_by(GLANCE, delta):
+        if not sure or not self._moved_by(1.0 + self._glances / 2, delta):
             return False
-        self._glanced = True
+        self._glances += 1
         return self._filter.surprised(scan, self._correction.map_from_odom.compose(odometry))
 
     def _moved_by(self, times: float, delta: Pose2) -> bool:
