@@ -196,8 +196,8 @@ class AmclLocalizer:
     def _worth_looking(self, scan: Scan, odometry: Pose2, delta: Pose2) -> bool:
         """Whether the robot moved by the thresholds; who is sure of its place by more, unless a scan is a surprise.
 
-        On the way, at the thresholds and halfway to twice of them, one scan each is compared with the map where odometry
-        says that the robot is: wheels may slip.
+        On the way, at the thresholds and after half as much more, a scan is compared with the map where odometry says
+        that the robot is: wheels may slip.
         """
         sure = self._calm >= SURE_AFTER
         if self._moved_by(self._spec.sure_update_factor if sure else 1.0, delta):
