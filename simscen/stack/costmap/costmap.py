@@ -156,7 +156,8 @@ class Costmap:
         self._live.roll(window)
         if self._tracks:
             self._unknown = carried(self._unknown, before, window, True)
-        self._show()
+        rows, columns = window.shape
+        self._touch((0, 0), (rows - 1, columns - 1))
 
     def _layer(self, centre: Pose2) -> StaticLayer:
         return self._layer_in(window_around(centre, self._size, self._spec.resolution))
@@ -172,6 +173,7 @@ class Costmap:
     def _lay(self, layer: StaticLayer) -> None:
         self._frame = layer.frame
         self._static_squared = squared_distances(layer.lethal, self._margin)
+        self._walled = bool(layer.lethal.any())
 
     def _show(self) -> None:
         """Compute everything again."""
@@ -228,6 +230,8 @@ class Costmap:
             slice(inner[0].start - outer[0].start, inner[0].stop - outer[0].start),
             slice(inner[1].start - outer[1].start, inner[1].stop - outer[1].start),
         )
-        squared = np.minimum(self._static_squared[inner], squared_distances(self._obstacles(outer), self._margin)[part])
+        squared = squared_distances(self._obstacles(outer), self._margin)[part]
+        if self._walled:
+            squared = np.minimum(self._static_squared[inner], squared)
         self._distance[inner] = self._inflation.metres.take(squared)
         self._costs[inner] = self._inflation.costs(squared, self._unknown[inner] if self._tracks else None)

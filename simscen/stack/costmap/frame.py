@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -44,15 +45,33 @@ class Frame:
         rows, columns = cells[:, 0], cells[:, 1]
         return (rows >= 0) & (columns >= 0) & (rows < self.shape[0]) & (columns < self.shape[1])
 
-    def numbers(self, points: Plane) -> Numbers:
-        """The cells under those of the points (n,) that lie on the grid."""
-        local = (points - complex(*self.origin)) * (1.0 / self.resolution)
+    def numbers(self, points: Plane, centre: complex, reach: float) -> Numbers:
+        """The cells under those of the points (n,) that lie on the grid; all lie within `reach` of the `centre`.
+
+        Where all of that is on the grid, nobody is asked.
+        """
+        local = points - complex(*self.origin)
+        local *= 1.0 / self.resolution
+        if self._holds(centre, reach + self.resolution):
+            whole: Numbers = local.view(np.float64).astype(np.int64).reshape(-1, 2).dot(self._steps)
+            return whole
         cells = np.floor(local.view(np.float64)).astype(np.int64)
         columns, rows = cells[::2], cells[1::2]
         # Below zero is far beyond every grid without a sign.
         inside = (columns.view(np.uint64) < self.shape[1]) & (rows.view(np.uint64) < self.shape[0])
         numbers: Numbers = (rows * self.shape[1] + columns)[inside]
         return numbers
+
+    def _holds(self, centre: complex, reach: float) -> bool:
+        """Whether all that is within `reach` metres of a point lies on the grid."""
+        (left, low), (rows, columns), x, y = self.origin, self.shape, centre.real, centre.imag
+        wide, high = columns * self.resolution, rows * self.resolution
+        return left + reach <= x <= left + wide - reach and low + reach <= y <= low + high - reach
+
+    @cached_property
+    def _steps(self) -> Numbers:
+        """What makes a cell's number of its column and row."""
+        return np.array((1, self.shape[1]))
 
     def points(self, numbers: Numbers) -> Plane:
         """The centres (n,) of cells."""

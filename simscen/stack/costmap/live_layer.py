@@ -27,6 +27,8 @@ class LiveLayer:
 
     def __init__(self, spec: CostmapSpec, inscribed: float, frame: Frame) -> None:
         self._spec, self._inscribed = spec, inscribed
+        self._walls: Squared | None = None
+        self._off_walls: Mask = np.zeros(0, dtype=bool)
         self.forget(frame)
 
     def forget(self, frame: Frame) -> None:
@@ -84,11 +86,17 @@ class LiveLayer:
     def on_scan(self, base: Pose2, scan: Scan, walls: Squared) -> Numbers:
         """Clear what the beams pass through, then mark what they hit; returns the cells that have changed."""
         spec, frame, scanned = self._spec, self._frame, self._scanned.reshape(-1)
-        seen = frame.numbers(hits(scan, base, spec.obstacle_min_range, spec.obstacle_max_range))
-        known = scanned.take(seen)
-        fresh = seen[~known]
-        fresh = fresh[walls.take(fresh) > BESIDE_A_WALL]
+        points, lidar = hits(scan, base, spec.obstacle_min_range, spec.obstacle_max_range)
+        seen = frame.numbers(points, lidar, spec.obstacle_max_range)
+        if walls is not self._walls:
+            self._walls, self._off_walls = walls, walls > BESIDE_A_WALL
         marks, lost = self._marks, NONE
+        if not len(marks):
+            fresh = seen[self._off_walls.take(seen)]
+            if not len(fresh):
+                return NONE
+        known = scanned.take(seen)
+        fresh = seen[~known & self._off_walls.take(seen)]
         if len(marks):
             points = frame.points(marks)
             gone = marks[crossed(points, frame.resolution, scan, base, spec)]

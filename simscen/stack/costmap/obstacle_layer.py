@@ -26,11 +26,15 @@ class ScanAmongMoving(Scan):
     moving: npt.NDArray[np.bool_] = field(kw_only=True)
 
 
-def hits(scan: Scan, base: Pose2, nearest: float, farthest: float) -> Plane:
-    """Map points x + iy (n,) of the beams that hit something that stands, `nearest` to `farthest` metres away."""
+def hits(scan: Scan, base: Pose2, nearest: float, farthest: float) -> tuple[Plane, complex]:
+    """Map points x + iy (n,) of the beams that hit something that stands, `nearest` to `farthest` metres away.
+
+    And where the lidar is.
+    """
+    place = _place(scan, base)
     points: Plane = _ends(scan, nearest, farthest) * cmath.rect(1.0, base.yaw)
-    points += _place(scan, base)
-    return points
+    points += place
+    return points, place
 
 
 @lru_cache(maxsize=2)

@@ -32,7 +32,7 @@ def test_crossed_cells_are_those_a_walk_along_the_beams_comes_through(beams: int
     centres = FRAME.points(np.arange(len(cells)))
     found = {tuple(cell) for cell in cells[crossed(centres, FRAME.resolution, scan, base, spec)].tolist()}
     truth = walked(scan, base, spec)
-    points = hits(scan, base, 0.0, 99.0)
+    points, _ = hits(scan, base, 0.0, 99.0)
     ends = {tuple(cell) for cell in FRAME.cells(np.column_stack((points.real, points.imag))).tolist()}
     # Cells at a beam's end may go either way: marking comes after clearing. Near the lidar many beams share a cell.
     lidar = base.compose(scan.mount)
@@ -44,5 +44,5 @@ def test_crossed_cells_are_those_a_walk_along_the_beams_comes_through(beams: int
 
 def test_hits_are_points_in_the_map() -> None:
     scan = Scan("l", 0, np.array([1.0, np.inf, np.nan, 2.0, 9.0]), 0.0, math.pi / 2, 0.05, 12.0, Pose2(0.1, 0, 0))
-    points = hits(scan, Pose2(1.0, 1.0, math.pi / 2), 0.0, 2.5)
+    points, _ = hits(scan, Pose2(1.0, 1.0, math.pi / 2), 0.0, 2.5)
     assert points == pytest.approx(np.array([1.0 + 2.1j, 3.0 + 1.1j]))
