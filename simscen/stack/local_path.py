@@ -1,7 +1,7 @@
 """The plan as a controller follows it: in the odom frame, in which its costmap is."""
 
-from simscen.core.geometry import Pose2
-from simscen.core.navigation import Path
+from simscen.core.geometry import Array, Pose2
+from simscen.core.navigation import Goal, Path
 from simscen.stack.frames import Frames, placed
 from simscen.stack.protocols import Controller
 from simscen.stack.replanning import PlanInForce
@@ -11,27 +11,39 @@ REACH = 1.0
 MOVED = 0.01
 """Metres by which the path may lie beside where it belongs before the controller is told of it. The localizer's
 corrections are larger, and those of every beat that follow an odometry's drift smaller."""
+STANDS = 1e-9
+"""Metres by which rounding alone may seem to move it."""
 
 
 class LocalPath:
     """Tells the controller a new plan, and the rest of the one it follows whenever map→odom has moved.
 
     Nav2's controllers transform the plan in each cycle; here one that is told nothing new can keep what it knows of it.
+    Most of the time map→odom stands still, and nothing is to be done.
     """
 
     def __init__(self, controller: Controller) -> None:
         self._controller = controller
         self._plan: PlanInForce | None = None
-        self._odom_from_map = Pose2(0.0, 0.0)
+        self._told = self._odom_from_map = Pose2(0.0, 0.0)
+        self._goal: Goal | None = None
+        self._local_goal: Goal | None = None
 
-    def tell(self, plan: PlanInForce, frames: Frames) -> None:
-        """The plan in force, while the robot is here."""
+    def tell(self, plan: PlanInForce, goal: Goal, frames: Frames) -> Goal:
+        """The plan in force, while the robot is here. Returns the goal in the odom frame."""
+        stands = frames.moved(self._odom_from_map, REACH) <= STANDS
+        if not stands:
+            self._odom_from_map = frames.odom_from_map
         if plan is not self._plan:
-            points = plan.path.points
-        elif frames.moved(self._odom_from_map, REACH) > MOVED:
+            self._follow(plan, plan.path.points)
+        elif not stands and frames.moved(self._told, REACH) > MOVED:
             plan.locate(frames.pose)
-            points = plan.ahead
-        else:
-            return
-        self._plan, self._odom_from_map = plan, frames.odom_from_map
-        self._controller.set_path(Path(placed(frames.odom_from_map, points), plan.path.tick))
+            self._follow(plan, plan.ahead)
+        local = self._local_goal
+        if local is None or goal is not self._goal or not stands:
+            self._goal, self._local_goal = goal, (local := goal.at(self._odom_from_map.compose(goal.pose)))
+        return local
+
+    def _follow(self, plan: PlanInForce, points: Array) -> None:
+        self._plan, self._told = plan, self._odom_from_map
+        self._controller.set_path(Path(placed(self._told, points), plan.path.tick))

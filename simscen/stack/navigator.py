@@ -113,9 +113,8 @@ class Navigator:
         if plan is None:
             return STOP
         self._replanned = False
-        self._path.tell(plan, frames)
         following = self.via[0] if self.via else goal  # a tour may end where it begins: only its last drive ends it
-        local = following.at(frames.odom_from_map.compose(following.pose))
+        local = self._path.tell(plan, following, frames)
         command = self._controller.command(frames.odometry, twist, self._costmaps.near.view, local)
         if held:
             raise NavigationFailure(ErrorCode.FAILED_TO_MAKE_PROGRESS, "the collision monitor holds the robot")

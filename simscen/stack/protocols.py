@@ -200,6 +200,19 @@ class Controller(Protocol):
         ...
 
 
+@runtime_checkable
+class DrivesArcs(Protocol):
+    """What a controller that ships can do besides: say of which arc its local plan is the beginning.
+
+    Nobody need place it point by point in another frame then.
+    """
+
+    @property
+    def arc(self) -> tuple[Pose2, Twist] | None:
+        """The pose and the velocity of its last command; None before there was any."""
+        ...
+
+
 class Behavior(Protocol):
     """A recovery behaviour such as spin: asked again and again until it is done. Its poses are in the odom frame."""
 

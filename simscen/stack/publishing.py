@@ -11,9 +11,10 @@ from simscen.core.geometry import Pose2
 from simscen.core.grid import UNKNOWN, OccupancyGrid
 from simscen.core.navigation import Path
 from simscen.core.trace import CostGrid
+from simscen.stack.arcs import SHOWN, arc
 from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.frames import Frames, placed
-from simscen.stack.protocols import Controller, CostmapView, Localizer
+from simscen.stack.protocols import Controller, CostmapView, DrivesArcs, Localizer
 
 BELIEF_RATE, LOCAL_PLAN_RATE = 10.0, 5.0
 """Hz: of beliefs without a scan, and of local plans."""
@@ -43,6 +44,7 @@ class Publishing:
         self.belief_due = 0
         """The tick from which on the belief is told without a scan."""
         self._local_plan_due = self._local_plan_period
+        self._arcs = controller if isinstance(controller, DrivesArcs) else None
         self._plan: Path | None = None
         self._wide, self._near = _Drawn("global", "map", GLOBAL_RATE), _Drawn("local", local_frame, LOCAL_RATE)
 
@@ -59,13 +61,16 @@ class Publishing:
         if tick >= self._wide.due or tick >= self._near.due:
             drawn = self._drawn(tick, costmaps)
         if plan is None or plan is self._plan:
-            return None, local_plan, drawn
+            return NOTHING_NEW if local_plan is None and not drawn else (None, local_plan, drawn)
         self._plan = plan
         return plan, local_plan, drawn
 
     def _driven(self, tick: int, frames: Frames) -> Path | None:
         """What the controller expects to drive, in the map frame."""
         self._local_plan_due = tick + self._local_plan_period
+        if self._arcs is not None:
+            driven = self._arcs.arc
+            return None if driven is None else Path(arc(frames.map_from_odom.compose(driven[0]), driven[1], SHOWN))
         plan = self._controller.local_plan
         return None if plan is None else Path(placed(frames.map_from_odom, plan.points), plan.tick)
 

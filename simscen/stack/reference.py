@@ -176,7 +176,8 @@ class ReferenceStack:
         if not self._prediction.calm or self._moves:
             self._foretell(tick, frames)
         self._control(tick, frames)
-        return self._publishing.news(tick, frames, self.plan, self._costmaps)
+        plan = self._navigator.plans.plan
+        return self._publishing.news(tick, frames, None if plan is None else plan.path, self._costmaps)
 
     def _where(self) -> Pose2:
         """Where the robot believes itself."""

@@ -2,13 +2,11 @@
 
 import math
 
-import numpy as np
-
-from simscen.core.geometry import Array, Pose2, wrap
+from simscen.core.geometry import Pose2, wrap
 from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import ErrorCode, Goal, Path
 from simscen.model.controllers import RegulatedPurePursuit as RppSpec
-from simscen.stack.arcs import poses_along
+from simscen.stack.arcs import SHOWN, arc
 from simscen.stack.controllers.following import PathFollower
 from simscen.stack.controllers.free_way import FreeWay
 from simscen.stack.controllers.goal_pose import GoalPose
@@ -18,8 +16,6 @@ from simscen.stack.footprint import distance_at
 from simscen.stack.protocols import CostmapView, NavigationFailure
 from simscen.stack.setting import Setting
 
-SHOWN: Array = np.arange(16, dtype=np.float64) * 0.1
-"""Seconds of the arc that `local_plan` shows."""
 NO_CHORD = 0.001
 """m²: nearer carrots are straight ahead (Nav2's calculateCurvature)."""
 BEND = 0.4
@@ -41,7 +37,8 @@ class RegulatedPurePursuit(PathFollower):
         self._spec, self._robot, self._free_way = spec, robot, FreeWay(footprint)
         self._goal_pose = GoalPose(robot, spec.rotate_to_heading_angular_vel, spec.max_angular_accel, period)
         self._turning = TurningRoom(setting)
-        self._arc: tuple[Pose2, Twist] | None = None
+        self.arc: tuple[Pose2, Twist] | None = None
+        """The pose and the velocity of its last command."""
 
     def begin(self) -> None:
         """Another goal."""
@@ -50,9 +47,7 @@ class RegulatedPurePursuit(PathFollower):
     @property
     def local_plan(self) -> Path | None:
         """The arc it expects to drive in the next second and a half."""
-        if self._arc is None:
-            return None
-        return Path(poses_along(*self._arc, SHOWN))
+        return None if self.arc is None else Path(arc(*self.arc, SHOWN))
 
     def command(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> Twist:
         """The velocity to drive now. Raises NO_VALID_CONTROL when the arc to the carrot is blocked."""
@@ -62,7 +57,7 @@ class RegulatedPurePursuit(PathFollower):
             command = STOP if steered else self._turn(wrap(goal.pose.yaw - pose.yaw), pose, twist, costmap)
         else:
             command = self._follow(track, pose, twist, costmap)
-        self._arc = (pose, command)
+        self.arc = (pose, command)
         return command
 
     def _follow(self, track: PathTracker, pose: Pose2, twist: Twist, costmap: CostmapView) -> Twist:

@@ -49,7 +49,9 @@ class InformedSet:
         self._origin = rates.origin
         self._height, self._width = -(-rates.height // self._factor), -(-rates.width // self._factor)
         ends = [self._index(*start), self._index(*goal)]
-        graph = _graph(rates, self._factor, priced)
+        graph = rates.kept.get((self._factor, priced))
+        if graph is None:
+            rates.kept[self._factor, priced] = graph = _graph(rates, self._factor, priced)
         lengths, self._before = dijkstra(graph, directed=False, indices=ends, return_predecessors=True)
         through: Array = lengths * self._size
         self._along, self._sum, self._end = through[0], through[0] + through[1], ends[1]

@@ -19,11 +19,16 @@ FINE = 0.125
 """Cells between two looks of a second search, where the first one's way led over what lay between its looks."""
 
 
+MOST_KEPT = 500_000
+"""Cells of a costmap of which what was worked out for one plan is kept for the next: up to 10 MB."""
+
+
 class OmplPlanner:
     """Plans for a disc of the robot's inscribed radius, by what each place costs."""
 
     def __init__(self, spec: PlannerSpec, robot: RobotModel) -> None:
         self._spec, self._robot = spec, robot
+        self._rates: Rates | None = None
         by_type = "medial_axis" if spec.type == "bit_star" else "uniform"
         self._sampler = SAMPLERS[by_type if spec.sampler == "auto" else spec.sampler]
 
@@ -33,6 +38,7 @@ class OmplPlanner:
 
     def _plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
         rates = Rates(costmap, self._robot, self._spec.cost_travel_multiplier, self._spec.allow_unknown)
+        self._rates = rates.after(self._rates) if costmap.costs.size <= MOST_KEPT else None
         ends = find_ends(rates, start, goal, self._spec.tolerance)
         way = np.array([ends.start]) if ends.start == ends.goal else self._way(rates, ends, seed)
         whole = spaced(np.vstack(((start.x, start.y), way)), SPACING)

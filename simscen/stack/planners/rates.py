@@ -46,8 +46,16 @@ class Rates:
         self._look: Any = memoryview(padded)  # answers in a tenth of numpy's time for a scalar
         coarse = STRIDE * robot.inscribed_radius if allow_unknown else 0.0  # a single cell may be unknown
         self.stride = max(STEP * costmap.resolution, coarse)
+        self.kept: dict[object, Any] = {}
+        """What was worked out of these costs, by what it is; where nothing has changed the next plan needs it again."""
         self._asked: tuple[float, float, float, float] | None = None
         self._answer = 0.0
+
+    def after(self, before: "Rates | None") -> "Rates":
+        """These, with what was worked out of those of the last plan where they are the same."""
+        if before is not None and np.array_equal(before.rates, self.rates):
+            self.kept = before.kept
+        return self
 
     @property
     def free(self) -> npt.NDArray[np.bool_]:
