@@ -165,7 +165,7 @@ class PlanKeeper:
         moving = self._costmap.moving
         if not (self._bent or len(moving)) or now - self._minded < MOVING_PERIOD or self._spec.replanning == "rate":
             return ""
-        if not self._bent and not meets(moving, pose, plan.ahead[::4, :2], self._speed, self._radius):
+        if not self._bent and not meets(moving, pose, plan.places(4), self._speed, self._radius):
             return ""
         self._minded = now
         return "moving"

@@ -62,6 +62,10 @@ class PlanInForce:
         points: Array = self._track.points[self._track.index :]
         return points
 
+    def places(self, every: int) -> list[complex]:
+        """So many apart of them as x + iy."""
+        return self._track.places(every)
+
     def missed(self, pose: Pose2) -> bool:
         """Whether a car that has not reached its goal can no longer do so on this plan."""
         x, y, _ = self._track.points[self._track.index].tolist()

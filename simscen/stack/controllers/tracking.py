@@ -82,6 +82,10 @@ class PathTracker:
         start = min(self.index, max(0, end - 2))
         return self.points[start:end], self.along[start:end] - self.along[start]
 
+    def places(self, every: int) -> list[complex]:
+        """Each so-manieth of the points from the nearest one on, x + iy."""
+        return self._places[self.index :: every]
+
     def remaining(self) -> float:
         """Metres of path from the nearest point to the end."""
         return self._metres[-1] - self._metres[self.index]

@@ -17,8 +17,6 @@ from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
 
 FINE = 0.125
 """Cells between two looks of a second search, where the first one's way led over what lay between its looks."""
-
-
 MOST_KEPT = 500_000
 """Cells of a costmap of which what was worked out for one plan is kept for the next: up to 10 MB."""
 

@@ -5,6 +5,7 @@ moves will be near it then, so of a crossing's whole way only the part is marked
 """
 
 import math
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -55,13 +56,22 @@ def _dear(moving: Moving, x: Array, y: Array, times: Array, radius: float) -> np
     return np.where(times > HORIZON, 0.0, cost).astype(np.uint8)
 
 
-def meets(moving: Moving, robot: Pose2, way: Array, speed: float, radius: float) -> bool:
-    """Whether a robot at `robot` that drives along `way` (n, 2) at `speed` comes too near to what moves."""
+def meets(moving: Moving, robot: Pose2, way: Iterable[complex], speed: float, radius: float) -> bool:
+    """Whether a robot at `robot` that drives along `way` (x + iy) at `speed` comes too near to what moves.
+
+    As `Moving.nearness` has it, in floats: until what is foreseen ends it comes to a handful of places.
+    """
     moving = moving.near(robot.x, robot.y, radius + WIDEST, speed, HORIZON)
     if not moving.things:
         return False
-    steps = np.hypot(*np.diff(np.vstack(((robot.x, robot.y), way)), axis=0).T)
-    times = np.cumsum(steps) / speed
-    soon = times < HORIZON
-    near, _ = moving.nearness(way[soon, 0], way[soon, 1], times[soon], radius, ROOM)
-    return bool((near > 0.0).any())
+    here, come = complex(robot.x, robot.y), 0.0
+    for place in way:
+        come += abs(place - here)
+        here, time = place, come / speed
+        if time >= HORIZON:
+            return False
+        for thing in moving.things:
+            room = min(ROOM + thing.deviation(time, moving.acceleration), WIDEST)
+            if abs(place - thing.place - time * thing.velocity) - thing.radius < radius + room:
+                return True
+    return False

@@ -58,7 +58,7 @@ def test_a_plan_passes_behind_who_would_be_there_first() -> None:
 
 
 def test_a_way_meets_what_will_be_there_then_and_nothing_else() -> None:
-    way = np.column_stack((np.linspace(0.1, 4.5, 45), np.zeros(45)))
+    way = [complex(x) for x in np.linspace(0.1, 4.5, 45)]
     assert meets(crossing(2.0, 2.0, -1.0), ROBOT, way, SPEED, RADIUS)
     assert not meets(crossing(2.0, 2.0, 1.0), ROBOT, way, SPEED, RADIUS)
     assert not meets(crossing(2.0, 0.9, -2.0), ROBOT, way, SPEED, RADIUS)  # it will have gone
