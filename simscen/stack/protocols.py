@@ -8,7 +8,7 @@ Promises are written as *given … then …* and tested in tests/contracts on ev
 """
 
 from dataclasses import dataclass, field, replace
-from typing import Protocol, TypeGuard
+from typing import Protocol, TypeGuard, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
