@@ -34,9 +34,9 @@ AMCL_PARAMETERS: Mapping[str, Mapping[str, object]] = {
     "nav2": {
         "laser_model_type": "likelihood_field", "sigma_hit": 0.2, "likelihood_exponent": 1.0,
         "beams_beyond_the_map": "miss", "map_trust_none": 0.0, "map_trust_full": 0.0,
-        "match_scans": False, "settling_distance": 0.0, "relocalization": "random", "sure_update_factor": 1.0,
+        "match_scans": False, "settling_distance": 0.0, "relocalization": "random",
     },
-    "consistent": {"covariance": "scatter", "sure_update_factor": 1.0},
+    "consistent": {"covariance": "scatter"},
 }  # fmt: skip
 """What AMCL's parameters are by default under each name."""
 
@@ -72,7 +72,7 @@ class Amcl(Ranged, LocalizerSpec):
     """How far the robot must have moved until it looks at another scan."""
     update_min_a: Annotated[NonNegativeAngle, Field(le=6.3)] = 0.2
     """How far it must have turned until it looks at another scan."""
-    sure_update_factor: Annotated[float, Field(ge=1, le=10), Quantity("ratio")] = 2.0
+    sure_update_factor: Annotated[float, Field(ge=1, le=10), Quantity("ratio")] = 1.0
     """How many times as far and as much that is while the robot is sure of its place: the map shows what the last scan
     saw, the particles are one narrow group, and scans and wheels say the same of how it moved. 1 = as in Nav2."""
     resample_interval: Annotated[int, Field(ge=1, le=100)] = 1
