@@ -85,7 +85,7 @@ def test_a_robot_that_is_sure_of_its_place_looks_at_a_scan_after_twice_the_motio
 
 
 def test_a_robot_whose_scan_does_not_show_the_map_looks_at_the_next_one_as_soon_as_any() -> None:
-    subject = localizer(Amcl(settling_distance=0.0), Estimate(START, (0.05, 0.05, 0.02)), 1)
+    subject = localizer(Amcl(sure_update_factor=2.0, settling_distance=0.0), Estimate(START, (0.05, 0.05, 0.02)), 1)
     updated = []
     for k in range(SURE_AFTER + 8):
         step, strange = Pose2(0.0, 0.0, 0.26 * k), k == SURE_AFTER + 4
@@ -100,7 +100,7 @@ def test_a_robot_whose_scan_does_not_show_the_map_looks_at_the_next_one_as_soon_
 
 def test_who_is_sure_looks_again_at_once_when_the_wheels_slip() -> None:
     """A scan is compared with the map where odometry says that the robot is, which takes a tenth of a correction."""
-    subject = localizer(Amcl(settling_distance=0.0), Estimate(START, (0.05, 0.05, 0.02)), 1)
+    subject = localizer(Amcl(sure_update_factor=2.0, settling_distance=0.0), Estimate(START, (0.05, 0.05, 0.02)), 1)
     for k in range(SURE_AFTER + 1):
         moved(subject, 24 * k, Pose2(0.0, 0.0, 0.26 * k))
     tick, said = 24 * (SURE_AFTER + 1), Pose2(0.0, 0.0, 0.26 * (SURE_AFTER + 1))
