@@ -12,6 +12,8 @@ STEP = 0.01
 AGAIN, LOOP = 0.12, 0.3
 """Metres of the hull within which it is where it has been, and by which it must have moved meanwhile: what lies between
 was to and fro."""
+ASIDE = 0.1
+"""Share of its way that a base must have gone sideways to have strafed; one that slips does so, too, by less."""
 
 
 class Trail:
@@ -23,7 +25,10 @@ class Trail:
     def __init__(self, way: Sequence[Pose2], pose: Pose2, lever: float, length: float) -> None:
         """`lever`: metres from the base to the hull's far end; `length`: metres that the base needs at least."""
         self._lever = lever
-        back = self._without_loops(self._thinned(np.array([pose, *reversed(way)], dtype=np.float64)))
+        came = self._thinned(np.array([pose, *reversed(way)], dtype=np.float64))
+        self.strafed = _strafed(came)
+        """Whether the base moved sideways on its way."""
+        back = self._without_loops(came)
         x, y, yaw = back[-1].tolist()
         end = (x - length * math.cos(yaw), y - length * math.sin(yaw), yaw)
         self.known = len(self._even(back))
@@ -65,3 +70,9 @@ class Trail:
         at = np.arange(0.0, moved[-1], STEP)
         back = np.column_stack((back[:, :2], np.unwrap(back[:, 2])))
         return np.column_stack([np.interp(at, moved, column) for column in back.T])
+
+
+def _strafed(came: Array) -> bool:
+    steps, yaw = np.diff(came[:, :2], axis=0), came[:-1, 2] + wrap_array(np.diff(came[:, 2])) / 2
+    aside = np.abs(np.cos(yaw) * steps[:, 1] - np.sin(yaw) * steps[:, 0])
+    return bool(aside.sum() > ASIDE * np.hypot(*steps.T).sum())

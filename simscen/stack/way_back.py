@@ -31,7 +31,7 @@ SPEEDS = (-1.0, -0.5, 0.0, 0.5)
 RATES = (0.0, 0.07, -0.07, 0.15, -0.15, 0.3, -0.3, 0.5, -0.5, 0.8, -0.8)
 """rad/s."""
 SIDEWAYS = (0.0, 0.5, -0.5, 1.0, -1.0)
-"""Parts of the speed, for a base that can."""
+"""Parts of the speed, for a base that can and came so: a controller may have been told not to strafe."""
 
 
 class WayBack:
@@ -81,7 +81,9 @@ class WayBack:
         None where to stand is as good.
         """
         *worth, standing = self._worth(pose).tolist()
-        better = sorted((k for k, gets in enumerate(worth) if gets > standing + GAIN), key=lambda k: -worth[k])
+        strafed, commands = self._trail.strafed, enumerate(self._commands)
+        better = [k for k, each in commands if worth[k] > standing + GAIN and (strafed or each.vy == 0.0)]
+        better.sort(key=lambda k: -worth[k])
         for_now: Twist | None = None
         for command in (self._commands[k] for k in better):
             blocked = self._blocked(pose, poses_along(pose, command, TIMES), costmap)

@@ -166,6 +166,7 @@ PLACES = {
     "robot.body": Place("robot", "body:\n  -\n    "),
     "robot.limits": Place("robot", "limits:\n  "),
     "robot.mount": Place("robot", "sensors:\n  front:\n    lidar:\n      mount:\n        "),
+    "robot.mount of a camera": Place("robot", "sensors:\n  front:\n    camera:\n      mount:\n        "),
 }  # fmt: skip
 """Where each mapping stands that is no word of a choice, by its topic."""
 TYPED = {

@@ -67,7 +67,8 @@ def test_a_file_that_names_a_stack_of_others_is_valid_with_a_warning(simscen, pr
     ("given", "told"),
     [
         ("mine=./nowhere", "--stack mine=./nowhere: no such file or directory: `./nowhere`"),
-        ("mine=./plain.scenario.yaml", "permission denied: `./plain.scenario.yaml` is not executable"),
+        ("mine=./notes.txt", "permission denied: `./notes.txt` is not executable"),
+        ("mine=./plain.scenario.yaml", "plain.scenario.yaml:1:1: error[SC010] missing key `stack`"),
         ("mine=./home", "`./home` is not a program but a folder"),
         ("mine=no-such-program-anywhere -x", "there is no program `no-such-program-anywhere` in the PATH"),
         ("mine='unclosed", "cannot be read as a command: no closing quotation"),
@@ -80,6 +81,7 @@ def test_a_file_that_names_a_stack_of_others_is_valid_with_a_warning(simscen, pr
 @pytest.mark.parametrize("command", ["run", "validate"])
 def test_a_program_that_cannot_be_run_is_told_before_anything_runs(simscen, project, command, given, told) -> None:
     (project / "home").mkdir()
+    (project / "notes.txt").write_text("none\n")
     ended = simscen(command, ".", "--stack", given)
     assert ended.code == 2
     assert told in ended.err
