@@ -35,7 +35,7 @@ class Setting:
     clear_costmap:    forgets live obstacles that are not seen any more (for a behaviour)
     clear_around:     the same, as far from the robot as the local costmap reaches
     way:              the poses that the robot came by in the last minute, the oldest first, in the odom frame (for a
-                      behaviour or a controller)
+                      behaviour)
     heard:            what stands between the localizer and all who ask it; here, nothing (for the reference stack)
     """
 

@@ -36,7 +36,7 @@ class RegulatedPurePursuit(PathFollower):
         super().__init__(spec.desired_linear_vel, robot)
         self._spec, self._robot, self._free_way = spec, robot, FreeWay(footprint)
         self._goal_pose = GoalPose(robot, spec.rotate_to_heading_angular_vel, spec.max_angular_accel, period)
-        self._turning = TurningRoom(setting)
+        self._turning = TurningRoom(footprint)
         self.arc: tuple[Pose2, Twist] | None = None
         """The pose and the velocity of its last command."""
 

@@ -7,33 +7,30 @@ import numpy as np
 from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
 from simscen.stack.arcs import poses_along
-from simscen.stack.footprint import distance_at
+from simscen.stack.footprint import Footprint, distance_at
 from simscen.stack.lookahead import time_free
 from simscen.stack.protocols import CostmapView
-from simscen.stack.setting import Setting
-from simscen.stack.way_back import WayBack
 
 ROOM = 1.01
 """Cells between the hull and the nearest lethal cell's centre that a turn must keep: cells stand for obstacles that
 may reach half a cell nearer, and behind the robot no scan corrects them."""
-BACK_OUT, AS_FAR = 0.15, 3.0
-"""m/s of backing out, Nav2's backup_speed, and metres at most."""
-AHEAD, BENDS = 1.0, (0.3, -0.3, 0.6, -0.6)
-"""Seconds of free way that a bend needs, and the turn rates in rad/s that are tried in this order."""
-ELSEWHERE = 0.1
-"""Metres from where it last backed out at which a robot begins anew."""
+BACK_OUT, AHEAD = 0.15, 1.0
+"""m/s of backing out, Nav2's backup_speed, and seconds of free way that it needs."""
+
+
+BENDS = (0.0, 0.3, -0.3, 0.6, -0.6)
+"""Turn rates in rad/s that are tried in this order: one that drove in on a bend cannot leave straight."""
 
 
 class TurningRoom:
     """Finds out whether a robot can turn where it is.
 
     A turn that is begun without room for all of it wedges the robot: its corners come nearer to obstacles with every
-    step, until it can neither turn nor leave. So is one that backs out straight where it came in round a bend.
+    step, until it can neither turn nor leave.
     """
 
-    def __init__(self, setting: Setting) -> None:
-        self._footprint = setting.footprint
-        self._back, self._last = WayBack(setting, BACK_OUT), Pose2(math.inf, math.inf)
+    def __init__(self, footprint: Footprint) -> None:
+        self._footprint = footprint
 
     def has_room(self, angle: float, pose: Pose2, costmap: CostmapView) -> bool:
         """Whether the hull keeps its room, or all that it has now, throughout a turn by `angle` rad."""
@@ -46,14 +43,6 @@ class TurningRoom:
         return bool((room >= min(ROOM * costmap.resolution, float(room[0]))).all())
 
     def back_out(self, pose: Pose2, costmap: CostmapView) -> Twist | None:
-        """Back the way it came, or where that is blocked on any bend; None when they are, too, or it cannot reverse."""
-        if self._back.speed <= 0.0:
-            return None
-        if not self._last.distance(pose) <= ELSEWHERE:
-            self._back.start(pose, AS_FAR)
-        self._last = pose
-        self._back.locate(pose)
-        if (back := self._back.command(pose, costmap)) is not None:
-            return back
-        bends = (Twist(-self._back.speed, 0.0, rate) for rate in BENDS)
-        return next((one for one in bends if time_free(self._footprint, costmap, pose, one, AHEAD) >= AHEAD), None)
+        """Back, where the robot came from, as straight as is free; None when all bends are blocked, too."""
+        backs = (Twist(-BACK_OUT, 0.0, rate) for rate in BENDS)
+        return next((one for one in backs if time_free(self._footprint, costmap, pose, one, AHEAD) >= AHEAD), None)
