@@ -75,8 +75,8 @@ class WayBack:
         along = self._trail.along
         return slice(self._at, int(np.searchsorted(along, along[self._at] + WINDOW, side="right")))
 
-    def command(self, pose: Pose2, costmap: CostmapView, partly: bool = False) -> Twist | None:
-        """The command that gets it farthest back of those that are free; `partly`: else of those that are for a moment.
+    def command(self, pose: Pose2, costmap: CostmapView) -> Twist | None:
+        """The command that gets it farthest back of those that are free; else of those that are for a moment.
 
         None where to stand is as good.
         """
@@ -89,7 +89,7 @@ class WayBack:
             blocked = self._blocked(pose, poses_along(pose, command, TIMES), costmap)
             if not blocked.any():
                 return command
-            if partly and for_now is None and blocked.argmax() > AT_LEAST:
+            if for_now is None and blocked.argmax() > AT_LEAST:
                 for_now = command
         return for_now
 

@@ -39,7 +39,7 @@ class Retrace:
             return None
         if seconds > TIME_ALLOWANCE:
             raise NavigationFailure(ErrorCode.BACKUP_TIMEOUT, "driving back the way it came took too long")
-        command = back.command(pose, costmap, partly=True)
+        command = back.command(pose, costmap)
         if command is None and back.moved < costmap.resolution:
             raise NavigationFailure(ErrorCode.BACKUP_COLLISION_AHEAD, "no room on the way it came")
         return command
