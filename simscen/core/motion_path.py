@@ -2,7 +2,6 @@
 
 import math
 from bisect import bisect_right
-from collections.abc import Iterable
 
 from simscen.core.geometry import Pose2, Pose3, wrap
 from simscen.core.shapes import MotionPath
@@ -46,30 +45,25 @@ class Track:
 
     def at(self, seconds: float) -> Pose3:
         """`pose_at`, upright in space."""
-        return self.row((seconds,))[0]
-
-    def row(self, moments: Iterable[float]) -> list[Pose3]:
-        """The same at several times in a row."""
-        path, z, made = self._path, self._z, list[Pose3]()
+        path, z = self._path, self._z
         if not self._even:
-            return [Pose3.planar(pose_at(path, seconds), z) for seconds in moments]
-        start, phase, once, first, last = path.start, path.phase, self._once, self._first, self._last
-        for seconds in moments:
-            running = seconds - start
-            local = phase + running if running > 0 else phase
-            if not once:
-                local = _local(path, local)
-            local = first if local < first else last if local > last else local
-            if not self._begin <= local < self._end:
-                self._enter(local)
-            part = (local - self._begin) / self._lasts if self._lasts > 0 else 1.0
-            (x, y, yaw), turn = self._pose, self._turn
-            x, y = x + part * self._dx, y + part * self._dy
-            if turn:
-                made.append(Pose3.planar(Pose2(x, y, wrap(yaw + part * turn)), z))
-            else:
-                made.append(_made(Pose3, (x, y, z, 0.0, 0.0, self._qz, self._qw)))
-        return made
+            return Pose3.planar(pose_at(path, seconds), z)
+        running = seconds - path.start
+        local = path.phase + running if running > 0 else path.phase
+        if not self._once:
+            local = _local(path, local)
+        if local < self._first:
+            local = self._first
+        elif local > self._last:
+            local = self._last
+        if not self._begin <= local < self._end:
+            self._enter(local)
+        part = (local - self._begin) / self._lasts if self._lasts > 0 else 1.0
+        (x, y, yaw), turn = self._pose, self._turn
+        x, y = x + part * self._dx, y + part * self._dy
+        if turn:
+            return Pose3.planar(Pose2(x, y, wrap(yaw + part * turn)), z)
+        return _made(Pose3, (x, y, z, 0.0, 0.0, self._qz, self._qw))
 
     def _enter(self, local: float) -> None:
         path, last = self._path, len(self._path.times) - 1

@@ -252,9 +252,12 @@ class Actors:
         if not self._travelling:
             return itertools.repeat(now, len(ticks))
         names = [actor.body.name for actor in self._travelling]
-        rows = [self._track(actor).row([(tick - actor.since) / self._rate for tick in ticks])
-                for actor in self._travelling]  # fmt: skip
+        rows = [self._scripted_row(actor, ticks) for actor in self._travelling]
         return [{**now, **dict(zip(names, column, strict=True))} for column in zip(*rows, strict=True)]
+
+    def _scripted_row(self, actor: Actor, ticks: Sequence[int]) -> list[Pose3]:
+        at, since, rate = self._track(actor).at, actor.since, self._rate
+        return [at((tick - since) / rate) for tick in ticks]
 
     def _track(self, actor: Actor) -> Track:
         if actor.track is None:

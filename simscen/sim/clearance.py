@@ -14,7 +14,7 @@ from simscen.sim.actors import Actors
 from simscen.sim.drives import Base
 from simscen.sim.outline import extremes
 from simscen.sim.outline import reach as reach_of
-from simscen.sim.proximity import Came, Proximity, motion
+from simscen.sim.proximity import Proximity, motion
 from simscen.sim.robot_body import RobotBody
 from simscen.sim.state import State
 
@@ -29,9 +29,10 @@ Vector = tuple[float, float, float]
 
 
 class _Alone(NamedTuple):
-    """When it was measured that anything that moves is farther than what stands, by a `gap` in metres."""
+    """When, and with the robot where, anything that moves was farther than what stands, by a `gap` in metres."""
 
     tick: int
+    pose: Pose3
     gap: float
 
 
@@ -67,7 +68,8 @@ class Clearance:
         """The other robots, as they are measured."""
         limits, (self._radius, self._height) = robot.limits, reach_of(robot.solid)
         self._limits, self._quickest = limits, max(limits.linear, limits.reverse or 0.0, limits.lateral or 0.0)
-        self.size = ROUNDED + math.hypot(self._radius, self._height)
+        self._extent = math.hypot(self._radius, self._height)
+        self.size = ROUNDED + self._extent
         """How far from its base the robot extends, in m."""
         # Where wheels roll on solids they may also hit them.
         touching = replace(robot, casters=(*robot.casters, *robot.tyres)) if uneven else robot
@@ -87,8 +89,8 @@ class Clearance:
         self._distance = 0.0
         self._measured_at, self.no_contact_before = -1, 0
         self._alone: _Alone | None = None
-        self._there, self._moved = Pose3(), 0.0
-        """Where the robot was last asked about since then, and how far it had come, in metres."""
+        self._waits_until = -1
+        """The tick until which it is known that samples can wait, and that nothing is touched."""
         self._actors.undisturbed(self._base.id, until=-1)
         self.enclosed_by: str | None = None
         """The solid that the robot is wholly inside of, where it touches no surface."""
@@ -98,7 +100,7 @@ class Clearance:
     def shaken(self, tick: int) -> None:
         """A push will change the robot's velocity during the step from `tick` on: how it moves now says nothing."""
         self._shaken_at = tick
-        self._measured_at, self.no_contact_before, self._alone = -1, tick, None
+        self._measured_at, self.no_contact_before, self._alone, self._waits_until = -1, tick, None, -1
         self._actors.undisturbed(self._base.id, until=tick)
 
     def measure(self, tick: int) -> float:
@@ -119,36 +121,35 @@ class Clearance:
         free = min(HORIZON, max(0.0, gap - TOLERANCE) / self._fastest(tick))
         self.no_contact_before = tick + (math.floor(free * self._rate) if tick != self._shaken_at else 0)
         self._actors.undisturbed(self._base.id, until=self.no_contact_before)
-        self._alone = None
+        self._alone, self._waits_until = None, -1
         if not (self.others or self.unsure) and self._ways is self._proximity:
             farther = self._actors.gap(pose[:3], self._distance + self.size, tick, self._base.id)
-            self._alone = None if farther is None else _Alone(tick, farther)
-            self._there, self._moved = pose, 0.0
+            self._alone = None if farther is None else _Alone(tick, pose, farther)
         return self._distance
 
-    def can_wait(self, tick: int, ticks: int, pose: Pose3) -> Came | None:
-        """How the robot came here, if `standing` will do for `measure` at `tick`, which is now, and nothing is touched
-        for so many ticks; else None.
+    def can_wait(self, tick: int, ticks: int, pose: Pose3) -> bool:
+        """Whether `standing` will do for `measure` at `tick`, which is now, and nothing is touched for so many ticks.
 
-        Told by how far it has come since the last measurement, without another; it is asked once for each sample.
+        Told by how far the robot has come since the last measurement, and can come for a while, without another.
         """
+        if tick + ticks <= self._waits_until:
+            return True
         if self._alone is None:
-            return None
-        since, gap = self._alone
-        before, self._there = self._there, pose
-        step = motion(before, pose, self._radius, self._height)
-        self._moved = moved = self._moved + step
+            return False
+        moved, closing = motion(self._alone.pose, pose, self._extent), self._fastest(tick)
         # It may have come nearer to what moves, and gone from what stands.
-        if gap - 2 * moved - self._actors.come_in(tick - since) <= 0:
-            return None
-        if tick + ticks > self.no_contact_before:
-            free = min(HORIZON, max(0.0, self._distance - moved - TOLERANCE) / self._fastest(tick))
-            self.no_contact_before = max(self.no_contact_before, tick + math.floor(free * self._rate))
-        return (before, step) if tick + ticks <= self.no_contact_before else None
+        farther = self._alone.gap - 2 * moved - self._actors.come_in(tick - self._alone.tick)
+        if farther <= 0:
+            return False
+        free = min(HORIZON, max(0.0, self._distance - moved - TOLERANCE) / closing)
+        self.no_contact_before = max(self.no_contact_before, tick + math.floor(free * self._rate))
+        still = math.floor(min(HORIZON, farther / (2 * closing)) * self._rate)
+        self._waits_until = min(self.no_contact_before, tick + still + ticks)
+        return tick + ticks <= self._waits_until
 
-    def standing(self, pose: Pose3, came: Came) -> float:
-        """What `measure` gave for a robot that came so to `pose`, at a tick for which it could wait."""
-        return min(self._reach, self._ways.distance(pose, came))
+    def standing(self, pose: Pose3) -> float:
+        """What `measure` gave for a robot that was at `pose`, at a tick for which it could wait."""
+        return min(self._reach, self._ways.distance(pose))
 
     def _search(self, tick: int, pose: Pose3, standing: Proximity) -> float:
         nearest, place = min(self._reach, standing.distance(pose)), pose[:3]

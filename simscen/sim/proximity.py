@@ -24,16 +24,13 @@ from simscen.sim.enclosure import winds_around
 from simscen.sim.parts import parts_of
 from simscen.sim.robot_body import RobotBody
 
-STRIDE = 0.25
+STRIDE = 0.5
 """m that the robot may move before the list of solids around it is made anew."""
 SLACK = 0.15
 """m beyond the nearest within which others are measured too, so that they need not be asked again at once."""
 NO_PLACE, NO_TURN = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
 NOISE = 0.005
 """m farther than the nearest may have gone within which it is measured; what lies farther costs time."""
-
-Came = tuple[Pose3, float]
-"""From where, and how far any point of a robot has moved at most since, in metres."""
 
 
 class Proximity:
@@ -42,7 +39,8 @@ class Proximity:
     def __init__(self, static: TriangleMesh, robot: RobotBody, reach: float) -> None:
         self._client = CLIENTS.take()
         self._mesh, self._reach = static, reach
-        self._radius, self._height = outline.reach(robot.solid)
+        self._radius, height = outline.reach(robot.solid)
+        self._extent = math.hypot(self._radius, height)
         self._hull = engine.hull_shapes(self._client, robot.solid)
         self._parts = parts_of(static)
         self._pairs: dict[int, list[tuple[int, int]]] = {}
@@ -55,19 +53,14 @@ class Proximity:
         self._distance = math.inf
         self._pose, self._centre = Pose3(), (math.inf, math.inf)
 
-    def distance(self, pose: Pose3, came: Came | None = None) -> float:
+    def distance(self, pose: Pose3) -> float:
         """Distance in metres from the robot, with its base at `pose`, to the nearest solid; inf beyond the reach.
-
-        `came` is how it got there, if that is known, and counts if it began where the robot was last measured.
 
         The distance to a part changes at most by what the robot moves, so only those are measured again that may have
         come nearer than the nearest, and the nearest no farther than it may have gone: what is asked costs time for
         each triangle within reach.
         """
-        if came is not None and came[0] is self._pose:
-            moved = came[1]
-        else:
-            moved = motion(self._pose, pose, self._radius, self._height)
+        moved = motion(self._pose, pose, self._extent)
         self._travelled += moved
         self._pose = pose
         if math.dist(pose[:2], self._centre) > STRIDE:
@@ -129,8 +122,8 @@ class Proximity:
 
     def _build(self, part: int) -> list[int]:
         vertices, faces = self._mesh.vertices, self._mesh.faces[self._parts.faces(part)]
-        if self._parts.whole(part) and is_convex(compact(vertices, faces)):
-            shapes = [engine.convex_shape(self._client, compact(vertices, faces).vertices)]
+        if self._parts.whole(part) and is_convex(solid := compact(vertices, faces)):
+            shapes = [engine.convex_shape(self._client, solid.vertices)]
         else:
             lots = engine.tiles(vertices, engine.above_floor(vertices, faces))
             shapes = [engine.concave_shape(self._client, compact(vertices, lot)) for lot in lots]
@@ -171,15 +164,12 @@ class Proximity:
         CLIENTS.give_back(self._client)
 
 
-def motion(before: Pose3, after: Pose3, radius: float, height: float) -> float:
-    """The most that any point within `radius` of the base's axis and `height` of its origin has moved, in metres."""
-    _, _, _, ax, ay, az, aw = before
-    _, _, _, bx, by, bz, bw = after
-    turned = 2 * math.acos(min(1.0, abs(ax * bx + ay * by + az * bz + aw * bw)))
-    # The base's z axis in the world, before and after.
-    up = 2 * (ax * az + aw * ay), 2 * (ay * az - aw * ax), 1 - 2 * (ax * ax + ay * ay)
-    now = 2 * (bx * bz + bw * by), 2 * (by * bz - bw * bx), 1 - 2 * (bx * bx + by * by)
-    return math.dist(before[:3], after[:3]) + turned * radius + math.dist(up, now) * height
+def motion(before: Pose3, after: Pose3, extent: float) -> float:
+    """A bound on how far any point within `extent` of the base's origin has moved, in metres.
+
+    A turn by an angle a moves it by 2 sin(a / 2) times that, and quaternions by 2 sin(a / 4).
+    """
+    return math.dist(before[:3], after[:3]) + 2 * extent * math.dist(before[3:], after[3:])
 
 
 def point_to_triangles(point: Array, corners: Array) -> Array:

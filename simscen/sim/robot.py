@@ -142,8 +142,8 @@ class Robot:
         """The same, to be looked at later; it is asked again after so many ticks. Raises as `truth`."""
         tick = self._scene.tick
         state = self._sound(tick)
-        if not self._contacts.touching and (came := self.clearance.can_wait(tick, ticks, state.pose)) is not None:
-            return self.samples.take(tick, state, came)
+        if not self._contacts.touching and self.clearance.can_wait(tick, ticks, state.pose):
+            return self.samples.take(tick, state)
         self.samples.settle()
         return self._truth(tick, state)
 

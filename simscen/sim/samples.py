@@ -7,7 +7,6 @@ several in a row take half the time.
 from simscen.core.trace import Truth
 from simscen.sim.actors import Actors
 from simscen.sim.clearance import Clearance
-from simscen.sim.proximity import Came
 from simscen.sim.state import State
 
 _made = tuple.__new__  # a truth without the calls of its class
@@ -16,10 +15,10 @@ _made = tuple.__new__  # a truth without the calls of its class
 class Sample:
     """How a robot was at a tick."""
 
-    __slots__ = ("came", "made", "samples", "state", "tick")
+    __slots__ = ("made", "samples", "state", "tick")
 
-    def __init__(self, samples: "Samples", tick: int, state: State, came: Came) -> None:
-        self.samples, self.tick, self.state, self.came = samples, tick, state, came
+    def __init__(self, samples: "Samples", tick: int, state: State) -> None:
+        self.samples, self.tick, self.state = samples, tick, state
         self.made: Truth | None = None
 
     def truth(self) -> Truth:
@@ -37,9 +36,9 @@ class Samples:
         self._clearance, self._actors = clearance, actors
         self._waiting: list[Sample] = []
 
-    def take(self, tick: int, state: State, came: Came) -> Sample:
-        """One that is worked out when somebody asks for it, or for another; `came` since the one before."""
-        sample = Sample(self, tick, state, came)
+    def take(self, tick: int, state: State) -> Sample:
+        """One that is worked out when somebody asks for it, or for another."""
+        sample = Sample(self, tick, state)
         self._waiting.append(sample)
         return sample
 
@@ -51,4 +50,4 @@ class Samples:
         standing, placed = self._clearance.standing, self._actors.scripted([sample.tick for sample in waiting])
         for sample, objects in zip(waiting, placed, strict=True):
             state = sample.state
-            sample.made = _made(Truth, (state.pose, state.twist, standing(state.pose, sample.came), objects))
+            sample.made = _made(Truth, (state.pose, state.twist, standing(state.pose), objects))

@@ -10,7 +10,7 @@ from simscen.core.geometry import Pose3
 from simscen.core.shapes import Box, Cylinder, Extrusion, Mesh, Solid
 from simscen.sim.embody import robot_body
 from simscen.sim.engine import fixed, hull_shape, tiles
-from simscen.sim.proximity import Proximity, point_to_triangles
+from simscen.sim.proximity import Proximity, motion, point_to_triangles
 from simscen.worlds.meshing import fuse
 
 
@@ -25,6 +25,23 @@ def test_distances_to_triangles_are_trimeshs():
 def test_a_triangle_without_area_is_as_far_as_its_edges():
     flat = np.array([[[0.0, 0, 0], [1, 0, 0], [2, 0, 0]]])
     assert point_to_triangles(np.array([1.5, 2.0, 0.0]), flat) == pytest.approx([2.0])
+
+
+def test_no_point_moves_farther_than_the_bound_and_the_bound_is_not_idle():
+    rng, extent = np.random.default_rng(5), 0.4
+    points = rng.normal(size=(400, 3))
+    points *= extent / np.linalg.norm(points, axis=1, keepdims=True)
+    for turn in (0.0, 1e-3, 0.1, 1.0, 3.0):
+        for flip in (1.0, -1.0):  # a quaternion and its opposite are the same heading
+            before = Pose3.from_rpy(*rng.normal(size=3), *rng.uniform(-1, 1, 3))
+            step = Pose3.from_rpy(*rng.normal(0.0, 0.1, 3), 0.0, turn, 0.0)
+            after = before.compose(step)
+            said = Pose3(*after.position, *(flip * part for part in after.quaternion))
+            moved = np.linalg.norm(after.apply(points) - before.apply(points), axis=1)
+            assert moved.max() <= motion(before, said, extent) + 1e-12
+            if flip > 0:
+                farthest = math.dist(before.position, after.position) + 2 * extent * math.sin(turn / 2)
+                assert motion(before, said, extent) <= 1.5 * farthest
 
 
 @pytest.fixture
