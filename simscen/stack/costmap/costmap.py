@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
@@ -12,10 +13,11 @@ from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.costmap.denoise_layer import without_specks
 from simscen.stack.costmap.frame import Cells, Frame
 from simscen.stack.costmap.inflation_layer import Inflation, squared_distances
-from simscen.stack.costmap.live_layer import LiveLayer, Window
+from simscen.stack.costmap.live_layer import EVERYWHERE, LiveLayer, Window
 from simscen.stack.costmap.obstacle_layer import crossed
 from simscen.stack.costmap.rolling import carried, left_behind, window_around, within
 from simscen.stack.costmap.static_layer import Mask, StaticLayer, empty_layer, static_layer
+from simscen.stack.nearest import FARTHEST, SquaredWithin
 from simscen.stack.prediction.moving import NOTHING
 from simscen.stack.protocols import CostmapView, Surroundings
 
@@ -95,9 +97,9 @@ class Costmap:
         if isinstance(seen, Image):
             self._touch_cells(self._live.on_image(base, seen, self._static_squared))
             return
-        changed = self._live.on_scan(base, seen, self._static_squared)
+        changed = self._live.on_scan(base, seen, self._static_squared if self._walled else None)
         if len(changed):
-            self._touch(*self._frame.extent(changed))
+            self._touch(*(self._whole if self._small else self._frame.extent(changed)))
         if self._tracks:
             self._learn(base, seen)
 
@@ -156,8 +158,7 @@ class Costmap:
         self._live.roll(window)
         if self._tracks:
             self._unknown = carried(self._unknown, before, window, True)
-        rows, columns = window.shape
-        self._touch((0, 0), (rows - 1, columns - 1))
+        self._touch(*self._whole)
 
     def _layer(self, centre: Pose2) -> StaticLayer:
         return self._layer_in(window_around(centre, self._size, self._spec.resolution))
@@ -172,6 +173,10 @@ class Costmap:
 
     def _lay(self, layer: StaticLayer) -> None:
         self._frame = layer.frame
+        rows, columns = layer.frame.shape
+        self._whole = (0, 0), (rows - 1, columns - 1)
+        # Who looks for what has changed in such a window finds that most of it is near that.
+        self._small = max(rows, columns) <= 4 * self._margin and self._margin <= FARTHEST
         self._static_squared = squared_distances(layer.lethal, self._margin)
         self._walled = bool(layer.lethal.any())
 
@@ -201,7 +206,8 @@ class Costmap:
         cells = frame.within(around, np.flatnonzero(self._unknown[around]))
         if not len(cells):
             return
-        cells = cells[crossed(frame.points(cells), frame.resolution, scan, base, self._spec)]
+        passed, _ = crossed(frame.points(cells), frame.resolution, scan, base, self._spec)
+        cells = cells[passed]
         if len(cells):
             self._unknown[np.divmod(cells, frame.shape[1])] = False
             self._touch(*frame.extent(cells))
@@ -224,6 +230,9 @@ class Costmap:
     def refresh(self, low: tuple[int, int], high: tuple[int, int]) -> None:
         """Compute distances and costs again wherever one of the cells from `low` to `high` can matter."""
         self._changed = None
+        if (low, high) == self._whole:
+            self._refresh_all()
+            return
         inner = self._frame.window(low, high, self._margin + self._speck)
         outer = self._frame.window(low, high, 2 * (self._margin + self._speck))
         part = (
@@ -235,3 +244,17 @@ class Costmap:
             squared = np.minimum(self._static_squared[inner], squared)
         self._distance[inner] = self._inflation.metres.take(squared)
         self._costs[inner] = self._inflation.costs(squared, self._unknown[inner] if self._tracks else None)
+
+    @cached_property
+    def _around(self) -> SquaredWithin:
+        """What tells distances in a small window."""
+        return SquaredWithin(self._frame.shape, self._margin)
+
+    def _refresh_all(self) -> None:
+        """The same for all of it."""
+        obstacles = self._obstacles(EVERYWHERE)
+        squared = self._around.of(obstacles) if self._small else squared_distances(obstacles, self._margin)
+        if self._walled:
+            squared = np.minimum(self._static_squared, squared)
+        self._distance = self._inflation.metres.take(squared)
+        self._costs = self._inflation.costs(squared, self._unknown if self._tracks else None)

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,9 @@ Cells = npt.NDArray[np.int64]
 _least, _most = np.minimum.reduce, np.maximum.reduce
 Numbers = npt.NDArray[np.int64]
 """Cells (n,) by number: row by row, from cell (0, 0) on."""
+
+MOST_KNOWN = 10_000
+"""Cells of a grid of which all centres are kept: those of a local costmap."""
 
 
 @dataclass(frozen=True)
@@ -52,14 +55,14 @@ class Frame:
         """
         local = points - complex(*self.origin)
         local *= 1.0 / self.resolution
-        if self._holds(centre, reach + self.resolution):
-            whole: Numbers = local.view(np.float64).astype(np.int64).reshape(-1, 2).dot(self._steps)
-            return whole
-        cells = np.floor(local.view(np.float64)).astype(np.int64)
-        columns, rows = cells[::2], cells[1::2]
-        # Below zero is far beyond every grid without a sign.
-        inside = (columns.view(np.uint64) < self.shape[1]) & (rows.view(np.uint64) < self.shape[0])
-        numbers: Numbers = (rows * self.shape[1] + columns)[inside]
+        flat, some = local.view(np.float64), not self._holds(centre, reach + self.resolution)
+        if some:
+            np.floor(flat, out=flat)  # where all are positive, to cut off does the same
+        cells = flat.astype(np.int64).reshape(-1, 2)
+        numbers: Numbers = cells.dot(self._steps)
+        if some:
+            off = cells.view(np.uint64)  # below zero is far beyond every grid without a sign
+            numbers = numbers[(off[:, 0] < self.shape[1]) & (off[:, 1] < self.shape[0])]
         return numbers
 
     def _holds(self, centre: complex, reach: float) -> bool:
@@ -75,9 +78,11 @@ class Frame:
 
     def points(self, numbers: Numbers) -> Plane:
         """The centres (n,) of cells."""
-        rows, columns = np.divmod(numbers, self.shape[1])
-        corner, edge = complex(*self.origin), self.resolution
-        points: Plane = rows * (1j * edge) + (columns * edge + (corner + (0.5 + 0.5j) * edge))
+        corner, (rows, columns) = complex(*self.origin), self.shape
+        if rows * columns > MOST_KNOWN:
+            return _middles(numbers, columns, self.resolution, corner)
+        points: Plane = _centres(self.shape, self.resolution).take(numbers)
+        points += corner
         return points
 
     def extent(self, numbers: Numbers) -> tuple[tuple[int, int], tuple[int, int]]:
@@ -104,3 +109,16 @@ class Frame:
             slice(max(0, low[0] - margin), max(0, min(self.shape[0], high[0] + 1 + margin))),
             slice(max(0, low[1] - margin), max(0, min(self.shape[1], high[1] + 1 + margin))),
         )
+
+
+def _middles(numbers: Numbers, columns: int, edge: float, corner: complex = 0j) -> Plane:
+    """The centres x + iy (n,) of cells of a grid with this corner."""
+    up, across = np.divmod(numbers, columns)
+    middles: Plane = up * (1j * edge) + (across * edge + (corner + (0.5 + 0.5j) * edge))
+    return middles
+
+
+@lru_cache(maxsize=8)
+def _centres(shape: tuple[int, int], edge: float) -> Plane:
+    """The same of all cells of a grid, from its corner."""
+    return _middles(np.arange(shape[0] * shape[1]), shape[1], edge)

@@ -16,7 +16,7 @@ Squared = npt.NDArray[np.uint16]
 
 
 def squared_distances(lethal: npt.NDArray[np.bool_], reach: int) -> Squared:
-    """For each cell the exact squared distance in cells to the nearest lethal cell's centre; FAR beyond `reach`."""
+    """For each cell the exact squared distance in cells to the nearest lethal cell; more beyond `reach`."""
     if not lethal.any():
         return np.full(lethal.shape, FAR, dtype=np.uint16)
     if reach <= FARTHEST:

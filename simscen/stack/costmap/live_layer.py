@@ -20,6 +20,7 @@ BESIDE_A_WALL = 2
 NONE: Numbers = np.zeros(0, dtype=np.int64)
 NOWHERE: Mask = np.zeros((0, 0), dtype=bool)
 Window = tuple[slice, slice]
+EVERYWHERE: Window = slice(None), slice(None)
 
 
 class LiveLayer:
@@ -71,7 +72,7 @@ class LiveLayer:
             self._heights = carried(self._heights, before, frame, np.nan)
             self._ground = carried(self._ground, before, frame, False)
 
-    def marked(self, window: Window = (slice(None), slice(None))) -> Mask:
+    def marked(self, window: Window = EVERYWHERE) -> Mask:
         """The cells in which something is."""
         if self._heights is None:
             return self._scanned[window]
@@ -83,35 +84,52 @@ class LiveLayer:
         """The same by number."""
         return self._marks if self._heights is None else np.flatnonzero(self.marked())
 
-    def on_scan(self, base: Pose2, scan: Scan, walls: Squared) -> Numbers:
-        """Clear what the beams pass through, then mark what they hit; returns the cells that have changed."""
+    def on_scan(self, base: Pose2, scan: Scan, walls: Squared | None) -> Numbers:
+        """Clear what the beams pass through, then mark what they hit; returns the cells that have changed.
+
+        `walls` are distances to what the map shows; None where it shows nothing.
+        """
         spec, frame, scanned = self._spec, self._frame, self._scanned.reshape(-1)
         points, lidar = hits(scan, base, spec.obstacle_min_range, spec.obstacle_max_range)
         seen = frame.numbers(points, lidar, spec.obstacle_max_range)
+        if not len(self._marks):
+            fresh, lost = self._off(walls, seen), NONE
+        else:
+            known = scanned.take(seen)
+            fresh, lost = self._off(walls, seen[~known]), self._cleared(base, scan, seen[known])
+        if not len(fresh):
+            return lost
+        scanned[fresh] = True
+        self._marks = np.concatenate((self._marks, fresh))
+        return np.concatenate((lost, fresh)) if len(lost) else fresh
+
+    def _off(self, walls: Squared | None, seen: Numbers) -> Numbers:
+        """Those of the cells that are not beside a wall."""
+        if walls is None:
+            return seen
         if walls is not self._walls:
             self._walls, self._off_walls = walls, walls > BESIDE_A_WALL
-        marks, lost = self._marks, NONE
-        if not len(marks):
-            fresh = seen[self._off_walls.take(seen)]
-            if not len(fresh):
-                return NONE
-        known = scanned.take(seen)
-        fresh = seen[~known & self._off_walls.take(seen)]
-        if len(marks):
-            points = frame.points(marks)
-            gone = marks[crossed(points, frame.resolution, scan, base, spec)]
-            under = marks[np.abs(points - complex(base.x, base.y)) < self._inscribed]
-            if len(gone) or len(under):
-                scanned[gone] = False
-                scanned[seen[known]] = True
-                scanned[under] = False  # Nav2's footprint_clearing_enabled, for the inscribed circle
-                kept = scanned.take(marks)
-                lost, marks = marks[~kept], marks[kept]
-        if len(fresh):
-            scanned[fresh] = True
-            marks = np.concatenate((marks, fresh))
-        self._marks = marks
-        return np.concatenate((lost, fresh)) if len(lost) else fresh
+        off: Numbers = seen[self._off_walls.take(seen)]
+        return off
+
+    def _cleared(self, base: Pose2, scan: Scan, seen: Numbers) -> Numbers:
+        """Clear what the beams pass through but those cells that were `seen` again; the cells that were marked."""
+        marks, frame, scanned = self._marks, self._frame, self._scanned.reshape(-1)
+        points = frame.points(marks)
+        gone, nearest = crossed(points, frame.resolution, scan, base, self._spec)
+        scanned[marks[gone]] = False
+        scanned[seen] = True
+        if nearest < self._inscribed + math.hypot(scan.mount.x, scan.mount.y):
+            under = np.abs(points - complex(base.x, base.y)) < self._inscribed
+            scanned[marks[under]] = False  # Nav2's footprint_clearing_enabled, for the inscribed circle
+        elif not len(gone):
+            return NONE
+        kept = scanned.take(marks)
+        if kept.all():
+            return NONE
+        self._marks = marks[kept]
+        lost: Numbers = marks[~kept]
+        return lost
 
     def on_image(self, base: Pose2, image: Image, walls: Squared) -> Cells:
         """Clear what the camera sees through, then mark what it sees; returns the cells that may have changed."""

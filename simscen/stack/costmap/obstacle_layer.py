@@ -18,6 +18,9 @@ from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.costmap.frame import Cells, Frame, Numbers
 from simscen.stack.localizers.beams import Plane, directions
 
+ROUNDING = 1e-9
+"""Metres before the end of what a beam shows to be free, nearer to which it is asked exactly whether a cell is."""
+
 
 @dataclass(frozen=True, eq=False)
 class ScanAmongMoving(Scan):
@@ -54,13 +57,15 @@ def _place(scan: Scan, base: Pose2) -> complex:
     return complex(base.x, base.y) + cmath.rect(1.0, base.yaw) * complex(scan.mount.x, scan.mount.y)
 
 
-def _shown_free(ranges: Array, scan: Scan, spec: CostmapSpec) -> Array:
-    """How far beams (n,) show free space: to their hits, or to raytrace_max_range; nan and too near beams show 0.
+@lru_cache(maxsize=4)
+def _shown_free(scan: Scan, farthest: float, inf_is_valid: bool) -> Array:
+    """How far beams (n,) show free space: to their hits, or to `farthest`; nan and too near beams show 0.
 
     So do beams that meet nothing, unless `inf_is_valid`.
     """
-    seen = np.where(ranges > scan.range_max, np.inf if spec.inf_is_valid else 0.0, ranges)
-    return np.where(seen >= scan.range_min, np.minimum(seen, spec.raytrace_max_range), 0.0)
+    ranges = scan.ranges
+    seen = np.where(ranges > scan.range_max, np.inf if inf_is_valid else 0.0, ranges)
+    return np.where(seen >= scan.range_min, np.minimum(seen, farthest), 0.0)
 
 
 def in_view(cells: Cells, frame: Frame, scan: Scan, base: Pose2) -> npt.NDArray[np.bool_]:
@@ -72,39 +77,45 @@ def in_view(cells: Cells, frame: Frame, scan: Scan, base: Pose2) -> npt.NDArray[
     return np.asarray(turned <= abs(scan.angle_increment) * len(scan.ranges))
 
 
-def crossed(points: Plane, resolution: float, scan: Scan, base: Pose2, spec: CostmapSpec) -> Numbers:
+def crossed(points: Plane, resolution: float, scan: Scan, base: Pose2, spec: CostmapSpec) -> tuple[Numbers, float]:
     """Indices of those cells with these centres x + iy (n,) that a beam crosses before it hits anything.
 
-    A line crosses a square of half-width h when its distance from the centre is at most h (|cos| + |sin|); each cell
-    is tested against the beam nearest to its centre, which crosses it if any does.
+    And how far the nearest of all centres, of which there is one, is from the lidar. A line crosses a square of
+    half-width h when its distance from the centre is at most h (|cos| + |sin|); each cell is tested against the beam
+    nearest to its centre, which crosses it if any does.
     """
     first, step, half = base.yaw + scan.mount.yaw + scan.angle_min, scan.angle_increment, resolution / 2
-    seen = (points - _place(scan, base)) * cmath.rect(1.0, -first)
+    seen = points - _place(scan, base)
+    seen *= cmath.rect(1.0, -first)
     distance, bearing = np.abs(seen), np.arctan2(seen.imag, seen.real)
-    beam, ranges = _nearest_beams(bearing, scan)
-    near = (distance * math.cos(step / 2) + half <= ranges).nonzero()[0]  # most lie behind what their beams hit
+    nearest = distance.min().item()
+    beam, free = _nearest_beams(bearing, scan, _shown_free(scan, spec.raytrace_max_range, spec.inf_is_valid))
+    near = (distance * math.cos(step / 2) + half <= free).nonzero()[0]  # most lie behind what their beams hit
     if not len(near):
-        return near
-    distance, bearing, length = distance[near], bearing[near], _shown_free(ranges[near], scan, spec)
-    off = np.remainder(bearing - beam[near] * step + math.pi, 2 * math.pi) - math.pi
-    direction = first + bearing - off
+        return near, nearest
+    distance, length = distance.take(near), free.take(near)
+    wide = half / abs(math.sin(step / 2))  # nearer than this, beams lie so close that each cell is on one
+    if spec.raytrace_min_range == 0.0 and (distance <= np.minimum(length - (half + ROUNDING), wide)).all():
+        return near, nearest
+    off = np.remainder(bearing[near] - beam[near] * step + math.pi, 2 * math.pi) - math.pi
+    direction = first + bearing[near] - off
     reach = half * (np.abs(np.cos(direction)) + np.abs(np.sin(direction)))
     along = distance * np.cos(off)
     passed = (np.abs(distance * np.sin(off)) <= reach) & (along <= length - half) & (along >= spec.raytrace_min_range)
-    crossed_by: Numbers = near[passed]
-    return crossed_by
+    return near[passed], nearest
 
 
-def _nearest_beams(bearing: Array, scan: Scan) -> tuple[Numbers, Array]:
-    """The beams nearest to directions (n,) that are counted from the first beam, and their ranges; nan beyond them."""
-    step, count = scan.angle_increment, len(scan.ranges)
+def _nearest_beams(bearing: Array, scan: Scan, told: Array) -> tuple[Numbers, Array]:
+    """The beams nearest to directions (n,) that are counted from the first beam, and what is `told` of each; nan where
+    there is none.
+    """
+    step, count = scan.angle_increment, len(told)
     turn = round(2 * math.pi / abs(step))
     even = abs(turn * abs(step) - 2 * math.pi) < 1e-6
     if even and turn == count:
         beam = np.rint(bearing / step).astype(np.int64)
-        return beam, scan.ranges.take(beam, mode="wrap")
+        return beam, told.take(beam, mode="wrap")
     beam = np.rint((bearing % (2 * math.pi)) / step).astype(np.int64)
     if even:
         beam %= turn
-    ranges = scan.ranges.take(beam, mode="clip")
-    return beam, np.where((beam >= 0) & (beam < count), ranges, np.nan)
+    return beam, np.where((beam >= 0) & (beam < count), told.take(beam, mode="clip"), np.nan)

@@ -3,7 +3,7 @@ import pytest
 from scipy.ndimage import distance_transform_edt
 
 from simscen.stack import nearest
-from simscen.stack.nearest import BEYOND, squared_cells, squared_within
+from simscen.stack.nearest import squared_cells, squared_within
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (64, 7), (130, 50)])
@@ -25,8 +25,8 @@ def test_up_to_a_reach_the_same_distances_are_told_sooner(shape, reach, at_once,
     marked = np.random.default_rng(5).random(shape) < 0.01
     marked[-1, -1] = True
     whole = np.rint(distance_transform_edt(~marked) ** 2)
-    assert np.array_equal(squared_within(marked, reach), np.where(whole <= reach**2, whole, BEYOND))
+    assert np.array_equal(squared_within(marked, reach), np.where(whole <= reach**2, whole, reach**2 + 1))
 
 
 def test_where_nothing_is_marked_everything_is_beyond_the_reach():
-    assert (squared_within(np.zeros((70, 5), dtype=bool), nearest.FARTHEST) == BEYOND).all()
+    assert (squared_within(np.zeros((70, 5), dtype=bool), nearest.FARTHEST) == nearest.FARTHEST**2 + 1).all()

@@ -30,7 +30,7 @@ def test_crossed_cells_are_those_a_walk_along_the_beams_comes_through(beams: int
     scan = Scan("l", 0, 2.0 + np.sin(3 * np.arange(beams) * step), -math.pi, step, 0.05, 12.0, Pose2(0.1, 0.05, 0.2))
     cells = np.argwhere(np.ones(FRAME.shape, dtype=bool))
     centres = FRAME.points(np.arange(len(cells)))
-    found = {tuple(cell) for cell in cells[crossed(centres, FRAME.resolution, scan, base, spec)].tolist()}
+    found = {tuple(cell) for cell in cells[crossed(centres, FRAME.resolution, scan, base, spec)[0]].tolist()}
     truth = walked(scan, base, spec)
     points, _ = hits(scan, base, 0.0, 99.0)
     ends = {tuple(cell) for cell in FRAME.cells(np.column_stack((points.real, points.imag))).tolist()}
