@@ -75,7 +75,8 @@ def reference_stack(spec: StackSpec, setting: Setting) -> ReferenceStack:
     )
     controller: Controller = made(InstalledController, spec.controller, driving)
     costmaps = Costmaps(spec, surroundings, controller.full_speed * spec.controller.looks_ahead, latency["costmap"])
-    driving = replace(driving, clear_costmap=costmaps.clear, clear_around=costmaps.clear_around)
+    monitor = CollisionMonitor(spec.collision_monitor, robot, surroundings.lidars, surroundings.tick_rate)
+    driving = replace(driving, clear_costmap=costmaps.clear, clear_around=costmaps.clear_around, allowed=monitor.allow)
     planning = replace(driving, name="planner", resolution=costmaps.wide.view.resolution)
     plans = PlanKeeper(
         spec.planner,
@@ -98,7 +99,6 @@ def reference_stack(spec: StackSpec, setting: Setting) -> ReferenceStack:
         spec.failure_tolerance,
         Forgetting(always=spec.recovery.clear_entirely),
     )
-    monitor = CollisionMonitor(spec.collision_monitor, robot, surroundings.lidars, surroundings.tick_rate)
     commands = Commands(
         VelocitySmoother(spec.velocity_smoother, robot, setting.control_period),
         monitor,

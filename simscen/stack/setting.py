@@ -11,6 +11,7 @@ from simscen.core.chance import Streams
 from simscen.core.geometry import Pose2
 from simscen.core.goalnames import Mode
 from simscen.core.grid import OccupancyGrid
+from simscen.core.motion import Twist
 from simscen.core.time import Clock
 from simscen.stack.footprint import Footprint
 from simscen.stack.protocols import Localizer, RobotModel, Surroundings
@@ -36,6 +37,7 @@ class Setting:
     clear_around:     the same, as far from the robot as the local costmap reaches
     way:              the poses that the robot came by in the last minute, the oldest first, in the odom frame (for a
                       behaviour)
+    allowed:          what the collision monitor would make of a command at a pose in the odom frame (for a behaviour)
     heard:            what stands between the localizer and all who ask it; here, nothing (for the reference stack)
     """
 
@@ -50,6 +52,7 @@ class Setting:
     clear_costmap: Callable[[], None] = lambda: None
     clear_around: Callable[[], None] = lambda: None
     way: Callable[[], Sequence[Pose2]] = tuple
+    allowed: Callable[[Twist, Pose2], Twist] = lambda command, _: command
     heard: Callable[[Localizer], Localizer] = lambda localizer: localizer
 
     def named(self, name: str) -> "Setting":

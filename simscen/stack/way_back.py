@@ -1,6 +1,7 @@
 """Which velocity leads a robot back the way it came."""
 
 import math
+from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
@@ -44,9 +45,10 @@ class WayBack:
 
     def __init__(self, setting: Setting, speed: float) -> None:
         """`speed`: m/s at most; less where the base cannot reverse as fast."""
-        self._footprint, self._way = setting.footprint, setting.way
+        self._footprint, self._way, self._allowed = setting.footprint, setting.way, setting.allowed
         self.speed = min(speed, setting.robot.max_reverse)
         """m/s; 0 for a robot without a reverse gear."""
+        self._last: Pose2 | None = None
         self._commands = _possible(setting.robot, self.speed)
         there = np.array([AHEAD])
         self._ends = np.stack([poses_along(Pose2(0.0, 0.0), each, there)[0] for each in (*self._commands, STOP)])
@@ -54,11 +56,21 @@ class WayBack:
     def start(self, pose: Pose2, length: float) -> None:
         """Begin from this pose in the odom frame, to go back so many metres at most."""
         lever = self._footprint.circumscribed
-        self._trail, self._at = Trail(self._way(), pose, lever, length + self.speed * AHEAD), 0
+        self._trail, self._at = Trail(self._came(), pose, lever, length + self.speed * AHEAD), 0
+        self._last = pose
+
+    def _came(self) -> Sequence[Pose2]:
+        """The way it came; where it has gone back a part of that since, the rest of it, and what came then."""
+        way = self._way()
+        if self._last is None or self._last not in way:
+            return way
+        since = len(way) - way[::-1].index(self._last)
+        rest = self._trail.poses[self._at : self._trail.known]
+        return [*(Pose2(*each) for each in rest[::-1].tolist()), *way[since:]]
 
     def locate(self, pose: Pose2) -> None:
         """Note where the robot is; it never goes forward again."""
-        ahead = self._ahead()
+        ahead, self._last = self._ahead(), pose
         self._at += int(self._trail.apart(self._trail.poses[ahead], np.array(pose)).argmin())
 
     @property
@@ -78,19 +90,29 @@ class WayBack:
     def command(self, pose: Pose2, costmap: CostmapView) -> Twist | None:
         """The command that gets it farthest back of those that are free; else of those that are for a moment.
 
-        None where to stand is as good.
+        None where to stand is as good. Who touches a post all but may not turn as the way does, says the monitor, which
+        sees by the centimetre what cells do not show: then whatever else leads back, until there is room again.
         """
         *worth, standing = self._worth(pose).tolist()
-        strafed, commands = self._trail.strafed, enumerate(self._commands)
-        better = [k for k, each in commands if worth[k] > standing + GAIN and (strafed or each.vy == 0.0)]
-        better.sort(key=lambda k: -worth[k])
+        strafed, vetoed = self._trail.strafed, False
+        possible = [k for k, each in enumerate(self._commands) if strafed or each.vy == 0.0]
+        possible.sort(key=lambda k: -worth[k])
         for_now: Twist | None = None
-        for command in (self._commands[k] for k in better):
+        for k in possible:
+            command, gains = self._commands[k], worth[k] > standing + GAIN
+            if not gains and (for_now is not None or not vetoed):
+                break
+            if vetoed and (command.vx > 0.0 or (command.vx == 0.0 and not gains)):
+                continue
             blocked = self._blocked(pose, poses_along(pose, command, TIMES), costmap)
-            if not blocked.any():
-                return command
-            if for_now is None and blocked.argmax() > AT_LEAST:
+            if blocked.any() and (not gains or for_now is not None or blocked.argmax() <= AT_LEAST):
+                continue
+            if self._allowed(command, pose) == STOP:
+                vetoed = True
+            elif blocked.any():
                 for_now = command
+            else:
+                return command
         return for_now
 
     def _blocked(self, pose: Pose2, poses: Array, costmap: CostmapView) -> Mask:

@@ -10,6 +10,9 @@ from simscen.stack.protocols import CostmapView, NavigationFailure
 from simscen.stack.setting import Setting
 from simscen.stack.way_back import WayBack
 
+SLOWLY = 1.5
+"""Times as long as the way takes at full speed it may take, for it is driven in part at half of it."""
+
 
 class Retrace:
     """Drive back the way it came, turns included, until there is room to turn."""
@@ -37,7 +40,7 @@ class Retrace:
             return None
         if back.driven >= self._spec.backup_dist and self._may_turn(pose, costmap):
             return None
-        if seconds > TIME_ALLOWANCE:
+        if seconds > max(TIME_ALLOWANCE, SLOWLY * self._spec.retrace_dist / back.speed):
             raise NavigationFailure(ErrorCode.BACKUP_TIMEOUT, "driving back the way it came took too long")
         command = back.command(pose, costmap)
         if command is None and back.moved < costmap.resolution:

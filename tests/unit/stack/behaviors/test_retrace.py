@@ -1,6 +1,7 @@
 """Who is wedged drives out the way it came."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -9,16 +10,20 @@ import pytest
 from simscen.core.geometry import Pose2
 from simscen.core.motion import STOP, Twist
 from simscen.core.navigation import ErrorCode
+from simscen.core.sensing import Scan
 from simscen.model import recovery as model
 from simscen.model.costmaps import Costmap as CostmapSpec
+from simscen.model.guards import CollisionMonitor as MonitorSpec
 from simscen.stack.arcs import poses_along
 from simscen.stack.behaviors.motions import BackUp, Spin
 from simscen.stack.behaviors.retrace import Retrace
+from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.protocols import Behavior, CostmapView, NavigationFailure, RobotModel, Surroundings
 from simscen.stack.trail import Trail
 from simscen.testing.flatland import RATE, Flatland, box_robot, round_robot, setting
 
+Allowed = Callable[[Twist, Pose2], Twist]
 LONG = box_robot(0.42, 0.42)
 POSTS = ((0.29, -0.03, 0.05), (-0.4, 0.17, 0.05))
 """Discs (x, y, radius) between which a robot at the origin can neither turn nor back up straight as Nav2's does."""
@@ -47,15 +52,16 @@ def behavior(robot: RobotModel, way: list[Pose2], **said: float) -> Retrace:
     return Retrace(model.Retrace(**said), replace(setting(robot), way=lambda: way))
 
 
-def run(behavior: Behavior, view: CostmapView, slip: float = 1.0) -> list[Pose2]:
-    """Do as it says until it is done: the poses. Of each turn the base makes the part `slip`."""
+def run(behavior: Behavior, view: CostmapView, slip: float = 1.0, allowed: Allowed = lambda one, _: one) -> list[Pose2]:
+    """Do what is `allowed` of what it says until it is done: the poses. Of each turn the base makes the part `slip`."""
     poses = [Pose2(0.0, 0.0)]
     behavior.start(poses[0])
     for beat in range(400):
         command = behavior.step(poses[-1], view, 0.05 * beat)
         if command is None:
             return poses
-        moved = Twist(command.vx, command.vy, slip * command.wz)
+        done = allowed(command, poses[-1])
+        moved = Twist(done.vx, done.vy, slip * done.wz)
         poses.append(Pose2(*poses_along(poses[-1], moved, np.array([0.05]))[0].tolist()))
     raise AssertionError("it never ends")
 
@@ -118,6 +124,32 @@ def test_it_fails_with_the_codes_of_backing_up() -> None:
     with pytest.raises(NavigationFailure) as failed:
         run(behavior(replace(LONG, max_reverse=0.0), IN), view)
     assert failed.value.code == ErrorCode.BACKUP_INVALID_INPUT
+
+
+def test_what_the_collision_monitor_would_not_let_it_drive_is_not_what_it_does() -> None:
+    way = driven((Twist(0.3, 0.0, 0.0), 2.0), (Twist(0.2, 0.0, -0.8), 1.0))
+    ranges = np.full(5, 9.0)
+    ranges[2] = math.hypot(0.02, 0.217)  # a post 7 mm beside the hull, towards which the way back turns
+    monitor = CollisionMonitor(MonitorSpec(), LONG, ("lidar",), RATE)
+    monitor.on_scan(Scan("lidar", 0, ranges, math.atan2(0.217, 0.02) - 0.02, 0.01, 0.1, 10.0), Pose2(0.0, 0.0))
+    view = view_of(LONG, Flatland())
+    with pytest.raises(NavigationFailure, match="too long"):
+        run(behavior(LONG, way), view, allowed=monitor.allow)
+    heedful = Retrace(model.Retrace(), replace(setting(LONG), way=lambda: way, allowed=monitor.allow))
+    end = run(heedful, view, allowed=monitor.allow)[-1]
+    assert math.hypot(end.x, end.y) > 0.29 and end.yaw > 0.3
+
+
+def test_who_has_gone_back_a_part_goes_on_from_there_though_it_stands_beside_the_way() -> None:
+    corridor = Flatland([(-4.0, 0.27, 3.0, 0.4), (-4.0, -0.4, 3.0, -0.27)])
+    way = driven((Twist(0.5, 0.0, 0.0), 6.0))
+    twice, view = behavior(LONG, way), view_of(LONG, corridor)
+    back = run(twice, view)
+    beside = [Pose2(each.x, each.y + 0.16, each.yaw) for each in (back[-1], back[-1])]
+    way += [*back, *beside]
+    twice.start(beside[-1])
+    command = twice.step(beside[-1], view_of(LONG, Flatland()), 0.0)
+    assert command is not None and command.vx < 0.0
 
 
 def test_a_trail_goes_back_by_small_steps_without_what_was_to_and_fro() -> None:
