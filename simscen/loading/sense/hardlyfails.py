@@ -28,6 +28,7 @@ DETOUR = 10.0
 MANY = 1000
 """Collisions: more than any run has seen."""
 TURN = 2 * math.pi
+LATENCY_HINT = "write one into a *.robot.yaml, or the durations here"
 
 
 def hardly_fails(loaded: LoadedScenario) -> Iterator[Problem]:
@@ -158,6 +159,9 @@ def _idle_faults(loaded: LoadedScenario) -> Iterator[Problem]:
 
 def _idle_stack(loaded: LoadedScenario) -> Iterator[Problem]:
     robot, stack = loaded.robot.spec, loaded.spec.stack
+    if getattr(stack, "latency", None) == "robot" and (robot is None or "latency" not in robot.model_fields_set):
+        message = f"the file of robot `{loaded.robot.name}` says no `latency`: computing takes no time"
+        yield loaded.problem(("stack", "latency"), "SC055", message, LATENCY_HINT)
     if robot is None:
         return
     fastest = top_speed(robot)
