@@ -15,7 +15,7 @@ from simscen.cli.select import Checks
 from simscen.cli.stacks import stacks_of
 from simscen.core.errors import Exit
 from simscen.core.problems import Problem
-from simscen.loading.anyfile import kind_of, problems_of
+from simscen.loading.anyfile import STACKS, kind_of, problems_of
 from simscen.loading.discovery import BASE, ROBOT, SCENARIO, STACK, WORLD, default_root, discover
 
 
@@ -49,9 +49,10 @@ def command(
     """Check scenario, world, robot and stack files without running anything.
 
     Every problem of every file is listed with its line. Folders are searched for *.scenario.yaml, *.world.yaml,
-    *.robot.yaml, *.stack.yaml and *.base.yaml. Of a base, which is there to be extended, and of a defaults.yaml what
-    is there is checked, and nothing is missing. Scenarios are looked at in their worlds: is the robot free at its
-    start and goals, can it get there in time, can all events happen, can all criteria hold and fail?
+    *.robot.yaml, *.stack.yaml and *.base.yaml. A parameter file of Nav2 is checked as a stack, and what of it means
+    nothing here is listed. Of a base, which is there to be extended, and of a defaults.yaml what is there is checked,
+    and nothing is missing. Scenarios are looked at in their worlds: is the robot free at its start and goals, can it
+    get there in time, can all events happen, can all criteria hold and fail?
 
     Exit code 0: all are valid; 2: some are not; 5: there are none.
     """
@@ -73,7 +74,7 @@ def _problems(kind: str, file: Path, checks: Checks) -> list[Problem]:
         found = [problem for choice in checks.choices for problem in checks.scenario(file, choice)[1]]
         return list(dict.fromkeys(found))
     found = problems_of(kind, file, checks.root, checks.world_path)
-    if kind in ("stack", "base") or any(problem.severity == "error" for problem in found):
+    if kind in (*STACKS, "base") or any(problem.severity == "error" for problem in found):
         return found
     built = checks.robot if kind == "robot" else checks.world
     return [*found, *built(file)]
@@ -103,7 +104,8 @@ class _Checked:
 
 
 def _count(number: int, what: str) -> str:
-    return f"{number} {what}{'' if number == 1 else 's'}"
+    noun, of, rest = what.partition(" of ")  # a parameter file of Nav2
+    return f"{number} {noun}{'' if number == 1 else 's'}{of}{rest}"
 
 
 def _text(checked: _Checked) -> None:

@@ -25,6 +25,7 @@ CODES = {
     "SC022": "Symbolic links lead in a circle.",
     "SC023": "A file, model or robot that is named does not exist.",
     "SC024": "Files extend each other in a circle, or there are too many of them.",
+    "SC025": "The file holds the parameters of a stack, where a scenario is asked for.",
     "SC030": "A name refers to nothing: no such place, region, door, object, goal, event, fault or robot.",
     "SC031": "The robot has no sensor of that name.",
     "SC032": "The fault makes no sense on that sensor.",

@@ -19,6 +19,7 @@ from simscen.loading.paths import Fence
 from simscen.loading.placing import placed, places_of, unknown_places
 from simscen.loading.sense.whose import whose
 from simscen.loading.stackchoice import StackChoice
+from simscen.loading.strangers import no_scenario, stranger
 from simscen.loading.tree import Fields, Key, Leaf, Node, at, child, value_place
 from simscen.loading.validation import check
 from simscen.loading.variations.expand import Variation, variations_of
@@ -78,6 +79,8 @@ def try_variations(
         message, hint = f"its id would end in {name!r}, which is no folder", "give the file a name before its suffix"
         return [Problem(fence.shown(file), 0, 0, "SC041", message, hint)]
     tree, problems = library.read(file, defaults=True)
+    if kind := stranger(tree, library.texts.get(shown := fence.shown(file), ""), shown):
+        return [no_scenario(kind, shown)]
     if choice is not None:
         library.add(choice.texts, choice.files)
     if problems or not isinstance(tree, Fields):

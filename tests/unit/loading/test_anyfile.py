@@ -22,6 +22,11 @@ Write = Callable[[str, str], Path]
         ("a.yaml", "simscen: 1\ndrive: {}", "robot"),
         ("a.yaml", "simscen: 1\nwalls: []", "world"),
         ("a.yaml", "not even [yaml", "scenario"),
+        ("a.yaml", "simscen: 1\nname: mine\nstack: {}", "stack"),
+        ("a.yaml", "simscen: 1\nworld: a\nstack: {}", "scenario"),
+        ("a.yaml", "amcl: {ros__parameters: {alpha1: 0.1}}", "parameter file of Nav2"),
+        ("a.yaml", "robot1:\n  /**: {ros__parameters: {a: 1, a: 2}}", "parameter file of Nav2"),
+        ("a.scenario.yaml", "amcl: {ros__parameters: {alpha1: 0.1}}", "scenario"),
     ],
 )
 def test_a_file_tells_its_kind_by_name_or_keys(write: Write, tmp_path: Path, name: str, text: str, kind: str) -> None:
@@ -53,3 +58,31 @@ def test_paths_may_be_relative_to_the_working_folder(
     monkeypatch.chdir(tmp_path)
     for name in ("a.scenario.yaml", "room.world.yaml"):
         assert _problems(Path(name), Path()) == []
+
+
+PARAMETERS = "amcl:\n  ros__parameters: {alpha1: 0.1, beta: 2}\ndocking_server:\n  ros__parameters: {a: 1}\n"
+
+
+def test_of_a_parameter_file_of_nav2_is_told_what_means_nothing_and_what_is_wrong(write: Write, tmp_path: Path) -> None:
+    told = _problems(write("nav2.yaml", PARAMETERS), tmp_path)
+    assert [(p.place, p.code, p.severity) for p in told] == [
+        ("nav2.yaml:2:40", "SC341", "warning"),
+        ("nav2.yaml:4:24", "SC341", "warning"),
+    ]
+    wrong = _problems(write("nav2.yaml", PARAMETERS.replace("alpha1: 0.1", "alpha1: -1.0")), tmp_path)
+    assert [(p.place, p.code, p.severity) for p in wrong] == [("nav2.yaml:2:29", "SC013", "error")]
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (PARAMETERS, "a parameter file of Nav2, and no scenario"),
+        ("simscen: 1\nstack: {}", "a stack file, and no scenario"),
+    ],
+)
+def test_parameters_of_a_stack_are_no_scenario_and_what_they_are_for_is_told(
+    write: Write, tmp_path: Path, text: str, told: str
+) -> None:
+    (problem,) = problems_of("scenario", write("mine.yaml", text), tmp_path)
+    assert (problem.place, problem.code, problem.message) == ("mine.yaml", "SC025", told)
+    assert "--stack NAME=mine.yaml" in problem.hint
