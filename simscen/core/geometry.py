@@ -43,6 +43,15 @@ def rotated(turn: tuple[float, float, float, float], vector: Vector) -> Vector:
     return a + w * p + y * r - z * q, b + w * q + z * p - x * r, c + w * r + x * q - y * p
 
 
+def forward_and_left(turn: tuple[float, float, float, float]) -> tuple[Vector, Vector]:
+    """The x and y axes of a frame that is turned by a unit quaternion (x, y, z, w)."""
+    x, y, z, w = turn
+    return (
+        (1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)),
+        (2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)),
+    )
+
+
 class Pose2(NamedTuple):
     """A position and heading in the plane; read `a_from_b` as the pose of frame b in frame a."""
 
@@ -130,13 +139,8 @@ class Pose3(NamedTuple):
     def rotation(self) -> Array:
         """The 3 x 3 rotation matrix."""
         x, y, z, w = self.quaternion
-        return np.array(
-            [
-                [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-            ]
-        )
+        (a, b, c), (d, e, f) = forward_and_left((x, y, z, w))
+        return np.array([[a, d, 2 * (x * z + y * w)], [b, e, 2 * (y * z - x * w)], [c, f, 1 - 2 * (x * x + y * y)]])
 
     def apply(self, points: Array) -> Array:
         """Points (n, 3) of this pose's frame, expressed in its parent frame."""

@@ -1,14 +1,76 @@
 """The one thing sensors ask of a ray-casting scene."""
 
 import math
+from abc import abstractmethod
+from collections.abc import Iterator
 from typing import Protocol
 
-from simscen.core.geometry import Array
+import numpy as np
+import numpy.typing as npt
+
+from simscen.core.geometry import Array, Pose3, Vector
+
+Singles = npt.NDArray[np.float32]
+
+
+class Fan:
+    """Rays in one plane that all begin in one place, as those of a lidar, evenly spaced.
+
+    It has room for what is worked out anew at each scan: where the rays begin, and which way they point.
+    """
+
+    def __init__(self, first: float, increment: float, count: int) -> None:
+        """Ray k points at `first` + k `increment` rad in the x-y plane; together they are no more than a full turn."""
+        angles = first + increment * np.arange(count, dtype=np.float64)
+        self._first, self._increment, self._count = first, increment, count
+        self._flat = np.column_stack((np.cos(angles), np.sin(angles)))
+        self._turned = np.empty((count, 3))
+        self._start = np.zeros(3, dtype=np.float32)
+        self.starts: Singles = np.ndarray((count, 3), np.float32, self._start, 0, (0, 4))
+        """(n, 3), all where `begin` said."""
+        self.directions: Singles = np.empty((count, 3), dtype=np.float32)
+        """(n, 3), as `turn` said."""
+
+    def __len__(self) -> int:
+        return self._count
+
+    def at(self, pose: Pose3) -> tuple[Array, Array]:
+        """Origins (n, 3) and unit directions (n, 3) of the rays of a fan whose frame is at `pose`."""
+        (x, y), turn = self._flat.T, pose.rotation()
+        return np.repeat([pose.position], self._count, axis=0), np.column_stack((x, y, np.zeros_like(x))) @ turn.T
+
+    def begin(self, x: float, y: float, z: float) -> None:
+        """All rays begin there."""
+        start = self._start
+        start[0], start[1], start[2] = x, y, z
+
+    def turn(self, ahead: Vector, left: Vector, rays: slice = slice(None)) -> None:
+        """Work out the directions of some `rays` where the fan's x and y axes are `ahead` and `left`."""
+        turned = self._turned[rays]
+        np.dot(self._flat[rays], np.array((ahead, left)), turned)
+        self.directions[rays] = turned
+
+    def towards(self, x: float, y: float, least: float) -> Iterator[slice]:
+        """The rays whose products with a vector (x, y, any) of the fan's frame are `least` or more, and some beside."""
+        far = math.hypot(x, y)
+        if least > far:
+            return
+        half = math.acos(max(-1.0, least / far)) / self._increment if far > 0 else math.inf
+        full = 2 * math.pi / self._increment
+        if 2 * half >= full:
+            yield slice(0, self._count)
+            return
+        middle = (math.atan2(y, x) - self._first) % (2 * math.pi) / self._increment
+        for around in (middle - full, middle, middle + full):
+            first, last = math.floor(around - half), math.ceil(around + half)
+            if last >= 0 and first < self._count:
+                yield slice(max(0, first), last + 1)
 
 
 class RayCaster(Protocol):
     """Casts rays against everything solid but the robot that asks."""
 
+    @abstractmethod
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
         """Distances (n,) in metres along unit `directions` (n, 3) from `origins` (n, 3).
 
@@ -17,3 +79,10 @@ class RayCaster(Protocol):
         *Given* the same geometry *then* the same distances, bit for bit, whatever was asked before.
         """
         ...
+
+    def sweep(self, fan: Fan, pose: Pose3, reach: float) -> Array | Singles:
+        """The same distances (n,) of a fan whose frame is at `pose` of its own; any beyond `reach` for nothing.
+
+        What begins in one place is asked sooner.
+        """
+        return self.cast(*fan.at(pose), reach)

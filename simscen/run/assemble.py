@@ -8,6 +8,7 @@ from simscen.core.belief import Belief
 from simscen.core.chance import Streams
 from simscen.core.events import Event, EventKind
 from simscen.core.geometry import Array, Pose3
+from simscen.core.rays import Fan, RayCaster, Singles
 from simscen.core.sensing import Odometry
 from simscen.core.shapes import Body, Shape, TriangleMesh
 from simscen.core.surface import Patch
@@ -180,7 +181,7 @@ def _stack(
     )
 
 
-class LiveRays:
+class LiveRays(RayCaster):
     """Rays of a robot against the static world and against everything else that moves, where it is now."""
 
     def __init__(self, scene: RayScene, robot: Robot, without: frozenset[str] = frozenset()) -> None:
@@ -192,6 +193,16 @@ class LiveRays:
 
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
         """See core.rays.RayCaster."""
+        self._look()
+        return self._scene.cast(origins, directions, reach)
+
+    def sweep(self, fan: Fan, pose: Pose3, reach: float) -> Singles:
+        """See core.rays.RayCaster."""
+        self._look()
+        return self._scene.sweep(fan, pose, reach)
+
+    def _look(self) -> None:
+        """See where everything is now."""
         robot = self._robot
         if robot.bodies is not self._bodies:  # it is the same one for as long as nothing comes or goes
             self._meshes, self._bodies = self._surfaces(robot.bodies), robot.bodies
@@ -200,7 +211,6 @@ class LiveRays:
         if where is not self._where:  # it is the same one for as long as nothing has moved
             self._where = where
             self._scene.set_moving({name: (mesh, where[name]) for name, mesh in self._meshes.items()})
-        return self._scene.cast(origins, directions, reach)
 
     def _surfaces(self, bodies: Mapping[str, Body]) -> dict[str, TriangleMesh]:
         """By name, the surface of each, which is the same one for all that are alike: a row of chairs is built once."""

@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from simscen.core.geometry import Array, Pose2, rotated
+from simscen.core.geometry import Array, Pose2, Pose3, rotated
+from simscen.core.rays import Fan, Singles
 from simscen.core.sensing import Scan
 from simscen.model.robot import Lidar
 from simscen.sensors.sensor import SensorSetting
@@ -28,28 +29,27 @@ class LidarSensor:
         self._increment = spec.field_of_view / max(1, spec.beams if full else spec.beams - 1)
         self._first = -spec.field_of_view / 2 if spec.beams > 1 else 0.0
         self._mount = Pose2(spec.mount.x, spec.mount.y, spec.mount.yaw)
-        angles = self._first + self._increment * np.arange(spec.beams, dtype=np.float64)
-        self._directions = _directions(angles + spec.mount.yaw)
-        self._reach = spec.max_range + CERTAIN * spec.noise
+        self._fan = Fan(self._first + spec.mount.yaw, self._increment, spec.beams)
+        # What is beyond this is beyond the lidar's range whatever the noise, and when it is rounded to a whole step.
+        self._reach = spec.max_range + CERTAIN * spec.noise + spec.resolution
         self._lens = spec.mount.x, spec.mount.y, spec.mount.z
         self._ahead, self._next = np.empty((0, spec.beams)), 0
 
     def read(self, tick: int) -> Scan:
         """One scan. inf: nothing within range; nan: something nearer than the lidar can measure."""
         pose = self._view.base_pose()
-        directions = self._directions @ pose.rotation().T
-        x, y, z = rotated(pose[3:], self._lens)
-        lens = np.array((pose.x + x, pose.y + y, pose.z + z))
-        origins = np.ndarray(directions.shape, np.float64, lens, 0, (0, 8))  # one place for all rays
-        ranges = self._measured(self._rays.cast(origins, directions, self._reach))
+        px, py, pz, i, j, k, w = pose
+        x, y, z = rotated((i, j, k, w), self._lens)
+        ranges = self._measured(self._rays.sweep(self._fan, Pose3(px + x, py + y, pz + z, i, j, k, w), self._reach))
         spec = self._spec
         return Scan(self.name, tick, ranges, self._first, self._increment, spec.min_range, spec.max_range, self._mount)
 
-    def _measured(self, distances: Array) -> Array:
+    def _measured(self, distances: Array | Singles) -> Array:
         """What the electronics make of true distances."""
         spec = self._spec
-        ranges = (distances + self._noise() if spec.noise > 0 else distances) / spec.resolution
-        np.rint(ranges, out=ranges)
+        ranges: Array = distances + self._noise() if spec.noise > 0 else distances.astype(np.float64)
+        ranges /= spec.resolution
+        np.rint(ranges, ranges)
         ranges *= spec.resolution
         ranges[ranges > spec.max_range] = np.inf
         ranges[ranges < spec.min_range] = np.nan
@@ -62,7 +62,3 @@ class LidarSensor:
         self._next += 1
         noise: Array = self._ahead[self._next - 1]
         return noise
-
-
-def _directions(angles: Array) -> Array:
-    return np.column_stack((np.cos(angles), np.sin(angles), np.zeros(len(angles))))

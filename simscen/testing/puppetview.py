@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2, Pose3
+from simscen.core.rays import RayCaster
 from simscen.model.robot import Differential
 
 SPEED, TURN = 0.3, 0.2
@@ -47,7 +48,7 @@ class PuppetView:
         return np.full((height, width, 3), 128, np.uint8), np.full((height, width), min(2.0, far), np.float32)
 
 
-class SquareRoom:
+class SquareRoom(RayCaster):
     """Rays to the four walls."""
 
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:

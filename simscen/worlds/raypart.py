@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-import numpy.typing as npt
 from embreex.mesh_construction import TriangleMesh as EmbreeMesh
 from embreex.rtcore import EmbreeDevice
 from embreex.rtcore_scene import EmbreeScene
@@ -11,10 +10,9 @@ from embreex.rtcore_scene import EmbreeScene
 from simscen.core.facelots import FaceLots, lots_of
 from simscen.core.facemesh import compact
 from simscen.core.geometry import Array, Pose3, Vector, rotated
+from simscen.core.rays import Fan, Singles
 from simscen.core.remembered import remembered
 from simscen.core.shapes import Mesh, TriangleMesh
-
-Singles = npt.NDArray[np.float32]
 
 EDGE, AHEAD = 4.0, 8.0
 """m of the squares that large worlds are taken in, and beyond the reach of rays within which they are."""
@@ -47,18 +45,23 @@ class Part:
 
         An array of `ends` becomes the answer.
         """
-        return self._run(np.subtract(origins, self.middle).astype(np.float32), directions, ends)
-
-    def distances_from(self, place: Vector, directions: Array, ends: float | Singles) -> Singles:
-        """The same of rays that all begin in one place."""
-        (x, y, z), (mx, my, mz) = place, self.centre
-        start = np.array((x - mx, y - my, z - mz), dtype=np.float32)
-        return self._run(np.ndarray(directions.shape, np.float32, start, 0, (0, 4)), directions, ends)
-
-    def _run(self, starts: Singles, directions: Array, ends: float | Singles) -> Singles:
+        starts = np.subtract(origins, self.middle).astype(np.float32)
         along = np.ascontiguousarray(directions, dtype=np.float32)
         answer: Singles = self._scene.run(starts, along, ends, query="DISTANCE")
         return answer
+
+    def sweep(self, fan: Fan, place: Vector, ends: float) -> Singles:
+        """The same of a fan of rays that begin in a place and point where they were turned to."""
+        (x, y, z), (mx, my, mz) = place, self.centre
+        fan.begin(x - mx, y - my, z - mz)
+        answer: Singles = self._scene.run(fan.starts, fan.directions, ends, query="DISTANCE")
+        return answer
+
+    def sweep_some(self, fan: Fan, rays: slice, place: Vector, ends: Singles) -> None:
+        """Some of a fan's rays alone: what they meet before their `ends` becomes their ends."""
+        (x, y, z), (mx, my, mz) = place, self.centre
+        fan.begin(x - mx, y - my, z - mz)
+        self._scene.run(fan.starts[rays], fan.directions[rays], ends, query="DISTANCE")
 
 
 class Mover:
@@ -94,11 +97,26 @@ class Mover:
         turn = self._turn
         return self.part.distances((origins - self.pose[:3]) @ turn, directions @ turn, ends)
 
-    def distances_from(self, place: Vector, directions: Array, ends: Singles) -> Singles:
-        """The same of rays that all begin in one place."""
-        (px, py, pz), (x, y, z, i, j, k, w) = place, self.pose
-        seen = rotated((-i, -j, -k, w), (px - x, py - y, pz - z))
-        return self.part.distances_from(seen, directions @ self._turn, ends)
+    def sweep(self, fan: Fan, pose: Pose3, axes: tuple[Vector, Vector], ends: Singles) -> None:
+        """What rays meet before their `ends` (n,) becomes these, of a fan at `pose` whose x and y axes are `axes`.
+
+        It is asked for those within the cone about the sphere around it, if any goes as far.
+        """
+        px, py, pz, i, j, k, w = pose
+        (x, y, z), radius = self.middle, self.part.radius
+        way = x - px, y - py, z - pz
+        far = math.hypot(*way)
+        ahead, left, _ = rotated((-i, -j, -k, w), way)
+        for rays in fan.towards(ahead, left, math.sqrt(far * far - radius * radius) if far > radius else -math.inf):
+            before = ends[rays]
+            if before[before.argmax()] >= far - radius:  # `max` takes ten times as long
+                self._cut(fan, rays, pose, axes, before)
+
+    def _cut(self, fan: Fan, rays: slice, pose: Pose3, axes: tuple[Vector, Vector], ends: Singles) -> None:
+        (px, py, pz, *_), (ahead, left), (x, y, z, i, j, k, w) = pose, axes, self.pose
+        back = -i, -j, -k, w
+        fan.turn(rotated(back, ahead), rotated(back, left), rays)
+        self.part.sweep_some(fan, rays, rotated(back, (px - x, py - y, pz - z)), ends)
 
 
 class Window:

@@ -8,10 +8,11 @@ import numpy as np
 import numpy.typing as npt
 from embreex.rtcore import EmbreeDevice
 
-from simscen.core.geometry import Array, Pose3, Vector
+from simscen.core.geometry import Array, Pose3, forward_and_left
+from simscen.core.rays import Fan, RayCaster, Singles
 from simscen.core.shapes import TriangleMesh
 from simscen.worlds import raypart
-from simscen.worlds.raypart import Mover, Part, Singles, Window
+from simscen.worlds.raypart import Mover, Part, Window
 
 Numbers = npt.NDArray[np.int64]
 Placed = tuple[TriangleMesh, Pose3]
@@ -24,7 +25,7 @@ _BEYOND = 1.001
 """Times its reach, where a ray ends that meets nothing within it."""
 
 
-class RayScene:
+class RayScene(RayCaster):
     """A `core.rays.RayCaster` over the triangles of a world and of the bodies that move in it.
 
     A body that moves stays as it was built; the few rays that come near it are carried into its frame. Distances agree
@@ -67,35 +68,20 @@ class RayScene:
         limit = min(reach, _FARTHEST)
         if not len(origins):
             return np.empty(0)
-        if not origins.strides[0]:
-            x, y, z = origins[0].tolist()
-            distances = self._from_one((x, y, z), directions, reach, limit * _BEYOND)
-        else:
-            distances = self._from_each(origins, directions, reach, limit * _BEYOND)
+        distances = self._from_each(origins, directions, reach, limit * _BEYOND)
         answer = distances.astype(np.float64)
         answer[distances > limit] = np.inf
         return answer
 
-    def _from_one(self, place: Vector, directions: Array, reach: float, end: float) -> Singles:
-        """Where rays that all begin in one place meet anything, as those of a scan: with as few operations as may be.
-
-        A moving body is asked for the rays within the cone about the sphere around it.
-        """
+    def sweep(self, fan: Fan, pose: Pose3, reach: float) -> Singles:
+        """See core.rays.RayCaster: with as few operations as may be, for each takes 1 µs where it runs once a scan."""
+        place, ahead_and_left = pose[:3], forward_and_left(pose[3:])
+        fan.turn(*ahead_and_left)
         static = self._static.around(place, reach) if isinstance(self._static, Window) else self._static
-        ends = static.distances_from(place, directions, end)
-        near = [mover for mover in self._movers.values() if mover.away(place) <= reach]
-        if not near:
-            return ends
-        px, py, pz = place
-        ways = [(x - px, y - py, z - pz) for x, y, z in [mover.middle for mover in near]]
-        for mover, (x, y, z), along in zip(near, ways, np.array(ways) @ directions.T, strict=True):
-            square, radius = x * x + y * y + z * z, mover.part.radius
-            outside = square - radius * radius
-            rays: Numbers = (along >= (math.sqrt(outside) if outside > 0 else -math.inf)).nonzero()[0]
-            if len(rays):
-                before = ends.take(rays)
-                if np.maximum.reduce(before) >= math.sqrt(square) - radius:  # `max` is two calls more
-                    ends[rays] = mover.distances_from(place, directions.take(rays, axis=0), before)
+        ends = static.sweep(fan, place, min(reach, _FARTHEST) * _BEYOND)
+        for mover in self._movers.values():
+            if mover.away(place) <= reach:
+                mover.sweep(fan, pose, ahead_and_left, ends)
         return ends
 
     def _from_each(self, origins: Array, directions: Array, reach: float, end: float) -> Singles:

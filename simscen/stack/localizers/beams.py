@@ -35,13 +35,13 @@ class Beams:
     @cached_property
     def ends(self) -> Plane:
         """Where the beams that hit something ended: points (m,) in the base frame."""
-        hit = np.flatnonzero(self.ranges < self.range_max)
+        hit = (self.ranges < self.range_max).nonzero()[0]
         return self.ranges.take(hit) * self.towards.take(hit) + self.origin
 
     def of_hits(self, chosen: npt.NDArray[np.bool_]) -> "Beams":
         """Of those that hit something the `chosen` ones (m,) alone, and all others."""
         kept = self.ranges >= self.range_max
-        kept[np.flatnonzero(~kept)[chosen]] = True
+        kept[(~kept).nonzero()[0][chosen]] = True
         return Beams(self.ranges[kept], self.towards[kept], self.origin, self.range_max)
 
 
@@ -76,7 +76,7 @@ def select_beams(scan: Scan, count: int, least: float, most: float) -> Beams:
     step = -(-len(scan.ranges) // count) or 1
     ranges, towards = scan.ranges[::step], directions(scan)[::step]
     range_max, range_min = min(scan.range_max, most), max(scan.range_min, least)
-    if (silent := np.isnan(ranges)).any():
+    if np.count_nonzero(silent := np.isnan(ranges)):
         ranges, towards = ranges[~silent], towards[~silent]
     ranges = np.where((ranges > range_min) & (ranges < range_max), ranges, range_max)
     return Beams(ranges, towards, complex(scan.mount.x, scan.mount.y), range_max)

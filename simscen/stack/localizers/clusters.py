@@ -72,7 +72,7 @@ def in_touch(particles: Particles) -> bool:
 
 def _mean(poses: Array, weights: Array) -> Pose2:
     """The mean of poses (n, 3) by weights (n,)."""
-    total, yaw = float(weights.sum()), poses[:, 2]
+    total, yaw = float(np.add.reduce(weights)), poses[:, 2]
     x, y = (weights @ poses[:, :2]).tolist()
     return Pose2(x / total, y / total, math.atan2(weights @ np.sin(yaw), weights @ np.cos(yaw)))
 

@@ -128,6 +128,7 @@ class LikelihoodFieldProb:
         self._field, self._z_rand, self._skipping, self._exponent = field, np.float32(z_rand), skipping, exponent
         self._z_hit, self._sigma_hit, self._beyond = z_hit, sigma_hit, beyond
         self._range_max, self._logarithm = math.nan, field.table
+        self._counts: Float32 = np.empty(0, dtype=np.float32)
 
     def log_likelihood(self, poses: Array, beams: Beams, converged: bool) -> Array:
         """Logarithms (n,) of Π p."""
@@ -135,11 +136,13 @@ class LikelihoodFieldProb:
         if self._skipping is not None and converged:
             points = points[self._kept(poses, points, self._skipping)]
 
-        counts = np.full(len(points), self._exponent, dtype=np.float32)
+        if len(points) != len(self._counts):
+            self._counts = np.full(len(points), self._exponent, dtype=np.float32)
+        counts = self._counts
 
         def judge(block: Array) -> Array:
-            # All cells are in the table; `clip` spares looking whether they are.
-            return (logarithms.take(self._field.cells_seen(block, points), mode="clip") @ counts).astype(np.float64)
+            # All cells are in the table; `wrap` spares looking whether they are.
+            return (logarithms.take(self._field.cells_seen(block, points), mode="wrap") @ counts).astype(np.float64)
 
         return by_blocks(judge, poses)
 

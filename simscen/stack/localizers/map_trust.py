@@ -61,7 +61,7 @@ class MapTrust:
         exponent = _between(told, *TELLING)
         if not particles.within(TOGETHER):
             return Worth(exponent, fitting, None)
-        counting = None if told == 1.0 else (said != _NOTHING).mean(axis=0) > MOSTLY
+        counting = None if told == 1.0 else np.add.reduce(said != _NOTHING, axis=0) > MOSTLY * len(said)
         return Worth(exponent * _between(fitting, self._none, self._full), fitting, counting)
 
     def fit(self, poses: Array, ends: Plane, telling: float) -> float | None:
@@ -74,7 +74,7 @@ class MapTrust:
 
     def _said(self, poses: Array, ends: Plane) -> npt.NDArray[np.uint8]:
         """What the map says of each beam at each pose: (n, b)."""
-        said: npt.NDArray[np.uint8] = self._says.take(self._field.cells_seen(poses, ends), mode="clip")
+        said: npt.NDArray[np.uint8] = self._says.take(self._field.cells_seen(poses, ends), mode="wrap")
         return said
 
 

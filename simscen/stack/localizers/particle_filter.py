@@ -19,7 +19,7 @@ from simscen.stack.localizers.kld import KldBound
 from simscen.stack.localizers.likelihood_field import SensorModel
 from simscen.stack.localizers.map_trust import MapTrust
 from simscen.stack.localizers.motion_models import MotionModel
-from simscen.stack.localizers.particles import FreeSpace, Particles
+from simscen.stack.localizers.particles import FreeSpace, Particles, alike
 from simscen.stack.localizers.recovery import PROBES, Recovery
 from simscen.stack.localizers.resampling import adaptive, systematic
 from simscen.stack.localizers.scan_matcher import Step, moved
@@ -134,16 +134,16 @@ class ParticleFilter:
         converged = spec.do_beamskip and self.particles.within(CONVERGED_WITHIN)
         counts = self._trusted * self._settled
         logarithm = counts * self._sensor.log_likelihood(poses, beams, converged)
-        best = float(logarithm.max())
-        if best == logarithm.min() and best > -np.inf:
+        best, worst = logarithm.item(logarithm.argmax()), logarithm.item(logarithm.argmin())
+        if best == worst and best > -np.inf:
             return None
         self._likely = best * self._sensor.tempering(beams)
         shift = best if best > -np.inf else 0.0
         weights = self.particles.weights * np.exp(logarithm - shift)
-        total = float(weights.sum())
+        total = float(np.add.reduce(weights))
         if self._recovery.wanted:
             self._observe(beams, weights, shift, counts)
-        weights = weights / total if total > 0 else np.full(len(poses), 1 / len(poses))
+        weights = weights / total if total > 0 else alike(len(poses))
         self.particles = self.particles.weighted(weights)
         answer = summarise(self.particles, self._sensor.peak) if total > 0 else None
         self._together = in_touch(self.particles)

@@ -16,11 +16,11 @@ def systematic(weights: Array, count: int, chance: np.random.Generator) -> Indic
 
     The low-variance sampler of Probabilistic Robotics, table 4.4: an index is drawn ⌊count·w⌋ or ⌈count·w⌉ times.
     """
-    cumulated = np.cumsum(weights)
+    cumulated = weights.cumsum()
     positions = (np.arange(count) + chance.random()) * (cumulated[-1] / count)
-    drawn = np.searchsorted(cumulated, positions, side="right")
+    drawn = cumulated.searchsorted(positions, side="right")
     # The last position can round up to the very end; the last index that has any weight is meant.
-    clipped: Indices = np.minimum(drawn, np.searchsorted(cumulated, cumulated[-1]))
+    clipped: Indices = np.minimum(drawn, cumulated.searchsorted(cumulated[-1]))
     return clipped
 
 

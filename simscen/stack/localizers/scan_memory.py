@@ -85,8 +85,7 @@ def travelled(before: Pose2, after: Pose2) -> float:
 def ends_of(scan: Scan, least: float, most: float) -> Plane:
     """Where some beams of a scan, evenly chosen among those that hit something, ended: (n,), about the base."""
     least, most = max(scan.range_min, least), min(scan.range_max, most, REACH)
-    with np.errstate(invalid="ignore"):
-        hit = np.flatnonzero((scan.ranges > least) & (scan.ranges < most))
+    hit = ((scan.ranges > least) & (scan.ranges < most)).nonzero()[0]
     if len(hit) > EACH:
         hit = hit.take(evenly(len(hit), EACH))
     ends: Plane = scan.ranges.take(hit) * directions(scan).take(hit) + complex(scan.mount.x, scan.mount.y)

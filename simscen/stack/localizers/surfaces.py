@@ -43,8 +43,7 @@ class Surface:
 def surfaces_of(scan: Scan) -> Surface:
     """What a scan hit, in the base frame; points at an edge, whose surface nobody can tell, are left out."""
     ranges = scan.ranges
-    with np.errstate(invalid="ignore"):
-        hit = np.flatnonzero((ranges > scan.range_min) & (ranges < min(scan.range_max, REACH)))
+    hit = ((ranges > scan.range_min) & (ranges < min(scan.range_max, REACH))).nonzero()[0]
     if len(hit) < 3:
         return Surface(_NONE, _NONE)
     ranges, gap = ranges.take(hit), abs(scan.angle_increment)
@@ -55,6 +54,7 @@ def surfaces_of(scan: Scan) -> Surface:
     along = points.take(row + apart, mode="clip") - before
     length = np.abs(along)
     bent = np.abs(((points - before).conj() * along).imag)
-    flat = np.flatnonzero((length > 0) & (length < np.maximum(TORN, 4 * gap * ranges)) & (bent < STRAIGHT * length))
+    # What has no length is not less bent than a share of it either.
+    flat = ((length < np.maximum(TORN, 4 * gap * ranges)) & (bent < STRAIGHT * length)).nonzero()[0]
     normals = along.take(flat) * -1j / length.take(flat)
     return Surface(points.take(flat) + complex(scan.mount.x, scan.mount.y), normals)

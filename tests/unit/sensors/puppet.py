@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from simscen.core.geometry import Pose2, Pose3
+from simscen.core.rays import RayCaster
 
 
 @dataclass
@@ -34,7 +35,7 @@ class Puppet:
         return np.zeros((height, width, 3), np.uint8), np.full((height, width), np.inf, np.float32)
 
 
-class SquareRoom:
+class SquareRoom(RayCaster):
     """Four walls at x, y = ± `half`: distances in closed form."""
 
     def __init__(self, half):
@@ -46,7 +47,7 @@ class SquareRoom:
         return np.nanmin(np.where(walls > 0, walls, np.inf), axis=1)
 
 
-class Nothing:
+class Nothing(RayCaster):
     """An empty world."""
 
     def cast(self, origins, directions, reach=math.inf):

@@ -6,6 +6,7 @@ import pytest
 from puppet import Nothing, Puppet, SquareRoom, at
 
 from simscen.core.geometry import Pose3
+from simscen.core.rays import RayCaster
 from simscen.model.robot import Lidar, Mount
 from simscen.sensors.lidar import LidarSensor
 from simscen.sensors.sensor import SensorSetting
@@ -69,7 +70,7 @@ def test_the_mount_is_where_the_lidar_is_and_where_it_looks():
 def test_a_robot_that_leans_shines_into_the_air():
     seen = []
 
-    class Watcher:
+    class Watcher(RayCaster):
         def cast(self, origins, directions, reach=math.inf):
             seen.append((origins[0], directions[180]))
             return np.ones(len(origins))

@@ -7,6 +7,7 @@ import pybullet
 import pytest
 
 from simscen.core.geometry import Pose2, Pose3
+from simscen.core.rays import Fan
 from simscen.core.shapes import Box, Cylinder, Extrusion, Solid, Sphere, TriangleMesh
 from simscen.worlds import rays
 from simscen.worlds.meshing import fuse
@@ -172,6 +173,34 @@ for _ in range(200):
 def test_a_scene_that_the_garbage_collector_takes_does_not_crash():
     """Embree 2 did, once in a hundred runs in one process: its device went before its scenes."""
     assert subprocess.run([sys.executable, "-c", COLLECTED], check=False).returncode == 0
+
+
+@pytest.mark.parametrize(("first", "beams", "field"), [(-math.pi, 360, 2 * math.pi), (2.0, 91, 1.5), (0.3, 1, 0.1)])
+def test_a_fan_meets_what_its_rays_meet_one_by_one(first, beams, field):
+    """Also a body that a full circle's first and last rays see, one that the lidar is in, and one out of reach."""
+    scene, fan = RayScene(fuse(ROOM)), Fan(first, field / beams, beams)
+    places = [(-2.5, 0.1, 0.3), (1.5, -1.5, 2.0), (0.05, 0.0, 1.0), (30.0, 0.0, 0.0)]
+    scene.set_moving({f"cart {k}": (CART, Pose3.planar(Pose2(*place))) for k, place in enumerate(places)})
+    for lens in (Pose3(0.0, 0.0, 0.3), Pose3.from_rpy(0.8, -0.4, 0.6, 0.1, -0.2, 2.5)):
+        for reach in (2.0, 20.0):
+            seen, alone = scene.sweep(fan, lens, reach), scene.cast(*fan.at(lens), reach)
+            assert np.array_equal(seen > reach, np.isinf(alone))
+            assert np.allclose(seen[seen <= reach], alone[seen <= reach], rtol=0, atol=2e-6)
+
+
+def test_the_rays_of_a_fan_within_a_cone_are_told_as_counting_all_would_tell():
+    chance = np.random.default_rng(11)
+    for _ in range(500):
+        count, first = int(chance.integers(1, 60)), float(chance.uniform(-7, 7))
+        increment = float(chance.uniform(0.01, 2 * math.pi / count))
+        (x, y), least = chance.normal(size=2), float(chance.uniform(-2.5, 2.5))
+        angles = first + increment * np.arange(count)
+        met = set(np.flatnonzero(x * np.cos(angles) + y * np.sin(angles) >= least).tolist())
+        told = [ray for rays in Fan(first, increment, count).towards(x, y, least) for ray in range(count)[rays]]
+        assert met <= set(told)
+        beside = set(told) - met
+        assert all((ray - 1) % count in met or (ray + 1) % count in met or not met for ray in beside)
+        assert len(beside) <= 4
 
 
 @pytest.mark.parametrize("spread", [0.0, 3.0])
