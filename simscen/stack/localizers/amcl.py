@@ -11,13 +11,14 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.sensing import Imu, Odometry, Scan
 from simscen.model.localizers import Amcl
 from simscen.stack.localizers.clusters import spread, summarise
-from simscen.stack.localizers.finder import STILL, Finder
+from simscen.stack.localizers.finder import UNSEEN, Finder
 from simscen.stack.localizers.global_search import GlobalSearch
 from simscen.stack.localizers.map_trust import MapTrust
 from simscen.stack.localizers.motion_models import MotionModel
 from simscen.stack.localizers.particle_filter import ParticleFilter
 from simscen.stack.localizers.scan_matcher import ScanMatcher, Step
 from simscen.stack.localizers.scatter import Scatter
+from simscen.stack.localizers.sure import Moved
 from simscen.stack.odometry_history import OdometryHistory
 
 SURE_AFTER = 8
@@ -75,7 +76,7 @@ class AmclLocalizer:
         self._matcher = ScanMatcher() if self._spec.match_scans else None
         self._scatter = Scatter() if self._spec.covariance == "scatter" and self._matcher is not None else None
         self._matched: tuple[str, Pose2] | None = None
-        self._torn, self._calm, self._glances = STILL, 0, 0
+        self._came, self._calm, self._glances = UNSEEN, 0, 0
         self._due: dict[str, bool] = {}
         self._waiting: dict[str, Scan] = {}
         self._belief: Belief | None = None
@@ -143,12 +144,12 @@ class AmclLocalizer:
     def _correct(self, scan: Scan, odometry: Pose2, delta: Pose2 | None) -> None:
         """Move the particles by what was driven since the last correction, and weigh them by a scan."""
         matched = None if self._matcher is None else self._matched_step(self._matcher, scan, odometry)
-        self._torn = STILL
+        self._came = Moved(step=matched, parted=None if self._matcher is None else self._matcher.parted)
         agreed = False
         if delta is not None and matched is not None:
             self._filter.follow(matched, delta)
             if not (agreed := matched.agrees(delta)):
-                self._torn = delta.between(matched.delta)
+                self._came = replace(self._came, torn=delta.between(matched.delta))
             if self._scatter is not None:
                 self._scatter.compare(matched.delta, delta)
         elif delta is not None:
@@ -182,7 +183,7 @@ class AmclLocalizer:
         base = self._base(odometry)
         believed = self._correction.map_from_odom.compose(odometry)
         fit = self._filter.fitting if self._calm else None
-        if (places := finder.places(scan, base, believed, limits, self._torn, fit)) is not None:
+        if (places := finder.places(scan, base, believed, limits, self._came, fit)) is not None:
             self._correction = _Correction(*self._filter.put(*places), odometry, scan.tick)
             self._moved_to, self._belief, self._calm = odometry, None, 0
             self._scatter = None if self._scatter is None else Scatter()

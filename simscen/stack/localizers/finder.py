@@ -12,7 +12,7 @@ from simscen.stack.localizers.clusters import errors_about
 from simscen.stack.localizers.global_search import APART, GlobalSearch, View
 from simscen.stack.localizers.map_trust import MapTrust
 from simscen.stack.localizers.scan_memory import ScanMemory, travelled
-from simscen.stack.localizers.sure import AROUND, Sure, drifted
+from simscen.stack.localizers.sure import AROUND, Moved, Sure
 
 RECENT, DOUBTFUL = 5, 0.6
 """Over so many scans that corrected the share of the beams that fit is averaged, and below this the robot may be lost.
@@ -48,7 +48,8 @@ what it saw since says it is back if it fits so, and by so much better than anyw
 Rooms that nobody mapped often look like one that somebody did, though less than that."""
 SHARPNESS = 0.02
 """Of two places that fit so much better or worse, the better is e times as likely, and gets as many more particles."""
-STILL = Pose2(0.0, 0.0, 0.0)
+UNSEEN = Moved()
+"""Of a robot that does not see how it goes."""
 
 
 class Finder:
@@ -66,39 +67,23 @@ class Finder:
         self._begun: Sure | None = None
         self._sure: Sure | None = None
         self._fits: deque[float] = deque(maxlen=RECENT)
-        self._drift, self._way, self._wait, self._driven, self._unchecked, self._doubted = (
-            np.zeros(3),
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-            False,
-        )
+        self._way, self._wait, self._driven, self._unchecked, self._doubted = 0.0, 0.0, 0.0, 0.0, False
         self._last: Pose2 | None = None
         self._suspected: tuple[Pose2, Pose2] | None = None
-        self._since, self._astray = 0.0, 0
+        self._since, self._astray, self._continuous = 0.0, 0, False
 
     def places(
-        self, scan: Scan, base: Pose2, believed: Pose2, limits: tuple[float, float], torn: Pose2 = STILL,
+        self, scan: Scan, base: Pose2, believed: Pose2, limits: tuple[float, float], way: Moved = UNSEEN,
         fit: float | None = None,
     ) -> tuple[Array, Array] | None:  # fmt: skip
         """Poses (k, 3) where the robot may be and the share of each (k,); None to leave it where it is believed to be.
 
-        `base` is where it was when it took the scan, in a frame that drifts; `limits` are the ranges that count. What
-        its scans and its wheels say of how it came there since the last scan is `torn` apart, where they do not agree.
-        `fit` is the share of the beams that fit where it is believed to be, if anyone knows.
+        `base` is where it was when it took the scan, in a frame that drifts; `limits` are the ranges that count, and
+        `way` is how it came there since the last scan. `fit` is the share of the beams that fit where it is believed to
+        be, if anyone knows.
         """
+        self._moved(base, way)
         ends = self._memory.add(scan, base, *limits)
-        if self._last is not None:
-            self._driven += (moved := travelled(self._last, base))
-            self._unchecked += moved
-            self._way += moved
-            self._drift = self._drift + drifted(moved, torn)
-            self._since += moved
-        elif self._told.pose is not None:
-            std = np.maximum(self._told.std, AROUND)
-            self._begun = self._sure = Sure(self._told.pose, base, self._drift, std)
-        self._last = base
         if not len(ends):
             return None
         here = np.array([believed])
@@ -121,6 +106,26 @@ class Finder:
             return None
         return self._sought(self._memory.about(base), base, here)
 
+    def _moved(self, base: Pose2, way: Moved) -> None:
+        """Carry on what is known of where the robot is; nothing is when it no longer sees what it saw."""
+        last, self._last = self._last, base
+        if last is None:
+            if self._told.pose is not None:
+                std = np.maximum(self._told.std, AROUND)
+                self._begun = self._sure = Sure.at(np.array(self._told.pose), base, std)
+            return
+        self._continuous = way.parted is not None
+        moved = travelled(last, base)
+        self._driven += moved
+        self._unchecked += moved
+        self._way += moved
+        self._since += moved
+        if way.parted:
+            self._memory.forget(0)
+            self._begun = self._sure = None
+        self._begun = self._begun and self._begun.after(last, base, moved, way)
+        self._sure = self._sure and self._sure.after(last, base, moved, way)
+
     def _as_told(self, begun: Sure, base: Pose2, here: Array) -> tuple[Array, Array] | None:
         """Where the robot is by what it was told and all that it saw since, where particles settled elsewhere.
 
@@ -129,14 +134,14 @@ class Finder:
         """
         if not self._memory.length:
             return None
-        view = self._memory.about(base)
-        if not len(view.ends) or self._trust.fit(here, view.ends, TELLING) is None:
+        view, expected = self._memory.about(base), begun.expected(base)
+        if not len(view.ends) or self._trust.fit(expected[None], view.ends, TELLING) is None:
             return None
         if (fit := self._search.fit(here, view))[0] > FITS:
             return None
-        poses, fits = self._search.near(view, begun.expected(base))
-        likely = fits / SHARPNESS - begun.unlikely(poses, base, begun.drift)
-        own = fit[0] / SHARPNESS - begun.unlikely(here, base, begun.drift)[0]
+        poses, fits = self._search.near(view, expected)
+        likely = fits / SHARPNESS - begun.unlikely(poses, base)
+        own = fit[0] / SHARPNESS - begun.unlikely(here, base)[0]
         best = int(likely.argmax())
         off = errors_about(here[0], poses[best : best + 1])[0]
         if likely[best] - own < LIKELIER or (math.hypot(off[0], off[1]) < APART[0] and abs(off[2]) < APART[1]):
@@ -153,7 +158,7 @@ class Finder:
             return None
         fit = float(self._reached(here, self._search.fit(here, view), base)[0])
         if fit > FITS:
-            self._sure = Sure.at(here[0], base, self._drift)
+            self._sure = Sure.at(here[0], base)
             return None
         poses, fits = self._search.near(view, here[0])
         fits = self._reached(poses, fits, base)
@@ -169,19 +174,20 @@ class Finder:
         """How well `poses` (n, 3) fit, less what it takes to have drifted there."""
         if self._sure is None:
             return fits
-        return fits - np.minimum(SHARPNESS * self._sure.unlikely(poses, base, self._drift), UNREACHED)
+        return fits - np.minimum(SHARPNESS * self._sure.unlikely(poses, base), UNREACHED)
 
     def _found(self, places: Array, base: Pose2) -> tuple[Array, Array]:
         """The one of `places` (1, 3) with all particles."""
         self._fits.clear()
-        self._sure = Sure.at(places[0], base, self._drift)
+        self._sure = Sure.at(places[0], base)
         return places, np.ones(1)
 
     def _in_doubt(self) -> bool:
         """Whether recent scans do not fit. When that begins, what was seen before may be of another place."""
         before, self._doubted = self._doubted, len(self._fits) == RECENT and sum(self._fits) < RECENT * DOUBTFUL
         if self._doubted and not before:
-            self._memory.forget(1)
+            if not self._continuous:
+                self._memory.forget(1)
             self._wait = 0.0
         return self._doubted
 
@@ -191,14 +197,17 @@ class Finder:
         if not len(poses):
             return None
         good, clear = (BACK_GOOD, BACK_PLAIN) if self._astray >= ASTRAY else (GOOD, PLAIN)
+        if self._known:
+            order = np.argsort(-(fits := self._reached(poses, fits, base)), kind="stable")
+            poses, fits = poses[order], fits[order]
         plain = len(fits) == 1 or fits[0] - fits[1] > clear
         if not self._known:
             self._known = plain and self._memory.length >= ENOUGH
             if self._known:
-                self._sure = Sure.at(poses[0], base, self._drift)
+                self._sure = Sure.at(poses[0], base)
             shares = np.exp((fits - fits[0]) / SHARPNESS)
             return poses, shares / shares.sum()
-        if plain and fits[0] > good and fits[0] > self._search.fit(here, view)[0] + BETTER:
+        if plain and fits[0] > good and fits[0] > self._reached(here, self._search.fit(here, view), base)[0] + BETTER:
             found = Pose2(*poses[0].tolist())
             if self._suspected is None or not _agree(*self._suspected, found, base):
                 self._suspected, self._since = (found, base), 0.0

@@ -38,6 +38,8 @@ COARSEST = 0.04
 """rad between two beams: of a lidar whose beams are further apart nobody can tell which points are of one surface."""
 AGREES = (0.03, 0.1, 0.03, 0.1)
 """m, and of each metre; rad, and of each rad: within this the match and odometry say the same."""
+AGAIN = 0.3
+"""Share of what a scan shows that the ones before it must have shown: less, and the robot was carried elsewhere."""
 INFLATED, FLOOR = 0.5, (0.004**2, 0.003**2, 0.0015**2)
 """Of the covariance that the match itself gives, and what is added (m, m, rad): neighbouring frames share the errors of
 their surfaces."""
@@ -60,6 +62,8 @@ class _Reference:
         seen = list(frames)
         self._points = np.concatenate([frame.points for frame in seen])
         self._normals = np.concatenate([frame.normals for frame in seen])
+        self.again = 0.0
+        """The share of the points of the last scan that was pulled which it did not see for the first time."""
         self._middle, around = middle, self._points - middle
         # a·b - b²/2 is greatest for the b that is nearest to a
         self._compared = np.empty((3, len(around)))
@@ -82,7 +86,9 @@ class _Reference:
         against = self._normals.take(nearest).conj()
         matched = (own.normals * turn * against).real > ALIKE
         matched &= np.abs(gap) < gate
-        if np.count_nonzero(matched) < LEAST:
+        count = int(np.count_nonzero(matched))
+        self.again = count / len(ends)
+        if count < LEAST:
             return None
         against *= matched
         slope = np.empty((4, len(ends)))
@@ -129,9 +135,12 @@ class ScanMatcher:
     def __init__(self) -> None:
         self._frames: deque[Surface] = deque(maxlen=FRAMES)
         self.pose = Pose2(0.0, 0.0, 0.0)
+        self.parted: bool | None = None
+        """Whether the last scan shows hardly anything of what those before it did; None when nobody can say."""
 
     def step(self, scan: Scan, guess: Pose2) -> Step | None:
         """How the base moved since the last scan, where odometry says `guess`; None when the scans do not say."""
+        self.parted = None
         if abs(scan.angle_increment) > COARSEST:
             self.pose = self.pose.compose(guess)
             return None
@@ -148,6 +157,7 @@ class ScanMatcher:
         (place, heading), gate, last = _trust(guess), 0, len(GATES) - 1
         for _ in range(ITERATIONS):
             if (equations := reference.pull(own, pose, GATES[gate])) is None:
+                self.parted = True
                 return None
             (xx, xy, xa, right), (_, yy, ya, up), (_, _, aa, around), _ = equations
             inverse = _inverse((xx + place, xy, xa, yy + place, ya, aa + heading))
@@ -163,6 +173,7 @@ class ScanMatcher:
             if gate == last and _within(step, STILL):
                 break
             gate = last if _within(step, SETTLED) else min(gate + 1, last)
+        self.parted = reference.again < AGAIN
         return pose, inverse
 
 

@@ -1,51 +1,91 @@
 """Where a robot can be: not far from where it last was sure to be, carried on by how it saw itself go."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
 from simscen.stack.localizers.clusters import errors_about
+from simscen.stack.localizers.planar_motion import swing
+from simscen.stack.localizers.scan_matcher import Step
 
 AROUND = (0.1, 0.1, 0.05)
 """m, m, rad: standard deviations of a robot about a place where it is sure to be."""
-DRIFT = (0.03, 0.03, 0.01)
-"""What it may drift by for each metre, turns included: more than scans do that are matched with each other, for along
-a corridor that looks the same everywhere the wheels have their way, and slip. Where scans and wheels do not agree, one
-of them errs by as much as they differ: wheels slip, or people walk along with the robot."""
+DRIFT = (0.03, 0.01)
+"""m and rad: what it may drift by for each metre, turns included, where no scan says how it went."""
+TOLD = 0.012
+"""m: by how much more than this the standard deviation of a step is larger, a robot drifts: along a corridor that looks
+the same everywhere the wheels have their way, and slip for a while, so that such steps err together."""
+
+
+@dataclass(frozen=True, eq=False)
+class Moved:
+    """A way from one correction to the next, `metres` long, turns included: a `step` as scans show it, if they do.
+
+    What scans and wheels say of it is `torn` apart, where they do not agree: then one of them errs by as much. Wheels
+    slip, or people walk along with the robot. The last scan showed hardly anything of what those before it did if they
+    `parted`, None when nobody can say.
+    """
+
+    torn: Pose2 = Pose2(0.0, 0.0, 0.0)
+    step: Step | None = None
+    parted: bool | None = None
+
+    def together(self, metres: float) -> tuple[float, float]:
+        """m and rad by which this way and others like it may err in one direction."""
+        if self.step is None:
+            return DRIFT[0] * metres, DRIFT[1] * metres
+        (xx, _, _), (_, yy, _), _ = self.step.covariance.tolist()
+        untold = max(0.0, math.sqrt(max(xx, yy)) - TOLD)
+        return untold + math.hypot(self.torn.x, self.torn.y), abs(self.torn.yaw)
 
 
 @dataclass(frozen=True, eq=False)
 class Sure:
-    """A robot was at `pose` when its base was at `base` in a frame that drifts, by up to `drift` (3,) until then.
+    """A robot was at `pose` when its base was at `base` in a frame that drifts.
 
-    `std` (3,) are the standard deviations of the pose in m, m and rad.
+    `std` (3,) are the standard deviations of the pose in m, m and rad; `covariance` (3, 3) is that of how the robot saw
+    itself go since, in the frame that drifts, and `together` in m and rad what may err in one direction besides.
     """
 
     pose: Pose2
     base: Pose2
-    drift: Array
     std: Array
+    covariance: Array
+    together: tuple[float, float] = (0.0, 0.0)
 
     @classmethod
-    def at(cls, pose: Array, base: Pose2, drift: Array) -> "Sure":
-        """Sure by what was seen."""
-        return cls(Pose2(*pose.tolist()), base, drift, np.array(AROUND))
+    def at(cls, pose: Array, base: Pose2, std: Array | tuple[float, float, float] = AROUND) -> "Sure":
+        """Sure by what was seen, or by what was told if that says how much."""
+        return cls(Pose2(*pose.tolist()), base, np.array(std), np.zeros((3, 3)))
+
+    def after(self, before: Pose2, base: Pose2, metres: float, way: Moved) -> "Sure":
+        """The same, when the base went on from `before`."""
+        metre, rad = way.together(metres)
+        noise = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        if way.step is not None:
+            c, s = math.cos(before.yaw), math.sin(before.yaw)
+            (xx, xy, xa), (_, yy, ya), (_, _, aa) = way.step.covariance.tolist()
+            noise = (
+                c * c * xx - 2 * c * s * xy + s * s * yy, c * s * (xx - yy) + (c * c - s * s) * xy, c * xa - s * ya,
+                s * s * xx + 2 * c * s * xy + c * c * yy, s * xa + c * ya, aa,
+            )  # fmt: skip
+        covariance = swing(self.covariance, base.x - before.x, base.y - before.y, noise)
+        return replace(self, covariance=covariance, together=(self.together[0] + metre, self.together[1] + rad))
 
     def expected(self, base: Pose2) -> Array:
         """The pose (3,) where the robot is if it has not drifted."""
         return np.array(self.pose.compose(self.base.between(base)))
 
-    def unlikely(self, poses: Array, base: Pose2, drift: Array) -> Array:
+    def unlikely(self, poses: Array, base: Pose2) -> Array:
         """The logarithm of how many times unlikelier than the expected pose each of `poses` (n, 3) is: (n,)."""
-        std = self.std + drift - self.drift
-        far: Array = 0.5 * np.square(errors_about(self.expected(base), poses) / std).sum(axis=1)
+        angle = self.pose.yaw - self.base.yaw
+        c, s = math.cos(angle), math.sin(angle)
+        turn = np.array(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
+        metre, rad = self.together
+        std = np.square(self.std + np.array((metre, metre, rad)))
+        off = errors_about(self.expected(base), poses)
+        information = np.linalg.inv(turn @ self.covariance @ turn.T + np.diag(std))
+        far: Array = 0.5 * np.einsum("ni,ij,nj->n", off, information, off)
         return far
-
-
-def drifted(metres: float, torn: Pose2) -> Array:
-    """What a robot may drift by (3,) on so many metres, turns included, of which scans and wheels differ by `torn`."""
-    apart = math.hypot(torn.x, torn.y)
-    drift: Array = np.array(DRIFT) * metres + (apart, apart, abs(torn.yaw))
-    return drift

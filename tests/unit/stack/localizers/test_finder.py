@@ -10,6 +10,8 @@ from simscen.stack.localizers.finder import Finder
 from simscen.stack.localizers.global_search import GlobalSearch
 from simscen.stack.localizers.likelihood_field import obstacle_field
 from simscen.stack.localizers.map_trust import MapTrust
+from simscen.stack.localizers.scan_matcher import Step
+from simscen.stack.localizers.sure import Moved
 from simscen.testing.room import BEAMS, cast, grid, scan
 
 START = Pose2(-2.5, -1.8, 0.6)
@@ -70,3 +72,20 @@ def test_a_robot_is_moved_far_only_when_searches_agree_over_two_metres() -> None
     assert found(away, way=3.0) == []
     (place,) = found(away, way=4.25)[:1]
     assert np.hypot(place[0], place[1]) < 0.1
+
+
+@pytest.mark.parametrize(("parted", "found_again"), [(True, True), (False, False)])
+def test_a_robot_that_saw_itself_carried_off_forgets_where_it_was(parted: bool, found_again: bool) -> None:
+    """What it saw there would lie beside what it sees here: with that, here fits no better than elsewhere."""
+    trust = MapTrust(obstacle_field(grid(), 2.0), beyond_the_map(grid()).ravel(), 0.45, 0.8)
+    finder, there, puts = Finder(GlobalSearch(grid()), trust, Estimate(START), 0.0), Pose2(3.9, -0.2, 2.17), []
+    step = Step(Pose2(0.25, 0.0, 0.0), np.diag([1e-5, 1e-5, 1e-6]))
+    for k, driven in enumerate(np.concatenate((np.arange(0.0, 2.0, 0.25), 2.0 + np.arange(0.0, 3.0, 0.25))).tolist()):
+        base, carried = Pose2(driven, 0.0, 0.0), k >= 8
+        pose = there.compose(Pose2(driven - 2.0, 0.0, 0.0)) if carried else START.compose(base)
+        ranges = cast(np.array([pose]), -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS))[0]
+        way = Moved(step=None if k == 8 else step, parted=parted and k == 8)
+        put = finder.places(scan(ranges), base, START.compose(base), (0.0, 100.0), way)
+        if put is not None:
+            puts.append(pose.between(Pose2(*put[0][0].tolist())))
+    assert any(np.hypot(off.x, off.y) < 0.1 for off in puts) is found_again

@@ -47,6 +47,32 @@ def test_scans_that_show_no_surface_say_nothing(ranges: np.ndarray) -> None:
     assert stepped(STEP, view(START), scan(ranges)) is None
 
 
+ELSEWHERE = Pose2(3.9, -0.2, 2.4)
+
+
+@pytest.mark.parametrize(
+    ("pose", "parted"),
+    [(START.compose(STEP), False), (START.compose(Pose2(0.3, 0.02, 0.4)), False), (ELSEWHERE, True)],
+    ids=["as the wheels say", "wheels that slip", "elsewhere"],
+)
+def test_a_robot_that_was_carried_elsewhere_sees_nothing_again(pose: Pose2, parted: bool) -> None:
+    matcher = ScanMatcher()
+    matcher.step(view(START), Pose2(0, 0, 0))
+    assert matcher.parted is None
+    matcher.step(view(pose), STEP)
+    assert matcher.parted is parted
+    matcher.step(view(pose.compose(STEP)), STEP)
+    assert matcher.parted is False
+
+
+@pytest.mark.parametrize("ranges", [np.full(BEAMS, np.inf), np.full(40, 2.0)], ids=["blind", "coarse"])
+def test_who_sees_nothing_cannot_say_whether_it_was_carried_elsewhere(ranges: np.ndarray) -> None:
+    matcher = ScanMatcher()
+    matcher.step(scan(ranges), Pose2(0, 0, 0))
+    matcher.step(scan(ranges), STEP)
+    assert matcher.parted is None
+
+
 def test_particles_follow_a_step_with_its_covariance() -> None:
     step = Step(STEP, np.diag([0.01, 0.0004, 0.0001]))
     poses = moved(np.tile((1.0, 2.0, np.pi / 2), (20_000, 1)), step, np.random.default_rng(1))

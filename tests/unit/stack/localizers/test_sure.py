@@ -1,26 +1,55 @@
-"""A robot drifts with the way that it goes, and no faster."""
+"""A robot drifts as far as its scans leave open how it went, and no further."""
 
 import numpy as np
 import pytest
 
-from simscen.core.geometry import Pose2
-from simscen.stack.localizers.sure import AROUND, DRIFT, Sure, drifted
+from simscen.core.geometry import Array, Pose2
+from simscen.stack.localizers.clusters import errors_about
+from simscen.stack.localizers.scan_matcher import Step, moved
+from simscen.stack.localizers.sure import AROUND, DRIFT, TOLD, Moved, Sure
 
 THEN = Pose2(1.0, 2.0, np.pi / 2)
-SURE = Sure.at(np.array([5.0, 5.0, 0.0]), THEN, np.ones(3))
+SURE = Sure.at(np.array([5.0, 5.0, 0.0]), THEN)
 NOW = THEN.compose(Pose2(2.0, 1.0, 0.3))
+STEP = Step(Pose2(0.25, 0.0, 0.1), np.array([[4e-5, 1e-5, 0.0], [1e-5, 3e-5, 1e-5], [0.0, 1e-5, 2e-5]]))
+
+
+def far(sure: Sure, base: Pose2, off: Array) -> float:
+    return float(sure.unlikely((sure.expected(base) + off)[None], base)[0])
 
 
 def test_it_is_expected_where_its_scans_say_that_it_went() -> None:
     assert SURE.expected(NOW) == pytest.approx([7.0, 6.0, 0.3])
-    assert SURE.unlikely(np.array([[7.0, 6.0, 0.3]]), NOW, np.ones(3)) == pytest.approx(0.0)
+    assert far(SURE, NOW, np.zeros(3)) == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize("off", [(0.3, 0.0, 0.0), (0.0, 0.3, 0.0), (0.0, 0.0, 0.1), (0.2, -0.1, 0.05)])
+def test_errors_of_steps_add_up_as_they_do_for_many_robots_that_go_the_same_way(off: tuple[float, ...]) -> None:
+    chance, base, sure = np.random.default_rng(1), THEN, Sure.at(np.array([5.0, 5.0, 0.7]), THEN, (1e-6, 1e-6, 1e-6))
+    robots = np.tile(np.array(sure.pose), (20_000, 1))
+    for _ in range(20):
+        robots, before, base = moved(robots, STEP, chance), base, base.compose(STEP.delta)
+        sure = sure.after(before, base, 0.3, Moved(step=STEP))
+    off_by = errors_about(sure.expected(base), robots)
+    aside, spread = np.array(off), off_by.T @ off_by / len(robots)
+    assert far(sure, base, aside) == pytest.approx(0.5 * aside @ np.linalg.inv(spread) @ aside, rel=0.05)
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
-@pytest.mark.parametrize(("metres", "torn"), [(0.0, Pose2(0, 0, 0)), (20.0, Pose2(0, 0, 0)), (0.5, Pose2(0.3, 0, 0.2))])
-def test_how_unlikely_another_place_is_goes_by_how_far_it_may_have_drifted(
-    axis: int, metres: float, torn: Pose2
+@pytest.mark.parametrize(
+    ("way", "drift"),
+    [
+        (Moved(), (10 * DRIFT[0], 10 * DRIFT[0], 10 * DRIFT[1])),
+        (Moved(torn=Pose2(0.3, -0.4, 0.2), step=Step(STEP.delta, np.zeros((3, 3)))), (0.5, 0.5, 0.2)),
+        (Moved(step=Step(STEP.delta, np.diag([(4 * TOLD) ** 2, 0.0, 0.0]))), (3 * TOLD, 3 * TOLD, 0.0)),
+    ],
+    ids=["unseen", "torn", "a corridor without an end"],
+)
+def test_where_scans_do_not_tell_the_next_step_errs_as_the_last_one(
+    axis: int, way: Moved, drift: tuple[float, float, float]
 ) -> None:
-    off = np.eye(3)[axis] * 2 * (AROUND[axis] + DRIFT[axis] * metres + (torn.x, torn.x, torn.yaw)[axis])
-    drift = SURE.drift + drifted(metres, torn)
-    assert SURE.unlikely((SURE.expected(NOW) + off)[None], NOW, drift) == pytest.approx(2.0)
+    """Twice as far leads twice as far astray; errors by chance lead √2 as far, and those of a step count besides."""
+    sure = SURE.after(THEN, THEN, 10.0, way).after(THEN, THEN, 10.0, way)
+    chance = 0.0 if way.step is None else 2 * way.step.covariance[axis, axis]
+    off = np.eye(3)[axis] * 2 * np.sqrt((AROUND[axis] + 2 * drift[axis]) ** 2 + chance)
+    assert far(sure, THEN, off) == pytest.approx(2.0)
