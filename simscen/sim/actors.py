@@ -315,8 +315,6 @@ class Actors:
 
     def lost(self, tick: int) -> str | None:
         """What has become of the first thing that the engine has lost, or None."""
-        if not self._pushable:
-            return None
         self.poses(tick)
         moved, self._moved = self._moved, []
         for actor in moved:

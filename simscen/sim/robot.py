@@ -114,6 +114,9 @@ class Robot:
         """
         self.name, self._scene = name, scene
         self.base, self._drive = build(scene.client, body, pose, period, 1 / scene.rate, scene.terrain)
+        self.advance = self._drive.advance
+        """One period of the firmware's loop; for the simulation."""
+        self._driven: Twist | None = None
         self._seen = Seen(self.base.state, scene)
         self._who = f'robot "{name}"' if name else "the robot"
         self.others: tuple[Robot, ...] = ()
@@ -131,7 +134,9 @@ class Robot:
 
     def drive(self, command: Twist) -> None:
         """Command a velocity in the base frame; the base follows within its limits."""
-        self._drive.command(command)
+        if command is not self._driven:  # most commands are the one before, said again
+            self._driven = command
+            self._drive.command(command)
 
     def truth(self) -> Truth:
         """The robot as it really is. Raises RunError when the physics has lost it or anything else."""
@@ -151,7 +156,9 @@ class Robot:
         """Its state. Raises RunError when the physics has lost it or anything else."""
         (x, y, z, i, j, k, w), (vx, vy, vz), (wx, wy, wz) = state = self._seen()
         actors = self._scene.actors
-        trouble = lost(self._who, x, y, z, i + j + k + w + vx + vy + vz + wx + wy + wz) or actors.lost(tick)
+        trouble = lost(self._who, x, y, z, i + j + k + w + vx + vy + vz + wx + wy + wz)
+        if trouble is None and actors.loose:
+            trouble = actors.lost(tick)
         if trouble is not None:
             raise RunError("diverged", f"simulation diverged at t={tick / self._scene.rate:.3f} s: {trouble}")
         return state
@@ -232,10 +239,6 @@ class Robot:
     def shaken(self) -> None:
         """Something is pushed during the next step."""
         self.clearance.shaken(self._scene.tick)
-
-    def advance(self) -> None:
-        """One period of the firmware's loop."""
-        self._drive.advance()
 
     def changed(self) -> None:
         """Something was put into or taken out of the world, or set down elsewhere."""

@@ -96,8 +96,11 @@ class Simulation:
 
     def step(self, ticks: int) -> None:
         """Let `ticks` ticks pass."""
-        scene, until, calm = self._scene, self._scene.tick + ticks, -1
-        plain = not (scene.floor or scene.presses or self._attends)
+        scene, calm = self._scene, -1
+        until, plain = scene.tick + ticks, not (scene.presses or self._attends or scene.floor)
+        if plain and (calm := self._calm_until(ticks)) >= until:
+            self._step_calmly(until)
+            return
         while scene.tick < until:
             if scene.tick >= calm:
                 calm = self._calm_until(ticks)
@@ -136,10 +139,12 @@ class Simulation:
         For so many ticks, the walls stand that what is loose may come to meanwhile.
         """
         actors = self._scene.actors
-        if actors.loose and not self._scene.walls.complete:
+        if not actors.loose:
+            return min([robot.calm_until for robot in self._each])
+        if not self._scene.walls.complete:
             self._put_up_walls(ticks)
         calm = min([robot.calm_until for robot in self._each])
-        return min(calm, actors.apart_until(self._scene.tick, self._fastest)) if actors.loose else calm
+        return min(calm, actors.apart_until(self._scene.tick, self._fastest))
 
     def _fastest(self) -> float:
         return max([robot.clearance.own_speed() for robot in self._each])
