@@ -67,6 +67,22 @@ def test_the_ground_that_rises_where_a_slope_ends_is_ground(mount: Pose3) -> Non
     assert not len(marked(((-1.0, 0.0), (0.8, 0.0), (9.0, -8.2 * math.tan(0.14))), mount))
 
 
+def nodding(degrees: float, down: float) -> Ground:
+    """What a robot that nods sees of ground that leads down by so many degrees, and is level from a metre on."""
+    nod = math.radians(degrees)
+    bend = math.tan(nod - math.radians(down))
+    return ((-1.0, 0.0), (0.0, 0.0), (1.0, bend), (9.0, bend + 8.0 * math.tan(nod)))
+
+
+@pytest.mark.parametrize("mount", [LEVEL, TILTED], ids=["level", "tilted"])
+def test_what_a_robot_nods_counts_as_slope(mount: Pose3) -> None:
+    """It nods about its axle, which is behind the camera: of a slope of 0.2 rad, which is 11.5°, 8° are left for it."""
+    for down in (0.0, 8.0):
+        assert not len(marked(nodding(8.0, down), mount))
+        assert len(marked(nodding(16.0, down), mount))
+    assert not len(marked(nodding(16.0, 8.0), mount, max_ground_slope=0.32))
+
+
 @pytest.mark.parametrize("mount", [LEVEL, TILTED], ids=["level", "tilted"])
 @pytest.mark.parametrize("away", [0.8, 1.3])
 @pytest.mark.parametrize("height", [0.1, 0.15])
