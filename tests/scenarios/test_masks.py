@@ -153,13 +153,18 @@ def test_a_goal_in_a_masked_cell_is_told_with_the_code_to_expect_and_the_stack_g
     assert simscen.simulate(file).passed
 
 
-def test_a_start_in_a_masked_cell_is_warned_of(tmp_path):
+def test_a_start_in_a_masked_cell_is_warned_of_and_the_stack_gives_that_code(tmp_path):
     grey = white()
     grey[:, :30] = 0
     mask(tmp_path, "left", grey)
     ((_, line, code, severity, text),) = told(scenario(tmp_path, "  keepout_mask: left.yaml\n"))
     assert (line, code, severity) == (LINE, "SC302", "warning")
-    assert "START_OCCUPIED" in text
+    assert "error_code: START_OCCUPIED" in text
+    file = scenario(tmp_path, "  keepout_mask: left.yaml\n")
+    failing = "  - result: {status: FAILED, error_code: START_OCCUPIED}\n"
+    file.write_text(file.read_text().replace("  - goals_reached: {}\n", failing))
+    assert told(file) == []
+    assert simscen.simulate(file).passed
 
 
 def test_masks_that_say_nothing_are_warned_of(tmp_path):

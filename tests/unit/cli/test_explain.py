@@ -1,6 +1,7 @@
 from pathlib import Path
 
 import pytest
+from pydantic import ValidationError
 
 import simscen as package
 from simscen.cli import explain, explainable
@@ -9,6 +10,7 @@ from simscen.cli.explain import explained
 from simscen.cli.explainable import known_names
 from simscen.core.errors import Exit
 from simscen.core.navigation import ErrorCode
+from simscen.model.robot import Limits
 
 
 def test_without_a_name_everything_is_listed(simscen) -> None:
@@ -46,6 +48,14 @@ def test_a_code_with_which_nothing_in_the_reference_stack_ends_is_told_as_one_of
     sources = [path.read_text(encoding="utf-8") for path in stack.rglob("*.py")]
     named = {code for code in ErrorCode if any(f"ErrorCode.{code.name}" in text for text in sources)}
     assert set(ErrorCode) - named - {ErrorCode.NONE} <= OF_OTHERS
+
+
+def test_no_robot_is_without_reverse_so_that_none_is_told_to_do_what_it_cannot() -> None:
+    assert ErrorCode.BACKUP_INVALID_INPUT in OF_OTHERS
+    base = {"linear": 1.0, "angular": 1.0, "linear_acceleration": 1.0, "angular_acceleration": 1.0}
+    assert Limits.model_validate({**base, "reverse": 0.1}).reverse == 0.1
+    with pytest.raises(ValidationError, match="reverse"):
+        Limits.model_validate({**base, "reverse": 0.0})
 
 
 @pytest.mark.parametrize(("name", "hint"), [("collision_s", "did you mean"), ("zzzzzz", "lists what there is")])
