@@ -91,6 +91,11 @@ def _told(rows: Rows) -> Pose2 | None:
 
 def _odd(readings: Sequence[Odometry | Scan]) -> Iterator[str]:
     """Readings that no localizer can use. Raises Unusable where that is every scan."""
+    taken = [one for one in readings if isinstance(one, Scan)]
+    if any(one.angle_increment == 0.0 and len(one.ranges) > 1 for one in taken):
+        raise Unusable("all beams of a scan look the same way: its angle_increment is 0")
+    if blind := sum(not len(one.points()) for one in taken):
+        yield f"{blind} of {len(taken)} scans measured nothing within their range_min and range_max"
     odometry = np.array([one.tick for one in readings if isinstance(one, Odometry)])
     scans = np.array([one.tick for one in readings if isinstance(one, Scan)])
     if late := int((np.diff(np.maximum.accumulate(odometry)) == 0).sum()):

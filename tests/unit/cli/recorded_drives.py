@@ -12,11 +12,11 @@ BOXES = np.array([
 ANGLES = -math.pi / 2 + math.pi / 180 * np.arange(181)
 
 
-def ranges_at(x: float, y: float, yaw: float) -> list[float]:
+def ranges_at(x: float, y: float, yaw: float, angles: np.ndarray = ANGLES) -> list[float]:
     """Exact ranges by the slab method."""
     with np.errstate(divide="ignore"):
-        inverse = 1 / np.column_stack((np.cos(yaw + ANGLES), np.sin(yaw + ANGLES)))
-    found = np.full(len(ANGLES), 20.0)
+        inverse = 1 / np.column_stack((np.cos(yaw + angles), np.sin(yaw + angles)))
+    found = np.full(len(angles), 20.0)
     for left, low, right, high in BOXES:
         near, far = ((np.array(corner) - (x, y)) * inverse for corner in ((left, low), (right, high)))
         enter, leave = np.minimum(near, far).max(axis=1), np.maximum(near, far).min(axis=1)

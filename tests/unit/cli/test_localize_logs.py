@@ -180,6 +180,60 @@ def test_a_lidar_is_where_tf_static_says_even_upside_down(
     assert "note:" not in found["err"]
 
 
+Layout = tuple[float, float, int]
+"""The first angle, the increment, and how many beams there are."""
+DEGREE, SIDE = math.pi / 180, math.pi / 2
+
+
+def rescanned(layout: Layout, change: Callable[[np.ndarray], Iterable[float]] = lambda ranges: ranges) -> list[Said]:
+    """The drive with another lidar, which sees the room anew from each place."""
+    first, step, count = layout
+    angles, found, places = first + step * np.arange(count), [], iter(drive())
+    for one in said():
+        if one.topic == "/scan":
+            ranges = change(np.array(ranges_at(*next(places)[1], angles)))
+            message = scan(one.message.header.stamp.sec * SECOND + one.message.header.stamp.nanosec, ranges, "laser")
+            message = replace(message, angle_min=first, angle_increment=step, angle_max=angles[-1])
+            found.append(replace(one, message=message))
+        else:
+            found.append(one)
+    return found
+
+
+def with_nonsense(ranges: np.ndarray) -> np.ndarray:
+    """A quarter of the beams without an answer, in each way in which drivers tell it."""
+    ranges[::4] = np.resize([0.0, math.nan, math.inf, -1.0, 1e30], len(ranges[::4]))
+    return ranges
+
+
+@pytest.mark.parametrize(
+    ("layout", "change"),
+    [
+        ((-SIDE, DEGREE / 2, 361), lambda ranges: ranges),
+        ((SIDE, -DEGREE / 2, 361), lambda ranges: ranges),
+        ((SIDE, -DEGREE, 181), with_nonsense),
+        ((0.0, DEGREE, 360), with_nonsense),
+    ],
+    ids=["361 beams", "361 beams clockwise", "clockwise, a quarter without an answer", "all around from ahead"],
+)
+def test_a_scan_is_read_however_its_beams_are_laid_out(
+    simscen, tmp_path: Path, layout: Layout, change: Callable[[np.ndarray], np.ndarray]
+) -> None:
+    write_map(tmp_path)
+    write_mcap(tmp_path / "drive.mcap", rescanned(layout, change))
+    found = localized(simscen, "drive.mcap")
+    assert found["error"]["max"] < 0.2
+    assert found["error"]["median"] < 0.06  # odometry alone: 0.21 m
+    assert "note:" not in found["err"]
+
+
+def test_scans_that_measure_nothing_are_told(simscen, tmp_path: Path) -> None:
+    write_map(tmp_path)
+    blind = rescanned((-SIDE, DEGREE, 181), lambda ranges: np.zeros(len(ranges)))
+    write_mcap(tmp_path / "drive.mcap", blind)
+    assert "150 of 150 scans measured nothing" in localized(simscen, "drive.mcap")["err"]
+
+
 def test_a_lidar_that_nobody_mounts_is_told(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
     write_mcap(tmp_path / "drive.mcap", said(frame="velodyne"))
@@ -245,10 +299,11 @@ def test_readings_that_count_for_nothing_are_told(simscen, tmp_path: Path) -> No
     ("change", "told"),
     [
         (lambda one: replace(one, message=scan(one.time, [1.0], "laser", math.nan)), "its angles and ranges are"),
+        (lambda one: replace(one, message=replace(one.message, angle_increment=0.0)), "its angle_increment is 0"),
         (lambda one: replace(one, message=posed(one.time, (0, 0, 0))), "/scan is a geometry_msgs/msg/PoseStamped"),
         (lambda one: replace(one, topic="/front/scan"), "it holds no scans"),
     ],
-    ids=["angles that are not numbers", "another type", "another topic"],
+    ids=["angles that are not numbers", "angles that are all the same", "another type", "another topic"],
 )
 def test_scans_that_are_none_are_told_with_what_there_is(
     simscen, tmp_path: Path, change: Callable[[Said], Said], told: str
