@@ -11,6 +11,8 @@ import numpy as np
 from simscen.core.geometry import Array
 
 Vector = tuple[float, float, float]
+TILT = 0.0123, 0.0271
+"""m by which the line through a place leans towards x and y for each m of its height: edges of maps lie upright."""
 
 
 def winds_around(corners: Array, place: Vector) -> bool:
@@ -24,3 +26,22 @@ def winds_around(corners: Array, place: Vector) -> bool:
     ab, bc, ca = ax * bx + ay * by + az * bz, bx * cx + by * cy + bz * cz, cx * ax + cy * ay + cz * az
     angles = 2 * np.arctan2(volume, la * lb * lc + ab * lc + bc * la + ca * lb)
     return bool(angles.sum() > 2 * math.pi)
+
+
+def winds_along_a_line(corners: Array, place: Vector) -> bool | None:
+    """`winds_around`, told by those triangles (n, 3, 3) of a surface alone that a line through the place may meet.
+
+    Whoever goes to infinity leaves a closed surface so often more than it enters it as it winds around the place. None
+    where both ways along the line do not say the same, as through a hole, or where an edge lies on it.
+    """
+    x, y, z = np.moveaxis(corners - place, 2, 0)
+    x, y = x - TILT[0] * z, y - TILT[1] * z
+    # For each corner, twice the area that the line and the two others span: all are of one sign where it passes.
+    areas = np.roll(x, -1, 1) * np.roll(y, -2, 1) - np.roll(x, -2, 1) * np.roll(y, -1, 1)
+    passes = (areas >= 0).all(axis=1) | (areas <= 0).all(axis=1)
+    areas, z = areas[passes], z[passes]
+    if not areas.all():
+        return None
+    facing, above = np.sign(areas[:, 0]), (areas * z).sum(axis=1) * areas[:, 0] > 0
+    up, down = facing[above].sum(), -facing[~above].sum()
+    return bool(up > 0) if up == down else None

@@ -35,13 +35,17 @@ class Parts:
 
     def whole(self, part: int) -> bool:
         """Whether a part is all of its solid."""
-        first, last = np.searchsorted(self.owners, (self.owners[part], self.owners[part] + 1))
-        return bool(last - first == 1)
+        return len(self.of(int(self.owners[part]))) == 1
+
+    def of(self, owner: int) -> range:
+        """The parts of a solid."""
+        first, last = np.searchsorted(self.owners, (owner, owner + 1)).tolist()
+        return range(first, last)
 
     def faces_of(self, owner: int) -> Indices:
         """The faces of a whole solid, by number."""
-        first, last = np.searchsorted(self.owners, (owner, owner + 1))
-        return self.order[self.starts[first] : self.starts[last]]
+        parts = self.of(owner)
+        return self.order[self.starts[parts.start] : self.starts[parts.stop]]
 
     def holding(self, place: tuple[float, float, float]) -> list[int]:
         """The solids whose extents a place lies in."""

@@ -20,7 +20,7 @@ from simscen.core.shapes import TriangleMesh
 from simscen.core.terrain import FLOOR
 from simscen.sim import engine, outline
 from simscen.sim.clients import CLIENTS
-from simscen.sim.enclosure import winds_around
+from simscen.sim.enclosure import TILT, winds_along_a_line, winds_around
 from simscen.sim.parts import parts_of
 from simscen.sim.robot_body import RobotBody
 
@@ -135,7 +135,22 @@ class Proximity:
     def around(self, place: tuple[float, float, float], but: Collection[int] = ()) -> list[int]:
         """The solids that a place is inside of, by number, without those in `but`."""
         asked = [owner for owner in self._parts.holding(place) if owner not in but]
-        return [owner for owner in asked if winds_around(self._mesh.vertices[self._faces(owner)], place)]
+        return [owner for owner in asked if self._winds_around(owner, place)]
+
+    def _winds_around(self, owner: int, place: tuple[float, float, float]) -> bool:
+        """Of a solid of many tiles mostly those suffice that lie above and below the place: 0.2 ms for 100."""
+        parts, vertices = self._parts, self._mesh.vertices
+        tiles = parts.of(owner)
+        if len(tiles) > 1:
+            low, high = parts.low[tiles.start : tiles.stop], parts.high[tiles.start : tiles.stop]
+            leans = max(TILT) * max(high[:, 2].max() - place[2], place[2] - low[:, 2].min())
+            over = ((low[:, :2] - leans <= place[:2]) & (place[:2] <= high[:, :2] + leans)).all(axis=1)
+            meeting = [parts.faces(tile) for tile, meets in zip(tiles, over.tolist(), strict=True) if meets]
+            faces = np.concatenate([np.empty(0, np.int64), *meeting])
+            said = winds_along_a_line(vertices[self._mesh.faces[faces]], place)
+            if said is not None:
+                return said
+        return winds_around(vertices[self._faces(owner)], place)
 
     def convex(self, owner: int) -> bool:
         """Whether a solid is convex."""

@@ -9,6 +9,7 @@ from playground import box, shipped
 from simscen.core.geometry import Pose3
 from simscen.core.shapes import Box, Cylinder, Extrusion, Mesh, Solid
 from simscen.sim.embody import robot_body
+from simscen.sim.enclosure import winds_along_a_line, winds_around
 from simscen.sim.engine import fixed, hull_shape, tiles
 from simscen.sim.proximity import Proximity, motion, point_to_triangles
 from simscen.worlds.meshing import fuse
@@ -141,3 +142,19 @@ def test_a_place_is_inside_a_solid_of_many_tiles_as_in_any_other():
     assert made.distance(Pose3(6.5, 0.0)) == pytest.approx(0.5 - 0.22, abs=1e-3)
     assert not made.convex(0)
     assert made.convex(1)
+
+
+def test_a_line_through_a_place_tells_whether_a_surface_winds_around_it():
+    """Trimesh asks along rays of its own; where the line meets a corner or passes a hole it does not answer."""
+    rng = np.random.default_rng(8)
+    block, ring = trimesh.creation.box((2.0, 2.0, 2.0)).subdivide(), trimesh.creation.annulus(0.5, 1.5, 3.0)
+    both = trimesh.util.concatenate([block, ring.apply_translation((1.0, 0.4, 0.3))])
+    places = rng.uniform(-2.5, 2.5, (300, 3))
+    inside = block.contains(places) | ring.contains(places)
+    said = [winds_along_a_line(both.triangles, tuple(place)) for place in places.tolist()]
+    assert 20 < inside.sum() < 280
+    assert said == inside.tolist()
+    assert winds_along_a_line(block.triangles, (1.0, 1.0, 1.0)) is None  # a corner
+    lidless = block.triangles[block.triangles[:, :, 2].min(axis=1) < 0.99]
+    assert winds_along_a_line(lidless, (0.1, 0.2, 0.0)) is None
+    assert winds_around(lidless, (0.1, 0.2, 0.0))
