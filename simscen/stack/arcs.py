@@ -11,8 +11,8 @@ from simscen.core.motion import Twist
 
 NO_TURN = 1e-6
 """rad/s below which an arc is a straight line."""
-SHOWN = tuple(0.1 * step for step in range(16))
-"""Seconds of an arc that a local plan shows."""
+SHOWN = tuple(0.25 * step for step in range(7))
+"""Seconds of an arc that a local plan shows: at 0.5 m/s and 1 rad/s its chords are 4 mm off the arc."""
 
 
 def poses_along(pose: Pose2, twist: Twist, times: Array) -> Array:
@@ -35,7 +35,7 @@ def arc(pose: Pose2, twist: Twist, times: Iterable[float]) -> Array:
     """The same poses (n, 3) for a dozen `times`, in floats: a third of the time that arrays of so few take."""
     (x, y, yaw), (vx, vy, wz) = pose, twist
     start, going = complex(x, y), cmath.rect(1.0, yaw) * complex(vx, vy)
-    poses = list[tuple[float, float, float]]()
+    poses: list[tuple[float, float, float]] = []
     for time in times:
         turned = wz * time
         way = time if abs(wz) < NO_TURN else (cmath.rect(1.0, turned) - 1.0) / complex(0.0, wz)

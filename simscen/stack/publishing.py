@@ -55,7 +55,8 @@ class Publishing:
 
     def news(self, tick: int, frames: Frames, plan: Path | None, costmaps: Costmaps) -> Published:
         """What is new after a step of the controller, which follows this plan."""
-        local_plan, drawn = None, tuple[CostGrid, ...]()
+        local_plan: Path | None = None
+        drawn: tuple[CostGrid, ...] = ()
         if plan is not None and tick >= self._local_plan_due:
             local_plan = self._driven(tick, frames)
         if tick >= self._wide.due or tick >= self._near.due:

@@ -1,10 +1,8 @@
 """Which piece of a scan continues which track, and which begins one."""
 
 import math
-from dataclasses import dataclass
 
-import numpy as np
-
+from simscen.core.oftenmade import often_made
 from simscen.stack.prediction.clusters import BOTH, Piece, Places, fitted
 from simscen.stack.prediction.stance import Stance
 from simscen.stack.prediction.tracks import Track
@@ -23,7 +21,7 @@ RADIUS_GAIN = 0.3
 """How much a new look at a whole piece changes the radius of a track."""
 
 
-@dataclass(frozen=True, eq=False)
+@often_made(eq=False)
 class Seen:
     """A scan at a tick, in pieces of its hits `places` (m,), by a lidar that is at `lidar` in the odom frame.
 
@@ -47,21 +45,17 @@ def associate(tracks: list[Track], seen: Seen) -> set[int]:
     pieces, lidar = seen.pieces, seen.lidar
     if not tracks or not pieces:
         return set()
-    expected = np.array([lidar.into(track.place) for track in tracks])
-    gates = [GATE + GATE_SIGMAS * track.place_deviation for track in tracks]
-    off = np.abs(expected[:, None] - np.array([piece.centre for piece in pieces]))
-    most = np.array([gate + track.radius for gate, track in zip(gates, tracks, strict=True)])
-    numbers, near = (off <= most[:, None]).nonzero()
-    possible = list[tuple[float, int, int]]()
-    for number, piece, far in zip(numbers.tolist(), near.tolist(), off[numbers, near].tolist(), strict=True):
-        track, (_, _, centre, _, edges) = tracks[number], pieces[piece]
-        # Of what is half hidden, the middle of the visible part may be a radius off.
-        hidden = track.radius if edges != BOTH else 0.0
-        if far <= gates[number] + hidden and (not seen.stands(piece) or _stood(track, centre, lidar, hidden)):
-            possible.append((far, number, piece))
+    possible: list[tuple[float, int, int]] = []
+    for number, track in enumerate(tracks):
+        expected, gate = lidar.into(track.place), GATE + GATE_SIGMAS * track.place_deviation
+        for piece, (_, _, centre, _, edges) in enumerate(pieces):
+            # Of what is half hidden, the middle of the visible part may be a radius off.
+            far, hidden = abs(expected - centre), 0.0 if edges == BOTH else track.radius
+            if far <= gate + hidden and (not seen.stands(piece) or _stood(track, centre, lidar, hidden)):
+                possible.append((far, number, piece))
     possible.sort()
-    given = dict[int, int]()
-    taken = set[int]()
+    given: dict[int, int] = {}
+    taken: set[int] = set()
     for _, number, piece in possible:
         if number not in given and piece not in taken:
             taken.add(piece)
@@ -79,7 +73,8 @@ def _stood(track: Track, centre: complex, lidar: Stance, hidden: float) -> bool:
 def _update(given: list[tuple[Track, int]], seen: Seen) -> None:
     """Tracks are seen as these pieces."""
     lidar = seen.lidar
-    pieces, guesses = [seen.pieces[number] for _, number in given], list[complex]()
+    pieces = [seen.pieces[number] for _, number in given]
+    guesses: list[complex] = []
     for (track, _), piece in zip(given, pieces, strict=True):
         if piece.edges == BOTH:
             track.radius += RADIUS_GAIN * (piece.radius - track.radius)

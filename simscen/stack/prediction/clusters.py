@@ -2,7 +2,6 @@
 
 import cmath
 import math
-from dataclasses import dataclass
 from itertools import accumulate
 from typing import NamedTuple
 
@@ -10,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array
+from simscen.core.oftenmade import often_made
 
 GAP, SPARSE = 0.15, 2.5
 """Two hits belong together when they are no farther apart than this many metres, or times the spacing of beams."""
@@ -34,7 +34,7 @@ Places = npt.NDArray[np.complex128]
 """Points (n,) as complex numbers, x + iy: to turn them is one multiplication."""
 
 
-@dataclass(frozen=True, eq=False)
+@often_made(eq=False)
 class Runs:
     """Hits of a scan, of which neighbours that are not far apart make a run: things that stand apart.
 
@@ -92,14 +92,15 @@ def clusters(found: Runs, scanned: Array, start: float, step: float, largest: fl
 
     The first beam goes along `start`, the next `step` rad further.
     """
-    beams, wide = found.beams, abs(step)
-    if len(beams) < FEWEST:
+    wide = abs(step)
+    if len(found.beams) < FEWEST:
         return []
     first, last = _parted(found.ranges, found.first, found.last)
     nearest = np.minimum.reduceat(found.ranges, first).tolist()
-    full, pieces = abs(len(scanned) * wide - 2 * math.pi) < wide, list[Piece]()
-    begin, end = beams[first].tolist(), beams[last].tolist()
-    for one, other, near, low, high in zip(first.tolist(), last.tolist(), nearest, begin, end, strict=True):
+    full = abs(len(scanned) * wide - 2 * math.pi) < wide
+    pieces: list[Piece] = []
+    begin, end = found.beams.take(first).tolist(), found.beams.take(last).tolist()
+    for one, other, near, low, high in zip(first, last, nearest, begin, end, strict=True):
         if other - one + 1 < FEWEST:
             continue
         sine = math.sin(min((high - low + 1) * (0.5 * wide), STEEPEST))
@@ -120,10 +121,10 @@ def _clear(ranges: Array, beam: int, beside: int, full_circle: bool) -> bool:
     return bool(ranges[beside] > ranges[beam])
 
 
-def counts(pieces: list[Piece], which: Mask) -> list[int]:
-    """How many of each piece's hits these are, of all (m,)."""
-    total = [0, *np.cumsum(which).tolist()]
-    return [total[piece.last + 1] - total[piece.first] for piece in pieces]
+def shares(pieces: list[Piece], which: Mask) -> list[tuple[int, int]]:
+    """How many of each piece's hits these are, of all (m,), and how many it has."""
+    told = which.tobytes()
+    return [(told.count(1, first, last + 1), last + 1 - first) for first, last, *_ in pieces]
 
 
 def _between(breaks: Indices, count: int) -> tuple[Indices, Indices]:
@@ -136,8 +137,9 @@ def _between(breaks: Indices, count: int) -> tuple[Indices, Indices]:
     return first, last
 
 
-def _parted(ranges: Array, first: Indices, last: Indices) -> tuple[Indices, Indices]:
-    """Pieces cut where two things that touch meet: there the range is greater than somewhere to either side.
+def _parted(ranges: Array, first: Indices, last: Indices) -> tuple[list[int], list[int]]:
+    """First and last hits of pieces, cut where two things that touch meet: there the range is greater than somewhere to
+    either side.
 
     Along one convex thing it falls to its nearest point and then rises, whatever its shape.
     """
@@ -149,25 +151,29 @@ def _parted(ranges: Array, first: Indices, last: Indices) -> tuple[Indices, Indi
     before = np.subtract(ranges, steps, out=steps)
     before -= np.minimum.accumulate(before)
     rise = np.maximum.reduceat(np.minimum(before, after, out=before), first)
-    cut = (rise > VALLEY) & (count >= 2 * FEWEST)
-    if not cut.any():
-        return first, last
-    parted = list(zip(first[~cut].tolist(), last[~cut].tolist(), strict=True))
-    edges = list(zip(first[cut].tolist(), last[cut].tolist(), strict=True))
-    while edges:
-        begin, end = edges.pop()
+    begin, end = first.tolist(), last.tolist()
+    for number in ((rise > VALLEY) & (count >= 2 * FEWEST)).nonzero()[0].tolist()[::-1]:
+        cut = slice(number, number + 1)
+        begin[cut], end[cut] = zip(*_parts(ranges, begin[number], end[number]), strict=True)
+    return begin, end
+
+
+def _parts(ranges: Array, begin: int, end: int) -> list[tuple[int, int]]:
+    """Those of one run, in order."""
+    left = [(begin, end)]
+    parts: list[tuple[int, int]] = []
+    while left:
+        begin, end = left.pop()
         if end - begin + 1 >= 2 * FEWEST:
             piece = ranges[begin : end + 1]
             before, after = np.minimum.accumulate(piece), np.minimum.accumulate(piece[::-1])[::-1]
             rise = piece - np.maximum(before, after)
             valley = int(rise.argmax())
             if rise[valley] > VALLEY:
-                edges += [(begin, begin + valley), (begin + valley + 1, end)]
+                left += [(begin + valley + 1, end), (begin, begin + valley)]
                 continue
-        parted.append((begin, end))
-    parted.sort()
-    pieces: Indices = np.array(parted, dtype=np.int64)
-    return pieces[:, 0], pieces[:, 1]
+        parts.append((begin, end))
+    return parts
 
 
 def fitted(arcs: list[Places], radii: list[float], centres: list[complex]) -> list[complex]:

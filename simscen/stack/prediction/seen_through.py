@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
+from simscen.core.oftenmade import often_made
 from simscen.core.sensing import Scan
 from simscen.stack.prediction.clusters import Indices, Mask, Places
 
@@ -109,7 +110,7 @@ def _least(values: Array, width: int) -> Array:
     return values
 
 
-@dataclass(frozen=True, eq=False)
+@often_made(eq=False)
 class Earlier:
     """What a scan saw through, and where its lidar was in the odom frame."""
 
@@ -141,7 +142,7 @@ class Earlier:
         return np.asarray(self.free[beam] > distance)
 
 
-@dataclass(frozen=True, eq=False)
+@often_made(eq=False)
 class Looked:
     """The beams (n,) of an earlier scan that went towards places, and how far away these were in m.
 

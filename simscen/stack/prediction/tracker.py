@@ -11,7 +11,7 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.sensing import Scan
 from simscen.model.guards import Prediction
 from simscen.stack.prediction.association import Seen, associate, begin
-from simscen.stack.prediction.clusters import Mask, Places, clusters, counts, runs
+from simscen.stack.prediction.clusters import Mask, Places, clusters, runs, shares
 from simscen.stack.prediction.going import Going
 from simscen.stack.prediction.moving import Moving, Thing, nothing
 from simscen.stack.prediction.seen_through import FARTHEST, Earlier, SeenThrough
@@ -91,7 +91,7 @@ class Tracker:
             return
         tracks, going, tick = self._tracks, self._going, sight.scan.tick
         begin(tracks, seen, associate(tracks, seen))
-        followed = list[Track]()
+        followed: list[Track] = []
         for track in tracks:
             going.settle(track, tick, tracks, sight.left)
             if not going.ended(track, tick, tracks, sight.past):
@@ -111,11 +111,9 @@ class Tracker:
         pieces = clusters(found, scan.ranges, scan.angle_min, scan.angle_increment, self._spec.max_radius)
         came = stood = [False] * len(pieces)
         if looked is not None and appeared is not None and pieces:
-            come = counts(pieces, appeared)
-            came = [count >= max(FEW, APPEARED * piece.hits) for count, piece in zip(come, pieces, strict=True)]
+            came = [count >= max(FEW, APPEARED * hits) for count, hits in shares(pieces, appeared)]
             if self._tracks:  # else nobody asks
-                stayed = counts(pieces, looked.stood())
-                stood = [count > STANDS * piece.hits for count, piece in zip(stayed, pieces, strict=True)]
+                stood = [count > STANDS * hits for count, hits in shares(pieces, looked.stood())]
         return Seen(scan.tick, found.places, pieces, sight.lidar, came, stood)
 
     def _tell(self, moving: list[Track], sight: Sight) -> None:
