@@ -80,6 +80,9 @@ class RegulatedPurePursuit(Ranged, ControllerSpec):
     """How near an obstacle must be to slow it down."""
     cost_scaling_gain: Annotated[float, Field(gt=0, le=1), Quantity("ratio")] = 1.0
     """How much: speed times this share of the distance over `cost_scaling_dist`."""
+    slow_down_ahead: bool = True
+    """Whether it slows down before bends and obstacles, so that its brakes suffice, and in gaps by the room beside its
+    hull. Nav2 does neither: it looks at where the robot is."""
     max_angular_accel: PositiveAngularAcceleration = 3.2
     """Of its turn rate, when it turns in place."""
     allow_reversing: bool = False

@@ -36,7 +36,9 @@ NAV2: Values = {
             "regenerate_noises": True, "open_loop": False, "CostCritic": _CIRCLE, "ObstaclesCritic": _CIRCLE,
             "TrajectoryValidator": _CIRCLE,
         },
-        "regulated_pure_pursuit": {"desired_linear_vel": 0.5, "use_velocity_scaled_lookahead_dist": False},
+        "regulated_pure_pursuit": {
+            "desired_linear_vel": 0.5, "use_velocity_scaled_lookahead_dist": False, "slow_down_ahead": False,
+        },
         "dwb": {"max_vel_x": 0.5, "max_vel_y": 0.0, "min_vel_y": 0.0, "prune_distance": 2.0},
     },
     "goal_checker": {

@@ -10,6 +10,7 @@ from simscen.stack.arcs import SHOWN, arc
 from simscen.stack.controllers.following import PathFollower
 from simscen.stack.controllers.free_way import FreeWay
 from simscen.stack.controllers.goal_pose import GoalPose
+from simscen.stack.controllers.slowing import Slowing
 from simscen.stack.controllers.tracking import AT_CUSP, PathTracker
 from simscen.stack.controllers.turning import TurningRoom
 from simscen.stack.footprint import distance_at
@@ -36,7 +37,7 @@ class RegulatedPurePursuit(PathFollower):
         super().__init__(spec.desired_linear_vel, robot)
         self._spec, self._robot, self._free_way = spec, robot, FreeWay(footprint)
         self._goal_pose = GoalPose(robot, spec.rotate_to_heading_angular_vel, spec.max_angular_accel, period)
-        self._turning = TurningRoom(footprint)
+        self._turning, self._slowing = TurningRoom(footprint), Slowing(spec, setting)
         self.arc: tuple[Pose2, Twist] | None = None
         """The pose and the velocity of its last command."""
 
@@ -158,15 +159,13 @@ class RegulatedPurePursuit(PathFollower):
         return Twist(speed, 0.0, speed * curvature)
 
     def _regulated(self, curvature: float, pose: Pose2, costmap: CostmapView) -> float:
-        spec, speed = self._spec, self._speed
-        slow = speed
-        if spec.use_regulated_linear_velocity_scaling and abs(curvature) * spec.regulated_linear_scaling_min_radius > 1:
-            slow = min(slow, speed / (abs(curvature) * spec.regulated_linear_scaling_min_radius))
-        if spec.use_cost_regulated_linear_velocity_scaling:
-            near = distance_at(costmap, pose.x, pose.y)
-            if near < spec.cost_scaling_dist:
-                slow = min(slow, speed * spec.cost_scaling_gain * near / spec.cost_scaling_dist)
-        return min(speed, self._approaching(max(slow, spec.regulated_linear_scaling_min_speed), pose))
+        assert self._track is not None
+        speed, slowing = self._speed, self._slowing
+        slow = slowing.within(speed, curvature)
+        if self._spec.use_cost_regulated_linear_velocity_scaling:
+            slow = min(slow, slowing.beside(speed, distance_at(costmap, pose.x, pose.y)))
+        slow = slowing.before(speed, slow, self._track, costmap)
+        return min(speed, self._approaching(max(slow, self._spec.regulated_linear_scaling_min_speed), pose))
 
     def _approaching(self, speed: float, pose: Pose2) -> float:
         """Slow down near the end of the path, or of a piece: by Nav2's ratio, never faster than the brakes allow."""

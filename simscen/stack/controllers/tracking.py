@@ -1,7 +1,9 @@
 """Where the robot is on its path, and what lies ahead."""
 
 import math
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
+from cmath import phase
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -13,6 +15,8 @@ SEARCH_AHEAD = 1.5
 """Metres of path beyond the last place that are searched for the nearest point, so that a path may cross itself."""
 AT_CUSP = 0.03
 """Metres before a change of direction at which it counts as reached."""
+BEND = 0.3
+"""Metres to both sides of a point over which the path's bend there is told."""
 ROUNDING = 1e-9
 """Metres: sums of lengths are not exact."""
 
@@ -40,7 +44,7 @@ class PathTracker:
         ahead = forward_steps(self.points)
         self._ends: list[int] = [*changes(ahead).tolist(), len(self.points) - 1]
         self._forward: list[bool] = [bool(ahead[max(0, end - 1)]) if len(ahead) else True for end in self._ends]
-        self.index = 0
+        self.index = self._begin = 0
 
     @property
     def length(self) -> float:
@@ -61,7 +65,7 @@ class PathTracker:
         """Move to the point of this piece nearest to the robot, and on to the next piece at its end."""
         self._nearest(pose)
         while len(self._ends) > 1 and self.to_cusp() <= AT_CUSP:
-            self.index = self._ends.pop(0)
+            self.index = self._begin = self._ends.pop(0)
             self._forward.pop(0)
             self._nearest(pose)
 
@@ -85,6 +89,27 @@ class PathTracker:
     def places(self, every: int) -> list[complex]:
         """Each so-manieth of the points from the nearest one on, x + iy."""
         return self._places[self.index :: every]
+
+    def stations(self, step: float, reach: float) -> Iterator[tuple[float, complex, float]]:
+        """Points of this piece about `step` metres apart, the first so far ahead: metres to each, x + iy, its bend."""
+        metres, here = self._metres, self._metres[self.index]
+        at = step
+        while at <= reach:
+            index = bisect_left(metres, here + at)
+            if index > self._ends[0]:
+                return
+            yield metres[index] - here, self._places[index], self._bend(index)
+            at = metres[index] - here + step
+
+    def _bend(self, index: int) -> float:
+        """About the curvature at a point in 1/m; 0 where the piece does not go on so far to both sides."""
+        metres, places = self._metres, self._places
+        before = bisect_right(metres, metres[index] - BEND) - 1
+        after = bisect_left(metres, metres[index] + BEND)
+        if before < self._begin or after > self._ends[0]:
+            return 0.0
+        turn = phase((places[after] - places[index]) * (places[index] - places[before]).conjugate())
+        return 2.0 * abs(turn) / (metres[after] - metres[before])
 
     def remaining(self) -> float:
         """Metres of path from the nearest point to the end."""

@@ -106,6 +106,7 @@ STARTS: dict[type[ControllerSpec], list[dict[str, Any]]] = {
         {"use_velocity_scaled_lookahead_dist": False, "use_fixed_curvature_lookahead": True},
         {"use_velocity_scaled_lookahead_dist": False},
         {"rotate_to_heading_min_angle": 0.1},
+        {"desired_linear_vel": 1.2},
     ],
     DynamicWindow: [
         {"type": "dwb", "vx_samples": 7, "vtheta_samples": 7, "sim_time": 1.0, "min_vel_x": -0.2},

@@ -19,7 +19,7 @@ from simscen.stack.protocols import NavigationFailure, Surroundings
 from simscen.testing.flatland import RATE, Flatland, round_robot, setting
 
 CASES = yaml.safe_load((Path(__file__).parent / "golden/regulated_pure_pursuit.yaml").read_text(encoding="utf-8"))
-PLAIN = {"use_velocity_scaled_lookahead_dist": False}
+PLAIN = {"use_velocity_scaled_lookahead_dist": False, "slow_down_ahead": False}
 
 
 @pytest.mark.parametrize("case", CASES, ids=[case["name"] for case in CASES])
