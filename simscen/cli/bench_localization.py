@@ -18,7 +18,7 @@ from simscen.loading.messages import quoted
 from simscen.report.look import look_of
 
 if TYPE_CHECKING:
-    from simscen.study.indoor.campaign import Interval, Row, Share
+    from simscen.study.indoor.campaign import Interval, Row, Share, Sureness
     from simscen.study.indoor.trial import Trial
 
 
@@ -112,12 +112,17 @@ def _between(interval: "Interval", form: str = ".3f") -> str:
 
 
 def _belief(row: "Row") -> list[str]:
-    from simscen.study.indoor.campaign import SURE
     from simscen.study.indoor.trial import MOMENTS
 
-    def moments(name: str) -> str:
-        low, high = row.anees_bounds[name]
-        told = ", ".join(f"{value:.2f} at {when:g} s" for when, value in zip(MOMENTS, row.anees[name], strict=True))
-        return f"  ANEES {name}: {told}; consistent: {low:.2f} … {high:.2f} (95 %)"
+    def lines(name: str, sure: "Sureness") -> list[str]:
+        within = (
+            "" if sure.bounds is None else f"; right on average: {sure.bounds[0]:.2f} … {sure.bounds[1]:.2f} (95 %)"
+        )
+        told = ", ".join(f"{value:.2f} at {when:g} s" for when, value in zip(MOMENTS, sure.moments, strict=True))
+        low, high = sure.moment_bounds
+        return [
+            f"  ANEES {name}: {sure.anees:.2f}{within}; in the 95 % ellipsoid: {sure.inside:.1%}",
+            f"    {told}; normal, independent: {low:.2f} … {high:.2f} (95 %)",
+        ]
 
-    return [row.parameters, *(moments(name) for name in SURE)]
+    return [row.parameters, *(line for name, sure in row.sure.items() for line in lines(name, sure))]

@@ -124,7 +124,8 @@ class Amcl(Ranged, LocalizerSpec):
     """Correct each step of odometry by how the scan fits those of the last metres, where these can tell."""
     covariance: Literal["particles", "scatter"] = "particles"
     """What the covariance is told from: the particles, as in Nav2, or also how the poses of the last metres scatter
-    about the way that the robot saw itself go, for particles all err together; that with `match_scans` only."""
+    about the way that the robot saw itself go, and how far off the beams are, for particles all err together; that
+    with `match_scans` only."""
     selective_resampling: bool = False
     """Resample only when the effective number of particles is below half of them."""
     do_beamskip: bool = False

@@ -1,18 +1,23 @@
 """Whether a localizer is as sure as it may be: normalised estimation error squared, averaged over runs.
 
 The average is over runs at fixed times, not over time: errors of one run are correlated, and the bounds of the
-chi-square distribution hold for independent samples only. (Bar-Shalom, Li, Kirubarajan 2001, section 5.4.)
+chi-square distribution hold for independent samples only. (Bar-Shalom, Li, Kirubarajan 2001, section 5.4.) Runs that
+share a building are not independent either: what stands elsewhere than the map shows it errs in all of them.
 """
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
-from simscen.core.chisquare import mean_bounds
+from simscen.core.chisquare import mean_bounds, quantile
 from simscen.core.geometry import Array
 from simscen.core.trace import Trace
 from simscen.criteria.nees import DIMENSIONS, nees_samples
 from simscen.criteria.nees import nees as squared_errors
+
+FEWEST = 3
+"""Buildings from which on they say how much they differ."""
 
 
 def nees(error: Array, covariance: Array) -> float:
@@ -33,6 +38,31 @@ def anees(values: Sequence[float]) -> float:
     return float(np.mean(values))
 
 
+def inside(values: Sequence[float], dimensions: int = DIMENSIONS, probability: float = 0.95) -> float:
+    """The share of NEES of errors that lie in the ellipsoid in which normal ones do with this probability."""
+    return float(np.mean(np.asarray(values) <= quantile(probability, dimensions)))
+
+
 def bounds(runs: int, dimensions: int = DIMENSIONS, probability: float = 0.95) -> tuple[float, float]:
     """Between which ANEES lies with this probability when the localizer is consistent: chi2(d N) / N."""
     return mean_bounds(runs, dimensions, probability)
+
+
+def bounds_over(
+    groups: Sequence[float], dimensions: int = DIMENSIONS, probability: float = 0.95
+) -> tuple[float, float] | None:
+    """Between which the mean of `groups` lies with this probability when the covariance is right on average.
+
+    `groups` are the ANEES of buildings, as many values in each: within one they may depend on each other in any way,
+    along a log and from log to log, and have any distribution. Nothing but how much buildings differ tells how far off
+    the mean may be; of its logarithm, for it is a scale: t times the relative standard error (delta method), with one
+    degree of freedom less than there are buildings. None for fewer than three, or where a value is infinite.
+    """
+    count, mean = len(groups), float(np.mean(groups))
+    if count < FEWEST or not 0.0 < mean < math.inf:
+        return None
+    from scipy.special import stdtrit
+
+    error = float(np.std(groups, ddof=1)) / mean / math.sqrt(count)
+    factor = math.exp(float(stdtrit(count - 1, (1.0 + probability) / 2.0)) * error)
+    return dimensions / factor, dimensions * factor

@@ -10,10 +10,12 @@ from simscen.core.belief import Belief, Estimate
 from simscen.core.geometry import Array, Pose2
 from simscen.core.sensing import Imu, Odometry, Scan
 from simscen.model.localizers import Amcl
+from simscen.stack.localizers.beams import select_beams
 from simscen.stack.localizers.clusters import spread, summarise
 from simscen.stack.localizers.finder import UNSEEN, Finder
 from simscen.stack.localizers.global_search import GlobalSearch
 from simscen.stack.localizers.map_trust import MapTrust
+from simscen.stack.localizers.misfit import MapMisfit
 from simscen.stack.localizers.motion_models import MotionModel
 from simscen.stack.localizers.particle_filter import ParticleFilter
 from simscen.stack.localizers.scan_matcher import ScanMatcher, Step
@@ -57,11 +59,14 @@ class AmclLocalizer:
 
     def __init__(
         self, spec: Amcl, particle_filter: ParticleFilter, motion: MotionModel, estimate: Estimate, tick_rate: int,
-        search: tuple[GlobalSearch, MapTrust] | None = None,
+        search: tuple[GlobalSearch, MapTrust] | None = None, misfit: MapMisfit | None = None,
     ) -> None:  # fmt: skip
-        """`search` is what finds a robot that is lost; without, that is left to random particles."""
+        """`search` is what finds a robot that is lost; without, that is left to random particles.
+
+        `misfit` says what beams tell of the covariance; without, only the particles do.
+        """
         self._spec, self._filter, self._motion, self._tick_rate = spec, particle_filter, motion, tick_rate
-        self._search = search
+        self._search, self._misfit = search, misfit
         self.reset(estimate)
 
     def reset(self, estimate: Estimate) -> None:
@@ -74,7 +79,7 @@ class AmclLocalizer:
         self.__dict__.pop("_correction", None)
         self._moved_to: Pose2 | None = None
         self._matcher = ScanMatcher() if self._spec.match_scans else None
-        self._scatter = Scatter() if self._spec.covariance == "scatter" and self._matcher is not None else None
+        self._scatter = Scatter() if self._misfit is not None and self._matcher is not None else None
         self._matched: tuple[str, Pose2] | None = None
         self._came, self._calm, self._glances = UNSEEN, 0, 0
         self._due: dict[str, bool] = {}
@@ -143,7 +148,7 @@ class AmclLocalizer:
 
     def _correct(self, scan: Scan, odometry: Pose2, delta: Pose2 | None) -> None:
         """Move the particles by what was driven since the last correction, and weigh them by a scan."""
-        matched = None if self._matcher is None else self._matched_step(self._matcher, scan, odometry)
+        spec, matched = self._spec, None if self._matcher is None else self._matched_step(self._matcher, scan, odometry)
         self._came = Moved(step=matched, parted=None if self._matcher is None else self._matcher.parted)
         agreed = False
         if delta is not None and matched is not None:
@@ -154,11 +159,14 @@ class AmclLocalizer:
                 self._scatter.compare(matched.delta, delta)
         elif delta is not None:
             self._filter.move(delta)
+        if self._scatter is not None:
+            self._scatter.drive(self._base(odometry), None if matched is None else matched.covariance)
         self._due[scan.sensor], self._moved_to, self._belief = False, odometry, None
         if (answer := self._filter.correct(scan)) is not None:
             pose, covariance = answer
-            if self._scatter is not None:
-                covariance = self._scatter.widened(pose, covariance, self._base(odometry))
+            if self._scatter is not None and self._misfit is not None:
+                misfit = self._misfit.of(select_beams(scan, spec.max_beams, spec.laser_min_range, spec.farthest), pose)
+                covariance = self._scatter.widened(pose, covariance, misfit)
             self._correction = _Correction(pose, covariance, odometry, scan.tick)
         else:
             last = self._correction
@@ -186,7 +194,8 @@ class AmclLocalizer:
         if (places := finder.places(scan, base, believed, limits, self._came, fit)) is not None:
             self._correction = _Correction(*self._filter.put(*places), odometry, scan.tick)
             self._moved_to, self._belief, self._calm = odometry, None, 0
-            self._scatter = None if self._scatter is None else Scatter()
+            if self._scatter is not None:
+                self._scatter.forget()
 
     def _base(self, odometry: Pose2) -> Pose2:
         """Where the robot is at `odometry` in a frame that drifts: by what its scans show of its motion, if they do."""

@@ -22,6 +22,7 @@ from simscen.stack.localizers.likelihood_field import (
     obstacle_field,
 )
 from simscen.stack.localizers.map_trust import NEAR, MapTrust
+from simscen.stack.localizers.misfit import MapMisfit
 from simscen.stack.localizers.motion_models import Differential, MotionModel, Omni
 from simscen.stack.localizers.particle_filter import ParticleFilter
 from simscen.stack.localizers.particles import FreeSpace
@@ -37,7 +38,8 @@ def amcl(spec: model.Amcl, setting: Setting) -> Localizer:
     doubted = known.trust if spec.map_trust_full > 0 else None
     particles = ParticleFilter(spec, motion, known.sensor, known.anywhere, setting.chance, doubted)
     search = (known.search, known.trust) if spec.relocalization == "scan_matching" else None
-    return AmclLocalizer(spec, particles, motion, setting.estimate, setting.surroundings.tick_rate, search)
+    misfit = known.misfit if spec.covariance == "scatter" else None
+    return AmclLocalizer(spec, particles, motion, setting.estimate, setting.surroundings.tick_rate, search, misfit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +49,7 @@ class Matching:
     sensor: SensorModel
     anywhere: FreeSpace
     trust: MapTrust
+    misfit: MapMisfit
     search: GlobalSearch
 
     def ready(self) -> None:
@@ -61,7 +64,8 @@ def matching(grid: OccupancyGrid, spec: model.Amcl) -> Matching:
     field, beyond = obstacle_field(grid, spec.laser_likelihood_max_dist), beyond_the_map(grid).ravel()
     fits = field if spec.laser_likelihood_max_dist > NEAR else obstacle_field(grid, 2 * NEAR)
     trust = MapTrust(fits, beyond, spec.map_trust_none, spec.map_trust_full)
-    return Matching(_sensor_model(spec, grid, field, beyond), FreeSpace(grid), trust, GlobalSearch(grid, field))
+    misfit = MapMisfit(fits, beyond, spec.z_hit, spec.z_rand, spec.sigma_hit)
+    return Matching(_sensor_model(spec, grid, field, beyond), FreeSpace(grid), trust, misfit, GlobalSearch(grid, field))
 
 
 def ekf(spec: model.Ekf, setting: Setting) -> Localizer:

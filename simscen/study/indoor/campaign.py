@@ -10,7 +10,7 @@ import numpy as np
 from simscen.core.chance import Streams
 from simscen.core.paired import mean_interval
 from simscen.model.localizers import Amcl
-from simscen.study.consistency import anees, bounds
+from simscen.study.consistency import anees, bounds, bounds_over, inside
 from simscen.study.indoor.logs import CIRCUMSTANCES, log
 from simscen.study.indoor.trial import MOMENTS, Trial, trial
 
@@ -22,7 +22,7 @@ PARAMETERS: Mapping[str, Amcl] = {
 }
 LOGS: Mapping[str, int] = {name: 5 if name == "tracked" else 1 for name in CIRCUMSTANCES}
 """Logs of each building under each circumstance."""
-SURE = ("clean", "slipping", "tracked")
+SURE = ("clean", "slipping", "tracked", "outdated", "half")
 """Circumstances under which the error is compared with the covariance."""
 WITHIN = 60.0
 """Seconds in which a robot must be found that was told nothing, or was carried elsewhere."""
@@ -40,20 +40,35 @@ class Share:
 
 
 @dataclass(frozen=True)
+class Sureness:
+    """How the squared error compares with the covariance: ANEES over all logs and moments, 3 when they agree.
+
+    `bounds` are those of a covariance that is right on average, by how much buildings differ; None for too few of them.
+    `inside` is the share of the poses that lie within their 95 % ellipsoid. `moments` are the ANEES over logs at each
+    of MOMENTS, and `moment_bounds` those of errors that are normal and of logs that are independent.
+    """
+
+    anees: float
+    bounds: Interval
+    inside: float
+    moments: Sequence[float]
+    moment_bounds: tuple[float, float]
+
+
+@dataclass(frozen=True)
 class Row:
     """One set of parameters. Errors in m: the median over the tracked logs of the median over a log.
 
     `unknown` and `kidnapped` count logs on which the robot was found within WITHIN, all others those on which it was
-    never lost. `anees` are over logs at each of MOMENTS, and `anees_bounds` those of a consistent belief. `ms` is the
-    processor's time a scan, odometry included, and `slowest_ms` that of the scan that took longest.
+    never lost. `ms` is the processor's time a scan, odometry included, and `slowest_ms` that of the scan that took
+    longest.
     """
 
     parameters: str
     shares: Mapping[str, Share]
     median: float
     median_interval: Interval
-    anees: Mapping[str, Sequence[float]]
-    anees_bounds: Mapping[str, tuple[float, float]]
+    sure: Mapping[str, Sureness]
     ms: float
     slowest_ms: float
 
@@ -79,16 +94,12 @@ def summed_up(name: str, trials: Sequence[Trial]) -> Row:
     """The row of some parameters."""
     under = {one: [trial for trial in trials if trial.circumstance == one] for one in CIRCUMSTANCES}
     medians = _by_building(under["tracked"], [trial.median for trial in under["tracked"]])
-    sure = {one: under[one] for one in SURE}
     return Row(
         parameters=name,
         shares={one: _share(some) for one, some in under.items()},
         median=float(np.median([trial.median for trial in under["tracked"]])),
         median_interval=_interval(medians),
-        anees={
-            one: [anees([trial.nees[k] for trial in some]) for k in range(len(MOMENTS))] for one, some in sure.items()
-        },
-        anees_bounds={one: bounds(len(some)) for one, some in sure.items()},
+        sure={one: _sureness(under[one]) for one in SURE if under[one]},
         ms=float(np.mean([trial.ms for trial in trials])),
         slowest_ms=max(trial.slowest_ms for trial in trials),
     )
@@ -99,6 +110,17 @@ def well(trial: Trial) -> bool:
     if trial.circumstance in ("unknown", "kidnapped"):
         return trial.found is not None and trial.found <= WITHIN
     return trial.tracked
+
+
+def _sureness(trials: Sequence[Trial]) -> Sureness:
+    every = [value for trial in trials for value in trial.nees]
+    return Sureness(
+        anees=anees(every),
+        bounds=bounds_over(_by_building(trials, [anees(trial.nees) for trial in trials])),
+        inside=inside(every),
+        moments=[anees([trial.nees[k] for trial in trials]) for k in range(len(MOMENTS))],
+        moment_bounds=bounds(len(trials)),
+    )
 
 
 def _share(trials: Sequence[Trial]) -> Share:

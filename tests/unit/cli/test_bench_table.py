@@ -5,7 +5,7 @@ from simscen.cli.bench_localization import SHARES
 from simscen.cli.bench_localization import as_text as localization
 from simscen.cli.bench_run import Localized, Measured
 from simscen.cli.bench_table import as_json, as_text
-from simscen.study.indoor.campaign import SURE, Share
+from simscen.study.indoor.campaign import SURE, Share, Sureness
 from simscen.study.indoor.campaign import Row as Numbers
 from simscen.study.tally import Row
 from simscen.study.versus import Difference, Versus
@@ -75,8 +75,8 @@ def test_the_json_holds_every_number() -> None:
 
 def test_the_table_of_localization_fits_a_narrow_terminal() -> None:
     shares = {name: Share(9, 10, (0.7, 1.0)) for name in SHARES}
-    nees, limits = dict.fromkeys(SURE, (1.0,) * 5), dict.fromkeys(SURE, (0.9, 6.34))
-    row = Numbers("Nav2's, likelihood_field_prob", shares, 0.029, (0.021, 0.042), nees, limits, 1.5, 189.0)
+    sure = dict.fromkeys(SURE, Sureness(1.0, (2.1, 4.2), 0.951, (1.0,) * 5, (0.9, 6.34)))
+    row = Numbers("Nav2's, likelihood_field_prob", shares, 0.029, (0.021, 0.042), sure, 1.5, 189.0)
     lines = localization([row], columns=80).splitlines()
     assert max(map(len, lines)) <= 80
     assert lines[:2] == [row.parameters, "  tracked 9 of 10 (0.70 … 1.00)  start unknown 9 of 10 (0.70 … 1.00)"]

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 from filterpy.stats import NEES
 
-from simscen.study.consistency import anees, bounds, nees
+from simscen.core.geometry import Array
+from simscen.study.consistency import anees, bounds, bounds_over, inside, nees
 
 
 def test_nees_is_that_of_filterpy() -> None:
@@ -30,3 +31,60 @@ def test_a_consistent_estimator_lies_within_the_bounds() -> None:
     values = [nees(chance.multivariate_normal(np.zeros(3), covariance), covariance) for _ in range(1000)]
     low, high = bounds(1000)
     assert low < anees(values) < high
+
+
+def filtered(chance: np.random.Generator, campaigns: int, buildings: int, shared: float) -> Array:
+    """NEES (campaigns, buildings, 25) of a Kalman filter that follows a random walk: five logs, each at five moments.
+
+    Each measurement errs on its own (variance 4) and as all do in its building (variance `shared`); the filter knows of
+    both. Moments are four steps apart, so that the errors of a log hang together, too.
+    """
+    walk, noise = 0.25, 4.0
+    before = (walk + np.sqrt(walk**2 + 4 * walk * noise)) / 2  # the Riccati equation's steady state, of one coordinate
+    gain = before / (before + noise)
+    variance = (1 - gain) * before + shared
+    error = np.sqrt(variance - shared) * chance.standard_normal((campaigns, buildings, 5, 3))
+    common = np.sqrt(shared) * chance.standard_normal((campaigns, buildings, 1, 3))
+    values = []
+    for step in range(20):
+        walked = error + np.sqrt(walk) * chance.standard_normal(error.shape)
+        error = (1 - gain) * walked + gain * np.sqrt(noise) * chance.standard_normal(error.shape)
+        if step % 4 == 3:
+            values.append(np.square(error + common).sum(axis=-1) / variance)
+    return np.stack(values, axis=-1).reshape(campaigns, buildings, 25)
+
+
+@pytest.mark.parametrize("shared", [0.0, 0.3])
+def test_bounds_over_buildings_cover_a_consistent_filter_and_no_other(shared: float) -> None:
+    """No other: 1.5 times as sure, or as unsure, as it may be, in standard deviations."""
+    values = filtered(np.random.default_rng(3), 400, 8, shared)
+
+    def kept(times: float) -> float:
+        campaigns = (values * times).mean(axis=2)
+        limits = [bounds_over(campaign.tolist()) for campaign in campaigns]
+        return float(np.mean([low < one.mean() < high for one, (low, high) in zip(campaigns, limits, strict=True)]))
+
+    assert 0.92 < kept(1.0) < 0.98
+    assert kept(1.5**2) < 0.03
+    assert kept(1.5**-2) < 0.03
+
+
+def test_bounds_of_independent_errors_are_too_narrow_for_logs_that_hang_together() -> None:
+    values = filtered(np.random.default_rng(3), 400, 8, 0.3)
+    low, high = bounds(8 * 25)
+    means = values.mean(axis=(1, 2))
+    assert np.mean((low < means) & (means < high)) < 0.85
+
+
+def test_of_two_buildings_nobody_knows_how_much_buildings_differ() -> None:
+    assert bounds_over([2.0, 4.0]) is None
+    assert bounds_over([2.0, 4.0, float("inf")]) is None
+
+
+def test_bounds_over_buildings_are_those_of_students_t_for_the_logarithm() -> None:
+    low, high = bounds_over([2.0, 3.0, 4.0]) or (0.0, 0.0)
+    assert np.log((low / 3.0, high / 3.0)) == pytest.approx((-0.8281, 0.8281), abs=1e-3)  # 4.3027 / (3 √3)
+
+
+def test_what_lies_in_the_ellipsoid_is_counted() -> None:
+    assert inside([7.8, 7.83, 1.0, 30.0]) == 0.5

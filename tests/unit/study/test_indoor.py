@@ -93,5 +93,9 @@ def test_a_row_counts_what_was_tracked_and_what_was_found_in_time() -> None:
     assert row.shares["unknown"].count == 2
     assert row.shares["kidnapped"] == Share(0, 1, None)
     assert row.median == pytest.approx(0.1)
-    assert row.anees["clean"] == [3.0] * len(MOMENTS)
+    clean = row.sure["clean"]
+    assert clean.moments == [3.0] * len(MOMENTS)
+    assert (clean.anees, clean.bounds, clean.inside) == (3.0, (3.0, 3.0), 1.0)
+    assert row.sure["outdated"].bounds is None
+    assert "half" not in row.sure
     assert set(PARAMETERS) >= {"Nav2's", "default", "consistent"}

@@ -1,48 +1,103 @@
-"""A robot whose scans err together is as unsure as its poses scatter about the way that it saw itself go."""
+"""A robot whose scans err together is as unsure as its poses scatter, and as what it sees is off the map."""
+
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
 
 from simscen.core.geometry import Array, Pose2
+from simscen.stack.localizers.misfit import Misfit
 from simscen.stack.localizers.scatter import COUNTED, Scatter
 
 STEP = Pose2(0.25, 0.0, 0.05)
+MATCHED = np.diag(np.square((0.005, 0.004, 0.0017)))
+"""(m, m, rad)²: the covariance of a step between two scans that see enough."""
 ERROR = np.array([0.05, 0.02, 0.01])
 """m, m, rad: standard deviations of errors that last for some corrections."""
 TOO_SURE = np.diag(np.square((0.01, 0.01, 0.005)))
+AS_MAPPED = Misfit(0.98, 0.1)
 
 
-def told(seed: int, lasting: float, error: Array, particles: Array) -> tuple[Array, Array]:
-    """The last error (3,) and covariance (3, 3) of a drive; `lasting` is the correlation of one error with the next."""
+def drive(seed: int, lasting: float, error: Array, particles: Array, misfit: Misfit = AS_MAPPED) -> list[float]:
+    """NEES of particles alone and of what is told, at the end and 9 m before; `lasting`: the correlation of one error
+    (ahead, aside, in heading) with the next."""
+    nees = []
+    for wrong, covariance in list(corrections(seed, lasting, error, particles, misfit))[COUNTED - 1 :: COUNTED]:
+        nees += [float(wrong @ np.linalg.solve(one, wrong)) for one in (particles, covariance)]
+    return nees
+
+
+def corrections(
+    seed: int, lasting: float, error: Array, particles: Array, misfit: Misfit = AS_MAPPED
+) -> Iterator[tuple[Array, Array]]:
+    """Errors (3,) and covariances (3, 3) of a drive."""
     chance, scatter = np.random.default_rng(seed), Scatter()
-    truth, off, covariance = Pose2(3.0, -2.0, 1.0), error * chance.standard_normal(3), particles
+    truth, off = Pose2(3.0, -2.0, 1.0), error * chance.standard_normal(3)
     start = truth
-    for _ in range(3 * COUNTED):
+    for _ in range(2 * COUNTED):
         truth = truth.compose(STEP)
         off = lasting * off + np.sqrt(1 - lasting**2) * error * chance.standard_normal(3)
-        x, y, yaw = (np.array(truth) + off).tolist()
-        covariance = scatter.widened(Pose2(x, y, yaw), particles, start.between(truth))
-    return off, covariance
+        c, s = np.cos(truth.yaw), np.sin(truth.yaw)
+        wrong = np.array(((c, -s, 0), (s, c, 0), (0, 0, 1))) @ off
+        x, y, yaw = (np.array(truth) + wrong).tolist()
+        scatter.drive(start.between(truth), MATCHED)
+        yield wrong, scatter.widened(Pose2(x, y, yaw), particles, misfit)
 
 
-@pytest.mark.parametrize("lasting", [0.6, 0.9, 0.97])
+@pytest.mark.parametrize("lasting", [0.85, 0.94])
 def test_the_squared_error_is_about_what_it_is_said_to_be_although_the_particles_are_far_too_sure(
     lasting: float,
 ) -> None:
-    """3 is right; opinions that err each on their own differ by twice what one is off by."""
-    drives = [told(seed, lasting, ERROR, TOO_SURE) for seed in range(100)]
-    nees = np.array([error @ np.linalg.solve(covariance, error) for error, covariance in drives])
-    assert 0.8 < nees.mean() < 4.5
-    assert np.mean([error @ np.linalg.solve(TOO_SURE, error) for error, _ in drives]) > 15
+    """3 is right; of AMCL's errors one and the next, 25 cm on, are correlated by 0.94."""
+    alone, told = np.array([drive(seed, lasting, ERROR, TOO_SURE) for seed in range(20)]).reshape(-1, 2).mean(axis=0)
+    assert 1.0 < told < 4.5
+    assert alone > 15
+
+
+def test_errors_that_all_poses_share_are_told_by_beams_that_are_off() -> None:
+    """What beams that are off mean was learned where poses scatter, and holds where they all err alike."""
+
+    def doubt(misfit: Misfit) -> float:
+        chance, scatter, base, covariance = np.random.default_rng(1), Scatter(), Pose2(0.0, 0.0, 0.0), TOO_SURE
+        for k in range(2 * COUNTED):
+            base, learning = base.compose(Pose2(0.25, 0.0, 0.0)), k < COUNTED
+            x = base.x + (0.05 * float(chance.standard_normal()) if learning else 0.1)
+            scatter.drive(base, MATCHED)
+            covariance = scatter.widened(Pose2(x, 0.0, 0.0), TOO_SURE, AS_MAPPED if learning else misfit)
+        return float(np.sqrt(covariance[0, 0]))
+
+    assert doubt(Misfit(0.98, 1.0)) > 2.0 * doubt(AS_MAPPED)
+
+
+def test_fewer_beams_that_the_map_explains_are_worth_less() -> None:
+    (_, most), (_, half) = (
+        list(corrections(1, 0.9, ERROR, TOO_SURE, Misfit(fits, 0.3 * fits)))[-1] for fits in (1.0, 0.5)
+    )
+    assert np.sqrt(np.diag(half)) == pytest.approx(2 * np.sqrt(np.diag(most)))
 
 
 def test_particles_that_are_less_sure_than_the_poses_scatter_are_believed_less() -> None:
-    _, covariance = told(1, 0.7, ERROR / 10, TOO_SURE * 25)
+    *_, (_, covariance) = corrections(1, 0.7, ERROR / 10, TOO_SURE * 25)
     assert 0 < np.trace(covariance) < np.trace(TOO_SURE * 25) / 2
 
 
+def test_what_matched_scans_drift_by_is_not_what_the_poses_are_off_by() -> None:
+    """Along a corridor without features nothing but wheels tells how far the robot went, and the map puts it right."""
+    blind, stds = np.diag(np.square((0.05, 0.004, 0.0017))), []
+    for doubt in (MATCHED, blind):
+        chance, scatter, base, covariance = np.random.default_rng(2), Scatter(), Pose2(0.0, 0.0, 0.0), TOO_SURE
+        for k in range(2 * COUNTED):
+            base = base.compose(Pose2(0.25 + 0.05 * float(chance.standard_normal()), 0.0, 0.0))
+            scatter.drive(base, doubt)
+            covariance = scatter.widened(Pose2(0.25 * k, 0.0, 0.0), TOO_SURE, AS_MAPPED)
+        stds.append(float(np.sqrt(covariance[0, 0])))
+    assert stds[1] < stds[0] / 3
+
+
 def test_the_first_correction_has_a_covariance_too() -> None:
-    covariance = Scatter().widened(Pose2(1.0, 2.0, 3.0), TOO_SURE, Pose2(0.0, 0.0, 0.0))
+    scatter = Scatter()
+    scatter.drive(Pose2(0.0, 0.0, 0.0), None)
+    covariance = scatter.widened(Pose2(1.0, 2.0, 3.0), TOO_SURE, None)
     assert (np.linalg.eigvalsh(covariance) > 0).all()
 
 
@@ -50,10 +105,13 @@ def test_the_first_correction_has_a_covariance_too() -> None:
 def test_it_is_the_same_wherever_the_frame_of_the_scans_lies(turn: float) -> None:
     poses = [Pose2(0.3 * k, 0.1 * np.sin(k), 0.2 * k) for k in range(12)]
     frame, found = Pose2(5.0, -3.0, turn), []
+    doubt = np.array(((4e-4, 1e-5, 0.0), (1e-5, 5e-5, 2e-6), (0.0, 2e-6, 9e-6)))
     for from_frame in (Pose2(0.0, 0.0, 0.0), frame):
-        scatter = Scatter()
-        found.append([scatter.widened(pose, TOO_SURE, from_frame.compose(Pose2(0.29 * k, 0.0, 0.2 * k)))
-                      for k, pose in enumerate(poses)][-1])  # fmt: skip
+        scatter, covariance = Scatter(), TOO_SURE
+        for k, pose in enumerate(poses):
+            scatter.drive(from_frame.compose(Pose2(0.29 * k, 0.0, 0.2 * k)), doubt)
+            covariance = scatter.widened(pose, TOO_SURE, AS_MAPPED)
+        found.append(covariance)
     assert np.allclose(*found)
 
 

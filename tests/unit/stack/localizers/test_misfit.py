@@ -1,0 +1,53 @@
+"""What beams say of how far off the map is: those that it explains, as far as it does."""
+
+import numpy as np
+import pytest
+
+from simscen.core.geometry import Pose2
+from simscen.core.grid import FREE, OCCUPIED, OccupancyGrid
+from simscen.stack.localizers.beams import Beams
+from simscen.stack.localizers.likelihood_field import obstacle_field
+from simscen.stack.localizers.misfit import MapMisfit, Misfit
+
+WALL = 4.05
+"""m: the x of the middles of a wall's cells."""
+SIGMA = 0.1
+
+
+def misfit(*ends: float, beyond: bool = False) -> Misfit | None:
+    """Of beams along x from the map's corner, which end at so many m."""
+    cells = np.full((40, 60), FREE, dtype=np.int8)
+    cells[:, 40] = OCCUPIED
+    field = obstacle_field(OccupancyGrid(cells, 0.1, Pose2(0.0, 0.0, 0.0)), 2.0)
+    says = np.full(field.table.shape, beyond)
+    ranges = np.array(ends)
+    beams = Beams(ranges, np.ones(len(ends), dtype=np.complex128), 0j, 10.0)
+    return MapMisfit(field, says, 0.5, 0.5, SIGMA).of(beams, Pose2(0.0, 2.0, 0.0))
+
+
+def explained(away: float) -> float:
+    """The probability that a beam hit the wall, by Bayes."""
+    hit = 0.5 * np.exp(-((away / SIGMA) ** 2) / 2)
+    return float(hit / (hit + 0.5 / 10.0))
+
+
+def test_beams_that_end_at_the_wall_are_off_by_nothing() -> None:
+    assert misfit(WALL, WALL) == pytest.approx((explained(0.0), 0.0))
+
+
+@pytest.mark.parametrize("away", [0.1, 0.2])
+def test_beams_count_for_what_they_are_off_by_as_far_as_the_map_explains_them(away: float) -> None:
+    share = explained(away)
+    assert misfit(WALL - away) == pytest.approx((share, (share * away / SIGMA) ** 2), rel=1e-3)
+
+
+def test_a_person_far_from_any_wall_makes_nothing_wrong_but_is_not_explained() -> None:
+    told = misfit(WALL, 2.0)
+    assert told is not None
+    assert told.fits == pytest.approx(explained(0.0) / 2)
+    assert told.squares == pytest.approx(0.0, abs=1e-9)
+
+
+def test_of_what_the_map_says_nothing_nothing_is_told() -> None:
+    assert misfit(WALL, beyond=True) is None
+    assert misfit(10.0) is None
