@@ -12,6 +12,11 @@ FILE_BYTES = 2 << 30
 OPEN_FILES = 256
 _PR_SET_PDEATHSIG = 1
 _PASSED_ON = {"PATH", "HOME", "LANG", "TMPDIR", "XDG_CACHE_HOME", "SIMSCEN_CACHE_DIR"}
+_ARITHMETIC = {
+    *("OPENBLAS_CORETYPE", "OPENBLAS_L2_SIZE"),
+    *("NPY_DISABLE_CPU_FEATURES", "NPY_ENABLE_CPU_FEATURES", "GLIBC_TUNABLES"),
+}
+"""Which instructions are used, so that a run has the last bits that the caller's own process would give it."""
 
 
 def die_with_parent(parent: int) -> None:
@@ -55,6 +60,6 @@ def limit_resources() -> None:
 
 def environment() -> dict[str, str]:
     """The environment of the processes that run scenarios: nothing secret, one BLAS thread, no hash seed."""
-    kept = {k: v for k, v in os.environ.items() if k in _PASSED_ON or k.startswith("LC_")}
+    kept = {k: v for k, v in os.environ.items() if k in _PASSED_ON | _ARITHMETIC or k.startswith("LC_")}
     one_thread = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMEXPR", "TBB")}
     return {**kept, **one_thread, "PYTHONHASHSEED": "0"}
