@@ -26,6 +26,12 @@ LONG = ("tests/scenarios/test_shipped.py", "tests/ros/", "tests/conformance/")
 """What takes longest begins first, so that no worker is left alone with it in the end."""
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int | None:
+    """One more than there are cores: a test that waits for a ROS graph or for processes it has started needs none."""
+    return None if "PYTEST_XDIST_AUTO_NUM_WORKERS" in os.environ else len(os.sched_getaffinity(0)) + 1
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Long ones first; otherwise in their order."""
     root = Path(__file__).parents[1]

@@ -99,7 +99,7 @@ def test_the_scenario_says_by_which_action_goals_go(with_interfaces, run, tmp_pa
     ]
 
 
-@pytest.mark.parametrize("repeats", [4, pytest.param(20, marks=pytest.mark.long)])
+@pytest.mark.parametrize("repeats", [2, pytest.param(20, marks=pytest.mark.long)])
 def test_runs_in_lockstep_are_equal_bit_for_bit_two_at_a_time(ros, run, repeats: int) -> None:
     """Two at a time: neither do they hear each other."""
     with ThreadPoolExecutor(2) as pool:

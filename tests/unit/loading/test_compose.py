@@ -84,9 +84,9 @@ def test_aliases_cannot_nest_deeper_either() -> None:
 def test_an_alias_bomb_is_refused_at_its_line_quickly_and_without_memory() -> None:
     lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x, x]"]
     lines += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]" for i in range(1, 10)]
-    before, begun = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.monotonic()
+    before, begun = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.process_time()
     problem = _problem("\n".join(lines))
-    assert time.monotonic() - begun < 0.5
+    assert time.process_time() - begun < 0.5
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 100_000
     assert problem.message == "aliases expand to more than 100000 values"
     assert problem.line == 5

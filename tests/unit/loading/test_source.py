@@ -1,6 +1,6 @@
 import os
+import signal
 import socket
-import time
 from pathlib import Path
 
 import pytest
@@ -41,18 +41,23 @@ def test_refuses_what_is_not_a_regular_file_without_waiting_for_it(tmp_path: Pat
         path = Path("/dev/zero")
     else:
         socket.socket(socket.AF_UNIX).bind(str(path))
-    begun = time.monotonic()
-    assert _problem(path).message == "not a regular file"
-    assert time.monotonic() - begun < 0.5
+    signal.signal(signal.SIGALRM, _waits)
+    signal.alarm(30)
+    try:
+        assert _problem(path).message == "not a regular file"
+    finally:
+        signal.alarm(0)
+
+
+def _waits(*_) -> None:
+    raise AssertionError("it waits for somebody who writes")
 
 
 def test_refuses_a_huge_file_without_reading_it_all(tmp_path: Path) -> None:
     path = tmp_path / "big.yaml"
     with path.open("wb") as file:
-        file.truncate(100 << 20)
-    begun = time.monotonic()
+        file.truncate(1 << 40)  # no memory holds it
     assert _problem(path).message == "larger than 1 MiB"
-    assert time.monotonic() - begun < 0.5
 
 
 def test_a_file_of_exactly_one_mebibyte_is_read(tmp_path: Path) -> None:
