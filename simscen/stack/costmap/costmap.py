@@ -256,5 +256,6 @@ class Costmap:
         squared = self._around.of(obstacles) if self._small else squared_distances(obstacles, self._margin)
         if self._walled:
             squared = np.minimum(self._static_squared, squared)
-        self._distance = self._inflation.metres.take(squared)
-        self._costs = self._inflation.costs(squared, self._unknown if self._tracks else None)
+        places = squared.astype(np.intp)  # once, for both look-ups
+        self._distance = self._inflation.metres.take(places)
+        self._costs = self._inflation.costs(places, self._unknown if self._tracks else None)

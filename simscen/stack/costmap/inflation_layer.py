@@ -45,7 +45,7 @@ class Inflation:
         cost[0] = LETHAL
         self.cost: npt.NDArray[np.uint8] = cost.astype(np.uint8)
 
-    def costs(self, squared: Squared, unknown: npt.NDArray[np.bool_] | None) -> npt.NDArray[np.uint8]:
+    def costs(self, squared: npt.NDArray[np.integer], unknown: npt.NDArray[np.bool_] | None) -> npt.NDArray[np.uint8]:
         """Costs of cells; `unknown` ones stay unknown unless an obstacle is within the inscribed radius."""
         cost = self.cost.take(squared)
         if unknown is not None:

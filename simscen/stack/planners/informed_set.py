@@ -184,20 +184,22 @@ def _at(mask: Mask, rows: int, columns: int) -> Mask:
 
 def _graph(rates: Rates, factor: int, priced: bool) -> csr_matrix:
     """Edges between blocks a move apart, as long as the move in blocks, or times what both cost."""
-    free = rates.free
-    blocks = _cut(free, factor)
+    blocks = _cut(rates.free, factor)
     height, width = blocks.shape[:2]
-    price = _prices(rates, factor) if priced else None
-    starts, ends, lengths = [], [], []
-    for (rows, columns), possible in _steps(blocks).items():
-        at = np.flatnonzero(possible)
-        to = at + (rows * width + columns)
-        starts.append(at)
-        ends.append(to)
-        length = math.hypot(rows, columns)
-        lengths.append(np.full(len(at), length) if price is None else 0.5 * length * (price[at] + price[to]))
-    entries = (np.concatenate(lengths), (np.concatenate(starts), np.concatenate(ends)))
-    return csr_matrix(entries, shape=(height * width, height * width))
+    steps = _steps(blocks)
+    moves = sorted(steps, key=lambda move: move[0] * width + move[1])
+    onward = np.array([rows * width + columns for rows, columns in moves])
+    lengths = np.array([math.hypot(*move) for move in moves])
+    possible = np.stack([steps[move].reshape(-1) for move in moves], axis=1)
+    at, move = possible.nonzero()  # block by block, as the matrix has them
+    to = at + onward[move]
+    if priced:
+        price = _prices(rates, factor)
+        length = (0.5 * lengths).astype(np.float32)[move] * (price[at] + price[to])
+    else:
+        length = lengths[move]
+    begin = np.concatenate(([0], possible.sum(axis=1).cumsum()))
+    return csr_matrix((length, to, begin), shape=(height * width, height * width))
 
 
 def _prices(rates: Rates, factor: int) -> Array:

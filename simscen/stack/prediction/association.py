@@ -73,18 +73,13 @@ def _stood(track: Track, centre: complex, lidar: Stance, hidden: float) -> bool:
 def _update(given: list[tuple[Track, int]], seen: Seen) -> None:
     """Tracks are seen as these pieces."""
     lidar = seen.lidar
-    pieces = [seen.pieces[number] for _, number in given]
-    guesses: list[complex] = []
-    for (track, _), piece in zip(given, pieces, strict=True):
-        if piece.edges == BOTH:
-            track.radius += RADIUS_GAIN * (piece.radius - track.radius)
-            guesses.append(piece.centre)
+    for track, number in given:
+        first, last, guess, radius, edges = seen.pieces[number]
+        if edges == BOTH:
+            track.radius += RADIUS_GAIN * (radius - track.radius)
         else:
-            guesses.append(lidar.into(track.place))
-    arcs = [seen.places[piece.first : piece.last + 1] for piece in pieces]
-    found = fitted(arcs, [track.radius for track, _ in given], guesses)
-    for (track, number), centre in zip(given, found, strict=True):
-        edges = seen.pieces[number].edges
+            guess = lidar.into(track.place)
+        centre = fitted(seen.places[first : last + 1].tolist(), track.radius, guess)
         hidden = 0.0 if edges == BOTH else HALF_SEEN
         track.correct(lidar.out(centre), NOISE + RELATIVE * abs(centre) + hidden)
         track.note(seen.tick, seen.came[number], seen.stood[number], edges, track.place_deviation)

@@ -2,7 +2,6 @@
 
 import cmath
 import math
-from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
@@ -176,27 +175,24 @@ def _parts(ranges: Array, begin: int, end: int) -> list[tuple[int, int]]:
     return parts
 
 
-def fitted(arcs: list[Places], radii: list[float], centres: list[complex]) -> list[complex]:
-    """The centres of the circles of these radii that fit arcs, points (n,) each, best; `centres` are a first guess."""
-    lengths = [len(arc) for arc in arcs]
-    at, owner, radius = np.concatenate(arcs), np.arange(len(arcs)).repeat(lengths), np.repeat(radii, lengths)
-    begin = [0, *accumulate(lengths[:-1])]
+def fitted(arc: list[complex], radius: float, centre: complex) -> complex:
+    """The centre of the circle of this radius that fits an arc, points x + iy, best; `centre` is a first guess.
+
+    In floats: a dozen points are too few for arrays.
+    """
+    half = 0.52 * len(arc)  # a little more: a short arc says little of how the circle lies across; there, stay
     for _ in range(STEPS):
-        off = np.array(centres)[owner]
-        off -= at
-        distance = np.abs(off)
-        off /= np.maximum(distance, 1e-6, out=distance)
-        # Of unit vectors x + iy the squares add up to x² - y² + 2ixy, the squared lengths to their number.
-        squares = np.add.reduceat(off * off, begin).tolist()
-        distance -= radius
-        misses = np.add.reduceat(off * distance, begin).tolist()
-        most = 0.0
-        for number, (twice, miss, count) in enumerate(zip(squares, misses, lengths, strict=True)):
-            # A little more than a half: a short arc says little of how the circle lies across; there, stay.
-            half, square = 0.52 * count, twice / 2
-            change = (half * miss - square * miss.conjugate()) / (half * half - abs(square) ** 2)
-            centres[number] -= change
-            most = max(most, abs(change))
-        if most < ENOUGH:
+        squares = miss = 0j
+        for place in arc:
+            off = centre - place
+            distance = abs(off)
+            towards = off / max(distance, 1e-6)
+            # Of unit vectors x + iy the squares add up to x² - y² + 2ixy, the squared lengths to their number.
+            squares += towards * towards
+            miss += towards * (distance - radius)
+        square = squares / 2
+        change = (half * miss - square * miss.conjugate()) / (half * half - abs(square) ** 2)
+        centre -= change
+        if abs(change) < ENOUGH:
             break
-    return centres
+    return centre

@@ -13,7 +13,8 @@ from simscen.core.geometry import Array, Pose2
 WIDEST = 0.8
 """Metres by which what is not known of a place widens it at most."""
 AHEAD, LEAST = 0.5, 0.05
-"""Seconds that are passed over at once at most where all keep clear of each other, and at least, to be worth it."""
+"""Seconds that are passed over at once at most, unless all keep clear of each other by WIDEST as well, and at least, to
+be worth it."""
 TOUCH = 0.03
 """Metres: whoever comes nearer is taken to touch."""
 
@@ -149,7 +150,7 @@ class Moving:
                 spare = (off - thing.radius - reach - room) / closing
                 if spare < LEAST:
                     return False
-                time += min(spare, AHEAD)
+                time += max(min(spare, AHEAD), spare - (WIDEST - room) / closing)
         return True
 
     def _deviation(self, thing: Thing, times: Reals) -> Reals:

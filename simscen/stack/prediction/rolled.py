@@ -5,9 +5,9 @@ swing around the robot, and so to move. This frame need not agree with anybody e
 were taken a second apart.
 """
 
-import math
 from collections import deque
 from collections.abc import Callable
+from math import cos, remainder, sin, tau
 
 from simscen.core.geometry import Pose2, wrap
 from simscen.core.sensing import Imu, Odometry
@@ -49,32 +49,33 @@ class Rolled:
     def _add_up(self) -> None:
         if not self._waiting:
             return
-        newest, x, y, yaw = self._poses[-1]
+        poses = self._poses
+        newest, x, y, yaw = poses[-1]
         last, turned, turns = self._last, self._turned, self._turns
         for reading in self._waiting:
             if isinstance(reading, Imu):
                 rate = reading.angular_velocity[2]
-                if abs(rate) < FASTEST:
+                if -FASTEST < rate < FASTEST:
                     turned += rate
                     turns += 1
                 continue
-            tick, pose = reading.tick, reading.pose
-            if last is not None and tick > last.tick and tick > newest:
-                before = last.pose
-                step = math.remainder(pose.yaw - before.yaw, math.tau)
+            tick = reading.tick
+            if last is not None and newest < tick > last.tick:
+                (there_x, there_y, heading), (before_x, before_y, before) = reading.pose, last.pose
+                step = remainder(heading - before, tau)
                 turn = turned / turns * (tick - last.tick) / self._rate if turns else step
                 # The wheels' step, turned into this frame, and by half of what they know too little of the turn.
-                into = yaw - before.yaw + (turn - step) / 2
-                c, s = math.cos(into), math.sin(into)
-                dx, dy = pose.x - before.x, pose.y - before.y
+                into = yaw - before + (turn - step) / 2
+                c, s, dx, dy = cos(into), sin(into), there_x - before_x, there_y - before_y
                 x, y, yaw, newest = x + c * dx - s * dy, y + s * dx + c * dy, yaw + turn, tick
-                self._poses.append((tick, x, y, yaw))
+                poses.append((tick, x, y, yaw))
             last, turned, turns = reading, 0.0, 0
         self._last, self._turned, self._turns = last, turned, turns
         self._waiting.clear()
-        self._now = _pose(self._poses[-1])
-        while self._poses[0][0] < newest - KEPT * self._rate:
-            self._poses.popleft()
+        self._now = _pose(poses[-1])
+        oldest = newest - KEPT * self._rate
+        while poses[0][0] < oldest:
+            poses.popleft()
 
 
 def _pose(kept: tuple[int, float, float, float]) -> Pose2:

@@ -139,7 +139,7 @@ class Earlier:
 
     def through(self, beam: Indices, distance: Array) -> Mask:
         """Whether beams (…,) went beyond what is so far off."""
-        return np.asarray(self.free[beam] > distance)
+        return np.asarray(self.free.take(beam) > distance)
 
 
 @often_made(eq=False)
@@ -166,7 +166,7 @@ class Looked:
 
     def stood(self) -> Mask:
         """Which of them were hit then, too."""
-        off = self.earlier.lengths[self.beam + self.earlier.view.around]
+        off = self.earlier.lengths.take(self.beam + self.earlier.view.around)
         off -= self.distance
         near = np.abs(off, out=off).min(axis=0)
         return np.asarray(near < SAME + SAME_RELATIVE * self.distance)

@@ -1,5 +1,6 @@
 """What the tracker makes of scans whose truth is a closed form."""
 
+import cmath
 import math
 from collections.abc import Callable
 
@@ -9,7 +10,7 @@ import pytest
 from simscen.core.geometry import Pose2
 from simscen.core.sensing import Scan
 from simscen.model.guards import Prediction
-from simscen.stack.prediction.clusters import clusters, runs
+from simscen.stack.prediction.clusters import ENOUGH, clusters, fitted, runs
 from simscen.stack.prediction.tracker import Tracker
 from simscen.testing.flatland import RATE, Flatland
 
@@ -256,3 +257,12 @@ def test_a_scan_that_is_garbage_moves_nothing_and_breaks_nothing() -> None:
             Scan("lidar", k * 24, ranges[: 360 if k % 3 else k // 3], -3.14, 0.0175, 0.1, 30.0), Pose2(0, 0)
         )
     assert np.isfinite(tracker.moving.centres).all()
+
+
+@pytest.mark.parametrize("seen", [1.2, 1.8, 2.5])
+def test_a_circle_that_is_seen_in_part_is_found_from_half_its_radius_off(seen: float) -> None:
+    """Its points are where the circle's equation has them, `seen` rad of it, as from the origin."""
+    middle, radius = 2.0 + 1.0j, 0.3
+    towards = math.pi + math.atan2(middle.imag, middle.real)
+    arc = [middle + cmath.rect(radius, towards + seen * (k / 14 - 0.5)) for k in range(15)]
+    assert abs(fitted(arc, radius, middle + cmath.rect(radius / 2, towards + 0.4)) - middle) < ENOUGH
