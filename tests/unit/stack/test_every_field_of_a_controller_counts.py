@@ -14,7 +14,7 @@ from pydantic import BaseModel, ValidationError
 from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
 from simscen.core.navigation import Goal, Path
-from simscen.model.controllers import ControllerSpec, DynamicWindow, RegulatedPurePursuit
+from simscen.model.controllers import CONTROLLERS, ControllerSpec, DynamicWindow, RegulatedPurePursuit
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.mppi import Mppi
 from simscen.stack.costmap.costmap import Costmap
@@ -243,3 +243,7 @@ def test_another_value_changes_a_command(other: Other) -> None:
 def test_every_field_is_tried() -> None:
     tried = {(other.spec, other.keys[0]) for other in OTHERS}
     assert tried == {(spec, name) for spec in STARTS for name in spec.model_fields if name != "type"}
+
+
+def test_every_shipped_controller_is_tried() -> None:
+    assert {f"{spec.__module__}:{spec.__name__}" for spec in STARTS} == set(CONTROLLERS.values())
