@@ -14,8 +14,8 @@ SLOWEST = 0.2
 """m/s: whoever is slower than this on average has not arrived in time."""
 FAULTS = {
     "lidar noise": ("{sensor: lidar, noise: {std: …}}", ("3 cm", "6 cm", "12 cm")),
-    "lidar garbage": ("{sensor: lidar, garbage: {probability: …}}", ("3 %", "10 %", "25 %")),
-    "lidar delay": ("{sensor: lidar, delay: {latency: …}}", ("50 ms", "150 ms", "250 ms")),
+    "lidar garbage": ("{sensor: lidar, garbage: {probability: …}}", ("10 %", "50 %", "80 %")),
+    "lidar delay": ("{sensor: lidar, delay: {jitter: …}}", ("100 ms", "200 ms", "400 ms")),
     "lidar sector": ("{sensor: lidar, sector: {from: 180 deg, to: …}}", ("210 deg", "270 deg", "350 deg")),
     "loose lidar": ("{sensor: lidar, intermittent: {up: 2 s, down: …}}", ("0.2 s", "0.5 s", "1 s")),
     "odometry scale": ("{sensor: odom, scale: {factor: …}}", ("103 %", "108 %", "120 %")),

@@ -157,6 +157,7 @@ ELSEWHERE = {
     "StackSpec.nav2_params": "tests/unit/loading/test_nav2_params.py",
     "StackSpec.latency": "tests/unit/run/test_latency.py",  # `robot` is what the robot's file says
     "Recovery.clear_entirely": "tests/unit/stack/test_forgetting.py",
+    "ClearCostmap.clear_entirely": "tests/unit/stack/behaviors/test_motions.py",
     "Recovery.retries_since_progress": "tests/unit/stack/test_checks_and_limits.py",
     "VelocitySmoother.counter_turn_slip": "tests/unit/stack/test_slipping_wheels.py",
     "Amcl.sure_update_factor": "tests/unit/stack/localizers/test_amcl.py",
