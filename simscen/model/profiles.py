@@ -26,7 +26,7 @@ NAV2: Values = {
     "localizer": {"amcl": {"parameters": "nav2"}},
     "costmap": {**_SEEN, "update_frequency": 1.0, "track_unknown_space": True},
     "local_costmap": {**_SEEN, "update_frequency": 5.0, "width": 3.0, "height": 3.0, "track_unknown_space": False},
-    "planner": {"navfn": _PLANNING, "smac_2d": _PLANNING},
+    "planner": {"navfn": _PLANNING, "smac_2d": {**_PLANNING, "tolerance": 0.125}},
     "controller": {
         "mppi": {
             "batch_size": 2000, "time_steps": 56, "model_dt": 0.05, "iteration_count": 1, "vx_max": 0.5,

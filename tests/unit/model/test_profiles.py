@@ -57,7 +57,7 @@ def test_what_is_said_wins_over_the_profile_and_the_profile_over_our_defaults() 
 def test_another_type_gets_the_profiles_values_for_that_type() -> None:
     spec = StackSpec(profile="nav2", controller={"type": "dwb"}, planner={"type": "smac_2d"}, localizer={"type": "ekf"})
     assert (spec.controller.type, spec.controller.max_vel_x, spec.controller.prune_distance) == ("dwb", 0.5, 2.0)
-    assert (spec.planner.type, spec.planner.replanning) == ("smac_2d", "rate")
+    assert (spec.planner.type, spec.planner.replanning, spec.planner.tolerance) == ("smac_2d", "rate", 0.125)
     assert spec.localizer == StackSpec(localizer={"type": "ekf"}).localizer
 
 
