@@ -51,8 +51,12 @@ class LidarSensor:
         ranges /= spec.resolution
         np.rint(ranges, ranges)
         ranges *= spec.resolution
-        ranges[ranges > spec.max_range] = np.inf
-        ranges[ranges < spec.min_range] = np.nan
+        # Where the nearest and the farthest are is told sooner than which are too near or too far; mostly none is.
+        near, far = ranges.item(ranges.argmin()), ranges.item(ranges.argmax())
+        if far > spec.max_range:
+            ranges[ranges > spec.max_range] = np.inf
+        if near < spec.min_range:
+            ranges[ranges < spec.min_range] = np.nan
         return ranges
 
     def _noise(self) -> Array:

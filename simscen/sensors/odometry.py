@@ -1,6 +1,7 @@
 """Wheel odometry: encoder increments added up along arcs, with errors that grow like a random walk."""
 
 import math
+from operator import sub
 
 from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
@@ -34,7 +35,7 @@ class WheelOdometrySensor:
         """The pose reckoned so far, and the mean velocity since the last reading."""
         rolled, before, seconds = self._view.encoders(), self._rolled, self._seconds
         self._rolled = rolled
-        step = self._noisy(self._motion(tuple([b - a for a, b in zip(before, rolled, strict=True)])))
+        step = self._noisy(self._motion(tuple(map(sub, rolled, before))))
         self._pose = pose = self._pose.compose(along_arc(step))
         vx, vy, wz = step
         return Odometry(self.name, tick, pose, _made(Twist, (vx / seconds, vy / seconds, wz / seconds)))

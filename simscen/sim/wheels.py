@@ -88,7 +88,7 @@ def hold(client: int, robot: int, joints: Sequence[int], torques: Sequence[float
 
 def mean_angles(client: int, robot: int, joints: Sequence[int], left: int) -> tuple[float, float]:
     """The mean angles in rad of joints on the left, which are the first so many, and of the others on the right."""
-    states = pybullet.getJointStates(robot, joints, physicsClientId=client)
+    states = pybullet.getJointStates(robot, joints, client)
     if len(states) == 2:
         return states[0][0], states[1][0]
     angles = [state[0] for state in states]

@@ -3,6 +3,7 @@
 import cmath
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +13,16 @@ from simscen.core.sensing import Scan
 
 Plane = npt.NDArray[np.complex128]
 """Points or directions x + iy: turned by a product, placed by a sum."""
+
+Cells = npt.NDArray[np.int32]
+
+
+class Field(Protocol):
+    """A table of what is where on a map."""
+
+    def cells_seen(self, poses: Array, points: Plane) -> Cells:
+        """Indices (n, b) into the table of `points` (b,) in the base frame as seen from each of `poses` (n, 3)."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +48,16 @@ class Beams:
         """Where the beams that hit something ended: points (m,) in the base frame."""
         hit = (self.ranges < self.range_max).nonzero()[0]
         return self.ranges.take(hit) * self.towards.take(hit) + self.origin
+
+    def cells(self, field: Field, poses: Array) -> Cells:
+        """Those of a field in which `ends` lie, seen from each of `poses` (n, 3): (n, m).
+
+        Of the same poses, which nobody writes to, the filter asks twice: what they are worth, and how likely they are.
+        """
+        last: tuple[Field, Array, Cells] | None = self.__dict__.get("_cells")
+        if last is None or last[0] is not field or last[1] is not poses:
+            last = self.__dict__["_cells"] = field, poses, field.cells_seen(poses, self.ends)
+        return last[2]
 
     def of_hits(self, chosen: npt.NDArray[np.bool_]) -> "Beams":
         """Of those that hit something the `chosen` ones (m,) alone, and all others."""

@@ -52,6 +52,8 @@ def summarise(particles: Particles, peak: float = 1.0) -> tuple[Pose2, Array]:
         labels = clusters(bins(poses))
         heaviest = labels == np.bincount(labels, weights=weights).argmax()
         poses, weights = poses[heaviest], weights[heaviest]
+    elif peak == 1.0:
+        return _together(particles)
     mean = _mean(poses, weights)
     if peak == 1.0:
         return mean, spread(particles, mean)
@@ -62,6 +64,19 @@ def summarise(particles: Particles, peak: float = 1.0) -> tuple[Pose2, Array]:
     turned = mean.yaw + towards * wrap(best.yaw - mean.yaw)
     pose = Pose2(mean.x + towards * (best.x - mean.x), mean.y + towards * (best.y - mean.y), wrap(turned))
     return pose, spread(particles, pose)
+
+
+def _together(particles: Particles) -> tuple[Pose2, Array]:
+    """The same of particles that are in touch, all sums in one product: of those headings are as good as numbers."""
+    first: tuple[float, float, float] = tuple(particles.poses[0].tolist())
+    off = np.ones((4, len(particles.weights)))
+    np.subtract(particles.poses.T, np.array([first]).T, off[:3])
+    off[2] = wrapped(off[2])
+    (xx, xy, xa, x), (_, yy, ya, y), (_, _, aa, a), (*_, total) = np.dot(off * particles.weights, off.T).tolist()
+    dx, dy, turn = x / total, y / total, a / total
+    xy, xa, ya = xy - dx * y, xa - dx * a, ya - dy * a
+    pose = Pose2(first[0] + dx, first[1] + dy, wrap(first[2] + turn))
+    return pose, np.array(((xx - dx * x, xy, xa), (xy, yy - dy * y, ya), (xa, ya, aa - turn * a)))
 
 
 def in_touch(particles: Particles) -> bool:

@@ -9,11 +9,10 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array
 from simscen.core.grid import FREE, UNKNOWN, OccupancyGrid
-from simscen.stack.localizers.beams import Plane
+from simscen.stack.localizers.beams import Cells, Plane
 from simscen.stack.nearest import BEYOND, FARTHEST, squared_cells, squared_within
 
 Float32 = npt.NDArray[np.float32]
-Cells = npt.NDArray[np.int32]
 Kind = TypeVar("Kind", np.float32, np.uint8)
 
 

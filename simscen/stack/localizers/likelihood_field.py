@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array
 from simscen.core.grid import OCCUPIED, OccupancyGrid
-from simscen.stack.localizers.beams import Beams, Plane
+from simscen.stack.localizers.beams import Beams
 from simscen.stack.localizers.distance_field import DistanceField, Float32, by_blocks
 
 PEAK_OF_SUMS = 16.0
@@ -83,10 +83,10 @@ class LikelihoodField:
 
     def log_likelihood(self, poses: Array, beams: Beams, converged: bool) -> Array:
         """Logarithms (n,) of 1 + Σ p³."""
-        points, z_rand = beams.ends, self._z_rand / np.float32(beams.range_max)
+        z_rand = self._z_rand / np.float32(beams.range_max)
 
         def judge(block: Array) -> Array:
-            p = self._hit.take(self._field.cells_seen(block, points))
+            p = self._hit.take(beams.cells(self._field, block))
             p += z_rand
             logarithm: Array = np.log1p(np.sum(p * p * p, axis=1, dtype=np.float64))
             return logarithm
@@ -128,23 +128,25 @@ class LikelihoodFieldProb:
         self._field, self._z_rand, self._skipping, self._exponent = field, np.float32(z_rand), skipping, exponent
         self._z_hit, self._sigma_hit, self._beyond = z_hit, sigma_hit, beyond
         self._range_max, self._logarithm = math.nan, field.table
-        self._counts: Float32 = np.empty(0, dtype=np.float32)
+        self._exponents: Float32 = np.empty(0, dtype=np.float32)
 
     def log_likelihood(self, poses: Array, beams: Beams, converged: bool) -> Array:
         """Logarithms (n,) of Π p."""
-        points, logarithms = beams.ends, self._logarithms(beams.range_max)
-        if self._skipping is not None and converged:
-            points = points[self._kept(poses, points, self._skipping)]
-
-        if len(points) != len(self._counts):
-            self._counts = np.full(len(points), self._exponent, dtype=np.float32)
-        counts = self._counts
+        kept = self._kept(poses, beams, self._skipping) if self._skipping is not None and converged else slice(None)
+        logarithms, counting = self._logarithms(beams.range_max), self._counts(len(beams.ends))[kept]
 
         def judge(block: Array) -> Array:
             # All cells are in the table; `wrap` spares looking whether they are.
-            return (logarithms.take(self._field.cells_seen(block, points), mode="wrap") @ counts).astype(np.float64)
+            cells = beams.cells(self._field, block)[:, kept]
+            return (logarithms.take(cells, mode="wrap") @ counting).astype(np.float64)
 
         return by_blocks(judge, poses)
+
+    def _counts(self, beams: int) -> Float32:
+        """How much each beam counts: (b,)."""
+        if beams != len(self._exponents):
+            self._exponents = np.full(beams, self._exponent, dtype=np.float32)
+        return self._exponents
 
     def _logarithms(self, range_max: float) -> Float32:
         """Those of the probability of a beam that ends in each cell of the field."""
@@ -162,8 +164,8 @@ class LikelihoodFieldProb:
         """The geometric mean over the beams that hit something."""
         return 1 / max(1, int(np.count_nonzero(beams.ranges < beams.range_max))) / self._exponent
 
-    def _kept(self, poses: Array, points: Plane, skipping: BeamSkipping) -> npt.NDArray[np.bool_] | slice:
-        near = self._field.table.take(self._field.cells_seen(poses, points)) < skipping.distance
+    def _kept(self, poses: Array, beams: Beams, skipping: BeamSkipping) -> npt.NDArray[np.bool_] | slice:
+        near = self._field.table.take(beams.cells(self._field, poses)) < skipping.distance
         explained: npt.NDArray[np.bool_] = near.mean(axis=0) > skipping.threshold
         misfit = np.count_nonzero(~explained) >= len(explained) * skipping.error_threshold
         return slice(None) if misfit else explained

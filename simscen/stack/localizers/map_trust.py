@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array
-from simscen.stack.localizers.beams import Plane
-from simscen.stack.localizers.distance_field import DistanceField
+from simscen.stack.localizers.beams import Beams, Cells, Plane
+from simscen.stack.localizers.distance_field import BLOCK, DistanceField
 from simscen.stack.localizers.particles import Particles
 
 NEAR = 0.3
@@ -50,13 +50,13 @@ class MapTrust:
         self._field, self._none, self._full = field, none, full
         self._says = np.where(beyond, _NOTHING, np.where(field.table < NEAR, _FITS, _FITS_NOT)).astype(np.uint8)
 
-    def of(self, particles: Particles, ends: Plane) -> Worth:
-        """What beams are worth that end at `ends` (b,) in the base frame.
+    def of(self, particles: Particles, beams: Beams) -> Worth:
+        """What the ends of beams are worth.
 
         Of a narrow group each beam counts that ends where the map says something for most
         particles: what it has in unknown space, less than a hit and more than a miss, draws them into the map or out.
         """
-        said = self._said(particles.poses[:: -(-len(particles.poses) // ASKED)], ends)
+        said = self._said(self._seen(particles.poses, beams))
         told, fitting = _told(said)
         exponent = _between(told, *TELLING)
         if not particles.within(TOGETHER):
@@ -69,12 +69,19 @@ class MapTrust:
 
         None when these are less than the share `telling`.
         """
-        told, fitting = _told(self._said(poses, ends))
+        told, fitting = _told(self._said(self._field.cells_seen(poses, ends)))
         return fitting if told and told >= telling else None
 
-    def _said(self, poses: Array, ends: Plane) -> npt.NDArray[np.uint8]:
-        """What the map says of each beam at each pose: (n, b)."""
-        said: npt.NDArray[np.uint8] = self._says.take(self._field.cells_seen(poses, ends), mode="wrap")
+    def _seen(self, poses: Array, beams: Beams) -> Cells:
+        """Where the beams end at some of `poses`; of few, that is known at all of them in a moment anyway."""
+        step = -(-len(poses) // ASKED)
+        if len(poses) <= BLOCK:
+            return beams.cells(self._field, poses)[::step]
+        return self._field.cells_seen(poses[::step], beams.ends)
+
+    def _said(self, cells: Cells) -> npt.NDArray[np.uint8]:
+        """What the map says of what ends in these cells."""
+        said: npt.NDArray[np.uint8] = self._says.take(cells, mode="wrap")
         return said
 
 

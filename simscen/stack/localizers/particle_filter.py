@@ -127,7 +127,7 @@ class ParticleFilter:
         spec, poses = self._spec, self.particles.poses
         beams = select_beams(scan, spec.max_beams, spec.laser_min_range, spec.farthest)
         if self._trust is not None and len(beams.ends):
-            self._trusted, self.fitting, told = self._trust.of(self.particles, beams.ends)
+            self._trusted, self.fitting, told = self._trust.of(self.particles, beams)
             if self._trusted == 0:
                 return None
             beams = beams if told is None else beams.of_hits(told)

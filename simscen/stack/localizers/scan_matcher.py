@@ -116,7 +116,7 @@ class Step:
 
 def moved(poses: Array, step: Step, chance: np.random.Generator) -> Array:
     """Each of `poses` (n, 3) moved by its own copy of a step."""
-    ahead, left, turn = np.linalg.cholesky(step.covariance) @ chance.standard_normal((3, len(poses)))
+    ahead, left, turn = np.dot(_root(step.covariance), chance.standard_normal((3, len(poses))))
     ahead += step.delta.x
     left += step.delta.y
     turn += step.delta.yaw
@@ -202,6 +202,16 @@ def _seen_from(yaw: float, inverse: Symmetric) -> Array:
     return np.array((
         (along + FLOOR[0], crossed, ahead), (crossed, aside + FLOOR[1], left), (ahead, left, aa + FLOOR[2]),
     ))  # fmt: skip
+
+
+def _root(covariance: Array) -> Array:
+    """The lower triangle (3, 3) whose product with its own transpose is `covariance` (Cholesky)."""
+    (xx, _, _), (xy, yy, _), (xa, ya, aa) = covariance.tolist()
+    x = math.sqrt(xx)
+    y_x, a_x = xy / x, xa / x
+    y = math.sqrt(yy - y_x * y_x)
+    a_y = (ya - a_x * y_x) / y
+    return np.array(((x, 0.0, 0.0), (y_x, y, 0.0), (a_x, a_y, math.sqrt(aa - a_x * a_x - a_y * a_y))))
 
 
 def _within(step: tuple[float, float], limits: tuple[float, float]) -> bool:

@@ -28,6 +28,22 @@ def group(pose: Pose2, std: float, count: int, seed: int) -> Array:
     return drawn
 
 
+@pytest.mark.parametrize("yaw", [0.3, np.pi])
+def test_a_narrow_group_is_summed_up_as_any_other(yaw: float) -> None:
+    """By one product of all that is to be summed up: as on the circle to a microradian."""
+    poses = group(Pose2(-20, 30, yaw), 0.02, 500, 5)
+    poses[:, 2] = (poses[:, 2] + np.pi) % (2 * np.pi) - np.pi
+    weights = np.random.default_rng(6).uniform(0, 1, 500)
+    weights /= weights.sum()
+    pose, covariance = summarise(Particles(poses, weights))
+    on_the_circle = float(np.angle(weights @ np.exp(1j * poses[:, 2])))
+    assert pose[:2] == pytest.approx((weights @ poses[:, :2]).tolist(), abs=1e-9)
+    assert abs(np.exp(1j * pose.yaw) - np.exp(1j * on_the_circle)) < 1e-6
+    off = np.column_stack((poses[:, :2] - pose[:2], np.angle(np.exp(1j * (poses[:, 2] - pose.yaw)))))
+    assert covariance == pytest.approx((off.T * weights) @ off, rel=1e-9, abs=1e-12)
+    assert np.array_equal(covariance, covariance.T)
+
+
 def test_the_pose_is_that_of_the_heavier_group_and_the_covariance_shows_the_other() -> None:
     poses = np.concatenate((group(Pose2(0, 0, 1), 0.02, 300, 1), group(Pose2(4, 0, 1), 0.02, 700, 2)))
     weights = np.concatenate((np.full(300, 0.6 / 300), np.full(700, 0.4 / 700)))

@@ -5,7 +5,7 @@ import pytest
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
-from simscen.stack.localizers.beams import Beams
+from simscen.stack.localizers.beams import Beams, Plane
 from simscen.stack.localizers.distance_field import beyond_the_map
 from simscen.stack.localizers.likelihood_field import obstacle_field
 from simscen.stack.localizers.map_trust import MapTrust
@@ -25,11 +25,16 @@ def trust() -> MapTrust:
     return MapTrust(obstacle_field(grid, 2.0), beyond_the_map(grid).ravel(), 0.45, 0.8)
 
 
+def beams_to(ends: Plane) -> Beams:
+    """Of a lidar at the base's origin."""
+    return Beams(np.abs(ends), ends / np.abs(ends), 0j, 30.0)
+
+
 def asked(poses: Array, on_walls: int, in_the_open: int, beyond: int) -> tuple[float, list[bool] | None]:
     """What so many beams are worth, and which of them count."""
     walls = np.linspace(-1.0, 1.0, on_walls) + 1.9j
     ends = np.concatenate((walls, np.full(in_the_open, 2.0 + 0.0j), np.full(beyond, 14.0 + 0.0j)))
-    exponent, _, counting = trust().of(Particles.equal(poses), ends)
+    exponent, _, counting = trust().of(Particles.equal(poses), beams_to(ends))
     return exponent, None if counting is None else counting.tolist()
 
 
@@ -62,3 +67,23 @@ def test_beams_that_hit_nothing_stay_when_some_of_the_others_are_left_out() -> N
     kept = beams.of_hits(np.array([True, False, True]))
     assert kept.ranges.tolist() == [1.0, 9.0, 3.0]
     assert kept.ends.tolist() == [1.0, 3.0]
+
+
+@pytest.mark.parametrize("count", [500, 700])
+def test_of_many_particles_some_are_asked(count: int) -> None:
+    """Whether or not it is known where the beams end at all of them."""
+    chance = np.random.default_rng(3)
+    poses = chance.normal((0.0, 0.0, 0.0), (0.1, 0.1, 0.02), (count, 3))
+    beams, asked_ones = beams_to(np.linspace(-1.0, 3.0, 40) + 1.9j), poses[:: -(-count // 50)]
+    worth, alone = trust().of(Particles.equal(poses), beams), trust().of(Particles.equal(asked_ones), beams)
+    assert 0.0 < worth.fitting < 1.0
+    assert (worth.exponent, worth.fitting) == (alone.exponent, alone.fitting)
+
+
+def test_where_beams_end_is_told_of_the_poses_that_are_asked_for() -> None:
+    grid = OccupancyGrid(np.full((80, 80), FREE, dtype=np.int8), 0.1, Pose2(-4.0, -4.0, 0.0))
+    field, beams = obstacle_field(grid, 2.0), beams_to(np.array([1.0 + 1.0j, -2.0 + 0.3j]))
+    here, there = np.zeros((1, 3)), np.array([[0.5, 0.0, 0.0]])
+    for poses, first in ((here, (50, 50)), (there, (55, 50)), (here, (50, 50)), (there, (55, 50))):
+        column, row = first
+        assert beams.cells(field, poses)[0, 0] == (row + 1) * 82 + column + 1

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from simscen.core.geometry import Pose2
+from simscen.core.geometry import Array, Pose2
 from simscen.core.sensing import Scan
 from simscen.stack.localizers.scan_matcher import ScanMatcher, Step, moved
 from simscen.testing.room import BEAMS, cast, scan
@@ -78,3 +78,19 @@ def test_particles_follow_a_step_with_its_covariance() -> None:
     poses = moved(np.tile((1.0, 2.0, np.pi / 2), (20_000, 1)), step, np.random.default_rng(1))
     assert poses.mean(axis=0) == pytest.approx((1 - 0.02, 2.3, np.pi / 2 + 0.15), abs=0.003)
     assert poses.std(axis=0) == pytest.approx((0.02, 0.1, 0.01), rel=0.03)
+
+
+def test_particles_spread_as_the_covariance_of_the_step_says() -> None:
+    """Three of them, each with one of the normal numbers 1: what they differ by makes up the covariance."""
+
+    class Ones(np.random.Generator):
+        def standard_normal(self, size: object = None, *_: object, **__: object) -> Array:  # type: ignore[override]
+            return np.eye(3)
+
+    chance = np.random.default_rng(4)
+    for _ in range(20):
+        root = chance.normal(size=(3, 3)) * 0.05
+        covariance, delta = root @ root.T + np.diag((1e-6, 1e-6, 1e-6)), Pose2(0.3, 0.1, -0.2)
+        after = moved(np.zeros((3, 3)), Step(delta, covariance), Ones(np.random.PCG64(1)))
+        off = (after - np.array(delta)).T
+        assert off @ off.T == pytest.approx(covariance, rel=1e-9, abs=1e-15)
