@@ -36,9 +36,11 @@ $(STAMP): pyproject.toml
 run: setup  ## Run the scenarios that ship
 	@$(BIN)/simscen run scenarios/
 
-test: setup  ## Run everything CI runs: checks, then the tests
-	@$(BIN)/python tests/ros/rig.py $(ROS) & $(MAKE) --no-print-directory check; failed=$$?; wait; exit $$failed
-	@$(BIN)/python -m pytest -m "not long"
+test: setup  ## Run everything CI runs: checks, then the tests with the types beside them
+	@$(BIN)/python tests/ros/rig.py $(ROS) & $(MAKE) --no-print-directory lint layers schemas; failed=$$?; wait; exit $$failed
+	@$(MAKE) --no-print-directory types > $(VENV)/types.log 2>&1 & types=$$!; \
+	$(BIN)/python -m pytest -m "not long"; failed=$$?; \
+	wait $$types || failed=1; cat $(VENV)/types.log; exit $$failed
 
 test-long: setup  ## Run the tests that `make test` leaves out because they take long
 	@$(BIN)/python -m pytest -m long

@@ -105,7 +105,7 @@ def yardwork(packages: Lay) -> Path:
     return lay_out(Path(__file__).parent / "plugins" / "yardwork", packages.site)  # type: ignore[attr-defined]
 
 
-@pytest.fixture(name="lay_out")
+@pytest.fixture(scope="session", name="lay_out")
 def how_to_lay_out() -> Callable[[Path, Path], Path]:
     """`lay_out(folder, site)`, for tests that start commands of their own."""
     return lay_out

@@ -1,5 +1,6 @@
 """`pytest --simscen-contract` as a plug-in author calls it, in a pytest of its own."""
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -80,21 +81,44 @@ def test_with_workers_a_mistake_is_told_in_words_as_well(run) -> None:
     assert told.strip().splitlines()[-1].startswith("ERROR: --simscen-contract headless: no installed package")
 
 
-@pytest.mark.parametrize(
-    ("target", "why"),
-    [
-        ("own:Checker", "part: Field required"),
-        ("own:Checker={part: 1}", "is no JSON"),
-        ("own:Unannotated", "its first argument is not annotated with a specification"),
-        ("own:Nothing", "has no attribute 'Nothing'"),
-        ("nowhere:Nothing", "No module named 'nowhere'"),
-        ("headless", "no installed package adds anything of that name"),
-    ],
-)
-def test_what_cannot_be_tried_is_an_error_in_words(run, target: str, why: str) -> None:
-    code, told = run("-p", "no:xdist", "--simscen-contract", target)
+REFUSED = {
+    "own:Checker": "part: Field required",
+    "own:Checker={part: 1}": "is no JSON",
+    "own:Unannotated": "its first argument is not annotated with a specification",
+    "own:Nothing": "has no attribute 'Nothing'",
+    "nowhere:Nothing": "No module named 'nowhere'",
+    "headless": "no installed package adds anything of that name",
+}
+EACH = """
+import contextlib, io, json, sys
+import pytest
+sys.path.insert(0, ".")
+plugin = ("-p", "no:simscen", "-p", "simscen.testing.plugin", "-p", "no:cacheprovider", "-p", "no:xdist")
+told = {}
+for target in sys.argv[1:]:
+    with io.StringIO() as text, contextlib.redirect_stdout(text), contextlib.redirect_stderr(text):
+        code = pytest.main([*plugin, "--simscen-contract", target])
+        told[target] = (int(code), text.getvalue())
+print(json.dumps(told))
+"""
+
+
+@pytest.fixture(scope="module")
+def refused(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[int, str]]:
+    """Exit code and words for each target, from one process that asks pytest for one after the other."""
+    folder = tmp_path_factory.mktemp("refused")
+    (folder / "own.py").write_text(OWN)
+    command = [sys.executable, "-c", EACH, *REFUSED]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
+    told: dict[str, tuple[int, str]] = json.loads(done.stdout)
+    return told
+
+
+@pytest.mark.parametrize("target", REFUSED)
+def test_what_cannot_be_tried_is_an_error_in_words(refused, target: str) -> None:
+    code, told = refused[target]
     assert code == 4
-    assert why in told
+    assert REFUSED[target] in told
     assert "Traceback" not in told
 
 
