@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import sys
 from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
@@ -11,9 +12,11 @@ import pytest
 from languageserver import Diagnostic, LanguageServer
 from pydantic import BaseModel
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from everyfield import every_value
+
 from simscen.actions.action import AnyAction
 from simscen.cli.catalogue import Topic, fields_of, topics
-from simscen.cli.everyfield import every_value
 from simscen.cli.jsonschema import MODELS
 from simscen.core.version import PACKAGE
 from simscen.criteria.criterion import AnyCriterion

@@ -1,14 +1,18 @@
 """A number may carry its unit, and a place may stand for its pose, wherever one is meant in any file."""
 
 import math
+import sys
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Annotated, Any
 
 import pytest
 from annotated_types import MaxLen, MinLen
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
-from simscen.cli.everyfield import Written, every_value
+sys.path.insert(0, str(Path(__file__).parents[2]))
+from everyfield import Written, every_value
+
 from simscen.model.controllers import DynamicWindow
 from simscen.model.localizers import Amcl
 from simscen.model.robot import InertialUnit, SkidSteer
