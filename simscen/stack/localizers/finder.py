@@ -120,8 +120,9 @@ class Finder:
         self._unchecked += moved
         self._way += moved
         self._since += moved
-        if way.parted:
+        if way.parted or way.led:
             self._memory.forget(0)
+        if way.parted:
             self._begun = self._sure = None
         self._begun = self._begun and self._begun.after(last, base, moved, way)
         self._sure = self._sure and self._sure.after(last, base, moved, way)

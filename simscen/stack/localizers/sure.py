@@ -14,6 +14,9 @@ AROUND = (0.1, 0.1, 0.05)
 """m, m, rad: standard deviations of a robot about a place where it is sure to be."""
 DRIFT = (0.03, 0.01)
 """m and rad: what it may drift by for each metre, turns included, where no scan says how it went."""
+LED = 0.1, 0.5
+"""m, and of the way by wheels: where scans say so much less or more of a step, what they show goes along, as people do;
+wheels that slip are 40 % off at most, but for those that spin on the spot, where nothing new is to be seen."""
 TOLD = 0.012
 """m: by how much more than this the standard deviation of a step is larger, a robot drifts: along a corridor that looks
 the same everywhere the wheels have their way, and slip for a while, so that such steps err together."""
@@ -31,6 +34,15 @@ class Moved:
     torn: Pose2 = Pose2(0.0, 0.0, 0.0)
     step: Step | None = None
     parted: bool | None = None
+
+    @property
+    def led(self) -> bool:
+        """Whether scans and wheels differ by more than wheels slip."""
+        apart = math.hypot(self.torn.x, self.torn.y)
+        if self.step is None or apart < LED[0]:
+            return False
+        wheels = self.step.delta.compose(self.torn.inverse())
+        return apart > LED[1] * math.hypot(wheels.x, wheels.y)
 
     def together(self, metres: float) -> tuple[float, float]:
         """m and rad by which this way and others like it may err in one direction."""

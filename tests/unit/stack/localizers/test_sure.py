@@ -53,3 +53,16 @@ def test_where_scans_do_not_tell_the_next_step_errs_as_the_last_one(
     chance = 0.0 if way.step is None else 2 * way.step.covariance[axis, axis]
     off = np.eye(3)[axis] * 2 * np.sqrt((AROUND[axis] + 2 * drift[axis]) ** 2 + chance)
     assert far(sure, THEN, off) == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(
+    ("seen", "torn", "led"),
+    [(0.25, 0.0, False), (0.16, -0.09, False), (0.05, -0.2, True), (0.5, 0.25, True), (0.0, -0.08, False)],
+    ids=["agreed", "wheels slip", "people walk along", "people come towards it", "hardly moved"],
+)
+def test_scans_that_differ_by_more_than_wheels_slip_show_what_goes_along(seen: float, torn: float, led: bool) -> None:
+    assert Moved(torn=Pose2(torn, 0.0, 0.0), step=Step(Pose2(seen, 0.0, 0.0), np.zeros((3, 3)))).led is led
+
+
+def test_wheels_alone_are_not_contradicted() -> None:
+    assert not Moved(torn=Pose2(1.0, 0.0, 0.0)).led
