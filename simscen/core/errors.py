@@ -34,6 +34,10 @@ class InvalidInput(SimscenError):
         self.problems = sorted(problems)
         super().__init__("\n".join(f"{p.place}: {p.message}" for p in self.problems))
 
+    def __reduce__(self) -> "tuple[type[InvalidInput], tuple[list[Problem]]]":
+        """Made anew of its problems, not of their text: it comes whole out of a process of a pool."""
+        return type(self), (self.problems,)
+
 
 class UsageError(SimscenError):
     """The command was called wrongly, or its output folder is unusable; the caller can mend it."""
@@ -62,3 +66,7 @@ class RunError(SimscenError):
     def __init__(self, kind: str, message: str, tail: str = "") -> None:
         self.kind, self.tail = kind, tail
         super().__init__(message)
+
+    def __reduce__(self) -> "tuple[type[RunError], tuple[str, str, str]]":
+        """As InvalidInput."""
+        return type(self), (self.kind, str(self), self.tail)

@@ -1,0 +1,31 @@
+"""Errors come whole out of another process: one that cannot be unpickled breaks the pool that it was raised in."""
+
+import pickle
+
+import pytest
+
+from simscen.core.errors import InvalidInput, NothingSelected, RunError, SimscenError, UsageError
+from simscen.core.problems import Problem
+
+PROBLEM = Problem("a.yaml", 3, 4, "SC001", "what is wrong", "how to mend it")
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        InvalidInput([PROBLEM]),
+        UsageError("no such folder"),
+        NothingSelected("none"),
+        RunError("timeout", "late", "tail"),
+    ],
+    ids=lambda error: type(error).__name__,
+)
+def test_an_error_is_the_same_in_another_process(error: SimscenError) -> None:
+    there = pickle.loads(pickle.dumps(error))
+    assert type(there) is type(error)
+    assert (str(there), there.exit, vars(there)) == (str(error), error.exit, vars(error))
+
+
+def test_every_error_on_purpose_is_tried_here() -> None:
+    tried = {InvalidInput, UsageError, NothingSelected, RunError}
+    assert set(SimscenError.__subclasses__()) == tried
