@@ -131,16 +131,16 @@ class Finder:
         """Where the robot is by what it was told and all that it saw since, where particles settled elsewhere.
 
         A scan of a room whose furniture was moved fits another place of it, and the next scans, which show the same,
-        confirm that. Seen together, and with the ways to what was seen, which must be free, they often do not.
+        confirm that. Seen together, and with the ways to what was seen, which must be free, they often do not. Where
+        the map shows little of it, and is soon fitted by chance, the told place is asked alone.
         """
         if not self._memory.length:
             return None
-        view, expected = self._memory.about(base), begun.expected(base)
-        if not len(view.ends) or self._trust.fit(expected[None], view.ends, TELLING) is None:
+        view, expected = self._memory.about(base), begun.expected(base)[None]
+        if not len(view.ends) or (fit := self._search.fit(here, view))[0] > FITS:
             return None
-        if (fit := self._search.fit(here, view))[0] > FITS:
-            return None
-        poses, fits = self._search.near(view, expected)
+        shown = self._trust.fit(expected, view.ends, TELLING) is not None
+        poses, fits = self._search.near(view, expected[0]) if shown else (expected, self._search.fit(expected, view))
         likely = fits / SHARPNESS - begun.unlikely(poses, base)
         own = fit[0] / SHARPNESS - begun.unlikely(here, base)[0]
         best = int(likely.argmax())

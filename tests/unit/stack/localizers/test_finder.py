@@ -5,6 +5,7 @@ import pytest
 
 from simscen.core.belief import Estimate
 from simscen.core.geometry import Array, Pose2
+from simscen.core.grid import UNKNOWN, OccupancyGrid
 from simscen.stack.localizers.distance_field import beyond_the_map
 from simscen.stack.localizers.finder import Finder
 from simscen.stack.localizers.global_search import GlobalSearch
@@ -18,16 +19,25 @@ START = Pose2(-2.5, -1.8, 0.6)
 OFF = Pose2(0.4, -0.3, 0.15)
 
 
+def corner_of_the_map() -> OccupancyGrid:
+    """The room only around START: of what is seen there the map shows less than half."""
+    cells = grid().cells.copy()
+    cells[:, grid().shape[1] * 35 // 100 :] = UNKNOWN
+    cells[grid().shape[0] * 40 // 100 :] = UNKNOWN
+    return OccupancyGrid(cells, grid().resolution, grid().origin)
+
+
 def found(
     off: Pose2, apart: float = 0.25, way: float = 2.0, settling: float = 0.0, told: Pose2 = Pose2(0, 0, 0),
-    std: tuple[float, float, float] = (0.5, 0.5, 0.26),
+    std: tuple[float, float, float] = (0.5, 0.5, 0.26), map_: OccupancyGrid | None = None,
 ) -> list[Array]:  # fmt: skip
     """Where a robot is put that starts at START, drives some `way`, scans each so many m and believes to be `off`.
 
     It was `told` to be that far off, with standard deviations `std`.
     """
-    trust = MapTrust(obstacle_field(grid(), 2.0), beyond_the_map(grid()).ravel(), 0.45, 0.8)
-    finder, places = Finder(GlobalSearch(grid()), trust, Estimate(START.compose(told), std), settling), []
+    known = map_ or grid()
+    trust = MapTrust(obstacle_field(known, 2.0), beyond_the_map(known).ravel(), 0.45, 0.8)
+    finder, places = Finder(GlobalSearch(known), trust, Estimate(START.compose(told), std), settling), []
     for driven in np.arange(0.0, way, apart).tolist():
         base = Pose2(driven, 0.0, 0.0)
         pose = START.compose(base)
@@ -60,6 +70,15 @@ def test_particles_that_settle_elsewhere_than_the_robot_was_told_are_put_back_if
     place = found(Pose2(0.9, -0.5, 0.1), way=0.3, settling=4.0)[0]
     assert np.hypot(place[0], place[1]) < 0.15
     assert abs(place[2]) < 0.05
+
+
+@pytest.mark.parametrize(("off", "places"), [(Pose2(0.9, -0.5, 0.1), 1), (Pose2(0.3, 0.2, 0.05), 0)])
+def test_where_the_map_shows_little_particles_do_not_go_where_it_fits_less_than_where_it_was_told(
+    off: Pose2, places: int
+) -> None:
+    """They were drawn 4.9 m off by the few beams that the map shows, of a robot that saw how it went."""
+    put = found(off, way=0.3, settling=4.0, map_=corner_of_the_map())
+    assert [np.abs(place).max() < 1e-9 for place in put[:1]] == [True] * places
 
 
 def test_what_was_told_counts_for_the_settling_distance_only() -> None:
