@@ -15,6 +15,13 @@ from tests.contracts.broken.cases import Wrapper, breaks
 PLANNER = OmplPlanner()
 
 
+def _nudged(path, share):
+    """A path of which one pose is up to a millimetre off: plans from two seeds are now and then the same."""
+    points = path.points.copy()
+    points[len(points) // 2, 0] += 1e-3 * share
+    return Path(points)
+
+
 @breaks(PLANNER, "success begins at the start", "begins 0.5")
 class BeginsElsewhere(Wrapper):
     def plan(self, costmap, start, goal, seed):
@@ -80,14 +87,14 @@ class NeverGivesUp(Wrapper):
 
 @breaks(PLANNER, "the same seed", "two paths from the same seed differ")
 class DrawsFromTheGlobalGenerator(Wrapper):
-    def plan(self, costmap, start, goal, seed):
-        return self.inner.plan(costmap, start, goal, random.randint(1, 10**6))
+    def plan(self, *asked):
+        return _nudged(self.inner.plan(*asked), random.random())
 
 
 @breaks(PLANNER, "the same seed", "two paths from the same seed differ")
 class AsksTheClock(Wrapper):
-    def plan(self, costmap, start, goal, seed):
-        return self.inner.plan(costmap, start, goal, time.perf_counter_ns() % 10**6 + 1)
+    def plan(self, *asked):
+        return _nudged(self.inner.plan(*asked), time.perf_counter_ns() % 10**9 / 10**9)
 
 
 @breaks(PLANNER, "the same seed", "two paths from the same seed differ")
