@@ -124,7 +124,8 @@ def test_102_a_warm_process_that_is_stopped_is_noticed_and_replaced(folder: Path
     text = (folder / "a.scenario.yaml").read_text()
     (folder / "a.scenario.yaml").write_text(text.replace("seed: 7", "tags: [stop-preparer]"))
     (folder / "b.scenario.yaml").write_text(text)
-    command = [sys.executable, "-c", IMPATIENT, "run", ".", "--out", "out", "-j", "1"]
+    # it is stopped by the run that it forked, maybe before it says so: who prepares is given the limit of a run besides
+    command = [sys.executable, "-c", IMPATIENT, "run", ".", "--out", "out", "-j", "1", "--wall-limit", "15"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120, check=False)
     assert (done.returncode, done.stderr) == (3, "")
     runs = {run["scenario"]: run for run in json.loads((folder / "out/results.json").read_text())["runs"]}
