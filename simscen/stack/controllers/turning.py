@@ -16,8 +16,6 @@ ROOM = 1.01
 may reach half a cell nearer, and behind the robot no scan corrects them."""
 BACK_OUT, AHEAD = 0.15, 1.0
 """m/s of backing out, Nav2's backup_speed, and seconds of free way that it needs."""
-
-
 BENDS = (0.0, 0.3, -0.3, 0.6, -0.6)
 """Turn rates in rad/s that are tried in this order: one that drove in on a bend cannot leave straight."""
 

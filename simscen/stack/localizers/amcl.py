@@ -10,7 +10,6 @@ from simscen.core.belief import Belief, Estimate
 from simscen.core.geometry import Array, Pose2
 from simscen.core.sensing import Imu, Odometry, Scan
 from simscen.model.localizers import Amcl
-from simscen.stack.localizers.beams import select_beams
 from simscen.stack.localizers.clusters import spread, summarise
 from simscen.stack.localizers.finder import UNSEEN, Finder
 from simscen.stack.localizers.global_search import GlobalSearch
@@ -148,7 +147,7 @@ class AmclLocalizer:
 
     def _correct(self, scan: Scan, odometry: Pose2, delta: Pose2 | None) -> None:
         """Move the particles by what was driven since the last correction, and weigh them by a scan."""
-        spec, matched = self._spec, None if self._matcher is None else self._matched_step(self._matcher, scan, odometry)
+        matched = None if self._matcher is None else self._matched_step(self._matcher, scan, odometry)
         self._came = Moved(step=matched, parted=None if self._matcher is None else self._matcher.parted)
         agreed = False
         if delta is not None and matched is not None:
@@ -165,8 +164,7 @@ class AmclLocalizer:
         if (answer := self._filter.correct(scan)) is not None:
             pose, covariance = answer
             if self._scatter is not None and self._misfit is not None:
-                misfit = self._misfit.of(select_beams(scan, spec.max_beams, spec.laser_min_range, spec.farthest), pose)
-                covariance = self._scatter.widened(pose, covariance, misfit)
+                covariance = self._scatter.widened(pose, covariance, self._misfit.of(self._filter.beams(scan), pose))
             self._correction = _Correction(pose, covariance, odometry, scan.tick)
         else:
             last = self._correction

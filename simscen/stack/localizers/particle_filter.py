@@ -73,9 +73,13 @@ class ParticleFilter:
         known = self._trusted == 1.0 and self.fitting >= SURE
         return known and self._together and self._recovery.share == 0
 
+    def beams(self, scan: Scan) -> Beams:
+        """Those of a scan that are compared with the map."""
+        return select_beams(scan, self._spec.max_beams, self._spec.laser_min_range, self._spec.farthest)
+
     def surprised(self, scan: Scan, pose: Pose2) -> bool:
         """Whether a scan is less likely at `pose` than the last one was at the best particle, by SURPRISE."""
-        beams = select_beams(scan, self._spec.max_beams, self._spec.laser_min_range, self._spec.farthest)
+        beams = self.beams(scan)
         likely = float(self._sensor.log_likelihood(np.array([pose]), beams, False)[0]) * self._sensor.tempering(beams)
         return likely < self._likely - SURPRISE
 
@@ -125,7 +129,7 @@ class ParticleFilter:
         summed up before new ones are drawn, which would only add noise (Probabilistic Robotics, section 4.3.4).
         """
         spec, poses = self._spec, self.particles.poses
-        beams = select_beams(scan, spec.max_beams, spec.laser_min_range, spec.farthest)
+        beams = self.beams(scan)
         if self._trust is not None and len(beams.ends):
             self._trusted, self.fitting, told = self._trust.of(self.particles, beams)
             if self._trusted == 0:

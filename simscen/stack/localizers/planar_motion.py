@@ -28,6 +28,22 @@ def swing(covariance: Array, dx: float, dy: float, noise: Noise) -> Array:
     return np.array(((xx_new, xy_new, xa_new), (xy_new, yy_new, ya_new), (xa_new, ya_new, aa_new + aa)))
 
 
+def turn(yaw: float) -> Array:
+    """The matrix (3, 3) that turns errors (x, y, yaw) of a frame at heading `yaw` into those of its parent."""
+    c, s = math.cos(yaw), math.sin(yaw)
+    return np.array(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
+
+
+def turned(covariance: Array, yaw: float) -> Noise:
+    """A covariance (3, 3) of a frame at heading `yaw`, in its parent's: for `swing`, and in floats as that."""
+    c, s = math.cos(yaw), math.sin(yaw)
+    (xx, xy, xa), (_, yy, ya), (_, _, aa) = covariance.tolist()
+    return (
+        c * c * xx - 2 * c * s * xy + s * s * yy, c * s * (xx - yy) + (c * c - s * s) * xy, c * xa - s * ya,
+        s * s * xx + 2 * c * s * xy + c * c * yy, s * xa + c * ya, aa,
+    )  # fmt: skip
+
+
 def grown(covariance: Array, yaw: float, step: Pose2, translation_noise: float, rotation_noise: float) -> Array:
     """A covariance (3, 3) after `step` in the base frame, taken at heading `yaw`.
 

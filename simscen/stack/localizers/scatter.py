@@ -7,7 +7,7 @@ import numpy as np
 
 from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.stack.localizers.misfit import Misfit
-from simscen.stack.localizers.planar_motion import swing
+from simscen.stack.localizers.planar_motion import swing, turn
 from simscen.stack.localizers.scan_matcher import FLOOR
 from simscen.stack.localizers.scan_memory import METRES_A_RAD
 
@@ -93,10 +93,9 @@ class Scatter:
             doubt = np.diag((self._off * share, self._off * share, self._turned * share))
         else:
             doubt = doubt - np.diag(FLOOR)  # what steps are off by about the way does not add up along it
-        c, s = math.cos(last.yaw), math.sin(last.yaw)
-        turn = np.array(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
+        frame = turn(last.yaw)
         swung = np.array(((1.0, 0.0, last.y - base.y), (0.0, 1.0, base.x - last.x), (0.0, 0.0, 1.0)))
-        self._drifts = swung @ self._drifts @ swung.T + turn @ (doubt + np.diag(DRIFT * way)) @ turn.T
+        self._drifts = swung @ self._drifts @ swung.T + frame @ (doubt + np.diag(DRIFT * way)) @ frame.T
         self._ways = self._ways + way
 
     def widened(self, pose: Pose2, covariance: Array, misfit: Misfit | None) -> Array:
@@ -109,8 +108,7 @@ class Scatter:
         if misfit is not None:
             self._misfits.append(misfit)
         fits, off = self._beams()
-        c, s = math.cos(pose.yaw), math.sin(pose.yaw)
-        axes = np.array(((c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0)))
+        axes = turn(pose.yaw).T
         told = axes @ own @ axes.T
         meant = self._meant / self._counts
         scattered = self._scattered(np.diag(told), np.square(meant * off))

@@ -7,7 +7,7 @@ import numpy as np
 
 from simscen.core.geometry import Array, Pose2
 from simscen.stack.localizers.clusters import errors_about
-from simscen.stack.localizers.planar_motion import swing
+from simscen.stack.localizers.planar_motion import Noise, swing, turn, turned
 from simscen.stack.localizers.scan_matcher import Step
 
 AROUND = (0.1, 0.1, 0.05)
@@ -22,9 +22,12 @@ TOLD = 0.012
 the same everywhere the wheels have their way, and slip for a while, so that such steps err together."""
 
 
+CERTAIN: Noise = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
 @dataclass(frozen=True, eq=False)
 class Moved:
-    """A way from one correction to the next, `metres` long, turns included: a `step` as scans show it, if they do.
+    """A way from one correction to the next: a `step` as scans show it, if they do.
 
     What scans and wheels say of it is `torn` apart, where they do not agree: then one of them errs by as much. Wheels
     slip, or people walk along with the robot. The last scan showed hardly anything of what those before it did if they
@@ -75,14 +78,7 @@ class Sure:
     def after(self, before: Pose2, base: Pose2, metres: float, way: Moved) -> "Sure":
         """The same, when the base went on from `before`."""
         metre, rad = way.together(metres)
-        noise = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        if way.step is not None:
-            c, s = math.cos(before.yaw), math.sin(before.yaw)
-            (xx, xy, xa), (_, yy, ya), (_, _, aa) = way.step.covariance.tolist()
-            noise = (
-                c * c * xx - 2 * c * s * xy + s * s * yy, c * s * (xx - yy) + (c * c - s * s) * xy, c * xa - s * ya,
-                s * s * xx + 2 * c * s * xy + c * c * yy, s * xa + c * ya, aa,
-            )  # fmt: skip
+        noise = CERTAIN if way.step is None else turned(way.step.covariance, before.yaw)
         covariance = swing(self.covariance, base.x - before.x, base.y - before.y, noise)
         return replace(self, covariance=covariance, together=(self.together[0] + metre, self.together[1] + rad))
 
@@ -92,12 +88,10 @@ class Sure:
 
     def unlikely(self, poses: Array, base: Pose2) -> Array:
         """The logarithm of how many times unlikelier than the expected pose each of `poses` (n, 3) is: (n,)."""
-        angle = self.pose.yaw - self.base.yaw
-        c, s = math.cos(angle), math.sin(angle)
-        turn = np.array(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
+        frame = turn(self.pose.yaw - self.base.yaw)
         metre, rad = self.together
         std = np.square(self.std + np.array((metre, metre, rad)))
         off = errors_about(self.expected(base), poses)
-        information = np.linalg.inv(turn @ self.covariance @ turn.T + np.diag(std))
+        information = np.linalg.inv(frame @ self.covariance @ frame.T + np.diag(std))
         far: Array = 0.5 * np.einsum("ni,ij,nj->n", off, information, off)
         return far
