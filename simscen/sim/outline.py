@@ -5,7 +5,8 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from simscen.core.geometry import Array
+from simscen.core.geometry import Array, Pose3
+from simscen.core.remembered import remembered
 from simscen.core.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Shape, Solid, Sphere
 from simscen.core.world import Polygon
 
@@ -28,14 +29,18 @@ def footprint(solids: Iterable[Solid]) -> Polygon:
 
 def parts(solids: Iterable[Solid], z_range: tuple[float, float]) -> list[Polygon]:
     """The outlines of solids seen from above, those that reach into the heights; of a mesh or tilted one, its hull."""
-    found = []
-    for solid in solids:
-        corners = solid.pose.apply(extremes(solid.shape))
-        if corners[:, 2].min() < z_range[1] and corners[:, 2].max() > z_range[0]:
-            upright = isinstance(solid.shape, Extrusion) and solid.pose.qx == solid.pose.qy == 0
-            outline = _bottom(corners) if upright else convex_hull(corners[:, :2])
-            found += [outline] if len(outline) > 2 else []
-    return found
+    return [outline for solid in solids if (outline := _outline(solid.shape, solid.pose, z_range))]
+
+
+@remembered
+def _outline(shape: Shape, pose: Pose3, z_range: tuple[float, float]) -> Polygon:
+    """None (no corners) if it does not reach into the heights. Of a row of chairs it is one for all of them."""
+    corners = pose.apply(extremes(shape))
+    if corners[:, 2].min() >= z_range[1] or corners[:, 2].max() <= z_range[0]:
+        return ()
+    upright = isinstance(shape, Extrusion) and pose.qx == pose.qy == 0
+    outline = _bottom(corners) if upright else convex_hull(corners[:, :2])
+    return outline if len(outline) > 2 else ()
 
 
 def _bottom(corners: Array) -> Polygon:

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from simscen.core.geometry import Pose2
+from simscen.core.grid import OccupancyGrid
 from simscen.core.sensing import Image, Scan
 from simscen.core.zones import Zones
 from simscen.model.costmaps import Costmap as CostmapSpec
@@ -16,10 +17,10 @@ from simscen.stack.costmap.inflation_layer import Inflation, squared_distances
 from simscen.stack.costmap.live_layer import EVERYWHERE, LiveLayer, Window
 from simscen.stack.costmap.obstacle_layer import crossed
 from simscen.stack.costmap.rolling import carried, left_behind, window_around, within
-from simscen.stack.costmap.static_layer import Mask, StaticLayer, empty_layer, static_layer
+from simscen.stack.costmap.static_layer import Mask, StaticLayer, empty_layer, static_layer, walls_within
 from simscen.stack.nearest import FARTHEST, SquaredWithin
 from simscen.stack.prediction.moving import NOTHING
-from simscen.stack.protocols import CostmapView, Surroundings
+from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
 
 BEYOND_HULL = 0.5
 """Metres beyond the hull up to which distances are told, or the inflation radius if that is more."""
@@ -51,10 +52,9 @@ class Costmap:
         self._size, self._no_farther = size or (spec.rolling_size, spec.rolling_size), no_farther
         self._inscribed = surroundings.robot.inscribed_radius
         resolution = spec.resolution if surroundings.map is None else surroundings.map.resolution
-        reach = max(spec.inflation_radius, surroundings.robot.circumscribed_radius + BEYOND_HULL)
-        scaling = spec.cost_scaling_factor
+        reach, scaling = _reach(spec, surroundings.robot), spec.cost_scaling_factor
         self._inflation = Inflation(resolution, self._inscribed, spec.inflation_radius, scaling, reach)
-        self._margin = max(2, math.ceil(reach / resolution))  # coarse cells beside a wall still know it
+        self._margin = _cells(reach, resolution)
         self._speck = spec.denoise_layer.minimal_group_size if spec.denoise_layer.enabled else 0
         self._revision, self._zoned, self._scans = 0, 0, 0
         self._newest: dict[str, tuple[Pose2, Scan | Image]] = {}
@@ -152,7 +152,7 @@ class Costmap:
     def _roll(self, base: Pose2) -> None:
         """Follow the robot; what is new in the window is unknown, where that is tracked."""
         before, window = self._frame, window_around(base, self._size, self._spec.resolution)
-        if self._surroundings.keepout or self._surroundings.masks.keepout is not None:
+        if self._forbidding:
             self._lay(self._layer_in(window))
         self._frame = window  # where nothing is forbidden, the cells of one window are those of any other
         self._live.roll(window)
@@ -171,13 +171,22 @@ class Costmap:
             return empty_layer(window, keepout, mask, unknown)
         return static_layer(grid, keepout, mask, unknown)
 
+    @property
+    def _forbidding(self) -> bool:
+        """Whether zones or a mask say where not to go."""
+        return bool(self._surroundings.keepout) or self._surroundings.masks.keepout is not None
+
     def _lay(self, layer: StaticLayer) -> None:
         self._frame = layer.frame
         rows, columns = layer.frame.shape
         self._whole = (0, 0), (rows - 1, columns - 1)
         # Who looks for what has changed in such a window finds that most of it is near that.
         self._small = max(rows, columns) <= 4 * self._margin and self._margin <= FARTHEST
-        self._static_squared = squared_distances(layer.lethal, self._margin)
+        grid = None if self._forbidding else self._surroundings.map
+        if grid is None:
+            self._static_squared = squared_distances(layer.lethal, self._margin)
+        else:
+            self._static_squared = walls_within(grid, self._margin)
         self._walled = bool(layer.lethal.any())
 
     def _show(self) -> None:
@@ -259,3 +268,17 @@ class Costmap:
         places = squared.astype(np.intp)  # once, for both look-ups
         self._distance = self._inflation.metres.take(places)
         self._costs = self._inflation.costs(places, self._unknown if self._tracks else None)
+
+
+def _reach(spec: CostmapSpec, robot: RobotModel) -> float:
+    """How far in metres from obstacles distances are told."""
+    return max(spec.inflation_radius, robot.circumscribed_radius + BEYOND_HULL)
+
+
+def ready(spec: CostmapSpec, robot: RobotModel, grid: OccupancyGrid) -> None:
+    """Work out now what a robot's costmap needs to know of its map, as long as nothing is forbidden there."""
+    walls_within(grid, _cells(_reach(spec, robot), grid.resolution))
+
+
+def _cells(reach: float, resolution: float) -> int:
+    return max(2, math.ceil(reach / resolution))  # coarse cells beside a wall still know it

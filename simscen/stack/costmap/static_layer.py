@@ -8,8 +8,10 @@ import numpy.typing as npt
 from simscen.core.filtermasks import kept_out
 from simscen.core.geometry import Array
 from simscen.core.grid import UNKNOWN, OccupancyGrid
+from simscen.core.remembered import remembered
 from simscen.core.world import Polygon
 from simscen.stack.costmap.frame import Frame
+from simscen.stack.costmap.inflation_layer import Squared, squared_distances
 
 Mask = npt.NDArray[np.bool_]
 OCCUPIED_FROM = 65
@@ -40,6 +42,12 @@ def static_layer(
         cells = grid.values_at(_all_centres(frame)).reshape(frame.shape)
     lethal = np.ascontiguousarray(cells >= OCCUPIED_FROM) | _forbidden(frame, keepout, mask)
     return StaticLayer(frame, lethal, (cells == UNKNOWN) & ~lethal & unknown)
+
+
+@remembered
+def walls_within(grid: OccupancyGrid, reach: int) -> Squared:
+    """For each cell of a map's layer in which nothing is forbidden, see `squared_distances`: once for all its runs."""
+    return squared_distances(static_layer(grid, ()).lethal, reach)
 
 
 def empty_layer(

@@ -52,6 +52,17 @@ def test_distances_of_the_map_are_those_between_cell_centres() -> None:
     assert np.allclose(view.distance, full(lethal), atol=1e-6)
 
 
+def test_costmaps_of_one_map_tell_each_their_own_distances() -> None:
+    grid = Flatland().room(8, 6).grid(BOUNDS)
+    for radius in (0.1, 0.3, 0.1):
+        robot, zone = round_robot(radius), ((4.0, 3.0), (4.5, 3.0), (4.5, 3.5))
+        for keepout in ((), (zone,)):
+            map_ = Costmap(Spec(inflation_radius=0.2), Surroundings(robot, grid, RATE, keepout=keepout))
+            distance = distance_transform_edt(map_.view.costs != 254) * 0.05
+            assert np.allclose(map_.view.distance, np.minimum(distance, radius + 0.5), atol=1e-6)
+            assert at(map_, 4.3, 3.1)[0] == (254 if keepout else 0)
+
+
 def test_costs_follow_nav2s_formula_between_the_inscribed_and_the_inflation_radius() -> None:
     map_ = costmap(Flatland().room(8, 6))
     for x in (0.1, 0.3, 0.45, 0.6, 0.75):
