@@ -147,18 +147,21 @@ class PlanKeeper:
             return "missed"
         if self._via and not self._partial and plan.remaining() < AT_ITS_END:
             return "missed"
-        view = self._costmap.view
         if self._spec.replanning == "rate":
             if now - self._looked < 1.0 / self._rate:
                 return ""
             self._looked = now
             near = plan.remaining() < NEARBY and not self._partial
-            return "" if near and not plan.blocked(view) else "rate"
-        if view.revision == self._checked:
+            return "" if near and not self._blocked(plan) else "rate"
+        if self._costmap.revision == self._checked:
             return ""
-        if plan.blocked(view):
+        if self._blocked(plan):
             return "blocked"
-        return "window" if self._partial and view.origin != self._origin else ""
+        return "window" if self._partial and self._costmap.view.origin != self._origin else ""
+
+    def _blocked(self, plan: PlanInForce) -> bool:
+        plan.watch(self._costmap)
+        return plan.blocked()
 
     def _moved(self, now: float, pose: Pose2, plan: PlanInForce) -> str:
         """Why what moves calls for another plan: this one meets it, or leads around where it was to be met."""
@@ -174,11 +177,10 @@ class PlanKeeper:
         """Why there may be a better plan by now; "" if nothing speaks for it."""
         if self._spec.replanning == "rate":
             return ""
-        view = self._costmap.view
-        if view.revision != self._checked:
-            self._checked = view.revision
+        if self._costmap.revision != self._checked:
+            self._checked = self._costmap.revision
             self._most = max(self._most, self._costmap.obstacle_cells)
-            if now - self._adopted >= TIGHT_PERIOD and plan.tightened(view):
+            if now - self._adopted >= TIGHT_PERIOD and plan.tightened():
                 return "tight"
         if now - self._looked < BETTER_PERIOD:
             return ""

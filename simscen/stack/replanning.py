@@ -7,7 +7,9 @@ import numpy as np
 from simscen.core.geometry import Array, Pose2
 from simscen.core.navigation import Path
 from simscen.stack.controllers.tracking import PathTracker
+from simscen.stack.costmap.costmap import Costmap
 from simscen.stack.footprint import distances
+from simscen.stack.localizers.beams import Plane
 from simscen.stack.protocols import CostmapView
 
 CLEARLY_SHORTER, AT_LEAST = 0.85, 0.5
@@ -25,6 +27,8 @@ SOON = 4.0
 
 UNSEEN = 0.5
 """Metres that the robot may come before its place on the plan is looked for though nobody has asked for it."""
+EVERY = 4
+"""Of the plan's points that are asked whether something has changed near them."""
 STRAYED, AT_END = 0.2, 0.03
 """Metres beside its plan, or from its end, at which a car needs another: it cannot turn back on the spot."""
 
@@ -37,7 +41,23 @@ class PlanInForce:
         self._followed = PathTracker(path)
         self._pose: Pose2 | None = None
         self._located = Pose2(*path.points[0].tolist())
-        self._room = self._rooms(costmap, 0)
+        self._line: Plane = path.points[:, 0] + 1j * path.points[:, 1]
+        self._near = max(radius, ROOMY) + EVERY * self._followed.longest
+        self._room = np.minimum(distances(costmap, path.points[:, :2]), np.float32(ROOMY))
+        self._revision = costmap.revision
+        self.see(costmap)
+
+    def watch(self, costmap: Costmap) -> None:
+        """See what the costmap shows now, where it may show another thing along the rest of the plan."""
+        if costmap.changed_near(self._revision, self._line[self._track.index :: EVERY], self._near):
+            self.see(costmap.view)
+        self._revision = costmap.revision
+
+    def see(self, costmap: CostmapView) -> None:
+        """Compare the plan with a costmap."""
+        room = distances(costmap, self.path.points[:, :2])
+        self._bad = room <= np.float32(self._radius)
+        self._tight = np.minimum(room, np.float32(ROOMY)) < self._room - np.float32(TIGHTER)
 
     def locate(self, pose: Pose2) -> None:
         """Note where the robot is. Its place on the plan is looked for when somebody asks, which mostly nobody does."""
@@ -75,30 +95,28 @@ class PlanInForce:
         """Metres to go."""
         return self._track.remaining()
 
-    def blocked(self, costmap: CostmapView) -> bool:
+    def blocked(self) -> bool:
         """Whether a point ahead has come to lie where the robot does not fit.
 
         The first points may be too near an obstacle already: a robot that stands there has to get out.
         """
-        ahead: Array = self._track.points[self._track.index :: 2, :2]
-        bad = distances(costmap, ahead) <= np.float32(self._radius)
+        bad = self._bad[self._track.index :: 2]
         if not bad.any():
             return False
         out = int((~bad).argmax())
         return bool(bad[out:].any() or bad.all())
 
-    def tightened(self, costmap: CostmapView) -> bool:
+    def tightened(self) -> bool:
         """Whether the plan has clearly less room soon than it had when it was made.
 
         A plan made when an obstacle was half seen leads past it without room, though the robot would still fit.
         """
-        index = self._track.index
-        end = int(np.searchsorted(self._track.along, self._track.along[index] + SOON, side="right"))
-        return bool((self._rooms(costmap, index)[: end - index] < self._room[index:end] - np.float32(TIGHTER)).any())
-
-    def _rooms(self, costmap: CostmapView, first: int) -> Array:
-        rooms: Array = np.minimum(distances(costmap, self._track.points[first:, :2]), np.float32(ROOMY))
-        return rooms
+        track = self._track
+        if not self._tight.any():
+            return False
+        along, index = track.along, track.index
+        end = int(np.searchsorted(along, along[index] + SOON, side="right"))
+        return bool(self._tight[index:end].any())
 
     def worse_than(self, other: Path) -> bool:
         """Whether another path is clearly shorter than what is left of this one."""

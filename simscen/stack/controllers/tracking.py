@@ -39,7 +39,9 @@ class PathTracker:
         self.along = np.concatenate(([0.0], np.cumsum(lengths)))
         self._metres: list[float] = self.along.tolist()
         self._places: list[complex] = (self.points[:, 0] + 1j * self.points[:, 1]).tolist()
-        self._most = 1.0 / (float(lengths.max(initial=0.0)) + ROUNDING)
+        self.longest = float(lengths.max(initial=0.0))
+        """Metres of the longest step."""
+        self._most = 1.0 / (self.longest + ROUNDING)
         """Points for each metre, at least."""
         ahead = forward_steps(self.points)
         self._ends: list[int] = [*changes(ahead).tolist(), len(self.points) - 1]

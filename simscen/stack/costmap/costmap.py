@@ -1,6 +1,7 @@
 """A costmap: static map below, live obstacles above, inflated, updated where something changed."""
 
 import math
+from collections import deque
 from dataclasses import replace
 from functools import cached_property
 
@@ -12,12 +13,13 @@ from simscen.core.sensing import Image, Scan
 from simscen.core.zones import Zones
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.costmap.denoise_layer import without_specks
-from simscen.stack.costmap.frame import Cells, Frame
+from simscen.stack.costmap.frame import Cells, Frame, Numbers
 from simscen.stack.costmap.inflation_layer import Inflation, squared_distances
-from simscen.stack.costmap.live_layer import EVERYWHERE, LiveLayer, Window
+from simscen.stack.costmap.live_layer import EVERYWHERE, NONE, LiveLayer, Window
 from simscen.stack.costmap.obstacle_layer import crossed
 from simscen.stack.costmap.rolling import carried, left_behind, window_around, within
 from simscen.stack.costmap.static_layer import Mask, StaticLayer, empty_layer, static_layer, walls_within
+from simscen.stack.localizers.beams import Plane
 from simscen.stack.nearest import FARTHEST, SquaredWithin
 from simscen.stack.prediction.moving import NOTHING
 from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
@@ -27,6 +29,8 @@ BEYOND_HULL = 0.5
 LOOK_AROUND = 5
 """Every which scan is asked what unknown cells it shows to be free: once a second at the default rate, Nav2's own for
 the global costmap. Nothing that drives waits for it, and of a map's outside there are many."""
+CHANGES = 16
+"""The newest revisions of which it is known what changed."""
 
 
 class Costmap:
@@ -60,6 +64,7 @@ class Costmap:
         self._newest: dict[str, tuple[Pose2, Scan | Image]] = {}
         self._view: CostmapView | None = None
         self._changed: tuple[tuple[int, int], tuple[int, int]] | None = None
+        self._changes = deque[Numbers | None](maxlen=CHANGES)
         self.moving = NOTHING
         """What moves, in its frame; shown with it."""
         layer = self._layer(Pose2(0.0, 0.0))
@@ -85,6 +90,26 @@ class Costmap:
         return view
 
     @property
+    def revision(self) -> int:
+        """Another one after each update that changed something."""
+        return self._revision
+
+    def changed_near(self, revision: int, places: Plane, metres: float) -> bool:
+        """Whether since that revision something may have come to, or gone from, within so many metres of a place.
+
+        `places` are x + iy (n,). Where it says no, the view need not be looked at for how far obstacles are from these.
+        """
+        since = self._revision - revision
+        if since > len(self._changes):
+            return True
+        changes = list(self._changes)[len(self._changes) - since :]
+        reach = metres + (1 + self._speck) * math.sqrt(2.0) * self._frame.resolution  # of cells, told by their middles
+        for cells in changes:
+            if cells is None or (np.abs(self._frame.points(cells)[:, None] - places) <= reach).any():
+                return True
+        return False
+
+    @property
     def obstacle_cells(self) -> int:
         """How many cells are marked as live obstacles, or were forbidden since the start."""
         return int(np.count_nonzero(self._live.marked())) + self._zoned
@@ -99,7 +124,7 @@ class Costmap:
             return
         changed = self._live.on_scan(base, seen, self._static_squared if self._walled else None)
         if len(changed):
-            self._touch(*(self._whole if self._small else self._frame.extent(changed)))
+            self._touch(*(self._whole if self._small else self._frame.extent(changed)), changed)
         if self._tracks:
             self._learn(base, seen)
 
@@ -193,7 +218,7 @@ class Costmap:
         """Compute everything again."""
         self._costs = self._inflation.costs(self._static_squared, self._unknown if self._tracks else None)
         self._distance = self._inflation.metres.take(self._static_squared)
-        self._revision += 1
+        self._note(None)
         self._changed = None
         if len(marked := self._live.cells):
             self._touch(*self._frame.extent(marked))
@@ -219,7 +244,7 @@ class Costmap:
         cells = cells[passed]
         if len(cells):
             self._unknown[np.divmod(cells, frame.shape[1])] = False
-            self._touch(*frame.extent(cells))
+            self._touch(*frame.extent(cells), NONE)
 
     def _touch_cells(self, cells: Cells) -> None:
         """These cells (n, 2) have changed."""
@@ -227,14 +252,19 @@ class Costmap:
             (top, left), (bottom, right) = cells.min(axis=0).tolist(), cells.max(axis=0).tolist()
             self._touch((top, left), (bottom, right))
 
-    def _touch(self, low: tuple[int, int], high: tuple[int, int]) -> None:
-        """Cells from `low` to `high` have changed."""
+    def _touch(self, low: tuple[int, int], high: tuple[int, int], which: Numbers | None = None) -> None:
+        """Cells from `low` to `high` have changed: obstacles came to, or went from, these at most, if that is known."""
         if self._changed is not None:
             before_low, before_high = self._changed
             low = min(low[0], before_low[0]), min(low[1], before_low[1])
             high = max(high[0], before_high[0]), max(high[1], before_high[1])
         self._changed = low, high
+        self._note(which)
+
+    def _note(self, which: Numbers | None) -> None:
+        """Another revision, in which obstacles came to or went from these cells, or anywhere."""
         self._revision += 1
+        self._changes.append(which)
 
     def refresh(self, low: tuple[int, int], high: tuple[int, int]) -> None:
         """Compute distances and costs again wherever one of the cells from `low` to `high` can matter."""

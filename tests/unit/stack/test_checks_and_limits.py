@@ -353,7 +353,8 @@ def test_a_plan_is_blocked_by_what_comes_to_lie_ahead_on_it_but_not_behind() -> 
     plan = PlanInForce(Path(line), robot.inscribed_radius, view_of(Flatland(), robot))
     for x, blocked in ((2.0, True), (-0.5, False)):
         plan.locate(Pose2(1.0, 0.0))
-        assert plan.blocked(view_of(Flatland(discs=[(x, 0.1, 0.1)]), robot)) == blocked
+        plan.see(view_of(Flatland(discs=[(x, 0.1, 0.1)]), robot))
+        assert plan.blocked() == blocked
     assert plan.remaining() == pytest.approx(2.95, abs=0.05)
 
 
@@ -369,9 +370,10 @@ def test_a_plan_is_tight_where_it_has_lost_room_soon_but_not_where_it_never_had_
     robot = round_robot()
     line = Path(np.column_stack((np.arange(0.0, 4.0, 0.05), np.zeros(80), np.zeros(80))))
     roomy, narrow = (view_of(Flatland(discs=discs), robot) for discs in ((), [(2.0, 0.45, 0.1)]))
-    assert PlanInForce(line, robot.inscribed_radius, roomy).tightened(narrow)
-    assert not PlanInForce(line, robot.inscribed_radius, narrow).tightened(narrow)
-    assert not PlanInForce(line, robot.inscribed_radius, narrow).tightened(roomy)
+    for made, now, tighter in ((roomy, narrow, True), (narrow, narrow, False), (narrow, roomy, False)):
+        plan = PlanInForce(line, robot.inscribed_radius, made)
+        plan.see(now)
+        assert plan.tightened() == tighter
 
 
 def test_the_lowest_limit_of_the_zones_one_is_in_counts() -> None:

@@ -163,6 +163,34 @@ def test_distances_kept_up_to_date_piece_by_piece_equal_those_computed_at_once()
         assert np.allclose(map_.view.distance, full(map_.view.costs == 254), atol=1e-6)
 
 
+@pytest.mark.parametrize("group", [1, 3])
+def test_where_nothing_has_changed_near_distances_are_those_of_before(group: int) -> None:
+    world, spec = Flatland().room(8, 6), Spec(denoise_layer={"enabled": group > 1, "minimal_group_size": group})
+    map_, told, rng = costmap(world, spec), [], np.random.default_rng(5)
+    places = rng.uniform((0.5, 0.5), (7.5, 5.5), (60, 2)) @ (1, 1j)
+    for _ in range(12):
+        revision, before = map_.revision, [at(map_, each.real, each.imag)[1] for each in places]
+        for _ in range(2):
+            x, y = rng.uniform((1.0, 1.0), (7.0, 5.0))
+            seen = Flatland(world.boxes, [(x + 0.7, y, 0.02), (x, y - 1.1, 0.05)])
+            map_.update(Pose2(x, y), scan_of(seen, Pose2(x, y), noise=0.03))
+        for place, distance in zip(places, before, strict=True):
+            told.append(map_.changed_near(revision, np.array([place]), 0.4))
+            assert told[-1] or min(distance, 0.4) == min(at(map_, place.real, place.imag)[1], 0.4)
+    assert 0.02 < np.mean(told) < 0.5
+    assert map_.changed_near(map_.revision - 100, places, 0.4)
+    assert not map_.changed_near(map_.revision, places, 0.4)
+
+
+def test_whatever_changes_all_of_it_has_changed_it_near_every_place() -> None:
+    map_, place = costmap(Flatland().room(8, 6)), np.array([4.0 + 3.0j])
+    for change in (map_.clear, lambda: map_.set_zones(Zones((((1, 1), (2, 1), (2, 2)),)))):
+        revision = map_.revision
+        change()
+        assert map_.changed_near(revision, place, 0.1)
+        assert not map_.changed_near(map_.revision, place, 0.1)
+
+
 def test_a_rolling_window_follows_the_robot_and_keeps_what_it_saw() -> None:
     map_ = costmap(None, Spec(rolling_size=8.0))
     world = Flatland(discs=[(2.0, 0.5, 0.1)])
