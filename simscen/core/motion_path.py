@@ -2,6 +2,7 @@
 
 import math
 from bisect import bisect_right
+from typing import NamedTuple
 
 from simscen.core.geometry import Pose2, Pose3, wrap
 from simscen.core.shapes import MotionPath
@@ -42,6 +43,7 @@ class Track:
         self._even = len(path.times) > 1 and path.ease == "linear"
         self._once = path.mode == "once"
         self._begin, self._end = math.inf, -math.inf
+        self._leg: Leg
 
     def at(self, seconds: float) -> Pose3:
         """`pose_at`, upright in space."""
@@ -57,23 +59,41 @@ class Track:
         elif local > self._last:
             local = self._last
         if not self._begin <= local < self._end:
-            self._enter(local)
-        part = (local - self._begin) / self._lasts if self._lasts > 0 else 1.0
-        (x, y, yaw), turn = self._pose, self._turn
-        x, y = x + part * self._dx, y + part * self._dy
+            number = min(bisect_right(path.times, local), len(path.times) - 1) - 1
+            self._leg, self._begin = Leg.of(path, number), path.times[number]
+            self._end = path.times[number + 1] if number + 2 < len(path.times) else math.inf
+        begin, lasts, x, y, yaw, dx, dy, turn, qz, qw = self._leg
+        part = (local - begin) / lasts if lasts > 0 else 1.0
+        x, y = x + part * dx, y + part * dy
         if turn:
             return Pose3.planar(Pose2(x, y, wrap(yaw + part * turn)), z)
-        return _made(Pose3, (x, y, z, 0.0, 0.0, self._qz, self._qw))
+        return _made(Pose3, (x, y, z, 0.0, 0.0, qz, qw))
 
-    def _enter(self, local: float) -> None:
-        path, last = self._path, len(self._path.times) - 1
-        leg = min(bisect_right(path.times, local), last) - 1
-        self._begin, end = path.times[leg], path.times[leg + 1]
-        self._lasts, self._end = end - self._begin, end if leg + 1 < last else math.inf
-        self._pose = begin = path.poses[leg]
-        to = path.poses[leg + 1]
-        self._dx, self._dy, self._turn = to.x - begin.x, to.y - begin.y, wrap(to.yaw - begin.yaw)
-        *_, self._qz, self._qw = Pose3.planar(Pose2(begin.x, begin.y, wrap(begin.yaw)))
+
+class Leg(NamedTuple):
+    """From one pose of a path to the next: when it begins, how long it lasts, from where, and by how much.
+
+    `qz` and `qw` are the quaternion of the heading that it begins with.
+    """
+
+    begin: float
+    lasts: float
+    x: float
+    y: float
+    yaw: float
+    dx: float
+    dy: float
+    turn: float
+    qz: float
+    qw: float
+
+    @classmethod
+    def of(cls, path: MotionPath, number: int) -> "Leg":
+        """The leg of this number."""
+        (x, y, yaw), to = path.poses[number], path.poses[number + 1]
+        begin, end = path.times[number : number + 2]
+        *_, qz, qw = Pose3.planar(Pose2(x, y, wrap(yaw)))
+        return cls(begin, end - begin, x, y, yaw, to.x - x, to.y - y, wrap(to.yaw - yaw), qz, qw)
 
 
 def top_speed(path: MotionPath, reach: float = 0.0) -> float:

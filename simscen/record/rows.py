@@ -15,6 +15,8 @@ from simscen.core.navigation import Path
 from simscen.core.samples import Samples, Ticks
 from simscen.core.trace import Trace
 
+_tick = struct.Struct("d").pack
+
 
 class Series:
     """A signal in the making: a tick and `width` numbers a row, which `pack` makes a part of `rows`.
@@ -31,9 +33,21 @@ class Series:
         """Append a row."""
         self.rows += self.pack(tick, *values)
 
+    def append(self, tick: int, values: Array) -> None:
+        """Append a row of as many numbers in whatever shape."""
+        self.rows += _tick(tick)
+        self.rows += values.tobytes()
+
     def extend(self, ticks: Ticks, values: Array) -> None:
         """Append rows: ticks (n,) and values (n, width)."""
         self.rows += np.column_stack((ticks, values)).tobytes()
+
+    def sort(self) -> None:
+        """Put rows in the order of their ticks."""
+        ticks, values = self.columns()
+        order = ticks.argsort(kind="stable")
+        self.rows = bytearray()
+        self.extend(ticks[order], values[order])
 
     def columns(self) -> tuple[Ticks, Array]:
         """Ticks (n,) and values (n, width)."""
@@ -76,6 +90,7 @@ class Rows:
         self.odometry = Series(7)
         self.command = Series(3)
         self.objects: dict[str, Series] = {}
+        self._together: dict[tuple[str, ...], Series] = {}
         self.scans: list[int] = []
         self.plans: list[tuple[int, Array]] = []
         self.events: list[Event] = []
@@ -86,6 +101,23 @@ class Rows:
         if known is None:
             known = self.objects[name] = Series(7)
         return known
+
+    def together(self, names: tuple[str, ...]) -> Series:
+        """The rows of things at ticks at which all of them have moved, one pose beside the other; until `part`."""
+        known = self._together.get(names)
+        if known is None:
+            known = self._together[names] = Series(7 * len(names))
+        return known
+
+    def part(self) -> None:
+        """Give each thing its own rows, in the order of their ticks."""
+        for names, series in self._together.items():
+            ticks, poses = series.columns()
+            for column, name in enumerate(names):
+                self.object(name).extend(ticks, poses[:, 7 * column : 7 * column + 7])
+        for name in {name: None for names in self._together for name in names}:
+            self.objects[name].sort()
+        self._together.clear()
 
     def trace(self, tick_rate: int, end: int) -> Trace:
         """What happened until `end`."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+from simscen.core.foreseen import Places
 from simscen.core.geometry import Pose3
 from simscen.core.motion import Twist
 from simscen.core.sensing import Odometry
@@ -30,7 +31,9 @@ class Thinning:
         self._at_rest: Mapping[str, Pose3] | None = None
         self._due = 0
         self._moved_at = -1
-        self._moved: dict[str, Pose3] = {}
+        self._moved: Mapping[str, Pose3] = {}
+        self._whole: tuple[int, Places] | None = None
+        """The sample before, if all things of it are kept: `_objects` does not know of it yet."""
 
     def keeps_command(self, tick: int, command: Twist) -> bool:
         """Whether the command of this beat is kept."""
@@ -46,14 +49,33 @@ class Thinning:
             self._odometry = odometry.sensor
         return odometry.sensor == self._odometry
 
-    def moved(self, tick: int, truth: Truth) -> dict[str, Pose3]:
+    def moved(self, tick: int, truth: Truth) -> Mapping[str, Pose3]:
         """The moving things whose pose is kept at this tick, by name."""
         if tick != self._moved_at:
             self._moved_at, self._moved = tick, self._kept(tick, truth)
         return self._moved
 
-    def _kept(self, tick: int, truth: Truth) -> dict[str, Pose3]:
-        kept, objects = dict[str, Pose3](), truth.objects
+    def _kept(self, tick: int, truth: Truth) -> Mapping[str, Pose3]:
+        objects = truth.objects
+        if type(objects) is Places and self._all_moved(objects):
+            self._whole, self._at_rest = (tick, objects), objects
+            return objects
+        if self._whole is not None:
+            before, places = self._whole
+            self._objects.update({name: (before, pose) for name, pose in places.items()})
+        kept = self._each(tick, objects)
+        self._whole = (tick, objects) if type(objects) is Places and len(kept) == len(objects) else None
+        return kept
+
+    def _all_moved(self, objects: Places) -> bool:
+        """Whether everything is elsewhere than in the sample before, of which everything is kept."""
+        if self._whole is None:
+            return False
+        before, seen = self._whole[1], objects.foreseen
+        return before.foreseen is seen and before.row == objects.row - 1 and seen.all_moved[objects.row]
+
+    def _each(self, tick: int, objects: Mapping[str, Pose3]) -> dict[str, Pose3]:
+        kept = dict[str, Pose3]()
         at_rest = objects is self._at_rest  # nothing has moved since the sample before
         if at_rest and tick < self._due:
             return kept

@@ -1,7 +1,11 @@
 """Collects the moments of a run into its Trace."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
+from simscen.core.foreseen import Places
+from simscen.core.geometry import Pose3
 from simscen.core.sensing import Odometry, Scan
 from simscen.core.time import Clock
 from simscen.core.trace import Moment, Trace
@@ -35,9 +39,7 @@ class TraceBuilder:
             series = self._truth
             series.rows += series.pack(tick, *pose, *twist, clearance)
             if objects:
-                for name, pose in thinning.moved(tick, truth).items():
-                    series = rows.object(name)
-                    series.rows += series.pack(tick, *pose)
+                self._add_objects(tick, thinning.moved(tick, truth))
         for reading in moment.readings:
             if type(reading) is Odometry:
                 if thinning.keeps_odometry(reading):
@@ -56,6 +58,14 @@ class TraceBuilder:
             for event in (*moment.events, *decision.events):
                 rows.events.append(event_text.from_json(event_text.to_json(event)))
 
+    def _add_objects(self, tick: int, moved: Mapping[str, Pose3]) -> None:
+        if type(moved) is Places:
+            self._rows.together(moved.foreseen.names).append(tick, moved.table)
+            return
+        for name, pose in moved.items():
+            series = self._rows.object(name)
+            series.rows += series.pack(tick, *pose)
+
     def finish(self, end_tick: int) -> Trace:
         """The run until `end_tick`; nothing may be appended to it from then on."""
         rows, (ticks, truth) = self._rows, self._truth.columns()
@@ -65,4 +75,5 @@ class TraceBuilder:
         rows.odometry.extend(ticks, lifted(odometry))
         ticks, belief = self._belief.columns()
         rows.belief.extend(ticks, np.column_stack((lifted(belief), belief[:, 3:])))
+        rows.part()
         return rows.trace(self._clock.rate, end_tick)

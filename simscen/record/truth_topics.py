@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 
+from simscen.core.foreseen import Places
 from simscen.core.trace import Truth
 from simscen.record import frames, pack, topics
 from simscen.record.out import Out, Together
@@ -30,11 +31,12 @@ class TruthTopics:
         """Write the sample of `tick`, which is at `now` nanoseconds."""
         moved = self._thinning.moved(tick, truth) if truth.objects else {}
         stamp, fields = self._time.stamp(tick), (truth.pose, truth.twist, truth.clearance)
-        layout = self._layouts.get(tuple(moved))
+        names = moved.foreseen.names if type(moved) is Places else tuple(moved)
+        layout = self._layouts.get(names)
         if layout is None and len(self._layouts) < MOST_LAYOUTS:
-            layout = self._layouts[tuple(moved)] = self._layout(moved)
+            layout = self._layouts[names] = self._layout(names)
         if layout is not None:
-            layout.write(now, stamp, *fields, *moved.values())
+            layout.write(now, stamp, *fields, *(moved.table.tolist() if type(moved) is Places else moved.values()))
             return
         self._without.write(now, stamp, *fields)
         links = [(frames.MAP, frames.of_object(name), stamp, pose) for name, pose in moved.items()]

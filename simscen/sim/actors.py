@@ -1,16 +1,17 @@
 """Things that move: by a script, or because they are pushed."""
 
-import itertools
 import math
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
 import pybullet
 
+from simscen.core.foreseen import Foreseen
 from simscen.core.geometry import Pose2, Pose3, wrap
 from simscen.core.motion_path import Track, top_speed
 from simscen.core.shapes import Body, MotionPath
+from simscen.core.tracks import Tracks
 from simscen.sim import engine
 from simscen.sim.actor import About, Actor, Placing, Vector
 from simscen.sim.enclosure import winds_around
@@ -57,6 +58,8 @@ class Actors:
         self._lying: Balls | None = None
         self._moved: list[Actor] = []
         self._about: dict[int, About] = {}
+        self._tracks: Tracks | None = None
+        self._foreseen: Foreseen | None = None
 
     def add(self, body: Body, tick: int) -> None:
         """Put a body into the world; one of the same name makes way."""
@@ -133,6 +136,7 @@ class Actors:
         actor.path, actor.since, actor.speed = path, tick, speed
         actor.led, actor.track = True, None
         actor.scripted.clear()
+        self._tracks = self._foreseen = None
         self._fastest = max(self._fastest, speed)
 
     def _sort(self) -> None:
@@ -143,6 +147,7 @@ class Actors:
         self._pushable = [actor for actor in self._actors.values() if actor.pushable]
         self._looked_until, self._meeting, self._lying = -1, [], None
         self._about.clear()
+        self._tracks = self._foreseen = None
         self._moved = list(self._pushable)
         for actor in self._pushable:
             engine.wake(self._client, actor.id)  # what lay on something that is gone has to fall
@@ -237,27 +242,42 @@ class Actors:
             return self._poses
         if self._posed_at is None or (self._pushable and not self._asleep(tick)):
             self._poses = {name: self._pose(actor, tick) for name, actor in self._actors.items()}
+            self._foreseen = None
             if self._still_since is None or not all(actor.resting for actor in self._pushable):
                 self._still_since = tick
         elif self._travelling:
-            self._poses = poses = dict(self._poses)
-            for actor in self._travelling:
-                poses[actor.body.name] = self._pose(actor, tick)
+            foreseen = None if self._foreseen is None else self._foreseen.at(tick)
+            if foreseen is not None:
+                self._poses = foreseen
+            else:
+                self._poses = {**self._poses, **{a.body.name: self._pose(a, tick) for a in self._travelling}}
         self._posed_at = tick
         return self._poses
 
-    def scripted(self, ticks: Sequence[int]) -> Iterable[Mapping[str, Pose3]]:
-        """`poses` at several ticks in a row, while nothing moves but by a script."""
-        now = self.poses(ticks[-1]) if self._posed_at is None else self._poses
-        if not self._travelling:
-            return itertools.repeat(now, len(ticks))
-        names = [actor.body.name for actor in self._travelling]
-        rows = [self._scripted_row(actor, ticks) for actor in self._travelling]
-        return [{**now, **dict(zip(names, column, strict=True))} for column in zip(*rows, strict=True)]
+    def look_ahead(self, tick: int, period: int) -> None:
+        """`poses` will be asked at `tick`, which is now, and every `period` ticks after it.
 
-    def _scripted_row(self, actor: Actor, ticks: Sequence[int]) -> list[Pose3]:
-        at, since, rate = self._track(actor).at, actor.since, self._rate
-        return [at((tick - since) / rate) for tick in ticks]
+        Where scripts have things then is worked out for all of the next second at once, as long as nothing comes, goes
+        or is pushed.
+        """
+        if (self._foreseen is not None and tick in self._foreseen.ticks) or not self._travelling:
+            return
+        if self._posed_at is None or any(actor.led for actor in self._travelling):
+            return
+        if self._pushable and not self._asleep(tick):
+            return
+        if self._tracks is None:
+            self._tracks = Tracks([(self._path(actor), actor.body.pose.z) for actor in self._travelling])
+        ticks = range(tick, tick + max(1, self._rate // period) * period, period)
+        since = np.array([actor.since for actor in self._travelling])
+        table = self._tracks.at((np.array(ticks)[:, np.newaxis] - since) / self._rate)
+        names = tuple(actor.body.name for actor in self._travelling)
+        self._foreseen = Foreseen(ticks, names, table, {**self._poses})
+
+    @staticmethod
+    def _path(actor: Actor) -> MotionPath:
+        assert actor.path is not None
+        return actor.path
 
     def _track(self, actor: Actor) -> Track:
         if actor.track is None:

@@ -129,7 +129,7 @@ class Robot:
         self.clearance = Clearance(
             scene.client, scene.rate, static, obstacles, uneven, body, self.base, self._seen, scene.actors, reach
         )
-        self.samples = Samples(self.clearance, scene.actors)
+        self.samples = Samples(self.clearance)
         self._names: dict[int, str | None] = {}
 
     def drive(self, command: Twist) -> None:
@@ -147,8 +147,9 @@ class Robot:
         """The same, to be looked at later; it is asked again after so many ticks. Raises as `truth`."""
         tick = self._scene.tick
         state = self._sound(tick)
+        self._scene.actors.look_ahead(tick, ticks)
         if not self._contacts.touching and self.clearance.can_wait(tick, ticks, state.pose):
-            return self.samples.take(tick, state)
+            return self.samples.take(state, self.objects())
         self.samples.settle()
         return self._truth(tick, state)
 

@@ -4,8 +4,10 @@ Who looks is the log, up to 0.9 s later: what works samples out has left the pro
 several in a row take half the time.
 """
 
+from collections.abc import Mapping
+
+from simscen.core.geometry import Pose3
 from simscen.core.trace import Truth
-from simscen.sim.actors import Actors
 from simscen.sim.clearance import Clearance
 from simscen.sim.state import State
 
@@ -13,12 +15,12 @@ _made = tuple.__new__  # a truth without the calls of its class
 
 
 class Sample:
-    """How a robot was at a tick."""
+    """How a robot was at a tick, and where things were."""
 
-    __slots__ = ("made", "samples", "state", "tick")
+    __slots__ = ("made", "objects", "samples", "state")
 
-    def __init__(self, samples: "Samples", tick: int, state: State) -> None:
-        self.samples, self.tick, self.state = samples, tick, state
+    def __init__(self, samples: "Samples", state: State, objects: Mapping[str, Pose3]) -> None:
+        self.samples, self.state, self.objects = samples, state, objects
         self.made: Truth | None = None
 
     def truth(self) -> Truth:
@@ -30,24 +32,22 @@ class Sample:
 
 
 class Samples:
-    """Those of one robot. Only while nothing moves but by a script, and far from the robot, do any wait."""
+    """Those of one robot. Only while it is far from all that moves do any wait."""
 
-    def __init__(self, clearance: Clearance, actors: Actors) -> None:
-        self._clearance, self._actors = clearance, actors
+    def __init__(self, clearance: Clearance) -> None:
+        self._clearance = clearance
         self._waiting: list[Sample] = []
 
-    def take(self, tick: int, state: State) -> Sample:
+    def take(self, state: State, objects: Mapping[str, Pose3]) -> Sample:
         """One that is worked out when somebody asks for it, or for another."""
-        sample = Sample(self, tick, state)
+        sample = Sample(self, state, objects)
         self._waiting.append(sample)
         return sample
 
     def settle(self) -> None:
         """Work out all that wait."""
-        if not self._waiting:
-            return
         waiting, self._waiting = self._waiting, []
-        standing, placed = self._clearance.standing, self._actors.scripted([sample.tick for sample in waiting])
-        for sample, objects in zip(waiting, placed, strict=True):
+        standing = self._clearance.standing
+        for sample in waiting:
             state = sample.state
-            sample.made = _made(Truth, (state.pose, state.twist, standing(state.pose), objects))
+            sample.made = _made(Truth, (state.pose, state.twist, standing(state.pose), sample.objects))

@@ -1,0 +1,74 @@
+"""Things whose poses were worked out ahead are logged and traced as those that were looked at one by one."""
+
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from moments import CLOCK, about
+
+from simscen.core.foreseen import Foreseen
+from simscen.core.geometry import Pose3
+from simscen.core.motion import STOP
+from simscen.core.trace import Decision, Moment, Trace, Truth
+from simscen.record.recorder import Recorder
+from simscen.record.tracebuilder import TraceBuilder
+
+EVERY, AHEAD = 6, 20
+STAYS = {"a shelf": Pose3(1.0, 2.0), "the door": Pose3(3.0, 4.0)}
+
+
+def foreseen(moves: tuple[str, ...], stays: dict[str, Pose3], pauses: float, seed: int) -> list[Moment]:
+    """Four seconds in which some things stay, and others move at most moments."""
+    chance = np.random.default_rng(seed)
+    table = chance.uniform(-5, 5, (160, len(moves), 7))
+    for moment in range(1, len(table)):
+        table[moment] = np.where(chance.random((len(moves), 1)) < pauses, table[moment - 1], table[moment])
+    everything = dict(sorted({**stays, **dict.fromkeys(moves, Pose3())}.items()))
+    moments = []
+    for first in range(0, len(table), AHEAD):
+        ticks = range(first * EVERY, (first + AHEAD) * EVERY, EVERY)
+        ahead = Foreseen(ticks, moves, table[first : first + AHEAD], everything)
+        places = [ahead.at(tick) for tick in ticks]
+        assert all(places)
+        assert ahead.at(ticks[-1] + 1) is None
+        assert ahead.at(ticks[-1] + EVERY) is None
+        moments += [
+            Moment(tick, Truth(Pose3(x=tick / 240), STOP, 1.0, objects), (), Decision(STOP))
+            for tick, objects in zip(ticks, places, strict=True)
+            if objects is not None and (pauses < 0.5 or chance.random() < 0.9)
+        ]
+    return moments
+
+
+def log_and_trace(moments: list[Moment]) -> tuple[bytes, Trace]:
+    stream, end = io.BytesIO(), moments[-1].tick + 1
+    recorder = Recorder(stream, CLOCK, about())
+    builder = TraceBuilder(CLOCK, recorder.robots[""].thinning)
+    for moment in moments:
+        recorder.append(moment)
+        builder.append(moment)
+    recorder.close(end)
+    return stream.getvalue(), builder.finish(end)
+
+
+@pytest.mark.parametrize("pauses", [0.0, 0.02, 0.7, 1.0])
+@pytest.mark.parametrize("stays", [{}, STAYS], ids=["all move", "some stay"])
+def test_a_run_is_written_as_if_each_pose_had_been_looked_at(stays: dict[str, Pose3], pauses: float) -> None:
+    late = foreseen(("cart 1", "cart 2", "cart 3"), stays, pauses, seed=3)
+    at_once = [replace(m, sample=m.truth and m.truth._replace(objects=dict(m.truth.objects))) for m in late]
+    (log, trace), (expected, traced) = log_and_trace(late), log_and_trace(at_once)
+    assert log == expected
+    assert list(trace.objects) == list(traced.objects) == sorted({*stays, "cart 1", "cart 2", "cart 3"})
+    for name, samples in traced.objects.items():
+        assert trace.objects[name].ticks.tolist() == samples.ticks.tolist()
+        assert trace.objects[name].values.tolist() == samples.values.tolist()
+
+
+def test_what_is_foreseen_is_a_mapping_by_name_in_order() -> None:
+    table = np.arange(2 * 14.0).reshape(2, 2, 7)
+    everything = {"a": Pose3(), "b": Pose3(9.0), "c": Pose3()}
+    places = Foreseen(range(12, 24, 6), ("a", "c"), table, everything).at(18)
+    assert places == {"a": Pose3(*range(14, 21)), "b": Pose3(9.0), "c": Pose3(*range(21, 28))}
+    assert places is not None
+    assert (list(places), len(places), type(places["a"])) == (["a", "b", "c"], 3, Pose3)
