@@ -50,11 +50,11 @@ class WayBack:
         """m/s; 0 for a robot without a reverse gear."""
         self._last: Pose2 | None = None
         self._commands = _possible(setting.robot, self.speed)
-        there = np.array([AHEAD])
-        self._ends = np.stack([poses_along(Pose2(0.0, 0.0), each, there)[0] for each in (*self._commands, STOP)])
 
     def start(self, pose: Pose2, length: float) -> None:
         """Begin from this pose in the odom frame, to go back so many metres at most."""
+        there = np.array([AHEAD])
+        self._ends = np.stack([poses_along(Pose2(0.0, 0.0), each, there)[0] for each in (*self._commands, STOP)])
         lever = self._footprint.circumscribed
         self._trail, self._at = Trail(self._came(), pose, lever, length + self.speed * AHEAD), 0
         self._last = pose

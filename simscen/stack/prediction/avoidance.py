@@ -9,6 +9,7 @@ that gets on. So the robot slows early, passes behind, and where it stands it st
 
 import math
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
@@ -52,8 +53,12 @@ class Avoidance:
         self._speed = max(full_speed, 0.3)
         round_enough = robot.circumscribed_radius - robot.inscribed_radius < NEARLY_ROUND
         self._discs = Discs(replace(robot, radius=robot.circumscribed_radius) if round_enough else robot)
-        self._repertoire = Repertoire(robot, self._speed)
         self._last: Twist | None = None
+
+    @cached_property
+    def _repertoire(self) -> Repertoire:
+        """Takes a millisecond to make, and most robots never have to get out of anybody's way."""
+        return Repertoire(self._robot, self._speed)
 
     def rest(self) -> None:
         """Nothing moves."""
