@@ -17,6 +17,7 @@ from simscen.core.shapes import Cylinder, Solid
 from simscen.loading.scenario import load_scenario
 from simscen.record.backlog import Log
 from simscen.run.lockstep import Rig
+from simscen.run.perform import MANY
 from simscen.run.prepare import Prepared, lidar_height, prepare
 from simscen.run.simulate import simulate
 from simscen.run.stopwatch import Stopwatch
@@ -112,10 +113,13 @@ def timed_run(prepared: Prepared, watch: Stopwatch | None = None) -> tuple[float
     """Simulated, CPU and wall seconds of one run, from setting up to the verdicts; `watch` takes it apart."""
     gc.collect()
     gc.freeze()  # as what hands out runs does: what was here before them is not looked through for garbage
+    before = gc.get_threshold()
+    gc.set_threshold(MANY)  # as a run's own process does
     with TemporaryDirectory() as folder:
         begun, begun_wall = time.process_time(), time.perf_counter()
         run = simulate(prepared, SEED, log=Path(folder, "run.mcap"), attach=partial(_watched, watch) if watch else None)
         cpu, wall = time.process_time() - begun, time.perf_counter() - begun_wall
+    gc.set_threshold(*before)
     gc.unfreeze()
     return run.result.simulated, cpu, wall
 

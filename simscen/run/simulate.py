@@ -1,9 +1,8 @@
 """The one way from a description to a result: assemble, step in lockstep, record, judge."""
 
-import gc
 import traceback
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -28,11 +27,6 @@ from simscen.run.lockstep import Rig, run_lockstep
 from simscen.run.logheader import log_header
 from simscen.run.prepare import Prepared, prepare
 from simscen.sim.alone import NAMELESS
-
-MANY = 20_000
-"""So many more objects than before, and Python looks for garbage in a run, which hardly makes any. Its own 700 are
-what moments hold that wait: thirty searches a minute of the patrol, a hundred where twenty carts drive.
-"""
 
 Attach = Callable[[Rig, Sequence[Log]], Sequence[Log]]
 """Is shown the rig and the logs of its first robot before the first beat; what it returns listens to that, too."""
@@ -71,9 +65,7 @@ def _simulated(
     clock = Clock(prepared.spec.physics.tick_rate)
     with ExitStack() as closing:
         recorder = log and closing.enter_context(Recorder(log, clock, log_header(prepared, seed)))
-        # Code of others may write into an array that it has handed out, or make garbage.
-        if not prepared.plugins:
-            closing.enter_context(_hardly_any_garbage())
+        # Code of others may write into an array that it has handed out.
         waits, written = 0 if prepared.plugins else clock.ticks(WAITS), recorder.robots if recorder else {}
         backlog = closing.enter_context(Backlog(waits, next(iter(written.values()), None)))
         kept = {name: one.thinning for name, one in written.items()}
@@ -103,17 +95,6 @@ def _simulated(
         if recorder:
             recorder.close(end.tick, to_json(run.result), _stack_facts(externals))
     return _with_stacks(run, {name: stack.described for name, stack in externals.items()})
-
-
-@contextmanager
-def _hardly_any_garbage() -> Iterator[None]:
-    """Until it ends nobody looks for garbage before there are MANY objects more, nor at all if nobody did before."""
-    before = gc.get_threshold()
-    gc.set_threshold(before[0] and max(MANY, before[0]), *before[1:])
-    try:
-        yield
-    finally:
-        gc.set_threshold(*before)
 
 
 def _close(stacks: Collection[ExternalStack]) -> None:

@@ -1,0 +1,50 @@
+"""The process of a run hardly looks for garbage, unless code of others runs in it."""
+
+import gc
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from simscen.loading.scenario import load_scenario
+from simscen.run import perform
+from simscen.run.prepare import prepare
+from simscen.spec.registry import Entry
+
+SCENARIO = """\
+simscen: 1
+world: {simscen: 1, walls: [{points: [[0, 0], [4, 0], [4, 4], [0, 4], [0, 0]]}]}
+robot: {pose: {x: 1, y: 1}}
+stack: {localizer: {type: ground_truth}}
+time_limit: 0.5 s
+pass: [collisions: {max: 0}]
+"""
+
+
+class Begun(Exception):
+    """The run would begin now."""
+
+
+@pytest.fixture
+def thresholds():
+    before = gc.get_threshold()
+    yield before
+    gc.set_threshold(*before)
+
+
+@pytest.mark.parametrize("others", [False, True])
+def test_garbage_is_looked_for_as_ever_where_code_of_others_runs(
+    thresholds: tuple[int, int, int], others: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def simulate(*_: object, **__: object) -> None:
+        raise Begun(gc.get_threshold()[0])
+
+    monkeypatch.setattr(perform, "simulate", simulate)
+    (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
+    package = Entry("planner", "theirs", "theirs:Planner", distribution="theirs", version="1.0")
+    prepared = replace(
+        prepare(load_scenario(tmp_path / "a.scenario.yaml", tmp_path)), plugins=(package,) if others else ()
+    )
+    with pytest.raises(Begun) as begun:
+        perform.perform(prepared, 1, tmp_path, (), lambda *_: None)
+    assert begun.value.args == ((thresholds[0] if others else perform.MANY),)
