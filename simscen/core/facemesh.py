@@ -30,6 +30,14 @@ def compact(vertices: Array, faces: Faces) -> Mesh:
     return Mesh(vertices[needed], (np.cumsum(needed, dtype=np.int32) - np.int32(1))[faces])
 
 
+def between(vertices: Array, faces: Faces, heights: tuple[float, float]) -> Mesh:
+    """Those of some faces that reach between two heights, with the vertices that they use."""
+    low, high = heights
+    below, above = (outside[faces] for outside in (vertices[:, 2] < low, vertices[:, 2] > high))
+    beside = (below[:, 0] & below[:, 1] & below[:, 2]) | (above[:, 0] & above[:, 1] & above[:, 2])
+    return compact(vertices, faces[~beside])
+
+
 def is_convex(mesh: Mesh) -> bool:
     """Whether a mesh is its own convex hull; one of many faces is not even looked at."""
     if len(mesh.faces) > CONVEX_FACES:

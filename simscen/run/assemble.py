@@ -210,7 +210,8 @@ class LiveRays(RayCaster):
         where = robot.objects()
         if where is not self._where:  # it is the same one for as long as nothing has moved
             self._where = where
-            self._scene.set_moving({name: (mesh, where[name]) for name, mesh in self._meshes.items()})
+            bodies = {name: (mesh, where[name]) for name, mesh in self._meshes.items()}
+            self._scene.set_moving(bodies, robot.homes)
 
     def _surfaces(self, bodies: Mapping[str, Body]) -> dict[str, TriangleMesh]:
         """By name, the surface of each, which is the same one for all that are alike: a row of chairs is built once."""

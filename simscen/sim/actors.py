@@ -60,6 +60,8 @@ class Actors:
         self._about: dict[int, About] = {}
         self._tracks: Tracks | None = None
         self._foreseen: Foreseen | None = None
+        self.homes: Mapping[str, Pose3] = {}
+        """Where things lay that can be pushed when all had settled; most of them lie there for good."""
 
     def add(self, body: Body, tick: int) -> None:
         """Put a body into the world; one of the same name makes way."""
@@ -164,6 +166,11 @@ class Actors:
         for number in at_rest:
             engine.lay(self._client, number)
         self._posed_at = None
+
+    def settled(self, tick: int) -> None:
+        """All has settled: what can be pushed is at home."""
+        poses = self.poses(tick)
+        self.homes = {actor.body.name: poses[actor.body.name] for actor in self._pushable}
 
     def shaken(self, tick: int) -> None:
         """Something is pushed during the step from `tick` on: how fast things are now says nothing about it."""

@@ -182,8 +182,13 @@ class Robot:
         poses = self._scene.actors.poses(self._scene.tick)
         return {**poses, **{robot.name: robot.base_pose() for robot in self.others}} if self.others else poses
 
+    @property
+    def homes(self) -> Mapping[str, Pose3]:
+        """Where things lay at tick 0 that can be pushed."""
+        return self._scene.actors.homes
+
     def moving(self) -> Mapping[str, tuple[Body, Pose3]]:
-        """The same with their bodies."""
+        """Everything that may move and where it is, with its body."""
         return {name: (self.bodies[name], pose) for name, pose in self.objects().items()}
 
     def base_pose(self) -> Pose3:

@@ -84,6 +84,7 @@ class Simulation:
             pybullet.stepSimulation(client)
             if -EVERY * LOOKS <= tick < 0 and tick % EVERY == 0:
                 settling.look()
+        actors.settled(0)
         for name, robot in self.robots.items():
             robot.settled(robots[name].pose)
         self._each = tuple(self.robots.values())

@@ -1,21 +1,21 @@
-"""Ray casting with Embree: one scene for what never moves, and one for each thing that does, in its own frame."""
+"""Ray casting with Embree: scenes for what never moves, for what lies at home, and for each thing that moves."""
 
 import math
 from collections.abc import Mapping
+from types import MappingProxyType
 from weakref import WeakValueDictionary
 
 import numpy as np
-import numpy.typing as npt
 from embreex.rtcore import EmbreeDevice
 
 from simscen.core.geometry import Array, Pose3, forward_and_left
 from simscen.core.rays import Fan, RayCaster, Singles
 from simscen.core.shapes import TriangleMesh
 from simscen.worlds import raypart
-from simscen.worlds.raypart import Mover, Part, Window
+from simscen.worlds.piles import Piles, Placed
+from simscen.worlds.raypart import Heights, Mover, Part, Window, meeting
 
-Numbers = npt.NDArray[np.int64]
-Placed = tuple[TriangleMesh, Pose3]
+NOWHERE: Mapping[str, Pose3] = MappingProxyType({})
 
 FEW = 20_000
 """Triangles of a world that is taken as a whole, in 25 ms."""
@@ -24,11 +24,16 @@ _FARTHEST = 1e30
 _BEYOND = 1.001
 """Times its reach, where a ray ends that meets nothing within it."""
 
+_ROOM, _HAIR = 0.1, 0.01
+"""m beyond the heights of rays from which triangles are taken, at least; and what single precision may err by."""
+
 
 class RayScene(RayCaster):
     """A `core.rays.RayCaster` over the triangles of a world and of the bodies that move in it.
 
-    A body that moves stays as it was built; the few rays that come near it are carried into its frame. Distances agree
+    A body that moves stays as it was built; the few rays that come near it are carried into its frame. Of what lies at
+    home the triangles are carried into the frame of the world instead, once, so that many are asked at once: that is
+    told by where it is now, not by what was asked before, and in which frame decides about last bits. Distances agree
     with PyBullet's rays within 1 mm. Embree works in single precision, so everything is kept about its own centre: a
     world that lies 10 km from the origin loses nothing, one that is itself 10 km wide half a millimetre. Make a scene
     in the process that uses it: Embree's threads do not survive a fork.
@@ -44,17 +49,27 @@ class RayScene(RayCaster):
             self._static = (Window if len(static.faces) > FEW else Part)(self._device, static)
         self._parts = WeakValueDictionary[int, Part]()
         self._movers: dict[str, Mover] = {}
+        self._piles = Piles(self._device, self._static.middle)
+        self._heights = math.inf, -math.inf
 
-    def set_moving(self, bodies: Mapping[str, Placed]) -> None:
-        """Say where the bodies are now: by name, the triangles in a body's frame and the pose of that frame."""
+    def set_moving(self, bodies: Mapping[str, Placed], homes: Mapping[str, Pose3] = NOWHERE) -> None:
+        """Say where the bodies are now: by name, the triangles in a body's frame and the pose of that frame.
+
+        What is at its home, where it mostly stays, is kept in the frame of the world, with all else that is.
+        """
         before, self._movers = self._movers, {}
+        at_home = dict[str, Placed]()
         for name, (mesh, pose) in bodies.items():
+            if homes.get(name) == pose:
+                at_home[name] = mesh, pose
+                continue
             mover = before.get(name)
             if mover is None or mover.part.mesh is not mesh:
                 mover = Mover(self._part_of(mesh), pose)
             elif mover.pose != pose:
                 mover = Mover(mover.part, pose)
             self._movers[name] = mover
+        self._piles.keep(at_home)
 
     def _part_of(self, mesh: TriangleMesh) -> Part:
         """The scene of a mesh, which is one for all that are alike; those of what is gone are forgotten with it."""
@@ -75,36 +90,48 @@ class RayScene(RayCaster):
 
     def sweep(self, fan: Fan, pose: Pose3, reach: float) -> Singles:
         """See core.rays.RayCaster: with as few operations as may be, for each takes 1 µs where it runs once a scan."""
-        place, ahead_and_left = pose[:3], forward_and_left(pose[3:])
-        fan.turn(*ahead_and_left)
-        static = self._static.around(place, reach) if isinstance(self._static, Window) else self._static
+        place, (ahead, left) = pose[:3], forward_and_left(pose[3:])
+        fan.turn(ahead, left)
+        rise = math.hypot(ahead[2], left[2])
+        heights = self._between(place[2] - _rising(rise, reach), place[2] + _rising(rise, reach))
+        static = self._static.around(place, reach, heights) if isinstance(self._static, Window) else self._static
         ends = static.sweep(fan, place, min(reach, _FARTHEST) * _BEYOND)
+        self._piles.sweep(fan, pose, reach, heights, ends)
         for mover in self._movers.values():
             if mover.away(place) <= reach:
-                mover.sweep(fan, pose, ahead_and_left, ends)
+                mover.sweep(fan, pose, (ahead, left), ends)
         return ends
 
     def _from_each(self, origins: Array, directions: Array, reach: float, end: float) -> Singles:
         """Where rays meet anything that begin in places of their own."""
         x, y, z = origins[0].tolist()
         reach += float(np.linalg.norm(origins - (x, y, z), axis=1).max())
-        static = self._static.around((x, y, z), reach) if isinstance(self._static, Window) else self._static
+        low, high = origins[:, 2].min(), origins[:, 2].max()
+        down, up = directions[:, 2].min(), directions[:, 2].max()
+        heights = self._between(low - _rising(-down, reach), high + _rising(up, reach))
+        static = self._static.around((x, y, z), reach, heights) if isinstance(self._static, Window) else self._static
         ends = static.distances(origins, directions, end)
+        self._piles.cast(origins, directions, heights, ends)
         for mover in self._movers.values():
             if mover.away((x, y, z)) <= reach:
-                rays: Numbers = _meeting(mover, origins, directions, ends).nonzero()[0]
+                rays = meeting(mover.middle, mover.part.radius, origins, directions, ends)
                 if len(rays):
                     ends[rays] = mover.distances(origins[rays], directions[rays], ends[rays])
         return ends
 
+    def _between(self, low: float, high: float) -> Heights:
+        """Heights between which triangles are taken, for rays between these: mostly those of the call before."""
+        below, above = self._heights
+        if not (below <= low - _HAIR and high + _HAIR <= above):
+            low, high = min(low, below), max(high, above)
+            room = max(_ROOM, high - low)  # what tilts ever more has them taken anew a few times only
+            self._heights = low - room, high + room
+        return self._heights
 
-def _meeting(mover: Mover, origins: Array, directions: Array, ends: Singles) -> npt.NDArray[np.bool_]:
-    """Which rays (n,) from several places meet the sphere around a mover before they end."""
-    ways, radius = mover.middle - origins, mover.part.radius
-    ahead = (ways * directions).sum(axis=1)
-    beside = (ways * ways).sum(axis=1) - ahead**2
-    met: npt.NDArray[np.bool_] = (ahead >= -radius) & (ahead - radius <= ends) & (beside <= radius * radius)
-    return met
+
+def _rising(slope: float, reach: float) -> float:
+    """How far a ray of a slope, of length 1 and sideways if negative, may rise."""
+    return slope * reach if slope > 0 else 0.0
 
 
 def ready(mesh: TriangleMesh) -> None:

@@ -1,0 +1,66 @@
+"""What a lidar sees of things that lie about, of which the robot drives into some."""
+
+import math
+
+import numpy as np
+from playground import box
+
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.rays import Fan
+from simscen.core.shapes import Body
+from simscen.run.assemble import LiveRays
+from simscen.worlds.meshing import fuse
+from simscen.worlds.rays import RayScene
+
+WALL = box("wall", 4.0, 0.0, 0.2, 8.0)
+CRATE = (box("crate", 0, 0, 0.3, 0.3, 0.3),)
+CRATES = [Body(f"crate {k}", CRATE, Pose3.planar(Pose2(1.0 + 0.5 * k, 0.4 * (k % 3), 0.3 * k)), 3.0) for k in range(6)]
+FAN = Fan(-math.pi, math.pi / 90, 180)
+
+
+def drive(simulate, every, looking):
+    """What a level fan meets, every tenth of a second; every so many ticks somebody else is `looking`."""
+    simulation = simulate(solids=[WALL], bodies=CRATES, drive=(0.4, 0.0, 0.0))
+    rays, scans = LiveRays(RayScene(fuse([WALL])), simulation.robot), []
+    for tick in range(0, 960, 6):
+        if tick == 780:
+            simulation.spawn(Body("late", CRATE, Pose3(-1.0, 0.5, 0.0), 3.0))
+        if tick == 870:
+            simulation.remove("crate 5")
+        if tick % 24 == 0:
+            scans.append(np.minimum(rays.sweep(FAN, simulation.base_pose()._replace(z=0.2), 6.0), 6.0))
+        if tick % every == 0:
+            looking(simulation)
+        simulation.step(6)
+    return simulation, np.array(scans)
+
+
+def test_who_else_looks_changes_not_one_bit_of_a_scan(simulate):
+    """Things that were pushed are no longer at home, nor is what wakes because something comes."""
+    other, at_home = [], []
+
+    def look(simulation):
+        homes = simulation.robot.homes
+        other or other.append(LiveRays(RayScene(fuse([WALL])), simulation.robot, frozenset({"crate 1"})))
+        other[0].sweep(FAN, Pose3.from_rpy(0.0, 0.5, 0.3, 0.1, 0.2, 0.0), 9.0)
+        at_home.append({name for name, pose in simulation.objects().items() if homes.get(name) == pose})
+
+    _, alone = drive(simulate, 960, lambda _: None)
+    _, watched = drive(simulate, 18, look)
+    assert np.array_equal(alone, watched)
+    assert at_home[0] == {body.name for body in CRATES}
+    assert any(len(names) == 5 and "crate 0" not in names for names in at_home), "which the robot has pushed"
+    assert all("late" not in names for names in at_home)
+
+
+def test_a_scan_sees_what_it_would_see_of_each_thing_alone(simulate):
+    apart = []
+
+    def look(simulation):
+        scene = RayScene(fuse([WALL]))
+        scene.set_moving({name: (fuse(body.solids), pose) for name, (body, pose) in simulation.robot.moving().items()})
+        apart.append(np.minimum(scene.sweep(FAN, simulation.base_pose()._replace(z=0.2), 6.0), 6.0))
+
+    _, scans = drive(simulate, 24, look)
+    assert np.abs(scans - np.array(apart)).max() < 1e-5
+    assert (scans < 6.0).sum() > 1000
