@@ -2,6 +2,7 @@
 
 import cmath
 import math
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +25,8 @@ STEEPEST = math.radians(80.0)
 """Half the angle that a piece fills at most, as far as its radius is concerned."""
 FEWEST = 3
 """Hits of a piece that is looked at."""
+ROUNDING = 1e-6
+"""Metres."""
 STEPS, ENOUGH = 4, 3e-3
 """Of Gauss-Newton: from half a radius off, a circle is found to a millimetre; metres of a step that is the last."""
 
@@ -34,21 +37,48 @@ Places = npt.NDArray[np.complex128]
 
 
 @often_made(eq=False)
-class Runs:
-    """Hits of a scan, of which neighbours that are not far apart make a run: things that stand apart.
+class Hits:
+    """What the `beams` of a scan hit, in order: `ranges` and `places` (m,).
 
-    `ranges` and `places` (m,) are of the hits, which `beams` made; a run is the hits `first[k]` … `last[k]`.
+    Of two that follow each other one may be `sparse` times its range away from the other, to belong to it.
     """
 
     beams: Indices
     ranges: Array
     places: Places
+    sparse: float
+
+    def may_be_together(self, which: list[int], few: int) -> bool:
+        """Whether so many of these hits in a row may be in one run: none is parted from those beside it."""
+        row = 1
+        for one, other in pairwise(which):
+            row = row + 1 if self._linked(one) and self._linked(other - 1) else 1
+            if row == few:
+                return True
+        return False
+
+    def _linked(self, hit: int) -> bool:
+        """Whether the next hit belongs to this one, as to be told without arrays; in doubt it does."""
+        here, there = self.places.item(hit), self.places.item(hit + 1)
+        near = min(self.ranges.item(hit), self.ranges.item(hit + 1))
+        return abs(there - here) <= max(self.sparse * near, GAP) + ROUNDING
+
+
+@often_made(eq=False)
+class Runs:
+    """Hits of which neighbours that are not far apart make a run: things that stand apart.
+
+    A run is the hits `first[k]` … `last[k]`.
+    """
+
+    hits: Hits
     first: Indices
     last: Indices
 
-    def most(self, which: Mask) -> int:
-        """How many of a run's hits these (m,) are at most."""
-        return int(np.add.reduceat(which, self.first, dtype=np.int64).max()) if len(which) else 0
+    def together(self, which: Mask, few: int) -> bool:
+        """Whether at least so many, more than one, of these hits (m,) are in one run."""
+        runs = self.first.searchsorted(which.nonzero()[0], side="right")
+        return bool((runs[few - 1 :] == runs[: 1 - few]).any())
 
 
 class Piece(NamedTuple):
@@ -70,20 +100,27 @@ class Piece(NamedTuple):
         return self.last - self.first + 1
 
 
-def runs(ranges: Array, places: Places, step: float, least: float, most: float) -> Runs:
-    """The runs of a scan of beams that answer between `least` and `most` metres, each `step` rad further.
+def answers(ranges: Array, places: Places, step: float, least: float, most: float) -> Hits:
+    """The hits of a scan of beams that answer between `least` and `most` metres, each `step` rad further.
 
-    `places` (n,) are what they hit. A circle's first and last run are not joined: what lies behind the robot across the
-    seam is two.
+    `places` (n,) are what they hit.
     """
     beams = ((ranges >= least) & (ranges <= most)).nonzero()[0]
-    r, hits = ranges[beams], places[beams]
-    gap = np.minimum(r[1:], r[:-1])
-    gap *= SPARSE * abs(step)
-    apart = np.abs(hits[1:] - hits[:-1]) > np.maximum(gap, GAP, out=gap)
+    return Hits(beams, ranges[beams], places[beams], SPARSE * abs(step))
+
+
+def runs(hits: Hits) -> Runs:
+    """The runs of hits.
+
+    A circle's first and last run are not joined: what lies behind the robot across the seam is two.
+    """
+    beams, ranges, places = hits.beams, hits.ranges, hits.places
+    gap = np.minimum(ranges[1:], ranges[:-1])
+    gap *= hits.sparse
+    apart = np.abs(places[1:] - places[:-1]) > np.maximum(gap, GAP, out=gap)
     if len(beams) and beams[-1] - beams[0] >= len(beams):
         apart |= beams[1:] - beams[:-1] > MISSED + 1
-    return Runs(beams, r, hits, *_between(apart.nonzero()[0], len(r)))
+    return Runs(hits, *_between(apart.nonzero()[0], len(ranges)))
 
 
 def clusters(found: Runs, scanned: Array, start: float, step: float, largest: float) -> list[Piece]:
@@ -92,13 +129,14 @@ def clusters(found: Runs, scanned: Array, start: float, step: float, largest: fl
     The first beam goes along `start`, the next `step` rad further.
     """
     wide = abs(step)
-    if len(found.beams) < FEWEST:
+    hits = found.hits
+    if len(hits.beams) < FEWEST:
         return []
-    first, last = _parted(found.ranges, found.first, found.last)
-    nearest = np.minimum.reduceat(found.ranges, first).tolist()
+    first, last = _parted(hits.ranges, found.first, found.last)
+    nearest = np.minimum.reduceat(hits.ranges, first).tolist()
     full = abs(len(scanned) * wide - 2 * math.pi) < wide
     pieces: list[Piece] = []
-    begin, end = found.beams.take(first).tolist(), found.beams.take(last).tolist()
+    begin, end = hits.beams.take(first).tolist(), hits.beams.take(last).tolist()
     for one, other, near, low, high in zip(first, last, nearest, begin, end, strict=True):
         if other - one + 1 < FEWEST:
             continue

@@ -156,13 +156,17 @@ class Looked:
     beam: Indices
     distance: Array
 
-    def appeared(self) -> Mask:
-        """Which of them were free then, by each of SLIPPED. What is farther away than FARTHEST never was."""
-        earlier, free = self.earlier, self.earlier.through(self.beam, self.distance)
-        some = free.nonzero()[0]
+    def free(self) -> Mask:
+        """Which of them were free then. What is farther away than FARTHEST never was."""
+        return self.earlier.through(self.beam, self.distance)
+
+    def appeared(self, free: Mask) -> Mask:
+        """Which of those that were free were so by each of SLIPPED."""
+        earlier, some = self.earlier, free.nonzero()[0]
+        appeared: Mask = free.copy()
         if len(some):
-            free[some] = earlier.through(*earlier.towards(self.turned[some] + LEFT * self.way)).all(axis=0)
-        return free
+            appeared[some] = earlier.through(*earlier.towards(self.turned[some] + LEFT * self.way)).all(axis=0)
+        return appeared
 
     def stood(self) -> Mask:
         """Which of them were hit then, too."""

@@ -11,7 +11,7 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.sensing import Scan
 from simscen.model.guards import Prediction
 from simscen.stack.prediction.association import Seen, associate, begin
-from simscen.stack.prediction.clusters import Mask, Places, clusters, runs, shares
+from simscen.stack.prediction.clusters import Hits, Mask, Places, Runs, answers, clusters, runs, shares
 from simscen.stack.prediction.going import Going
 from simscen.stack.prediction.moving import Moving, Thing, nothing
 from simscen.stack.prediction.seen_through import FARTHEST, Earlier, SeenThrough
@@ -35,7 +35,7 @@ class Tracker:
     def __init__(self, spec: Prediction, tick_rate: int) -> None:
         self._spec, self._rate = spec, tick_rate
         self._memory = SeenThrough(tick_rate)
-        self._every = 1
+        self._every, self._restless = 1, False
         self._towards = self._towards_some = np.zeros(0, dtype=np.complex128)
         self._tracks, self._going = list[Track](), Going(spec, tick_rate)
         self.tick = 0
@@ -66,7 +66,7 @@ class Tracker:
                 track.predict(seconds, self._spec.acceleration)
         self.hits, self.moving = None, self._nothing
         before = self._memory.before(scan.tick)
-        if self._tracks or (before is not None and self._suspicious(scan, lidar, before)):
+        if self._tracks or (before is not None and (self._restless or self._suspicious(scan, lidar, before))):
             self._follow(Sight(scan, _ends(scan.ranges, self._towards), lidar, before))
         self._memory.remember(scan, lidar)
 
@@ -79,8 +79,12 @@ class Tracker:
     def _suspicious(self, scan: Scan, lidar: Pose2, before: Earlier) -> bool:
         """Whether one of the beams that are looked at hits what has appeared."""
         ranges = scan.ranges[:: self._every]
-        come = before.looked(_ends(ranges, self._towards_some), lidar).appeared()
-        return bool(come.any()) and bool((come & (ranges >= scan.range_min) & (ranges <= self._farthest(scan))).any())
+        looked = before.looked(_ends(ranges, self._towards_some), lidar)
+        come = looked.free()
+        if not come.any():
+            return False
+        come &= (ranges >= scan.range_min) & (ranges <= self._farthest(scan))
+        return bool(looked.appeared(come).any())
 
     def _farthest(self, scan: Scan) -> float:
         return min(scan.range_max, self._spec.max_range)
@@ -102,19 +106,33 @@ class Tracker:
 
     def _seen(self, sight: Sight) -> Seen | None:
         """The scan in pieces, and what an earlier one saw where they are; None where no track is nor can begin."""
-        scan, before = sight.scan, sight.before
-        found = runs(scan.ranges, sight.ends, scan.angle_increment, scan.range_min, self._farthest(scan))
-        looked = None if before is None or not len(found.beams) else before.looked(found.places, sight.at)
-        appeared = None if looked is None else looked.appeared()
-        if not self._tracks and (appeared is None or found.most(appeared) < FEW):
+        scan, before, tracks = sight.scan, sight.before, self._tracks
+        hits = answers(scan.ranges, sight.ends, scan.angle_increment, scan.range_min, self._farthest(scan))
+        looked = None if before is None or not len(hits.beams) else before.looked(hits.places, sight.at)
+        free = None if looked is None else looked.free()
+        if not tracks and (free is None or not self._may_begin(hits, free)):
+            return None
+        found = runs(hits)
+        appeared = None if looked is None or free is None else looked.appeared(free)
+        if not tracks and (appeared is None or not self._begins(found, appeared)):
             return None
         pieces = clusters(found, scan.ranges, scan.angle_min, scan.angle_increment, self._spec.max_radius)
         came = stood = [False] * len(pieces)
         if looked is not None and appeared is not None and pieces:
-            came = [count >= max(FEW, APPEARED * hits) for count, hits in shares(pieces, appeared)]
-            if self._tracks:  # else nobody asks
-                stood = [count > STANDS * hits for count, hits in shares(pieces, looked.stood())]
-        return Seen(scan.tick, found.places, pieces, sight.lidar, came, stood)
+            came = [count >= max(FEW, APPEARED * every) for count, every in shares(pieces, appeared)]
+            if tracks:  # else nobody asks
+                stood = [count > STANDS * every for count, every in shares(pieces, looked.stood())]
+        return Seen(scan.tick, hits.places, pieces, sight.lidar, came, stood)
+
+    def _may_begin(self, hits: Hits, free: Mask) -> bool:
+        """Whether enough that stands where it was free may be one thing; mostly it is a chair leg here and there."""
+        which = free.nonzero()[0].tolist()
+        self._restless = len(which) > 0
+        return hits.may_be_together(which, FEW)
+
+    def _begins(self, found: Runs, appeared: Mask) -> bool:
+        """Whether enough of a run has appeared, and one of the beams that are looked at while nothing moves."""
+        return found.together(appeared, FEW) and bool((found.hits.beams[appeared] % self._every == 0).any())
 
     def _tell(self, moving: list[Track], sight: Sight) -> None:
         """Note what moves, and which beams hit it."""

@@ -10,7 +10,7 @@ import pytest
 from simscen.core.geometry import Pose2
 from simscen.core.sensing import Scan
 from simscen.model.guards import Prediction
-from simscen.stack.prediction.clusters import ENOUGH, clusters, fitted, runs
+from simscen.stack.prediction.clusters import ENOUGH, answers, clusters, fitted, runs
 from simscen.stack.prediction.tracker import Tracker
 from simscen.testing.flatland import RATE, Flatland
 
@@ -240,11 +240,51 @@ def test_posts_do_not_move_when_the_robot_skids_aside_and_its_wheels_do_not_know
 
 def test_the_last_piece_of_a_scan_is_as_near_as_its_last_hit() -> None:
     ranges, step = np.array([50.0] * 10 + [2.0, 1.95, 1.9]), 0.01
-    found = runs(ranges, ranges * np.exp(1j * step * np.arange(13)), step, 0.1, 10.0)
+    found = runs(answers(ranges, ranges * np.exp(1j * step * np.arange(13)), step, 0.1, 10.0))
     (piece,) = clusters(found, ranges, 0.0, step, 1.0)
     sine = math.sin(1.5 * step)
     assert piece.radius == pytest.approx(1.9 * sine / (1.0 - sine))
     assert abs(piece.centre) == pytest.approx(1.9 + piece.radius)
+
+
+def test_hits_that_are_in_one_run_are_never_told_beforehand_to_be_in_several() -> None:
+    chance, step, told = np.random.default_rng(4), math.radians(1.0), list[tuple[bool, bool]]()
+    for _ in range(400):
+        ranges = np.repeat(chance.uniform(1.0, 6.0, 18), 4) + chance.normal(0.0, 0.04, 72)
+        ranges[chance.random(72) < 0.1] = np.inf
+        hits = answers(ranges, np.fmin(ranges, 1e5) * np.exp(1j * step * np.arange(72)), step, 0.1, 10.0)
+        which = chance.random(len(hits.beams)) < 0.15
+        told.append((runs(hits).together(which, 3), hits.may_be_together(which.nonzero()[0].tolist(), 3)))
+        first, last = runs(hits).first, runs(hits).last
+        assert told[-1][0] == any(which[one : other + 1].sum() >= 3 for one, other in zip(first, last, strict=True))
+    assert (True, False) not in told
+    assert min(told.count((True, True)), told.count((False, False))) > 50
+
+
+def test_who_looks_at_all_beams_at_once_tells_what_he_tells_who_looks_at_some_of_them_first() -> None:
+    """After a scan in which something had appeared all are looked at; wires appear at many scans."""
+    chance = np.random.default_rng(2)
+    wires = Flatland(
+        discs=[(6 * chance.random() + 1, 2.2 * (-1) ** k * (0.5 + chance.random()), 0.002) for k in range(30)]
+    )
+
+    def flies(t: float) -> list[Disc]:
+        """Four beams wide, where each sixth is looked at first."""
+        return [(0.4 * t + 2.5 * math.cos(3 * t), 2.5 * math.sin(3 * t), 0.03)] if round(10 * t) % 12 == 0 else []
+
+    def tracks(afresh: bool) -> list[list[complex]]:
+        found = list[list[complex]]()
+
+        def note(watch: Watch) -> None:
+            found.append([track.place for track in watch.tracker._tracks])
+            watch.tracker._restless &= not afresh
+
+        Watch(flies, base=lambda t: Pose2(0.4 * t, 0.0), walls=wires).run(12.0, note)
+        return found
+
+    found = tracks(False)
+    assert found == tracks(True)
+    assert 10 < sum(map(bool, found)) < 100
 
 
 def test_a_scan_that_is_garbage_moves_nothing_and_breaks_nothing() -> None:
