@@ -49,6 +49,6 @@ def _connected() -> int:
 
 
 def _grounded(client: int) -> int:
-    plane = engine.fixed(client, pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client))
-    engine.touch(client, plane, -1, engine.GROUND, engine.EVERYTHING)
+    ground = engine.plane(client, engine.speck(client))
+    engine.touch(client, ground, -1, engine.GROUND, engine.EVERYTHING)
     return client

@@ -27,7 +27,9 @@ UNTIL_ASLEEP = 2.0
 
 TERRAIN, GROUND, HULL, WHEEL, UNMOVED = 128, 64, 32, 16, 2
 """Collision groups of uneven ground, of the plane, of a robot's parts, and Bullet's own of what nothing pushes."""
-EVERYTHING = -1
+NOTHING, EVERYTHING = 0, -1
+AS_IT_IS = -1
+"""The look of a body that the renderer shows as the shape that it is; of most triangles it shows nothing."""
 
 PRIMITIVES = (Box, Cylinder, Sphere, Capsule)
 """What the engine knows as such."""
@@ -198,15 +200,15 @@ def fused(solids: Sequence[Solid], triangulate: Triangulate) -> Mesh:
     return Mesh(vertices, np.concatenate(faces))
 
 
-def body(client: int, mass: float, shape: int, pose: Pose3, frame: Frame, friction: float) -> int:
-    """A rigid body of a collision shape, with principal moments and centre of mass in `frame`.
+def body(client: int, mass: float, shape: int, pose: Pose3, frame: Frame, friction: float, look: int = AS_IT_IS) -> int:
+    """A rigid body of a collision shape, with principal moments and centre of mass in `frame`, and how it looks.
 
     Nothing pushes one of mass 0.
     """
     moments, base_from_centre = frame
     centre = pose.compose(base_from_centre)
     number: int = pybullet.createMultiBody(
-        mass, shape, -1, pose.position, pose.quaternion,
+        mass, shape, look, pose.position, pose.quaternion,
         baseInertialFramePosition=base_from_centre.position,
         baseInertialFrameOrientation=base_from_centre.quaternion, physicsClientId=client,
     )  # fmt: skip
@@ -234,12 +236,29 @@ def lay(client: int, number: int) -> None:
     pybullet.changeDynamics(number, -1, activationState=asleep, sleepThreshold=AT_REST, physicsClientId=client)
 
 
-def fixed(client: int, shape: int) -> int:
+def fixed(client: int, shape: int, look: int = AS_IT_IS) -> int:
     """A body that never moves; it sleeps, for Bullet looks anew at what lies upon something that is awake."""
-    number = body(client, 0.0, shape, Pose3(), ((0.0, 0.0, 0.0), Pose3()), 1.0)
+    number = body(client, 0.0, shape, Pose3(), ((0.0, 0.0, 0.0), Pose3()), 1.0, look)
     sleeps = pybullet.ACTIVATION_STATE_ENABLE_SLEEPING
     pybullet.changeDynamics(number, -1, activationState=sleeps, physicsClientId=client)
     return number
+
+
+def plane(client: int, look: int = AS_IT_IS) -> int:
+    """The plane z = 0."""
+    return fixed(client, pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client), look)
+
+
+def speck(client: int) -> int:
+    """The look of what nobody will ever see, a triangle too small to be drawn: Bullet makes that of a shape at once.
+
+    For a plane it paints 3 MB, which takes a millisecond.
+    """
+    corners = [(0.0, 0.0, 0.0), (1e-9, 0.0, 0.0), (0.0, 1e-9, 0.0)]
+    look: int = pybullet.createVisualShape(
+        pybullet.GEOM_MESH, vertices=corners, indices=[0, 1, 2], physicsClientId=client
+    )
+    return look
 
 
 def _primitive(shape: Shape) -> tuple[int, Sequence[float], float, float]:

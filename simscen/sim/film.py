@@ -34,6 +34,7 @@ class Film:
         """Show everything where it is now."""
         if not self._begun:
             self._begun = True
+            engine.touch(self._client, engine.plane(self._client), -1, engine.NOTHING, engine.NOTHING)
             self._shown(self._static.vertices, self._static.faces)
         for name in [name for name in self._props if name not in moving]:
             self._strike(name)
