@@ -323,6 +323,11 @@ class Sensor(Choice):
         assert isinstance(self.chosen, SensorSpec)
         return self.chosen.localizes
 
+    @property
+    def takes_pictures(self) -> bool:
+        """Whether it may: one of an installed package may look at one whatever it then says."""
+        return self.narrow is not None or self.says == "Image"
+
 
 class Part(Shaped):
     """A piece of the robot's body; `pose` in the base frame."""

@@ -56,6 +56,9 @@ def assemble(prepared: Prepared, seed: int, printed: Path | None = None) -> Rig:
         tick_rate=clock.rate,
         solver_iterations=spec.physics.solver_iterations,
         clearance_range=prepared.case.clearance_range,
+        pictures=any(
+            sensor.takes_pictures for part in prepared.each.values() for sensor in part.robot.sensors.values()
+        ),
     )
     for region, friction in world.friction.items():
         simulation.lay(region, Patch(world.regions[region], friction))

@@ -41,8 +41,11 @@ class Actors:
     20 mm, with it by 0.1 mm. What can be pushed sleeps where it lies until something comes near; see `encounters`.
     """
 
-    def __init__(self, client: int, tick_rate: int, triangulate: engine.Triangulate) -> None:
-        self._client, self._rate, self._triangulate = client, tick_rate, triangulate
+    def __init__(
+        self, client: int, tick_rate: int, triangulate: engine.Triangulate, look: int = engine.AS_IT_IS
+    ) -> None:
+        """The renderer is shown a `look` of the engine's of each."""
+        self._client, self._rate, self._triangulate, self._shown_as = client, tick_rate, triangulate, look
         self._actors: dict[str, Actor] = {}
         self._travelling: list[Actor] = []
         self._fastest = 0.0
@@ -75,6 +78,7 @@ class Actors:
             body.pose,
             frame,
             FRICTION,
+            self._shown_as,
         )
         radius, height = reach(body.solids)
         speed = 0.0 if body.path is None else top_speed(body.path, radius)

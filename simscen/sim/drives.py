@@ -74,19 +74,22 @@ class Drive(Protocol):
 
 
 def build(
-    client: int, body: RobotBody, pose: Pose2, period: float, tick: float, terrain: Terrain
+    client: int, body: RobotBody, pose: Pose2, period: float, tick: float, terrain: Terrain, look: int
 ) -> tuple[Base, Drive]:
-    """A robot set down at `pose`, and its drive, whose firmware runs every `period` seconds; a step lasts `tick`."""
+    """A robot set down at `pose`, and its drive, whose firmware runs every `period` seconds; a step lasts `tick`.
+
+    The renderer is shown a `look` of the engine's.
+    """
     match body.drive:
         case Omnidirectional():
-            base = PlanarBase(client, body, pose)
+            base = PlanarBase(client, body, pose, look)
             return base, OmnidirectionalDrive(base, body, period)
         case Mecanum():
-            base = PlanarBase(client, body, pose)
+            base = PlanarBase(client, body, pose, look)
             return base, MecanumDrive(base, body, period)
         case Ackermann():
-            vehicle = Vehicle(client, body, pose, terrain, tick)
+            vehicle = Vehicle(client, body, pose, terrain, tick, look)
             return vehicle, AckermannDrive(client, vehicle, body, period)
         case Differential() | SkidSteer():
-            vehicle = Vehicle(client, body, pose, terrain, tick)
+            vehicle = Vehicle(client, body, pose, terrain, tick, look)
             return vehicle, SidedDrive(client, vehicle, body, period)

@@ -28,7 +28,8 @@ class PlanarBase:
 
     rolling: Mapping[int, float]
 
-    def __init__(self, client: int, body: RobotBody, pose: Pose2) -> None:
+    def __init__(self, client: int, body: RobotBody, pose: Pose2, look: int = engine.AS_IT_IS) -> None:
+        """Set down at `pose`; the renderer is shown a `look` of the engine's."""
         self._client = client
         moments, base_from_centre = _whole(body).principal()
         sleds = 2
@@ -38,7 +39,7 @@ class PlanarBase:
             0,
             linkMasses=[SLED] * sleds + [body.mass] + [SLED] * extra,
             linkCollisionShapeIndices=[-1] * sleds + hulls,
-            linkVisualShapeIndices=[-1] * (sleds + len(hulls)),
+            linkVisualShapeIndices=[-1] * sleds + [look] * len(hulls),
             linkPositions=[(0, 0, 0)] * (sleds + len(hulls)),
             linkOrientations=[UPRIGHT] * (sleds + len(hulls)),
             linkInertialFramePositions=[(0, 0, 0)] * sleds + [base_from_centre.position] + [(0, 0, 0)] * extra,

@@ -48,7 +48,7 @@ class Scene:
     walls: Walls
     terrain: Terrain
     actors: Actors
-    film: Film
+    film: Film | None
     robots: dict[str, "Robot"] = field(default_factory=dict)
     tick: int = 0
     presses: list[Press] = field(default_factory=list)
@@ -107,13 +107,16 @@ class Robot:
         pose: Pose2,
         period: float,
         reach: float,
+        look: int,
     ) -> None:
         """Set down at `pose`; its firmware runs every `period` seconds, clearance is searched within `reach` metres.
+
+        The renderer is shown a `look` of the engine's.
 
         `obstacles` are what of the `static` world is in its way.
         """
         self.name, self._scene = name, scene
-        self.base, self._drive = build(scene.client, body, pose, period, 1 / scene.rate, scene.terrain)
+        self.base, self._drive = build(scene.client, body, pose, period, 1 / scene.rate, scene.terrain, look)
         self.advance = self._drive.advance
         """One period of the firmware's loop; for the simulation."""
         self._driven: Twist | None = None
@@ -215,9 +218,11 @@ class Robot:
     def image(
         self, mount: Pose3, width: int, height: int, field_of_view: float, far: float
     ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float32]]:
-        """What a camera at `mount` in the base frame sees; see `camera.picture`."""
+        """What a camera at `mount` in the base frame sees; see `camera.picture`. Only where there are pictures."""
+        film = self._scene.film
+        assert film is not None, "nobody was to take pictures"
         self._scene.actors.show(self._scene.tick)
-        self._scene.film.set(self.moving())
+        film.set(self.moving())
         return picture(self._scene.client, self.base_pose().compose(mount), width, height, field_of_view, far)
 
     def place(self, pose: Pose2) -> None:

@@ -52,18 +52,22 @@ class Simulation:
         tick_rate: int = 240,
         solver_iterations: int = 10,
         clearance_range: float = CLEARANCE_RANGE,
+        pictures: bool = True,
     ) -> None:
         """Build the world with the robots at rest where they are placed.
 
         Neither the order of `robots` nor that of `bodies` matters: the engine gets both by name. Clearance is searched
         within `clearance_range` metres of a hull. `triangulate` gives the surface of a shape, for moving things that
-        the engine has no primitive for.
+        the engine has no primitive for. Without `pictures` no robot has eyes that take any, and the renderer need not
+        be shown anything.
         """
         client = CLIENTS.take()
         engine.set_up(client, tick_rate, solver_iterations, one_by_one=len(robots) > 1)
         terrain = Terrain(client, static, max((w.radius for r in robots.values() for w in r.body.wheels), default=0.0))
         walls = Walls(client, terrain.rest)
-        film, actors = Film(client, static, triangulate), Actors(client, tick_rate, triangulate)
+        look = engine.AS_IT_IS if pictures else engine.speck(client)
+        film = Film(client, static, triangulate) if pictures else None
+        actors = Actors(client, tick_rate, triangulate, look)
         self._scene = Scene(client, tick_rate, walls, terrain, actors, film)
         self._attends: tuple[int, Callable[[], None]] | None = None
         self._firmware = max(1, round(tick_rate / FIRMWARE_RATE))
@@ -72,7 +76,7 @@ class Simulation:
         for name, (body, pose, obstacles) in sorted(robots.items()):
             period = self._firmware / tick_rate
             ways = static if obstacles is None else obstacles
-            self.robots[name] = Robot(name, self._scene, static, ways, body, pose, period, clearance_range)
+            self.robots[name] = Robot(name, self._scene, static, ways, body, pose, period, clearance_range, look)
         for thing in sorted(bodies, key=lambda body: body.name):
             actors.add(terrain.lifted(thing), 0)
         if not walls.complete:

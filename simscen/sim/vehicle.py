@@ -38,16 +38,25 @@ class Vehicle:
     """
 
     def __init__(
-        self, client: int, body: RobotBody, pose: Pose2, terrain: Terrain | None = None, tick: float = 0.0
+        self,
+        client: int,
+        body: RobotBody,
+        pose: Pose2,
+        terrain: Terrain | None = None,
+        tick: float = 0.0,
+        look: int = engine.AS_IT_IS,
     ) -> None:
-        """Set down at `pose`; one step of the engine lasts `tick` seconds, 0 where nothing will ever drive it."""
+        """Set down at `pose`; one step of the engine lasts `tick` seconds, 0 where nothing will ever drive it.
+
+        The renderer is shown a `look` of the engine's.
+        """
         self._client, self._terrain = client, terrain
         moments, self._base_from_centre = body.chassis.principal()
         self._centre = self._base_from_centre.position
         self._centre_from_base = self._base_from_centre.inverse()
         self._level = self._centre_from_base.quaternion == UPRIGHT
         casters = yielding(body.casters) if terrain else ()
-        self.id, self.joints, self.hull_links = _build(client, body, casters, tick)
+        self.id, self.joints, self.hull_links = _build(client, body, casters, tick, look)
         self.rolling: Mapping[int, float] = _rolling(body, self.joints, self.hull_links, casters)
         standing = [(caster.pose.x, caster.pose.y) for caster in body.casters if not lowest(caster)]
         self._feet = np.array([*((wheel.x, wheel.y) for wheel in body.wheels), *standing])
@@ -127,7 +136,7 @@ def _rolling(body: RobotBody, joints: Sequence[int], hull: Sequence[int], caster
 
 
 def _build(
-    client: int, body: RobotBody, casters: Sequence[Solid], tick: float
+    client: int, body: RobotBody, casters: Sequence[Solid], tick: float, look: int
 ) -> tuple[int, tuple[int, ...], tuple[int, ...]]:
     """The multibody; for each wheel its first joint, steering before rolling; and the links of the hull.
 
@@ -151,11 +160,12 @@ def _build(
     robot: int = pybullet.createMultiBody(
         body.chassis.mass,
         first,
+        look,
         baseInertialFramePosition=centre.position,
         baseInertialFrameOrientation=centre.quaternion,
         linkMasses=[link.mass for link in links],
         linkCollisionShapeIndices=[link.shape for link in links],
-        linkVisualShapeIndices=[-1] * len(links),
+        linkVisualShapeIndices=[look] * len(links),
         linkPositions=[link.place for link in links],
         linkOrientations=[UPRIGHT] * len(links),
         linkInertialFramePositions=[(0, 0, 0)] * len(links),

@@ -51,3 +51,16 @@ def test_the_same_picture_twice_is_equal(simulate):
     simulation = simulate(solids=[box("wall", 2, 0.5, 0.1, 1)])
     (rgb, depth), (again, deep) = picture(simulation), picture(simulation)
     assert (rgb == again).all() and (depth == deep).all()
+
+
+def test_what_no_picture_is_taken_of_moves_no_differently(simulate):
+    path = MotionPath((0.0, 1.0), (Pose2(5, 0), Pose2(3, 0)))
+    cart = Body("cart", (box("cart", 0, 0, 0.2, 2, 2),), Pose3(5), path=path)
+    seen, unseen = (
+        simulate(solids=[box("wall", 1.5, 0.5, 0.1, 1)], bodies=[cart], drive=(0.5, 0.0, 0.3), pictures=pictures)
+        for pictures in (True, False)
+    )
+    for _ in range(60):
+        seen.step(6)
+        unseen.step(6)
+        assert seen.truth() == unseen.truth() and seen.collisions() == unseen.collisions()
