@@ -12,6 +12,7 @@ from simscen.stack.planners.nearby import nearby
 from simscen.stack.planners.rates import Rates
 from simscen.stack.planners.samplers import SAMPLERS, Legs
 from simscen.stack.planners.search import Point, search
+from simscen.stack.planners.straight import free_straight_on
 from simscen.stack.planners.tube import eased
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
 
@@ -27,11 +28,14 @@ class OmplPlanner:
     def __init__(self, spec: PlannerSpec, robot: RobotModel) -> None:
         self._spec, self._robot = spec, robot
         self._rates: Rates | None = None
+        self._cheapest = spec.type == "bit_star" and spec.simplify  # the others go about it in their own way
         by_type = "medial_axis" if spec.type == "bit_star" else "uniform"
         self._sampler = SAMPLERS[by_type if spec.sampler == "auto" else spec.sampler]
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
         """A path of poses in the map frame, 5 cm apart."""
+        if self._cheapest and free_straight_on(costmap, start, goal, self._robot.circumscribed_radius):
+            return Path(with_headings(spaced(np.array([start[:2], goal[:2]]), SPACING), goal))
         return nearby(self._plan, costmap, start, goal, seed)
 
     def _plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
