@@ -10,13 +10,14 @@ from simscen.core.geometry import Pose2
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.planners import OmplPlanner as Spec
 from simscen.stack.costmap.costmap import Costmap
-from simscen.stack.planners import informed_set, samplers
+from simscen.stack.planners import informed_set, ompl_planner, samplers
 from simscen.stack.planners.ends import find_ends
 from simscen.stack.planners.ompl_planner import OmplPlanner
 from simscen.stack.planners.rates import Rates
 from simscen.stack.planners.search import search
+from simscen.stack.planners.straight import dear_until
 from simscen.stack.planners.tube import eased
-from simscen.stack.protocols import Surroundings
+from simscen.stack.protocols import CostmapView, Surroundings
 from simscen.testing.flatland import RATE, Flatland
 
 GROUNDS = {"rooms": rooms, "forest": forest, "maze": maze}
@@ -40,6 +41,23 @@ def test_a_plan_of_the_default_planner_costs_at_most_five_percent_more_than_the_
         ratios.append(rates.along(points[:, :2]) / cheapest(rates, start, goal))
     assert np.mean(ratios) < 1.02
     assert max(ratios) < 1.05
+
+
+def test_a_way_that_is_dear_here_and_there_and_else_straight_is_as_good(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As with people about: the way past what is dear is searched for, and joined with the straight one."""
+    chance, everywhere, dear = np.random.default_rng(3), list[int](), 0
+    monkeypatch.setattr(ompl_planner, "nearby", lambda plan, *asked: everywhere.append(1) or plan(*asked))
+    start, goal = Pose2(0.55, 1.55), Pose2(11.55, 1.75)
+    for seed in range(20):
+        costs = np.zeros((30, 120), dtype=np.uint8)
+        for column, row in chance.integers((8, 2), (20 + 4 * seed, 24), (6, 2)).tolist():
+            costs[row : row + 4, column : column + 4] = chance.integers(50, 253)
+        view = CostmapView(costs, np.ones(costs.shape, dtype=np.float32), 0.1, (0.0, 0.0))
+        rates = Rates(view, ROBOT, 2.0, True)
+        points = OmplPlanner(Spec(), ROBOT).plan(view, start, goal, seed).points
+        assert rates.along(points[:, :2]) < 1.02 * cheapest(rates, start, goal)
+        dear += dear_until(view, start, goal, ROBOT.circumscribed_radius) > 0.0
+    assert 4 <= len(everywhere) <= dear - 4
 
 
 @pytest.mark.parametrize(("kind", "number", "seed"), [("rooms", 4, 2), ("forest", 3, 2), ("forest", 5, 1)])

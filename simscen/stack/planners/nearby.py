@@ -25,7 +25,7 @@ def nearby(plan: Plan, costmap: CostmapView, start: Pose2, goal: Pose2, seed: in
     """
     margin = max(MARGIN, SHARE * start.distance(goal))
     while costmap.costs.size > LARGE:
-        part = _window(costmap, start, goal, margin)
+        part = window(costmap, start, goal, margin)
         if part is None or 2 * part.costs.size > costmap.costs.size:
             break
         with contextlib.suppress(NavigationFailure):
@@ -36,7 +36,7 @@ def nearby(plan: Plan, costmap: CostmapView, start: Pose2, goal: Pose2, seed: in
     return plan(costmap, start, goal, seed)
 
 
-def _window(costmap: CostmapView, start: Pose2, goal: Pose2, margin: float) -> CostmapView | None:
+def window(costmap: CostmapView, start: Pose2, goal: Pose2, margin: float) -> CostmapView | None:
     """The costmap within `margin` metres of both ends along x and y; None where an end is off the map."""
     (rows, columns), size = costmap.costs.shape, costmap.resolution
     low, high = [], []

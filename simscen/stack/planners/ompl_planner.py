@@ -12,7 +12,7 @@ from simscen.stack.planners.nearby import nearby
 from simscen.stack.planners.rates import Rates
 from simscen.stack.planners.samplers import SAMPLERS, Legs
 from simscen.stack.planners.search import Point, search
-from simscen.stack.planners.straight import free_straight_on
+from simscen.stack.planners.straight import straight_on
 from simscen.stack.planners.tube import eased
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
 
@@ -34,17 +34,31 @@ class OmplPlanner:
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
         """A path of poses in the map frame, 5 cm apart."""
-        if self._cheapest and free_straight_on(costmap, start, goal, self._robot.circumscribed_radius):
-            return Path(with_headings(spaced(np.array([start[:2], goal[:2]]), SPACING), goal))
+        if self._cheapest:
+            radius = self._robot.circumscribed_radius
+            points = straight_on(costmap, start, goal, radius, lambda part, there: self._past(part, start, there, seed))
+            if points is not None:
+                return Path(with_headings(spaced(points, SPACING), goal))
         return nearby(self._plan, costmap, start, goal, seed)
 
     def _plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
-        rates = Rates(costmap, self._robot, self._spec.cost_travel_multiplier, self._spec.allow_unknown)
+        rates = self._counted(costmap)
         self._rates = rates.after(self._rates) if costmap.costs.size <= MOST_KEPT else None
+        return Path(with_headings(self._points(rates, start, goal, seed), goal))
+
+    def _past(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> tuple[Array, float]:
+        """A way (n, 2) on a part of the costmap, and what it costs."""
+        rates = self._counted(costmap)
+        points = self._points(rates, start, goal, seed)
+        return points, rates.along(points)
+
+    def _counted(self, costmap: CostmapView) -> Rates:
+        return Rates(costmap, self._robot, self._spec.cost_travel_multiplier, self._spec.allow_unknown)
+
+    def _points(self, rates: Rates, start: Pose2, goal: Pose2, seed: int) -> Array:
         ends = find_ends(rates, start, goal, self._spec.tolerance)
         way = np.array([ends.start]) if ends.start == ends.goal else self._way(rates, ends, seed)
-        whole = spaced(np.vstack(((start.x, start.y), way)), SPACING)
-        return Path(with_headings(whole, goal))
+        return spaced(np.vstack(((start.x, start.y), way)), SPACING)
 
     def _way(self, rates: Rates, ends: Ends, seed: int) -> Array:
         """What the first search finds that finds a way."""

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Array, Pose2
+from simscen.core.navigation import ErrorCode
 from simscen.model.planners import OmplPlanner as PlannerSpec
 from simscen.stack.planners.ompl_planner import OmplPlanner
-from simscen.stack.planners.straight import free_straight_on
-from simscen.stack.protocols import CostmapView
+from simscen.stack.planners.straight import BEYOND, dear_until, straight_on
+from simscen.stack.protocols import CostmapView, NavigationFailure
 from simscen.testing.flatland import round_robot
 
 RADIUS, SIZE, CORNER = 0.2, 0.05, (-0.7, 0.3)
@@ -17,8 +18,9 @@ def view_of(costs: Array) -> CostmapView:
     return CostmapView(costs.astype(np.uint8), np.where(costs > 0, 0.1, 1.0).astype(np.float32), SIZE, CORNER, 1, 0.5)
 
 
-def touched(costs: Array, start: Pose2, goal: Pose2) -> bool:
-    """Whether the straight way meets the inside of any dear cell: each is cut with it by Liang and Barsky's rule."""
+def left_at(costs: Array, start: Pose2, goal: Pose2) -> float:
+    """The share of the straight way at which it leaves the last dear cell: each is cut with it by Liang and Barsky."""
+    last = 0.0
     for row, column in np.argwhere(costs > 0).tolist():
         low = CORNER[0] + column * SIZE, CORNER[1] + row * SIZE
         enter, leave = 0.0, 1.0
@@ -30,19 +32,18 @@ def touched(costs: Array, start: Pose2, goal: Pose2) -> bool:
             one, other = sorted(((edge - here) / step, (edge + SIZE - here) / step))
             enter, leave = max(enter, one), min(leave, other)
         if leave > enter:
-            return True
-    return False
+            last = max(last, leave)
+    return last
 
 
-def test_a_straight_way_is_free_just_where_it_meets_no_dear_cell() -> None:
-    chance, free = np.random.default_rng(5), 0
+def test_a_straight_way_is_dear_as_far_as_it_meets_dear_cells() -> None:
+    chance, told = np.random.default_rng(5), []
     for _ in range(300):
         costs = (chance.random((30, 40)) < 0.02) * chance.integers(1, 253, (30, 40))
-        ends = [Pose2(*(chance.uniform((0, 0), (40, 30)) * SIZE + CORNER).tolist()) for _ in range(2)]
-        told = free_straight_on(view_of(costs), *ends, RADIUS)
-        assert told == (not touched(costs, *ends))
-        free += told
-    assert 60 < free < 240
+        start, goal = (Pose2(*(chance.uniform((0, 0), (40, 30)) * SIZE + CORNER).tolist()) for _ in range(2))
+        told.append(dear_until(view_of(costs), start, goal, RADIUS))
+        assert told[-1] == pytest.approx(left_at(costs, start, goal) * start.distance(goal))
+    assert 60 < told.count(0.0) < 240
 
 
 @pytest.mark.parametrize("turn", range(8))
@@ -52,18 +53,19 @@ def test_along_an_axis_or_a_diagonal_the_cells_are_those_passed(turn: int) -> No
     middle = Pose2(CORNER[0] + 20.5 * SIZE, CORNER[1] + 20.5 * SIZE)
     reach = SIZE * 20 * (math.sqrt(2) if turn % 2 else 1.0) - 1e-9
     goal = Pose2(middle.x + reach * math.cos(heading), middle.y + reach * math.sin(heading))
-    assert free_straight_on(view_of(costs), middle, goal, RADIUS)
+    assert dear_until(view_of(costs), middle, goal, RADIUS) == 0.0
     costs[20 + 7 * round(math.sin(heading)), 20 + 7 * round(math.cos(heading))] = 1
-    assert not free_straight_on(view_of(costs), middle, goal, RADIUS)
+    until = SIZE * 7.5 * (math.sqrt(2) if turn % 2 else 1.0)
+    assert dear_until(view_of(costs), middle, goal, RADIUS) == pytest.approx(until)
 
 
-def test_a_way_that_leaves_the_costmap_or_comes_too_near_is_not_free() -> None:
+def test_a_way_that_leaves_the_costmap_or_is_too_near_an_obstacle_is_dear_to_its_end() -> None:
     view = view_of(np.zeros((20, 20)))
     inside = Pose2(CORNER[0] + 0.5, CORNER[1] + 0.5)
-    assert free_straight_on(view, inside, inside, RADIUS)
+    assert dear_until(view, inside, inside, RADIUS) == 0.0
     for x, y in ((1.01, 0.5), (-0.01, 0.5), (0.5, 1.01), (0.5, -0.01)):
-        assert not free_straight_on(view, inside, Pose2(CORNER[0] + x, CORNER[1] + y), RADIUS)
-    assert not free_straight_on(view, inside, Pose2(CORNER[0] + 0.9, CORNER[1] + 0.9), 1.0)
+        assert dear_until(view, inside, Pose2(CORNER[0] + x, CORNER[1] + y), RADIUS) == math.inf
+    assert dear_until(view, inside, Pose2(CORNER[0] + 0.9, CORNER[1] + 0.5), 1.0) == pytest.approx(0.4)
 
 
 def test_the_default_planner_goes_straight_on_where_that_costs_nothing() -> None:
@@ -79,3 +81,39 @@ def test_the_default_planner_goes_straight_on_where_that_costs_nothing() -> None
     steps = np.hypot(*np.diff(points[:, :2], axis=0).T)
     assert steps.max() <= 0.05 + 1e-9
     assert steps.sum() == pytest.approx(math.hypot(4.9, 0.4))
+
+
+@pytest.mark.parametrize(("more", "aside", "taken"), [(0.09, 0.0, True), (0.11, 0.0, False), (0.09, 0.1, False)])
+def test_a_way_past_what_is_dear_is_taken_only_where_all_of_it_costs_hardly_more(
+    more: float, aside: float, taken: bool
+) -> None:
+    costs = np.zeros((40, 220))
+    costs[18:22, 10:30] = 90
+    (x, y), asked = CORNER, list[Pose2]()
+    start, goal = Pose2(x + 0.2, y + 1.0), Pose2(x + 10.2, y + 1.0)
+
+    def past(part: CostmapView, there: Pose2) -> tuple[Array, float]:
+        asked.append(there)
+        assert part.costs.max() == 90
+        return np.array((start[:2], (there.x, there.y + aside))), start.distance(there) + more
+
+    points = straight_on(view_of(costs), start, goal, RADIUS, past)
+    assert asked[0][:2] == pytest.approx((x + 1.5 + BEYOND, y + 1.0))
+    assert (points is not None) == taken
+    if points is not None:
+        assert points.tolist() == [list(start[:2]), list(asked[0][:2]), list(goal[:2])]
+
+
+def test_where_there_is_no_way_past_or_too_much_is_dear_nothing_is_said() -> None:
+    costs = np.zeros((40, 220))
+    costs[18:22, 10:30] = 90
+    (x, y), start = CORNER, Pose2(CORNER[0] + 0.2, CORNER[1] + 1.0)
+
+    def shut(part: CostmapView, there: Pose2) -> tuple[Array, float]:
+        raise NavigationFailure(ErrorCode.NO_VALID_PATH, "shut")
+
+    def unasked(part: CostmapView, there: Pose2) -> tuple[Array, float]:
+        raise AssertionError
+
+    assert straight_on(view_of(costs), start, Pose2(x + 10.2, y + 1.0), RADIUS, shut) is None
+    assert straight_on(view_of(costs), start, Pose2(x + 5.2, y + 1.0), RADIUS, unasked) is None
