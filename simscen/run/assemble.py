@@ -193,6 +193,7 @@ class LiveRays(RayCaster):
         self._bodies: Mapping[str, Body] | None = None
         self._meshes: dict[str, TriangleMesh] = {}
         self._where: Mapping[str, Pose3] | None = None
+        self._homes: Mapping[str, Pose3] | None = None
 
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
         """See core.rays.RayCaster."""
@@ -210,11 +211,11 @@ class LiveRays(RayCaster):
         if robot.bodies is not self._bodies:  # it is the same one for as long as nothing comes or goes
             self._meshes, self._bodies = self._surfaces(robot.bodies), robot.bodies
             self._where = None
-        where = robot.objects()
-        if where is not self._where:  # it is the same one for as long as nothing has moved
-            self._where = where
+        where, homes = robot.objects(), robot.homes
+        if where is not self._where or homes is not self._homes:  # the same ones for as long as nothing has moved
+            self._where, self._homes = where, homes
             bodies = {name: (mesh, where[name]) for name, mesh in self._meshes.items()}
-            self._scene.set_moving(bodies, robot.homes)
+            self._scene.set_moving(bodies, homes)
 
     def _surfaces(self, bodies: Mapping[str, Body]) -> dict[str, TriangleMesh]:
         """By name, the surface of each, which is the same one for all that are alike: a row of chairs is built once."""

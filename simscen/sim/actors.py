@@ -64,7 +64,8 @@ class Actors:
         self._tracks: Tracks | None = None
         self._foreseen: Foreseen | None = None
         self.homes: Mapping[str, Pose3] = {}
-        """Where things lay that can be pushed when all had settled; most of them lie there for good."""
+        """Where things that can be pushed lay when all had settled, or came to rest later; most lie there for good."""
+        self._lay: Mapping[str, Pose3] | None = None
 
     def add(self, body: Body, tick: int) -> None:
         """Put a body into the world; one of the same name makes way."""
@@ -172,9 +173,16 @@ class Actors:
         self._posed_at = None
 
     def settled(self, tick: int) -> None:
-        """All has settled: what can be pushed is at home."""
+        """It is time to see what lies where it lay when this was called before: there it is at home.
+
+        What has left its home, or is gone, keeps it for when it is there again to the last bit.
+        """
         poses = self.poses(tick)
-        self.homes = {actor.body.name: poses[actor.body.name] for actor in self._pushable}
+        lie = {actor.body.name: poses[actor.body.name] for actor in self._pushable}
+        before, self._lay = lie if self._lay is None else self._lay, lie
+        come = {name: pose for name, pose in lie.items() if before.get(name) == pose != self.homes.get(name)}
+        if come:
+            self.homes = {**self.homes, **come}
 
     def shaken(self, tick: int) -> None:
         """Something is pushed during the step from `tick` on: how fast things are now says nothing about it."""

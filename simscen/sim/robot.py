@@ -187,7 +187,7 @@ class Robot:
 
     @property
     def homes(self) -> Mapping[str, Pose3]:
-        """Where things lay at tick 0 that can be pushed."""
+        """Where things that can be pushed lay at tick 0, or have come to rest since."""
         return self._scene.actors.homes
 
     def moving(self) -> Mapping[str, tuple[Body, Pose3]]:

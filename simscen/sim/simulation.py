@@ -1,6 +1,7 @@
 """The world in motion: robots, what stands, what moves. Time is whole ticks."""
 
 import itertools
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
@@ -25,6 +26,8 @@ from simscen.sim.walls import Walls
 
 FIRMWARE_RATE = 60
 """Hz at which a base's firmware updates its wheel speeds; Clearpath's and Robotis' run at 50 to 100 Hz."""
+HOMING = 5.0
+"""Seconds from one look at what lies still to the next: by ticks alone, whoever else looks."""
 SETTLING = 60
 """Ticks before tick 0 in which everything comes to rest on the ground."""
 
@@ -71,6 +74,7 @@ class Simulation:
         self._scene = Scene(client, tick_rate, walls, terrain, actors, film)
         self._attends: tuple[int, Callable[[], None]] | None = None
         self._firmware = max(1, round(tick_rate / FIRMWARE_RATE))
+        self._homing = math.ceil(HOMING * tick_rate)
         self.robots: dict[str, Robot] = self._scene.robots
         self._each: tuple[Robot, ...] = ()
         for name, (body, pose, obstacles) in sorted(robots.items()):
@@ -101,6 +105,15 @@ class Simulation:
 
     def step(self, ticks: int) -> None:
         """Let `ticks` ticks pass."""
+        scene, until = self._scene, self._scene.tick + ticks
+        if scene.actors.loose:
+            for due in range(scene.tick - scene.tick % self._homing + self._homing, until + 1, self._homing):
+                self._step(due - scene.tick)
+                scene.actors.settled(due)
+        if scene.tick < until:
+            self._step(until - scene.tick)
+
+    def _step(self, ticks: int) -> None:
         scene, calm = self._scene, -1
         until, plain = scene.tick + ticks, not (scene.presses or self._attends or scene.floor)
         if plain and (calm := self._calm_until(ticks)) >= until:

@@ -17,6 +17,8 @@ Placed = tuple[TriangleMesh, Pose3]
 
 MANY = 20_000
 """Triangles that are taken as one pile, in 10 ms."""
+SEVERAL = 16
+"""Piles of which a new one is made, with what has come home."""
 
 
 class Piles:
@@ -36,6 +38,8 @@ class Piles:
             gone = before.keys() - stay
             self._piles = [left for pile in self._piles for left in pile.without(gone)]
         if len(stay) < len(bodies):
+            if len(self._piles) >= SEVERAL:
+                self._piles, stay = [], set()
             come = {name: body for name, body in bodies.items() if name not in stay}
             meshes = {name: Mesh(pose.apply(mesh.vertices), mesh.faces) for name, (mesh, pose) in come.items()}
             self._piles += Pile(self._device, self._middle, meshes).small()
@@ -88,7 +92,7 @@ class Pile:
         """
         if gone.isdisjoint(self._meshes):
             yield self
-        elif len(self._meshes) > 1:
+        elif not gone >= self._meshes.keys():
             for half in self._halves():
                 yield from half.without(gone)
 

@@ -51,10 +51,11 @@ def changes():
         yield dict(poses)
 
 
-@pytest.mark.parametrize("many", [piles.MANY, 60])
-def test_how_things_are_piled_up_changes_not_one_bit(monkeypatch, many):
+@pytest.mark.parametrize(("many", "several"), [(piles.MANY, piles.SEVERAL), (60, 3)])
+def test_how_things_are_piled_up_changes_not_one_bit(monkeypatch, many, several):
     """A scene that has seen all of it says what one says that sees it for the first time, or heard of less before."""
     monkeypatch.setattr(piles, "MANY", many)
+    monkeypatch.setattr(piles, "SEVERAL", several)
     old = RayScene(WALLS)
     for number, poses in enumerate(list(changes())[::2]):
         fresh = RayScene(WALLS)
@@ -95,8 +96,8 @@ def test_things_at_home_take_no_scene_of_their_own(monkeypatch):
     scene.set_moving(placed(poses), HOMES)
     scene.sweep(FAN, LEVEL, math.inf)
     assert len(built) == 2
-    poses["thing 07"] = Pose3(3.0, 3.0)
-    for _ in range(3):
+    for step in range(12):
+        poses["thing 07"] = Pose3(3.0 + 0.01 * step, 3.0)
         scene.set_moving(placed(poses), HOMES)
         scene.sweep(FAN, LEVEL, math.inf)
     assert len(built) <= 2 + 1 + math.ceil(math.log2(len(HOMES)))
@@ -107,7 +108,7 @@ def test_which_heights_are_looked_at_changes_not_one_bit(monkeypatch, few):
     """Rays that tilt ever more have what they may meet taken anew, and only so often."""
     monkeypatch.setattr(rays, "FEW", few)
     tilts = [*np.linspace(0.0, 0.6, 20).tolist(), 0.0, -0.6]
-    lenses = [Pose3.from_rpy(0.4, 0.1, 0.3, 0.5 * tilt, tilt, 0.3) for tilt in tilts]
+    lenses = [Pose3.from_rpy(0.4, 0.1, 0.8, 0.5 * tilt, tilt, 0.3) for tilt in tilts]
     scene, taken = RayScene(WALLS), set()
     scene.set_moving(placed(HOMES), HOMES)
     for lens in lenses:
