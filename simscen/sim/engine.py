@@ -203,7 +203,7 @@ def fused(solids: Sequence[Solid], triangulate: Triangulate) -> Mesh:
 def body(client: int, mass: float, shape: int, pose: Pose3, frame: Frame, friction: float, look: int = AS_IT_IS) -> int:
     """A rigid body of a collision shape, with principal moments and centre of mass in `frame`, and how it looks.
 
-    Nothing pushes one of mass 0.
+    Nothing pushes one of mass 0, which sleeps while it stands: Bullet looks anew at what lies upon something awake.
     """
     moments, base_from_centre = frame
     centre = pose.compose(base_from_centre)
@@ -218,6 +218,8 @@ def body(client: int, mass: float, shape: int, pose: Pose3, frame: Frame, fricti
     )  # fmt: skip
     if mass == 0:  # Bullet would look at each step for where it touches the ground, though neither moves the other
         touch(client, number, -1, UNMOVED, ~(UNMOVED | GROUND | TERRAIN))
+        sleeps = pybullet.ACTIVATION_STATE_ENABLE_SLEEPING
+        pybullet.changeDynamics(number, -1, activationState=sleeps, physicsClientId=client)
     if mass > 0:
         pybullet.changeDynamics(number, -1, localInertiaDiagonal=moments, physicsClientId=client)
         pybullet.resetBasePositionAndOrientation(number, centre.position, centre.quaternion, physicsClientId=client)
@@ -237,11 +239,8 @@ def lay(client: int, number: int) -> None:
 
 
 def fixed(client: int, shape: int, look: int = AS_IT_IS) -> int:
-    """A body that never moves; it sleeps, for Bullet looks anew at what lies upon something that is awake."""
-    number = body(client, 0.0, shape, Pose3(), ((0.0, 0.0, 0.0), Pose3()), 1.0, look)
-    sleeps = pybullet.ACTIVATION_STATE_ENABLE_SLEEPING
-    pybullet.changeDynamics(number, -1, activationState=sleeps, physicsClientId=client)
-    return number
+    """A body that never moves."""
+    return body(client, 0.0, shape, Pose3(), ((0.0, 0.0, 0.0), Pose3()), 1.0, look)
 
 
 def plane(client: int, look: int = AS_IT_IS) -> int:
