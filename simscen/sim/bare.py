@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 import pybullet
 
-from simscen.core.geometry import Array, Pose2
+from simscen.core.facemesh import compact
+from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.shapes import Solid, TriangleMesh
 from simscen.sim import engine
-from simscen.sim.clients import Clients
 from simscen.sim.robot_body import RobotBody
 from simscen.sim.vehicle import Vehicle
 
@@ -22,15 +22,23 @@ class BareWorld:
     def __init__(
         self, static: TriangleMesh | Sequence[Solid], robot: RobotBody, pose: Pose2, triangulate: engine.Triangulate
     ) -> None:
-        self._client = Clients().take()  # one of its own, which nobody has used
-        engine.set_up(self._client, 240, 10)
+        self._client = client = pybullet.connect(pybullet.DIRECT)
+        engine.set_up(client, 240, 10)
+        ground = self._stand(pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client))
+        engine.touch(client, ground, -1, engine.GROUND, engine.EVERYTHING)
         if isinstance(static, TriangleMesh):
-            engine.static_mesh(self._client, static)
+            for lot in engine.tiles(static.vertices, engine.above_floor(static.vertices, static.faces)):
+                mesh = self._stand(engine.concave_shape(client, compact(static.vertices, lot)))
+                pybullet.changeDynamics(mesh, -1, collisionMargin=0.0, physicsClientId=client)
         else:
             for solid in static:
-                engine.fixed(self._client, engine.body_shape(self._client, [solid], False, triangulate))
+                self._stand(engine.body_shape(client, [solid], False, triangulate))
         Vehicle(self._client, robot, pose)
         self._pose = pose
+
+    def _stand(self, shape: int) -> int:
+        """A body that never moves, as `createMultiBody` makes it unless it is told otherwise; see engine.fixed."""
+        return engine.body(self._client, 0.0, shape, Pose3(), ((0.0, 0.0, 0.0), Pose3()), 1.0)
 
     def step(self, ticks: int) -> None:
         """Step and nothing else."""

@@ -239,8 +239,18 @@ def lay(client: int, number: int) -> None:
 
 
 def fixed(client: int, shape: int, look: int = AS_IT_IS) -> int:
-    """A body that never moves."""
-    return body(client, 0.0, shape, Pose3(), ((0.0, 0.0, 0.0), Pose3()), 1.0, look)
+    """A body that never moves; it sleeps, for Bullet looks anew at what lies upon something that is awake.
+
+    It is a rigid body: a multibody, as Bullet would have it, has six velocities of its own that stay zero, and each
+    contact with it is solved for them too. On a ground that is one a robot's step takes an eighth longer.
+    """
+    number: int = pybullet.createMultiBody(0.0, shape, look, useMaximalCoordinates=1, physicsClientId=client)
+    touch(client, number, -1, UNMOVED, ~(UNMOVED | GROUND | TERRAIN))
+    pybullet.changeDynamics(
+        number, -1, lateralFriction=1.0, restitution=0.0, activationState=pybullet.ACTIVATION_STATE_SLEEP,
+        physicsClientId=client,
+    )  # fmt: skip
+    return number
 
 
 def plane(client: int, look: int = AS_IT_IS) -> int:
