@@ -143,7 +143,7 @@ class Window:
     """The world of a mesh about the place that rays were last cast from, and at their heights.
 
     Of a large one most is out of their reach, and of what is not, from a quarter to most is above or below them.
-    Embree takes a microsecond for each triangle, and some 200 bytes. Those around are where all of them would be.
+    Embree takes half a microsecond for each triangle, and some 200 bytes. Those around are where all of them would be.
     """
 
     def __init__(self, device: EmbreeDevice, mesh: TriangleMesh) -> None:

@@ -18,7 +18,7 @@ from simscen.worlds.raypart import Heights, Mover, Part, Window, meeting
 NOWHERE: Mapping[str, Pose3] = MappingProxyType({})
 
 FEW = 20_000
-"""Triangles of a world that is taken as a whole, in 25 ms."""
+"""Triangles of a world that is taken as a whole, in 12 ms."""
 _FARTHEST = 1e30
 """m that a ray reaches at most, in single precision."""
 _BEYOND = 1.001
