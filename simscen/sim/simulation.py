@@ -81,8 +81,7 @@ class Simulation:
             period = self._firmware / tick_rate
             ways = static if obstacles is None else obstacles
             self.robots[name] = Robot(name, self._scene, static, ways, body, pose, period, clearance_range, look)
-        for thing in sorted(bodies, key=lambda body: body.name):
-            actors.add(terrain.lifted(thing), 0)
+        actors.fill((terrain.lifted(thing) for thing in sorted(bodies, key=lambda body: body.name)), 0)
         if not walls.complete:
             self._put_up_walls(SETTLING)
         settling = actors.settling()
