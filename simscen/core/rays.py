@@ -2,7 +2,6 @@
 
 import math
 from abc import abstractmethod
-from collections.abc import Iterator
 from typing import Protocol
 
 import numpy as np
@@ -23,6 +22,7 @@ class Fan:
         """Ray k points at `first` + k `increment` rad in the x-y plane; together they are no more than a full turn."""
         angles = first + increment * np.arange(count, dtype=np.float64)
         self._first, self._increment, self._count = first, increment, count
+        self._full = 2 * math.pi / increment
         self._flat = np.column_stack((np.cos(angles), np.sin(angles)))
         self._turned = np.empty((count, 3))
         self._start = np.zeros(3, dtype=np.float32)
@@ -50,21 +50,21 @@ class Fan:
         np.dot(self._flat[rays], np.array((ahead, left)), turned)
         self.directions[rays] = turned
 
-    def towards(self, x: float, y: float, least: float) -> Iterator[slice]:
+    def towards(self, x: float, y: float, least: float) -> list[slice]:
         """The rays whose products with a vector (x, y, any) of the fan's frame are `least` or more, and some beside."""
         far = math.hypot(x, y)
         if least > far:
-            return
+            return []
+        count, full = self._count, self._full
         half = math.acos(max(-1.0, least / far)) / self._increment if far > 0 else math.inf
-        full = 2 * math.pi / self._increment
         if 2 * half >= full:
-            yield slice(0, self._count)
-            return
+            return [slice(0, count)]
         middle = (math.atan2(y, x) - self._first) % (2 * math.pi) / self._increment
-        for around in (middle - full, middle, middle + full):
-            first, last = math.floor(around - half), math.ceil(around + half)
-            if last >= 0 and first < self._count:
-                yield slice(max(0, first), last + 1)
+        return [
+            slice(max(0, math.floor(around - half)), math.ceil(around + half) + 1)
+            for around in (middle - full, middle, middle + full)
+            if around + half > -1 and around - half < count
+        ]
 
 
 class RayCaster(Protocol):

@@ -30,6 +30,9 @@ class Piles:
         self._bodies: Mapping[str, Placed] = {}
         self._piles: list[Pile] = []
 
+    def __bool__(self) -> bool:
+        return bool(self._piles)
+
     def keep(self, bodies: Mapping[str, Placed]) -> None:
         """These lie there now, and no others."""
         before, self._bodies = self._bodies, bodies

@@ -1,7 +1,6 @@
 """Embree scenes: of a mesh, of such a mesh where it is now, and of what is around in a large world."""
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 import numpy.typing as npt
@@ -118,16 +117,17 @@ class Mover:
         self.part.sweep_some(fan, rays, rotated(back, (px - x, py - y, pz - z)), ends)
 
 
-def towards(fan: Fan, pose: Pose3, middle: Vector, radius: float, ends: Singles) -> Iterator[tuple[slice, Singles]]:
+def towards(fan: Fan, pose: Pose3, middle: Vector, radius: float, ends: Singles) -> list[tuple[slice, Singles]]:
     """The rays of a fan at `pose` within the cone about a sphere, and their ends, if any of them goes as far."""
     (x, y, z), (px, py, pz, i, j, k, w) = middle, pose
     way = x - px, y - py, z - pz
     far = math.hypot(*way)
     ahead, left, _ = rotated((-i, -j, -k, w), way)
-    for rays in fan.towards(ahead, left, math.sqrt(far * far - radius * radius) if far > radius else -math.inf):
-        before = ends[rays]
-        if before[before.argmax()] >= far - radius:  # `max` takes ten times as long
-            yield rays, before
+    cone = fan.towards(ahead, left, math.sqrt(far * far - radius * radius) if far > radius else -math.inf)
+    found = [(rays, ends[rays]) for rays in cone]
+    return [
+        (rays, some) for rays, some in found if some[some.argmax()] >= far - radius
+    ]  # `max` takes ten times as long
 
 
 def meeting(middle: Vector, radius: float, origins: Array, directions: Array, ends: Singles) -> Numbers:

@@ -24,6 +24,7 @@ _FARTHEST = 1e30
 _BEYOND = 1.001
 """Times its reach, where a ray ends that meets nothing within it."""
 
+_ALL = -math.inf, math.inf
 _ROOM, _HAIR = 0.1, 0.01
 """m beyond the heights of rays from which triangles are taken, at least; and what single precision may err by."""
 
@@ -60,7 +61,7 @@ class RayScene(RayCaster):
         before, self._movers = self._movers, {}
         at_home = dict[str, Placed]()
         for name, (mesh, pose) in bodies.items():
-            if homes.get(name) == pose:
+            if homes and homes.get(name) == pose:
                 at_home[name] = mesh, pose
                 continue
             mover = before.get(name)
@@ -69,7 +70,8 @@ class RayScene(RayCaster):
             elif mover.pose != pose:
                 mover = Mover(mover.part, pose)
             self._movers[name] = mover
-        self._piles.keep(at_home)
+        if at_home or self._piles:
+            self._piles.keep(at_home)
 
     def _part_of(self, mesh: TriangleMesh) -> Part:
         """The scene of a mesh, which is one for all that are alike; those of what is gone are forgotten with it."""
@@ -92,11 +94,14 @@ class RayScene(RayCaster):
         """See core.rays.RayCaster: with as few operations as may be, for each takes 1 µs where it runs once a scan."""
         place, (ahead, left) = pose[:3], forward_and_left(pose[3:])
         fan.turn(ahead, left)
-        rise = math.hypot(ahead[2], left[2])
-        heights = self._between(place[2] - _rising(rise, reach), place[2] + _rising(rise, reach))
-        static = self._static.around(place, reach, heights) if isinstance(self._static, Window) else self._static
-        ends = static.sweep(fan, place, min(reach, _FARTHEST) * _BEYOND)
-        self._piles.sweep(fan, pose, reach, heights, ends)
+        static, heights = self._static, _ALL
+        if self._piles or isinstance(static, Window):
+            rise = _rising(math.hypot(ahead[2], left[2]), reach)
+            heights = self._between(place[2] - rise, place[2] + rise)
+        part = static.around(place, reach, heights) if isinstance(static, Window) else static
+        ends = part.sweep(fan, place, min(reach, _FARTHEST) * _BEYOND)
+        if self._piles:
+            self._piles.sweep(fan, pose, reach, heights, ends)
         for mover in self._movers.values():
             if mover.away(place) <= reach:
                 mover.sweep(fan, pose, (ahead, left), ends)
