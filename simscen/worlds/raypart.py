@@ -125,9 +125,8 @@ def towards(fan: Fan, pose: Pose3, middle: Vector, radius: float, ends: Singles)
     ahead, left, _ = rotated((-i, -j, -k, w), way)
     cone = fan.towards(ahead, left, math.sqrt(far * far - radius * radius) if far > radius else -math.inf)
     found = [(rays, ends[rays]) for rays in cone]
-    return [
-        (rays, some) for rays, some in found if some[some.argmax()] >= far - radius
-    ]  # `max` takes ten times as long
+    # `max` takes ten times as long.
+    return [(rays, some) for rays, some in found if some[some.argmax()] >= far - radius]
 
 
 def meeting(middle: Vector, radius: float, origins: Array, directions: Array, ends: Singles) -> Numbers:
