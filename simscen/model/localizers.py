@@ -34,9 +34,9 @@ AMCL_PARAMETERS: Mapping[str, Mapping[str, object]] = {
     "nav2": {
         "laser_model_type": "likelihood_field", "sigma_hit": 0.2, "likelihood_exponent": 1.0,
         "beams_beyond_the_map": "miss", "map_trust_none": 0.0, "map_trust_full": 0.0,
-        "match_scans": False, "settling_distance": 0.0, "relocalization": "random",
+        "match_scans": False, "settling_distance": 0.0, "relocalization": "random", "sure_update_interval": 1,
     },
-    "consistent": {"covariance": "scatter"},
+    "consistent": {"covariance": "scatter", "sure_update_interval": 1},
 }  # fmt: skip
 """What AMCL's parameters are by default under each name."""
 
@@ -72,9 +72,10 @@ class Amcl(Ranged, LocalizerSpec):
     """How far the robot must have moved until it looks at another scan."""
     update_min_a: Annotated[NonNegativeAngle, Field(le=6.3)] = 0.2
     """How far it must have turned until it looks at another scan."""
-    sure_update_factor: Annotated[float, Field(ge=1, le=10), Quantity("ratio")] = 1.0
-    """How many times as far and as much that is while the robot is sure of its place: the map shows what the last scan
-    saw, the particles are one narrow group, and scans and wheels say the same of how it moved. 1 = as in Nav2."""
+    sure_update_interval: Annotated[int, Field(ge=1, le=10)] = 2
+    """Scans looked at for each that is compared with the map, while the robot is sure of its place: the map shows what
+    the last one saw, the particles are one narrow group, and scans and wheels say the same of how it moved. The others
+    show that alone. 1 = each, as in Nav2, and always so with `covariance: scatter`."""
     resample_interval: Annotated[int, Field(ge=1, le=100)] = 1
     """Scans looked at for each resampling."""
     max_beams: Annotated[int, Field(ge=2, le=4096)] = 60

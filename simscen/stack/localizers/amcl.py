@@ -66,6 +66,7 @@ class AmclLocalizer:
         """
         self._spec, self._filter, self._motion, self._tick_rate = spec, particle_filter, motion, tick_rate
         self._search, self._misfit = search, misfit
+        self._every = spec.sure_update_interval if misfit is None else 1
         self.reset(estimate)
 
     def reset(self, estimate: Estimate) -> None:
@@ -80,7 +81,7 @@ class AmclLocalizer:
         self._matcher = ScanMatcher() if self._spec.match_scans else None
         self._scatter = Scatter() if self._misfit is not None and self._matcher is not None else None
         self._matched: tuple[str, Pose2] | None = None
-        self._came, self._calm, self._glances = UNSEEN, 0, 0
+        self._came, self._calm, self._passed = UNSEEN, 0, 0
         self._due: dict[str, bool] = {}
         self._waiting: dict[str, Scan] = {}
         self._belief: Belief | None = None
@@ -138,7 +139,7 @@ class AmclLocalizer:
         if odometry is None or not scan.range_max > 0:
             return
         delta = None if self._moved_to is None else self._moved_to.between(odometry)
-        if delta is not None and self._worth_looking(scan, odometry, delta):
+        if delta is not None and self._moved_enough(delta):
             self._due = dict.fromkeys(self._due, True)
         if self._due.get(scan.sensor, True):
             self._correct(scan, odometry, delta)
@@ -146,7 +147,10 @@ class AmclLocalizer:
                 self._look_elsewhere(self._finder, scan, odometry)
 
     def _correct(self, scan: Scan, odometry: Pose2, delta: Pose2 | None) -> None:
-        """Move the particles by what was driven since the last correction, and weigh them by a scan."""
+        """Move the particles by what was driven since the last correction, and weigh them by a scan.
+
+        Who is sure of its place need not compare each with the map: in between scans show how it goes.
+        """
         matched = None if self._matcher is None else self._matched_step(self._matcher, scan, odometry)
         self._came = Moved(step=matched, parted=None if self._matcher is None else self._matcher.parted)
         agreed = False
@@ -161,7 +165,10 @@ class AmclLocalizer:
         if self._scatter is not None:
             self._scatter.drive(self._base(odometry), None if matched is None else matched.covariance)
         self._due[scan.sensor], self._moved_to, self._belief = False, odometry, None
-        if (answer := self._filter.correct(scan)) is not None:
+        sure = agreed and not self._came.parted and self._calm >= SURE_AFTER
+        self._passed = self._passed + 1 if sure and self._passed + 1 < self._every else 0
+        answer = None if self._passed else self._filter.correct(scan)
+        if answer is not None:
             pose, covariance = answer
             if self._scatter is not None and self._misfit is not None:
                 covariance = self._scatter.widened(pose, covariance, self._misfit.of(self._filter.beams(scan), pose))
@@ -170,9 +177,9 @@ class AmclLocalizer:
             last = self._correction
             carried = last.map_from_odom.compose(odometry) if matched is None else last.pose.compose(matched.delta)
             covariance = spread(self._filter.particles, carried)
-            self._correction = _Correction(carried, covariance, odometry, self._correction.tick)
-        calm = agreed and answer is not None and self._filter.sure
-        self._calm, self._glances = self._calm + 1 if calm else 0, 0
+            self._correction = _Correction(carried, covariance, odometry, scan.tick if self._passed else last.tick)
+        if not self._passed:
+            self._calm = self._calm + 1 if agreed and answer is not None and self._filter.sure else 0
 
     def _matched_step(self, matcher: ScanMatcher, scan: Scan, odometry: Pose2) -> Step | None:
         """The motion since the last correction as the first lidar saw it; None where it did not see it."""
@@ -187,6 +194,9 @@ class AmclLocalizer:
         """Put the particles where the robot may be if it is not where it was thought to be."""
         limits = self._spec.laser_min_range, self._spec.farthest
         base = self._base(odometry)
+        if self._passed:
+            finder.passed(scan, base, limits, self._came)
+            return
         believed = self._correction.map_from_odom.compose(odometry)
         fit = self._filter.fitting if self._calm else None
         if (places := finder.places(scan, base, believed, limits, self._came, fit)) is not None:
@@ -201,20 +211,5 @@ class AmclLocalizer:
             return odometry
         return self._matcher.pose.compose(self._matched[1].between(odometry))
 
-    def _worth_looking(self, scan: Scan, odometry: Pose2, delta: Pose2) -> bool:
-        """Whether the robot moved by the thresholds; who is sure of its place by more, unless a scan is a surprise.
-
-        On the way, at the thresholds and after half as much more, a scan is compared with the map where odometry says
-        that the robot is: wheels may slip.
-        """
-        sure = self._calm >= SURE_AFTER
-        if self._moved_by(self._spec.sure_update_factor if sure else 1.0, delta):
-            return True
-        if not sure or not self._moved_by(1.0 + self._glances / 2, delta):
-            return False
-        self._glances += 1
-        return self._filter.surprised(scan, self._correction.map_from_odom.compose(odometry))
-
-    def _moved_by(self, times: float, delta: Pose2) -> bool:
-        far, turned = times * self._spec.update_min_d, times * self._spec.update_min_a
-        return math.hypot(delta.x, delta.y) > far or abs(delta.yaw) > turned
+    def _moved_enough(self, delta: Pose2) -> bool:
+        return math.hypot(delta.x, delta.y) > self._spec.update_min_d or abs(delta.yaw) > self._spec.update_min_a

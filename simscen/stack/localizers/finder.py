@@ -8,6 +8,7 @@ import numpy as np
 from simscen.core.belief import Estimate
 from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.core.sensing import Scan
+from simscen.stack.localizers.beams import Plane
 from simscen.stack.localizers.clusters import errors_about
 from simscen.stack.localizers.global_search import APART, GlobalSearch, View
 from simscen.stack.localizers.map_trust import MapTrust
@@ -82,8 +83,7 @@ class Finder:
         `way` is how it came there since the last scan. `fit` is the share of the beams that fit where it is believed to
         be, if anyone knows.
         """
-        self._moved(base, way)
-        ends = self._memory.add(scan, base, *limits)
+        ends = self.passed(scan, base, limits, way)
         if not len(ends):
             return None
         here = np.array([believed])
@@ -105,6 +105,11 @@ class Finder:
         if self._driven < self._wait:
             return None
         return self._sought(self._memory.about(base), base, here)
+
+    def passed(self, scan: Scan, base: Pose2, limits: tuple[float, float], way: Moved) -> Plane:
+        """Remember a scan, and ask nothing; where it ended, about the base. As `places` otherwise."""
+        self._moved(base, way)
+        return self._memory.add(scan, base, *limits)
 
     def _moved(self, base: Pose2, way: Moved) -> None:
         """Carry on what is known of where the robot is; nothing is when it no longer sees what it saw."""

@@ -35,8 +35,6 @@ AT_ONCE = 0.2
 
 SURE = 0.9
 """Share of a scan's beams that must fit for nothing to be amiss."""
-SURPRISE = 0.15
-"""By so much is the logarithm of a beam's likelihood less, on average: a wall ahead that is 6 cm off."""
 
 _STRAY, _ANYWHERE = 1.0, 2.0
 """Marks of what descends from particles that recovery put anywhere, and of these themselves."""
@@ -62,7 +60,7 @@ class ParticleFilter:
         self._recovery = Recovery(self._spec.recovery_alpha_slow, self._spec.recovery_alpha_fast, self._sensor.strays)
         self._put_anywhere: npt.NDArray[np.bool_] | None = None
         self._strays: npt.NDArray[np.bool_] | None = None
-        self._corrections, self._trusted, self._together, self._likely = 0, 1.0, False, 0.0
+        self._corrections, self._trusted, self._together = 0, 1.0, False
         self.fitting = 0.0
         """The share of the last scan's beams that fit at the particles, as far as the map says anything of them."""
         self._settled = AT_ONCE if estimate.pose is not None and self._spec.settling_distance > 0 else 1.0
@@ -76,12 +74,6 @@ class ParticleFilter:
     def beams(self, scan: Scan) -> Beams:
         """Those of a scan that are compared with the map."""
         return select_beams(scan, self._spec.max_beams, self._spec.laser_min_range, self._spec.farthest)
-
-    def surprised(self, scan: Scan, pose: Pose2) -> bool:
-        """Whether a scan is less likely at `pose` than the last one was at the best particle, by SURPRISE."""
-        beams = self.beams(scan)
-        likely = float(self._sensor.log_likelihood(np.array([pose]), beams, False)[0]) * self._sensor.tempering(beams)
-        return likely < self._likely - SURPRISE
 
     def move(self, delta: Pose2) -> None:
         """Move each particle by its own noisy copy of a motion that odometry reports in the base frame."""
@@ -141,7 +133,6 @@ class ParticleFilter:
         best, worst = logarithm.item(logarithm.argmax()), logarithm.item(logarithm.argmin())
         if best == worst and best > -np.inf:
             return None
-        self._likely = best * self._sensor.tempering(beams)
         shift = best if best > -np.inf else 0.0
         weights = self.particles.weights * np.exp(logarithm - shift)
         total = float(np.add.reduce(weights))

@@ -160,7 +160,7 @@ ELSEWHERE = {
     "ClearCostmap.clear_entirely": "tests/unit/stack/behaviors/test_motions.py",
     "Recovery.retries_since_progress": "tests/unit/stack/test_checks_and_limits.py",
     "VelocitySmoother.counter_turn_slip": "tests/unit/stack/test_slipping_wheels.py",
-    "Amcl.sure_update_factor": "tests/unit/stack/localizers/test_amcl.py",
+    "Amcl.sure_update_interval": "tests/unit/stack/localizers/test_amcl.py",
     # Whoever makes goals reads these.
     "SimpleGoalChecker.xy_goal_tolerance": "tests/unit/run/test_goal_tolerances.py",
     "SimpleGoalChecker.yaw_goal_tolerance": "tests/unit/run/test_goal_tolerances.py",

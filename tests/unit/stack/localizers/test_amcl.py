@@ -1,7 +1,7 @@
 """AMCL keeps Nav2's rhythm and stays sane whatever its sensors say."""
 
+import math
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -16,9 +16,10 @@ from simscen.core.sensing import Odometry, Scan
 from simscen.model.localizers import Amcl
 from simscen.stack.localizers.amcl import SURE_AFTER
 from simscen.stack.localizers.build import amcl
+from simscen.stack.localizers.particle_filter import ParticleFilter
 from simscen.stack.protocols import Localizer
 from simscen.stack.setting import Setting
-from simscen.testing.room import BEAMS, ODOMETRY_PERIOD, cast, drive, grid, localizer, run, scan, surroundings
+from simscen.testing.room import BEAMS, cast, drive, grid, localizer, run, scan, surroundings
 
 START = Pose2(-2.5, -1.8, 0.6)
 DEFAULT = Amcl()
@@ -63,52 +64,86 @@ def test_a_scan_corrects_only_after_enough_motion(step: Pose2, corrects: bool) -
     assert belief.updated == (24 if corrects else 0)
 
 
-def steps_between_corrections(spec: Amcl, seconds: float) -> Array:
-    """How far and by how much (k, 2) a robot drove and turned from one correction to the next."""
-    driven = drive(seconds)
-    beliefs = run(localizer(spec, Estimate(Pose2(*driven.truth[0]), (0.1, 0.1, 0.05)), 1), driven, 1)
-    rows = np.unique([belief.updated for belief in beliefs]) // ODOMETRY_PERIOD
-    poses = [Pose2(*row) for row in driven.truth[rows]]
-    return np.array([(before.distance(now), abs(before.between(now).yaw)) for before, now in pairwise(poses)])
+SURELY = Amcl(sure_update_interval=2, settling_distance=0.0)
+TOLD = Estimate(START, (0.05, 0.05, 0.02))
 
 
-def test_a_robot_that_is_sure_of_its_place_looks_at_a_scan_after_twice_the_motion() -> None:
-    sure, always = (
-        steps_between_corrections(Amcl(sure_update_factor=factor, settling_distance=0.0), 30.0) for factor in (2.0, 1.0)
-    )
-    told = always / (DEFAULT.update_min_d, DEFAULT.update_min_a)
-    assert (told.max(axis=1) < 1.6).all()
-    twice = sure[SURE_AFTER:] / (DEFAULT.update_min_d, DEFAULT.update_min_a)
-    assert (twice.max(axis=1) > 1.9).all()
-    assert (twice.max(axis=1) < 2.6).all()
-    assert sure[: SURE_AFTER - 1] == pytest.approx(always[: SURE_AFTER - 1])
+@pytest.fixture
+def compared(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Ticks of the scans that are compared with the map."""
+    ticks: list[int] = []
+    correct = ParticleFilter.correct
+
+    def watched(self: ParticleFilter, scan: Scan) -> tuple[Pose2, Array] | None:
+        ticks.append(scan.tick)
+        return correct(self, scan)
+
+    monkeypatch.setattr(ParticleFilter, "correct", watched)
+    return ticks
 
 
-def test_a_robot_whose_scan_does_not_show_the_map_looks_at_the_next_one_as_soon_as_any() -> None:
-    subject = localizer(Amcl(sure_update_factor=2.0, settling_distance=0.0), Estimate(START, (0.05, 0.05, 0.02)), 1)
-    updated = []
-    for k in range(SURE_AFTER + 8):
-        step, strange = Pose2(0.0, 0.0, 0.26 * k), k == SURE_AFTER + 4
-        here = seen(START.compose(step), 24 * k)
-        subject.on_odometry(odometry(24 * k, step))
-        subject.on_scan(replace(here, ranges=np.full_like(here.ranges, 1.2)) if strange else here)
-        updated.append(subject.belief.updated // 24)
-    later = SURE_AFTER + 5
-    assert updated[: SURE_AFTER + 3] == [*range(SURE_AFTER + 1), SURE_AFTER, SURE_AFTER + 2]
-    assert updated[later:] == list(range(later, len(updated)))
+@pytest.mark.parametrize("interval", [1, 2, 3])
+def test_who_is_sure_compares_one_of_so_many_scans_with_the_map(interval: int, compared: list[int]) -> None:
+    driven = drive(20.0)
+    spec = SURELY.model_copy(update={"sure_update_interval": interval})
+    beliefs = run(localizer(spec, Estimate(Pose2(*driven.truth[0]), TOLD.std), 1), driven, 1)
+    looked_at = list(dict.fromkeys(belief.updated for belief in beliefs))
+    assert compared == looked_at[: SURE_AFTER + 1] + looked_at[SURE_AFTER + interval :: interval]
 
 
-def test_who_is_sure_looks_again_at_once_when_the_wheels_slip() -> None:
-    """A scan is compared with the map where odometry says that the robot is, which takes a tenth of a correction."""
-    subject = localizer(Amcl(sure_update_factor=2.0, settling_distance=0.0), Estimate(START, (0.05, 0.05, 0.02)), 1)
-    for k in range(SURE_AFTER + 1):
+def test_a_covariance_of_scatter_is_learned_from_each_scan(compared: list[int]) -> None:
+    driven = drive(10.0)
+    spec = SURELY.model_copy(update={"covariance": "scatter"})
+    beliefs = run(localizer(spec, Estimate(Pose2(*driven.truth[0]), TOLD.std), 1), driven, 1)
+    assert compared == list(dict.fromkeys(belief.updated for belief in beliefs))
+    assert len(compared) > SURE_AFTER + 4
+
+
+def turning(subject: Localizer, until: int) -> None:
+    for k in range(until):
         moved(subject, 24 * k, Pose2(0.0, 0.0, 0.26 * k))
+
+
+def test_a_scan_that_is_not_compared_shows_how_far_the_robot_came(compared: list[int]) -> None:
+    """Wheels that are 2 cm off are no surprise, and not believed either."""
+    subject = localizer(SURELY, TOLD, 1)
+    turning(subject, SURE_AFTER + 1)
+    before, tick = subject.belief, 24 * (SURE_AFTER + 1)
+    said = Pose2(0.0, 0.0, 0.26 * (SURE_AFTER + 1))
+    truth = START.compose(said).compose(Pose2(0.02, 0.0, 0.0))
+    subject.on_odometry(odometry(tick, said))
+    subject.on_scan(seen(truth, tick))
+    after = subject.belief
+    assert after.updated == tick
+    assert tick not in compared
+    drifted = truth.between(after.pose), START.compose(Pose2(0.0, 0.0, 0.26 * SURE_AFTER)).between(before.pose)
+    assert math.dist(drifted[0][:2], drifted[1][:2]) < 0.008
+    assert np.linalg.eigvalsh(after.covariance).min() > 0
+    assert np.trace(after.covariance) > np.trace(before.covariance)
+
+
+def test_who_is_sure_compares_a_scan_at_once_when_the_wheels_slip(compared: list[int]) -> None:
+    subject = localizer(SURELY, TOLD, 1)
+    turning(subject, SURE_AFTER + 1)
     tick, said = 24 * (SURE_AFTER + 1), Pose2(0.0, 0.0, 0.26 * (SURE_AFTER + 1))
     slipped = said.compose(Pose2(0.3, 0.0, 0.0))
     subject.on_odometry(odometry(tick, said))
     subject.on_scan(seen(START.compose(slipped), tick))
-    assert subject.belief.updated == tick
-    assert np.hypot(*(np.array(START.compose(slipped)) - subject.belief.pose)[:2]) < 0.1
+    assert compared[-1] == tick
+    assert math.dist(START.compose(slipped)[:2], subject.belief.pose[:2]) < 0.1
+
+
+@pytest.mark.parametrize("strange_at", [SURE_AFTER + 3, SURE_AFTER + 4])
+def test_after_a_scan_that_does_not_show_the_map_each_is_compared(strange_at: int, compared: list[int]) -> None:
+    subject = localizer(SURELY, TOLD, 1)
+    for k in range(SURE_AFTER + 10):
+        step = Pose2(0.0, 0.0, 0.26 * k)
+        here = seen(START.compose(step), 24 * k)
+        subject.on_odometry(odometry(24 * k, step))
+        subject.on_scan(replace(here, ranges=np.full_like(here.ranges, 1.2)) if k == strange_at else here)
+    numbers = [tick // 24 for tick in compared]
+    sure = [k for k in range(SURE_AFTER + 1, strange_at) if (k - SURE_AFTER) % 2]
+    assert numbers == [k for k in range(SURE_AFTER + 10) if k not in sure]
 
 
 def test_between_corrections_odometry_carries_the_pose_and_uncertainty_grows() -> None:
