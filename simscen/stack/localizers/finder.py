@@ -197,12 +197,17 @@ class Finder:
             self._wait = 0.0
         return self._doubted
 
+    @property
+    def _strayed(self) -> bool:
+        """Whether it is where the map shows nothing, and went there: who was carried off may be anywhere."""
+        return self._astray >= ASTRAY and self._sure is not None
+
     def _sought(self, view: View, base: Pose2, here: Array) -> tuple[Array, Array] | None:
         poses, fits = self._search.places(view)
         waited, self._wait, self._driven = self._wait, BETWEEN, 0.0
         if not len(poses):
             return None
-        good, clear = (BACK_GOOD, BACK_PLAIN) if self._astray >= ASTRAY else (GOOD, PLAIN)
+        good, clear = (BACK_GOOD, BACK_PLAIN) if self._strayed else (GOOD, PLAIN)
         if self._known:
             order = np.argsort(-(fits := self._reached(poses, fits, base)), kind="stable")
             poses, fits = poses[order], fits[order]
@@ -222,7 +227,7 @@ class Finder:
                 self._astray = 0
                 return self._found(poses[:1], base)
         else:
-            more = MOST_BETWEEN if self._astray >= ASTRAY else 2 * max(waited, BETWEEN)
+            more = MOST_BETWEEN if self._strayed else 2 * max(waited, BETWEEN)
             self._suspected, self._wait = None, min(MOST_BETWEEN, more)
         return None
 

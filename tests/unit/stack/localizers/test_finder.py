@@ -108,3 +108,19 @@ def test_a_robot_that_saw_itself_carried_off_forgets_where_it_was(parted: bool, 
         if put is not None:
             puts.append(pose.between(Pose2(*put[0][0].tolist())))
     assert any(np.hypot(off.x, off.y) < 0.1 for off in puts) is found_again
+
+
+@pytest.mark.parametrize("carried_off", [True, False])
+def test_who_was_carried_off_is_found_by_what_is_too_little_for_who_left_the_map(carried_off: bool) -> None:
+    """Rooms that nobody mapped look like mapped ones, and who went there is there; who was carried off is anywhere."""
+    trust = MapTrust(obstacle_field(grid(), 2.0), beyond_the_map(grid()).ravel(), 0.45, 0.8)
+    finder, away, puts = Finder(GlobalSearch(grid()), trust, Estimate(START), 0.0), Pose2(40.0, 3.0, 0.7), []
+    for k, driven in enumerate([0.04 * k for k in range(25)] + [1.0 + 0.25 * k for k in range(10)]):
+        pose = START.compose(Pose2(driven, 0.0, 0.0))
+        ranges = cast(np.array([pose]), -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS))[0]
+        ranges[::6] *= 0.5  # people
+        way = Moved(parted=carried_off and k == 1)
+        put = finder.places(scan(ranges), Pose2(driven, 0.0, 0.0), pose.compose(away), (0.0, 100.0), way)
+        if put is not None:
+            puts.append(pose.between(Pose2(*put[0][0].tolist())))
+    assert [np.hypot(off.x, off.y) < 0.1 for off in puts[:1]] == [True] * carried_off
