@@ -113,18 +113,18 @@ class PlanKeeper:
         reason = self._must_replan(now, pose, plan)
         if reason:
             self._ask(tick, goal, pose, reason)
-        elif wish := self._moved(now, pose, plan) or self._may_replan(now, plan):
+        elif wish := self._moved(now, pose, plan) or self._may_replan(now, goal, pose, plan):
             self._ask(tick, goal, pose, wish, wished=True)
 
     def _ask(self, tick: int, goal: Goal, pose: Pose2, reason: str, wished: bool = False) -> None:
         """Plan from here and now; the answer is there when the planner would be done."""
-        due, before = tick + self._latency, (self._partial, self._origin)
+        due, before = tick + self._latency, (self._partial, self._origin, self._bent)
         try:
             answer: Path | NavigationFailure = self._compute(due, goal, pose)
         except NavigationFailure as failure:
             answer = failure
-        self._asked = _Asked(due, reason, wished, answer, self._partial, self._origin)
-        self._partial, self._origin = before
+        self._asked = _Asked(due, reason, wished, answer, self._partial, self._origin, self._bent)
+        self._partial, self._origin, self._bent = before
 
     def _hear(self, tick: int, now: float) -> tuple[Event, ...]:
         """Follow the plan that was asked for, once it is there. Raises what it failed with."""
@@ -136,9 +136,9 @@ class PlanKeeper:
             if asked.wished:
                 return ()  # it was only a look: the plan that is being followed is still good
             raise asked.answer
-        if asked.reason == "better" and (self.plan is None or not self.plan.worse_than(asked.answer)):
+        if asked.reason == "better" and (self.plan is None or not self.plan.worse_than(asked.answer.length())):
             return ()
-        self._partial, self._origin = asked.partial, asked.origin
+        self._partial, self._origin, self._bent = asked.partial, asked.origin, asked.bent
         return (self._adopt(tick, now, asked.answer, asked.reason),)
 
     def _must_replan(self, now: float, pose: Pose2, plan: PlanInForce) -> str:
@@ -173,7 +173,7 @@ class PlanKeeper:
         self._minded = now
         return "moving"
 
-    def _may_replan(self, now: float, plan: PlanInForce) -> str:
+    def _may_replan(self, now: float, goal: Goal, pose: Pose2, plan: PlanInForce) -> str:
         """Why there may be a better plan by now; "" if nothing speaks for it."""
         if self._spec.replanning == "rate":
             return ""
@@ -187,7 +187,11 @@ class PlanKeeper:
         self._looked, cells = now, self._costmap.obstacle_cells
         gone = cells < self._most - GONE
         self._most = cells if gone else max(self._most, cells)
-        return "better" if gone else ""
+        return "better" if gone and self._can_be_shorter(goal, pose, plan) else ""
+
+    def _can_be_shorter(self, goal: Goal, pose: Pose2, plan: PlanInForce) -> bool:
+        """Whether a plan straight to where the goal may be reached would be taken: no other is shorter."""
+        return self._partial or plan.worse_than(pose.distance(goal.pose) - goal.xy_tolerance)
 
     def _compute(self, tick: int, goal: Goal, pose: Pose2) -> Path:
         """One path through all that is to be passed; where it turns from one to the next, it heads for the next."""
@@ -247,3 +251,4 @@ class _Asked:
     answer: Path | NavigationFailure
     partial: bool
     origin: tuple[float, float]
+    bent: bool

@@ -118,7 +118,7 @@ class PlanInForce:
         end = int(np.searchsorted(along, along[index] + SOON, side="right"))
         return bool(self._tight[index:end].any())
 
-    def worse_than(self, other: Path) -> bool:
-        """Whether another path is clearly shorter than what is left of this one."""
-        left, length = self.remaining(), other.length()
+    def worse_than(self, length: float) -> bool:
+        """Whether another plan, so many metres long, is clearly shorter than what is left of this one."""
+        left = self.remaining()
         return length < CLEARLY_SHORTER * left and length < left - AT_LEAST

@@ -361,9 +361,8 @@ def test_a_plan_is_blocked_by_what_comes_to_lie_ahead_on_it_but_not_behind() -> 
 @pytest.mark.parametrize(("length", "better"), [(1.0, True), (2.4, True), (2.6, False)])
 def test_another_plan_must_be_clearly_shorter(length: float, better: bool) -> None:
     line = np.column_stack((np.linspace(0, 3, 61), np.zeros(61), np.zeros(61)))
-    other = Path(np.array([[0, 0, 0], [length, 0, 0]], dtype=float))
     plan = PlanInForce(Path(line), 0.2, view_of(Flatland(), round_robot()))
-    assert plan.worse_than(other) == better
+    assert plan.worse_than(length) == better
 
 
 def test_a_plan_is_tight_where_it_has_lost_room_soon_but_not_where_it_never_had_any() -> None:

@@ -114,6 +114,18 @@ def test_an_obstacle_that_has_gone_gives_cause_to_look_and_a_clearly_shorter_pla
     assert bench.steps(60) == ["better"]
 
 
+def test_where_not_even_the_straight_way_is_clearly_shorter_nobody_looks_for_a_better_plan() -> None:
+    """The planner would be busy with it, and a plan that is blocked would have to wait."""
+    for bulge, looked in ((1.0, False), (2.5, True)):  # 6.4 m and 8.5 m instead of 6
+        bench = Bench()
+        bench.script.bulge = bulge
+        bench.see((2.5, 3.0, 0.2))
+        bench.steps(4)
+        bench.see()
+        assert bench.steps(60) == []
+        assert (len(bench.script.seeds) == 2) == looked
+
+
 def test_a_look_for_a_better_plan_that_fails_is_no_failure() -> None:
     bench = Bench()
     bench.script.bulge = 2.5
@@ -216,6 +228,17 @@ def test_a_plan_that_meets_what_moves_is_made_anew_twice_a_second_until_nothing_
     assert bench.steps(20) == ["moving", "moving"]
     bench.costmap.moving = NOTHING
     assert bench.steps(40) == ["moving"]  # straight again
+
+
+def test_a_plan_around_what_moves_that_is_not_taken_is_no_cause_for_more() -> None:
+    bench = Bench()
+    bench.script.bulge = 2.5
+    bench.see((2.5, 3.0, 0.4))
+    bench.steps(4)
+    bench.costmap.moving = across(2.2, -0.2)  # off the plan, but where others might lead
+    bench.see()
+    assert bench.steps(60) == []
+    assert len(bench.script.seeds) == 2  # one look for a better one
 
 
 def test_who_walks_away_is_no_reason_for_another_plan() -> None:
