@@ -23,7 +23,9 @@ GLOBAL_RATE, LOCAL_RATE = 0.5, 1.0
 CELLS_A_SECOND = 125_000
 """Of each costmap; a large one is published so much more rarely."""
 # As nav2_costmap_2d's publisher translates costs: 1 … 252 become 1 … 98.
-_PUBLISHED = np.array([0, *(1 + 97 * (cost - 1) // 251 for cost in range(1, 253)), 99, 100, UNKNOWN], dtype=np.int8)
+_PUBLISHED = np.array(
+    [0, *(1 + 97 * (cost - 1) // 251 for cost in range(1, 253)), 99, 100, UNKNOWN], dtype=np.int8
+).tobytes()
 
 
 Published = tuple[Path | None, Path | None, tuple[CostGrid, ...]]
@@ -98,5 +100,6 @@ class _Drawn:
         if view.revision == self.revision:
             return None
         self.revision = view.revision
-        grid = OccupancyGrid(_PUBLISHED.take(view.costs), view.resolution, Pose2(*view.origin))
+        cells = np.frombuffer(view.costs.tobytes().translate(_PUBLISHED), dtype=np.int8).reshape(view.costs.shape)
+        grid = OccupancyGrid(cells, view.resolution, Pose2(*view.origin))
         return CostGrid(self.name, self.frame, grid)

@@ -112,7 +112,7 @@ class Costmap:
     @property
     def obstacle_cells(self) -> int:
         """How many cells are marked as live obstacles, or were forbidden since the start."""
-        return int(np.count_nonzero(self._live.marked())) + self._zoned
+        return self._live.count + self._zoned
 
     def update(self, base: Pose2, seen: Scan | Image) -> None:
         """Clear what a sensor sees through, then mark what it sees, from the robot at `base`."""

@@ -84,6 +84,11 @@ class LiveLayer:
         """The same by number."""
         return self._marks if self._heights is None else np.flatnonzero(self.marked())
 
+    @property
+    def count(self) -> int:
+        """How many they are; some are listed twice, as two beams hit them at once."""
+        return len(set(self._marks.tolist())) if self._heights is None else int(np.count_nonzero(self.marked()))
+
     def on_scan(self, base: Pose2, scan: Scan, walls: Squared | None) -> Numbers:
         """Clear what the beams pass through, then mark what they hit; returns the cells that have changed.
 
@@ -117,13 +122,14 @@ class LiveLayer:
         marks, frame, scanned = self._marks, self._frame, self._scanned.reshape(-1)
         points = frame.points(marks)
         gone, nearest = crossed(points, frame.resolution, scan, base, self._spec)
+        beneath = nearest < self._inscribed + math.hypot(scan.mount.x, scan.mount.y)
+        if not beneath and not len(gone):
+            return NONE
         scanned[marks[gone]] = False
         scanned[seen] = True
-        if nearest < self._inscribed + math.hypot(scan.mount.x, scan.mount.y):
+        if beneath:
             under = np.abs(points - complex(base.x, base.y)) < self._inscribed
             scanned[marks[under]] = False  # Nav2's footprint_clearing_enabled, for the inscribed circle
-        elif not len(gone):
-            return NONE
         kept = scanned.take(marks)
         if kept.all():
             return NONE
