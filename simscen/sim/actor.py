@@ -57,7 +57,8 @@ class Actor:
 class About(NamedTuple):
     """The actors that at a tick were within a distance in metres of a place, and all that may be pushed unless asleep.
 
-    `asleep` is since when all of those have been lying still; None where they have not.
+    `asleep` is since when all of those have been lying still; None where they have not. `lying` are number, place and
+    size of each, where none of these moves.
     """
 
     actors: tuple[Actor, ...]
@@ -65,6 +66,7 @@ class About(NamedTuple):
     distance: float
     tick: int
     asleep: int | None
+    lying: tuple[tuple[int, Vector, float], ...] | None
 
     def holds(self, place: Vector, distance: float, tick: int, step: float) -> bool:
         """Whether no other can be within a distance of a place at a tick, moving `step` metres a tick at most."""

@@ -29,6 +29,8 @@ NEVER = 2**62
 """A tick that never comes."""
 ABOUT = 2.0
 """m farther than was asked for within which things are looked for, so that the others need not be looked at soon."""
+AHEAD = 4
+"""Seconds for which it is worked out at once where scripts have things."""
 JUMP = 50.0
 """A script that asks for more m/s than this sets its body down elsewhere, rather than hurl it through the world."""
 
@@ -285,8 +287,8 @@ class Actors:
     def look_ahead(self, tick: int, period: int) -> None:
         """`poses` will be asked at `tick`, which is now, and every `period` ticks after it.
 
-        Where scripts have things then is worked out for all of the next second at once, as long as nothing comes, goes
-        or is pushed.
+        Where scripts have things then is worked out for some seconds at once, as long as nothing comes, goes or is
+        pushed.
         """
         if (self._foreseen is not None and tick in self._foreseen.ticks) or not self._travelling:
             return
@@ -296,7 +298,7 @@ class Actors:
             return
         if self._tracks is None:
             self._tracks = Tracks([(self._path(actor), actor.body.pose.z) for actor in self._travelling])
-        ticks = range(tick, tick + max(1, self._rate // period) * period, period)
+        ticks = range(tick, tick + max(1, AHEAD * self._rate // period) * period, period)
         since = np.array([actor.since for actor in self._travelling])
         table = self._tracks.at((np.array(ticks)[:, np.newaxis] - since) / self._rate)
         names = tuple(actor.body.name for actor in self._travelling)
@@ -378,7 +380,7 @@ class Actors:
         `by` is the number of the robot that asks. A scripted one is put where it is now if that is so near, or where
         the engine has had it until now: nobody is to run into what has gone.
         """
-        near, poses = list[int](), self.poses(tick)
+        poses = self.poses(tick)
         asleep = self._still_since if not self._pushable or self._asleep(tick) else None
         about = self._about.get(by)
         if (
@@ -387,6 +389,9 @@ class Actors:
             or not about.holds(place, distance, tick, self._fastest / self._rate)
         ):
             about = self._about[by] = self._look_about(place, distance + ABOUT, tick, asleep)
+        if about.lying is not None:
+            return [number for number, there, size in about.lying if math.dist(there, place) <= distance + size]
+        near = list[int]()
         for actor in about.actors:
             pose, reach = poses[actor.body.name], distance + actor.size
             is_near = math.dist(pose[:3], place) <= reach
@@ -422,7 +427,10 @@ class Actors:
             if (asleep is None and actor.pushable)
             or min(math.dist(poses[name][:3], place), math.dist(actor.shown[:3], place)) <= distance + actor.size
         )
-        return About(actors, place, distance, tick, asleep)
+        lying = None
+        if not any(actor.path is not None or (asleep is None and actor.pushable) for actor in actors):
+            lying = tuple((actor.id, poses[actor.body.name].position, actor.size) for actor in actors)
+        return About(actors, place, distance, tick, asleep, lying)
 
     @property
     def loose(self) -> bool:

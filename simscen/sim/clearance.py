@@ -10,7 +10,7 @@ import pybullet
 
 from simscen.core.geometry import Pose3
 from simscen.core.shapes import TriangleMesh
-from simscen.sim.actors import Actors
+from simscen.sim.actors import NEVER, Actors
 from simscen.sim.drives import Base
 from simscen.sim.outline import extremes
 from simscen.sim.outline import reach as reach_of
@@ -103,8 +103,11 @@ class Clearance:
         self._measured_at, self.no_contact_before, self._alone, self._waits_until = -1, tick, None, -1
         self._actors.undisturbed(self._base.id, until=tick)
 
-    def measure(self, tick: int) -> float:
-        """The clearance at `tick`, which is now, in metres; the reach where nothing is nearer."""
+    def measure(self, tick: int, ticks: int = NEVER) -> float:
+        """The clearance at `tick`, which is now, in metres; the reach where nothing is nearer.
+
+        It is asked again after so many `ticks`; how long nothing can be touched is told anew if not known until then.
+        """
         if self._measured_at == tick:
             return self._distance
         pose = self._state().pose
@@ -118,8 +121,9 @@ class Clearance:
         if self.enclosed_by is not None:
             self._distance = -abs(self._distance)
             gap = self._distance
-        free = min(HORIZON, max(0.0, gap - TOLERANCE) / self._fastest(tick))
-        self.no_contact_before = tick + (math.floor(free * self._rate) if tick != self._shaken_at else 0)
+        if self.no_contact_before < tick + ticks:
+            free = min(HORIZON, max(0.0, gap - TOLERANCE) / self._fastest(tick))
+            self.no_contact_before = tick + (math.floor(free * self._rate) if tick != self._shaken_at else 0)
         self._actors.undisturbed(self._base.id, until=self.no_contact_before)
         self._alone, self._waits_until = None, -1
         if not (self.others or self.unsure) and self._ways is self._proximity:

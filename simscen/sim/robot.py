@@ -12,7 +12,7 @@ from simscen.core.geometry import Pose2, Pose3
 from simscen.core.motion import Twist
 from simscen.core.shapes import Body, TriangleMesh
 from simscen.core.trace import Late, Truth
-from simscen.sim.actors import Actors
+from simscen.sim.actors import NEVER, Actors
 from simscen.sim.camera import picture
 from simscen.sim.clearance import Clearance
 from simscen.sim.contacts import Before, Contacts, Motion, inside, touches
@@ -154,7 +154,7 @@ class Robot:
         if not self._contacts.touching and self.clearance.can_wait(tick, ticks, state.pose):
             return self.samples.take(state, self.objects())
         self.samples.settle()
-        return self._truth(tick, state)
+        return self._truth(tick, state, ticks)
 
     def _sound(self, tick: int) -> State:
         """Its state. Raises RunError when the physics has lost it or anything else."""
@@ -167,8 +167,8 @@ class Robot:
             raise RunError("diverged", f"simulation diverged at t={tick / self._scene.rate:.3f} s: {trouble}")
         return state
 
-    def _truth(self, tick: int, state: State) -> Truth:
-        clearance = self.clearance.measure(tick)
+    def _truth(self, tick: int, state: State, ticks: int = NEVER) -> Truth:
+        clearance = self.clearance.measure(tick, ticks)
         if self._contacts.touched(tick):
             clearance = min(clearance, 0.0)  # surfaces that press on each other may be a hair apart
         return Truth(state.pose, state.twist, clearance, self.objects())

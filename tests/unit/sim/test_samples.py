@@ -36,3 +36,23 @@ def test_samples_looked_at_later_are_those_of_the_moment(simulate, mass: float) 
     looked_at = [sample if isinstance(sample, Truth) else sample.truth() for sample in late]
     assert looked_at == seen
     assert sum(type(truth.objects) is Places for truth in looked_at) > 100  # worked out ahead, nearly always
+
+
+def test_samples_among_things_that_sleep_and_are_pushed_are_those_of_the_moment(simulate) -> None:
+    crate = (Solid(Box((0.3, 0.3, 0.3))),)
+    lying = [Body(f"crate {k}", crate, Pose3(x, y, 0.15), 0.5) for k, (x, y) in enumerate([(3, 0), (2, 2), (0, 4)])]
+    cart = Body("cart", (box("cart", 0, 0, 0.4, 0.4),), Pose3(-1.0, 4.0), path=MotionPath(
+        (0.0, 8.0, 12.0), (Pose2(-1.0, 4.0), Pose2(-1.0, 4.0), Pose2(1.0, 4.0))))  # fmt: skip
+    asked, waiting = (simulate(bodies=[*lying, cart], drive=(0.5, 0.0, 0.0)) for _ in range(2))
+    seen, late = [], []
+    for _ in range(560):
+        for simulation in (asked, waiting):
+            simulation.step(6)
+        seen.append(asked.truth())
+        late.append(waiting.robot.sample(6))
+    assert [sample if isinstance(sample, Truth) else sample.truth() for sample in late] == seen
+    assert [event.name for event in asked.collisions()] == [event.name for event in waiting.collisions()]
+    first, last = (truth.objects for truth in (seen[0], seen[-1]))
+    assert last["crate 0"].x > first["crate 0"].x + 0.5  # by the robot
+    assert last["crate 2"].x > first["crate 2"].x + 0.5  # by the cart
+    assert last["crate 1"] == first["crate 1"]
