@@ -24,8 +24,8 @@ from simscen.sim.enclosure import TILT, winds_along_a_line, winds_around
 from simscen.sim.parts import parts_of
 from simscen.sim.robot_body import RobotBody
 
-STRIDE = 0.5
-"""m that the robot may move before the list of solids around it is made anew."""
+STRIDE, FAR_STRIDE = 0.5, 4.0
+"""m that the robot may move before the list of solids around it is made anew, and that of those it is made of."""
 SLACK = 0.15
 """m beyond the nearest within which others are measured too, so that they need not be asked again at once."""
 NO_PLACE, NO_TURN = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
@@ -52,6 +52,8 @@ class Proximity:
         self._nearest: int | None = None
         self._distance = math.inf
         self._pose, self._centre = Pose3(), (math.inf, math.inf)
+        self._standing: npt.NDArray[np.int64] = np.flatnonzero(self._parts.high[:, 2] > FLOOR)
+        self._about, self._far_centre = self._standing, self._centre
 
     def distance(self, pose: Pose3) -> float:
         """Distance in metres from the robot, with its base at `pose`, to the nearest solid; inf beyond the reach.
@@ -107,18 +109,26 @@ class Proximity:
     def _look_around(self, pose: Pose3) -> None:
         """Lists the parts that may come within reach during the next stride."""
         self._centre = (pose.x, pose.y)
-        low, high = self._parts.low[:, :2], self._parts.high[:, :2]
-        outside = np.maximum(np.maximum(low - self._centre, self._centre - high), 0.0)
-        far = np.hypot(outside[:, 0], outside[:, 1]) - self._radius
-        near = np.flatnonzero((far < self._reach + STRIDE) & (self._parts.high[:, 2] > FLOOR))
+        if math.dist(self._centre, self._far_centre) > FAR_STRIDE:
+            self._far_centre = self._centre
+            self._about, _ = self._within(self._reach + STRIDE + FAR_STRIDE, self._standing)
+        near, far = self._within(self._reach + STRIDE, self._about)
         known = self._bounds
         self._bounds = {
             part: max(bound + self._travelled, known.get(part, -math.inf))
-            for bound, part in sorted(zip(far[near].tolist(), near.tolist(), strict=True))
+            for bound, part in sorted(zip(far.tolist(), near.tolist(), strict=True))
         }
         self._least = -math.inf
         if self._nearest not in self._bounds:
             self._nearest = None
+
+    def _within(self, metres: float, parts: npt.NDArray[np.int64]) -> tuple[npt.NDArray[np.int64], Array]:
+        """Those of some parts that may be within so many metres of the robot, and how far they are at least."""
+        low, high = self._parts.low[parts, :2], self._parts.high[parts, :2]
+        outside = np.maximum(np.maximum(low - self._centre, self._centre - high), 0.0)
+        far = np.hypot(outside[:, 0], outside[:, 1]) - self._radius
+        near = far < metres
+        return parts[near], far[near]
 
     def _build(self, part: int) -> list[int]:
         vertices, faces = self._mesh.vertices, self._mesh.faces[self._parts.faces(part)]
