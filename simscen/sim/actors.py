@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pybullet
 
-from simscen.core.foreseen import Foreseen
 from simscen.core.geometry import Pose2, Pose3, wrap
 from simscen.core.motion_path import Track, top_speed
 from simscen.core.shapes import Body, MotionPath
-from simscen.core.tracks import Tracks
 from simscen.sim import engine
 from simscen.sim.actor import About, Actor, Placing, Vector
+from simscen.sim.ahead import Ahead
 from simscen.sim.enclosure import winds_around
 from simscen.sim.encounters import HORIZON, Balls, encounters
+from simscen.sim.homes import Homes
 from simscen.sim.inertia import GRAVITY, of_solids
 from simscen.sim.lost import lost
 from simscen.sim.outline import reach
@@ -29,8 +29,6 @@ NEVER = 2**62
 """A tick that never comes."""
 ABOUT = 2.0
 """m farther than was asked for within which things are looked for, so that the others need not be looked at soon."""
-AHEAD = 4
-"""Seconds for which it is worked out at once where scripts have things."""
 JUMP = 50.0
 """A script that asks for more m/s than this sets its body down elsewhere, rather than hurl it through the world."""
 
@@ -63,11 +61,8 @@ class Actors:
         self._lying: Balls | None = None
         self._moved: list[Actor] = []
         self._about: dict[int, About] = {}
-        self._tracks: Tracks | None = None
-        self._foreseen: Foreseen | None = None
-        self.homes: Mapping[str, Pose3] = {}
-        """Where things that can be pushed lay when all had settled, or came to rest later; most lie there for good."""
-        self._lay: Mapping[str, Pose3] | None = None
+        self._ahead = Ahead((), tick_rate)
+        self._homes = Homes()
 
     def add(self, body: Body, tick: int) -> None:
         """Put a body into the world; one of the same name makes way."""
@@ -154,7 +149,7 @@ class Actors:
         actor.path, actor.since, actor.speed = path, tick, speed
         actor.led, actor.track = True, None
         actor.scripted.clear()
-        self._tracks = self._foreseen = None
+        self._ahead = Ahead(self._travelling, self._rate)
         self._fastest = max(self._fastest, speed)
 
     def _sort(self) -> None:
@@ -165,7 +160,7 @@ class Actors:
         self._pushable = [actor for actor in self._actors.values() if actor.pushable]
         self._looked_until, self._meeting, self._lying = -1, [], None
         self._about.clear()
-        self._tracks = self._foreseen = None
+        self._ahead = Ahead(self._travelling, self._rate)
         self._moved = list(self._pushable)
         for actor in self._pushable:
             engine.wake(self._client, actor.id)  # what lay on something that is gone has to fall
@@ -184,16 +179,14 @@ class Actors:
         self._posed_at = None
 
     def settled(self, tick: int) -> None:
-        """It is time to see what lies where it lay when this was called before: there it is at home.
-
-        What has left its home, or is gone, keeps it for when it is there again to the last bit.
-        """
+        """It is time to see what lies where it lay when this was called before: there it is at home."""
         poses = self.poses(tick)
-        lie = {actor.body.name: poses[actor.body.name] for actor in self._pushable}
-        before, self._lay = lie if self._lay is None else self._lay, lie
-        come = {name: pose for name, pose in lie.items() if before.get(name) == pose != self.homes.get(name)}
-        if come:
-            self.homes = {**self.homes, **come}
+        self._homes.look({actor.body.name: poses[actor.body.name] for actor in self._pushable})
+
+    @property
+    def homes(self) -> Mapping[str, Pose3]:
+        """Where things that can be pushed lay when all had settled, or came to rest later; most lie there for good."""
+        return self._homes.poses
 
     def shaken(self, tick: int) -> None:
         """Something is pushed during the step from `tick` on: how fast things are now says nothing about it."""
@@ -272,11 +265,11 @@ class Actors:
             return self._poses
         if self._posed_at is None or (self._pushable and not self._asleep(tick)):
             self._poses = {name: self._pose(actor, tick) for name, actor in self._actors.items()}
-            self._foreseen = None
+            self._ahead.forget()
             if self._still_since is None or not all(actor.resting for actor in self._pushable):
                 self._still_since = tick
         elif self._travelling:
-            foreseen = None if self._foreseen is None else self._foreseen.at(tick)
+            foreseen = self._ahead.at(tick)
             if foreseen is not None:
                 self._poses = foreseen
             else:
@@ -290,24 +283,8 @@ class Actors:
         Where scripts have things then is worked out for some seconds at once, as long as nothing comes, goes or is
         pushed.
         """
-        if (self._foreseen is not None and tick in self._foreseen.ticks) or not self._travelling:
-            return
-        if self._posed_at is None or any(actor.led for actor in self._travelling):
-            return
-        if self._pushable and not self._asleep(tick):
-            return
-        if self._tracks is None:
-            self._tracks = Tracks([(self._path(actor), actor.body.pose.z) for actor in self._travelling])
-        ticks = range(tick, tick + max(1, AHEAD * self._rate // period) * period, period)
-        since = np.array([actor.since for actor in self._travelling])
-        table = self._tracks.at((np.array(ticks)[:, np.newaxis] - since) / self._rate)
-        names = tuple(actor.body.name for actor in self._travelling)
-        self._foreseen = Foreseen(ticks, names, table, {**self._poses})
-
-    @staticmethod
-    def _path(actor: Actor) -> MotionPath:
-        assert actor.path is not None
-        return actor.path
+        if self._travelling and self._posed_at is not None and (not self._pushable or self._asleep(tick)):
+            self._ahead.look(tick, period, self._poses)
 
     def _track(self, actor: Actor) -> Track:
         if actor.track is None:
