@@ -20,6 +20,8 @@ def with_faulty_map(prepared: Prepared, seed: int) -> Prepared:
     if not prepared.robots:
         return _of_one(prepared, Streams(seed))
     parts = {name: _of_one(part, Streams(seed, name)) for name, part in prepared.robots.items()}
+    if all(parts[name] is part for name, part in prepared.robots.items()):
+        return prepared  # and what has been worked out of it
     first = next(iter(parts.values()))
     return replace(prepared, map=first.map, mapped=first.mapped, robots=parts)
 

@@ -1,0 +1,45 @@
+"""The map that each robot gets: of runs that no fault changes it for, what was worked out before stays."""
+
+from pathlib import Path
+
+import pytest
+
+from simscen.loading.scenario import load_scenario
+from simscen.run.faultymap import with_faulty_map
+from simscen.run.prepare import Prepared, prepare
+
+SCENARIO = """\
+simscen: 1
+world:
+  simscen: 1
+  walls: [{points: [[0, 0], [4, 0], [4, 4], [0, 4], [0, 0]]}]
+robots:
+  a: {pose: {x: 1, y: 1}, goals: [{pose: {x: 1.5, y: 1}}]}
+  b: {pose: {x: 3, y: 3}, goals: [{pose: {x: 2.5, y: 3}}]FAULTS}
+time_limit: 6
+pass: [{goals_reached: {}}]
+"""
+
+
+@pytest.fixture
+def two(tmp_path: Path):
+    """Two robots, the second with some faults."""
+
+    def prepared(faults: str = "") -> Prepared:
+        (tmp_path / "a.scenario.yaml").write_text(SCENARIO.replace("FAULTS", faults))
+        return prepare(load_scenario(tmp_path / "a.scenario.yaml", tmp_path))
+
+    return prepared
+
+
+def test_robots_whose_maps_are_true_run_with_what_was_prepared(two) -> None:
+    prepared = two()
+    assert with_faulty_map(prepared, seed=1) is prepared
+
+
+def test_only_the_robot_whose_map_has_a_fault_gets_another(two) -> None:
+    prepared = two(", faults: [{sensor: map, shift: {x: 10 cm}}]")
+    run = with_faulty_map(prepared, seed=1)
+    assert run.robots["a"] is prepared.robots["a"]
+    assert run.robots["b"].mapped == (0,)
+    assert run.robots["b"].map is not prepared.robots["b"].map
