@@ -1,14 +1,15 @@
 """How near the robot is to what never moves, solid by solid.
 
 Asking the fused mesh would be exact too, but costs 0.6 µs for each triangle within reach: 20 to 40 ms of CPU for each
-simulated second in a BARN world (28 facets a cylinder, 40 Hz). Here every solid that is convex is one convex shape, in
-an engine of its own that is never stepped, built when the robot first comes near. A concave solid as large as a map
-(188 000 triangles in one) is taken in tiles, each built and asked only when the robot is near it.
+simulated second in a BARN world (28 facets a cylinder, 40 Hz). Here every solid that is convex is one convex shape,
+built when the robot first comes near, of an engine of its own that is never stepped and has no bodies. A concave solid
+as large as a map (188 000 triangles in one) is taken in tiles, each built and asked only when the robot is near it.
 """
 
 import itertools
 import math
 from collections.abc import Collection
+from heapq import heappop, heappush, heapreplace
 
 import numpy as np
 import numpy.typing as npt
@@ -24,13 +25,20 @@ from simscen.sim.enclosure import TILT, winds_along_a_line, winds_around
 from simscen.sim.parts import parts_of
 from simscen.sim.robot_body import RobotBody
 
-STRIDE, FAR_STRIDE = 0.5, 4.0
-"""m that the robot may move before the list of solids around it is made anew, and that of those it is made of."""
+STRIDE = 4.0
+"""m that the robot may move before the list of solids around it is made anew."""
 SLACK = 0.15
 """m beyond the nearest within which others are measured too, so that they need not be asked again at once."""
+MARGIN = 0.001
+"""m by which Bullet takes a mesh for larger than it is; of a body it could be told not to, but one takes 0.2 ms."""
+ROUNDED = 0.002
+"""m that a robot may extend farther than the corners of its shapes, by which it is bounded."""
 NO_PLACE, NO_TURN = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
 NOISE = 0.005
 """m farther than the nearest may have gone within which it is measured; what lies farther costs time."""
+
+Around = tuple[float, int, tuple[float, float, float, float]]
+"""A lower bound of the distance to a part plus what had been travelled when that was known; the part; its extent."""
 
 
 class Proximity:
@@ -39,21 +47,20 @@ class Proximity:
     def __init__(self, static: TriangleMesh, robot: RobotBody, reach: float) -> None:
         self._client = CLIENTS.take()
         self._mesh, self._reach = static, reach
-        self._radius, height = outline.reach(robot.solid)
-        self._extent = math.hypot(self._radius, height)
+        radius, self._height = outline.reach(robot.solid)
+        self._radius, self._extent = radius + ROUNDED, math.hypot(radius, self._height)
         self._hull = engine.hull_shapes(self._client, robot.solid)
         self._parts = parts_of(static)
         self._pairs: dict[int, list[tuple[int, int]]] = {}
-        # For each part around: a lower bound of its distance plus what had been travelled when that was known.
-        self._bounds: dict[int, float] = {}
+        self._others: list[Around] = []
+        """Parts around but for the nearest, as a heap: only while the first may be nearer has any to be looked at."""
         self._travelled = 0.0
-        # The least of them, but for the nearest part's: as long as that is farther, no other has to be looked at.
-        self._least = -math.inf
-        self._nearest: int | None = None
+        self._nearest: Around | None = None
         self._distance = math.inf
         self._pose, self._centre = Pose3(), (math.inf, math.inf)
         self._standing: npt.NDArray[np.int64] = np.flatnonzero(self._parts.high[:, 2] > FLOOR)
-        self._about, self._far_centre = self._standing, self._centre
+        low, high = self._parts.low[self._standing], self._parts.high[self._standing]
+        self._extents = np.ascontiguousarray((low[:, 0], low[:, 1], high[:, 0], high[:, 1]))
 
     def distance(self, pose: Pose3) -> float:
         """Distance in metres from the robot, with its base at `pose`, to the nearest solid; inf beyond the reach.
@@ -69,78 +76,77 @@ class Proximity:
             self._look_around(pose)
         nearest = math.inf
         if self._nearest is not None:
-            nearest = self._measure(self._nearest, min(self._distance + moved + NOISE, self._reach))
+            nearest = self._measure(self._nearest[1], min(self._distance + moved + NOISE, self._reach))
             if nearest == math.inf:
-                self._nearest, self._least = None, -math.inf
-        if self._least - self._travelled < min(nearest, self._reach):
+                heappush(self._others, self._nearest)
+                self._nearest = None
+        if self._others and self._others[0][0] < min(nearest, self._reach) + self._travelled:
             nearest = self._look_for_nearer(nearest)
         self._distance = nearest
         return nearest
 
     def _look_for_nearer(self, nearest: float) -> float:
-        """Measures the other parts that may be nearer."""
+        """Measures the other parts that may be nearer, unless what they extend over is too far by now."""
+        others, travelled, (x, y) = self._others, self._travelled, self._pose[:2]
+        radius = self._radius + 2 * self._height * math.hypot(*self._pose[3:5])  # where it is tilted, its top leans
         limit = min(nearest, self._reach)
-        for part, bound in self._bounds.items():
-            if bound - self._travelled < limit and part != self._nearest:
-                found = self._measure(part, min(nearest + SLACK, self._reach))
+        # Sums are compared, for of two that are rounded alike the greater stays so: each bound of `limit` ends this.
+        while others and others[0][0] < limit + travelled:
+            _, part, extent = others[0]
+            left, low, right, high = extent
+            bound = math.hypot(max(left - x, 0.0, x - right), max(low - y, 0.0, y - high)) - radius
+            if bound < limit:
+                bound = min(nearest + SLACK, self._reach)
+                found = self._measure(part, bound)
                 if found < nearest:
-                    nearest, self._nearest = found, part
-                    limit = min(nearest, self._reach)
-        others = [bound for part, bound in self._bounds.items() if part != self._nearest]
-        self._least = min(others, default=math.inf)
+                    heappop(others)
+                    if self._nearest is not None:
+                        heappush(others, (nearest + travelled, *self._nearest[1:]))
+                    self._nearest = 0.0, part, extent
+                    nearest = limit = found
+                    continue
+                bound = min(found, bound)
+            heapreplace(others, (bound + travelled, part, extent))
         return nearest
 
     def _measure(self, part: int, within: float) -> float:
-        """Distance to one part; inf if above `within`. Remembers what is known for later."""
+        """Distance to one part; inf if above `within`."""
         pairs = self._pairs.get(part)
         if pairs is None:
             pairs = self._pairs[part] = list(itertools.product(self._hull, self._build(part)))
         place, turn, client = self._pose[:3], self._pose[3:], self._client
         nearest = math.inf
-        for hull, body in pairs:
-            # In the order of PyBullet's manual: names would cost a fifth of the call. Body B has a place of its own.
+        for hull, shape in pairs:
+            # In the order of PyBullet's manual: names would cost a fifth of the call. Both shapes have places.
             for point in pybullet.getClosestPoints(
-                -1, body, within, -1, -1, hull, -1, place, NO_PLACE, turn, NO_TURN, client
+                -1, -1, within, -1, -1, hull, shape, place, NO_PLACE, turn, NO_TURN, client
             ):
-                nearest = min(nearest, point[8])
-        self._bounds[part] = min(nearest, within) + self._travelled
-        return nearest
+                nearest = min(nearest, point[8] + MARGIN)
+        return nearest if nearest <= within else math.inf
 
     def _look_around(self, pose: Pose3) -> None:
         """Lists the parts that may come within reach during the next stride."""
-        self._centre = (pose.x, pose.y)
-        if math.dist(self._centre, self._far_centre) > FAR_STRIDE:
-            self._far_centre = self._centre
-            self._about, _ = self._within(self._reach + STRIDE + FAR_STRIDE, self._standing)
-        near, far = self._within(self._reach + STRIDE, self._about)
-        known = self._bounds
-        self._bounds = {
-            part: max(bound + self._travelled, known.get(part, -math.inf))
-            for bound, part in sorted(zip(far.tolist(), near.tolist(), strict=True))
-        }
-        self._least = -math.inf
-        if self._nearest not in self._bounds:
-            self._nearest = None
-
-    def _within(self, metres: float, parts: npt.NDArray[np.int64]) -> tuple[npt.NDArray[np.int64], Array]:
-        """Those of some parts that may be within so many metres of the robot, and how far they are at least."""
-        low, high = self._parts.low[parts, :2], self._parts.high[parts, :2]
-        outside = np.maximum(np.maximum(low - self._centre, self._centre - high), 0.0)
-        far = np.hypot(outside[:, 0], outside[:, 1]) - self._radius
-        near = far < metres
-        return parts[near], far[near]
+        x, y = self._centre = (pose.x, pose.y)
+        left, low, right, high = self._extents
+        outside = np.maximum(np.maximum(left - x, x - right), 0.0), np.maximum(np.maximum(low - y, y - high), 0.0)
+        far = np.hypot(*outside) - (self._radius + self._height)
+        near = np.flatnonzero(far < self._reach + STRIDE)
+        bounds, parts = (far[near] + self._travelled).tolist(), self._standing[near].tolist()
+        extents = map(tuple, self._extents[:, near].T.tolist())
+        known = {part: bound for bound, part, _ in self._others}
+        mine = None if self._nearest is None else self._nearest[1]
+        self._others = sorted(
+            (max(bound, known.get(part, bound)), part, extent)
+            for bound, part, extent in zip(bounds, parts, extents, strict=True)
+            if part != mine
+        )
 
     def _build(self, part: int) -> list[int]:
         vertices, faces = self._mesh.vertices, self._mesh.faces[self._parts.faces(part)]
         if self._parts.whole(part) and is_convex(solid := compact(vertices, faces)):
-            shapes = [engine.convex_shape(self._client, solid.vertices)]
-        else:
-            lots = engine.tiles(vertices, engine.above_floor(vertices, faces))
-            shapes = [engine.concave_shape(self._client, compact(vertices, lot)) for lot in lots]
-        bodies = [engine.fixed(self._client, shape) for shape in shapes]
-        for body in bodies:
-            pybullet.changeDynamics(body, -1, collisionMargin=0.0, physicsClientId=self._client)
-        return bodies
+            return [engine.convex_shape(self._client, solid.vertices)]
+        lots = engine.tiles(vertices, engine.above_floor(vertices, faces))
+        return [engine.concave_shape(self._client, compact(vertices, lot)) for lot in lots]
 
     def around(self, place: tuple[float, float, float], but: Collection[int] = ()) -> list[int]:
         """The solids that a place is inside of, by number, without those in `but`."""

@@ -1,8 +1,10 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pybullet
 import pytest
+import shapely
 import trimesh
 from playground import box, shipped
 
@@ -79,6 +81,69 @@ def test_the_same_place_gives_the_same_distance_whatever_was_asked_before(proxim
     for x in range(10):
         proximity.distance(Pose3(x, x / 2))
     assert proximity.distance(Pose3(1.9, 0.3)) == first
+
+
+def drum_robot(radius, height):
+    """A robot that is nothing but an upright cylinder."""
+    return replace(
+        robot_body(shipped("turtlebot")), casters=(), hull=(Solid(Cylinder(radius, height), Pose3(z=height / 2)),)
+    )
+
+
+def test_distances_on_a_way_through_a_crowd_are_shapelys():
+    rng = np.random.default_rng(11)
+    corner = Extrusion(((0, 0), (1, 0), (1, 0.2), (0.2, 0.2), (0.2, 1), (0, 1)), 1.0)
+    kinds = (Box((0.6, 0.4, 1.0)), Cylinder(0.3, 1.0), corner)
+    places = [Pose3.from_rpy(x, y, 0.5, 0.0, 0.0, yaw) for x, y, yaw in rng.uniform((0, 0, -3), (24, 24, 3), (160, 3))]
+    mesh = fuse([Solid(kinds[k % 3], pose, str(k)) for k, pose in enumerate(places)])
+    corners = mesh.vertices[mesh.faces]
+    plan = shapely.union_all(shapely.polygons(corners[np.ptp(corners[:, :, 2], axis=1) == 0][:, :, :2]))
+    poses = [Pose3(2.0, 2.0)]
+    for turn in rng.normal(0.0, 0.15, 800).tolist():
+        onward = poses[-1].compose(Pose3.from_rpy(0.06, 0.0, 0.0, 0.0, 0.0, turn))
+        poses.append(onward if 0 < onward.x < 24 and 0 < onward.y < 24 else Pose3(*rng.uniform(0, 24, 2)))
+    expected = plan.distance(shapely.points([pose[:2] for pose in poses])) - 0.25
+    expected[expected > 1.0] = math.inf
+    made = Proximity(mesh, drum_robot(0.25, 1.2), 1.0)
+    said = np.array([made.distance(pose) for pose in poses])
+    made.close()
+    outside = expected > 0
+    assert outside.sum() > 500
+    assert np.isinf(expected).sum() > 100
+    assert said[outside] == pytest.approx(expected[outside], abs=1e-4)
+    assert (said[~outside] <= 0).all()
+
+
+def test_the_nearest_of_two_changes_with_each_step_between_them():
+    made = Proximity(fuse([box("left", 0, 0.9, 1, 1), box("right", 0, -0.9, 1, 1)]), drum_robot(0.2, 0.4), 2.0)
+    for k in range(20):
+        y = 0.05 * (-1) ** (k // 2)
+        assert made.distance(Pose3(0.01 * k - 0.1, y)) == pytest.approx(0.15, abs=1e-6)
+    made.close()
+
+
+def test_a_reach_ends_where_it_ends():
+    made = Proximity(fuse([box("ahead", 2.0, 0, 1, 1)]), drum_robot(0.2, 0.4), 1.0)
+    assert made.distance(Pose3(0.2995)) == math.inf
+    assert made.distance(Pose3(0.3005)) == pytest.approx(0.9995, abs=1e-6)
+    assert made.distance(Pose3(0.2995)) == math.inf
+    made.close()
+
+
+def test_the_top_of_a_tilted_robot_may_be_nearest_to_what_its_base_is_far_from():
+    made = Proximity(fuse([box("ahead", 1.5, 0, 1, 4, 4), box("behind", -1.15, 0, 1, 4, 4)]), drum_robot(0.2, 1.5), 2.0)
+    leans = 1.5 * math.sin(0.3) + 0.2 * math.cos(0.3)
+    assert made.distance(Pose3.from_rpy(0.0, 0.0, 0.0, 0.0, 0.3, 0.0)) == pytest.approx(1.0 - leans, abs=1e-3)
+    made.close()
+
+
+def test_what_stands_behind_nearer_solids_is_not_built():
+    rows = [box(f"{y} {k}", 1.0 * k, y, 1.1, 0.4) for y in (-0.8, 0.8, -1.4, 1.4) for k in range(30)]
+    made = Proximity(fuse(rows), drum_robot(0.2, 0.4), 2.0)
+    for k in range(200):
+        assert made.distance(Pose3(0.1 * k)) == pytest.approx(0.4, abs=1e-6)
+    assert 20 <= len(made._pairs) <= 44
+    made.close()
 
 
 def wall_of_many_triangles(columns, rows):
