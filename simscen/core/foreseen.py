@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 
-from simscen.core.geometry import Array, Pose3
+from simscen.core.geometry import Array, Pose3, Vector
 
 _made = tuple.__new__  # a pose without the calls of its class
 
@@ -20,6 +20,17 @@ class Foreseen:
         """Where everything is at a tick; None at any other."""
         return Places(self, self.ticks.index(tick)) if tick in self.ticks else None
 
+    def far(self, place: Vector, distance: float) -> set[str]:
+        """Those in the table that are never within a distance in metres of a place."""
+        ways = self.table[:, :, :3] - place
+        nearest = (ways * ways).sum(axis=2).min(axis=0)
+        return {name for name, far in zip(self.names, (nearest > distance * distance).tolist(), strict=True) if far}
+
+    @cached_property
+    def columns(self) -> dict[str, int]:
+        """Where in the table those are that do not stay."""
+        return {name: column for column, name in enumerate(self.names)}
+
     @cached_property
     def all_moved(self) -> list[bool]:
         """For each tick, whether everything is elsewhere than at the tick before."""
@@ -28,13 +39,12 @@ class Foreseen:
 
 
 class Places(Mapping[str, Pose3]):
-    """Where everything is at one of those moments; poses are made when somebody looks at one."""
+    """Where everything is at one of those moments; a pose is made when somebody looks at it."""
 
-    __slots__ = ("_poses", "foreseen", "row")
+    __slots__ = ("foreseen", "row")
 
     def __init__(self, foreseen: Foreseen, row: int) -> None:
         self.foreseen, self.row = foreseen, row
-        self._poses: dict[str, Pose3] | None = None
 
     @property
     def table(self) -> Array:
@@ -42,19 +52,10 @@ class Places(Mapping[str, Pose3]):
         row: Array = self.foreseen.table[self.row]
         return row
 
-    @property
-    def poses(self) -> dict[str, Pose3]:
-        """By name, in order."""
-        poses = self._poses
-        if poses is None:
-            seen = self.foreseen
-            poses = self._poses = {**seen.everything}
-            for name, row in zip(seen.names, self.table.tolist(), strict=True):
-                poses[name] = _made(Pose3, row)
-        return poses
-
     def __getitem__(self, name: str) -> Pose3:
-        return self.poses[name]
+        seen = self.foreseen
+        column = seen.columns.get(name)
+        return seen.everything[name] if column is None else _made(Pose3, seen.table[self.row, column].tolist())
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.foreseen.everything)

@@ -1,16 +1,12 @@
 """The composition root: the only place that builds engines, sensors and stacks."""
 
-import math
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from simscen.core.belief import Belief
 from simscen.core.chance import Streams
 from simscen.core.events import Event, EventKind
-from simscen.core.geometry import Array, Pose3
-from simscen.core.rays import Fan, RayCaster, Singles
 from simscen.core.sensing import Odometry
-from simscen.core.shapes import Body, Shape, TriangleMesh
 from simscen.core.surface import Patch
 from simscen.core.time import Clock
 from simscen.model.anystack import ExternalStackSpec
@@ -24,6 +20,7 @@ from simscen.run.faultsettings import FaultSettings
 from simscen.run.filters import Filters
 from simscen.run.latency import command_latencies, sensor_latencies, with_latency
 from simscen.run.live import LiveStage, described
+from simscen.run.liverays import LiveRays
 from simscen.run.lockstep import Rig
 from simscen.run.prepare import Prepared
 from simscen.run.robotmodel import robot_model
@@ -37,7 +34,7 @@ from simscen.sim.robot import Robot
 from simscen.sim.simulation import Placed, Simulation
 from simscen.stack.build import build_stack
 from simscen.stack.protocols import Stack, Surroundings
-from simscen.worlds.meshing import fuse, triangulate
+from simscen.worlds.meshing import triangulate
 from simscen.worlds.rays import RayScene
 
 
@@ -182,58 +179,6 @@ def _stack(
         mode=prepared.spec.navigation.mode,
         heard=lambda localizer: ToldLocalizer(localizer, told) if prepared.spec.faults else localizer,
     )
-
-
-class LiveRays(RayCaster):
-    """Rays of a robot against the static world and against everything else that moves, where it is now."""
-
-    def __init__(self, scene: RayScene, robot: Robot, without: frozenset[str] = frozenset()) -> None:
-        """Of what moves, the rays go through what is called as in `without`."""
-        self._scene, self._robot, self._without = scene, robot, without
-        self._bodies: Mapping[str, Body] | None = None
-        self._meshes: dict[str, TriangleMesh] = {}
-        self._where: Mapping[str, Pose3] | None = None
-        self._homes: Mapping[str, Pose3] | None = None
-
-    def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
-        """See core.rays.RayCaster."""
-        self._look()
-        return self._scene.cast(origins, directions, reach)
-
-    def sweep(self, fan: Fan, pose: Pose3, reach: float) -> Singles:
-        """See core.rays.RayCaster."""
-        self._look()
-        return self._scene.sweep(fan, pose, reach)
-
-    def _look(self) -> None:
-        """See where everything is now."""
-        robot = self._robot
-        if robot.bodies is not self._bodies:  # it is the same one for as long as nothing comes or goes
-            self._meshes, self._bodies = self._surfaces(robot.bodies), robot.bodies
-            self._where = None
-        where, homes = robot.objects(), robot.homes
-        if where is not self._where or homes is not self._homes:  # the same ones for as long as nothing has moved
-            self._where, self._homes = where, homes
-            bodies = {name: (mesh, where[name]) for name, mesh in self._meshes.items()}
-            self._scene.set_moving(bodies, homes)
-
-    def _surfaces(self, bodies: Mapping[str, Body]) -> dict[str, TriangleMesh]:
-        """By name, the surface of each, which is the same one for all that are alike: a row of chairs is built once."""
-        before = self._bodies or {}
-        known = [(_parts(before[name]), mesh) for name, mesh in self._meshes.items()]
-        meshes = dict[str, TriangleMesh]()
-        for name, body in bodies.items():
-            if name not in self._without:
-                parts = _parts(body)
-                alike = next((surface for others, surface in known if others == parts), None)
-                meshes[name] = fuse(body.solids) if alike is None else alike
-                known.append((parts, meshes[name]))
-        return meshes
-
-
-def _parts(body: Body) -> list[tuple[Shape, Pose3]]:
-    """What it is made of, whatever that is called."""
-    return [(solid.shape, solid.pose) for solid in body.solids]
 
 
 class TruthSensor:

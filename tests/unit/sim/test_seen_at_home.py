@@ -9,7 +9,7 @@ from simscen.core.geometry import Pose2, Pose3
 from simscen.core.motion import Twist
 from simscen.core.rays import Fan
 from simscen.core.shapes import Body
-from simscen.run.assemble import LiveRays
+from simscen.run.liverays import LiveRays
 from simscen.worlds.meshing import fuse
 from simscen.worlds.rays import RayScene
 

@@ -8,7 +8,7 @@ from playground import box, shipped
 
 from simscen.core.geometry import Pose2
 from simscen.core.motion import Twist
-from simscen.run.assemble import LiveRays
+from simscen.run.liverays import LiveRays
 from simscen.sim.embody import robot_body
 from simscen.sim.simulation import Placed, Simulation
 from simscen.worlds.meshing import fuse, triangulate

@@ -1,0 +1,62 @@
+"""What a lidar sees of things that follow scripts, of which most are out of its reach."""
+
+import math
+
+import numpy as np
+from playground import box
+
+from simscen.core.foreseen import Places
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.rays import Fan
+from simscen.core.shapes import Body, MotionPath
+from simscen.run import liverays
+from simscen.run.liverays import LiveRays
+from simscen.worlds.meshing import fuse
+from simscen.worlds.rays import RayScene
+
+WALL = box("wall", 4.0, 0.0, 0.2, 8.0)
+PARTS = (box("cart", 0.2, 0, 0.5, 0.3, 0.4),)
+MESH = fuse(PARTS)
+FAN = Fan(-math.pi, math.pi / 45, 90)
+REACH = 2.0
+CARTS = [f"cart {number}" for number in range(16)]
+
+
+def carts() -> list[Body]:
+    """One after the other they cross a square of 20 m, about its middle."""
+    chance, bodies = np.random.default_rng(1), []
+    for name in CARTS:
+        begin = Pose2(*chance.uniform(-10, 10, 2).tolist())
+        end = Pose2(*(-chance.uniform(0.7, 1.3, 2) * begin[:2]).tolist())
+        start, lasts = chance.uniform(0, 9), chance.uniform(6, 12)
+        path = MotionPath((0.0, float(lasts)), (begin, end), start=float(start))
+        bodies.append(Body(name, PARTS, Pose3.planar(begin), path=path))
+    return [*bodies, Body("shelf", PARTS, Pose3(1.0, 1.0)), Body("late", PARTS, Pose3(-6.0, 6.0))]
+
+
+def test_a_scan_is_that_of_a_scene_that_was_told_of_everything(simulate, monkeypatch) -> None:
+    """Whoever else looks, from wherever and however far; also once something is given a script."""
+    monkeypatch.setattr(liverays, "STRAY", 0.5)
+    simulation, chance = simulate(solids=[WALL], bodies=carts(), drive=(0.02, 0.0, 0.1)), np.random.default_rng(2)
+    robot, told = simulation.robot, RayScene(fuse([WALL]))
+    rays, watched = (LiveRays(RayScene(fuse([WALL])), robot) for _ in range(2))
+    ahead, met = 0, set[str]()
+    for beat in range(130):
+        robot.sample(24)
+        if beat == 30:
+            simulation.move("late", MotionPath((0.0, 8.0), (Pose2(-6.0, 6.0), Pose2(6.0, -6.0))))
+        objects, pose = robot.objects(), simulation.base_pose()._replace(z=0.2)
+        told.set_moving({name: (MESH, there) for name, there in objects.items()})
+        seen = told.sweep(FAN, pose, REACH)
+        if beat % 2 == 1:
+            watched.sweep(FAN, Pose3(*chance.uniform(-5, 5, 2).tolist(), 0.2), float(chance.uniform(1, 5)))
+        assert np.array_equal(rays.sweep(FAN, pose, REACH), seen)
+        assert np.array_equal(watched.sweep(FAN, pose, REACH), seen)
+        if beat % 10 == 0:
+            assert np.array_equal(watched.cast(*FAN.at(pose), REACH), told.cast(*FAN.at(pose), REACH))
+        ahead += type(objects) is Places
+        met |= {name for name, there in objects.items() if math.dist(there[:2], pose[:2]) < REACH}
+        simulation.step(24)
+    assert ahead > 120, "worked out ahead, nearly always"
+    assert met > {"shelf", "late"}
+    assert len(met.intersection(CARTS)) > 5
