@@ -143,7 +143,8 @@ class MotionPath:
 class TriangleMesh:
     """Many solids fused: `vertices` (n, 3), `faces` (m, 3) and, for each face, the index of its owner in `names`.
 
-    `frictions` are those of the solids' surfaces, by the same index; empty where all are 1.
+    `frictions` are those of the solids' surfaces, by the same index; empty where all are 1. `hulls` are the vertices
+    of solids that are convex for sure, None of others; empty where nobody has asked.
     """
 
     vertices: Array
@@ -151,3 +152,4 @@ class TriangleMesh:
     owners: npt.NDArray[np.int32]
     names: tuple[str, ...] = field(default=())
     frictions: tuple[float, ...] = ()
+    hulls: tuple[slice | None, ...] = ()

@@ -128,21 +128,23 @@ class Proximity:
         """Lists the parts that may come within reach during the next stride."""
         x, y = self._centre = (pose.x, pose.y)
         left, low, right, high = self._extents
-        outside = np.maximum(np.maximum(left - x, x - right), 0.0), np.maximum(np.maximum(low - y, y - high), 0.0)
-        far = np.hypot(*outside) - (self._radius + self._height)
-        near = np.flatnonzero(far < self._reach + STRIDE)
-        bounds, parts = (far[near] + self._travelled).tolist(), self._standing[near].tolist()
-        extents = map(tuple, self._extents[:, near].T.tolist())
+        outside = np.maximum(np.maximum(left - x, x - right), np.maximum(low - y, y - high))
+        bounds = outside - (self._radius + self._height)  # less than what is diagonal, which is told when it comes up
+        near = np.flatnonzero(bounds < self._reach + STRIDE)
+        parts, extents = self._standing[near].tolist(), map(tuple, self._extents[:, near].T.tolist())
         known = {part: bound for bound, part, _ in self._others}
         mine = None if self._nearest is None else self._nearest[1]
         self._others = sorted(
             (max(bound, known.get(part, bound)), part, extent)
-            for bound, part, extent in zip(bounds, parts, extents, strict=True)
+            for bound, part, extent in zip((bounds[near] + self._travelled).tolist(), parts, extents, strict=True)
             if part != mine
         )
 
     def _build(self, part: int) -> list[int]:
-        vertices, faces = self._mesh.vertices, self._mesh.faces[self._parts.faces(part)]
+        vertices, hulls = self._mesh.vertices, self._mesh.hulls
+        if hulls and (own := hulls[self._parts.owners[part]]):
+            return [engine.convex_shape(self._client, vertices[own])]
+        faces = self._mesh.faces[self._parts.faces(part)]
         if self._parts.whole(part) and is_convex(solid := compact(vertices, faces)):
             return [engine.convex_shape(self._client, solid.vertices)]
         lots = engine.tiles(vertices, engine.above_floor(vertices, faces))

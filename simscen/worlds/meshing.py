@@ -11,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from simscen.core.facemesh import CONVEX_FACES
 from simscen.core.geometry import Array
 from simscen.core.shapes import (
     Box,
@@ -43,21 +44,37 @@ _BOX_FACES = np.array(
 def fuse(solids: Iterable[Solid]) -> TriangleMesh:
     """All solids as one triangle mesh in the frame they are placed in; face owners index `names`."""
     vertices, faces = [np.empty((0, 3))], [np.empty((0, 3), np.int32)]
-    owners, names, frictions = [np.empty(0, np.int32)], [], []
-    meshes: dict[Shape, Mesh] = {}
+    owners, names, frictions, hulls = [np.empty(0, np.int32)], [], [], list[slice | None]()
+    meshes: dict[Shape, tuple[Mesh, bool]] = {}
     count = 0
     for owner, solid in enumerate(solids):
         if solid.shape not in meshes:
-            meshes[solid.shape] = triangulate(solid.shape)
-        mesh = meshes[solid.shape]
+            mesh = triangulate(solid.shape)
+            meshes[solid.shape] = mesh, len(mesh.faces) <= CONVEX_FACES and _convex(solid.shape)
+        mesh, convex = meshes[solid.shape]
         vertices.append(solid.pose.apply(mesh.vertices))
         faces.append(mesh.faces + np.int32(count))
         owners.append(np.full(len(mesh.faces), owner, dtype=np.int32))
         names.append(solid.name)
         frictions.append(solid.friction)
+        hulls.append(slice(count, count + len(mesh.vertices)) if convex else None)
         count += len(mesh.vertices)
     slippery = tuple(frictions) if any(friction != 1.0 for friction in frictions) else ()
-    return TriangleMesh(np.concatenate(vertices), np.concatenate(faces), np.concatenate(owners), tuple(names), slippery)
+    return TriangleMesh(
+        np.concatenate(vertices), np.concatenate(faces), np.concatenate(owners), tuple(names), slippery, tuple(hulls)
+    )
+
+
+def _convex(shape: Shape) -> bool:
+    """Whether a shape is convex for sure; of triangles nobody has said so."""
+    match shape:
+        case Mesh():
+            return False
+        case Extrusion(polygon):
+            around = zip(polygon, polygon[1:] + polygon[:1], polygon[2:] + polygon[:2], strict=True)
+            return all((bx - ax) * (cy - by) > (by - ay) * (cx - bx) for (ax, ay), (bx, by), (cx, cy) in around)
+        case _:
+            return True
 
 
 def triangulate(shape: Shape) -> Mesh:

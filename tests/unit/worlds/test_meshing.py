@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from simscen.core.facemesh import CONVEX_FACES, compact, is_convex
 from simscen.core.geometry import Pose3
 from simscen.core.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Solid, Sphere
 from simscen.worlds.meshing import facets, fuse, triangulate
@@ -55,6 +56,24 @@ def test_fusing_places_every_solid_and_remembers_whose_face_it_is():
     post = mesh.vertices[mesh.faces[mesh.owners == 1]].reshape(-1, 3)
     assert np.allclose(post[:, 0].max(), -2.8)
     assert mesh.names == ("a", "b")
+
+
+def test_what_is_told_to_be_convex_is_its_own_hull_and_its_vertices_are_those_told():
+    quad, bent = ((0, 0), (2, 0), (2.2, 1), (0, 0.9)), ((0, 0), (2, 0), (0.5, 0.5), (0, 2))
+    shapes = [*(shape for shape, _ in VOLUMES), Extrusion(quad, 1.0), Extrusion(bent, 1.0), triangulate(Box((1, 1, 1)))]
+    rng = np.random.default_rng(2)
+    poses = [Pose3.from_rpy(*rng.uniform(-50, 50, 3), *rng.uniform(-3, 3, 3)) for _ in shapes]
+    mesh = fuse([Solid(shape, pose) for shape, pose in zip(shapes, poses, strict=True)])
+    told = [hull is not None for hull in mesh.hulls]
+    assert told == [True, True, False, False, False, False, True, False, False, True, False, False]
+    assert {len(triangulate(shape).faces) > CONVEX_FACES for shape, _ in VOLUMES[2:6]} == {True}
+    for owner, hull in enumerate(mesh.hulls):
+        solid = compact(mesh.vertices, mesh.faces[mesh.owners == owner])
+        if hull is not None:
+            assert np.array_equal(mesh.vertices[hull], solid.vertices)
+            assert is_convex(solid)
+            judge = trimesh.Trimesh(solid.vertices, solid.faces, process=False)
+            assert judge.convex_hull.volume == pytest.approx(judge.volume, rel=1e-9)
 
 
 def test_nothing_fuses_to_an_empty_mesh():
