@@ -8,47 +8,50 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose3, Vector
+from simscen.core.packets import TINY, WIDE, Packets
 
 Singles = npt.NDArray[np.float32]
+ALL = slice(None)
 
 
 class Fan:
     """Rays in one plane that all begin in one place, as those of a lidar, evenly spaced.
 
-    It has room for what is worked out anew at each scan: where the rays begin, and which way they point.
+    It has room for what is worked out anew at each scan: where the rays begin, which way they point, and how far.
     """
 
     def __init__(self, first: float, increment: float, count: int) -> None:
         """Ray k points at `first` + k `increment` rad in the x-y plane; together they are no more than a full turn."""
-        angles = first + increment * np.arange(count, dtype=np.float64)
+        self.rays = Packets(count)
+        """As `begin`, `turn` and `end` said; what fills up the last packet is its last ray once more."""
+        angles = first + increment * np.minimum(np.arange(WIDE * len(self.rays.ends)), count - 1)
         self._first, self._increment, self._count = first, increment, count
         self._full = 2 * math.pi / increment
-        self._flat = np.column_stack((np.cos(angles), np.sin(angles)))
-        self._turned = np.empty((count, 3))
-        self._start = np.zeros(3, dtype=np.float32)
-        self.starts: Singles = np.ndarray((count, 3), np.float32, self._start, 0, (0, 4))
-        """(n, 3), all where `begin` said."""
-        self.directions: Singles = np.empty((count, 3), dtype=np.float32)
-        """(n, 3), as `turn` said."""
+        self._flat = np.array((np.cos(angles), np.sin(angles)))
 
     def __len__(self) -> int:
         return self._count
 
     def at(self, pose: Pose3) -> tuple[Array, Array]:
         """Origins (n, 3) and unit directions (n, 3) of the rays of a fan whose frame is at `pose`."""
-        (x, y), turn = self._flat.T, pose.rotation()
+        (x, y), turn = self._flat[:, : self._count], pose.rotation()
         return np.repeat([pose.position], self._count, axis=0), np.column_stack((x, y, np.zeros_like(x))) @ turn.T
 
-    def begin(self, x: float, y: float, z: float) -> None:
-        """All rays begin there."""
-        start = self._start
-        start[0], start[1], start[2] = x, y, z
+    def begin(self, x: float, y: float, z: float, packets: slice = ALL) -> None:
+        """Those of some `packets` begin there."""
+        self.rays.starts[packets] = np.array(((x,), (y,), (z,)), dtype=np.float32)
 
-    def turn(self, ahead: Vector, left: Vector, rays: slice = slice(None)) -> None:
-        """Work out the directions of some `rays` where the fan's x and y axes are `ahead` and `left`."""
-        turned = self._turned[rays]
-        np.dot(self._flat[rays], np.array((ahead, left)), turned)
-        self.directions[rays] = turned
+    def turn(self, ahead: Vector, left: Vector, packets: slice = ALL) -> None:
+        """Work out the directions of some `packets` where the fan's x and y axes are `ahead` and `left`."""
+        directions = self.rays.directions[packets]
+        flat = self._flat if packets is ALL else self._flat[:, packets.start * WIDE : packets.stop * WIDE]
+        turned = np.array((ahead, left)).T.dot(flat)
+        turned[np.abs(turned) < TINY] = 0.0
+        directions[:] = turned.reshape(3, -1, WIDE).swapaxes(0, 1)
+
+    def end(self, reach: float) -> None:
+        """No ray goes farther."""
+        self.rays.ends[:] = reach
 
     def towards(self, x: float, y: float, least: float) -> list[slice]:
         """The rays whose products with a vector (x, y, any) of the fan's frame are `least` or more, and some beside."""

@@ -4,7 +4,6 @@ import math
 from collections.abc import Iterator, Mapping, Set
 
 import numpy as np
-from embreex.rtcore import EmbreeDevice
 
 from simscen.core.facemesh import between
 from simscen.core.geometry import Array, Pose3, Vector
@@ -24,9 +23,9 @@ SEVERAL = 16
 class Piles:
     """All bodies that lie at home, of which those that lie together are one pile for as long as none of them leaves."""
 
-    def __init__(self, device: EmbreeDevice, middle: Array) -> None:
+    def __init__(self, middle: Array) -> None:
         """In a world about this middle."""
-        self._device, self._middle = device, middle
+        self._middle = middle
         self._bodies: Mapping[str, Placed] = {}
         self._piles: list[Pile] = []
 
@@ -45,16 +44,16 @@ class Piles:
                 self._piles, stay = [], set()
             come = {name: body for name, body in bodies.items() if name not in stay}
             meshes = {name: Mesh(pose.apply(mesh.vertices), mesh.faces) for name, (mesh, pose) in come.items()}
-            self._piles += Pile(self._device, self._middle, meshes).small()
+            self._piles += Pile(self._middle, meshes).small()
 
-    def sweep(self, fan: Fan, pose: Pose3, reach: float, heights: Heights, ends: Singles) -> None:
-        """What rays meet before their `ends` (n,) becomes these, of a fan at `pose` that was turned to it."""
+    def sweep(self, fan: Fan, pose: Pose3, reach: float, heights: Heights) -> None:
+        """Rays of a fan at `pose` that was turned to it end at what they meet here."""
         for pile in self._piles:
             if pile.away(pose[:3]) <= reach:
-                pile.sweep(fan, pose, heights, ends)
+                pile.sweep(fan, pose, heights)
 
     def cast(self, origins: Array, directions: Array, heights: Heights, ends: Singles) -> None:
-        """The same of rays that begin in places of their own."""
+        """Of rays that begin in places of their own, what they meet before their `ends` (n,) becomes these."""
         for pile in self._piles:
             pile.cast(origins, directions, heights, ends)
 
@@ -69,9 +68,9 @@ class Pile:
     What a ray meets does not depend on what else is in a scene, so nobody can tell how bodies are piled.
     """
 
-    def __init__(self, device: EmbreeDevice, middle: Array, meshes: Mapping[str, Mesh]) -> None:
+    def __init__(self, middle: Array, meshes: Mapping[str, Mesh]) -> None:
         """By name, meshes in the world's frame; `middle` is that of the world, about which all of them are kept."""
-        self._device, self._middle, self._meshes = device, middle, meshes
+        self._middle, self._meshes = middle, meshes
         corners = np.concatenate([mesh.vertices for mesh in meshes.values()])
         self._low, self._high = corners.min(axis=0), corners.max(axis=0)
         x, y, z = ((self._low + self._high) / 2).tolist()
@@ -104,12 +103,12 @@ class Pile:
         along = int((self._high - self._low).argmax())
         names = sorted(self._meshes, key=lambda name: (self._meshes[name].vertices[:, along].mean(), name))
         for some in (names[: len(names) // 2], names[len(names) // 2 :]):
-            yield Pile(self._device, self._middle, {name: self._meshes[name] for name in some})
+            yield Pile(self._middle, {name: self._meshes[name] for name in some})
 
     def _scene(self, heights: Heights) -> Part:
         if self._part is None or heights != self._heights:
             one = _one(list(self._meshes.values()))
-            self._part = Part(self._device, between(one.vertices, one.faces, heights), self._middle)
+            self._part = Part(between(one.vertices, one.faces, heights), self._middle)
             self._heights = heights
         return self._part
 
@@ -117,13 +116,13 @@ class Pile:
         """How far in metres from a place the nearest of it may be."""
         return math.dist(self._centre, place) - self._radius
 
-    def sweep(self, fan: Fan, pose: Pose3, heights: Heights, ends: Singles) -> None:
-        """What rays meet before their `ends` (n,) becomes these, of a fan at `pose` that was turned to it."""
-        for rays, before in towards(fan, pose, self._centre, self._radius, ends):
-            self._scene(heights).sweep_some(fan, rays, pose[:3], before)
+    def sweep(self, fan: Fan, pose: Pose3, heights: Heights) -> None:
+        """Rays of a fan at `pose` that was turned to it end at what they meet here."""
+        for packets in towards(fan, pose, self._centre, self._radius):
+            self._scene(heights).sweep(fan, pose[:3], packets)
 
     def cast(self, origins: Array, directions: Array, heights: Heights, ends: Singles) -> None:
-        """The same of rays that begin in places of their own."""
+        """Of rays that begin in places of their own, what they meet before their `ends` (n,) becomes these."""
         rays = meeting(self._centre, self._radius, origins, directions, ends)
         if len(rays):
             ends[rays] = self._scene(heights).distances(origins[rays], directions[rays], ends[rays])

@@ -3,28 +3,22 @@
 import math
 from collections.abc import Mapping
 from types import MappingProxyType
-from weakref import WeakValueDictionary
 
 import numpy as np
-from embreex.rtcore import EmbreeDevice
 
 from simscen.core.geometry import Array, Pose3, forward_and_left
 from simscen.core.rays import Fan, RayCaster, Singles
 from simscen.core.shapes import TriangleMesh
-from simscen.worlds import raypart
 from simscen.worlds.piles import Piles, Placed
-from simscen.worlds.raypart import Heights, Mover, Part, Window, meeting
+from simscen.worlds.raypart import Heights, Mover, Part, meeting, part_of
 
 NOWHERE: Mapping[str, Pose3] = MappingProxyType({})
 
-FEW = 20_000
-"""Triangles of a world that is taken as a whole, in 12 ms."""
 _FARTHEST = 1e30
 """m that a ray reaches at most, in single precision."""
 _BEYOND = 1.001
 """Times its reach, where a ray ends that meets nothing within it."""
 
-_ALL = -math.inf, math.inf
 _ROOM, _HAIR = 0.1, 0.01
 """m beyond the heights of rays from which triangles are taken, at least; and what single precision may err by."""
 
@@ -36,21 +30,15 @@ class RayScene(RayCaster):
     home the triangles are carried into the frame of the world instead, once, so that many are asked at once: that is
     told by where it is now, not by what was asked before, and in which frame decides about last bits. Distances agree
     with PyBullet's rays within 1 mm. Embree works in single precision, so everything is kept about its own centre: a
-    world that lies 10 km from the origin loses nothing, one that is itself 10 km wide half a millimetre. Make a scene
-    in the process that uses it: Embree's threads do not survive a fork.
+    world that lies 10 km from the origin loses nothing, one that is itself 10 km wide half a millimetre. What is
+    built of a mesh is kept with that, for other scenes and for what is forked.
     """
 
     def __init__(self, static: "TriangleMesh | RayScene") -> None:
-        """Of a world; or of that of another scene, which is then built once for both."""
-        self._device: EmbreeDevice = static._device if isinstance(static, RayScene) else EmbreeDevice()
-        if isinstance(static, RayScene):
-            world = static._static
-            self._static: Part | Window = Window(self._device, world.mesh) if isinstance(world, Window) else world
-        else:
-            self._static = (Window if len(static.faces) > FEW else Part)(self._device, static)
-        self._parts = WeakValueDictionary[int, Part]()
+        """Of a world; or of that of another scene."""
+        self._static: Part = static._static if isinstance(static, RayScene) else part_of(static)
         self._movers: dict[str, Mover] = {}
-        self._piles = Piles(self._device, self._static.middle)
+        self._piles = Piles(self._static.middle)
         self._heights = math.inf, -math.inf
 
     def set_moving(self, bodies: Mapping[str, Placed], homes: Mapping[str, Pose3] = NOWHERE) -> None:
@@ -65,20 +53,13 @@ class RayScene(RayCaster):
                 at_home[name] = mesh, pose
                 continue
             mover = before.get(name)
-            if mover is None or mover.part.mesh is not mesh:
-                mover = Mover(self._part_of(mesh), pose)
+            if mover is None or mover.mesh is not mesh:
+                mover = Mover(mesh, part_of(mesh), pose)
             elif mover.pose != pose:
-                mover = Mover(mover.part, pose)
+                mover = Mover(mesh, mover.part, pose)
             self._movers[name] = mover
         if at_home or self._piles:
             self._piles.keep(at_home)
-
-    def _part_of(self, mesh: TriangleMesh) -> Part:
-        """The scene of a mesh, which is one for all that are alike; those of what is gone are forgotten with it."""
-        part = self._parts.get(id(mesh))
-        if part is None:
-            part = self._parts[id(mesh)] = Part(self._device, mesh)
-        return part
 
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
         """See core.rays.RayCaster."""
@@ -94,29 +75,26 @@ class RayScene(RayCaster):
         """See core.rays.RayCaster: with as few operations as may be, for each takes 1 µs where it runs once a scan."""
         place, (ahead, left) = pose[:3], forward_and_left(pose[3:])
         fan.turn(ahead, left)
-        static, heights = self._static, _ALL
-        if self._piles or isinstance(static, Window):
-            rise = _rising(math.hypot(ahead[2], left[2]), reach)
-            heights = self._between(place[2] - rise, place[2] + rise)
-        part = static.around(place, reach, heights) if isinstance(static, Window) else static
-        ends = part.sweep(fan, place, min(reach, _FARTHEST) * _BEYOND)
+        fan.end(min(reach, _FARTHEST) * _BEYOND)
+        self._static.sweep(fan, place)
         if self._piles:
-            self._piles.sweep(fan, pose, reach, heights, ends)
+            rise = _rising(math.hypot(ahead[2], left[2]), reach)
+            self._piles.sweep(fan, pose, reach, self._between(place[2] - rise, place[2] + rise))
         for mover in self._movers.values():
             if mover.away(place) <= reach:
-                mover.sweep(fan, pose, (ahead, left), ends)
-        return ends
+                mover.sweep(fan, pose, (ahead, left))
+        return fan.rays.distances()
 
     def _from_each(self, origins: Array, directions: Array, reach: float, end: float) -> Singles:
         """Where rays meet anything that begin in places of their own."""
         x, y, z = origins[0].tolist()
         reach += float(np.linalg.norm(origins - (x, y, z), axis=1).max())
-        low, high = origins[:, 2].min(), origins[:, 2].max()
-        down, up = directions[:, 2].min(), directions[:, 2].max()
-        heights = self._between(low - _rising(-down, reach), high + _rising(up, reach))
-        static = self._static.around((x, y, z), reach, heights) if isinstance(self._static, Window) else self._static
-        ends = static.distances(origins, directions, end)
-        self._piles.cast(origins, directions, heights, ends)
+        ends = self._static.distances(origins, directions, end)
+        if self._piles:
+            low, high = origins[:, 2].min(), origins[:, 2].max()
+            down, up = directions[:, 2].min(), directions[:, 2].max()
+            heights = self._between(low - _rising(-down, reach), high + _rising(up, reach))
+            self._piles.cast(origins, directions, heights, ends)
         for mover in self._movers.values():
             if mover.away((x, y, z)) <= reach:
                 rays = meeting(mover.middle, mover.part.radius, origins, directions, ends)
@@ -140,6 +118,5 @@ def _rising(slope: float, reach: float) -> float:
 
 
 def ready(mesh: TriangleMesh) -> None:
-    """Work out now what scenes of a world need to know of it."""
-    if len(mesh.faces) > FEW:
-        raypart.ready(mesh)
+    """Work out now what scenes of a world need to know of it: a fifth of a microsecond for each triangle."""
+    part_of(mesh)

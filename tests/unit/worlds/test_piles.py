@@ -8,7 +8,7 @@ import pytest
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.rays import Fan
 from simscen.core.shapes import Box, Cylinder, Solid
-from simscen.worlds import piles, raypart, rays
+from simscen.worlds import piles, raypart
 from simscen.worlds.meshing import fuse
 from simscen.worlds.rays import RayScene
 
@@ -83,30 +83,28 @@ def test_what_lies_at_home_is_met_where_it_would_be_met_alone(reach):
 
 
 def test_things_at_home_take_no_scene_of_their_own(monkeypatch):
-    """One for the walls, one for all things; then those of the halves that are left of it, and of who went."""
+    """One is for all; then those of the halves that are left of it, and of who went."""
     built = list[int]()
     make = raypart.Part.__init__
 
-    def counted(part, device, mesh, middle=None):
-        make(part, device, mesh, middle)
+    def counted(part, mesh, middle=None):
+        make(part, mesh, middle)
         built.append(len(mesh.faces))
 
-    monkeypatch.setattr(raypart.Part, "__init__", counted)
     scene, poses = RayScene(WALLS), dict(HOMES)
+    monkeypatch.setattr(raypart.Part, "__init__", counted)
     scene.set_moving(placed(poses), HOMES)
     scene.sweep(FAN, LEVEL, math.inf)
-    assert len(built) == 2
+    assert len(built) == 1
     for step in range(12):
         poses["thing 07"] = Pose3(3.0 + 0.01 * step, 3.0)
         scene.set_moving(placed(poses), HOMES)
         scene.sweep(FAN, LEVEL, math.inf)
-    assert len(built) <= 2 + 1 + math.ceil(math.log2(len(HOMES)))
+    assert len(built) <= 1 + 1 + math.ceil(math.log2(len(HOMES)))
 
 
-@pytest.mark.parametrize("few", [0, rays.FEW])
-def test_which_heights_are_looked_at_changes_not_one_bit(monkeypatch, few):
+def test_which_heights_are_looked_at_changes_not_one_bit():
     """Rays that tilt ever more have what they may meet taken anew, and only so often."""
-    monkeypatch.setattr(rays, "FEW", few)
     tilts = [*np.linspace(0.0, 0.6, 20).tolist(), 0.0, -0.6]
     lenses = [Pose3.from_rpy(0.4, 0.1, 0.8, 0.5 * tilt, tilt, 0.3) for tilt in tilts]
     scene, taken = RayScene(WALLS), set()

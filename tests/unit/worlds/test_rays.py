@@ -1,15 +1,18 @@
 import math
+import os
 import subprocess
 import sys
 
 import numpy as np
 import pybullet
 import pytest
+from embreex.mesh_construction import TriangleMesh as EmbreeMesh
+from embreex.rtcore import EmbreeDevice
+from embreex.rtcore_scene import EmbreeScene
 
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.rays import Fan
 from simscen.core.shapes import Box, Cylinder, Extrusion, Solid, Sphere, TriangleMesh
-from simscen.worlds import rays
 from simscen.worlds.meshing import fuse
 from simscen.worlds.rays import RayScene
 
@@ -141,20 +144,34 @@ def test_many_bodies_are_seen_as_if_they_were_one_world():
     assert_agree(apart.cast(origins, directions), together.cast(origins, directions))
 
 
-def test_of_a_large_world_what_is_in_reach_is_where_all_of_it_would_be_to_the_last_bit(monkeypatch):
-    chance = np.random.default_rng(8)
-    places = chance.uniform((-60, -60, 0), (60, 60, 3), (1500, 3)).tolist()
-    mesh = fuse([Solid(Box((0.7, 0.3, 0.9)), Pose3.planar(Pose2(*place), 0.45)) for place in places])
-    whole = RayScene(mesh)
-    monkeypatch.setattr(rays, "FEW", 0)
-    near = RayScene(RayScene(mesh))
-    for x in (-70.0, -58.0, -20.0, -19.0, 0.0, 45.0, -20.0):
-        origins, directions = around(360, (x, 0.3 * x, 0.3))
-        for reach in (4.0, 12.0, 25.0):
-            assert np.array_equal(near.cast(origins, directions, reach), whole.cast(origins, directions, reach))
-    origins, directions = random_rays(500, 9, (-60, -60, 0.1), (60, 60, 0.8))
-    assert np.array_equal(near.cast(origins, directions, 5.0), whole.cast(origins, directions, 5.0))
-    assert np.array_equal(near.cast(origins, directions), whole.cast(origins, directions))
+def field(count):
+    places = np.random.default_rng(8).uniform((-60, -60, 0), (60, 60, 3), (count, 3)).tolist()
+    return fuse([Solid(Box((0.7, 0.3, 0.9)), Pose3.planar(Pose2(*place), 0.45)) for place in places])
+
+
+@pytest.mark.parametrize("count", [1, 15, 16, 17, 361, 5000])
+def test_rays_meet_what_the_package_of_embree_says_of_each_alone_to_the_last_bit(count):
+    mesh = field(1500)
+    device = EmbreeDevice()
+    theirs = EmbreeScene(device, True)
+    middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
+    EmbreeMesh(theirs, mesh.vertices - middle, mesh.faces)
+    for origins, directions in (around(count, (1.0, 2.0, 0.3)), random_rays(count, 9, (-60, -60, 0.1), (60, 60, 0.8))):
+        starts, along = (origins - middle).astype(np.float32), directions.astype(np.float32)
+        for reach in (4.0, 1e6):
+            told = theirs.run(starts, along, 1.001 * reach, query="DISTANCE").astype(float)
+            told[told > reach] = np.inf
+            assert np.array_equal(RayScene(mesh).cast(origins, directions, reach), told)
+
+
+def test_a_scene_survives_a_fork_and_others_are_built_there():
+    mesh, (origins, directions) = field(200), around(720, (1.0, 2.0, 0.3))
+    here = RayScene(mesh).cast(origins, directions)
+    child = os.fork()
+    if not child:
+        inherited, anew = (RayScene(one).cast(origins, directions) for one in (mesh, field(200)))
+        os._exit(0 if np.array_equal(inherited, here) and np.array_equal(anew, here) else 1)
+    assert os.waitpid(child, 0)[1] == 0
 
 
 COLLECTED = """
