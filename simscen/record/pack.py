@@ -74,17 +74,19 @@ def pose_stamped(frame: str) -> Template:
     return message
 
 
-def transforms(links: Sequence[tuple[str, str, str]]) -> Template:
+def transforms(links: Sequence[tuple[str, str, str]], more: int = 0, size: int = 0) -> Template:
     """tf2_msgs/msg/TFMessage: stamp, and the poses of the links, each of which is a frame, its child, and the name of
-    the field for the child's pose in the frame.
+    the field for the child's pose in the frame; and of so many `more`, packed already, of a `size` in bytes: packed.
     """
     message = Template()
-    message.put("I", len(links))
+    message.put("I", len(links) + more)
     for frame, child, pose in links:
         message.slot("iI", "*stamp")
         message.string(frame)
         message.string(child)
         message.slot("7d", f"*{pose}")
+    if more:
+        message.slot(f"{size}s", "packed")
     return message
 
 

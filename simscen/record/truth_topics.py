@@ -1,11 +1,13 @@
 """What really happened: /clock, /ground_truth/odom, /simscen/clearance, and on /tf the robot and moving things."""
 
 from collections.abc import Iterable
+from typing import NamedTuple
 
-from simscen.core.foreseen import Places
+from simscen.core.foreseen import Foreseen, Places
 from simscen.core.trace import Truth
 from simscen.record import frames, pack, topics
 from simscen.record.out import Out, Together
+from simscen.record.pack_ahead import Bytes, TransformsAhead
 from simscen.record.pack_many import TransformsPacker
 from simscen.record.simtime import SimTime
 from simscen.record.thinning import Thinning
@@ -26,21 +28,40 @@ class TruthTopics:
         self._without = out.together(self._always)
         self._layouts: dict[tuple[str, ...], Together] = {}
         self._transforms, self._moves = TransformsPacker(), out.line(topics.TF)
+        self._ahead: _Ahead | None = None
 
     def write(self, now: int, tick: int, truth: Truth) -> None:
         """Write the sample of `tick`, which is at `now` nanoseconds."""
         moved = self._thinning.moved(tick, truth) if truth.objects else {}
         stamp, fields = self._time.stamp(tick), (truth.pose, truth.twist, truth.clearance)
-        names = moved.foreseen.names if type(moved) is Places else tuple(moved)
+        if type(moved) is Places:
+            ahead = self._ahead
+            if ahead is None or ahead.foreseen is not moved.foreseen:
+                ahead = self._ahead = self._lay_out(moved.foreseen)
+            ahead.layout.write(now, stamp, *fields, ahead.packed[moved.row].tobytes())
+            return
+        names = tuple(moved)
         layout = self._layouts.get(names)
         if layout is None and len(self._layouts) < MOST_LAYOUTS:
             layout = self._layouts[names] = self._layout(names)
         if layout is not None:
-            layout.write(now, stamp, *fields, *(moved.table.tolist() if type(moved) is Places else moved.values()))
+            layout.write(now, stamp, *fields, *moved.values())
             return
         self._without.write(now, stamp, *fields)
         links = [(frames.MAP, frames.of_object(name), stamp, pose) for name, pose in moved.items()]
         self._moves.write(now, self._transforms([(frames.MAP, self._frame, stamp, truth.pose), *links]))
+
+    def _lay_out(self, foreseen: Foreseen) -> "_Ahead":
+        """The messages at each of its moments at which all things have moved."""
+        before, names = self._ahead, foreseen.names
+        if before is not None and before.foreseen.names == names:
+            transforms, layout = before.transforms, before.layout
+        else:
+            transforms = TransformsAhead([(frames.MAP, frames.of_object(name)) for name in names])
+            own = pack.transforms([(frames.MAP, self._frame, "pose")], len(names), transforms.size)
+            layout = self._out.together((*self._always, (topics.TF, own)))
+        stamps = [self._time.stamp(tick) for tick in foreseen.ticks]
+        return _Ahead(foreseen, transforms, layout, transforms(stamps, foreseen.table))
 
     def _layout(self, moved: Iterable[str]) -> Together:
         """The messages with the poses of these things on /tf, behind the robot's."""
@@ -48,3 +69,12 @@ class TruthTopics:
         return self._out.together(
             (*self._always, (topics.TF, pack.transforms([(frames.MAP, self._frame, "pose"), *links])))
         )
+
+
+class _Ahead(NamedTuple):
+    """All messages for things whose poses were worked out ahead, and those on /tf as they are `packed`."""
+
+    foreseen: Foreseen
+    transforms: TransformsAhead
+    layout: Together
+    packed: Bytes
