@@ -107,6 +107,31 @@ def top_speed(path: MotionPath, reach: float = 0.0) -> float:
     return max(speeds, default=0.0)
 
 
+class Way(NamedTuple):
+    """Straight from one place to another in the plane, but for what it may stray from that, all in metres."""
+
+    x: float
+    y: float
+    to_x: float
+    to_y: float
+    strays: float = 0.0
+
+
+def ways(path: MotionPath) -> list[Way]:
+    """Where something on a path ever is: on its way from each pose to the next."""
+    (x, y, _), *_ = poses = path.poses
+    legs = range(len(path.times) - 1)
+    return [Way(*poses[leg][:2], *poses[leg + 1][:2], _strays(path, leg)) for leg in legs] or [Way(x, y, x, y)]
+
+
+def _strays(path: MotionPath, leg: int) -> float:
+    """A cubic curve lies within its control points, which are a third of a leg's time from its ends."""
+    if path.ease != "spline":
+        return 0.0
+    third = (path.times[leg + 1] - path.times[leg]) / 3
+    return third * max(_metres(_velocity(path, k), 0.0) for k in (leg, leg + 1))
+
+
 def _speed(path: MotionPath, leg: int, reach: float) -> float:
     step, seconds = _step(path.poses[leg], path.poses[leg + 1]), path.times[leg + 1] - path.times[leg]
     if path.ease == "spline":

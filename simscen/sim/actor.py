@@ -1,12 +1,20 @@
-"""One thing that moves, and which of them are about a place."""
+"""One thing that moves by a script, or because it is pushed, or that may be moved some time."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
-from simscen.core.geometry import Pose3
-from simscen.core.motion_path import Track
+import pybullet
+
+from simscen.core.geometry import Pose3, wrap
+from simscen.core.motion_path import Track, Way
 from simscen.core.shapes import Body, Mesh, MotionPath
+from simscen.sim.inertia import GRAVITY
+
+FALLING = 0.1 * GRAVITY
+"""m/s that what rests may gain within a tenth of a second."""
+JUMP = 50.0
+"""A script that asks for more m/s than this sets its body down elsewhere, rather than hurl it through the world."""
 
 Vector = tuple[float, float, float]
 Placing = tuple[Vector, tuple[float, float, float, float]]
@@ -14,33 +22,43 @@ Placing = tuple[Vector, tuple[float, float, float, float]]
 
 @dataclass
 class Actor:
-    """A body in the engine: `shown` is where the engine has it, `path` began at tick `since`.
+    """A body, and the `path` that it has followed since tick `since`, if any.
 
-    `speed` is the fastest that any part of it ever moves along its path, in m/s, `size` how far from its origin it
-    extends, and `radius` how far from its axis, in metres. Where the engine has it as a surface without an inside,
-    `surface` is that, in the body's frame.
+    `ways` are all on which its origin ever is, `speed` is the fastest that any part of it ever moves on them, in m/s,
+    `size` how far from its origin it extends, and `radius` how far from its axis, in metres. Where the engine has it as
+    a surface without an inside, `surface` is that, in the body's frame.
     """
 
-    id: int
     body: Body
-    centre_from_base: Pose3
-    shown: Pose3
     path: MotionPath | None
     since: int
+    ways: Sequence[Way]
     speed: float
     size: float
     radius: float
     surface: Mesh | None
+    led: bool = False
+    """Whether it may be given another path at any time."""
+    number: int | None = None
+    """The engine's, once that has it."""
+    shown: Pose3 | None = None
+    """Where the engine has it, once that has it."""
+    centre_from_base: Pose3 = Pose3()
     placed: tuple[Placing, Pose3] | None = None
     """What the engine last said of its centre of mass, and the pose that comes of it."""
     resting: bool = False
     """Whether it has not moved at all since the engine was asked before."""
-    led: bool = False
-    """Whether it may be given another path at any time."""
     track: Track | None = None
     """Its path as it is asked for."""
     scripted: dict[int, Pose3] = field(default_factory=dict)
     """Where its path has it at the ticks that were asked for last."""
+
+    @property
+    def id(self) -> int:
+        """The engine's number of it. Raises LookupError where that has not got it: better no run than a wrong one."""
+        if self.number is None:
+            raise LookupError(f'"{self.body.name}" is not in the engine')
+        return self.number
 
     @property
     def pushable(self) -> bool:
@@ -53,21 +71,55 @@ class Actor:
             return False
         return self.path.over(since) or since + seconds < self.path.start
 
+    def follow(self, path: MotionPath, speed: float, tick: int) -> None:
+        """Follow another path from `tick` on."""
+        self.path, self.since, self.speed, self.track = path, tick, speed, None
+        self.scripted.clear()
 
-class About(NamedTuple):
-    """The actors that at a tick were within a distance in metres of a place, and all that may be pushed unless asleep.
+    def at(self, tick: int, rate: int) -> Pose3:
+        """Where its path has it."""
+        there = self.scripted.get(tick)
+        if there is None:
+            if len(self.scripted) > 1:
+                self.scripted.clear()
+            if self.track is None:
+                assert self.path is not None
+                self.track = Track(self.path, self.body.pose.z)
+            self.scripted[tick] = there = self.track.at((tick - self.since) / rate)
+        return there
 
-    `asleep` is since when all of those have been lying still; None where they have not. `lying` are number, place and
-    size of each, where none of these moves.
-    """
+    def velocity(self, tick: int, rate: int) -> tuple[Vector, float]:
+        """The velocity in m/s and rad/s that leads along its path to the next tick."""
+        here, there = self.at(tick, rate), self.at(tick + 1, rate)
+        vx, vy = (there.x - here.x) * rate, (there.y - here.y) * rate
+        if math.hypot(vx, vy) > JUMP:
+            return (0.0, 0.0, 0.0), 0.0
+        return (vx, vy, 0.0), wrap(there.yaw - here.yaw) * rate
 
-    actors: tuple[Actor, ...]
-    place: Vector
-    distance: float
-    tick: int
-    asleep: int | None
-    lying: tuple[tuple[int, Vector, float], ...] | None
+    def away(self, place: Vector, pose: Pose3) -> float:
+        """How far from a place it is in metres, being at `pose`, or is as the engine has it."""
+        away = math.dist(pose[:3], place)
+        return away if self.shown is None else min(away, math.dist(self.shown[:3], place))
 
-    def holds(self, place: Vector, distance: float, tick: int, step: float) -> bool:
-        """Whether no other can be within a distance of a place at a tick, moving `step` metres a tick at most."""
-        return math.dist(place, self.place) + step * (tick - self.tick) + distance <= self.distance
+    def show(self, client: int, pose: Pose3) -> None:
+        """Put it somewhere, if the engine has it."""
+        if self.number is not None and pose != self.shown:
+            self.shown = pose
+            pybullet.resetBasePositionAndOrientation(self.id, pose[:3], pose[3:], client)
+
+    def ask(self, client: int) -> Pose3 | None:
+        """See where the engine has moved it, which can be pushed; None where it has not."""
+        said: Placing = pybullet.getBasePositionAndOrientation(self.id, client)
+        self.resting = self.placed is not None and self.placed[0] == said
+        if self.resting:
+            return None
+        pose = Pose3(*said[0], *said[1]).compose(self.centre_from_base)
+        self.placed = said, pose
+        return pose
+
+    def fastest(self, client: int) -> float:
+        """How fast any part of it may be within a tenth of a second, in m/s, which can be pushed."""
+        if self.resting:
+            return FALLING
+        linear, angular = pybullet.getBaseVelocity(self.id, physicsClientId=client)
+        return math.hypot(*linear) + math.hypot(*angular) * self.size + FALLING

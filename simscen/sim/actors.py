@@ -7,30 +7,26 @@ from dataclasses import replace
 import numpy as np
 import pybullet
 
-from simscen.core.geometry import Pose2, Pose3, wrap
-from simscen.core.motion_path import Track, top_speed
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.motion_path import Way, top_speed, ways
 from simscen.core.shapes import Body, MotionPath
 from simscen.sim import engine
-from simscen.sim.actor import About, Actor, Placing, Vector
+from simscen.sim.about import About, look_about
+from simscen.sim.actor import FALLING, Actor, Vector
 from simscen.sim.ahead import Ahead
 from simscen.sim.enclosure import winds_around
-from simscen.sim.encounters import HORIZON, Balls, encounters
 from simscen.sim.homes import Homes
-from simscen.sim.inertia import GRAVITY, of_solids
+from simscen.sim.inertia import of_solids
 from simscen.sim.lost import lost
+from simscen.sim.meetings import Meetings
 from simscen.sim.outline import reach
+from simscen.sim.presence import Absent, Looker
 from simscen.sim.settled import Settling
 
 FRICTION = 0.6
 """Of pushable things on the ground: about that of wood or cardboard on concrete."""
-FALLING = 0.1 * GRAVITY
-"""m/s that what rests may gain within a tenth of a second."""
 NEVER = 2**62
 """A tick that never comes."""
-ABOUT = 2.0
-"""m farther than was asked for within which things are looked for, so that the others need not be looked at soon."""
-JUMP = 50.0
-"""A script that asks for more m/s than this sets its body down elsewhere, rather than hurl it through the world."""
 
 
 class Actors:
@@ -39,15 +35,25 @@ class Actors:
     Scripted bodies are kept where the engine last needed them; `begin` and `show` around a step make them push
     what they meet, with their true velocity. Without velocity they would push only by sinking in: a cart at 1 m/s by
     20 mm, with it by 0.1 mm. What can be pushed sleeps where it lies until something comes near; see `encounters`.
+    Where nothing can be, the engine gets what a robot comes near to; see `presence`.
     """
 
     def __init__(
-        self, client: int, tick_rate: int, triangulate: engine.Triangulate, look: int = engine.AS_IT_IS
+        self,
+        client: int,
+        tick_rate: int,
+        triangulate: engine.Triangulate,
+        look: int = engine.AS_IT_IS,
+        all_present: bool = True,
     ) -> None:
-        """The renderer is shown a `look` of the engine's of each."""
+        """The renderer is shown a `look` of the engine's of each; `all_present`: of all, wherever they are."""
         self._client, self._rate, self._triangulate, self._shown_as = client, tick_rate, triangulate, look
+        self._all_present = all_present
         self._actors: dict[str, Actor] = {}
+        self._absent: Absent | None = None
+        self._missing = 0
         self._travelling: list[Actor] = []
+        self._driven: list[Actor] = []
         self._fastest = 0.0
         self._pushable: list[Actor] = []
         self._poses: Mapping[str, Pose3] = {}
@@ -55,51 +61,81 @@ class Actors:
         self._still_since: int | None = None
         self._until_asleep = math.ceil(2 * engine.UNTIL_ASLEEP * tick_rate)
         self._undisturbed: dict[int, int] = {}
-        self._looked_until = -1
-        self._meeting: list[Actor] = []
-        self._shaken_at = -1
-        self._lying: Balls | None = None
+        self._meetings = Meetings(client, tick_rate, (), ())
         self._moved: list[Actor] = []
         self._about: dict[int, About] = {}
         self._ahead = Ahead((), tick_rate)
         self._homes = Homes()
 
-    def add(self, body: Body, tick: int) -> None:
-        """Put a body into the world; one of the same name makes way."""
+    def add(self, body: Body, tick: int, led: bool = False) -> None:
+        """Put a body into the world, maybe one that `follow` will move; one of the same name makes way."""
         self.remove(body.name)
-        self.fill([body], tick)
+        self._actors[body.name] = self._made(body, tick, led)
+        self._let_in(tick)
 
     def fill(self, bodies: Iterable[Body], tick: int) -> None:
-        """Put bodies into the world, in this order, of whose names none is there."""
-        for body in bodies:
-            self._actors[body.name] = self._made(body, tick)
+        """Put bodies into the world of whose names none is there."""
+        self._actors.update((body.name, self._made(body, tick)) for body in bodies)
+        self._let_in(tick)
+
+    def _made(self, body: Body, tick: int, led: bool = False) -> Actor:
+        radius, height = reach(body.solids)
+        stays = (Way(body.pose.x, body.pose.y, body.pose.x, body.pose.y),)
+        on, speed = (stays, 0.0) if body.path is None else (ways(body.path), top_speed(body.path, radius))
+        hollow = engine.hollow(body.solids, body.mass > 0 and body.path is None)
+        surface = engine.fused(body.solids, self._triangulate) if hollow else None
+        return Actor(body, body.path, tick, on, speed, math.hypot(radius, height), radius, surface, led)
+
+    def _let_in(self, tick: int) -> None:
+        """Let the engine have what may meet anything but a robot, or go anywhere."""
+        self._actors = dict(sorted(self._actors.items()))
+        actors = self._actors.values()
+        everything = self._all_present or any(actor.pushable for actor in actors)
+        for actor in actors:
+            if actor.number is None and (everything or actor.led):
+                self._enter(actor, tick)
         self._sort()
 
-    def _made(self, body: Body, tick: int) -> Actor:
-        pushable = body.mass > 0 and body.path is None
-        frame = of_solids(body.solids, body.mass).principal() if pushable else ((0.0, 0.0, 0.0), Pose3())
-        number = engine.body(
-            self._client,
-            body.mass if pushable else 0.0,
-            engine.body_shape(self._client, body.solids, pushable, self._triangulate),
-            body.pose,
-            frame,
-            FRICTION,
-            self._shown_as,
-        )
-        radius, height = reach(body.solids)
-        speed = 0.0 if body.path is None else top_speed(body.path, radius)
-        surface = engine.fused(body.solids, self._triangulate) if engine.hollow(body.solids, pushable) else None
-        centre = frame[1].inverse()
-        return Actor(
-            number, body, centre, body.pose, body.path, tick, speed, math.hypot(radius, height), radius, surface
-        )
+    def _enter(self, actor: Actor, tick: int) -> None:
+        """Let the engine have it from now on."""
+        client, body, look = self._client, actor.body, self._shown_as
+        shape = engine.body_shape(client, body.solids, actor.pushable, self._triangulate)
+        if actor.pushable:
+            frame = of_solids(body.solids, body.mass).principal()
+            actor.centre_from_base = frame[1].inverse()
+            actor.number = engine.body(client, body.mass, shape, body.pose, frame, FRICTION, look)
+        elif actor.path is None:
+            actor.number = engine.fixed(client, shape, look, body.pose, FRICTION)
+        else:
+            actor.number = engine.body(client, 0.0, shape, body.pose, ((0.0, 0.0, 0.0), Pose3()), FRICTION, look)
+        if actor.path is None:
+            actor.shown = body.pose
+        else:  # to the last bit as if it had been there for long, which where the engine makes it is not
+            actor.show(client, actor.at(tick, self._rate))
+
+    @property
+    def all_here(self) -> bool:
+        """Whether the engine has all of them."""
+        return not self._missing
+
+    def meet(self, robots: Iterable[Looker], tick: int) -> dict[int, str | None]:
+        """Let the engine have what any robot may find within its reach: names by numbers of what it had not got."""
+        if self._absent is None:
+            self._absent = Absent([actor for actor in self._actors.values() if actor.number is None])
+        met = self._absent.met(robots)
+        for actor in met:
+            self._enter(actor, tick)
+        if met:
+            self._missing -= len(met)
+            self._driven = [actor for actor in self._travelling if actor.number is not None]
+        return {actor.id: actor.body.name for actor in met}
 
     def remove(self, name: str) -> None:
         """Take a body out of the world; an unknown name is none."""
         actor = self._actors.pop(name, None)
         if actor is not None:
-            pybullet.removeBody(actor.id, physicsClientId=self._client)
+            if actor.number is not None:
+                pybullet.removeBody(actor.number, physicsClientId=self._client)
             self._sort()
 
     def move(self, name: str, path: MotionPath, tick: int) -> None:
@@ -141,24 +177,24 @@ class Actors:
         self._still_since = None
 
     def follow(self, name: str, path: MotionPath, speed: float, tick: int) -> None:
-        """Let an upright round body that follows a path follow another from `tick` on, nowhere faster than `speed`.
+        """Let an upright round body that is led follow another path from `tick` on, nowhere faster than `speed`.
 
         Where it is now does not change, nor does how fast it may come along: no clearance has to be measured anew.
         """
         actor = self._actors[name]
-        actor.path, actor.since, actor.speed = path, tick, speed
-        actor.led, actor.track = True, None
-        actor.scripted.clear()
+        actor.follow(path, speed, tick)
         self._ahead = Ahead(self._travelling, self._rate)
         self._fastest = max(self._fastest, speed)
 
     def _sort(self) -> None:
         self._posed_at = self._still_since = None
-        self._actors = dict(sorted(self._actors.items()))
-        self._travelling = [actor for actor in self._actors.values() if actor.path is not None]
+        actors = self._actors.values()
+        self._absent, self._missing = None, sum(actor.number is None for actor in actors)
+        self._travelling = [actor for actor in actors if actor.path is not None]
+        self._driven = [actor for actor in self._travelling if actor.number is not None]
         self._fastest = max((actor.speed for actor in self._travelling), default=0.0)
-        self._pushable = [actor for actor in self._actors.values() if actor.pushable]
-        self._looked_until, self._meeting, self._lying = -1, [], None
+        self._pushable = [actor for actor in actors if actor.pushable]
+        self._meetings = Meetings(self._client, self._rate, self._travelling, self._pushable)
         self._about.clear()
         self._ahead = Ahead(self._travelling, self._rate)
         self._moved = list(self._pushable)
@@ -190,7 +226,7 @@ class Actors:
 
     def shaken(self, tick: int) -> None:
         """Something is pushed during the step from `tick` on: how fast things are now says nothing about it."""
-        self._looked_until, self._shaken_at = -1, tick
+        self._meetings.shaken(tick)
 
     def apart_until(self, tick: int, robots: Callable[[], float]) -> int:
         """The tick until which no scripted body can push anything; -1 where one may push something during this step.
@@ -199,65 +235,32 @@ class Actors:
         """
         if not (self._travelling and self._pushable):
             return NEVER
-        if tick >= self._looked_until:
-            self._look(tick, robots())
-        return -1 if self._meeting else self._looked_until
-
-    def _look(self, tick: int, robots: float) -> None:
-        """See who may meet; all are put where they are, for until the next look nobody may run into what has gone."""
-        poses, moving = self.poses(tick), list[Actor]()
-        for actor in self._travelling:
-            self._show(actor, poses[actor.body.name])
-            if not actor.parked((tick - actor.since) / self._rate, HORIZON):
-                moving.append(actor)
-        if self._lying is None or not self._asleep(tick):
-            self._lying = Balls.of((poses[a.body.name][:3], a.size, self._speed(a)) for a in self._pushable)
-        scripted = Balls.of((poses[a.body.name][:3], a.radius, a.speed) for a in moving)  # upright, all of them
-        # What is hit by something heavier leaves with up to twice its speed.
-        found = encounters(scripted, self._lying, 2 * max(robots, self._fastest, float(self._lying.speeds.max())))
-        self._meeting = [moving[number] for number in found.scripted]
-        for number in found.pushable:
-            engine.wake(self._client, self._pushable[number].id)
+        meetings = self._meetings
+        if tick >= meetings.until and meetings.look(tick, robots(), self.poses(tick), self._asleep(tick)):
             self._still_since = None
-        self._looked_until = tick + (1 if tick == self._shaken_at else max(1, math.floor(found.seconds * self._rate)))
+        return -1 if meetings.scripted else meetings.until
 
     def begin(self, tick: int, everything: bool = True) -> None:
         """Before the step that leads from `tick` to the next: scripted bodies in place and with their velocity.
 
         Not `everything`: only those that may push something.
         """
-        for actor in self._travelling if everything else self._meeting:
-            self._show(actor, self._pose(actor, tick))
-            velocity, turning = self._scripted(actor, tick)
+        for actor in self._driven if everything else self._meetings.scripted:
+            actor.show(self._client, actor.at(tick, self._rate))
+            velocity, turning = actor.velocity(tick, self._rate)
             if turning or any(velocity):
                 pybullet.resetBaseVelocity(actor.id, velocity, (0.0, 0.0, turning), physicsClientId=self._client)
 
-    def _scripted(self, actor: Actor, tick: int) -> tuple[Vector, float]:
-        """The velocity in m/s and rad/s that leads along the path to the next tick."""
-        here, there = self._pose(actor, tick), self._pose(actor, tick + 1)
-        vx, vy = (there.x - here.x) * self._rate, (there.y - here.y) * self._rate
-        if math.hypot(vx, vy) > JUMP:
-            return (0.0, 0.0, 0.0), 0.0
-        return (vx, vy, 0.0), wrap(there.yaw - here.yaw) * self._rate
-
     def velocities(self, tick: int) -> dict[int, Vector]:
-        """How everything moves at `tick`, in m/s, by the engine's numbers."""
-        return {
-            actor.id: pybullet.getBaseVelocity(actor.id, physicsClientId=self._client)[0]
-            if actor.path is None
-            else self._scripted(actor, tick)[0]
-            for actor in self._actors.values()
-        }
+        """How everything moves at `tick` that the engine has, in m/s, by its numbers."""
+        moving = {actor.id: actor.velocity(tick, self._rate)[0] for actor in self._driven}
+        pushed = {actor.id: pybullet.getBaseVelocity(actor.id, self._client)[0] for actor in self._pushable}
+        return {**moving, **pushed}
 
     def show(self, tick: int, everything: bool = True) -> None:
         """Put the scripted bodies where they are at `tick`, or those that may push something."""
-        for actor in self._travelling if everything else self._meeting:
-            self._show(actor, self._pose(actor, tick))
-
-    def _show(self, actor: Actor, pose: Pose3) -> None:
-        if pose != actor.shown:
-            actor.shown = pose
-            pybullet.resetBasePositionAndOrientation(actor.id, pose[:3], pose[3:], self._client)
+        for actor in self._driven if everything else self._meetings.scripted:
+            actor.show(self._client, actor.at(tick, self._rate))
 
     def poses(self, tick: int) -> Mapping[str, Pose3]:
         """Where everything is, by name in order; the engine is asked at most once for each tick."""
@@ -286,12 +289,6 @@ class Actors:
         if self._travelling and self._posed_at is not None and (not self._pushable or self._asleep(tick)):
             self._ahead.look(tick, period, self._poses)
 
-    def _track(self, actor: Actor) -> Track:
-        if actor.track is None:
-            assert actor.path is not None
-            actor.track = Track(actor.path, actor.body.pose.z)
-        return actor.track
-
     def _asleep(self, tick: int) -> bool:
         """Whether all that can be pushed has long been lying, so that the engine lets it lie, and nobody touched it.
 
@@ -314,20 +311,13 @@ class Actors:
 
     def _pose(self, actor: Actor, tick: int) -> Pose3:
         if actor.path is not None:
-            there = actor.scripted.get(tick)
-            if there is None:
-                if len(actor.scripted) > 1:
-                    actor.scripted.clear()
-                actor.scripted[tick] = there = self._track(actor).at((tick - actor.since) / self._rate)
-            return there
-        if not actor.body.mass > 0:
+            return actor.at(tick, self._rate)
+        if not actor.pushable:
             actor.resting = True
             return actor.body.pose
-        said: Placing = pybullet.getBasePositionAndOrientation(actor.id, self._client)
-        actor.resting = actor.placed is not None and actor.placed[0] == said
-        if actor.placed is None or not actor.resting:
-            actor.placed = said, Pose3(*said[0], *said[1]).compose(actor.centre_from_base)
+        if actor.ask(self._client) is not None:
             self._moved.append(actor)
+        assert actor.placed is not None
         return actor.placed[1]
 
     def around(self, place: Vector, tick: int) -> str | None:
@@ -365,49 +355,22 @@ class Actors:
             or about.asleep != asleep
             or not about.holds(place, distance, tick, self._fastest / self._rate)
         ):
-            about = self._about[by] = self._look_about(place, distance + ABOUT, tick, asleep)
-        if about.lying is not None:
-            return [number for number, there, size in about.lying if math.dist(there, place) <= distance + size]
-        near = list[int]()
-        for actor in about.actors:
-            pose, reach = poses[actor.body.name], distance + actor.size
-            is_near = math.dist(pose[:3], place) <= reach
-            if actor.path is not None and (is_near or math.dist(actor.shown[:3], place) <= reach):
-                self._show(actor, pose)
-            if is_near:
-                near.append(actor.id)
-        return near
+            about = self._about[by] = look_about(self._actors.values(), poses, place, distance, tick, asleep)
+        return about.near(self._client, place, distance, poses)
 
     def gap(self, place: Vector, distance: float, tick: int, by: int) -> float | None:
         """How much farther than a distance from a place, in metres, `within` would have to look to find anybody.
 
         None where what is pushed or led may come from anywhere soon. `within` was asked just now.
         """
-        about, poses = self._about[by], self.poses(tick)
+        about = self._about[by]
         if self._pushable or any(actor.led for actor in self._travelling):
             return None
-        gap = about.distance - math.dist(place, about.place) - self.come_in(tick - about.tick)
-        for actor in about.actors:
-            away = min(math.dist(poses[actor.body.name][:3], place), math.dist(actor.shown[:3], place))
-            gap = min(gap, away - actor.size)
-        return gap - distance
+        return about.gap(place, self.poses(tick), self.come_in(tick - about.tick)) - distance
 
     def come_in(self, ticks: int) -> float:
         """How far in metres any script moves anything in so many ticks, at most."""
         return self._fastest * ticks / self._rate
-
-    def _look_about(self, place: Vector, distance: float, tick: int, asleep: int | None) -> About:
-        poses = self.poses(tick)
-        actors = tuple(
-            actor
-            for name, actor in self._actors.items()
-            if (asleep is None and actor.pushable)
-            or min(math.dist(poses[name][:3], place), math.dist(actor.shown[:3], place)) <= distance + actor.size
-        )
-        lying = None
-        if not any(actor.path is not None or (asleep is None and actor.pushable) for actor in actors):
-            lying = tuple((actor.id, poses[actor.body.name].position, actor.size) for actor in actors)
-        return About(actors, place, distance, tick, asleep, lying)
 
     @property
     def loose(self) -> bool:
@@ -422,8 +385,8 @@ class Actors:
                 yield actor.id, poses[actor.body.name].position, actor.size + travelled
 
     def ids(self) -> dict[int, str | None]:
-        """Names by the engine's numbers."""
-        return {actor.id: name for name, actor in self._actors.items()}
+        """Names by the engine's numbers, of those that it has."""
+        return {actor.number: name for name, actor in self._actors.items() if actor.number is not None}
 
     def top_speed(self, tick: int) -> float:
         """How fast anything may come along within a tenth of a second from `tick` on, which is now, in m/s.
@@ -435,10 +398,5 @@ class Actors:
         self.poses(tick)
         if self._asleep(tick):
             return max(self._fastest, FALLING) * (2 if len(self._pushable) > 1 else 1)
-        return max(self._fastest, *map(self._speed, self._pushable)) * (2 if len(self._pushable) > 1 else 1)
-
-    def _speed(self, actor: Actor) -> float:
-        if actor.resting:
-            return FALLING
-        linear, angular = pybullet.getBaseVelocity(actor.id, physicsClientId=self._client)
-        return math.hypot(*linear) + math.hypot(*angular) * actor.size + FALLING
+        speeds = [actor.fastest(self._client) for actor in self._pushable]
+        return max(self._fastest, *speeds) * (2 if len(self._pushable) > 1 else 1)

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import pybullet
 
+from simscen.core.case import CLEARANCE_RANGE
 from simscen.core.geometry import Pose3
 from simscen.core.shapes import TriangleMesh
 from simscen.sim.actors import NEVER, Actors
@@ -71,6 +72,8 @@ class Clearance:
         self._extent = math.hypot(self._radius, self._height)
         self.size = ROUNDED + self._extent
         """How far from its base the robot extends, in m."""
+        self.looks = self.size + max(reach, CLEARANCE_RANGE)
+        """How far from its base things that move may be that it is measured against, in m, and no less than usual."""
         # Where wheels roll on solids they may also hit them.
         touching = replace(robot, casters=(*robot.casters, *robot.tyres)) if uneven else robot
         self._proximity = Proximity(static, touching, reach)

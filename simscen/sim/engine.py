@@ -31,6 +31,8 @@ NOTHING, EVERYTHING = 0, -1
 AS_IT_IS = -1
 """The look of a body that the renderer shows as the shape that it is; of most triangles it shows nothing."""
 
+ORIGIN = Pose3()
+
 PRIMITIVES = (Box, Cylinder, Sphere, Capsule)
 """What the engine knows as such."""
 
@@ -238,16 +240,18 @@ def lay(client: int, number: int) -> None:
     pybullet.changeDynamics(number, -1, activationState=asleep, sleepThreshold=AT_REST, physicsClientId=client)
 
 
-def fixed(client: int, shape: int, look: int = AS_IT_IS) -> int:
+def fixed(client: int, shape: int, look: int = AS_IT_IS, pose: Pose3 = ORIGIN, friction: float = 1.0) -> int:
     """A body that never moves; it sleeps, for Bullet looks anew at what lies upon something that is awake.
 
     It is a rigid body: a multibody, as Bullet would have it, has six velocities of its own that stay zero, and each
     contact with it is solved for them too. On a ground that is one a robot's step takes an eighth longer.
     """
-    number: int = pybullet.createMultiBody(0.0, shape, look, useMaximalCoordinates=1, physicsClientId=client)
+    number: int = pybullet.createMultiBody(
+        0.0, shape, look, pose.position, pose.quaternion, useMaximalCoordinates=1, physicsClientId=client
+    )
     touch(client, number, -1, UNMOVED, ~(UNMOVED | GROUND | TERRAIN))
     pybullet.changeDynamics(
-        number, -1, lateralFriction=1.0, restitution=0.0, activationState=pybullet.ACTIVATION_STATE_SLEEP,
+        number, -1, lateralFriction=friction, restitution=0.0, activationState=pybullet.ACTIVATION_STATE_SLEEP,
         physicsClientId=client,
     )  # fmt: skip
     return number

@@ -20,6 +20,7 @@ from simscen.sim.drives import build
 from simscen.sim.film import Film
 from simscen.sim.floor import Floor
 from simscen.sim.lost import lost
+from simscen.sim.presence import Looker
 from simscen.sim.robot_body import RobotBody
 from simscen.sim.samples import Samples
 from simscen.sim.state import Seen, State
@@ -88,8 +89,19 @@ class Scene:
         for robot in self.robots.values():
             robot.samples.settle()
 
+    def meet(self) -> None:
+        """Let the engine have what a robot may come near to; asked at every tick at which one looks about itself."""
+        if self.actors.all_here:
+            return
+        robots = self.robots.values()
+        met = self.actors.meet((robot.looker for robot in robots), self.tick)
+        if met:
+            for robot in robots:
+                robot.know(met)
+
     def changed(self) -> None:
         """Something was put into or taken out of the world, or set down elsewhere."""
+        self.meet()
         for robot in self.robots.values():
             robot.changed()
 
@@ -261,9 +273,14 @@ class Robot:
         self._names = {**dict.fromkeys(scene.walls.bodies), **scene.terrain.names, **scene.actors.ids(), **others}
         self.clearance.forget()
 
-    def know_walls(self, bodies: list[int]) -> None:
-        """These stand now, too."""
-        self._names.update(dict.fromkeys(bodies))
+    @property
+    def looker(self) -> Looker:
+        """Where it is, and how far it looks for what moves."""
+        return Looker(self.base.id, self._seen().pose.position, self.clearance.looks)
+
+    def know(self, bodies: Mapping[int, str | None]) -> None:
+        """The engine has these now, too: names by its numbers, None of walls."""
+        self._names.update(bodies)
 
     @property
     def calm_until(self) -> int:

@@ -70,7 +70,7 @@ class Simulation:
         walls = Walls(client, terrain.rest)
         look = engine.AS_IT_IS if pictures else engine.speck(client)
         film = Film(client, static, triangulate) if pictures else None
-        actors = Actors(client, tick_rate, triangulate, look)
+        actors = Actors(client, tick_rate, triangulate, look, all_present=pictures)
         self._scene = Scene(client, tick_rate, walls, terrain, actors, film)
         self._attends: tuple[int, Callable[[], None]] | None = None
         self._firmware = max(1, round(tick_rate / FIRMWARE_RATE))
@@ -82,6 +82,7 @@ class Simulation:
             ways = static if obstacles is None else obstacles
             self.robots[name] = Robot(name, self._scene, static, ways, body, pose, period, clearance_range, look)
         actors.fill((terrain.lifted(thing) for thing in sorted(bodies, key=lambda body: body.name)), 0)
+        self._scene.meet()
         if not walls.complete:
             self._put_up_walls(SETTLING)
         settling = actors.settling()
@@ -111,6 +112,7 @@ class Simulation:
                 scene.actors.settled(due)
         if scene.tick < until:
             self._step(until - scene.tick)
+        scene.meet()
 
     def _step(self, ticks: int) -> None:
         scene, calm = self._scene, -1
@@ -175,6 +177,7 @@ class Simulation:
             scene.tick += 1
             scene.actors.show(scene.tick, everything=False)
             return
+        scene.meet()
         scene.actors.begin(scene.tick)
         motions = {robot.base.id: robot.look() for robot in self.robots.values()}
         if not scene.walls.complete:
@@ -193,7 +196,7 @@ class Simulation:
         for body in itertools.chain(near, scene.actors.coming(scene.tick, ticks)):
             if fresh := scene.walls.near(*body):
                 for robot in self.robots.values():
-                    robot.know_walls(fresh)
+                    robot.know(dict.fromkeys(fresh))
 
     def lay(self, name: str, patch: Patch) -> None:
         """Make a piece of floor slippery, or dry again; a patch of the same name is replaced."""
@@ -248,7 +251,7 @@ class Simulation:
         """Let a round body come that `follow` will move, never faster than `speed` in m/s."""
         self._scene.settle()
         path = MotionPath((0.0,), (body.pose.plane,))
-        self._scene.actors.add(replace(body, path=path), self.tick)
+        self._scene.actors.add(replace(body, path=path), self.tick, led=True)
         self._scene.actors.follow(body.name, path, speed, self.tick)
         self._scene.changed()
 
