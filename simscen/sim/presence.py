@@ -5,7 +5,6 @@ three. A thing that were missing where a robot meets it would be a collision tha
 time or by speeds: it comes in, for good, before a robot is within reach of any place that its script ever leads it to.
 """
 
-import math
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
@@ -21,9 +20,8 @@ ROUNDED = 1e-3
 
 
 class Looker(NamedTuple):
-    """A robot by the engine's number: where it is, and how far from there it looks for what moves, in metres."""
+    """Where a robot is, and how far from there it looks for what moves, in metres."""
 
-    number: int
     place: Vector
     reach: float
 
@@ -39,19 +37,15 @@ class Absent:
         self._squared = np.maximum((self._along**2).sum(axis=1), 1e-12)
         self._wide = rows[:, 4] + np.array([actor.size for actor in actors])[self._owners] + ROUNDED
         self._missing = np.ones(len(actors), dtype=np.bool_)
-        self._looked: dict[int, Looker] = {}
 
     def met(self, robots: Iterable[Looker]) -> list[Actor]:
-        """Those of them, in their order, that a robot might find within its reach some time; they are absent no more.
+        """Those of them, in their order, that any robot might find within its reach some time; absent no more.
 
-        For as long as each robot is no more than a stride away, those are all.
+        For as long as each is no more than a stride away from there, those are all.
         """
         met = np.zeros(len(self._actors), dtype=np.bool_)
-        for robot in robots:
-            known = self._looked.get(robot.number)
-            if known is None or math.dist(known.place, robot.place) + robot.reach > known.reach + STRIDE:
-                self._looked[robot.number] = robot
-                met[self._owners[self._apart(robot.place) <= robot.reach + STRIDE]] = True
+        for place, reach in robots:
+            met[self._owners[self._apart(place) <= reach + STRIDE]] = True
         met &= self._missing
         self._missing &= ~met
         return [self._actors[number] for number in np.flatnonzero(met).tolist()]

@@ -1,5 +1,6 @@
 """One robot in a simulation: how it moves, what it touches, and how near it is to anything."""
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
@@ -20,7 +21,7 @@ from simscen.sim.drives import build
 from simscen.sim.film import Film
 from simscen.sim.floor import Floor
 from simscen.sim.lost import lost
-from simscen.sim.presence import Looker
+from simscen.sim.presence import STRIDE, Looker
 from simscen.sim.robot_body import RobotBody
 from simscen.sim.samples import Samples
 from simscen.sim.state import Seen, State
@@ -28,6 +29,7 @@ from simscen.sim.terrain import Terrain, stands
 from simscen.sim.walls import Walls
 
 Vector = tuple[float, float, float]
+NOWHERE = (math.inf, math.inf, math.inf)
 
 
 @dataclass(frozen=True)
@@ -89,19 +91,21 @@ class Scene:
         for robot in self.robots.values():
             robot.samples.settle()
 
-    def meet(self) -> None:
-        """Let the engine have what a robot may come near to; asked at every tick at which one looks about itself."""
+    def meet(self, anew: bool = False) -> None:
+        """Let the engine have what a robot may come near to; asked at every tick at which one looks about itself.
+
+        It is looked `anew` once something has come or gone.
+        """
         if self.actors.all_here:
             return
-        robots = self.robots.values()
-        met = self.actors.meet((robot.looker for robot in robots), self.tick)
-        if met:
-            for robot in robots:
+        lookers = [robot.look_out() for robot in self.robots.values() if anew or robot.gone]
+        if lookers and (met := self.actors.meet(lookers, self.tick)):
+            for robot in self.robots.values():
                 robot.know(met)
 
     def changed(self) -> None:
         """Something was put into or taken out of the world, or set down elsewhere."""
-        self.meet()
+        self.meet(anew=True)
         for robot in self.robots.values():
             robot.changed()
 
@@ -146,6 +150,7 @@ class Robot:
         )
         self.samples = Samples(self.clearance)
         self._names: dict[int, str | None] = {}
+        self._looked_from = NOWHERE
 
     def drive(self, command: Twist) -> None:
         """Command a velocity in the base frame; the base follows within its limits."""
@@ -274,9 +279,14 @@ class Robot:
         self.clearance.forget()
 
     @property
-    def looker(self) -> Looker:
+    def gone(self) -> bool:
+        """Whether it has moved more than a stride since it looked out."""
+        return math.dist(self._looked_from, self._seen().pose[:3]) > STRIDE
+
+    def look_out(self) -> Looker:
         """Where it is, and how far it looks for what moves."""
-        return Looker(self.base.id, self._seen().pose.position, self.clearance.looks)
+        self._looked_from = self._seen().pose.position
+        return Looker(self._looked_from, self.clearance.looks)
 
     def know(self, bodies: Mapping[int, str | None]) -> None:
         """The engine has these now, too: names by its numbers, None of walls."""

@@ -47,7 +47,7 @@ def test_all_whose_ways_lead_a_robot_within_its_reach_are_met_and_few_others(sim
     simulation = simulate(bodies=bodies, pose=Pose2(100.0, 100.0), pictures=False)
     actors = list(simulation._scene.actors._actors.values())
     absent, place = Absent(actors), (chance.uniform(-5, 5), chance.uniform(-5, 5), 0.0)
-    met = absent.met([Looker(1, place, 3.0)])
+    met = absent.met([Looker(place, 3.0)])
 
     def nearest(actor: Actor) -> float:
         if actor.path is None:
@@ -61,7 +61,7 @@ def test_all_whose_ways_lead_a_robot_within_its_reach_are_met_and_few_others(sim
     assert 0 < len(names) < 50
     assert {name for name, distance in away.items() if distance <= 3.0 + STRIDE} <= names
     assert {name for name in names if away[name] > 3.2 + STRIDE + strays[name]} == set()
-    assert absent.met([Looker(1, (place[0] + 0.9 * STRIDE, *place[1:]), 3.0)]) == []
+    assert absent.met([Looker((place[0] + STRIDE, *place[1:]), 3.0 - STRIDE)]) == []
 
 
 def course(seed, present):
