@@ -1,12 +1,13 @@
 import itertools
 import math
+import random
 
 import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline
 
 from simscen.core.geometry import Pose2, Pose3, wrap
-from simscen.core.motion_path import Track, pose_at, top_speed
+from simscen.core.motion_path import Track, pose_at, top_speed, ways
 from simscen.core.shapes import MotionPath
 
 THERE = (Pose2(0, 0, 0), Pose2(2, 0, 0), Pose2(2, 1, math.pi / 2))
@@ -126,3 +127,26 @@ def test_a_track_is_where_its_path_is_bit_for_bit(mode, ease):
     for seconds in [*times, *times[::-7]]:
         assert track.at(seconds) == Pose3.planar(pose_at(path, seconds), 0.4)
     assert Track(MotionPath((0.0,), (Pose2(1, 2, 3),)), 0.0).at(5.0) == Pose3.planar(Pose2(1, 2, 3))
+
+
+@pytest.mark.parametrize("mode", ["once", "loop", "back_and_forth"])
+@pytest.mark.parametrize("ease", ["linear", "smooth", "spline"])
+def test_nothing_strays_farther_from_its_ways_than_they_say(ease, mode):
+    chance = random.Random(5)
+    strayed = []
+    for _ in range(20):
+        poses = tuple(Pose2(chance.uniform(-5, 5), chance.uniform(-5, 5), chance.uniform(-3, 3)) for _ in range(4))
+        path = MotionPath((0.0, *sorted(chance.uniform(0.1, 9) for _ in range(3))), poses, mode, ease=ease)
+        for moment in range(60):
+            x, y, _ = pose_at(path, 0.3 * moment)
+            away = [(beside(x, y, way), way.strays) for way in ways(path)]
+            assert any(metres <= strays + 1e-9 for metres, strays in away)
+            strayed.append(min(metres for metres, _ in away))
+    assert (max(strayed) > 0.1) == (ease == "spline")
+
+
+def beside(x, y, way):
+    """How far a place is from a straight line between two."""
+    start, along = complex(way.x, way.y), complex(way.to_x - way.x, way.to_y - way.y)
+    share = (complex(x, y) - start) / along
+    return abs(complex(x, y) - start - min(max(share.real, 0.0), 1.0) * along)

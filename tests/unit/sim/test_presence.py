@@ -126,6 +126,12 @@ def test_the_engine_has_what_comes_near_some_time_and_what_a_robot_comes_near_to
     assert simulation.truth().clearance == pytest.approx(7.3 - 6.5 - RADIUS, abs=0.001)
 
 
+def test_what_is_come_to_while_nobody_asks_is_touched(simulate):
+    simulation = simulate(bodies=[FAR], drive=(0.5, 0.0, 0.0), pictures=False)
+    simulation.step(18 * 240)
+    assert [event.name for event in simulation.collisions()][:1] == ["far"]
+
+
 def test_where_anything_can_be_pushed_the_engine_has_everything(simulate):
     simulation = simulate(bodies=[FAR], pictures=False)
     assert there(simulation) == set()
