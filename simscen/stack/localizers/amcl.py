@@ -13,7 +13,7 @@ from simscen.model.localizers import Amcl
 from simscen.stack.localizers.clusters import spread, summarise
 from simscen.stack.localizers.finder import UNSEEN, Finder
 from simscen.stack.localizers.global_search import GlobalSearch
-from simscen.stack.localizers.map_trust import MapTrust
+from simscen.stack.localizers.map_trust import TOGETHER, MapTrust
 from simscen.stack.localizers.misfit import MapMisfit
 from simscen.stack.localizers.motion_models import MotionModel
 from simscen.stack.localizers.particle_filter import ParticleFilter
@@ -24,6 +24,9 @@ from simscen.stack.odometry_history import OdometryHistory
 
 SURE_AFTER = 8
 """Corrections in a row in which nothing was amiss, after which a robot is sure of its place."""
+SHOWN = 0.7
+"""Share of what a scan shows that those before it must have shown, for particles to be weighed by it that are no narrow
+group: who steps before the lidar hides most of the room, and fits wherever something is as near."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +170,7 @@ class AmclLocalizer:
         self._due[scan.sensor], self._moved_to, self._belief = False, odometry, None
         sure = agreed and not self._came.parted and self._calm >= SURE_AFTER
         self._passed = self._passed + 1 if sure and self._passed + 1 < self._every else 0
-        answer = None if self._passed else self._filter.correct(scan)
+        answer = None if self._passed or self._hidden else self._filter.correct(scan)
         if answer is not None:
             pose, covariance = answer
             if self._scatter is not None and self._misfit is not None:
@@ -180,6 +183,12 @@ class AmclLocalizer:
             self._correction = _Correction(carried, covariance, odometry, scan.tick if self._passed else last.tick)
         if not self._passed:
             self._calm = self._calm + 1 if agreed and answer is not None and self._filter.sure else 0
+
+    @property
+    def _hidden(self) -> bool:
+        """Whether somebody hides the room from particles that may be anywhere about, so that no map can tell."""
+        again = None if self._matcher is None else self._matcher.again
+        return again is not None and again < SHOWN and not self._filter.particles.within(TOGETHER)
 
     def _matched_step(self, matcher: ScanMatcher, scan: Scan, odometry: Pose2) -> Step | None:
         """The motion since the last correction as the first lidar saw it; None where it did not see it."""

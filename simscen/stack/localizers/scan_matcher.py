@@ -26,6 +26,10 @@ GATES, ITERATIONS = (0.5, 0.35, 0.25, 0.15, 0.1), 6
 """m: what is further from its nearest neighbour counts for nothing, in one iteration after the other; and the most."""
 SETTLED, STILL = (0.02, 0.01), (0.002, 0.001)
 """m, rad: after an iteration that moved the scan less the last gate comes next; after one that moved it less, none."""
+LOOSE, LOOSER = 0.1, 1.5
+"""m, and of the root mean square of all gaps, whichever is more: what is so far from its neighbour counts a quarter,
+what is further soon nothing (Geman & McClure). Where most points fit, who walks along and what comes into sight beside
+a thing are no reason to doubt them; where none does, the robot went elsewhere than its wheels say."""
 SIGMA = 0.03
 """m: the standard deviation of points from surfaces, correlations included."""
 ALIKE = 0.7
@@ -85,12 +89,15 @@ class _Reference:
         gap -= ends
         against = self._normals.take(nearest).conj()
         matched = (own.normals * turn * against).real > ALIKE
-        matched &= np.abs(gap) < gate
+        squares = (gap * gap.conj()).real
+        matched &= squares < gate * gate
         count = int(np.count_nonzero(matched))
         self.again = count / len(ends)
         if count < LEAST:
             return None
-        against *= matched
+        squares /= max(LOOSE**2, LOOSER**2 * squares.dot(matched).item() / count)
+        squares += 1.0
+        against *= matched / squares
         slope = np.empty((4, len(ends)))
         slope[0] = against.real
         np.negative(against.imag, out=slope[1])
@@ -135,12 +142,17 @@ class ScanMatcher:
     def __init__(self) -> None:
         self._frames: deque[Surface] = deque(maxlen=FRAMES)
         self.pose = Pose2(0.0, 0.0, 0.0)
-        self.parted: bool | None = None
+        self.again: float | None = None
+        """The share of what the last scan shows that those before it showed; None when nobody can say."""
+
+    @property
+    def parted(self) -> bool | None:
         """Whether the last scan shows hardly anything of what those before it did; None when nobody can say."""
+        return None if self.again is None else self.again < AGAIN
 
     def step(self, scan: Scan, guess: Pose2) -> Step | None:
         """How the base moved since the last scan, where odometry says `guess`; None when the scans do not say."""
-        self.parted = None
+        self.again = None
         if abs(scan.angle_increment) > COARSEST:
             self.pose = self.pose.compose(guess)
             return None
@@ -157,7 +169,7 @@ class ScanMatcher:
         (place, heading), gate, last = _trust(guess), 0, len(GATES) - 1
         for _ in range(ITERATIONS):
             if (equations := reference.pull(own, pose, GATES[gate])) is None:
-                self.parted = True
+                self.again = 0.0
                 return None
             (xx, xy, xa, right), (_, yy, ya, up), (_, _, aa, around), _ = equations
             inverse = _inverse((xx + place, xy, xa, yy + place, ya, aa + heading))
@@ -173,7 +185,7 @@ class ScanMatcher:
             if gate == last and _within(step, STILL):
                 break
             gate = last if _within(step, SETTLED) else min(gate + 1, last)
-        self.parted = reference.again < AGAIN
+        self.again = reference.again
         return pose, inverse
 
 

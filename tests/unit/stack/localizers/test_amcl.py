@@ -91,6 +91,22 @@ def test_who_is_sure_compares_one_of_so_many_scans_with_the_map(interval: int, c
     assert compared == looked_at[: SURE_AFTER + 1] + looked_at[SURE_AFTER + interval :: interval]
 
 
+@pytest.mark.parametrize(("std", "expected"), [(1.0, [0, 48]), (0.1, [0, 24, 48])])
+def test_who_hides_the_room_tells_nothing_to_a_robot_that_may_be_anywhere_about(
+    std: float, expected: list[int], compared: list[int]
+) -> None:
+    """Somebody 0.3 m from the lidar hides half of the room; a robot whose particles are together asks the map."""
+    subject = localizer(Amcl(settling_distance=400.0), Estimate(START, (std, std, 0.2)), 1)
+    for tick, metres in ((0, 0.0), (24, 0.26), (48, 0.52)):
+        there = Pose2(metres, 0.0, 0.0)
+        view = seen(START.compose(there), tick)
+        if tick == 24:
+            view.ranges[: BEAMS // 2] = 0.3
+        subject.on_odometry(odometry(tick, there))
+        subject.on_scan(view)
+    assert compared == expected
+
+
 def test_a_covariance_of_scatter_is_learned_from_each_scan(compared: list[int]) -> None:
     driven = drive(10.0)
     spec = SURELY.model_copy(update={"covariance": "scatter"})

@@ -41,6 +41,16 @@ def test_along_a_corridor_without_an_end_odometry_has_its_way() -> None:
     assert step.covariance[0, 0] > 10 * step.covariance[1, 1]
 
 
+@pytest.mark.parametrize("wheels", [0.25, 0.21, 0.3])
+def test_who_walks_before_a_robot_along_a_corridor_does_not_hold_it_back(wheels: float) -> None:
+    """Scans showed 0.03 m: the wall at the end was as far as the wheels say, and outvoted by whoever is nearer."""
+    corridor = (-100.0, 1.0, 9.0, 1.1), (-100.0, -1.1, 9.0, -1.0), (9.0, -1.1, 9.1, 1.1)
+    before, after = (np.array([*corridor, (2.0 + gone, -0.2, 2.3 + gone, 0.2)]) for gone in (0.0, 0.25))
+    step = stepped(Pose2(wheels, 0, 0), view(Pose2(0, 0, 0), before), view(Pose2(0.25, 0, 0), after))
+    assert step is not None
+    assert tuple(step.delta) == pytest.approx((wheels, 0.0, 0.0), abs=0.01)
+
+
 @pytest.mark.parametrize("ranges", [np.full(BEAMS, np.inf), np.full(BEAMS, np.nan), np.full(40, 2.0), np.empty(0)])
 def test_scans_that_show_no_surface_say_nothing(ranges: np.ndarray) -> None:
     assert stepped(STEP, scan(ranges), scan(ranges)) is None
