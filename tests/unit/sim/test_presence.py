@@ -126,10 +126,14 @@ def test_the_engine_has_what_comes_near_some_time_and_what_a_robot_comes_near_to
     assert simulation.truth().clearance == pytest.approx(7.3 - 6.5 - RADIUS, abs=0.001)
 
 
-def test_what_is_come_to_while_nobody_asks_is_touched(simulate):
+@pytest.mark.parametrize("every", [12, 18 * 240], ids=["asked", "not asked"])
+def test_what_a_robot_drives_into_from_afar_is_touched(simulate, every):
     simulation = simulate(bodies=[FAR], drive=(0.5, 0.0, 0.0), pictures=False)
-    simulation.step(18 * 240)
-    assert [event.name for event in simulation.collisions()][:1] == ["far"]
+    for _ in range(18 * 240 // every):
+        simulation.step(every)
+        clearance = simulation.truth().clearance
+    assert clearance <= 0.0
+    assert [event.name for event in simulation.collisions()] == ["far"]
 
 
 def test_where_anything_can_be_pushed_the_engine_has_everything(simulate):
