@@ -15,7 +15,7 @@ class About(NamedTuple):
     """The actors that at a tick were within a distance in metres of a place, and all that may be pushed unless asleep.
 
     `asleep` is since when all of those have been lying still; None where they have not. `lying` are each, its place
-    and size, where none of these moves.
+    on the ground and its width, where none of these moves.
     """
 
     actors: tuple[Actor, ...]
@@ -23,19 +23,20 @@ class About(NamedTuple):
     distance: float
     tick: int
     asleep: int | None
-    lying: tuple[tuple[Actor, Vector, float], ...] | None
+    lying: tuple[tuple[Actor, tuple[float, float], float], ...] | None
 
     def holds(self, place: Vector, distance: float, tick: int, step: float) -> bool:
         """Whether no other can be within a distance of a place at a tick, moving `step` metres a tick at most."""
         return math.dist(place, self.place) + step * (tick - self.tick) + distance <= self.distance
 
-    def near(self, client: int, place: Vector, distance: float, poses: Mapping[str, Pose3]) -> list[int]:
+    def near(self, client: int, place: Vector, distance: float, level: float, poses: Mapping[str, Pose3]) -> list[int]:
         """The engine's numbers of those that may be as near to a place as a distance, being where `poses` has them.
 
+        `level` is enough of it along the ground; what stands has neighbours nearer than it is high.
         A scripted one is put there if that is so near, or where the engine has had it until now.
         """
         if self.lying is not None:
-            return [actor.id for actor, there, size in self.lying if math.dist(there, place) <= distance + size]
+            return [actor.id for actor, there, width in self.lying if math.dist(there, place[:2]) <= level + width]
         near = list[int]()
         for actor in self.actors:
             pose, reach = poses[actor.body.name], distance + actor.size
@@ -63,5 +64,6 @@ def look_about(
     )
     lying = None
     if not any(actor.path is not None or (asleep is None and actor.pushable) for actor in about):
-        lying = tuple((actor, poses[actor.body.name].position, actor.size) for actor in about)
+        placed = ((actor, poses[actor.body.name]) for actor in about)
+        lying = tuple((actor, pose[:2], actor.width(pose)) for actor, pose in placed)
     return About(about, place, distance, tick, asleep, lying)

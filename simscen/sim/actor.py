@@ -96,6 +96,11 @@ class Actor:
             return (0.0, 0.0, 0.0), 0.0
         return (vx, vy, 0.0), wrap(there.yaw - here.yaw) * rate
 
+    def width(self, pose: Pose3) -> float:
+        """How far from its origin it extends along the ground, at most, in metres: where it leans its top does, too."""
+        height = math.sqrt(self.size**2 - self.radius**2)
+        return min(self.size, self.radius + 2 * height * math.hypot(pose.qx, pose.qy))
+
     def away(self, place: Vector, pose: Pose3) -> float:
         """How far from a place it is in metres, being at `pose`, or is as the engine has it."""
         away = math.dist(pose[:3], place)

@@ -341,9 +341,10 @@ class Actors:
                     return trouble
         return None
 
-    def within(self, place: Vector, distance: float, tick: int, by: int) -> list[int]:
+    def within(self, place: Vector, distance: float, level: float, tick: int, by: int) -> list[int]:
         """The engine's numbers of those that may be as near to a place as a distance in metres, for it to be asked.
 
+        Along the ground they need not be farther than `level` to be too far.
         `by` is the number of the robot that asks. A scripted one is put where it is now if that is so near, or where
         the engine has had it until now: nobody is to run into what has gone.
         """
@@ -356,7 +357,7 @@ class Actors:
             or not about.holds(place, distance, tick, self._fastest / self._rate)
         ):
             about = self._about[by] = look_about(self._actors.values(), poses, place, distance, tick, asleep)
-        return about.near(self._client, place, distance, poses)
+        return about.near(self._client, place, distance, level, poses)
 
     def gap(self, place: Vector, distance: float, tick: int, by: int) -> float | None:
         """How much farther than a distance from a place, in metres, `within` would have to look to find anybody.

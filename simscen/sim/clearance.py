@@ -160,7 +160,8 @@ class Clearance:
 
     def _search(self, tick: int, pose: Pose3, standing: Proximity) -> float:
         nearest, place = min(self._reach, standing.distance(pose)), pose[:3]
-        for other in self._actors.within(place, nearest + self.size, tick, self._base.id):
+        width = ROUNDED + self._radius + 2 * self._height * math.hypot(pose.qx, pose.qy)  # its top, where it leans
+        for other in self._actors.within(place, nearest + self.size, nearest + width, tick, self._base.id):
             for link in self._base.hull_links:
                 points = pybullet.getClosestPoints(self._base.id, other, nearest, link, physicsClientId=self._client)
                 nearest = min((point[8] for point in points), default=nearest)

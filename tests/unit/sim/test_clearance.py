@@ -10,7 +10,7 @@ from shapely.ops import unary_union
 
 from simscen.core.case import CLEARANCE_RANGE
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.shapes import Body, Cylinder, Extrusion, MotionPath, Solid, Sphere
+from simscen.core.shapes import Body, Box, Cylinder, Extrusion, MotionPath, Solid, Sphere
 
 RADIUS = 0.22  # of the turtlebot
 MILLIMETRE = 1e-3
@@ -83,6 +83,19 @@ def test_things_that_come_from_afar_or_wake_there_count_as_soon_as_they_are_near
             assert truth.clearance == pytest.approx(gap, abs=5e-3)
     assert min(nearest[: 40 * 6]) == CLEARANCE_RANGE
     assert min(nearest) < 0.3
+
+
+def test_what_sleeps_is_as_wide_as_it_lies_not_as_it_would_stand(simulate):
+    """A fallen post reaches to the robot from where an upright one could not, nearer than the wall."""
+    post = (Solid(Box((0.2, 0.2, 2.4)), Pose3(), "post"),)
+    fallen = Body("fallen", post, Pose3.from_rpy(0.0, 2.0, 0.1, math.pi / 2, 0.0, 0.0), mass=20.0)
+    upright = Body("upright", post, Pose3(0.0, -2.0, 1.2), mass=20.0)
+    simulation = simulate(solids=[box("wall", RADIUS + 0.95, 0, 0.1, 4)], bodies=[fallen, upright])
+    simulation.step(1200)
+    assert simulation.truth().clearance == pytest.approx(0.8 - RADIUS, abs=2 * MILLIMETRE)
+    simulation.remove("fallen")
+    simulation.step(1200)
+    assert simulation.truth().clearance == pytest.approx(0.9, abs=MILLIMETRE)
 
 
 def test_clearance_is_negative_where_hull_and_obstacle_overlap(simulate):

@@ -153,4 +153,4 @@ def test_nobody_is_measured_against_what_is_missing(simulate):
     """Rather than that a collision with it is not seen."""
     simulation = simulate(bodies=[FAR], pictures=False)
     with pytest.raises(LookupError, match='"far" is not in the engine'):
-        simulation._scene.actors.within((7.0, 0.0, 0.0), 2.0, 0, simulation.robot.base.id)
+        simulation._scene.actors.within((7.0, 0.0, 0.0), 2.0, 2.0, 0, simulation.robot.base.id)
