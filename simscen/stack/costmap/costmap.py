@@ -9,16 +9,17 @@ import numpy as np
 
 from simscen.core.geometry import Pose2
 from simscen.core.grid import OccupancyGrid
+from simscen.core.remembered import remembered
 from simscen.core.sensing import Image, Scan
 from simscen.core.zones import Zones
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.costmap.denoise_layer import without_specks
 from simscen.stack.costmap.frame import Cells, Frame, Numbers
-from simscen.stack.costmap.inflation_layer import Inflation, squared_distances
+from simscen.stack.costmap.inflation_layer import Costs, Inflation, inflation, squared_distances
 from simscen.stack.costmap.live_layer import EVERYWHERE, NONE, LiveLayer, Window
 from simscen.stack.costmap.obstacle_layer import crossed
 from simscen.stack.costmap.rolling import carried, left_behind, window_around, within
-from simscen.stack.costmap.static_layer import Mask, StaticLayer, empty_layer, static_layer, walls_within
+from simscen.stack.costmap.static_layer import Mask, StaticLayer, empty_layer, free_layer, static_layer, walls_within
 from simscen.stack.localizers.beams import Plane
 from simscen.stack.nearest import FARTHEST, SquaredWithin
 from simscen.stack.prediction.moving import NOTHING
@@ -56,9 +57,8 @@ class Costmap:
         self._size, self._no_farther = size or (spec.rolling_size, spec.rolling_size), no_farther
         self._inscribed = surroundings.robot.inscribed_radius
         resolution = spec.resolution if surroundings.map is None else surroundings.map.resolution
-        reach, scaling = _reach(spec, surroundings.robot), spec.cost_scaling_factor
-        self._inflation = Inflation(resolution, self._inscribed, spec.inflation_radius, scaling, reach)
-        self._margin = _cells(reach, resolution)
+        self._inflation = _inflation(spec, surroundings.robot, resolution)
+        self._margin = _cells(_reach(spec, surroundings.robot), resolution)
         self._speck = spec.denoise_layer.minimal_group_size if spec.denoise_layer.enabled else 0
         self._revision, self._zoned, self._scans = 0, 0, 0
         self._newest: dict[str, tuple[Pose2, Scan | Image]] = {}
@@ -71,8 +71,9 @@ class Costmap:
         self._frame: Frame = layer.frame
         self._live = LiveLayer(spec, self._inscribed, layer.frame)
         self._lay(layer)
-        self._unknown = layer.unknown
-        self._show()
+        self._unknown = layer.unknown.copy()
+        grid = None if self._forbidding else surroundings.map
+        self._show(None if grid is None else _costs(grid, self._inflation, self._margin, self._tracks).copy())
 
     @property
     def view(self) -> CostmapView:
@@ -194,6 +195,8 @@ class Costmap:
         unknown = self._tracks
         if grid is None:
             return empty_layer(window, keepout, mask, unknown)
+        if not self._forbidding:
+            return free_layer(grid, unknown)
         return static_layer(grid, keepout, mask, unknown)
 
     @property
@@ -214,9 +217,11 @@ class Costmap:
             self._static_squared = walls_within(grid, self._margin)
         self._walled = bool(layer.lethal.any())
 
-    def _show(self) -> None:
-        """Compute everything again."""
-        self._costs = self._inflation.costs(self._static_squared, self._unknown if self._tracks else None)
+    def _show(self, costs: Costs | None = None) -> None:
+        """Compute everything again, but for `costs` that are known."""
+        if costs is None:
+            costs = self._inflation.costs(self._static_squared, self._unknown if self._tracks else None)
+        self._costs = costs
         self._distance = self._inflation.metres.take(self._static_squared)
         self._note(None)
         self._changed = None
@@ -307,7 +312,19 @@ def _reach(spec: CostmapSpec, robot: RobotModel) -> float:
 
 def ready(spec: CostmapSpec, robot: RobotModel, grid: OccupancyGrid) -> None:
     """Work out now what a robot's costmap needs to know of its map, as long as nothing is forbidden there."""
-    walls_within(grid, _cells(_reach(spec, robot), grid.resolution))
+    tables, margin = _inflation(spec, robot, grid.resolution), _cells(_reach(spec, robot), grid.resolution)
+    _costs(grid, tables, margin, spec.track_unknown_space)
+
+
+@remembered
+def _costs(grid: OccupancyGrid, tables: Inflation, margin: int, tracks: bool) -> Costs:
+    """What cells of a map cost before anything is seen, where nothing is forbidden: once for all its runs."""
+    return tables.costs(walls_within(grid, margin), free_layer(grid, tracks).unknown if tracks else None)
+
+
+def _inflation(spec: CostmapSpec, robot: RobotModel, resolution: float) -> Inflation:
+    inscribed, reach = robot.inscribed_radius, _reach(spec, robot)
+    return inflation(resolution, inscribed, spec.inflation_radius, spec.cost_scaling_factor, reach)
 
 
 def _cells(reach: float, resolution: float) -> int:

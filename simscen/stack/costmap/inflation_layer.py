@@ -3,6 +3,8 @@
 Distances are kept as squared whole cells (uint16), so that distance in metres and cost are one table look-up each.
 """
 
+from functools import lru_cache
+
 import numpy as np
 import numpy.typing as npt
 
@@ -13,6 +15,7 @@ FAR = BEYOND
 """The largest squared distance kept: 256 cells, 12.8 m at 5 cm."""
 
 Squared = npt.NDArray[np.uint16]
+Costs = npt.NDArray[np.uint8]
 
 
 def squared_distances(lethal: npt.NDArray[np.bool_], reach: int) -> Squared:
@@ -25,6 +28,12 @@ def squared_distances(lethal: npt.NDArray[np.bool_], reach: int) -> Squared:
     for rows, distances in squared_cells(lethal):
         squared[rows] = np.where(distances <= reach * reach, np.minimum(distances, FAR), FAR)
     return squared
+
+
+@lru_cache(maxsize=8)
+def inflation(resolution: float, inscribed: float, radius: float, scaling: float, reach: float) -> "Inflation":
+    """The tables for these, which both costmaps of a robot and all its runs have in common."""
+    return Inflation(resolution, inscribed, radius, scaling, reach)
 
 
 class Inflation:
@@ -45,7 +54,7 @@ class Inflation:
         cost[0] = LETHAL
         self.cost: npt.NDArray[np.uint8] = cost.astype(np.uint8)
 
-    def costs(self, squared: npt.NDArray[np.integer], unknown: npt.NDArray[np.bool_] | None) -> npt.NDArray[np.uint8]:
+    def costs(self, squared: npt.NDArray[np.integer], unknown: npt.NDArray[np.bool_] | None) -> Costs:
         """Costs of cells; `unknown` ones stay unknown unless an obstacle is within the inscribed radius."""
         cost = self.cost.take(squared)
         if unknown is not None:

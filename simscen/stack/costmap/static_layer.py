@@ -45,9 +45,15 @@ def static_layer(
 
 
 @remembered
+def free_layer(grid: OccupancyGrid, unknown: bool) -> StaticLayer:
+    """The layer of a map in which nothing is forbidden: once for all its runs, which write into copies."""
+    return static_layer(grid, (), unknown=unknown)
+
+
+@remembered
 def walls_within(grid: OccupancyGrid, reach: int) -> Squared:
-    """For each cell of a map's layer in which nothing is forbidden, see `squared_distances`: once for all its runs."""
-    return squared_distances(static_layer(grid, ()).lethal, reach)
+    """For each cell of such a layer, see `squared_distances`: once for all its runs."""
+    return squared_distances(free_layer(grid, True).lethal, reach)
 
 
 def empty_layer(
