@@ -1,7 +1,7 @@
 """Which of the things that nobody pushes the engine has: those to whose ways a robot has come near.
 
 A body takes 0.16 µs of each step wherever it is, and 0.3 ms to be made; of twenty carts in a warehouse a robot meets
-three. A thing that were missing where a robot meets it would be a collision that nobody sees, so nothing here goes by
+two. A thing that were missing where a robot meets it would be a collision that nobody sees, so nothing here goes by
 time or by speeds: it comes in, for good, before a robot is within reach of any place that its script ever leads it to.
 """
 
