@@ -1,7 +1,6 @@
 """Makes the plan, watches over it while it is followed, and replaces it when need be: half of Nav2's tree."""
 
 import contextlib
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -24,9 +23,6 @@ BETTER_PERIOD = 2.0
 """Seconds between two looks for a shorter way after obstacles have gone."""
 MOVING_PERIOD = 0.5
 """Seconds between two plans around what moves."""
-LITTLE_ROUND, SAME_END = 0.1, 0.3
-"""Metres by which a plan may be longer because of what moves without being looked at again while it meets nothing, and
-between the ends of two plans that lead to the same place."""
 RECONSIDER = 2
 """Every which step the plan is looked at: 10 Hz at the default rate, twice as often as Nav2's costmap is updated."""
 USUAL_RATE, THROUGH_POSES_RATE = 1.0, 0.333
@@ -71,7 +67,7 @@ class PlanKeeper:
         """A new goal."""
         self.drop("goal")
         self._checked, self._adopted, self._looked, self._most = -1, now, now, 0
-        self._detour, self._minded = 0.0, now
+        self._bent, self._minded = False, now
         self._partial, self._origin = False, (0.0, 0.0)
         self._steps, self._cautious = 0, False
 
@@ -122,13 +118,13 @@ class PlanKeeper:
 
     def _ask(self, tick: int, goal: Goal, pose: Pose2, reason: str, wished: bool = False) -> None:
         """Plan from here and now; the answer is there when the planner would be done."""
-        due, before = tick + self._latency, (self._partial, self._origin, self._detour)
+        due, before = tick + self._latency, (self._partial, self._origin, self._bent)
         try:
             answer: Path | NavigationFailure = self._compute(due, goal, pose)
         except NavigationFailure as failure:
             answer = failure
-        self._asked = _Asked(due, reason, wished, answer, self._partial, self._origin, self._detour)
-        self._partial, self._origin, self._detour = before
+        self._asked = _Asked(due, reason, wished, answer, self._partial, self._origin, self._bent)
+        self._partial, self._origin, self._bent = before
 
     def _hear(self, tick: int, now: float) -> tuple[Event, ...]:
         """Follow the plan that was asked for, once it is there. Raises what it failed with."""
@@ -142,7 +138,7 @@ class PlanKeeper:
             raise asked.answer
         if asked.reason == "better" and (self.plan is None or not self.plan.worse_than(asked.answer.length())):
             return ()
-        self._partial, self._origin, self._detour = asked.partial, asked.origin, asked.detour
+        self._partial, self._origin, self._bent = asked.partial, asked.origin, asked.bent
         return (self._adopt(tick, now, asked.answer, asked.reason),)
 
     def _must_replan(self, now: float, pose: Pose2, plan: PlanInForce) -> str:
@@ -168,11 +164,11 @@ class PlanKeeper:
         return plan.blocked()
 
     def _moved(self, now: float, pose: Pose2, plan: PlanInForce) -> str:
-        """Why what moves calls for another plan: this one meets it, or leads far round for its sake."""
-        moving, far = self._costmap.moving, self._detour > LITTLE_ROUND
-        if not (far or len(moving)) or now - self._minded < MOVING_PERIOD or self._spec.replanning == "rate":
+        """Why what moves calls for another plan: this one meets it, or leads around where it was to be met."""
+        moving = self._costmap.moving
+        if not (self._bent or len(moving)) or now - self._minded < MOVING_PERIOD or self._spec.replanning == "rate":
             return ""
-        if not far and not meets(moving, pose, plan.places(4), self._speed, self._radius):
+        if not self._bent and not meets(moving, pose, plan.places(4), self._speed, self._radius):
             return ""
         self._minded = now
         return "moving"
@@ -202,25 +198,14 @@ class PlanKeeper:
         legs, start = list[Array](), pose
         seen = self._costmap.view
         view = foreseen(seen, pose, self._speed, self._radius)
+        self._bent = view is not seen
         for stop in (*self._via, goal):
             points = self._leg(view, stop, start)
             legs.append(points)
             start = Pose2(*points[-1].tolist())
             if self._partial:
                 break
-        path = Path(np.concatenate([*(leg[:-1] for leg in legs[:-1]), legs[-1]]), tick)
-        self._detour = 0.0 if view is seen else self._longer(path, pose)
-        return path
-
-    def _longer(self, path: Path, pose: Pose2) -> float:
-        """Metres by which a new path is longer than if nothing moved: than the plan in force, less what that is longer.
-
-        Where there is none, or none to the same place, than the straight way: no less.
-        """
-        end, old = path.points[-1, :2], self.plan
-        if old is None or math.dist(old.path.points[-1, :2], end) > SAME_END:
-            return path.length() - math.dist(pose[:2], end)
-        return max(0.0, self._detour + path.length() - old.remaining())
+        return Path(np.concatenate([*(leg[:-1] for leg in legs[:-1]), legs[-1]]), tick)
 
     def _leg(self, view: CostmapView, goal: Goal, start: Pose2) -> Array:
         self._plans += 1
@@ -266,4 +251,4 @@ class _Asked:
     answer: Path | NavigationFailure
     partial: bool
     origin: tuple[float, float]
-    detour: float
+    bent: bool

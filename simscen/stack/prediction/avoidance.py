@@ -18,7 +18,7 @@ from simscen.core.motion import STOP, Twist
 from simscen.model.guards import Prediction
 from simscen.stack.footprint import Discs
 from simscen.stack.prediction.moving import WIDEST, Moving, Reals
-from simscen.stack.prediction.rollouts import HORIZON, STEP, TIMES, Followed, Repertoire, Rollouts, arc
+from simscen.stack.prediction.rollouts import HORIZON, TIMES, Followed, Repertoire, Rollouts, arc
 from simscen.stack.protocols import CostmapView, RobotModel
 
 ROOM = 0.25
@@ -37,8 +37,6 @@ CALM = 0.02
 """Risk below which the controller's way is left alone, …"""
 CALMER = 0.01
 """… and below which it is given back to it."""
-BEARABLE = math.sqrt(CALMER / (NEAR + LASTING))
-"""A `nearness` that makes no more than that of risk, if it lasts from now on; e times that after 2 SOON."""
 SLOWER = (1.0, 0.75, 0.5, 0.25, 0.0)
 """Parts of the controller's speed that are tried on its own way."""
 AT_ONCE, ROUNDING = 64, 1e-9
@@ -99,7 +97,7 @@ class Avoidance:
         if path is None or len(path) < 2 or wanted.vx == 0.0:
             return False
         place, speed, off = path.course(pose, twist, wanted, self._robot)
-        return moving.surely_off(place, speed, self._discs.reach + off, ROOM, (STEP, HORIZON), (BEARABLE, 2 * SOON))
+        return moving.surely_off(place, speed, self._discs.reach + off, ROOM, HORIZON)
 
     def _best(
         self,

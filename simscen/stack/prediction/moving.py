@@ -12,8 +12,9 @@ from simscen.core.geometry import Array, Pose2
 
 WIDEST = 0.8
 """Metres by which what is not known of a place widens it at most."""
-AHEAD = 0.5
-"""Seconds that are passed over at once at most, unless all keep clear of each other by WIDEST as well."""
+AHEAD, LEAST = 0.5, 0.05
+"""Seconds that are passed over at once at most, unless all keep clear of each other by WIDEST as well, and at least, to
+be worth it."""
 TOUCH = 0.03
 """Metres: whoever comes nearer is taken to touch."""
 
@@ -136,33 +137,20 @@ class Moving:
         return nearest, touched
 
     def surely_off(
-        self,
-        place: Callable[[float], complex],
-        speed: float,
-        reach: float,
-        kept_off: float,
-        moments: tuple[float, float],
-        bearable: tuple[float, float] = (0.0, math.inf),
+        self, place: Callable[[float], complex], speed: float, reach: float, kept_off: float, seconds: float
     ) -> bool:
-        """Whether a disc of radius `reach` at `place(t)`, no faster than `speed`, has no greater `nearness` than is
-        bearable; False where that is not told at once.
-
-        It is looked at in `moments` so many seconds apart, up to the last; those are passed over until which the room
-        between them suffices. What is bearable grows e times in so many seconds.
+        """Whether a disc of radius `reach` at `place(t)`, no faster than `speed`, has a `nearness` of 0 at most for so
+        many seconds; False where that is not told at once.
         """
-        step, last = moments
-        least, fades = bearable
         for thing in self.things:
-            closing, time = max(speed + abs(thing.velocity), 1e-3), step
-            while time < last + 0.5 * step:
-                gap = abs(thing.place + thing.velocity * time - place(time)) - thing.radius - reach
-                room = min(kept_off + thing.deviation(time, self.acceleration), WIDEST)
-                if gap < room * (1.0 - least * math.exp(time / fades)):
+            closing, time = max(speed + abs(thing.velocity), 1e-3), 0.0
+            while time < seconds:
+                off = abs(thing.place + thing.velocity * time - place(time))
+                room = min(kept_off + thing.deviation(min(time + AHEAD, seconds), self.acceleration), WIDEST)
+                spare = (off - thing.radius - reach - room) / closing
+                if spare < LEAST:
                     return False
-                room = min(kept_off + thing.deviation(time + AHEAD, self.acceleration), WIDEST)
-                spare = (gap - room) / closing
-                ahead = max(0.0, min(spare, AHEAD), spare - (WIDEST - room) / closing)
-                time += (int(ahead / step) + 1) * step
+                time += max(min(spare, AHEAD), spare - (WIDEST - room) / closing)
         return True
 
     def _deviation(self, thing: Thing, times: Reals) -> Reals:

@@ -86,7 +86,8 @@ class View:
         """How far away (n,) the beams of a scan saw, and what is added at either end."""
         lengths = np.zeros(self.count + 2 * self.more)
         seen = lengths[self.more : -self.more]
-        np.minimum(scan.ranges, FARTHEST, out=seen, where=scan.ranges >= max(scan.range_min, 0.0))
+        np.fmin(np.fmax(scan.ranges, 0.0), FARTHEST, out=seen)
+        seen[seen < scan.range_min] = 0.0
         if self.full:
             lengths[: self.more], lengths[-self.more :] = seen[-self.more :], seen[: self.more]
         return lengths
@@ -184,18 +185,17 @@ class SeenThrough:
         self._scans: deque[Earlier] = deque(maxlen=KEPT)
         self._view = View(0, 0.0, 0.0)
 
-    def remember(self, scan: Scan, lidar: Pose2) -> bool:
-        """Keep a scan, unless one has just been kept; `lidar` is where it was taken. Whether it was kept."""
+    def remember(self, scan: Scan, lidar: Pose2) -> None:
+        """Keep a scan; `lidar` is where it was taken."""
         if self._scans and 0 <= scan.tick - self._scans[-1].tick < self._every:
-            return False
+            return
         view, count = self._view, len(scan.ranges)
         if count < FEWEST_BEAMS or scan.angle_increment <= 0.0:
-            return False
+            return
         if (view.count, view.start, view.increment) != (count, scan.angle_min, scan.angle_increment):
             self._view = view = View(count, scan.angle_min, scan.angle_increment)
         lengths = view.lengths(scan)
         self._scans.append(Earlier(scan.tick, lidar, view, lengths, view.free(lengths)))
-        return True
 
     def before(self, tick: int) -> Earlier | None:
         """The scan of about AGO before; None while there is none of AT_LEAST."""

@@ -19,8 +19,7 @@ from simscen.stack.prediction.sight import Sight
 from simscen.stack.prediction.tracks import Track
 
 CHECKED = 120
-"""Beams of a scan that are looked at while nothing is followed, of those scans alone that are kept for later ones: five
-a second. All beams, when what one of these hits has appeared, and of each scan as long as anything is followed."""
+"""Beams of a scan that are looked at while nothing moves; all, when what one of these hits has appeared."""
 APPEARED, FEW = 0.3, 3
 """Share of a piece's hits, and how many at least, that must have appeared to begin a track."""
 STANDS = 0.5
@@ -66,19 +65,16 @@ class Tracker:
             for track in self._tracks:
                 track.predict(seconds, self._spec.acceleration)
         self.hits, self.moving = None, self._nothing
-        before, kept = self._memory.before(scan.tick), self._memory.remember(scan, lidar)
-        if self._tracks or (kept and before is not None and self._strange(scan, lidar, before)):
+        before = self._memory.before(scan.tick)
+        if self._tracks or (before is not None and (self._restless or self._suspicious(scan, lidar, before))):
             self._follow(Sight(scan, _ends(scan.ranges, self._towards), lidar, before))
+        self._memory.remember(scan, lidar)
 
     def _look_along(self, scan: Scan) -> None:
         """Note where the beams go, and which are looked at while nothing moves."""
         self._every = max(1, len(scan.ranges) // CHECKED)
         self._towards = np.exp(1j * scan.angles())
         self._towards_some = self._towards[:: self._every].copy()
-
-    def _strange(self, scan: Scan, lidar: Pose2, before: Earlier) -> bool:
-        """Whether all beams of a scan are to be looked at though nothing is followed."""
-        return self._restless or self._suspicious(scan, lidar, before)
 
     def _suspicious(self, scan: Scan, lidar: Pose2, before: Earlier) -> bool:
         """Whether one of the beams that are looked at hits what has appeared."""

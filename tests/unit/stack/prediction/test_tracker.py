@@ -270,7 +270,7 @@ def test_who_looks_at_all_beams_at_once_tells_what_he_tells_who_looks_at_some_of
 
     def flies(t: float) -> list[Disc]:
         """Four beams wide, where each sixth is looked at first."""
-        return [(0.4 * t + 2.5 * math.cos(3 * t), 2.5 * math.sin(3 * t), 0.03)] if round(10 * t) % 12 < 2 else []
+        return [(0.4 * t + 2.5 * math.cos(3 * t), 2.5 * math.sin(3 * t), 0.03)] if round(10 * t) % 12 == 0 else []
 
     def tracks(afresh: bool) -> list[list[complex]]:
         found = list[list[complex]]()
