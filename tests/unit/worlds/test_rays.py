@@ -231,3 +231,17 @@ def test_a_body_farther_off_than_any_ray_reaches_is_left_out_until_it_comes_near
         assert scene.cast(origins, directions, 5.0)[0] == pytest.approx(seen)
     scene.set_moving({"body": (off, Pose3(6.0 - 4.0 - spread))})
     assert scene.cast(origins, directions, 5.0)[4] == pytest.approx(3.5)
+
+
+@pytest.mark.parametrize("turns", range(4))
+@pytest.mark.parametrize("tilt", [1e-19, 1.8e-18, 1e-17, 1e-9])
+def test_rays_that_rounding_tilts_meet_what_level_ones_meet(turns, tilt):
+    """Embree took whole packets for nothing whose rays part by the sign of next to nothing."""
+    ends = [Solid(Box((0.2, 10.0, 2.0)), Pose3(x, 0, 1)) for x in (-5, 5)]
+    scene, fan = RayScene(fuse([*ROOM, *ends])), Fan(-math.pi, math.pi / 180, 360)
+    half = turns * math.pi / 4
+    for roll, pitch in ((tilt, -tilt), (-tilt, tilt), (-tilt, -tilt)):
+        turned = Pose3(0.0, 0.0, 0.2, qz=math.sin(half), qw=math.cos(half))
+        level = scene.sweep(fan, turned, 30.0).copy()
+        assert scene.sweep(fan, turned._replace(qx=roll, qy=pitch), 30.0) == pytest.approx(level, abs=1e-5)
+        assert level.max() < 8.0
