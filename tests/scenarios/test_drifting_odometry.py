@@ -25,12 +25,14 @@ def seconds(prepared: Prepared, seed: int) -> float:
     return trace.seconds(trace.end)
 
 
-def test_a_narrow_field_takes_hardly_longer_with_odometry_that_drifts_a_metre(tmp_path: Path) -> None:
-    _, twenty_centimetres, _ = narrow_fields(tmp_path, [9102])
-    field = twenty_centimetres.drives[0].file
-    slipping = field.with_name("slipping.scenario.yaml")
-    slipping.write_text(SLIPPING.format(field=field.name))
-    true = seconds(prepare(load_scenario(field, tmp_path)), 1)
-    drifting = prepare(load_scenario(slipping, tmp_path))
-    for seed in (2, 5):
-        assert seconds(drifting, seed) < 1.5 * true
+def test_narrow_fields_take_hardly_longer_with_odometry_that_drifts_a_metre(tmp_path: Path) -> None:
+    """In sum: one drive in seven swings once whatever drifts. With samples everywhere six take 1.7 times as long."""
+    _, twenty_centimetres, _ = narrow_fields(tmp_path, [9101, 9102, 9103])
+    true = slipping = 0.0
+    for drive in twenty_centimetres.drives:
+        slips = drive.file.with_name(f"slipping_{drive.file.name}")
+        slips.write_text(SLIPPING.format(field=drive.file.name))
+        true += 2 * seconds(prepare(load_scenario(drive.file, tmp_path)), 1)
+        drifting = prepare(load_scenario(slips, tmp_path))
+        slipping += seconds(drifting, 2) + seconds(drifting, 5)
+    assert slipping < 1.3 * true
