@@ -81,10 +81,10 @@ layers: setup
 	@$(BIN)/lint-imports --no-cache 2>&1 | tail -n 4; test $${PIPESTATUS[0]} -eq 0 || { $(BIN)/lint-imports --no-cache; exit 1; }
 
 schemas: setup  ## Check that schemas/ and docs/reference/ are what the code says
-	@$(BIN)/python -m simscen.cli.generate --check
+	@$(BIN)/python -m simscen.cli.catalog.generate --check
 
 docs: setup  ## Write schemas/ and docs/reference/ anew
-	@$(BIN)/python -m simscen.cli.generate
+	@$(BIN)/python -m simscen.cli.catalog.generate
 
 site: setup  ## Build the documentation as a site into build/site: a dead link is an error
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict

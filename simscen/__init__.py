@@ -36,7 +36,7 @@ def simulate(
     """
     from pathlib import Path
 
-    from simscen.cli.stacks import load_with
+    from simscen.cli.session.stacks import load_with
     from simscen.run.prepare import prepare
     from simscen.run.simulate import simulate as run
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any, NamedTuple, Union, get_args, get_origin
 from pydantic import BaseModel, RootModel
 from pydantic.fields import FieldInfo
 
-from simscen.cli.jsonschema import MODELS
+from simscen.cli.catalog.json_schema import MODELS
 from simscen.model.criteria_file import CriteriaSpec
 from simscen.model.rosmap import RosMapSpec
 from simscen.spec.bytype import ByType

@@ -10,9 +10,8 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from simscen.cli.called import COMPLETE, PLUGINS
-from simscen.cli.later import import_later
-from simscen.cli.surroundings import NO_ROOM, flushed, occupy_descriptors, output_lost, require_folder
+from simscen.cli.lazy_import import import_lazily
+from simscen.cli.process import COMPLETE, NO_ROOM, PLUGINS, flushed, occupy_descriptors, output_lost, require_folder
 from simscen.core.errors import Exit, InvalidInput, SimscenError
 
 COMMANDS = {
@@ -36,7 +35,7 @@ COMMANDS = {
     "bench": "Measure how fast simscen runs here.",
     "doctor": "Check that this installation can run scenarios.",
 }
-"""Command → what it does. `simscen.cli.<command>` has a function `command`, or an `app` with commands of its own."""
+"""Command → what it does. `simscen.cli.commands.<command>` has a function `command`, or an `app` with commands of its own."""
 
 
 LIGHT = frozenset({"validate", "list", "schema", "explain", "new", "completion"})
@@ -60,7 +59,7 @@ class Commands(TyperGroup):
         if cmd_name not in COMMANDS or not importlib.util.find_spec(_module(cmd_name)):
             return None
         if cmd_name in LIGHT or cmd_name == "run":
-            import_later("numpy")
+            import_lazily("numpy")
         module = importlib.import_module(_module(cmd_name))
         gc.freeze()  # what is imported stays: it need never be looked through for garbage
         gc.enable()
@@ -112,7 +111,7 @@ def main() -> None:
     # Plug-ins of pydantic that happen to be installed could change what is valid; looking for them costs 12 ms, too,
     # and so does what it imports to look for them.
     os.environ[PLUGINS] = "__all__"
-    import_later("importlib.metadata", "entry_points")
+    import_lazily("importlib.metadata", "entry_points")
     if COMPLETE in os.environ:
         from typer.completion import completion_init  # type: ignore[attr-defined]
 
@@ -165,7 +164,7 @@ def _internal() -> Exit:
 
 
 def _module(command: str) -> str:
-    return f"simscen.cli.{command}"
+    return f"simscen.cli.commands.{command}"
 
 
 if __name__ == "__main__":

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from simscen.cli.diagnostics import as_text
-from simscen.cli.select import Checks, checked
-from simscen.cli.stacks import stacks_of
+from simscen.cli.session.selection import Checks, checked
+from simscen.cli.session.stacks import stacks_of
 from simscen.core.errors import InvalidInput, SimscenError, UsageError
 from simscen.core.result import Outcome
 from simscen.loading.discovery import default_root

@@ -18,7 +18,7 @@ from simscen.run.process.jobs import Job, Replays
 from simscen.run.process.standby import Standby
 from simscen.run.process.whereabouts import whereabouts
 
-WARM_PROCESS = ("-m", "simscen.cli.warm_process")
+WARM_PROCESS = ("-m", "simscen.cli.session.warm_process")
 WALL_LIMIT = 300.0
 """Seconds that one run may take, as with `simscen run`."""
 

@@ -17,9 +17,9 @@ from junitparser import JUnitXml
 
 TELLING = Path(__file__).parents[1] / "conformance" / "telling_zygote.py"
 SIMSCEN = f"""
-import simscen.cli.runsession
+import simscen.cli.session.run_session
 from simscen.cli.main import main
-simscen.cli.runsession.WARM_PROCESS = ({str(TELLING)!r},)
+simscen.cli.session.run_session.WARM_PROCESS = ({str(TELLING)!r},)
 main()
 """
 FAULTS = {

@@ -15,7 +15,7 @@ import time
 import numpy as np
 import pybullet
 
-from simscen.cli import warm_process
+from simscen.cli.session import warm_process
 from simscen.stack.localizers import likelihood_field
 
 FLOOD = 200  # MiB

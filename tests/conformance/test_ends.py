@@ -90,7 +90,14 @@ def test_93_a_working_folder_that_was_deleted_is_told(folder: Path, words: str) 
 
 @pytest.mark.parametrize(
     "module",
-    ["simscen.core.errors", "simscen.cli.main", "typer", "simscen.cli.run", "pydantic", "simscen.loading.scenario"],
+    [
+        "simscen.core.errors",
+        "simscen.cli.main",
+        "typer",
+        "simscen.cli.commands.run",
+        "pydantic",
+        "simscen.loading.scenario",
+    ],
 )
 def test_94_ctrl_c_while_it_starts_ends_it_without_a_traceback(folder: Path, module: str) -> None:
     code = SIGINT_AT_IMPORT.format(module=module, arguments=["run", ".", "--out", "out"])

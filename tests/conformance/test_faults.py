@@ -16,9 +16,9 @@ from simscen.record.replay import read_log
 TELLING = Path(__file__).with_name("telling_zygote.py")
 WITH_FAULTS = f"""
 import sys
-import simscen.cli.runsession
+import simscen.cli.session.run_session
 from simscen.cli.main import main
-simscen.cli.runsession.WARM_PROCESS = ({str(TELLING)!r},)
+simscen.cli.session.run_session.WARM_PROCESS = ({str(TELLING)!r},)
 main()
 """
 LIMIT = 10.0

@@ -16,10 +16,10 @@ from simscen.record.replay import read_log
 SIMSCEN = str(Path(sys.executable).with_name("simscen"))
 TELLING = Path(__file__).with_name("telling_zygote.py")
 IMPATIENT = f"""
-import simscen.cli.runsession
+import simscen.cli.session.run_session
 from simscen.cli.main import main
 from simscen.run.process import supervisor
-simscen.cli.runsession.WARM_PROCESS = ({str(TELLING)!r},)
+simscen.cli.session.run_session.WARM_PROCESS = ({str(TELLING)!r},)
 supervisor.SILENCE = 5.0
 main()
 """

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from simscen.cli.diagnostics import as_text
-from simscen.cli.select import Checks
+from simscen.cli.session.selection import Checks
 from simscen.core.problems import Problem
 from simscen.loading.codes import CODES
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from simscen.cli.catalog.commands_page import commands_of, parameters_of
 from simscen.cli.main import COMMANDS
-from simscen.cli.options import commands_of, parameters_of
 from simscen.core.errors import Exit
 
 ROOT = Path(__file__).parents[2]

@@ -16,8 +16,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from everyfield import every_value
 
 from simscen.actions.action import AnyAction
-from simscen.cli.catalogue import Topic, fields_of, topics
-from simscen.cli.jsonschema import MODELS
+from simscen.cli.catalog.json_schema import MODELS
+from simscen.cli.catalog.topics import Topic, fields_of, topics
 from simscen.core.version import PACKAGE
 from simscen.criteria.criterion import AnyCriterion
 from simscen.faults.fault import AnyFault

@@ -11,7 +11,7 @@ from pathlib import Path
 from mcap import records
 from mutate import mutant
 
-from simscen.cli.select import Checks
+from simscen.cli.session.selection import Checks
 from simscen.core.errors import InvalidInput
 from simscen.core.problems import Problem
 from simscen.judge.judge import judge

@@ -174,7 +174,7 @@ def test_schema_and_explain_know_it_and_what_is_committed_does_not(yard) -> None
     assert "reversed_length (metric of yardwork 1.2)" in simscen("explain", "reversed_length").stdout
     assert re.search(r"^  .*\bcrosstalk\b", simscen("explain").stdout, re.MULTILINE)
     assert "dwell" not in simscen("schema", PYTHONPATH="").stdout
-    check = [sys.executable, "-m", "simscen.cli.generate", "--check"]
+    check = [sys.executable, "-m", "simscen.cli.catalog.generate", "--check"]
     assert subprocess.run(check, capture_output=True, text=True, check=False).stdout == ""
 
 

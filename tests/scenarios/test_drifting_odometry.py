@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
+from simscen.bench.navigation.experiments import narrow_fields
 from simscen.core.events import EventKind
 from simscen.loading.scenario import load_scenario
 from simscen.run.prepare import Prepared, prepare
 from simscen.run.simulate import simulate
-from simscen.study.experiments import narrow_fields
 
 SLIPPING = """\
 simscen: 1

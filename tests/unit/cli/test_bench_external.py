@@ -1,5 +1,5 @@
-from simscen.cli.bench import _external_lines
-from simscen.run.bench_external import External
+from simscen.bench.speed.external_stack import External
+from simscen.cli.commands.bench import _external_lines
 
 
 def test_the_cost_of_a_beat_is_told_beside_that_in_the_engine() -> None:

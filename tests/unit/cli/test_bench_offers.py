@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.cli.bench_offers import Sizes, offers
+from simscen.cli.benchmarks.navigation_experiments import Sizes, available_experiments
 
 PROJECT = Path(__file__).parents[3]
 MADE_QUICKLY = (
@@ -20,13 +20,13 @@ HERE = ("BARN", "random goals", "degraded sensing", "tb3_sandbox", *MADE_QUICKLY
 
 
 def test_there_are_these_offers(tmp_path: Path) -> None:
-    assert {offer.name for offer in offers(None, None, PROJECT, tmp_path, Sizes())} == set(HERE)
+    assert {offer.name for offer in available_experiments(None, None, PROJECT, tmp_path, Sizes())} == set(HERE)
 
 
 @pytest.mark.parametrize("name", MADE_QUICKLY)
 def test_an_offer_knows_what_its_experiments_are_called(tmp_path: Path, name: str) -> None:
     small = Sizes(seeds=1, fields=2, dynamic=1, goals=1, lost=1)
-    (offer,) = (offer for offer in offers(None, None, PROJECT, tmp_path, small) if offer.name == name)
+    (offer,) = (offer for offer in available_experiments(None, None, PROJECT, tmp_path, small) if offer.name == name)
     assert [made.name for made in offer.make()] == (list(offer.parts) or [name])
 
 
@@ -35,7 +35,7 @@ def test_a_later_first_number_gives_other_drives_under_the_same_names(tmp_path: 
         small = Sizes(first, seeds=1, fields=2, dynamic=1, goals=1, lost=1)
         return [
             f"{made.name}: {drive.file.stem} {list(drive.seeds)}"
-            for offer in offers(None, None, PROJECT, tmp_path / str(first), small)
+            for offer in available_experiments(None, None, PROJECT, tmp_path / str(first), small)
             if offer.name in ("narrow fields", "dynamic fields", "ramps", "two robots", "localization", "corner cases")
             for made in offer.make()
             for drive in made.drives

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.cli.bench_compare import as_text, judgement
-from simscen.cli.bench_result import FORMAT, Result, as_json, read_result
+from simscen.cli.benchmarks.results import FORMAT, Result, as_json, comparison_text, judgement, read_result
 from simscen.core.errors import UsageError
 from simscen.run.figure import Figure
 
@@ -42,12 +41,12 @@ only after: step"""
 
 
 def test_each_figure_of_both_has_a_line_with_what_is_noise() -> None:
-    told = as_text(BEFORE, AFTER)
+    told = comparison_text(BEFORE, AFTER)
     assert [line.split() for line in told.splitlines()] == [line.split() for line in TABLE.splitlines()]
 
 
 def test_another_machine_and_another_version_are_told() -> None:
-    told = as_text(BEFORE, replace(AFTER, machine="aarch64, 4 cores", simscen="0.2.0"))
+    told = comparison_text(BEFORE, replace(AFTER, machine="aarch64, 4 cores", simscen="0.2.0"))
     assert "simscen 0.1.0 before, 0.2.0 after" in told
     assert "not the same machine: x86_64, 2 cores, avx before, aarch64, 4 cores after; only ratios tell" in told
 
@@ -59,7 +58,7 @@ def test_more_of_what_is_better_is_better_and_fewer_than_two_rounds_say_nothing(
 
 
 def test_a_figure_that_was_nothing_has_no_ratio() -> None:
-    assert as_text(BEFORE, BEFORE).splitlines()[-1].split() == ["scan", "0", "ms", "0", "ms", "-", "-", "-"]
+    assert comparison_text(BEFORE, BEFORE).splitlines()[-1].split() == ["scan", "0", "ms", "0", "ms", "-", "-", "-"]
 
 
 def test_a_result_is_read_as_it_was_written(tmp_path: Path) -> None:
@@ -104,4 +103,4 @@ def test_a_file_that_cannot_be_read_is_told_in_words(tmp_path: Path, there: bool
 
 def test_results_of_different_commands_have_nothing_to_compare() -> None:
     with pytest.raises(UsageError, match="no figure in common: compare results of the same command"):
-        as_text(BEFORE, replace(AFTER, figures={"2 robots": Figure(80.0, "ms a simulated second")}))
+        comparison_text(BEFORE, replace(AFTER, figures={"2 robots": Figure(80.0, "ms a simulated second")}))

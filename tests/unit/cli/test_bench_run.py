@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from simscen.cli.bench_nav import with_stack
-from simscen.cli.bench_run import _planned
-from simscen.study import corridors
-from simscen.study.experiment import Experiment
+from simscen.bench.navigation import corridors
+from simscen.bench.navigation.experiment import Experiment
+from simscen.cli.benchmarks.navigation import with_stack
+from simscen.cli.benchmarks.navigation_runs import _planned
 
 
 def hall(folder: Path) -> Experiment:

@@ -1,14 +1,14 @@
 import json
 from dataclasses import replace
 
-from simscen.cli.bench_localization import SHARES
-from simscen.cli.bench_localization import as_text as localization
-from simscen.cli.bench_run import Localized, Measured
-from simscen.cli.bench_table import as_json, as_text
-from simscen.study.indoor.campaign import SURE, Share, Sureness
-from simscen.study.indoor.campaign import Row as Numbers
-from simscen.study.tally import Row
-from simscen.study.versus import Difference, Versus
+from simscen.bench.localization.campaign import SURE, Share, Sureness
+from simscen.bench.localization.campaign import Row as Numbers
+from simscen.bench.navigation.comparison import Difference, DriveComparison
+from simscen.bench.navigation.summary import Row
+from simscen.cli.benchmarks.localization import SHARES
+from simscen.cli.benchmarks.localization import as_text as localization
+from simscen.cli.benchmarks.navigation_runs import Localized, Measured
+from simscen.cli.benchmarks.navigation_table import as_json, as_text
 
 BARN = Row("BARN", 30, 29 / 30, (0.833, 0.994), 1 / 30, 0.0, 0.0, 0.0, 7.24, 0.476, 1.031, 0.71)
 TOUR = Row("localization, tour", 20, 1.0, None, 0.0, 0.0, 0.0, 0.0, 48.8, None, 0.99, 0.625)
@@ -27,7 +27,7 @@ BARN                              30       0      3  -0.100 (-0.200 … +0.000) 
 
 BARN's own figures for DWA at 0.5 m/s, in another simulator and all 50 worlds: success 0.850, collisions 0.056, \
 timeouts 0.094, score 0.159"""
-SLOWER = Versus(
+SLOWER = DriveComparison(
     "BARN",
     30,
     0,

@@ -7,7 +7,7 @@ import pytest
 from pydantic import BaseModel
 
 from simscen.actions.action import AnyAction
-from simscen.cli.catalogue import Topic, fields_of, kind_of, topics
+from simscen.cli.catalog.topics import Topic, fields_of, kind_of, topics
 from simscen.criteria.criterion import AnyCriterion
 from simscen.loading.compose import compose
 from simscen.model.checkers import GoalCheckerSpec

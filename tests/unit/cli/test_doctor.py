@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from simscen.cli import doctor, machine
-from simscen.run import bench
+from simscen.bench.speed import run_speed
+from simscen.cli import installation
+from simscen.cli.commands import doctor
 from simscen.run.keptfiles import KeptFiles, cache_folder
 
 
@@ -50,18 +51,18 @@ def test_the_cache_of_worlds_is_told_and_one_of_others_is_ill(tmp_path: Path, mo
     KeptFiles(folder).put("a" * 64, bytes(99_968))
     assert doctor.cache() == f"{folder}: 1 files, 0.1 MB of at most 256; to be deleted at any time"
     folder.chmod(0o777)
-    with pytest.raises(machine.Ill, match="others may write to it"):
+    with pytest.raises(installation.Ill, match="others may write to it"):
         doctor.cache()
 
 
 def test_speed_is_that_of_a_patrol_beside_pybullet(monkeypatch) -> None:
-    def patrol(cpu: float, bare: float) -> bench.Patrol:
-        return bench.Patrol(60.0, cpu, {"physics": 1.0}, bare, (cpu,), (bare,), {"physics": (1.0,)})
+    def patrol(cpu: float, bare: float) -> run_speed.Patrol:
+        return run_speed.Patrol(60.0, cpu, {"physics": 1.0}, bare, (cpu,), (bare,), {"physics": (1.0,)})
 
-    monkeypatch.setattr(bench, "measure_patrol", lambda _: patrol(2.0, 0.5))
+    monkeypatch.setattr(run_speed, "measure_patrol", lambda _: patrol(2.0, 0.5))
     assert doctor.speed() == "30 times real time on one core, 4.0 times what PyBullet alone takes"
-    monkeypatch.setattr(bench, "measure_patrol", lambda _: patrol(90.0, 20.0))
-    with pytest.raises(machine.Ill, match="a faster processor"):
+    monkeypatch.setattr(run_speed, "measure_patrol", lambda _: patrol(90.0, 20.0))
+    with pytest.raises(installation.Ill, match="a faster processor"):
         doctor.speed()
 
 
@@ -76,28 +77,28 @@ def test_speed_is_that_of_a_patrol_beside_pybullet(monkeypatch) -> None:
 def test_limits_that_are_too_tight_are_told_with_what_helps(monkeypatch, what, value, told) -> None:
     real = resource.getrlimit
     monkeypatch.setattr(resource, "getrlimit", lambda asked: (value, value) if asked == what else real(asked))
-    with pytest.raises(machine.Ill, match=re.escape(told)):
-        machine.limits()
+    with pytest.raises(installation.Ill, match=re.escape(told)):
+        installation.limits()
 
 
 def test_the_memory_of_a_container_counts(monkeypatch) -> None:
-    monkeypatch.setattr(machine, "_cgroup_memory", lambda: 300 << 20)
-    with pytest.raises(machine.Ill, match="a run gets 300 MiB of memory"):
-        machine.limits()
+    monkeypatch.setattr(installation, "_cgroup_memory", lambda: 300 << 20)
+    with pytest.raises(installation.Ill, match="a run gets 300 MiB of memory"):
+        installation.limits()
 
 
 def test_packages_that_do_not_fit_are_ill(monkeypatch) -> None:
-    monkeypatch.setattr(machine, "unmet", lambda: ["numpy 1.0 is installed"])
-    with pytest.raises(machine.Ill, match=r"numpy 1\.0 is installed"):
-        machine.packages()
+    monkeypatch.setattr(installation, "unmet", lambda: ["numpy 1.0 is installed"])
+    with pytest.raises(installation.Ill, match=r"numpy 1\.0 is installed"):
+        installation.packages()
 
 
 def test_other_pythons_and_missing_packages_are_ill(monkeypatch) -> None:
-    with pytest.raises(machine.Ill, match="pip install no-such-package"):
-        machine._version("no-such-package")
+    with pytest.raises(installation.Ill, match="pip install no-such-package"):
+        installation._version("no-such-package")
     monkeypatch.setattr(sys, "version_info", (3, 12, 1))
-    with pytest.raises(machine.Ill, match=r"needs 3\.10 or 3\.11"):
-        machine.python()
+    with pytest.raises(installation.Ill, match=r"needs 3\.10 or 3\.11"):
+        installation.python()
 
 
 def test_a_sandbox_without_pidfd_is_ill(monkeypatch) -> None:
@@ -105,13 +106,13 @@ def test_a_sandbox_without_pidfd_is_ill(monkeypatch) -> None:
         raise PermissionError(1, "Operation not permitted")
 
     monkeypatch.setattr(os, "pidfd_open", refused)
-    with pytest.raises(machine.Ill, match="Operation not permitted"):
-        machine.pidfd()
+    with pytest.raises(installation.Ill, match="Operation not permitted"):
+        installation.pidfd()
 
 
 def test_a_folder_that_takes_no_files_is_ill(tmp_path) -> None:
-    with pytest.raises(machine.Ill, match="cannot write in"):
-        machine.writable(tmp_path / "nowhere")
+    with pytest.raises(installation.Ill, match="cannot write in"):
+        installation.writable(tmp_path / "nowhere")
 
 
 def test_it_tells_what_the_names_of_stacks_run_and_what_of_that_is_not_there(monkeypatch, tmp_path: Path) -> None:
@@ -122,8 +123,8 @@ def test_it_tells_what_the_names_of_stacks_run_and_what_of_that_is_not_there(mon
     file.write_text("stacks: {mine: {command: sh -c 'exit 0'}, other: {command: sh}}\n")
     assert doctor.stacks() == f"{file}: mine = sh -c 'exit 0', other = sh"
     file.write_text("stacks:\n  mine: {command: ./gone}\n")
-    with pytest.raises(machine.Ill, match=r"config\.yaml:2:19: no such file or directory: `\./gone`"):
+    with pytest.raises(installation.Ill, match=r"config\.yaml:2:19: no such file or directory: `\./gone`"):
         doctor.stacks()
     file.write_text("stacks: [mine]\n")
-    with pytest.raises(machine.Ill, match=r"config\.yaml:1:9: expected a mapping, got a list"):
+    with pytest.raises(installation.Ill, match=r"config\.yaml:1:9: expected a mapping, got a list"):
         doctor.stacks()

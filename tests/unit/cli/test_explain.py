@@ -4,10 +4,10 @@ import pytest
 from pydantic import ValidationError
 
 import simscen as package
-from simscen.cli import explain, explainable
-from simscen.cli.codetopics import NAV2, OF_OTHERS
-from simscen.cli.explain import explained
-from simscen.cli.explainable import known_names
+from simscen.cli.catalog import reference_topics
+from simscen.cli.catalog.reference_topics import NAV2, OF_OTHERS, known_names
+from simscen.cli.commands import explain
+from simscen.cli.commands.explain import explained
 from simscen.core.errors import Exit
 from simscen.core.navigation import ErrorCode
 from simscen.model.robot import Limits
@@ -114,8 +114,8 @@ def test_misspelt_keys_and_codes_are_told_what_was_meant(simscen, name: str, mea
 
 
 def test_every_topic_every_key_and_every_code_is_explained(monkeypatch) -> None:
-    everything = explainable.everything()
-    for module in (explain, explainable):
+    everything = reference_topics.everything()
+    for module in (explain, reference_topics):
         monkeypatch.setattr(module, "everything", lambda: everything)  # to collect it costs most of the time
     for name in [*known_names(), *known_names(keys=True)]:
         assert explained(name), name

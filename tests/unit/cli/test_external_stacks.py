@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from simscen.cli.called import config_file, environment
-from simscen.cli.select import Selection, load_all
+from simscen.cli.process import config_file, environment
+from simscen.cli.session.selection import Selection, load_all
 from simscen.core.errors import UsageError
 from simscen.run.digest import digest
 

@@ -3,7 +3,7 @@ import sys
 
 LATER = """
 import sys
-from simscen.cli.later import import_later
+from simscen.cli.lazy_import import import_later
 import_later("{name}")
 import {name} as early
 assert "{probe}" not in sys.modules
@@ -32,7 +32,7 @@ def test_a_library_that_is_there_already_stays() -> None:
         [
             sys.executable,
             "-c",
-            "import json; from simscen.cli.later import import_later as l; l('json'); json.dumps(1)",
+            "import json; from simscen.cli.lazy_import import import_later as l; l('json'); json.dumps(1)",
         ],
         check=True,
     )
@@ -41,7 +41,7 @@ def test_a_library_that_is_there_already_stays() -> None:
 def test_a_function_can_be_imported_without_the_library_until_it_is_called() -> None:
     code = """
 import sys
-from simscen.cli.later import import_later
+from simscen.cli.lazy_import import import_later
 import_later("importlib.metadata", "entry_points")
 from importlib.metadata import entry_points
 import importlib
@@ -55,7 +55,7 @@ from importlib.metadata import distribution
 
 def test_another_name_of_such_a_library_brings_all_of_it() -> None:
     code = """
-from simscen.cli.later import import_later
+from simscen.cli.lazy_import import import_later
 import_later("importlib.metadata", "entry_points")
 import importlib.metadata
 from importlib.metadata import entry_points

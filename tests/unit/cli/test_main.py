@@ -24,7 +24,9 @@ def test_the_version_is_printed(simscen) -> None:
     assert simscen("--version").out.startswith("simscen 0")
 
 
-@pytest.mark.parametrize("name", [name for name in cli.COMMANDS if cli.importlib.util.find_spec(f"simscen.cli.{name}")])
+@pytest.mark.parametrize(
+    "name", [name for name in cli.COMMANDS if cli.importlib.util.find_spec(f"simscen.cli.commands.{name}")]
+)
 def test_the_table_says_what_the_command_says(simscen, name: str) -> None:
     told = " ".join(simscen(name, "--help").out.split())
     assert cli.COMMANDS[name].rstrip(".") in told

@@ -5,8 +5,8 @@ import re
 import pytest
 import typer
 
+from simscen.cli.catalog.commands_page import EXITS, commands_of, exits, parameters_of, section
 from simscen.cli.main import COMMANDS, app
-from simscen.cli.options import EXITS, commands_of, exits, parameters_of, section
 from simscen.core.errors import Exit
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import typer
 
-from simscen.cli import requirements
+from simscen.cli import installation
 from simscen.cli.start import start
 
 PYPROJECT = (Path(__file__).parents[3] / "pyproject.toml").read_text()
@@ -31,8 +31,8 @@ def installed(monkeypatch):
 
 
 def test_this_installation_has_what_it_needs() -> None:
-    assert requirements.unmet() == []
-    assert requirements.unmet_typer() == []
+    assert installation.unmet() == []
+    assert installation.unmet_typer() == []
 
 
 @pytest.mark.parametrize(
@@ -54,12 +54,12 @@ def test_this_installation_has_what_it_needs() -> None:
 )
 def test_versions_are_compared(installed, need, version, fits) -> None:
     installed([need], numpy=version)
-    assert (requirements.unmet() == []) is fits
+    assert (installation.unmet() == []) is fits
 
 
 def test_what_is_wrong_is_told_with_what_helps(installed) -> None:
     installed(["typer<1,>=0.20", "ompl>=2"], typer="0.12.5")
-    assert requirements.unmet() == [
+    assert installation.unmet() == [
         "typer 0.12.5 is installed, and simscen needs typer>=0.20,<1: pip install 'typer>=0.20,<1'",
         "ompl is not installed: pip install 'ompl'",
     ]
@@ -89,7 +89,7 @@ def test_a_typer_that_misreads_options_reads_none(monkeypatch, capsys, command) 
 
 def test_the_oldest_typer_is_that_of_pyproject() -> None:
     (oldest,) = re.findall(r'"typer>=([\d.]+),', PYPROJECT)
-    assert tuple(map(int, oldest.split("."))) == requirements.TYPER
+    assert tuple(map(int, oldest.split("."))) == installation.TYPER
 
 
 def test_every_dependency_has_bounds_that_are_read() -> None:

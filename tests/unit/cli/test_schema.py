@@ -7,8 +7,8 @@ from typing import Any
 import jsonschema
 import pytest
 
-from simscen.cli.generate import ROOT, outdated
-from simscen.cli.jsonschema import MODELS, schema_of
+from simscen.cli.catalog.generate import ROOT, outdated
+from simscen.cli.catalog.json_schema import MODELS, schema_of
 from simscen.loading.compose import compose
 
 DIAGNOSTICS = ROOT / "tests/diagnostics"

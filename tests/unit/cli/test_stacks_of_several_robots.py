@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.cli.select import Selection, load_all
+from simscen.cli.session.selection import Selection, load_all
 from simscen.loading.resolved import resolved_text, spec_of_text
 from simscen.run.digest import digest
 

@@ -2,11 +2,11 @@
 
 import pytest
 
+from simscen.bench.speed.overhead import SHORT, short_patrol
+from simscen.bench.speed.scaling import AXES, write_more
+from simscen.bench.speed.suite import Suite, spread_over
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import load_scenario
-from simscen.run.benchgrowth import AXES, write_more
-from simscen.run.benchoverhead import SHORT, short_patrol
-from simscen.run.benchsuite import Suite, spread_over
 from simscen.run.worldsource import load_robot, load_world
 
 

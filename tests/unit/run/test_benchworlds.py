@@ -2,8 +2,8 @@
 
 import pytest
 
+from simscen.bench.speed.large_worlds import MOVABLE, MOVING, STANDING, write_arena, write_hall, write_warehouse
 from simscen.loading.scenario import load_scenario
-from simscen.run.benchworlds import MOVABLE, MOVING, STANDING, write_arena, write_hall, write_warehouse
 from simscen.run.prepare import prepare
 from simscen.run.worldsource import load_world
 

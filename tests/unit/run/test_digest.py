@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from simscen.cli.select import Selection, load_all
+from simscen.cli.session.selection import Selection, load_all
 from simscen.run import digest as module
 from simscen.run.digest import digest
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from simscen.cli.jsonschema import as_text, schema_of
+from simscen.cli.catalog.json_schema import as_text, schema_of
 from simscen.core.chance import Streams
 from simscen.core.errors import InvalidInput, RunError
 from simscen.core.geometry import Pose2

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from stack_programs import DRIVE
 
-from simscen.cli.runsession import WARM_PROCESS
+from simscen.cli.session.run_session import WARM_PROCESS
 from simscen.core.result import Outcome
 from simscen.core.sessionevents import RunStarted
 from simscen.report.junit import to_xml

@@ -8,7 +8,7 @@ import pytest
 from mcap.reader import make_reader
 from stack_programs import DRIVE
 
-from simscen.cli.runsession import WARM_PROCESS
+from simscen.cli.session.run_session import WARM_PROCESS
 from simscen.core.errors import RunError
 from simscen.core.result import Outcome
 from simscen.loading.scenario import load_scenario

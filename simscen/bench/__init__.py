@@ -1,0 +1,1 @@
+"""Benchmarks: speed of the simulator, quality of navigation and of localization."""

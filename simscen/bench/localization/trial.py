@@ -1,0 +1,68 @@
+"""One log through one localizer: was the robot tracked, was it found, and how sure was it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from simscen.bench.localization.consistency import nees
+from simscen.bench.localization.generated_logs import KIDNAPPED_AT, Log
+from simscen.bench.localization.recorded_drive import errors_of, localize
+from simscen.model.localizers import Localizer
+from simscen.model.stack import StackSpec
+from simscen.record.foreign.sensedrows import TICK_RATE
+from simscen.stack.protocols import RobotModel, Surroundings
+
+LOST, FOUND = 1.0, 0.5
+"""m off from which on a robot is lost, and within which it is found."""
+MOMENTS = (15.0, 30.0, 45.0, 60.0, 75.0)
+"""Seconds of a log at which the squared error is compared with the covariance."""
+ROBOT = RobotModel(((0.2, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.2, -0.2)), None, 0.6, 0.3, 0.0, 1.0, 1.0, 1.0, 2.0)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """How a log went: errors in m, times in s; `found` is None for a robot that was not found for good.
+
+    `tracked`: never LOST. `nees` are the normalised squared errors at MOMENTS. `ms` is the processor's time a scan,
+    `slowest_ms` that of the scan that took longest.
+    """
+
+    building: int
+    number: int
+    circumstance: str
+    tracked: bool
+    median: float
+    largest: float
+    found: float | None
+    nees: tuple[float, ...]
+    ms: float
+    slowest_ms: float
+
+
+def trial(log: Log, localizer: Localizer, seed: int) -> Trial:
+    """Run a log through a localizer; the same arguments give the same figures, but for the processor's time."""
+    spec = StackSpec(localizer=localizer)
+    localized = localize(log.sensed, spec, Surroundings(ROBOT, log.map, TICK_RATE), log.estimate, seed)
+    errors = errors_of(localized, log.sensed, LOST)
+    assert errors is not None  # a made log has a reference from its first reading to its last
+    truth = log.sensed.truth
+    rows = np.searchsorted(localized.times, MOMENTS)
+    off = localized.poses[rows] - truth[rows]
+    off[:, 2] = (off[:, 2] + np.pi) % (2 * np.pi) - np.pi
+    since = KIDNAPPED_AT if log.circumstance == "kidnapped" else 0.0
+    return Trial(
+        building=log.building, number=log.number, circumstance=log.circumstance,
+        tracked=not errors.lost,
+        median=float(np.median(errors.distance)), largest=float(errors.distance.max()),
+        found=_found(errors.times - since, errors.distance),
+        nees=tuple(nees(error, covariance) for error, covariance in zip(off, localized.covariances[rows], strict=True)),
+        ms=localized.cpu * 1e3 / localized.scans, slowest_ms=localized.slowest * 1e3,
+    )  # fmt: skip
+
+
+def _found(times: np.ndarray, distance: np.ndarray) -> float | None:
+    """When the robot was within FOUND after it had been LOST for the last time."""
+    last = np.flatnonzero((distance > LOST) & (times >= 0))
+    begin = int(last[-1]) + 1 if len(last) else int(np.searchsorted(times, 0.0))
+    near = np.flatnonzero(distance[begin:] < FOUND)
+    return max(0.0, float(times[begin + near[0]])) if len(near) else None

@@ -1,0 +1,1 @@
+"""Navigation benchmarks: generated worlds, experiments, and their scores."""

@@ -1,0 +1,108 @@
+"""Maps of office floors, as SLAM leaves them: cells of 5 to 25 cm, thin walls, grey pockets; written as ROS maps."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from simscen.bench.navigation.experiment import write_scenario
+from simscen.core.chance import Streams
+
+FINE = 0.05
+"""Metres: the cells that a floor is drawn in, before it becomes as coarse as its map."""
+RESOLUTIONS = (0.05, 0.05, 0.10, 0.15, 0.20, 0.25)
+WIDE, DEEP = (20.0, 45.0), (12.0, 28.0)
+"""Metres: least and most of a floor's two sides."""
+CORRIDOR, DOOR = (1.7, 2.6), (0.9, 1.3)
+FREE, WALL, UNKNOWN = 254, 0, 205
+"""As map_server writes them."""
+Image = npt.NDArray[np.uint8]
+
+
+@dataclass
+class _Floor:
+    """A floor that is being drawn: row 0 is its lowest y."""
+
+    image: Image
+    thick: float
+
+    def wall(self, x0: float, y0: float, x1: float, y1: float, thick: float | None = None) -> None:
+        """From one point to another, along an axis; or a box, where it is along none."""
+        half = (self.thick if thick is None else thick) / 2
+        rows = slice(max(0, int((min(y0, y1) - half) / FINE)), int((max(y0, y1) + half) / FINE) + 1)
+        columns = slice(max(0, int((min(x0, x1) - half) / FINE)), int((max(x0, x1) + half) / FINE) + 1)
+        self.image[rows, columns] = WALL
+
+
+def building(number: int) -> tuple[Image, float]:
+    """The map of the floor of this number (from 1), and the edge of its cells in metres: always the same."""
+    chance = Streams(number).generator("building")
+    resolution = RESOLUTIONS[number % len(RESOLUTIONS)]
+    width, depth = float(chance.uniform(*WIDE)), float(chance.uniform(*DEEP))
+    image = np.full((int(depth / FINE), int(width / FINE)), FREE, np.uint8)
+    floor = _Floor(image, float(chance.choice([0.05, 0.1, 0.2])))
+    for wall in ((0, 0, width, 0), (0, depth, width, depth), (0, 0, 0, depth), (width, 0, width, depth)):
+        floor.wall(*wall)
+    broad = float(chance.uniform(*CORRIDOR))
+    for y in np.arange(chance.uniform(4, 6), depth - 4, chance.uniform(9, 13)).tolist():
+        for side in (-1, 1):
+            _rooms(floor, chance, y + side * broad / 2, side)
+    _across(floor, chance, broad)
+    image[[0, -1]], image[:, [0, -1]] = WALL, WALL
+    return _as_mapped(image, resolution, chance), resolution
+
+
+def _rooms(floor: _Floor, chance: np.random.Generator, y: float, side: int) -> None:
+    """A line of rooms along a corridor, each with a door to it and some furniture."""
+    depth, width = (size * FINE for size in floor.image.shape)
+    x = 0.0
+    while x < width:
+        room, door = float(chance.uniform(3, 7)), float(chance.uniform(*DOOR))
+        before = float(chance.uniform(0.3, room - door - 0.3))
+        floor.wall(x, y, min(width, x + before), y)
+        floor.wall(min(width, x + before + door), y, min(width, x + room), y)
+        far = min(max(y + side * float(chance.uniform(3.0, 3.8)), 0.0), depth)
+        floor.wall(min(width, x + room), y, min(width, x + room), far)
+        for _ in range(int(chance.integers(0, 3))):
+            left, low = x + float(chance.uniform(0.5, room - 0.5)), y + side * float(chance.uniform(1.2, 2.8))
+            size = chance.uniform(0.2, 0.9, 2).tolist()
+            floor.wall(left, low, left + size[0], low + size[1], FINE)
+        x += room
+
+
+def _across(floor: _Floor, chance: np.random.Generator, broad: float) -> None:
+    """Corridors across, with walls that have gaps as wide as doors."""
+    depth, width = (size * FINE for size in floor.image.shape)
+    for x in np.arange(chance.uniform(5, 9), width - 3, chance.uniform(12, 20)).tolist():
+        floor.image[int(0.5 / FINE) : -int(0.5 / FINE), int((x - broad / 2) / FINE) : int((x + broad / 2) / FINE)] = (
+            FREE
+        )
+        for side in (-1, 1):
+            y = 0.5
+            while y < depth - 1:
+                long = float(chance.uniform(2, 6))
+                if chance.random() < 0.6:
+                    floor.wall(x + side * broad / 2, y, x + side * broad / 2, min(depth, y + long))
+                y += long + float(chance.uniform(0.9, 1.6))
+
+
+def _as_mapped(image: Image, resolution: float, chance: np.random.Generator) -> Image:
+    """In cells of the map: occupied where a good part of a cell is; some grey, as where a scan never came."""
+    step = round(resolution / FINE)
+    rows, columns = (size // step * step for size in image.shape)
+    parts = image[:rows, :columns].reshape(rows // step, step, columns // step, step)
+    mapped = np.where((parts == WALL).mean(axis=(1, 3)) > (0.3 if step > 2 else 0.49), WALL, FREE).astype(np.uint8)
+    mapped[(mapped == FREE) & (chance.random(mapped.shape) < 0.001)] = UNKNOWN
+    mapped[[0, -1]], mapped[:, [0, -1]] = WALL, WALL
+    return mapped
+
+
+def write_building(number: int, folder: Path) -> Path:
+    """The floor as `building_<number>.yaml` with its image beside it, as map_server would save it."""
+    mapped, resolution = building(number)
+    image = folder / f"building_{number}.pgm"
+    folder.mkdir(parents=True, exist_ok=True)
+    image.write_bytes(f"P5\n{mapped.shape[1]} {mapped.shape[0]}\n255\n".encode() + np.flipud(mapped).tobytes())
+    text = f"image: {image.name}\nresolution: {resolution:g}\norigin: [0, 0, 0]\nnegate: 0\n"
+    return write_scenario(image.with_suffix(".yaml"), f"{text}occupied_thresh: 0.65\nfree_thresh: 0.196\n")

@@ -1,0 +1,1 @@
+"""Speed benchmarks: what a simulated second costs, held against PyBullet alone."""

@@ -1,0 +1,204 @@
+"""What a simulated second costs in worlds as people have them, each held against the patrol of a small house."""
+
+import gc
+import math
+import resource
+import statistics
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise, product
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from simscen.bench.speed.run_speed import timed_run
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.grid import FREE, OCCUPIED, OccupancyGrid
+from simscen.core.shapes import Box, Solid
+from simscen.loading.scenario import load_scenario
+from simscen.run.prepare import prepare
+from simscen.worlds.meshing import fuse
+from simscen.worlds.rosmap import save_map
+
+HOUSE = Path(__file__).parents[2] / "data" / "bench" / "house.scenario.yaml"
+MOVABLE = 40
+STANDING, MOVING = 4980, 20
+"""What the warehouse holds."""
+EDGE = 2000
+"""Cells of 5 cm along each side of the map: 100 x 100 m."""
+SCENARIO = """\
+simscen: 1
+seed: 1
+world: {world}
+robot: {{pose: {{x: {start[0]}, y: {start[1]}}}}}
+goals: [{goals}]
+time_limit: 60 s
+pass:
+  - collisions: {{max: 0}}
+"""
+
+
+@dataclass(frozen=True)
+class Cost:
+    """A world of so many triangles that stay, and things that can move: CPU ms for each simulated second.
+
+    `preparing` is CPU seconds once for all runs; `memory` is the most that this process has used so far, in MB.
+    """
+
+    name: str
+    triangles: int
+    movable: int
+    simulated: float
+    milliseconds: float
+    preparing: float
+    memory: float
+
+
+def measure_worlds(rounds: int) -> Iterator[Cost]:
+    """The house, a hall with movable meshes, a warehouse, a map of 100 x 100 m: the median of several runs each."""
+    with TemporaryDirectory() as folder:
+        yield _measured("house, patrol of five rooms", HOUSE, rounds)
+        yield _measured(f"hall, {MOVABLE} movable meshes", write_hall(Path(folder, "hall")), rounds)
+        objects = f"{STANDING + MOVING} objects, {MOVING} moving"
+        yield _measured(f"warehouse, {objects}", write_warehouse(Path(folder, "warehouse")), rounds)
+        yield _measured("map of 100 x 100 m", write_arena(Path(folder, "arena")), rounds)
+
+
+def _measured(name: str, file: Path, rounds: int) -> Cost:
+    import time
+
+    gc.collect()  # what was there of the last world would count as memory of this one
+    begun = time.process_time()
+    prepared = prepare(load_scenario(file, file.parent))
+    preparing = time.process_time() - begun
+    timed_run(prepared)  # the first run pays for imports and caches
+    runs = [timed_run(prepared) for _ in range(rounds)]
+    simulated = runs[0][0]
+    return Cost(
+        name,
+        triangles=len(prepared.built.mesh.faces),
+        movable=len(prepared.built.world.bodies),
+        simulated=simulated,
+        milliseconds=1e3 * statistics.median(cpu for _, cpu, _ in runs) / simulated,
+        preparing=preparing,
+        memory=_most_memory(),
+    )
+
+
+def _most_memory() -> float:
+    used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return used / 1e6 if sys.platform == "darwin" else used / 1e3
+
+
+def write_hall(folder: Path) -> Path:
+    """A hall of 30 x 20 m as an SDF world, with chairs in five rows: movable meshes of 432 triangles; its scenario."""
+    folder.mkdir()
+    for number in range(4):
+        (folder / f"mesh_{number}.obj").write_text(_obj(_chair(0.4 + 0.05 * number)))
+    places = [(2.5 + 3.5 * column, 2.0 + 4.0 * row) for row, column in product(range(5), range(8))]
+    models = "".join(_mesh_model(number, x, y) for number, (x, y) in enumerate(places))
+    walls = "".join(
+        _box_model(name, x, y, length, width)
+        for name, x, y, length, width in (
+            ("south", 15, 0, 30, 0.2),
+            ("north", 15, 20, 30, 0.2),
+            ("west", 0, 10, 0.2, 20),
+            ("east", 30, 10, 0.2, 20),
+        )
+    )
+    (folder / "hall.world").write_text(f'<sdf version="1.7"><world name="hall">{walls}{models}</world></sdf>')
+    return _scenario(folder, "hall.world", ((1.0, 4.0), (25.0, 4.0), (25.0, 12.0), (1.0, 12.0)))
+
+
+def _chair(width: float) -> list[Solid]:
+    """Slats of a seat and a back on four legs, from the ground up."""
+    half, slats = width / 2 - 0.02, np.linspace(-1, 1, 16).tolist()
+    parts = [((width, width / 20, 0.04), (0.0, half * place, 0.46)) for place in slats]
+    parts += [((0.04, width / 20, 0.5), (-half, half * place, 0.73)) for place in slats]
+    parts += [((0.04, 0.04, 0.44), (x, y, 0.22)) for x in (-half, half) for y in (-half, half)]
+    return [Solid(Box(size), Pose3(*place), "chair") for size, place in parts]
+
+
+def _obj(solids: list[Solid]) -> str:
+    mesh = fuse(solids)
+    corners = [f"v {x} {y} {z}" for x, y, z in mesh.vertices.tolist()]
+    return "\n".join([*corners, *(f"f {a + 1} {b + 1} {c + 1}" for a, b, c in mesh.faces.tolist())]) + "\n"
+
+
+def _mesh_model(number: int, x: float, y: float) -> str:
+    mesh = f"<mesh><uri>mesh_{number % 4}.obj</uri></mesh>"
+    return (
+        f'<model name="thing {number}"><pose>{x} {y} 0 0 0 {number}</pose><link name="body">'
+        "<inertial><mass>5</mass></inertial>"
+        f'<collision name="c"><geometry>{mesh}</geometry></collision></link></model>'
+    )
+
+
+def _box_model(name: str, x: float, y: float, length: float, width: float) -> str:
+    box = f"<box><size>{length} {width} 1</size></box>"
+    return (
+        f'<model name="{name}"><static>true</static><pose>{x} {y} 0.5 0 0 0</pose><link name="body">'
+        f'<collision name="c"><geometry>{box}</geometry></collision></link></model>'
+    )
+
+
+def write_warehouse(folder: Path) -> Path:
+    """A warehouse of 100 x 100 m: 4980 boxes and drums in rows, and 20 carts on the move; its scenario.
+
+    Aisles of 2.4 m between the rows and one of 8 m across them; half of the carts drive where the robot passes.
+    """
+    folder.mkdir()
+    chance = np.random.default_rng(12)
+    columns = [*np.arange(4.0, 46.0, 0.75).tolist(), *np.arange(54.5, 96.5, 0.75).tolist()]
+    bays = list(product(columns, (row + side for row in range(4, 97, 4) for side in (-0.4, 0.4))))
+    stock = [
+        f"  - {{name: unit {n}, {_unit(n)}, pose: {{x: {bays[bay][0]:.2f}, y: {bays[bay][1]:.2f}, yaw: {turn:.2f}}}}}"
+        for n, (bay, turn) in enumerate(
+            zip(chance.permutation(len(bays))[:STANDING].tolist(), chance.uniform(-0.2, 0.2, STANDING), strict=True)
+        )
+    ]
+    carts = [
+        f"  - {{name: cart {n}, box: [0.9, 0.6, 0.9], pose: {{x: {x}, y: {y + 0.8:.1f}}},"
+        f" move: {{through: [[{x + 20}, {y + 0.8:.1f}]], speed: 0.5 m/s, repeat: back_and_forth}}}}"
+        for n, (x, y) in enumerate(product((12, 60), (26, 30, 34, 38, 42, 62, 66, 70, 74, 78)))
+    ]
+    walls = "  - {name: outer wall, points: [[0, 0], [100, 0], [100, 100], [0, 100], [0, 0]]}"
+    lines = ["simscen: 1", "walls:", walls, "obstacles:", *stock, "objects:", *carts]
+    (folder / "warehouse.world.yaml").write_text("\n".join(lines) + "\n")
+    return _scenario(folder, "warehouse.world.yaml", ((8.0, 33.8), (48.0, 33.8), (50.0, 42.0)))
+
+
+def _unit(number: int) -> str:
+    """A box between 0.5 and 0.65 m wide; every fourth is a drum."""
+    width = 0.5 + 0.05 * (number % 4)
+    return f"cylinder: [{width / 2:.3f}, 1.0]" if number % 4 == 0 else f"box: [{width:.2f}, {width:.2f}, 1.2]"
+
+
+def write_arena(folder: Path) -> Path:
+    """A ROS map of 100 x 100 m at 5 cm with 400 blocks and 0.5 % of noise, as from SLAM; its scenario."""
+    folder.mkdir()
+    chance = np.random.default_rng(7)
+    cells = np.full((EDGE, EDGE), FREE, dtype=np.int8)
+    cells[chance.random((EDGE, EDGE)) < 0.005] = OCCUPIED
+    cells[:4] = cells[-4:] = cells[:, :4] = cells[:, -4:] = OCCUPIED
+    for column, row, width, depth in chance.integers((10, 10, 8, 8), (EDGE - 60, EDGE - 60, 50, 50), (400, 4)).tolist():
+        cells[row : row + depth, column : column + width] = OCCUPIED
+    middle = EDGE // 2
+    cells[middle - 12 : middle + 12, 60:-60] = FREE
+    save_map(OccupancyGrid(cells, 0.05, Pose2(0.0, 0.0)), folder / "arena.yaml")
+    return _scenario(folder, "arena.yaml", ((5.0, 50.0), (25.0, 50.0), (50.0, 50.0)))
+
+
+def _scenario(folder: Path, world: str, way: tuple[tuple[float, float], ...]) -> Path:
+    goals = ", ".join(f"{{pose: {{x: {x}, y: {y}, yaw: {yaw:.4f}}}}}" for x, y, yaw in _headed(way))
+    file = folder / f"{folder.name}.scenario.yaml"
+    file.write_text(SCENARIO.format(world=world, start=way[0], goals=goals))
+    return file
+
+
+def _headed(way: tuple[tuple[float, float], ...]) -> Iterator[tuple[float, float, float]]:
+    """The places of a way after its first, with the heading in which one comes to them."""
+    for (ax, ay), (bx, by) in pairwise(way):
+        yield bx, by, math.atan2(by - ay, bx - ax)

@@ -1,0 +1,141 @@
+"""What a run costs beyond its simulation, and what has to be paid before the first one."""
+
+import gc
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from resource import RUSAGE_CHILDREN, getrusage
+from tempfile import TemporaryDirectory
+
+from simscen.bench.speed.run_speed import PATROL, SEED, Tell, nobody
+from simscen.core.result import RunKey
+from simscen.core.trace import Moment
+from simscen.loading.scenario import load_scenario
+from simscen.record.backlog import Log
+from simscen.run.figure import Figure, Figures
+from simscen.run.lockstep import Rig
+from simscen.run.outfolder import run_folder
+from simscen.run.prepare import prepare
+from simscen.run.process.jobs import Job, ProcessEnd
+from simscen.run.process.supervisor import Ended, supervise
+from simscen.run.simulate import simulate
+
+SHORT = 0.1
+"""Simulated seconds of a run that is hardly more than what surrounds it."""
+WALL_LIMIT = 300.0
+MILLISECONDS, MEGABYTES = "ms", "MB"
+
+
+@dataclass(frozen=True)
+class Overhead:
+    """Each of several rounds: CPU ms but where it says wall, MB.
+
+    `run`: a run of SHORT in this process. `beyond`: what of that lies outside of its beats: assembling, the log's
+    beginning and end, verdicts. `process`: the same run as a session does it, from the fork on, with its picture;
+    `wall` is how long that takes, `memory` the most that its process has used. `preparing`: world, map and ways, once
+    for all runs. `start`: importing the engines, once a session. `validate`: the command.
+    """
+
+    run: tuple[float, ...]
+    beyond: tuple[float, ...]
+    process: tuple[float, ...]
+    wall: tuple[float, ...]
+    memory: tuple[float, ...]
+    preparing: tuple[float, ...]
+    start: tuple[float, ...]
+    validate: tuple[float, ...]
+
+    @property
+    def figures(self) -> Figures:
+        """Their medians."""
+        return {
+            f"a run of {SHORT} s": Figure.of(self.run, MILLISECONDS),
+            "of that beyond its simulation": Figure.of(self.beyond, MILLISECONDS),
+            "the same as a process": Figure.of(self.process, MILLISECONDS),
+            "the same as a process, wall time": Figure.of(self.wall, MILLISECONDS),
+            "preparing a scenario": Figure.of(self.preparing, MILLISECONDS),
+            "start of a session": Figure.of(self.start, MILLISECONDS),
+            "simscen validate": Figure.of(self.validate, MILLISECONDS),
+            "memory of a worker": Figure.of(self.memory, MEGABYTES),
+        }
+
+
+class _Beats:
+    """CPU ms that a run takes from its first beat to its last: its simulation, with the first plan."""
+
+    def attach(self, rig: Rig, own: Sequence[Log]) -> Sequence[Log]:
+        """The run begins."""
+        self.begun = self.ended = time.process_time()
+        return (self,)
+
+    def append(self, moment: Moment) -> None:
+        """Another beat has passed."""
+        self.ended = time.process_time()
+
+    @property
+    def took(self) -> float:
+        """Of the last run."""
+        return 1e3 * (self.ended - self.begun)
+
+
+def measure_overhead(rounds: int, entry: Sequence[str], tell: Tell = nobody) -> Overhead:
+    """Runs of the patrol that end at once. `entry` is how Python is called to be a session's warm process."""
+    tell("what surrounds a run")
+    with TemporaryDirectory() as folder:
+        file = short_patrol(Path(folder))
+        loaded = load_scenario(file, file.parent)
+        prepared = prepare(loaded)
+        log = Path(folder, "run.mcap")
+
+        beats = _Beats()
+
+        def run() -> object:
+            log.unlink(missing_ok=True)
+            return simulate(prepared, SEED, log=log, attach=beats.attach)
+
+        run()
+        each = [(_cpu(run), beats.took) for _ in range(rounds)]
+        keys = [RunKey(loaded.id, seed + 1) for seed in range(rounds + 1)]
+        jobs = [Job(n, loaded, key, run_folder(Path(folder), key), WALL_LIMIT) for n, key in enumerate(keys)]
+        ends = [
+            end
+            for happening in supervise(jobs, 1, entry, lambda: True)
+            if isinstance(happening, Ended) and isinstance(end := happening.end, ProcessEnd)
+        ]
+        others = ends[1:]  # the first waits for the engines to be imported
+        return Overhead(
+            run=tuple(whole for whole, _ in each),
+            beyond=tuple(whole - simulated for whole, simulated in each),
+            process=tuple(1e3 * end.cpu for end in others),
+            wall=tuple(1e3 * end.wall for end in others),
+            memory=tuple(end.peak_bytes / 1e6 for end in others),
+            preparing=tuple(_cpu(lambda: prepare(loaded)) for _ in range(rounds)),
+            start=tuple(_child("-c", f"import {entry[-1]}") for _ in range(rounds)),
+            validate=tuple(_child("-m", "simscen", "validate", str(file)) for _ in range(rounds)),
+        )
+
+
+def short_patrol(folder: Path, seconds: float = SHORT) -> Path:
+    """The patrol with another time limit."""
+    file = folder / "short.scenario.yaml"
+    file.write_text(PATROL.read_text(encoding="utf-8").replace("time_limit: 60 s", f"time_limit: {seconds} s"))
+    return file
+
+
+def _cpu(what: Callable[[], object]) -> float:
+    """CPU ms of this process for a call."""
+    gc.collect()
+    begun = time.process_time()
+    what()
+    return 1e3 * (time.process_time() - begun)
+
+
+def _child(*arguments: str) -> float:
+    """CPU ms of a Python called so."""
+    before = getrusage(RUSAGE_CHILDREN)
+    subprocess.run([sys.executable, *arguments], check=True, capture_output=True)
+    after = getrusage(RUSAGE_CHILDREN)
+    return 1e3 * (after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)

@@ -1,0 +1,204 @@
+"""Speed, measured: a whole run, its parts, and PyBullet alone in the same world."""
+
+import gc
+import statistics
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from simscen.core.geometry import Array, Pose2, Pose3
+from simscen.core.shapes import Cylinder, Solid
+from simscen.loading.scenario import load_scenario
+from simscen.record.backlog import Log
+from simscen.run.lockstep import Rig
+from simscen.run.perform import MANY
+from simscen.run.prepare import Prepared, lidar_height, prepare
+from simscen.run.simulate import simulate
+from simscen.run.stopwatch import Stopwatch
+from simscen.sim.bare import BareWorld
+from simscen.stack.installed.stack import InstalledStack
+from simscen.stack.reference import ReferenceStack
+from simscen.worlds.meshing import fuse, triangulate
+from simscen.worlds.rays import RayScene
+
+PATROL = Path(__file__).parents[2] / "data" / "bench" / "patrol.scenario.yaml"
+SEED = 1
+Tell = Callable[[str], None]
+"""Is told what is being measured."""
+BEAMS = 720
+
+
+@dataclass(frozen=True)
+class Patrol:
+    """A run of `simulated` seconds: CPU seconds in all, by part, and for PyBullet alone to step and scan as often.
+
+    Medians; `cpus`, `bares` and `parted` (by part) are what they are of: PyBullet alone had its turn after each run.
+    """
+
+    simulated: float
+    cpu: float
+    parts: dict[str, float]
+    bare: float
+    cpus: tuple[float, ...]
+    bares: tuple[float, ...]
+    parted: dict[str, tuple[float, ...]]
+
+    @property
+    def ratios(self) -> tuple[float, ...]:
+        """How many times as long as PyBullet alone each run took."""
+        return tuple(cpu / bare for cpu, bare in zip(self.cpus, self.bares, strict=True))
+
+    @property
+    def ratio(self) -> float:
+        """Their median: a machine that is slow for a while is so for both."""
+        return statistics.median(self.ratios)
+
+    @property
+    def factor(self) -> float:
+        """Simulated seconds for each second of one core."""
+        return self.simulated / self.cpu
+
+
+@dataclass(frozen=True)
+class Field:
+    """A field of obstacles: ms for a scan of 720 beams and µs for a step, in simscen and in PyBullet alone.
+
+    PyBullet alone has a body for each obstacle, as one would write it.
+    """
+
+    obstacles: int
+    scan_ms: float
+    step_us: float
+    bare_scan_ms: float
+    bare_step_us: float
+
+
+def nobody(_: str) -> None:
+    """Is told for nothing."""
+
+
+def measure_patrol(rounds: int, tell: Tell = nobody) -> Patrol:
+    """The median of several runs of the patrol, recorded as always; then half as many more, taken apart."""
+    prepared = prepare(load_scenario(PATROL, PATROL.parent))
+    simulated, *_ = timed_run(prepared)  # the first run pays for imports and caches
+    cpus, bares = list[float](), list[float]()
+    for number in range(rounds):
+        tell(f"patrol, round {number + 1} of {rounds}")
+        cpus.append(timed_run(prepared)[1])
+        bares.append(bare_patrol(prepared, simulated))
+    cpu = statistics.median(cpus)
+    tell("patrol, taken apart")
+    taken = [_taken_apart(prepared, cpu) for _ in range((rounds + 1) // 2)]
+    parted = {name: tuple(one[name] for one in taken) for name in taken[0]}
+    parts = {name: statistics.median(each) for name, each in parted.items()}
+    return Patrol(simulated, cpu, parts, statistics.median(bares), tuple(cpus), tuple(bares), parted)
+
+
+def _taken_apart(prepared: Prepared, cpu: float) -> dict[str, float]:
+    """Seconds of a run's parts. The stopwatch sees wall time and costs some itself: scaled to a run without it."""
+    watch = Stopwatch()
+    _, _, whole = timed_run(prepared, watch)
+    parts = {name: seconds * cpu / whole for name, seconds in watch.seconds.items()}
+    parts["lockstep, set-up, verdicts"] = cpu - sum(parts.values())
+    return parts
+
+
+def timed_run(prepared: Prepared, watch: Stopwatch | None = None) -> tuple[float, float, float]:
+    """Simulated, CPU and wall seconds of one run, from setting up to the verdicts; `watch` takes it apart."""
+    gc.collect()
+    gc.freeze()  # as what hands out runs does: what was here before them is not looked through for garbage
+    before = gc.get_threshold()
+    gc.set_threshold(MANY)  # as a run's own process does
+    with TemporaryDirectory() as folder:
+        begun, begun_wall = time.process_time(), time.perf_counter()
+        run = simulate(prepared, SEED, log=Path(folder, "run.mcap"), attach=partial(_watched, watch) if watch else None)
+        cpu, wall = time.process_time() - begun, time.perf_counter() - begun_wall
+    gc.set_threshold(*before)
+    gc.unfreeze()
+    return run.result.simulated, cpu, wall
+
+
+def _watched(watch: Stopwatch, rig: Rig, own: Sequence[Log]) -> Sequence[Log]:
+    """Watch the parts of the rig, and the log and the trace that are its `own` listeners."""
+    (agent,) = rig.agents
+    watch.watch("physics", rig.simulation, "step")
+    watch.watch("physics", agent.robot, "drive")
+    watch.watch("truth and contacts", agent.robot, "truth", "sample", "collisions")
+    watch.watch("truth and contacts", agent.robot.samples, "settle")
+    watch.watch("sensors", agent.senses, "read")
+    if isinstance(agent.stack, InstalledStack) and isinstance(agent.stack.inner, ReferenceStack):
+        for name, component, methods in agent.stack.inner.components:
+            watch.watch(name, component, *methods)
+    watch.watch("navigator", agent.stack, "decide")
+    for name, listener, methods in zip(("trace", "log"), own, (("append",), ("append", "settle")), strict=True):
+        watch.watch(name, listener, *methods)
+    return ()
+
+
+def bare_patrol(prepared: Prepared, simulated: float) -> float:
+    """CPU seconds that PyBullet takes to step and scan as often in the same world, and nothing else."""
+    lidar = next(sensor.lidar for sensor in prepared.robot.sensors.values() if sensor.lidar)
+    bare = BareWorld(prepared.built.mesh, prepared.body, prepared.start, triangulate)
+    around = _circle(lidar.beams)
+    begun = time.process_time()
+    for _ in range(round(simulated * lidar.rate)):
+        bare.step(round(240 / lidar.rate))
+        bare.scan(around, lidar.min_range, lidar.max_range, lidar_height(prepared.robot))
+    cpu = time.process_time() - begun
+    bare.close()
+    return cpu
+
+
+def measure_field(obstacles: int) -> Field:
+    """Scan and step in a field of cylinders as dense as a BARN world (0.9 of them to the square metre)."""
+    prepared = prepare(load_scenario(PATROL, PATROL.parent))
+    solids = cylinders(obstacles)
+    mesh, start, height = fuse(solids), Pose2(0.0, 0.0, 0.0), lidar_height(prepared.robot)
+    rays = RayScene(mesh)
+    around = _circle(BEAMS)
+    directions = np.column_stack((around, np.zeros(BEAMS)))
+    origins = np.tile([0.0, 0.0, height], (BEAMS, 1))
+    fused = BareWorld(mesh, prepared.body, start, triangulate)
+    bare = BareWorld(solids, prepared.body, start, triangulate)
+    field = Field(
+        obstacles,
+        scan_ms=1e3 * _each(lambda: rays.cast(origins, directions), 200),
+        step_us=1e6 * _each(lambda: fused.step(1), 2000),
+        bare_scan_ms=1e3 * _each(lambda: bare.scan(around, 0.12, 30.0, height), 10),
+        bare_step_us=1e6 * _each(lambda: bare.step(1), 500),
+    )
+    fused.close()
+    bare.close()
+    return field
+
+
+def _circle(beams: int) -> Array:
+    """Directions (beams, 2) all around."""
+    angles = np.linspace(-np.pi, np.pi, beams, endpoint=False)
+    return np.column_stack((np.cos(angles), np.sin(angles)))
+
+
+def cylinders(count: int) -> list[Solid]:
+    """So many cylinders of 7.5 cm radius, at random but for a free disc of 1 m about the origin."""
+    chance = np.random.default_rng(SEED)
+    edge = (count / 0.9) ** 0.5 / 2
+    places = chance.uniform(-edge, edge, (4 * count + 40, 2))
+    places = places[np.hypot(*places.T) > 1.0][:count]
+    return [Solid(Cylinder(0.075, 1.0), Pose3(x, y, 0.5), f"cylinder {k}") for k, (x, y) in enumerate(places.tolist())]
+
+
+def _each(what: Callable[[], Any], times: int) -> float:
+    """The median over five rounds of the CPU seconds for one call."""
+    rounds = []
+    for _ in range(5):
+        begun = time.process_time()
+        for _ in range(times):
+            what()
+        rounds.append((time.process_time() - begun) / times)
+    return statistics.median(rounds)

@@ -1,0 +1,95 @@
+"""How the cost of a simulated second grows with what there is: the patrol, with more of one thing at a time."""
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from simscen.bench.speed.run_speed import PATROL, Tell, nobody, timed_run
+from simscen.loading.scenario import load_scenario
+from simscen.run.figure import Figure, Figures
+from simscen.run.goals import goals_of
+from simscen.run.prepare import prepare
+
+SECONDS = 15
+"""Of the patrol."""
+AXES = {
+    "obstacles": (0, 100, 1000),
+    "objects": (20, 100),
+    "moving objects": (5, 20),
+    "beams": (90, 360, 1440),
+    "particles": (500, 2000, 8000),
+    "robots": (2, 4),
+}
+"""What there is more of, and how much."""
+ROBOT = PATROL.parent.parent / "robots" / "turtlebot.robot.yaml"
+ROW = 25
+"""Things side by side behind the patrol's hall, 0.6 m apart."""
+UNIT = "ms a simulated second"
+
+
+def measure_growth(rounds: int, tell: Tell = nobody) -> Figures:
+    """The medians of several runs each."""
+    figures: Figures = {}
+    with TemporaryDirectory() as folder:
+        for axis, counts in AXES.items():
+            for count in counts:
+                tell(f"{count} {axis}")
+                prepared = prepare(load_scenario(write_more(Path(folder), axis, count), Path(folder)))
+                timed_run(prepared)  # the first run pays for caches
+                runs = [timed_run(prepared) for _ in range(rounds)]
+                figures[f"{count} {axis}"] = Figure.of([1e3 * cpu / simulated for simulated, cpu, _ in runs], UNIT)
+    return figures
+
+
+def write_more(folder: Path, axis: str, count: int) -> Path:
+    """The patrol as a scenario file with so much of something."""
+    text = PATROL.read_text(encoding="utf-8").replace("time_limit: 60 s", f"time_limit: {SECONDS} s")
+    match axis:
+        case "obstacles":
+            text = text.replace("  obstacles:\n", "  obstacles:\n" + _crates(count, ""))
+        case "objects":  # that could be pushed
+            text = text.replace("  objects:\n", "  objects:\n" + _crates(count, ", mass: 5 kg"))
+        case "moving objects":
+            move = ", move: {{through: [[{there}, {y}]], speed: 0.2 m/s, repeat: back_and_forth}}"
+            text = text.replace("  objects:\n", "  objects:\n" + _crates(count, move))
+        case "beams":
+            robot = ROBOT.read_text(encoding="utf-8").replace("beams: 360", f"beams: {count}")
+            (folder / "robot.robot.yaml").write_text(robot, encoding="utf-8")
+            text = text.replace("robot: {pose", "robot: {model: robot.robot.yaml, pose")
+        case "particles":
+            text += f"stack: {{localizer: {{type: amcl, min_particles: {count}, max_particles: {count}}}}}\n"
+        case _:
+            text = re.sub(r"^robot:.*?^(?=time_limit)", _robots(count), text, flags=re.DOTALL | re.MULTILINE)
+    file = folder / f"{axis.replace(' ', '_')}_{count}.scenario.yaml"
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+def _crates(count: int, more: str) -> str:
+    return "".join(
+        f"    - {{name: crate {n}, box: [0.3, 0.3, 0.4], pose: {{x: {x}, y: {y}}}"
+        f"{more.format(there=round(x + 0.2, 2), y=y)}}}\n"
+        for n, x, y in _places(count)
+    )
+
+
+def _places(count: int) -> Iterator[tuple[int, float, float]]:
+    for number in range(count):
+        row, column = divmod(number, ROW)
+        yield number, round(0.5 + 0.6 * column, 2), round(11.0 + 0.6 * row, 2)
+
+
+def _robots(count: int) -> str:
+    """So many robots that begin one behind the other; each patrols the same goals, from another one on."""
+    goals = goals_of(load_scenario(PATROL, PATROL.parent).spec)
+    poses = [{"x": goal.pose.x, "y": goal.pose.y, "yaw": goal.pose.yaw} for goal in goals]
+    robots = {
+        f"robot_{number}": {
+            "pose": {"x": 1.0, "y": 1.2 + 1.2 * number, "yaw": 0.0},
+            "goals": [{"pose": pose} for pose in (*poses[number:], *poses[:number])],
+        }
+        for number in range(count)
+    }
+    return f"robots: {json.dumps(robots)}\n"

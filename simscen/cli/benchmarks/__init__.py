@@ -1,0 +1,1 @@
+"""The commands of `simscen bench` and their output."""

@@ -1,0 +1,128 @@
+"""`simscen bench localization`: how well AMCL knows where the robot is."""
+
+import json
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict
+from enum import Enum
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from simscen.cli.benchmarks.navigation_table import aligned, broken, fits, named
+from simscen.cli.benchmarks.results import print_progress
+from simscen.cli.diagnostics import print_text
+from simscen.core.errors import NothingSelected
+from simscen.loading.messages import quoted
+from simscen.report.look import look_of
+
+if TYPE_CHECKING:
+    from simscen.bench.localization.campaign import Interval, Row, Share, Sureness
+    from simscen.bench.localization.trial import Trial
+
+
+class Format(str, Enum):
+    """What is printed."""
+
+    TEXT = "text"
+    JSON = "json"
+
+
+def command(
+    buildings: Annotated[int, typer.Option(min=1, max=1000, help="How many buildings to generate.")] = 10,
+    first: Annotated[int, typer.Option(min=1, max=1_000_000, help="The number of the first one.")] = 1,
+    only: Annotated[list[str] | None, typer.Option(help="Part of the name of parameters; repeatable.")] = None,
+    workers: Annotated[int | None, typer.Option("--workers", "-j", min=1, max=256, help="Default: all cores.")] = None,
+    format_: Annotated[Format, typer.Option("--format", help="What to print.")] = Format.TEXT,
+) -> None:
+    """Measure how well AMCL knows where the robot is, on generated logs.
+
+    Office floors of 40 m and more without symmetry, a lidar of 181 or 361 beams over 180°, raw odometry of wheels that
+    slip, people, moved furniture, glass. Eleven logs of each floor: five on which the start is told, two in a building
+    as mapped, with clean wheels and with raw ones, one whose start is unknown, one with half of the floor rebuilt since
+    the map was made, one with a map of the other half only, and one of a robot that is carried elsewhere. Each goes
+    through AMCL with Nav2's parameters, simscen's defaults and those whose covariance is true. Intervals are by
+    bootstrap over buildings. What was lost or not found is said on standard error. A few minutes on two cores.
+    """
+    from simscen.bench.localization.campaign import PARAMETERS, drive, summed_up
+
+    names = [name for name in PARAMETERS if not only or any(part.casefold() in name.casefold() for part in only)]
+    if not names:
+        raise NothingSelected("no parameters are called so; there are: " + ", ".join(map(quoted, PARAMETERS)))
+    trials: dict[str, list[Trial]] = {name: [] for name in names}
+    numbers = range(first, first + buildings)
+    for done, of_one in enumerate(drive(numbers, names, min(buildings, workers or len(os.sched_getaffinity(0)))), 1):
+        for name, some in of_one.items():
+            trials[name] += some
+            _tell(name, some)
+        print_progress(f"{done} of {buildings} buildings" if done < buildings else "")
+    rows = [summed_up(name, some) for name, some in trials.items()]
+    if format_ is Format.JSON:
+        logs = {name: [asdict(trial) for trial in some] for name, some in trials.items()}
+        print(json.dumps({"rows": [asdict(row) for row in rows], "logs": logs}, indent=2))
+    else:
+        print_text(as_text(rows, look_of(sys.stdout, os.environ).columns))
+
+
+def _tell(name: str, trials: "Sequence[Trial]") -> None:
+    from simscen.bench.localization.campaign import well
+
+    for one in trials:
+        if not well(one):
+            place = f"building {one.building}, log {one.number}, {one.circumstance}"
+            print_progress("")
+            found = "not found" if one.found is None else f"found after {one.found:.1f} s"
+            print_text(f"{name}: {place}: up to {one.largest:.1f} m off, {found}", sys.stderr)
+
+
+SHARES = {
+    "tracked": "tracked", "unknown": "start unknown", "outdated": "half rebuilt", "half": "half a map",
+    "kidnapped": "kidnapped",
+}  # fmt: skip
+"""What circumstances are called in the table."""
+
+
+def as_text(rows: "Sequence[Row]", columns: int | None = None) -> str:
+    """A line for each set of parameters, then how sure each was; in at most so many `columns`."""
+    head = ("parameters", *SHARES.values(), "median error", "ms a scan", "slowest")
+    table = [_cells(row) for row in rows]
+    lines = aligned([head, *table], str.ljust)
+    if columns is not None and not fits(lines, columns):
+        lines = [line for row in table for line in named(head, row, columns)]
+    return "\n".join(broken([*lines, "", *(line for row in rows for line in _belief(row))], columns))
+
+
+def _cells(row: "Row") -> tuple[str, ...]:
+    return (
+        row.parameters,
+        *(_share(row.shares[name]) for name in SHARES),
+        f"{row.median:.3f} m{_between(row.median_interval)}",
+        f"{row.ms:.1f}",
+        f"{row.slowest_ms:.0f}",
+    )
+
+
+def _share(share: "Share") -> str:
+    return f"{share.count} of {share.of}{_between(share.interval, '.2f')}"
+
+
+def _between(interval: "Interval", form: str = ".3f") -> str:
+    return "" if interval is None else f" ({interval[0]:{form}} … {interval[1]:{form}})"
+
+
+def _belief(row: "Row") -> list[str]:
+    from simscen.bench.localization.trial import MOMENTS
+
+    def lines(name: str, sure: "Sureness") -> list[str]:
+        within = (
+            "" if sure.bounds is None else f"; right on average: {sure.bounds[0]:.2f} … {sure.bounds[1]:.2f} (95 %)"
+        )
+        told = ", ".join(f"{value:.2f} at {when:g} s" for when, value in zip(MOMENTS, sure.moments, strict=True))
+        low, high = sure.moment_bounds
+        return [
+            f"  ANEES {name}: {sure.anees:.2f}{within}; in the 95 % ellipsoid: {sure.inside:.1%}",
+            f"    {told}; normal, independent: {low:.2f} … {high:.2f} (95 %)",
+        ]
+
+    return [row.parameters, *(line for name, sure in row.sure.items() for line in lines(name, sure))]

@@ -1,0 +1,136 @@
+"""`simscen bench growth`: how the cost grows with what there is."""
+
+import json
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from simscen.cli.benchmarks.results import COMPARE_HELP, Format, Result, load_baseline, print_progress, print_result
+from simscen.cli.diagnostics import print_text
+from simscen.core.errors import Exit
+from simscen.run.figure import Figures
+
+if TYPE_CHECKING:
+    from simscen.bench.speed.suite import Suite
+if TYPE_CHECKING:
+    from simscen.bench.speed.large_worlds import Cost
+
+
+def growth_command(
+    format_: Annotated[Format, typer.Option("--format", help="What to print.")] = Format.TEXT,
+    rounds: Annotated[int, typer.Option(min=1, max=100, help="Runs of each; the median counts.")] = 3,
+    compare: Annotated[Path | None, typer.Option("--compare", metavar="FILE", help=COMPARE_HELP)] = None,
+) -> None:
+    """Measure how the cost of a simulated second grows with what there is.
+
+    The patrol of 15 s with more of one thing at a time: obstacles that stand, objects that could be pushed, objects
+    that a script moves, beams of the lidar, particles of AMCL, robots. CPU time of one core; a minute and a half.
+    """
+    from simscen.cli.process import engine_output_on_stderr
+
+    before = load_baseline(compare)
+    with engine_output_on_stderr():
+        from simscen.bench.speed.scaling import measure_growth
+
+        figures = measure_growth(rounds, print_progress)
+    print_result(Result.here(figures), growth_text(figures), {}, format_, before)
+
+
+def growth_text(figures: Figures) -> str:
+    """A line for each; beside it how many times as much as the least of its kind."""
+    width = max(map(len, figures))
+    lines = ["the patrol with                 CPU a simulated second"]
+    first: dict[str, float] = {}
+    for name, figure in figures.items():
+        kind = name.partition(" ")[2]
+        ratio = figure.value / first.setdefault(kind, figure.value)
+        lines.append(f"    {name:{width}}  {figure.value:9.1f} ms  {ratio:6.2f} times")
+    return "\n".join(lines)
+
+
+# MERGED: `simscen bench worlds`: what a simulated second costs in large worlds.
+def worlds_command(
+    as_json: Annotated[bool, typer.Option("--json", help="Print all numbers as JSON.")] = False,
+    rounds: Annotated[int, typer.Option(min=1, max=100, help="Runs in each world; the median counts.")] = 3,
+) -> None:
+    """Measure what a simulated second costs in large worlds.
+
+    The patrol of a house, a generated hall with 40 movable meshes, and a generated ROS map of 100 x 100 m with 400
+    blocks and noise: at most 60 s each with everything on, CPU time of one core, as multiples of the house.
+    """
+    from simscen.cli.process import engine_output_on_stderr
+
+    with engine_output_on_stderr():
+        from simscen.bench.speed.large_worlds import measure_worlds
+
+        costs = list(measure_worlds(rounds))
+    print_text(json.dumps([asdict(cost) for cost in costs], indent=2) if as_json else worlds_text(costs))
+
+
+def worlds_text(costs: "Sequence[Cost]") -> str:
+    """A line for each world; the first is what the others are held against."""
+    width = max(len(cost.name) for cost in costs)
+    lines = [f"{'':{width}}  triangles  movable  CPU a second   ratio  preparing   memory"]
+    lines += [
+        f"{c.name:{width}}  {c.triangles:9}  {c.movable:7}  {c.milliseconds:9.1f} ms"
+        f"  {c.milliseconds / costs[0].milliseconds:6.2f}  {c.preparing:7.2f} s  {c.memory:4.0f} MB"
+        for c in costs
+    ]
+    return "\n".join(lines)
+
+
+# MERGED: `simscen bench suite`: how fast a suite is run on all cores.
+def suite_command(
+    paths: Annotated[
+        list[Path] | None,
+        typer.Argument(help="Scenario files, or folders to search; default: scenarios.", show_default=False),
+    ] = None,
+    most: Annotated[int, typer.Option(min=1, max=100_000, help="At most so many runs, evenly taken from all.")] = 60,
+    jobs: Annotated[
+        int | None, typer.Option("--jobs", "-j", min=1, max=256, help="Runs at a time; default: one for each core.")
+    ] = None,
+    format_: Annotated[Format, typer.Option("--format", help="What to print.")] = Format.TEXT,
+    compare: Annotated[Path | None, typer.Option("--compare", metavar="FILE", help=COMPARE_HELP)] = None,
+) -> None:
+    """Measure how fast a suite of scenarios is run on all cores.
+
+    Each scenario once, with everything that `simscen run` does but reports: runs a minute, wall time from the session's
+    start to its end as a multiple of what PyBullet alone takes on one core to step and scan for the same simulated time
+    (measured before and after), memory of the workers. Exit code 0, or 3 when a run broke off.
+    """
+    from simscen.cli.process import engine_output_on_stderr
+    from simscen.cli.session.run_session import WARM_PROCESS
+    from simscen.cli.session.selection import Selection, load_all
+
+    before = load_baseline(compare)
+    workers = jobs or len(os.sched_getaffinity(0))
+    with engine_output_on_stderr(), TemporaryDirectory() as folder:
+        from simscen.bench.speed.suite import measure_suite, spread_over
+
+        scenarios, _ = load_all(paths or [Path("scenarios")], None, (), False, Selection())
+        suite = measure_suite(spread_over(scenarios, most), workers, Path(folder), WARM_PROCESS, print_progress)
+    print_result(Result.here(suite.figures), suite_text(suite), {"suite": asdict(suite)}, format_, before)
+    if suite.unfinished:
+        print(f"{len(suite.unfinished)} runs broke off: {', '.join(suite.unfinished)}", file=sys.stderr)
+        sys.exit(Exit.INCOMPLETE)
+
+
+def suite_text(suite: "Suite") -> str:
+    """What it took, on how many cores, and beside PyBullet alone."""
+    figures, alone = suite.figures, suite.bare * suite.simulated
+    took = f"{suite.simulated:.0f} s simulated in {suite.wall:.1f} s of wall time, {suite.workers} at a time"
+    return "\n".join([
+        f"{suite.runs} runs, {took}",
+        f"  {figures['suite: runs a minute'].value:.0f} runs a minute",
+        f"  {suite.wall / alone:.2f} times what PyBullet alone takes on one core to step and scan as long"
+        f" ({alone:.1f} s)",
+        f"  CPU time {suite.cpu / alone:.2f} times that, {1e3 * suite.cpu / suite.simulated:.1f} ms a simulated second",
+        f"  memory of a worker {figures['suite: memory of a worker'].value:.0f} MB,"
+        f" of the largest {figures['suite: memory of the largest worker'].value:.0f} MB",
+    ])  # fmt: skip

@@ -1,0 +1,1 @@
+"""Generated documentation: `simscen explain`, reference pages, JSON Schemas."""

@@ -1,0 +1,127 @@
+"""The commands with their arguments and options as a page, made from the functions that typer is given."""
+
+import importlib
+import inspect
+import types
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from typing import Annotated, Any, Union, get_args, get_origin
+
+from typer.models import ArgumentInfo, OptionInfo
+
+from simscen.core.errors import Exit
+
+EXITS = {
+    Exit.PASSED: "All passed, or failed as their scenarios say; nothing is wrong.",
+    Exit.FAILED: "A criterion failed, or held although it was expected to fail.",
+    Exit.USAGE: "An invalid file, wrong usage or an unusable output folder. Nothing was run.",
+    Exit.INCOMPLETE: "A run could not be completed (crash, timeout, out of memory), or a result could not be written.",
+    Exit.INTERNAL: "A bug in simscen.",
+    Exit.NOTHING_SELECTED: "Nothing was selected, or all of it is skipped.",
+    Exit.HUNG_UP: "Interrupted by SIGHUP: the terminal has gone.",
+    Exit.INTERRUPTED: "Interrupted by Ctrl-C (SIGINT).",
+    Exit.TERMINATED: "Interrupted by SIGTERM.",
+}
+_WORDS = {int: "integer", float: "number", str: "text", Path: "path"}
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """An argument or option: how it is written, what it takes, its default ("" = none) and what it means."""
+
+    written: str
+    value: str
+    default: str
+    help: str
+
+
+def commands_of(name: str) -> Iterator[tuple[str, Callable[..., Any]]]:
+    """The functions of a command and of its subcommands, each with the words that call it."""
+    module = importlib.import_module(f"simscen.cli.commands.{name}")
+    app = getattr(module, "app", None)
+    if app is None:
+        yield name, module.command
+        return
+    group = app.registered_callback and app.registered_callback.callback
+    if group and app.registered_callback.invoke_without_command is True:
+        yield name, group
+    for info in app.registered_commands:
+        if info.callback is not None:
+            yield f"{name} {info.name or info.callback.__name__}", info.callback
+
+
+def parameters_of(function: Callable[..., Any]) -> list[Parameter]:
+    """What the function of a command takes, in the order of its help."""
+    return [_parameter(*found) for found in _parameters_of(function)]
+
+
+def section(words: str, function: Callable[..., Any]) -> str:
+    """A command as a section of the page."""
+    rows = [
+        f"| `{p.written}` | {p.value} | {f'`{p.default}`' if p.default else ''} | {_plain(p.help)} |"
+        for p in parameters_of(function)
+    ]
+    head = ["| argument or option | value | default | meaning |", "|---|---|---|---|"]
+    table = "\n".join([*head, *rows]) if rows else "It takes nothing."
+    return f"## `simscen {words}`\n\n{_plain(inspect.cleandoc(function.__doc__ or ''))}\n\n{table}\n"
+
+
+def exits() -> str:
+    """The table of exit codes."""
+    rows = "\n".join(f"| {code.value} | {text} |" for code, text in EXITS.items())
+    text = "Of several that apply, the first of 129, 130 and 143, 4, 3, 1 is returned."
+    return f"## Exit codes\n\n{text}\n\n| code | meaning |\n|---|---|\n{rows}\n"
+
+
+def _parameters_of(function: Callable[..., Any]) -> list[tuple[inspect.Parameter, Any, ArgumentInfo | OptionInfo]]:
+    found = []
+    # Not get_type_hints: Python 3.10 hides the annotation in an Optional where the default is None.
+    for parameter in inspect.signature(function, eval_str=True).parameters.values():
+        annotation = parameter.annotation
+        if get_origin(annotation) is Annotated:
+            kind, info = get_args(annotation)[:2]
+            if isinstance(info, ArgumentInfo | OptionInfo):
+                found.append((parameter, kind, info))
+    return found
+
+
+def _parameter(parameter: inspect.Parameter, kind: Any, info: ArgumentInfo | OptionInfo) -> Parameter:
+    repeated, kind = _bare(kind)
+    required = parameter.default is inspect.Parameter.empty
+    default = "" if required or parameter.default in (None, False, "") else _shown(parameter.default)
+    if isinstance(info, ArgumentInfo):
+        word = (info.metavar or parameter.name).upper()
+        written = f"{word}…" if repeated else word if required else f"[{word}]"
+    else:
+        # Within Annotated, typer takes the first name for what is its default elsewhere.
+        names = [name for name in (info.default, *(info.param_decls or ())) if isinstance(name, str)]
+        written = ", ".join(names or [f"--{parameter.name.replace('_', '-')}"])
+    return Parameter(written, "" if kind is bool else _word(kind, info), default, info.help or "")
+
+
+def _bare(kind: Any) -> tuple[bool, Any]:
+    """Whether a type that may be None is a list, and of what."""
+    if get_origin(kind) in (Union, types.UnionType):
+        kind = next(member for member in get_args(kind) if member is not type(None))
+    repeated = get_origin(kind) is list
+    return repeated, get_args(kind)[0] if repeated else kind
+
+
+def _word(kind: Any, info: ArgumentInfo | OptionInfo) -> str:
+    if isinstance(kind, type) and issubclass(kind, Enum):
+        return " or ".join(f"`{member.value}`" for member in kind)
+    word = _WORDS[kind]
+    if info.min is not None and info.max is not None:
+        return f"{word}, {info.min:g} to {info.max:g}" if kind is float else f"{word}, {info.min} to {info.max}"
+    return f"{word}, at least {info.min:g}" if info.min is not None else word
+
+
+def _plain(text: str) -> str:
+    """Text that Markdown leaves as it is: *.world.yaml and <run-id> are neither emphasis nor HTML."""
+    return text.replace("*", "\\*").replace("<", "\\<").replace("|", "\\|")
+
+
+def _shown(default: Any) -> str:
+    return str(default.value if isinstance(default, Enum) else default)

@@ -1,0 +1,134 @@
+"""`simscen bench`: how fast it is here, and the other benchmarks as its commands."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from simscen.cli.benchmarks import localization, navigation, results, speed
+from simscen.cli.benchmarks.results import COMPARE_HELP, Format, Result, load_baseline, print_progress, print_result
+from simscen.run.figure import Figure, Figures
+
+if TYPE_CHECKING:
+    from simscen.bench.speed.external_stack import External
+    from simscen.bench.speed.overhead import Overhead
+    from simscen.bench.speed.run_speed import Field, Patrol
+
+app = typer.Typer(rich_markup_mode=None, add_completion=False)
+app.command("suite")(speed.suite_command)
+app.command("growth")(speed.growth_command)
+app.command("worlds")(speed.worlds_command)
+app.command("compare")(results.compare_command)
+app.command("nav")(navigation.command)
+app.command("localization")(localization.command)
+
+
+@app.callback(invoke_without_command=True)
+def command(
+    ctx: typer.Context,
+    format_: Annotated[Format, typer.Option("--format", help="What to print.")] = Format.TEXT,
+    rounds: Annotated[int, typer.Option(min=1, max=100, help="Runs of the patrol; the median counts.")] = 5,
+    compare: Annotated[Path | None, typer.Option("--compare", metavar="FILE", help=COMPARE_HELP)] = None,
+) -> None:
+    """Measure how fast simscen runs here.
+
+    A patrol of 60 s with everything on (240 Hz physics, 360 beams at 10 Hz, 500 to 2000 particles, full MCAP log) on
+    one core: times real time, as a multiple of what PyBullet alone takes to step and scan as often, and what share each
+    part has. What surrounds a run: set-up and verdicts, its process, the start of a session, memory of a worker. Then a
+    720-beam scan and a step in two fields of obstacles, beside PyBullet with one body for each. These are CPU times.
+    Last the patrol with its stack behind the stack protocol: µs of wall time that the engine waits for it at each beat.
+
+    Less than a minute on an idle machine. Other commands take longer: `suite` on all cores, `growth` with what there
+    is, `worlds` that are large. --compare FILE holds the result against one of --format json, `compare` two of these.
+    """
+    if ctx.invoked_subcommand is not None:
+        return
+    from simscen.cli.process import engine_output_on_stderr
+    from simscen.cli.session.run_session import WARM_PROCESS
+
+    before = load_baseline(compare)
+    with engine_output_on_stderr():
+        from simscen.bench.speed import run_speed
+        from simscen.bench.speed.external_stack import measure_external
+        from simscen.bench.speed.overhead import measure_overhead
+
+        patrol = run_speed.measure_patrol(rounds, print_progress)
+        overhead = measure_overhead(rounds, WARM_PROCESS, print_progress)
+        print_progress("fields of obstacles")
+        fields = [run_speed.measure_field(count) for count in (209, 2090)]
+        print_progress("the stack as a process of its own")
+        external = measure_external(max(1, rounds // 2))
+    figures = {**_patrol_figures(patrol), **overhead.figures, **_other_figures(fields, external)}
+    lines = [*_patrol_lines(patrol, rounds), *_overhead_lines(overhead), *_field_lines(fields)]
+    text = "\n".join([*lines, *_external_lines(external)])
+    print_result(Result.here(figures), text, _sections(patrol, overhead, fields, external), format_, before)
+
+
+def _sections(patrol: "Patrol", overhead: "Overhead", fields: "list[Field]", external: "External") -> dict[str, Any]:
+    return {
+        "patrol": {**asdict(patrol), "real_time_factor": patrol.factor, "ratio_to_bare": patrol.ratio},
+        "overhead": asdict(overhead),
+        "fields": [asdict(field) for field in fields],
+        "external": {**asdict(external), "ratio": external.ratio},
+    }
+
+
+def _patrol_figures(patrol: "Patrol") -> Figures:
+    each, unit = 1e3 / patrol.simulated, "ms a simulated second"
+    return {
+        "patrol, times PyBullet alone": Figure.of(patrol.ratios, ""),
+        "patrol": Figure.of([each * cpu for cpu in patrol.cpus], unit),
+        "PyBullet alone": Figure.of([each * bare for bare in patrol.bares], unit),
+        **{name: Figure.of([each * one for one in rounds], unit) for name, rounds in patrol.parted.items()},
+    }
+
+
+def _other_figures(fields: "list[Field]", external: "External") -> Figures:
+    figures = dict[str, Figure]()
+    for field in fields:
+        figures[f"scan among {field.obstacles} obstacles"] = Figure(field.scan_ms, "ms")
+        figures[f"step among {field.obstacles} obstacles"] = Figure(field.step_us, "µs")
+    return {**figures, "beat with the stack as a process": Figure(external.there_us, "µs")}
+
+
+def _patrol_lines(patrol: "Patrol", rounds: int) -> list[str]:
+    width = max(map(len, patrol.parts))
+    shares = sorted(patrol.parts.items(), key=lambda part: -part[1])
+    ratio = f"{patrol.ratio:.2f} times what PyBullet alone takes to step and scan as often"
+    spread = f"{min(patrol.ratios):.2f} … {max(patrol.ratios):.2f} in single rounds"
+    return [
+        f"patrol of {patrol.simulated:g} s, everything on, one core",
+        f"  {patrol.factor:.0f} times real time ({patrol.cpu:.2f} s of CPU time, median of {rounds})",
+        f"  {ratio} ({patrol.bare:.2f} s; {spread})",
+        f"    {'':{width}}  share   ms a simulated second   times PyBullet alone",
+        *(
+            f"    {n:{width}} {s / patrol.cpu:6.1%} {1e3 * s / patrol.simulated:23.2f} {s / patrol.bare:22.2f}"
+            for n, s in shares
+        ),
+    ]
+
+
+def _overhead_lines(overhead: "Overhead") -> list[str]:
+    width = max(map(len, overhead.figures))
+    told = [f"    {name:{width}} {one.value:7.1f} {one.unit}" for name, one in overhead.figures.items()]
+    return ["what surrounds a run (CPU time unless it says so)", *told]
+
+
+def _field_lines(fields: "list[Field]") -> list[str]:
+    return [
+        "a scan of 720 beams and a physics step among cylinders",
+        "    obstacles      scan   PyBullet alone      step   PyBullet alone",
+        *(
+            f"    {f.obstacles:9} {f.scan_ms:6.2f} ms {f.bare_scan_ms:13.2f} ms"
+            f" {f.step_us:6.0f} µs {f.bare_step_us:13.0f} µs"
+            for f in fields
+        ),
+    ]
+
+
+def _external_lines(external: "External") -> list[str]:
+    return [
+        f"the stack of the patrol as a process of its own, all it hears and says in full, {external.beats} beats",
+        f"    {external.there_us:.0f} µs a beat; in the engine {external.here_us:.0f} µs ({external.ratio:.1f} times)",
+    ]

@@ -1,0 +1,124 @@
+"""`simscen explain`."""
+
+import shutil
+import textwrap
+from typing import Annotated
+
+import typer
+
+from simscen.cli import completions
+from simscen.cli.catalog.key_topics import key_topics
+from simscen.cli.catalog.reference_topics import everything, known_names
+from simscen.cli.catalog.topics import OPTIONAL, Field, Topic
+from simscen.cli.diagnostics import print_text
+from simscen.core.errors import UsageError
+from simscen.loading.codes import CODES
+from simscen.loading.messages import quoted, suggestion
+
+
+def command(
+    name: Annotated[
+        str, typer.Argument(help="What to explain; nothing = list what there is.", autocompletion=completions.topics)
+    ] = "",
+    page: Annotated[
+        bool, typer.Option("--page", help="Print the reference of the language, with what is installed, as Markdown.")
+    ] = False,
+) -> None:
+    """Explain a word of the language, a key, a signal, a metric, a component or a code.
+
+    For example `simscen explain stopped_within`, `explain amcl`, `explain amcl.update_min_a`, `explain goals.pose`,
+    `explain GOAL_OCCUPIED` or its number 206, `explain crashed`, `explain "exit 3"`, `explain SC012`. Where a name
+    means several things, all are explained; `simscen explain trigger.localization_error` picks one.
+    """
+    if page:
+        from simscen.cli.catalog.language_page import language_page
+
+        print_text(language_page(installed=True).rstrip())
+        return
+    width = max(40, min(100, shutil.get_terminal_size().columns))
+    if not name:
+        print_text(_overview(width))
+    else:
+        print_text(explained(name, width))
+
+
+def explained(name: str, width: int = 100) -> str:
+    """All that a name means. Raises UsageError where nothing is called so."""
+    if name.upper() in CODES:
+        return f"{name.upper()}\n{_wrapped(CODES[name.upper()], width, '  ')}"
+    return "\n\n".join(_explained(topic, width) for topic in _called(name))
+
+
+def _called(name: str) -> list[Topic]:
+    known = everything()
+    lowered = name.lower()
+    found = [topic for topic in known if lowered in (name.lower() for name in _names(topic))]
+    found = found or key_topics(name, known)
+    if not found:
+        hint = suggestion(name, [*known_names(), *(known_names(keys=True) if "." in name else _bare_keys(known))])
+        raise UsageError(
+            f"nothing is called {quoted(name)}; "
+            + (hint if hint.startswith("did") else "`simscen explain` lists what there is")
+        )
+    return found
+
+
+def _names(topic: Topic) -> tuple[str, ...]:
+    return (topic.name, f"{topic.group}.{topic.name}", *((topic.alias,) if topic.alias else ()))
+
+
+def _bare_keys(everything: list[Topic]) -> list[str]:
+    return [field.key for topic in everything for field in topic.fields]
+
+
+def _overview(width: int) -> str:
+    groups: dict[str, list[str]] = {}
+    for topic in everything():
+        groups.setdefault(topic.group, []).append(topic.name)
+    lines = [f"{group}:\n{_wrapped(', '.join(names), width, '  ')}" for group, names in groups.items()]
+    return "\n".join(
+        [*lines, "", "`simscen explain NAME` tells more, also of keys (`amcl.update_min_a`) and of problems (SC012)."]
+    )
+
+
+def _explained(topic: Topic, width: int) -> str:
+    of = f"{topic.group} of {topic.origin}" if topic.origin else topic.group
+    parts = [f"{topic.name} ({of})", _paragraphs(topic.text, width)]
+    if topic.value:
+        parts.append(f"  Value: {topic.value}")
+    if topic.fields:
+        parts.append("\n".join(_field(field, width) for field in topic.fields))
+    if topic.example:
+        parts.append(f"  Example: {topic.example}")
+    return "\n\n".join(part for part in parts if part)
+
+
+def _field(field: Field, width: int) -> str:
+    needed = "required" if not field.default else "" if field.default == OPTIONAL else f"default {field.default}"
+    head = f"  {field.key}: {field.kind}" + (f" ({needed})" if needed else "")
+    return "\n".join([head, _wrapped(field.text, width, "      ")]) if field.text else head
+
+
+def _paragraphs(text: str, width: int) -> str:
+    return "\n\n".join(_lines(paragraph, width) for paragraph in text.split("\n\n"))
+
+
+def _lines(paragraph: str, width: int) -> str:
+    """A paragraph; headings such as "When it fails:" begin a line of their own."""
+    items: list[str] = []
+    for line in paragraph.splitlines():
+        if line.startswith(" ") and items:
+            items[-1] += " " + line.strip()
+        elif items and not _is_heading(line):
+            items[-1] += " " + line
+        else:
+            items.append(line)
+    return "\n".join(_wrapped(item, width, "  ") for item in items)
+
+
+def _is_heading(line: str) -> bool:
+    return line.startswith(("What is measured:", "When it fails:", "Why this:", "Source:"))
+
+
+def _wrapped(text: str, width: int, indent: str) -> str:
+    return textwrap.fill(" ".join(text.split()), width, initial_indent=indent, subsequent_indent=indent)

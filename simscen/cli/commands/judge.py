@@ -1,0 +1,152 @@
+"""`simscen judge`."""
+
+import json
+import shlex
+import sys
+from enum import Enum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from simscen.cli import completions
+from simscen.cli.diagnostics import harmless, print_text
+from simscen.cli.session.judging import Judging, runs_without_log
+from simscen.cli.session.logs import logs_of
+from simscen.cli.session.output_files import verdict
+from simscen.core.errors import UsageError
+from simscen.core.sessionevents import RunFinished
+from simscen.judge.resultdata import as_data
+from simscen.record.foreign.wanted import TOPICS, Clock, Wanted
+from simscen.report.judged import in_a_line, in_full, summary, table
+from simscen.report.line import text_of
+from simscen.report.results import as_document, in_order
+
+
+class Time(str, Enum):
+    """Which time of a message counts."""
+
+    HEADER = "header"
+    LOG = "log"
+
+
+def command(
+    logs: Annotated[
+        list[Path],
+        typer.Argument(
+            help="Logs (run.mcap, *.mcap, rosbag2 folders), or folders to search for them.",
+            autocompletion=completions.logs,
+        ),
+    ],
+    scenario: Annotated[
+        Path | None, typer.Option(help="Judge by the criteria of this file; `pass:` is all that it needs.")
+    ] = None,
+    truth: Annotated[
+        str | None,
+        typer.Option(help="What counts as the truth in a log of others: a topic, or two frames as map:base_link."),
+    ] = None,
+    topic: Annotated[
+        list[str] | None,
+        typer.Option(help="NAME=TOPIC: what a standard topic is called, e.g. odom=/my/odom; repeatable."),
+    ] = None,
+    time: Annotated[
+        Time, typer.Option(help="Which time of the messages of others counts: their headers', or that of logging.")
+    ] = Time.HEADER,
+    tick_rate: Annotated[int, typer.Option(min=1, max=10_000, help="Ticks a second for logs of others.")] = 1000,
+    same_frame: Annotated[
+        bool, typer.Option("--same-frame", help="The truth's frame is the map's, although it is called otherwise.")
+    ] = False,
+    root: Annotated[Path | None, typer.Option(help="Files that the scenario names stay in this folder.")] = None,
+    world_path: Annotated[list[Path] | None, typer.Option(help="Folder with worlds and models; repeatable.")] = None,
+    json_: Annotated[bool, typer.Option("--json", help="Print result.json, of several logs results.json.")] = False,
+) -> None:
+    """Judge recorded runs, without simulating them.
+
+    A log of simscen holds the truth, the goals and the scenario, so nothing else is needed; with --scenario other
+    criteria and bounds can be tried on it. In a folder every log is judged. The logs of real robots, with the standard
+    topics of ROS 2, need --scenario, and --truth for whatever asks where the robot truly was; a criterion that the log
+    does not decide is inconclusive, never passed.
+
+    Exit code 0: all hold; 1: one fails or is inconclusive; 2: not a usable log or scenario; 3: one could not be judged,
+    or one of several logs cannot be used; 5: no logs found.
+    """
+    wanted = wanted_of(truth, topic or [], time, tick_rate, same_frame)
+    files = logs_of(logs)
+    judging = Judging(wanted, scenario, root, world_path or [])
+    lost = runs_without_log(logs)
+    runs = [*((str(file), judging.judged(file, alone=len(files) + len(lost) == 1)) for file in files), *lost]
+    if wanted != Wanted() and not judging.foreign:
+        judging.notes.append("logs of simscen hold their own truth and times: options for those of others do nothing")
+    for note in judging.notes:
+        print_text(f"note: {harmless(note)}", sys.stderr)
+    if json_:
+        options = _options(wanted, scenario, root, world_path or [])
+        print(_document([run for _, run in runs], options), end="")
+    else:
+        _print(runs, scenario is not None)
+    sys.exit(verdict([run for _, run in runs]))
+
+
+def wanted_of(truth: str | None, topic: list[str], time: Time, tick_rate: int, same_frame: bool) -> Wanted:
+    """How to read a log of others, from the options that say so. Raises UsageError."""
+    clock: Clock = "log" if time is Time.LOG else "header"
+    wanted = Wanted(truth, _topics(topic), tick_rate, clock, same_frame)
+    _check_truth(wanted)
+    return wanted
+
+
+def _print(runs: list[tuple[str, RunFinished]], one_scenario: bool) -> None:
+    if len(runs) == 1:
+        lines = list(in_full(runs[0][1], runs[0][0]))
+    elif one_scenario:
+        lines = [*table(runs), summary([run for _, run in runs])]
+    else:
+        width = max(len(name) for name, _ in runs)
+        lines = [*(in_a_line(run, f"{name:{width}}") for name, run in runs), summary([run for _, run in runs])]
+    for line in lines:
+        print_text(text_of(line))
+
+
+def _document(runs: list[RunFinished], options: list[str]) -> str:
+    """result.json of one log, results.json of several; `again` judges the log again instead of simulating its run."""
+    document = {**as_data(runs[0].result)} if len(runs) == 1 else as_document(runs)
+    logs = [run.artifacts.mcap for run in in_order(runs)]
+    for log, data in zip(logs, document.get("runs", [document]), strict=True):
+        if log:
+            data["again"] = shlex.join(["simscen", "judge", log, *options])
+    return json.dumps(document, sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _options(wanted: Wanted, scenario: Path | None, root: Path | None, world_path: list[Path]) -> list[str]:
+    """How this command was called, as far as it matters."""
+    given = {"--scenario": scenario, "--truth": wanted.truth, "--root": root}
+    several = [("--topic", f"{name}={topic}") for name, topic in wanted.topics.items()]
+    several += [("--world-path", str(folder)) for folder in world_path]
+    words = [word for name, value in given.items() if value is not None for word in (name, str(value))]
+    words += [word for pair in several for word in pair]
+    words += ["--time", "log"] if wanted.clock == "log" else []
+    words += ["--tick-rate", str(wanted.tick_rate)] if wanted.tick_rate != Wanted.tick_rate else []
+    return [*words, *(["--same-frame"] if wanted.same_frame else [])]
+
+
+def _check_truth(wanted: Wanted) -> None:
+    """Raise UsageError for a truth that is none."""
+    if wanted.truth is None:
+        return
+    if not wanted.truth.startswith("/") and not (wanted.frames and all(wanted.frames)):
+        told = f"expected a /topic, or two frames as map:base_link, got {harmless(wanted.truth) or 'nothing'}"
+        raise UsageError(f"cannot read --truth: {told}")
+    if wanted.truth == wanted.topic("amcl_pose"):
+        raise UsageError(f"--truth {harmless(wanted.truth)} is what the robot believes: every belief would be right")
+
+
+def _topics(written: list[str]) -> dict[str, str]:
+    """The names of topics by what they stand for. Raises UsageError."""
+    found = {}
+    for text in written:
+        name, equals, topic = text.partition("=")
+        if not equals or name not in TOPICS or not topic.startswith("/"):
+            known = ", ".join(TOPICS)
+            raise UsageError(f"cannot read --topic {harmless(text)}: expected NAME=/TOPIC with one of {known}")
+        found[name] = topic
+    return found

@@ -1,0 +1,173 @@
+"""`simscen localize`."""
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from simscen.bench.localization.recorded_drive import Errors, Localized, errors_of, localize
+from simscen.cli.diagnostics import from_here, harmless, print_text
+from simscen.cli.session.output_files import save
+from simscen.core.belief import Estimate
+from simscen.core.chance import LARGEST_SEED
+from simscen.core.errors import InvalidInput, UsageError
+from simscen.core.geometry import Pose2
+from simscen.core.grid import OccupancyGrid
+from simscen.core.problems import Problem
+from simscen.loading.criteria_file import LoadedCriteria, load_criteria
+from simscen.loading.discovery import default_root
+from simscen.loading.robotfile import load_robot_file
+from simscen.loading.tree import value_place
+from simscen.loading.worldfile import load_world_file
+from simscen.model.stack import StackSpec
+from simscen.record.foreign.sensed import Sensed, read_sensed
+from simscen.record.foreign.sensedrows import TICK_RATE
+from simscen.stack.protocols import RobotModel, Surroundings
+
+
+def command(
+    log: Annotated[Path, typer.Argument(help="An MCAP file, a rosbag2 folder, a CARMEN .log or a .csv.")],
+    map_: Annotated[Path, typer.Option("--map", help="The ROS map (yaml) that the robot has.")],
+    robot: Annotated[str, typer.Option(help="A robot file, or the name of one that ships.")],
+    scenario: Annotated[
+        Path | None, typer.Option(help="Take the `stack:` of this file; `pass:` is all else that it needs.")
+    ] = None,
+    reference: Annotated[
+        str | None,
+        typer.Option(
+            help="The topic of the reference pose, or two frames of /tf as map:base_link; default: what the log itself "
+            "calls the truth."
+        ),
+    ] = None,
+    odom: Annotated[
+        str, typer.Option(help="The topic of the odometry, or two frames of /tf as odom:base_link.")
+    ] = "/odom",
+    scan: Annotated[str, typer.Option(help="The topic of the scans.")] = "/scan",
+    start: Annotated[
+        str | None,
+        typer.Option(help="X,Y,YAW in m and rad, or unknown; default: where the reference begins, else /initialpose."),
+    ] = None,
+    lost: Annotated[float, typer.Option(min=0.01, help="Metres off from which on the robot is lost.")] = 1.0,
+    seed: Annotated[int, typer.Option(min=1, max=LARGEST_SEED, help="Of the localizer's chance.")] = 1,
+    picture: Annotated[Path | None, typer.Option(help="Draw map, belief and reference (png).")] = None,
+    root: Annotated[Path | None, typer.Option(help="Files that the others name stay in this folder.")] = None,
+    json_: Annotated[bool, typer.Option("--json", help="Print JSON: the figures and the error over time.")] = False,
+) -> None:
+    """Run a recorded drive through the localizer alone, and compare its belief with a reference.
+
+    This is how AMCL's parameters are tried on a building of one's own: no engine, the same log, another --scenario. The
+    same log and seed give the same figures. A CSV file has rows `odom,TIME,X,Y,YAW`,
+    `scan,TIME,ANGLE_MIN,ANGLE_INCREMENT,RANGE_MIN,RANGE_MAX,R0,R1,…`, `truth,TIME,X,Y,YAW` and, before the scans,
+    `mount,X,Y,YAW` of the lidar on the robot.
+
+    Exit code 0: the log went through, whatever the figures; 2: something cannot be used.
+    """
+    sensed = read_sensed(log, odom, scan, reference)
+    spec, grid, model = _given(scenario, map_, robot, root)
+    grid = grid.refined(spec.costmap.resolution)
+    estimate = _estimate(start, sensed)
+    localized = localize(sensed, spec, Surroundings(model, grid, TICK_RATE), estimate, seed)
+    errors = errors_of(localized, sensed, lost)
+    for note in sensed.notes:
+        print_text(f"note: {harmless(note)}", sys.stderr)
+    if picture is not None:
+        _draw(grid, localized, sensed, picture, [log, map_])
+    each = localized.cpu * 1e3 / max(1, localized.scans)
+    print_text(f"{each:.2f} ms of processor time per scan", sys.stderr)
+    if json_:
+        print(json.dumps(_document(localized, errors, seed), sort_keys=True, indent=2, allow_nan=False))
+    else:
+        for line in _lines(localized, errors, lost):
+            print_text(harmless(line))
+
+
+def _given(
+    scenario: Path | None, map_: Path, robot: str, root: Path | None
+) -> tuple[StackSpec, OccupancyGrid, RobotModel]:
+    from simscen.run.robotmodel import robot_model
+    from simscen.run.worldsource import load_map, robot_of
+
+    spec = StackSpec()
+    if scenario is not None:
+        home = root if root is not None else default_root([scenario])
+        try:
+            written = load_criteria(scenario, home)
+        except InvalidInput as error:
+            raise InvalidInput(from_here(error.problems, home)) from error
+        if not isinstance(written.spec.stack, StackSpec):
+            raise InvalidInput(from_here([_without_localizer(written)], home))
+        spec = written.spec.stack
+    home = root if root is not None else default_root([map_])
+    try:
+        world = load_world_file(map_, home)
+    except InvalidInput as error:
+        raise InvalidInput(from_here(error.problems, home)) from error
+    if world.map is None:
+        raise InvalidInput(
+            [Problem(str(map_), 0, 0, "SC320", "not a ROS map", "`simscen world --help` tells how to make one")]
+        )
+    home = root if root is not None else (default_root([Path(robot)]) if Path(robot).exists() else Path.cwd())
+    try:
+        file = load_robot_file(robot, home)
+        body = robot_of(file.robot, file.roots)[1]
+    except InvalidInput as error:
+        raise InvalidInput(from_here(error.problems, home)) from error
+    return spec, load_map(world.map), robot_model(body)
+
+
+def _without_localizer(written: LoadedCriteria) -> Problem:
+    """Another stack's localizer is its own affair."""
+    place = value_place(written.tree, ("stack",))
+    hint = "name a file whose `stack` is simscen's own"
+    return written.library.with_source([Problem(*place, "SC016", "this stack has no localizer of simscen's", hint)])[0]
+
+
+def _estimate(start: str | None, sensed: Sensed) -> Estimate:
+    """Where the localizer is told to begin. Raises UsageError where nobody says."""
+    if start == "unknown":
+        return Estimate(None)
+    if start is None:
+        if len(sensed.truth):
+            return Estimate(Pose2(*sensed.truth[0].tolist()))
+        if sensed.told is None:
+            raise UsageError("the log has no reference pose to begin with: say --start X,Y,YAW or --start unknown")
+        return Estimate(sensed.told)
+    try:
+        x, y, yaw = (float(part) for part in start.split(","))
+    except ValueError as error:
+        raise UsageError(f"cannot read --start {harmless(start)}: expected X,Y,YAW or unknown") from error
+    if not all(abs(value) < 1e6 for value in (x, y, yaw)):
+        raise UsageError(f"cannot read --start {harmless(start)}: no place is there")
+    return Estimate(Pose2(x, y, yaw))
+
+
+def _draw(grid: OccupancyGrid, localized: Localized, sensed: Sensed, picture: Path, inputs: list[Path]) -> None:
+    from simscen.report.picture.localized import write_localized
+
+    save(picture, lambda path: write_localized(grid, localized.poses[:, :2], sensed.truth[:, :2], path), inputs)
+
+
+def _lines(localized: Localized, errors: Errors | None, lost: float) -> list[str]:
+    x, y, yaw = localized.poses[-1].tolist()
+    seconds = localized.times[-1] - localized.times[0]
+    lines = [f"{localized.scans} scans in {seconds:.1f} s; at the end it is believed at ({x:.2f}, {y:.2f}, {yaw:.3f})"]
+    if errors is None:
+        return [*lines, "no reference to compare with"]
+    figures = errors.figures()
+    told = ", ".join(f"{name} {figures[name]:.3f} m" for name in ("median", "rmse", "max", "final"))
+    lines += [f"error: {told}", f"heading: rmse {figures['yaw_rmse']:.4f} rad"]
+    for one in errors.lost:
+        end = "to the end" if one.until is None else f"to {one.until:.1f} s"
+        lines.append(f"lost (more than {lost:g} m off) from {one.since:.1f} s {end}")
+    return lines if errors.lost else [*lines, f"never lost (more than {lost:g} m off)"]
+
+
+def _document(localized: Localized, errors: Errors | None, seed: int) -> dict[str, object]:
+    document: dict[str, object] = {"scans": localized.scans, "seed": seed, "end": localized.poses[-1].tolist()}
+    if errors is None:
+        return document | {"error": None}
+    over = [list(row) for row in zip(errors.times.tolist(), errors.distance.tolist(), errors.yaw.tolist(), strict=True)]
+    lost = [{"since": one.since, "until": one.until} for one in errors.lost]
+    return document | {"error": errors.figures(), "error_over_time": over, "lost": lost}

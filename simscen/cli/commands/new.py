@@ -1,0 +1,106 @@
+"""`simscen new`."""
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from simscen.cli import completions
+from simscen.cli.diagnostics import harmless, print_text
+from simscen.cli.shipped_scenarios import shipped_scenarios
+from simscen.core.errors import InvalidInput, UsageError
+from simscen.core.version import PACKAGE
+from simscen.loading.discovery import BASE, SCENARIO, default_root
+from simscen.loading.document import DEFAULTS
+from simscen.loading.messages import quoted, suggestion
+from simscen.loading.scenario import try_variations, unusable_name
+from simscen.loading.source import reason
+
+
+def command(
+    name: Annotated[str, typer.Argument(help="A name or path, e.g. `aisle` for aisle.scenario.yaml.")],
+    like: Annotated[
+        str,
+        typer.Option(
+            metavar="SCENARIO",
+            help="Copy this scenario, with what it needs: a file, or the name of a shipped one.",
+            autocompletion=completions.shipped,
+        ),
+    ] = "",
+) -> None:
+    """Write a commented scenario to start from.
+
+    It is valid and passes as it is. With `--like`, it is a copy of another scenario: the worlds, maps and robots that
+    it names are copied into a folder of its name beside it, unless they are in the same project, and its paths lead
+    there. A name that ends in .base.yaml, or defaults.yaml, is a base, which scenarios extend. A project that has the
+    schemas in a folder `schemas` gets the line that editors look for. A file that is there is never overwritten.
+    """
+    last = name.rpartition("/")[2]
+    if unusable_name(next((last.removesuffix(suffix) for suffix in SCENARIO if last.endswith(suffix)), last)):
+        raise UsageError(f"{name!r} is no name for a scenario")
+    partial = last == DEFAULTS or last.endswith(BASE)
+    if partial and like:
+        raise UsageError(f"{name!r} would be a base, which says only a part: --like copies whole scenarios")
+    file = Path(name if partial or name.endswith(SCENARIO) else f"{name}{SCENARIO[0]}")
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.open("x").close()
+    except FileExistsError:
+        raise UsageError(f"{file} is there already; choose another name") from None
+    except (OSError, ValueError) as error:
+        why = reason(error) if isinstance(error, OSError) else "the name cannot be a path"
+        raise UsageError(f"cannot write {name!r}: {why}") from None
+    try:
+        written = _copy(like, file) if like else _starter(file, "base" if partial else "scenario")
+    except OSError as error:
+        file.unlink(missing_ok=True)
+        raise UsageError(f"cannot write {name!r}: {reason(error)}") from None
+    except BaseException:
+        file.unlink(missing_ok=True)
+        raise
+    for other in written[1:]:
+        print_text(f"{harmless(str(other))} is written, too")
+    verb = "validate" if partial else "run"
+    print_text(f"{harmless(str(file))} is written; try: simscen {verb} {harmless(str(file))}")
+
+
+def _starter(file: Path, kind: str) -> list[Path]:
+    text = (PACKAGE / "data" / f"starter.{kind}.yaml").read_text(encoding="utf-8")
+    file.write_text(_for_editors(file, kind) + text, encoding="utf-8")
+    return [file]
+
+
+def _for_editors(file: Path, kind: str) -> str:
+    """The line that tells editors where the schema is, if the project has it in a folder `schemas` above the file."""
+    home = file.absolute().parent
+    root = default_root([file])
+    above = [folder for folder in (home, *home.parents) if folder.is_relative_to(root)]
+    schema = next((one for folder in above if (one := folder / "schemas" / f"{kind}.schema.json").is_file()), None)
+    return "" if schema is None else f"# yaml-language-server: $schema={os.path.relpath(schema, home)}\n"
+
+
+def _copy(like: str, file: Path) -> list[Path]:
+    from simscen.loading.copying import copy_scenario
+
+    source = _source(like)
+    found = try_variations(source, default_root([source]))
+    if isinstance(found, list):
+        raise InvalidInput(found)
+    return copy_scenario(found[-1], file, default_root([file]))  # the last one knows the files of all
+
+
+def _source(like: str) -> Path:
+    """The scenario that is meant. Raises UsageError."""
+
+    if Path(like).is_file():
+        return Path(like)
+    shipped = shipped_scenarios()
+    means = [path for name, path in shipped.items() if like in (name, name.rpartition("/")[2])]
+    if len(means) == 1:
+        return means[0]
+    if means:
+        names = [name for name, path in shipped.items() if path in means]
+        raise UsageError(f"several shipped scenarios are called {quoted(like)}: {', '.join(names)}")
+    hint = suggestion(like, shipped)
+    raise UsageError(f"there is no file and no shipped scenario {quoted(like)}" + (f"; {hint}" if hint else ""))

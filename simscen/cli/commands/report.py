@@ -1,0 +1,63 @@
+"""`simscen report`."""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from simscen.cli.diagnostics import print_text
+from simscen.cli.session.output_files import JunitFamily, Reports, require_writable, verdict
+from simscen.cli.session.terminal import Format, screen
+from simscen.core.errors import Exit
+from simscen.core.result import RunResult
+from simscen.core.sessionevents import RunFinished
+from simscen.judge.measure.compare import compare
+from simscen.judge.measure.suite import suite, told
+from simscen.report.journal import require_free
+from simscen.report.rebuild import read_journal
+
+
+def command(
+    folder: Annotated[Path, typer.Argument(help="The output folder of `simscen run`.")],
+    junit: Annotated[Path | None, typer.Option(help="Write JUnit XML here, and nothing else.")] = None,
+    junit_family: Annotated[
+        JunitFamily, typer.Option(help="xunit2 leaves out what Jenkins' schema forbids.")
+    ] = JunitFamily.SIMSCEN,
+    format_: Annotated[Format, typer.Option("--format", help="What to print.")] = Format.TEXT,
+) -> None:
+    """Write the reports of an output folder anew from its journal; with --junit only that file, and the folder stays.
+
+    Every run that was planned is in results.json and junit.xml, also when simscen itself was killed: a run that had
+    begun is then an error of type `interrupted`, one that had not `not-run`. Nothing is simulated or judged again.
+
+    Exit code as of `simscen run`: 0: all passed; 1: a criterion failed; 2: not an output folder, or still in use; 3: a
+    run was not completed.
+    """
+    past = read_journal(folder)
+    require_free(folder)
+    require_writable(junit, folder)
+    reports = Reports(folder, junit, junit_family.value, only=junit is not None)
+    answers = past.answers
+    with screen(format_) as shown:
+        shown(past.started(folder))
+        for answer in answers:
+            shown(answer)
+        comparison = compare((answer.result for answer in answers), past.stacks)
+        written = reports.write(answers, comparison)
+        shown(reports.closing(answers, past.wall, past.interrupted, comparison))
+    if format_ is Format.TEXT:
+        for stack, results in _by_stack(answers).items():
+            print_text(f"{stack}: {told(suite(results))}" if stack else told(suite(results)))
+    code = verdict(answers) if written else Exit.INCOMPLETE
+    sys.exit(shown.exit(code))
+
+
+def _by_stack(answers: Sequence[RunFinished]) -> dict[str, list[RunResult]]:
+    """The results of each stack, in the order of the first of each; second runs are no more evidence."""
+    found: dict[str, list[RunResult]] = {}
+    for answer in answers:
+        if not answer.key.repeats:
+            found.setdefault(answer.key.stack_name, []).append(answer.result)
+    return found

@@ -1,0 +1,146 @@
+"""`simscen robot`: does a robot drive as its file says?"""
+
+import math
+import sys
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from simscen.cli.diagnostics import as_json as problems_as_json
+from simscen.cli.diagnostics import as_text, from_here, harmless, print_text
+from simscen.cli.session.output_files import save
+from simscen.core.errors import Exit, InvalidInput
+from simscen.loading.discovery import default_root
+from simscen.loading.robotfile import RobotFile, load_robot_file
+
+if TYPE_CHECKING:
+    from simscen.run.robotcheck import Check, Checked
+    from simscen.run.trialdrive import Motion, Trial
+    from simscen.sim.robot_body import RobotBody
+
+app = typer.Typer(rich_markup_mode=None, add_completion=False, no_args_is_help=True)
+
+
+@app.callback()
+def _robot() -> None:
+    """Drive a robot once and compare command, odometry and truth."""
+
+
+@app.command()
+def check(
+    robot: Annotated[str, typer.Argument(help="A *.robot.yaml, .urdf or .xacro file, or the name of a shipped robot.")],
+    picture: Annotated[Path | None, typer.Option(help="Draw the ways that were driven (png).")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
+    root: Annotated[Path | None, typer.Option(help="Files that the robot names stay in this folder.")] = None,
+    world_path: Annotated[
+        list[Path] | None, typer.Option(help="Folder with ROS packages or models; repeatable.")
+    ] = None,
+) -> None:
+    """Drive a robot once in an empty world, and compare what it was told, what its encoders say and what is true.
+
+    It rests for a second, drives 2 m straight, turns once on the spot (a car: its smallest circle), drives a square,
+    and sideways if it can. Odometry is without noise: what differs is slip, skidding and wrong dimensions. Dimensions
+    that differ from those of the URDF, and wheels and casters that it draws off the ground, are warnings.
+
+    Exit code 0: every check held; 1: one did not; 2: the robot cannot be used.
+    """
+    file = load_robot_file(robot, root or default_root([Path(robot)]), world_path or ())
+    home = file.library.fence.root
+    try:
+        failed = _checked(file, robot, picture, as_json)
+    except InvalidInput as error:
+        raise InvalidInput(from_here(file.library.with_source_where_missing(error.problems), home)) from error
+    if failed:
+        sys.exit(Exit.FAILED)
+
+
+def _checked(file: RobotFile, named: str, picture: Path | None, as_json: bool) -> int:
+    from simscen.cli.process import engine_output_on_stderr
+    from simscen.run.robotcheck import check_robot
+    from simscen.run.robotgeometry import geometry_notes
+    from simscen.run.worldsource import robot_of
+
+    spec, body = robot_of(file.robot, file.roots)
+    library = file.library
+    notes = library.with_source_where_missing(geometry_notes(file.robot, spec, body, file.roots))
+    notes = from_here(notes, library.fence.root)
+    with engine_output_on_stderr():
+        checked = check_robot(body)
+    if as_json:
+        print(problems_as_json(notes, **as_data(body, checked)))
+    else:
+        print_text("\n".join([harmless(f"{body.name} · {named}"), *as_table(body, checked)]))
+        if notes:
+            print_text(as_text(notes))
+    if picture is not None:
+        from simscen.report.picture.drives import draw_drives
+
+        panels = [(t.name, t.command.path, t.odometry.path, t.truth.path) for t in checked.trials]
+        image = draw_drives(body.name, panels, body.footprint)
+        save(picture, lambda path: image.save(path, format="PNG"), [file.robot.path])
+    return checked.failed
+
+
+# MERGED: What a robot did when it was driven once, as a table and as JSON.
+def as_table(body: "RobotBody", checked: "Checked") -> Iterator[str]:
+    """At most 80 columns: what was driven, then every check with its figure and its limit."""
+    drive = body.drive.type.replace("_", " ")
+    yield f"  {drive}, {body.mass:.4g} kg, {len(body.wheels)} wheels"
+    slope, step = checked.climb
+    if slope:
+        yield f"  climbs {math.degrees(slope):.1f}° and a step of {1000 * step:.0f} mm, on dry concrete (closed forms)"
+    yield ""
+    yield f"  {'':9}{'driven in m':^24}{'turned in degrees':^25}  odometry   most"
+    yield f"  {'':9}{'command odometry   truth'}  {'command odometry  truth'}  off at end  tilt"
+    yield from map(_row, checked.trials)
+    yield ""
+    yield from map(_line, checked.checks)
+    yield ""
+    yield (
+        f"{checked.failed} of {len(checked.checks)} checks failed"
+        if checked.failed
+        else (f"all {len(checked.checks)} checks held")
+    )
+
+
+def _row(trial: "Trial") -> str:
+    motions = (trial.command, trial.odometry, trial.truth)
+    driven = " ".join(f"{motion.driven:7.3f}" for motion in motions)
+    turned = " ".join(f"{_degrees(motion.turned):7.1f}" for motion in motions)
+    gap = trial.odometry.end.distance(trial.truth.end)
+    return f"  {trial.name:9} {driven}  {turned}   {gap:7.3f} m  {math.degrees(trial.tilt):4.1f}"
+
+
+def _line(check: "Check") -> str:
+    verdict = "ok" if check.held else "FAILED"
+    told = f"  {verdict:7} {check.name:36} {check.value:9.3f}, at most {check.limit:.3g} {check.unit}"
+    return told if check.held or not check.advice else f"{told}\n          {check.advice}"
+
+
+def as_data(body: "RobotBody", checked: "Checked") -> dict[str, Any]:
+    """All figures, angles in rad and lengths in m as far as no unit is beside them; ways without their poses."""
+    return {
+        "robot": body.name,
+        "drive": body.drive.type,
+        "passed": not checked.failed,
+        "climb": {"slope": checked.climb.slope, "step": checked.climb.step},
+        "rest": asdict(checked.rest),
+        "trials": [_trial(trial) for trial in checked.trials],
+        "checks": [{**asdict(check), "held": check.held} for check in checked.checks],
+    }
+
+
+def _trial(trial: "Trial") -> dict[str, Any]:
+    motions = {name: _motion(getattr(trial, name)) for name in ("command", "odometry", "truth")}
+    return {"name": trial.name, **motions, "tilt": trial.tilt}
+
+
+def _motion(motion: "Motion") -> dict[str, Any]:
+    return {"driven": motion.driven, "turned": motion.turned, "end": motion.end._asdict()}
+
+
+def _degrees(angle: float) -> float:
+    return round(math.degrees(angle), 1) + 0.0  # no minus before a zero

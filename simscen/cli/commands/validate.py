@@ -1,0 +1,127 @@
+"""`simscen validate`."""
+
+import sys
+from collections import Counter
+from dataclasses import dataclass, field
+from enum import Enum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from simscen.cli import completions
+from simscen.cli.diagnostics import as_github, as_json, as_text, from_here, print_text
+from simscen.cli.session.selection import Checks
+from simscen.cli.session.stacks import stacks_of
+from simscen.core.errors import Exit
+from simscen.core.problems import Problem
+from simscen.loading.anyfile import STACKS, kind_of, problems_of
+from simscen.loading.discovery import BASE, ROBOT, SCENARIO, STACK, WORLD, default_root, discover
+
+
+class Format(str, Enum):
+    """How problems are printed."""
+
+    TEXT = "text"
+    JSON = "json"
+    GITHUB = "github"
+
+
+def command(
+    paths: Annotated[list[Path], typer.Argument(help="Files, or folders to search.", autocompletion=completions.files)],
+    format_: Annotated[Format, typer.Option("--format", help="How to print problems.")] = Format.TEXT,
+    stack: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=VALUE", help="Check scenarios with this stack, as `simscen run` does. Repeatable."),
+    ] = None,
+    root: Annotated[Path | None, typer.Option(help="Files inside scenarios stay in this folder.")] = None,
+    world_path: Annotated[list[Path] | None, typer.Option(help="Folder with worlds and models; repeatable.")] = None,
+    lenient: Annotated[
+        bool, typer.Option("--lenient", help="What of an SDF world cannot be used is a warning, not an error.")
+    ] = False,
+    fast: Annotated[
+        bool, typer.Option("--fast", help="Leave out whatever needs a world or robot to be built.")
+    ] = False,
+    picture: Annotated[
+        Path | None, typer.Option(help="Folder for a picture of each scenario whose geometry is wrong.")
+    ] = None,
+) -> None:
+    """Check scenario, world, robot and stack files without running anything.
+
+    Every problem of every file is listed with its line. Folders are searched for *.scenario.yaml, *.world.yaml,
+    *.robot.yaml, *.stack.yaml and *.base.yaml. A parameter file of Nav2 is checked as a stack, and what of it means
+    nothing here is listed. Of a base, which is there to be extended, and of a defaults.yaml what is there is checked,
+    and nothing is missing. Scenarios are looked at in their worlds: is the robot free at its start and goals, can it
+    get there in time, can all events happen, can all criteria hold and fail?
+
+    Exit code 0: all are valid; 2: some are not; 5: there are none.
+    """
+    home = root if root is not None else default_root(paths)
+    stacks = stacks_of(stack or [], home, world_path or [])
+    checks = Checks(home, world_path or [], lenient, fast, picture, stacks=stacks, runs=bool(stack))
+    checked = _Checked()
+    for file in discover(paths, home, SCENARIO + WORLD + ROBOT + STACK + BASE):
+        kind = kind_of(file, home)
+        checked.add(kind, from_here(_problems(kind, file, checks), home))
+    _PRINT[format_](checked)
+    if checked.wrong:
+        sys.exit(Exit.USAGE)
+
+
+def _problems(kind: str, file: Path, checks: Checks) -> list[Problem]:
+    """What the text tells; where that is nothing, what building it tells, which needs numpy."""
+    if kind == "scenario":
+        found = [problem for choice in checks.choices for problem in checks.scenario(file, choice)[1]]
+        return list(dict.fromkeys(found))
+    found = problems_of(kind, file, checks.root, checks.world_path)
+    if kind in (*STACKS, "base") or any(problem.severity == "error" for problem in found):
+        return found
+    built = checks.robot if kind == "robot" else checks.world
+    return [*found, *built(file)]
+
+
+@dataclass
+class _Checked:
+    """How many files of each kind were read, and what was wrong."""
+
+    kinds: Counter[str] = field(default_factory=Counter)
+    problems: list[Problem] = field(default_factory=list)
+    wrong: int = 0
+
+    def add(self, kind: str, problems: list[Problem]) -> None:
+        self.kinds[kind] += 1
+        self.wrong += any(problem.severity == "error" for problem in problems)
+        self.problems += [problem for problem in problems if problem not in self.problems]
+
+    @property
+    def summary(self) -> str:
+        if self.wrong:
+            errors = sum(problem.severity == "error" for problem in self.problems)
+            return f"{_count(errors, 'problem')} in {self.wrong} of {_count(self.kinds.total(), 'file')}"
+        counts = [_count(number, kind) for kind, number in self.kinds.items()]
+        listed = " and ".join([", ".join(counts[:-1]), counts[-1]] if len(counts) > 1 else counts)
+        return f"{listed} {'is' if self.kinds.total() == 1 else 'are'} valid"
+
+
+def _count(number: int, what: str) -> str:
+    noun, of, rest = what.partition(" of ")  # a parameter file of Nav2
+    return f"{number} {noun}{'' if number == 1 else 's'}{of}{rest}"
+
+
+def _text(checked: _Checked) -> None:
+    if checked.problems:
+        print_text(as_text(checked.problems))
+    print_text(checked.summary)
+
+
+def _json(checked: _Checked) -> None:
+    print(as_json(checked.problems, valid=not checked.wrong, files=checked.kinds.total()))
+
+
+def _github(checked: _Checked) -> None:
+    if checked.problems:
+        print_text(as_github(checked.problems))
+    print_text(checked.summary)
+
+
+_PRINT = {Format.TEXT: _text, Format.JSON: _json, Format.GITHUB: _github}

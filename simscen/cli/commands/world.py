@@ -1,0 +1,207 @@
+"""`simscen world`: inspect, convert and export worlds."""
+
+import json
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from pydantic import ValidationError
+
+from simscen.cli.diagnostics import as_text, from_here, harmless, print_text
+from simscen.cli.session.output_files import save
+from simscen.core.errors import InvalidInput
+from simscen.core.problems import Problem
+from simscen.core.world import World
+from simscen.loading.discovery import default_root
+from simscen.loading.loaded import LoadedWorld
+from simscen.loading.worldfile import load_world_file, world_text
+from simscen.model.world import WorldSpec
+from simscen.run.outfolder import write_atomically
+from simscen.run.precheck.feasibility import notes_of
+from simscen.run.worldsource import world_of
+
+if TYPE_CHECKING:
+    from simscen.worlds.inspect import Inspection, Item
+
+app = typer.Typer(rich_markup_mode=None, add_completion=False, no_args_is_help=True)
+
+File = Annotated[Path, typer.Argument(metavar="WORLD", help="A *.world.yaml, a ROS map (yaml), an SDF or .world file.")]
+Root = Annotated[Path | None, typer.Option(help="Files that the world names stay in this folder.")]
+WorldPath = Annotated[list[Path] | None, typer.Option(help="Folder with worlds and models; repeatable.")]
+Lenient = Annotated[bool, typer.Option("--lenient", help="Leave out what of SDF cannot be used, with a warning.")]
+Height = Annotated[float, typer.Option(min=0.0, max=100.0, help="Height of the lidar in metres.")]
+LIDAR_HEIGHT = 0.2
+
+
+@app.callback()
+def _world() -> None:
+    """Inspect, convert and export worlds."""
+
+
+@app.command()
+def inspect(
+    path: File,
+    png: Annotated[Path | None, typer.Option(help="Draw the cut at lidar height and the map over it.")] = None,
+    height: Height = LIDAR_HEIGHT,
+    everything: Annotated[bool, typer.Option("--all", help="List every solid, however many there are.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of lines.")] = False,
+    root: Root = None,
+    world_path: WorldPath = None,
+    lenient: Lenient = False,
+) -> None:
+    """Print what a world holds: solids, bodies, their extents and triangles, places, regions, warnings.
+
+    Exit code 0; 2: the file or something in it cannot be used.
+    """
+    from simscen.worlds.build import build
+    from simscen.worlds.inspect import inspect as inspected
+
+    home = root or default_root([path])
+    source = load_world_file(path, home, world_path or ())
+    built = build(_built(source, home, world_path or [], lenient), height)
+    found = inspected(built)
+    if as_json:
+        print(json.dumps(asdict(found), indent=2))
+    else:
+        print_text("\n".join([harmless(f"{found.name} · {path}"), *described(found, height, everything)]))
+        warnings = from_here(notes_of(built.world, source, home), home)
+        if warnings:
+            print_text(as_text(warnings))
+    if png is not None:
+        from simscen.worlds.picture import picture
+
+        save(png, lambda file: picture(built, height).save(file, format="PNG"), [path])
+
+
+@app.command()
+def export(
+    path: File,
+    map_: Annotated[Path, typer.Option("--map", help="The map's yaml; its image (pgm) goes beside it.")],
+    height: Height = LIDAR_HEIGHT,
+    resolution: Annotated[float, typer.Option(min=0.005, max=1.0, help="Metres for each cell.")] = 0.05,
+    root: Root = None,
+    world_path: WorldPath = None,
+    lenient: Lenient = False,
+) -> None:
+    """Write a world as a ROS map, which Nav2's map_server reads: what SLAM with a perfect lidar would have drawn.
+
+    A world that came with a map of its own keeps its resolution. Exit code 0; 2: the world cannot be used or the map
+    not be written.
+    """
+    from simscen.worlds.build import build
+    from simscen.worlds.rosmap import save_map
+
+    home = root or default_root([path])
+    source = load_world_file(path, home, world_path or ())
+    grid = build(_built(source, home, world_path or [], lenient), height, resolution).map
+    save(map_, lambda file: save_map(grid, file), [path])
+    rows, columns = grid.shape
+    print_text(f"{harmless(str(map_))}: {columns} x {rows} cells of {grid.resolution:g} m")
+
+
+@app.command()
+def convert(
+    path: File,
+    out: Annotated[Path, typer.Argument(help="The *.world.yaml to write.")],
+    height: Height = LIDAR_HEIGHT,
+    root: Root = None,
+    world_path: WorldPath = None,
+    lenient: Lenient = False,
+) -> None:
+    """Write any world as a *.world.yaml of its own.
+
+    Upright boxes, cylinders and prisms stay as they are; meshes and whatever else leans or bulges become upright prisms
+    over their cut at lidar height. Everything that is not as it was is told, one line each. A ROS map stays a file of
+    its own, which the world names. Exit code 0; 2: the world cannot be used or written.
+    """
+    home = root or default_root([path])
+    source = load_world_file(path, home, world_path or ())
+    spec, changes = _converted(source, home, world_path or [], lenient, height)
+    if source.map is not None:
+        spec = spec.model_copy(update={"map": _relative(source.map.path, out)})
+    write = world_text(spec).encode()
+    save(out, lambda file: write_atomically(file, write), [path])
+    for change in changes:
+        print_text(f"changed: {harmless(change)}")
+    things = len(spec.walls) + len(spec.obstacles) + len(spec.objects) + len(spec.doors)
+    print_text(f"{harmless(str(out))}: {things} walls, obstacles, objects and doors; {len(changes)} changed")
+
+
+def _converted(
+    source: LoadedWorld, home: Path, world_path: list[Path], lenient: bool, height: float
+) -> tuple[WorldSpec, list[str]]:
+    spec = source.spec or WorldSpec(simscen=1, name=source.name)
+    if source.sdf is None:
+        return spec, []
+    from simscen.worlds.convert import convert as converted
+
+    world = _built(replace(source, spec=None, map=None), home, world_path, lenient)
+    try:
+        done = converted(world, height)
+        return done.onto(spec), [*done.changes, *world.notes]
+    except ValidationError as error:
+        told = "; ".join(f"{'.'.join(map(str, found['loc']))}: {found['msg']}" for found in error.errors()[:3])
+        message = f"a world file cannot hold this world: {told}"
+        raise InvalidInput([Problem(str(source.path), 0, 0, "SC312", message)]) from None
+
+
+def _built(source: LoadedWorld, home: Path, world_path: list[Path], lenient: bool) -> World:
+    try:
+        return world_of(source, home, world_path, lenient)
+    except InvalidInput as error:
+        raise InvalidInput(from_here(error.problems, home)) from error
+
+
+def _relative(file: Path, out: Path) -> str:
+    """How a file is named in `out`."""
+    return Path(os.path.relpath(file.resolve(), out.resolve().parent)).as_posix()
+
+
+# MERGED: A world in numbers, as lines of text.
+MOST_LISTED = 20
+LONGEST = 44
+
+
+def described(found: "Inspection", height: float, everything: bool) -> Iterator[str]:
+    """Everything there is to tell; of many solids only the first, unless `everything` is wanted."""
+    x0, y0, x1, y1 = found.bounds
+    yield f"  bounds    x {x0:.2f} … {x1:.2f} m, y {y0:.2f} … {y1:.2f} m ({x1 - x0:.2f} x {y1 - y0:.2f} m)"
+    kinds = ", ".join(f"{count} {kind}" for kind, count in found.shapes)
+    yield f"  static    {_count(len(found.solids), 'solid')}{f': {kinds}' if kinds else ''}"
+    yield f"  moving    {_count(len(found.bodies), 'object')}"
+    yield f"  triangles {found.triangles}"
+    rows, columns = found.map_size
+    occupied, free, unknown = (f"{100 * share:.1f} %" for share in found.map_shares)
+    yield f"  map       {columns} x {rows} cells of {found.map_resolution:g} m, cut at {height:g} m: " + (
+        f"{occupied} occupied, {free} free, {unknown} unknown"
+    )
+    yield from _items("solids", found.solids, len(found.solids) if everything else MOST_LISTED)
+    yield from _items("objects", found.bodies, len(found.bodies))
+    for title, names in (("places", found.places), ("regions", found.regions)):
+        if names:
+            yield f"  {title:9} {harmless(', '.join(names))}"
+
+
+def _items(title: str, items: "Sequence[Item]", most: int) -> Iterator[str]:
+    if items:
+        yield f"  {title}"
+    width = max((min(len(harmless(item.name)), LONGEST) for item in items[:most]), default=0)
+    yield from (f"    {_item(item, width)}" for item in items[:most])
+    if len(items) > most:
+        yield f"    … and {len(items) - most} more (--all lists them)"
+
+
+def _item(item: "Item", width: int) -> str:
+    x0, y0, z0, x1, y1, z1 = item.extent
+    name = harmless(item.name)
+    shown = name if len(name) <= LONGEST else f"…{name[1 - LONGEST :]}"
+    where = f"x {x0:.2f} … {x1:.2f}  y {y0:.2f} … {y1:.2f}  z {z0:.2f} … {z1:.2f}"
+    mass = "" if item.mass is None else f"  {item.mass:g} kg" if item.mass else "  cannot be pushed"
+    return f"{shown:{width}}  {item.shape:9} {item.triangles:7} triangles  {where}{mass}"
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"

@@ -1,0 +1,1 @@
+"""A session of `simscen run`: selection of runs, execution, output files."""

@@ -1,0 +1,192 @@
+"""What a session leaves behind: results.json, junit.xml, report.html, run.json; and its exit code."""
+
+import errno
+import json
+import os
+import platform
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from datetime import datetime, timezone
+from enum import Enum
+from functools import cached_property
+from pathlib import Path
+
+from simscen.cli.diagnostics import print_text
+from simscen.core.comparison import Comparison
+from simscen.core.errors import Exit, UsageError
+from simscen.core.outputs import require_no_input, require_plain
+from simscen.core.result import Outcome
+from simscen.core.sessionevents import RunFinished, SessionFinished
+from simscen.report.journaldata import NAME
+from simscen.report.junit import Family, to_xml
+from simscen.report.results import to_json
+from simscen.report.suite import Live, Session, to_html
+from simscen.report.suite.history import Past, past_sessions
+from simscen.run.outfolder import RUNS, probe_writable, write_atomically
+from simscen.run.versions import arithmetic, cpu_flags, versions
+
+PAGE = "report.html"
+OWN = ("results.json", PAGE, "run.json", NAME, RUNS)
+"""What a session writes into its folder beside junit.xml."""
+
+
+class JunitFamily(str, Enum):
+    """Dialects of JUnit XML."""
+
+    SIMSCEN = "simscen"
+    XUNIT2 = "xunit2"
+
+
+class Reports:
+    """The reports of one session in `folder`; `junit` is the report that is named at the end.
+
+    With `only`, that one is all that is written. `used` are the installed packages and external stacks of its runs.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        junit: Path | None,
+        family: Family,
+        only: bool = False,
+        used: Mapping[str, object] | None = None,
+    ) -> None:
+        self.folder, self.junit, self._only = folder, junit or folder / "junit.xml", only
+        self._used = used or {}
+        self._family: Family = family
+
+    def begin(self) -> None:
+        """Write run.json, so that a session that is killed has said where it ran. Raises UsageError."""
+        try:
+            write_atomically(self.folder / "run.json", session_info_json(self._used))
+        except OSError as error:
+            raise UsageError(f"cannot use the output folder {self.folder}: {error.strerror}") from error
+
+    def write(self, answers: Sequence[RunFinished], comparison: Comparison | None = None) -> bool:
+        """Write the reports; one that cannot be written is told, and the one before it stays whole."""
+        junit = to_xml(answers, self._family)
+        whole = {
+            self.folder / "results.json": to_json(answers, str(self.folder), comparison).encode(),
+            self.folder / "junit.xml": junit,
+            self.folder / PAGE: self._page(answers, comparison),
+        }
+        documents = {**({} if self._only else whole), self.junit: junit}
+        outcomes = [_written(path, data) for path, data in documents.items()]  # every one is tried
+        return all(outcomes)
+
+    def write_live(self, answers: Sequence[RunFinished], live: Live) -> bool:
+        """Write the page of a session that goes on."""
+        page = to_html(Session(answers, self._past, folder=str(self.folder), live=live))
+        return _written(self.folder / PAGE, page.encode())
+
+    def _page(self, answers: Sequence[RunFinished], comparison: Comparison | None) -> bytes:
+        files = ("results.json", "junit.xml", "run.json")
+        return to_html(Session(answers, self._past, comparison, str(self.folder), files)).encode()
+
+    @cached_property
+    def _past(self) -> Sequence[Past]:
+        return past_sessions(self.folder)
+
+    def end(self, wall: float) -> bool:
+        """Write run.json anew, with the seconds that the session took."""
+        return _written(self.folder / "run.json", session_info_json(self._used, wall))
+
+    def closing(
+        self, answers: Sequence[RunFinished], wall: float, interrupted: bool, comparison: Comparison | None = None
+    ) -> SessionFinished:
+        """The last event of a session."""
+        count = {outcome: sum(answer.outcome is outcome for answer in answers) for outcome in Outcome}
+        return SessionFinished(
+            count[Outcome.PASSED],
+            count[Outcome.FAILED],
+            count[Outcome.ERROR],
+            simulated=sum(answer.result.simulated for answer in answers),
+            wall=wall,
+            interrupted=interrupted,
+            junit=str(self.junit),
+            folder=str(self.folder),
+            comparison=comparison,
+            expected=count[Outcome.FAILED_AS_EXPECTED],
+            skipped=count[Outcome.SKIPPED],
+            page="" if self._only else str(self.folder / PAGE),
+        )
+
+
+def verdict(answers: Sequence[RunFinished]) -> Exit:
+    """The exit code of a session that was not interrupted."""
+    outcomes = {answer.outcome for answer in answers}
+    if outcomes == {Outcome.SKIPPED}:
+        return Exit.NOTHING_SELECTED
+    if Outcome.ERROR in outcomes:
+        only_skipped = all(a.result.error is None or a.result.error.kind == "not-run" for a in answers)
+        return Exit.FAILED if only_skipped and Outcome.FAILED in outcomes else Exit.INCOMPLETE
+    return Exit.FAILED if Outcome.FAILED in outcomes else Exit.PASSED
+
+
+def require_writable(junit: Path | None, folder: Path | None, inputs: Iterable[Path] = ()) -> None:
+    """Raise UsageError for a report that cannot be written: that should be known before anything runs.
+
+    Nor may it be one of the `inputs`, or what else simscen writes in its output `folder`.
+    """
+    if junit is None:
+        return
+    try:
+        _require_free_name(junit, folder)
+        require_no_input(junit, inputs)
+        junit.parent.mkdir(parents=True, exist_ok=True)
+        probe_writable(junit)
+    except OSError as error:
+        raise UsageError(f"cannot write {junit}: {error.strerror}") from error
+
+
+def _require_free_name(junit: Path, folder: Path | None) -> None:
+    """Raise OSError where simscen writes something else of that name, in this session's folder or another's."""
+    real = Path(os.path.realpath(junit))
+    for home in real.parents:
+        is_output = home == (folder and Path(os.path.realpath(folder))) or (home / NAME).exists()
+        if is_output and real.relative_to(home).parts[0] in OWN:
+            raise OSError(errno.EINVAL, "the output folder has something else of that name")
+
+
+def _written(path: Path, data: bytes) -> bool:
+    try:
+        write_atomically(path, data)
+    except OSError as error:
+        print_text(f"simscen: cannot write {path}: {error.strerror}", sys.stderr)
+        return False
+    return True
+
+
+# MERGED: Where a session runs: all that may differ between two sessions with equal results.
+def session_info_json(used: Mapping[str, object], wall: float | None = None) -> bytes:
+    """run.json; `used` are installed packages and external stacks, `wall` the seconds that the session took.
+
+    While it is under way `wall` is None.
+    """
+    return json.dumps(
+        {
+            "written": datetime.now(timezone.utc).isoformat(timespec="seconds"),
+            "wall_seconds": None if wall is None else round(wall, 3),
+            "host": platform.node(),
+            "command": sys.argv,
+            "machine": platform.machine(),
+            "cores": os.cpu_count(),
+            "cpu_flags": cpu_flags(),
+            "arithmetic": arithmetic(),
+            "packages": versions(),
+            **used,
+        },
+        indent=2,
+    ).encode()
+
+
+# MERGED: Files that a command is told to write.
+def save(path: Path, write: Callable[[Path], None], inputs: Iterable[Path] = ()) -> None:
+    """Let `write` make the file; raises UsageError where that cannot be done or would overwrite what was read."""
+    try:
+        require_plain(path)
+        require_no_input(path, inputs)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write(path)
+    except OSError as error:
+        raise UsageError(f"cannot write {path}: {error.strerror}") from error

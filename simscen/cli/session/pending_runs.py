@@ -1,0 +1,135 @@
+"""What a session has to do: all of its runs, or those that an earlier one in the same folder left."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from simscen.core.errors import InvalidInput, UsageError
+from simscen.core.result import Outcome, RunKey
+from simscen.core.sessionevents import RunFinished, SessionStarted, started
+from simscen.core.version import __version__
+from simscen.loading.loaded import LoadedScenario
+from simscen.report.journal import Journal
+from simscen.report.journaldata import Planned
+from simscen.report.rebuild import read_journal
+from simscen.report.sessions import last_failed
+from simscen.run.digest import digest
+from simscen.run.outfolder import DEFAULT
+from simscen.run.process.jobs import Job
+from simscen.run.repeat_command import repeat_command, shown
+from simscen.run.session import Options, seeds_of
+
+
+@dataclass(frozen=True)
+class PendingRuns:
+    """The journal of the session, the jobs to do, and the answers that are `kept` from the session before.
+
+    `stacks` are the NAME=VALUE of those that were chosen.
+    """
+
+    journal: Journal
+    jobs: Sequence[Job]
+    kept: Sequence[RunFinished]
+    workers: int
+    stacks: tuple[str, ...] = ()
+
+    def started(self, folder: Path) -> SessionStarted:
+        """The first event of the session."""
+        keys = [*(job.key for job in self.jobs), *(answer.key for answer in self.kept)]
+        return started(__version__, keys, self.workers, folder, self.stacks)
+
+
+def begin(journal: Journal, jobs: Sequence[Job], workers: int) -> PendingRuns:
+    """Plan the session in its journal. Raises UsageError when not even that can be written.
+
+    Kept are verdicts, not errors, on scenarios that are as they were; of two runs that are to be compared, both or
+    none.
+    """
+    scenarios = {_asked(job): job.scenario for job in jobs}
+    digests = {asked: digest(scenario) for asked, scenario in scenarios.items()}
+    planned = [_planned(job, digests[_asked(job)]) for job in jobs]
+    known = _verdicts(journal)
+    answers = [known.get(run) for run in planned]
+    kept: list[RunFinished] = []
+    left: list[Job] = []
+    for number, (job, answer) in enumerate(zip(jobs, answers, strict=True)):
+        if answer is not None and answers[_twin(jobs, number)] is not None:
+            kept.append(answer)
+        else:
+            left.append(job)
+    journal.plan(planned, __version__, workers)
+    for answer in kept:
+        journal(answer)
+    if journal.error:
+        raise UsageError(f"cannot write the journal in {journal.folder}: {journal.error.strerror}")
+    return PendingRuns(journal, left, kept, workers, tuple(dict.fromkeys(run.stack for run in planned if run.stack)))
+
+
+def _planned(job: Job, digest: str) -> Planned:
+    scenario = job.scenario
+    again = repeat_command(scenario, job.key.seed)
+    return Planned(job.key, scenario.path, digest, again, shown(scenario.file), scenario.stack)
+
+
+def _verdicts(journal: Journal) -> dict[Planned, RunFinished]:
+    """The verdicts that the folder holds already, by what was asked."""
+    try:
+        past = read_journal(journal.folder)
+    except InvalidInput:  # a new folder
+        return {}
+    answers = {run: past.answered[run.key] for run in past.planned if run.key in past.answered}
+    return {run: answer for run, answer in answers.items() if answer.outcome is not Outcome.ERROR}
+
+
+def _twin(jobs: Sequence[Job], number: int) -> int:
+    """The number of the run that is to be compared with this one (--check-determinism); its own when there is none."""
+    twin = number ^ 1
+    if twin < len(jobs) and jobs[twin].key != jobs[number].key and jobs[twin].key.first == jobs[number].key.first:
+        return twin
+    return number
+
+
+def _asked(job: Job) -> tuple[str, str, str]:
+    """Scenario, variation and stack."""
+    return job.scenario.id, job.scenario.variation, job.scenario.stack_name
+
+
+# MERGED: `simscen run --last-failed`: which runs that means, and what to say of it.
+EVERYTHING = "everything that is chosen runs"
+
+
+def failed_runs(
+    scenarios: Sequence[LoadedScenario], options: Options, out: Path | None
+) -> tuple[frozenset[RunKey] | None, str]:
+    """The runs of these scenarios that failed when they were run last, and what to tell.
+
+    None where there is nothing to choose by: then, as with pytest, everything runs. Sessions are looked for beside the
+    output folder `out`. A failed run keeps its seed, unless the options name seeds.
+    """
+    home = DEFAULT if out is None else out.absolute().parent
+    last = last_failed(home)
+    if last is None:
+        return None, f"there is no earlier session in {home}: {EVERYTHING}"
+    if not last.runs:
+        return None, f"nothing failed in the last session, {last.folder}: {EVERYTHING}"
+    chosen = {(one.title, one.stack_name): one for one in scenarios if one.spec.skip is None}
+    found = frozenset(key for key in last.runs if _run_key(key, chosen.get((key.test, key.stack_name)), options))
+    left = len(last.runs) - len(found)
+    where = f"{left} {_is(left)} not among what is chosen"
+    if not found:
+        return None, f"{_runs(last.runs)} failed last, and {_is(left)} not among what is chosen: {EVERYTHING}"
+    return found, f"{_runs(last.runs)} failed last" + (f": {len(found)} {_is(len(found))} run, {where}" if left else "")
+
+
+def _run_key(key: RunKey, scenario: LoadedScenario | None, options: Options) -> bool:
+    if scenario is None:
+        return False
+    return (options.seed is None and options.repeat == 1) or key.seed in seeds_of(scenario, options)
+
+
+def _runs(runs: Collection[RunKey]) -> str:
+    return f"{len(runs)} run{'' if len(runs) == 1 else 's'}"
+
+
+def _is(number: int) -> str:
+    return "is" if number == 1 else "are"

@@ -1,0 +1,167 @@
+"""What `--stack NAME=VALUE` and the user's own configuration say of stacks.
+
+Light commands load this, so what reads configurations and looks for programs is imported where it is needed.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from simscen.cli.diagnostics import from_here, harmless
+from simscen.cli.process import config_file, environment
+from simscen.core.errors import InvalidInput, UsageError
+from simscen.core.externalcommand import ExternalCommand
+from simscen.core.problems import Problem
+from simscen.core.result import RunKey
+from simscen.loading.discovery import STACK, default_root
+from simscen.loading.externalstack import torn, undefined
+from simscen.loading.loaded import LoadedScenario
+from simscen.loading.messages import quoted, suggestion
+from simscen.loading.scenario import load_scenario
+from simscen.loading.stackchoice import REFERENCE, StackChoice
+from simscen.model.anystack import ExternalStackSpec
+from simscen.spec.registry import entries, find
+
+YAML = (".yaml", ".yml")
+STACK_HELP = (
+    "Run every scenario with this stack instead of its own: a command that speaks the stack protocol, a *.stack.yaml "
+    "file, a parameter file of Nav2, `reference`, another type of stack, or a name in the user's configuration. Of "
+    "several robots, it drives each; NAME='COMMAND' where a robot's stack is `external: NAME` only says what that "
+    "runs. "
+)
+if TYPE_CHECKING:
+    from simscen.loading.userconfig import UserConfig
+
+_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,59}")
+
+
+@dataclass
+class Stacks:
+    """The stacks that were `chosen` with --stack, in their order, and what the names of external ones run.
+
+    The configuration is read when a name asks for it. Nothing is looked for on the network or in a scenario's folder.
+    """
+
+    chosen: Sequence[StackChoice] = ()
+    _commands: dict[str, ExternalCommand | None] = field(default_factory=dict)
+
+    @cached_property
+    def config(self) -> UserConfig:
+        """The user's own configuration. Raises InvalidInput."""
+        from simscen.loading.userconfig import load_config
+
+        return load_config(config_file())
+
+    def with_command(self, loaded: LoadedScenario) -> tuple[LoadedScenario, list[Problem]]:
+        """The scenario with what its external stacks run, or with the problems that nobody says so.
+
+        Raises InvalidInput for a configuration that says it wrongly.
+        """
+        if loaded.robots:
+            tried = {name: self.with_command(view) for name, view in loaded.robots.items()}
+            given = [choice.name for choice in self.chosen if choice.runs]
+            problems = [*(one for _, found in tried.values() for one in found), *torn(loaded, given, config_file())]
+            whole = replace(loaded, robots={name: view for name, (view, _) in tried.items()})
+            return whole, list(dict.fromkeys(problems))
+        stack = loaded.spec.stack
+        if not isinstance(stack, ExternalStackSpec):
+            return loaded, []
+        if (command := self.command(stack.external)) is not None:
+            return replace(loaded, runs=command), []
+        names = [*(choice.name for choice in self.chosen if choice.runs), *self.config.spec.stacks]
+        problem = undefined(loaded, names, self.config.file)
+        return loaded, [problem] if problem is not None else []
+
+    def command(self, name: str) -> ExternalCommand | None:
+        """What an external stack's name runs: as --stack says, else as the configuration does."""
+        if name not in self._commands:
+            given = next((choice.runs for choice in self.chosen if choice.name == name and choice.runs), None)
+            self._commands[name] = given or self.config.command(name, environment(), Path.cwd())
+        return self._commands[name]
+
+
+def commands_of(scenarios: Iterable[LoadedScenario]) -> dict[str, dict[str, object]]:
+    """What the external stacks of scenarios run, by name: nothing of the environment, which may hold secrets."""
+    stacks = ((view.spec.stack, view.runs) for loaded in scenarios for view in loaded.each.values())
+    found = {stack.external: runs for stack, runs in stacks if isinstance(stack, ExternalStackSpec) and runs}
+    return {
+        name: {"command": list(runs.argv), "cwd": runs.cwd, "digest": runs.digest}
+        for name, runs in sorted(found.items())
+    }
+
+
+def load_with(
+    stack: str | None, file: Path, root: Path | None, world_path: Sequence[Path], variation: str = ""
+) -> LoadedScenario:
+    """A scenario or one of its variations, with the stack that a `--stack` means or its own, ready to be prepared.
+
+    Raises InvalidInput, and UsageError where it has no such variation or none is named.
+    """
+    home = root or default_root([file])
+    stacks = stacks_of([] if stack is None else [stack], home, world_path)
+    chosen = next(iter(stacks.chosen), None)
+    loaded, problems = stacks.with_command(load_scenario(file, home, world_path, chosen, variation))
+    if problems:
+        raise InvalidInput(problems)
+    return loaded
+
+
+def stacks_of(written: Sequence[str], root: Path, world_path: Sequence[Path] = ()) -> Stacks:
+    """What was given as --stack.
+
+    Raises UsageError for what cannot be read, cannot be run or has the name of another, InvalidInput for a stack file
+    or a configuration that is wrong.
+    """
+    stacks = Stacks()
+    choices: dict[str, StackChoice] = {}
+    for text in written:
+        choice = _choice(text, root, world_path, stacks)
+        if choice.name.casefold() in choices:
+            raise UsageError(f"--stack {harmless(text)}: there is another stack of that name; give it its own")
+        choices[choice.name.casefold()] = choice
+    return Stacks(tuple(choices.values()))
+
+
+def _choice(text: str, root: Path, world_path: Sequence[Path], stacks: Stacks) -> StackChoice:
+    name, equals, value = text.partition("=")
+    if not _NAME.fullmatch(name):
+        hint = "a name has letters, digits, `_`, `.` and `-`"
+        raise UsageError(f"cannot read --stack {harmless(text)}: expected NAME=VALUE; {hint}")
+    if RunKey("", 1, stack_name=name.casefold()).repeats:
+        raise UsageError(f"--stack {harmless(text)}: no stack may be called {quoted(name)}; it names second runs")
+    value = value if equals else name
+    if value == REFERENCE or (_NAME.fullmatch(value) and find("stack", value)):
+        return StackChoice(name, value, type=value)
+    if value.endswith(STACK) or (value.endswith(YAML) and Path(value).is_file()):
+        from simscen.loading.stackfile import load_stack_file
+
+        try:
+            return load_stack_file(name, value, Path(value), root, world_path)
+        except InvalidInput as error:
+            raise InvalidInput(from_here(error.problems, root)) from error
+    return StackChoice(name, value, runs=_command(text, value, bool(equals), stacks))
+
+
+def _command(text: str, value: str, may_be_new: bool, stacks: Stacks) -> ExternalCommand:
+    """A name in the configuration, or a command."""
+    if _NAME.fullmatch(value) and (known := stacks.command(value)) is not None:
+        return known
+    if not may_be_new:
+        names = [REFERENCE, *(entry.name for entry in entries("stack")), *stacks.config.spec.stacks]
+        told = f"{quoted(value)} is neither a type of stack nor a name in {stacks.config.file}"
+        raise UsageError(f"cannot read --stack {harmless(text)}: expected NAME=VALUE; {told}; {_near(value, names)}")
+    from simscen.loading.program import command_of
+
+    try:
+        return command_of(value, environment(), Path.cwd())
+    except ValueError as error:
+        raise UsageError(f"--stack {harmless(text)}: {harmless(str(error))}") from error
+
+
+def _near(word: str, names: Sequence[str]) -> str:
+    return suggestion(word, dict.fromkeys(names))

@@ -1,1 +1,0 @@
-"""Studies: what many runs together say, and the generated worlds they drive in. Knows no simulator."""

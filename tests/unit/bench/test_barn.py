@@ -1,0 +1,49 @@
+from pathlib import Path
+
+import pytest
+
+from simscen.bench.navigation.barn import barn_worlds, scenario
+from simscen.core.errors import UsageError
+from simscen.loading.scenario import load_scenario
+
+DATA = Path(__file__).parents[4] / "shared" / "data" / "barn_sample"
+
+
+def test_a_scenario_of_the_challenge_is_valid(tmp_path: Path) -> None:
+    (tmp_path / "empty.world.yaml").write_text("simscen: 1\n")
+    file = tmp_path / "barn.scenario.yaml"
+    file.write_text(scenario("a world", "empty.world.yaml"))
+    loaded = load_scenario(file, tmp_path)
+    assert loaded.map == "none"
+    assert loaded.spec.time_limit == 100.0
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("world,length\n1,12\n", "no column 'ref_path_len'"),
+        ("world,ref_path_len\n1,12\n2,far\n", "line 3: could not convert string to float: 'far'"),
+        ("world,ref_path_len\n1\n", "line 2: "),
+        ("world,ref_path_len\n1,-3\n", "line 2: a path is longer than 0 m, not -3"),
+        ("world,ref_path_len\n", "lists no worlds"),
+    ],
+)
+def test_an_unusable_list_of_worlds_is_named(tmp_path: Path, text: str, said: str) -> None:
+    (tmp_path / "scenarios.csv").write_text(text)
+    with pytest.raises(UsageError) as raised:
+        barn_worlds(tmp_path)
+    assert f"{tmp_path / 'scenarios.csv'}" in str(raised.value)
+    assert said in str(raised.value)
+
+
+def test_a_folder_without_a_list_of_worlds_is_named(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"cannot read the list of BARN's worlds: .*scenarios\.csv"):
+        barn_worlds(tmp_path)
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason="the worlds of others are not here: see CONTRIBUTING.md")
+def test_the_worlds_of_the_dataset_are_there_with_their_reference_lengths() -> None:
+    worlds = {world.file.stem: world for world in barn_worlds(DATA)}
+    assert len(worlds) == 6
+    assert worlds["world_1"].reference_length == 12.431
+    assert all(world.file.is_file() for world in worlds.values())

@@ -1,0 +1,90 @@
+import numpy as np
+import pytest
+from filterpy.stats import NEES
+
+from simscen.bench.localization.consistency import anees, bounds, bounds_over, nees, within_bounds
+from simscen.core.geometry import Array
+
+
+def test_nees_is_that_of_filterpy() -> None:
+    chance = np.random.default_rng(1)
+    square = chance.normal(size=(3, 3))
+    covariance, error = square @ square.T + np.eye(3), chance.normal(size=3)
+    expected = NEES(error[None], np.zeros((1, 3)), covariance[None])[0]
+    assert nees(error, covariance) == pytest.approx(expected)
+
+
+def test_a_belief_without_doubt_is_overconfident() -> None:
+    assert nees(np.array([0.1, 0.0, 0.0]), np.diag([0.0, 1.0, 1.0])) == float("inf")
+
+
+@pytest.mark.parametrize(
+    ("runs", "low", "high"), [(20, 2.02, 4.17), (50, 2.36, 3.72), (100, 2.54, 3.50), (1000, 2.85, 3.15)]
+)
+def test_the_bounds_are_those_of_the_literature(runs: int, low: float, high: float) -> None:
+    assert bounds(runs) == pytest.approx((low, high), abs=0.01)
+
+
+def test_a_consistent_estimator_lies_within_the_bounds() -> None:
+    chance = np.random.default_rng(7)
+    covariance = np.diag([0.01, 0.04, 0.001])
+    values = [nees(chance.multivariate_normal(np.zeros(3), covariance), covariance) for _ in range(1000)]
+    low, high = bounds(1000)
+    assert low < anees(values) < high
+
+
+def filtered(chance: np.random.Generator, campaigns: int, buildings: int, shared: float) -> Array:
+    """NEES (campaigns, buildings, 25) of a Kalman filter that follows a random walk: five logs, each at five moments.
+
+    Each measurement errs on its own (variance 4) and as all do in its building (variance `shared`); the filter knows of
+    both. Moments are four steps apart, so that the errors of a log hang together, too.
+    """
+    walk, noise = 0.25, 4.0
+    before = (walk + np.sqrt(walk**2 + 4 * walk * noise)) / 2  # the Riccati equation's steady state, of one coordinate
+    gain = before / (before + noise)
+    variance = (1 - gain) * before + shared
+    error = np.sqrt(variance - shared) * chance.standard_normal((campaigns, buildings, 5, 3))
+    common = np.sqrt(shared) * chance.standard_normal((campaigns, buildings, 1, 3))
+    values = []
+    for step in range(20):
+        walked = error + np.sqrt(walk) * chance.standard_normal(error.shape)
+        error = (1 - gain) * walked + gain * np.sqrt(noise) * chance.standard_normal(error.shape)
+        if step % 4 == 3:
+            values.append(np.square(error + common).sum(axis=-1) / variance)
+    return np.stack(values, axis=-1).reshape(campaigns, buildings, 25)
+
+
+@pytest.mark.parametrize("shared", [0.0, 0.3])
+def test_bounds_over_buildings_cover_a_consistent_filter_and_no_other(shared: float) -> None:
+    """No other: 1.5 times as sure, or as unsure, as it may be, in standard deviations."""
+    values = filtered(np.random.default_rng(3), 400, 8, shared)
+
+    def kept(times: float) -> float:
+        campaigns = (values * times).mean(axis=2)
+        limits = [bounds_over(campaign.tolist()) for campaign in campaigns]
+        return float(np.mean([low < one.mean() < high for one, (low, high) in zip(campaigns, limits, strict=True)]))
+
+    assert 0.92 < kept(1.0) < 0.98
+    assert kept(1.5**2) < 0.03
+    assert kept(1.5**-2) < 0.03
+
+
+def test_bounds_of_independent_errors_are_too_narrow_for_logs_that_hang_together() -> None:
+    values = filtered(np.random.default_rng(3), 400, 8, 0.3)
+    low, high = bounds(8 * 25)
+    means = values.mean(axis=(1, 2))
+    assert np.mean((low < means) & (means < high)) < 0.85
+
+
+def test_of_two_buildings_nobody_knows_how_much_buildings_differ() -> None:
+    assert bounds_over([2.0, 4.0]) is None
+    assert bounds_over([2.0, 4.0, float("inf")]) is None
+
+
+def test_bounds_over_buildings_are_those_of_students_t_for_the_logarithm() -> None:
+    low, high = bounds_over([2.0, 3.0, 4.0]) or (0.0, 0.0)
+    assert np.log((low / 3.0, high / 3.0)) == pytest.approx((-0.8281, 0.8281), abs=1e-3)  # 4.3027 / (3 √3)
+
+
+def test_what_lies_in_the_ellipsoid_is_counted() -> None:
+    assert within_bounds([7.8, 7.83, 1.0, 30.0]) == 0.5

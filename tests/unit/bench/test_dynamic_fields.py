@@ -1,0 +1,47 @@
+"""What every generated field of moving cylinders must be, whatever its number."""
+
+import numpy as np
+import pytest
+
+from simscen.bench.navigation.dynamic_fields import COUNT, HALF, SPEEDS, SPREAD, DynamicField, dynamic_field
+
+FIELDS = [dynamic_field(number, speed) for speed in SPEEDS for number in range(1, 21)]
+
+
+def of(speed: float) -> list[DynamicField]:
+    return [field for field in FIELDS if field.speed == speed]
+
+
+def test_a_number_and_a_speed_are_one_field() -> None:
+    for a, b in zip(dynamic_field(3, 1.23).movers, dynamic_field(3, 1.23).movers, strict=True):
+        assert np.array_equal(a.points, b.points) and np.array_equal(a.times, b.times) and a.phase == b.phase
+    assert dynamic_field(3, 1.23).movers[0].phase != dynamic_field(4, 1.23).movers[0].phase
+
+
+def test_there_are_5_to_24_cylinders_and_both_ends_occur() -> None:
+    counts = [len(field.movers) for field in FIELDS]
+    assert COUNT[0] <= min(counts) < 8 and 21 < max(counts) <= COUNT[1]
+
+
+def test_cylinders_keep_to_the_arena_and_begin_at_different_places_of_their_ways() -> None:
+    for field in FIELDS:
+        for mover in field.movers:
+            assert np.abs(mover.points).max() <= HALF + 1e-9
+            assert 0 <= mover.phase < 2 * mover.times[-1]
+
+
+@pytest.mark.parametrize("speed", SPEEDS)
+def test_the_mean_speed_is_the_one_asked_for_and_no_piece_is_much_faster_or_slower(speed: float) -> None:
+    means = []
+    for field in of(speed):
+        for mover in field.movers:
+            each = np.hypot(*np.diff(mover.points, axis=0).T) / np.diff(mover.times)
+            assert speed - 2 * SPREAD - 1e-9 <= each.min() and each.max() <= speed + 2 * SPREAD + 1e-9
+            means.append(float(each.mean()))
+    assert np.mean(means) == pytest.approx(speed, abs=0.04)
+
+
+def test_ways_lead_along_both_axes() -> None:
+    spans = [np.ptp(mover.points, axis=0) for field in FIELDS for mover in field.movers]
+    wide = sum(bool(span[0] > span[1]) for span in spans)
+    assert 0.25 < wide / len(spans) < 0.75

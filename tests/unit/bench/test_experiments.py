@@ -1,0 +1,86 @@
+"""Every scenario that the benchmark generates is a scenario like any other."""
+
+from pathlib import Path
+
+import pytest
+
+from simscen.bench.navigation.experiments import (
+    Experiment,
+    corner_cases,
+    dynamic_fields,
+    generated_fields,
+    localizations,
+    sandbox,
+)
+from simscen.cli.benchmarks.navigation import with_stack
+from simscen.loading.scenario import load_scenario
+
+PROJECT = Path(__file__).parents[3]
+SANDBOX = PROJECT.parent / "shared" / "data" / "nav2_tb3_sandbox"
+
+
+def loads(experiment: Experiment) -> None:
+    for drive in experiment.drives:
+        load_scenario(drive.file, experiment.root, experiment.world_path)
+
+
+def test_generated_fields_load_and_carry_their_reference_length(tmp_path: Path) -> None:
+    fields = generated_fields(tmp_path, (1,))
+    loads(fields)
+    assert (fields.drives[0].reference_length or 0.0) >= 10.0
+
+
+def test_dynamic_fields_load_at_three_speeds(tmp_path: Path) -> None:
+    experiments = dynamic_fields(tmp_path, (1,))
+    assert [each.name for each in experiments] == [
+        "dynamic fields, 0.74 m/s",
+        "dynamic fields, 1.23 m/s",
+        "dynamic fields, 1.72 m/s",
+    ]
+    for each in experiments:
+        loads(each)
+
+
+def test_localization_loads_and_misleads_in_another_direction_each_time(tmp_path: Path) -> None:
+    experiments = localizations(tmp_path, PROJECT / "worlds", range(1, 21), range(1, 4))
+    for experiment in experiments:
+        loads(experiment)
+    _, misled, unknown, _ = experiments
+    assert list(unknown.drives[0].seeds) == [1, 2, 3]
+    assert len({drive.file.read_text() for drive in misled.drives}) == 3
+
+
+def test_every_corner_case_that_ships_is_an_experiment() -> None:
+    cases = corner_cases(PROJECT / "scenarios", PROJECT, range(1, 21))
+    assert {"narrow doorway", "dead end", "u trap"} <= {case.name for case in cases}
+    for case in cases:
+        loads(case)
+
+
+@pytest.mark.skipif(not SANDBOX.is_dir(), reason="the worlds of others are not here: see CONTRIBUTING.md")
+def test_the_sandbox_loads_with_and_without_the_box(tmp_path: Path) -> None:
+    for experiment in sandbox(tmp_path, SANDBOX, [1]):
+        loads(experiment)
+
+
+NAV2 = """\
+controller_server:
+  ros__parameters: {FollowPath: {plugin: "nav2_mppi_controller::MPPIController", vx_max: 0.4}}
+planner_server:
+  ros__parameters: {GridBased: {plugin: "nav2_navfn_planner::NavfnPlanner"}}
+"""
+
+
+def test_every_experiment_can_be_driven_by_a_stack_of_other_parts_from_a_file_of_nav2(tmp_path: Path) -> None:
+    (tmp_path / "nav2.yaml").write_text(NAV2)
+    (tmp_path / "ours.stack.yaml").write_text("simscen: 1\nstack: {nav2_params: nav2.yaml}\n")
+    experiments = [
+        generated_fields(tmp_path / "made", (1,)),
+        *dynamic_fields(tmp_path / "made", (1,))[:1],
+        *corner_cases(PROJECT / "scenarios", PROJECT, range(1, 2)),
+        *localizations(tmp_path / "made", PROJECT / "worlds", range(1, 2), range(1, 2)),
+    ]
+    for other in with_stack(tmp_path / "ours.stack.yaml", experiments, tmp_path / "made", PROJECT):
+        for drive in other.drives:
+            stack = load_scenario(drive.file, other.root, other.world_path).spec.stack
+            assert (stack.controller.type, stack.controller.vx_max, stack.planner.type) == ("mppi", 0.4, "navfn")

@@ -1,0 +1,55 @@
+import numpy as np
+import pytest
+from shapely import MultiPoint, Point, box
+
+from simscen.bench.navigation import obstacle_fields
+from simscen.bench.navigation.obstacle_fields import CELL, GAP, GOAL, START, obstacle_field
+
+
+def test_the_same_number_gives_the_same_field_and_another_one_another() -> None:
+    first, again, other = obstacle_field(3), obstacle_field(3), obstacle_field(4)
+    assert np.array_equal(first.centres, again.centres)
+    assert not np.array_equal(first.centres, other.centres)
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_a_disc_has_a_way_by_the_word_of_another_library(number: int) -> None:
+    field = obstacle_field(number)
+    lane = box(-30 * CELL, 0.0, 0.0, GOAL.y + 1.0)
+    # 2 mm less than the disc: shapely's circles are polygons, and a lattice finds ways to its resolution only.
+    free = lane.difference(MultiPoint(field.centres).buffer(CELL / 2 + GAP - 0.002))
+    pieces = [piece for piece in getattr(free, "geoms", [free]) if piece.contains(Point(START.x, START.y))]
+    assert pieces and pieces[0].contains(Point(GOAL.x, GOAL.y))
+
+
+def test_the_shortest_way_is_no_shorter_than_the_straight_one() -> None:
+    assert 10.0 <= obstacle_field(1).shortest < 20.0
+
+
+def test_fields_are_as_dense_as_the_worlds_of_barn() -> None:
+    densities = [obstacle_field(number).density for number in range(1, 9)]
+    assert 0.05 < np.mean(densities) < 0.22
+
+
+def test_lonely_cells_vanish_and_crowded_ones_fill() -> None:
+    alone = np.zeros((3, 3), np.bool_)
+    alone[1, 1] = True
+    assert obstacle_fields._neighbours(alone).tolist() == [[1, 1, 1], [1, 0, 1], [1, 1, 1]]
+
+
+def test_a_narrow_field_has_a_way_for_the_robot_and_none_for_a_wider_one_by_the_word_of_another_library() -> None:
+    gap, too_wide = 0.31, 0.36
+    field = obstacle_field(2, gap, too_wide)
+    lane = box(-30 * CELL, 0.0, 0.0, GOAL.y + 1.0)
+
+    def crossable(radius: float) -> bool:
+        free = lane.difference(MultiPoint(field.centres).buffer(CELL / 2 + radius))
+        pieces = [piece for piece in getattr(free, "geoms", [free]) if piece.contains(Point(START.x, START.y))]
+        return bool(pieces) and bool(pieces[0].contains(Point(GOAL.x, GOAL.y)))
+
+    assert crossable(gap - 0.002)
+    assert not crossable(too_wide + CELL / 3)  # as fine as the lattice on which that is looked for
+
+
+def test_a_field_of_another_width_leaves_the_usual_ones_as_they_are() -> None:
+    assert obstacle_field(3).shortest == obstacle_field(3, GAP).shortest

@@ -1,0 +1,122 @@
+"""Drives from anywhere to anywhere, and the worlds that are made for them."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from scipy import ndimage
+
+from simscen.bench.navigation import corridors
+from simscen.bench.navigation.experiment import with_stack_parameters
+from simscen.bench.navigation.office_maps import FREE, building, write_building
+from simscen.bench.navigation.random_goals import FAULTS, MOVABLE, ROOM, degraded, random_drives, random_goals
+from simscen.core.geometry import Pose3
+from simscen.core.shapes import Body, Box, Solid
+from simscen.core.world import BuiltWorld, World
+from simscen.loading.scenario import load_scenario
+from simscen.loading.worldfile import load_world_file
+from simscen.run.worldsource import world_of
+from simscen.worlds.build import build
+
+
+def two_rooms() -> BuiltWorld:
+    """10 x 6 m, parted at x = 5 by a wall without a door; something that may move at (2, 3)."""
+    solids = [Solid(Box((10.2, 0.1, 1.0)), Pose3(5.0, y, 0.5), "wall") for y in (0.0, 6.0)] + [
+        Solid(Box((0.1, 6.0, 1.0)), Pose3(x, 3.0, 0.5), "wall") for x in (0.0, 5.0, 10.0)
+    ]
+    thing = Body("cart", (Solid(Box((0.4, 0.4, 0.4)), Pose3(), "cart"),), Pose3(2.0, 3.0, 0.2))
+    return build(World("rooms", tuple(solids), (thing,), bounds=(0.0, 0.0, 10.0, 6.0)), 0.2)
+
+
+def test_every_errand_can_be_driven_and_has_room_at_both_ends() -> None:
+    found = list(random_drives(two_rooms(), 0.22, range(1, 21), least=2.0))
+    assert len(found) == 20
+    for one in found:
+        assert (one.start.x < 5.0) == (one.goal.x < 5.0)  # nothing leads through the wall
+        assert one.length >= max(2.0, one.start.distance(one.goal) - 1e-6)
+        for end in (one.start, one.goal):
+            to_walls = min(abs(end.x - x) for x in (0.0, 5.0, 10.0)), min(end.y, 6.0 - end.y)
+            assert min(to_walls) >= 0.05 + 0.22 + ROOM - 0.01
+            assert math.hypot(end.x - 2.0, end.y - 3.0) >= MOVABLE
+
+
+def test_a_drive_is_that_of_its_number_whichever_others_are_drawn() -> None:
+    one, two, three = random_drives(two_rooms(), 0.22, (1, 2, 3), least=2.0)
+    assert [one, two, three] != [one, one, one]
+    assert list(random_drives(two_rooms(), 0.22, (3, 1), least=2.0)) == [three, one]
+    assert [each.number for each in (one, two, three)] == [1, 2, 3]
+
+
+def test_a_building_is_a_map_with_one_large_free_part_that_loads(tmp_path: Path) -> None:
+    for number in range(1, 7):
+        mapped, resolution = building(number)
+        parts, _ = ndimage.label(mapped == FREE)
+        largest = np.bincount(parts.ravel())[1:].max()
+        assert largest * resolution**2 > 100.0
+        assert largest > 0.6 * np.count_nonzero(mapped == FREE)
+    file = write_building(1, tmp_path)
+    world = world_of(load_world_file(file, tmp_path), tmp_path)
+    assert world.grid is not None
+    assert world.grid.resolution == building(1)[1]
+    assert np.array_equal(world.grid.cells == 0, np.flipud(building(1)[0] == FREE)[::-1])
+
+
+def test_random_goals_and_degraded_drives_load(tmp_path: Path) -> None:
+    file = write_building(3, tmp_path)
+    built = {file.name: build(world_of(load_world_file(file, tmp_path), tmp_path), 0.2)}
+    plain = random_goals("random goals", tmp_path, built, (1, 2))
+    weak, medium, strong = degraded(tmp_path / "degraded", built, 1, (tmp_path,))
+    assert len(plain.drives) == 2
+    for drive in plain.drives:
+        load_scenario(drive.file, plain.root, plain.world_path)
+    assert len(weak.drives) == len(medium.drives) == len(strong.drives) == len(FAULTS)
+    for a, b in list(zip(weak.drives, strong.drives, strict=True))[::3]:
+        before, after = (load_scenario(drive.file, weak.root, weak.world_path).spec for drive in (a, b))
+        assert before.own.pose == after.own.pose and before.goals == after.goals
+        assert before.faults != after.faults
+        assert a.world == file.name  # its interval is over buildings, not over faults in one
+
+
+def test_corridors_and_ramps_load_and_are_not_all_alike(tmp_path: Path) -> None:
+    for made in (corridors.two_robots(tmp_path / "c", (1, 2, 3)), corridors.ramps(tmp_path / "r", (1, 2, 3))):
+        names = {load_scenario(drive.file, made.root).spec.name for drive in made.drives}
+        assert len(names) == 3
+
+
+def test_no_ramp_is_a_wall_on_the_map_that_the_robots_lidar_would_make(tmp_path: Path) -> None:
+    for drive in corridors.ramps(tmp_path, range(1, 21)).drives:
+        loaded = load_scenario(drive.file, tmp_path)
+        (lidar,) = (sensor.lidar for sensor in loaded.robot.spec.sensors.values() if sensor.lidar)
+        (platform,) = loaded.world.spec.obstacles
+        assert platform.box[2] < lidar.mount.z - 0.01
+
+
+OTHER = {"controller": {"desired_linear_vel": 0.3}, "localizer": {"type": "odometry"}}
+
+
+def test_a_variant_has_the_same_drives_with_other_parameters(tmp_path: Path) -> None:
+    made = corridors.ramps(tmp_path / "r", (1, 2))
+    other = with_stack_parameters(made, "slow", OTHER, tmp_path / "v")
+    for before, after in zip(made.drives, other.drives, strict=True):
+        one = load_scenario(before.file, made.root).spec
+        two = load_scenario(after.file, other.root, other.world_path).spec
+        assert one.goals == two.goals
+        assert (two.stack.controller.desired_linear_vel, two.stack.localizer.type) == (0.3, "odometry")
+
+
+def test_a_variant_of_drives_without_a_map_keeps_the_localizer_that_needs_none(tmp_path: Path) -> None:
+    made = replace(corridors.ramps(tmp_path / "r", (1,)), mapless=True)
+    other = with_stack_parameters(made, "slow", OTHER, tmp_path / "v")
+    spec = load_scenario(other.drives[0].file, other.root, other.world_path).spec
+    assert (spec.stack.controller.desired_linear_vel, spec.stack.localizer.type) == (0.3, "amcl")
+
+
+def test_the_reference_tells_of_every_fault() -> None:
+    page = (Path(__file__).parents[3] / "docs/reference/navigation-benchmark.md").read_text(encoding="utf-8")
+    table = page[page.index("| fault | weak |") :].partition("\n\n")[0]
+    rows = {row.split("`")[1]: row for row in table.splitlines() if row.startswith("| `")}
+    assert set(FAULTS) <= set(rows)
+    for fault, (_, values) in FAULTS.items():
+        if "sector" not in fault:  # which is told by its width
+            assert all(f"| {value} " in rows[fault] for value in values)

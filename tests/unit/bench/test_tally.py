@@ -1,0 +1,57 @@
+from dataclasses import replace
+
+import pytest
+from finishedruns import ARRIVED, GAVE_UP, HIT, LATE, run
+
+from simscen.bench.navigation.summary import DriveOutcome, Trial, summarize
+from simscen.core.result import Outcome
+from simscen.core.sessionevents import RunFinished
+
+
+@pytest.mark.parametrize(
+    ("finished", "fate"),
+    [
+        (ARRIVED, DriveOutcome.SUCCESS),
+        (HIT, DriveOutcome.COLLISION),
+        (run(Outcome.FAILED, collided=True, ended="time limit"), DriveOutcome.COLLISION),
+        (LATE, DriveOutcome.TIMEOUT),
+        (GAVE_UP, DriveOutcome.FAILED),
+        (run(Outcome.ERROR), DriveOutcome.ERROR),
+    ],
+)
+def test_a_run_has_exactly_one_fate(finished: RunFinished, fate: DriveOutcome) -> None:
+    assert Trial(finished).fate is fate
+
+
+def test_rates_are_of_all_runs_and_times_of_the_good_ones() -> None:
+    row = summarize("BARN", [Trial(r, 10.0) for r in (ARRIVED, ARRIVED, HIT, LATE)])
+    assert (row.runs, row.success, row.collisions, row.timeouts, row.failed) == (4, 0.5, 0.25, 0.25, 0.0)
+    assert row.seconds == 8.0
+
+
+def test_a_score_counts_failures_as_nothing() -> None:
+    # 10 m at 2 m/s is 5 s; arriving within 10 s is worth 0.5.
+    assert summarize("BARN", [Trial(ARRIVED, 10.0), Trial(HIT, 10.0)]).score == pytest.approx(0.25)
+
+
+def test_a_case_without_reference_has_no_score() -> None:
+    assert summarize("doorway", [Trial(ARRIVED)]).score is None
+
+
+def test_success_is_weighted_by_how_long_the_shortest_way_takes_at_top_speed() -> None:
+    # 10 m at 2 m/s is 5 s; it took 8 s. Whoever fails has none of it, and nobody more than all.
+    assert summarize("BARN", [Trial(ARRIVED, top_speed=2.0), Trial(HIT, top_speed=2.0)]).sct == pytest.approx(5 / 8 / 2)
+    assert summarize("BARN", [Trial(ARRIVED, top_speed=1.0)]).sct == 1.0
+
+
+def test_where_nobody_is_to_arrive_no_time_weighs() -> None:
+    refused = run(Outcome.PASSED, seconds=None)
+    assert summarize("blocked", [Trial(refused, top_speed=1.0), Trial(GAVE_UP, top_speed=1.0)]).sct is None
+
+
+def test_of_several_robots_the_mean_counts() -> None:
+    metrics = {"success": 1.0, "a/time_to_goal": 10.0, "b/time_to_goal": 14.0, "a/shortest_length": 6.0}
+    both = replace(ARRIVED, result=replace(ARRIVED.result, metrics=metrics))
+    assert Trial(both).metric("time_to_goal") == 12.0
+    assert Trial(both, top_speed=0.5).sct == 1.0
+    assert Trial(both, top_speed=1.0).sct == 0.5

@@ -1,0 +1,83 @@
+import pytest
+from finishedruns import ARRIVED, HIT, run
+
+from simscen.bench.navigation.comparison import compare_drives
+from simscen.bench.navigation.summary import Trial, over_worlds, summarize
+from simscen.core.intervals import wilson
+from simscen.core.result import Outcome
+from simscen.core.sessionevents import RunFinished
+
+SLOW = run(Outcome.PASSED, seconds=12.0)
+
+
+def test_the_interval_is_over_worlds_however_many_seeds_each_has() -> None:
+    few = [Trial(r, world=f"{n}") for n, r in enumerate((ARRIVED, HIT, ARRIVED, ARRIVED, HIT, ARRIVED))]
+    many = [Trial(trial.run, world=trial.world) for trial in few for _ in range(20)]
+    assert over_worlds(few) == over_worlds(many)
+    low, high = over_worlds(few) or (0.0, 0.0)
+    assert low == pytest.approx(1 / 3, abs=0.01)  # of six worlds, four or so good ones: 2.5 % have at most two
+    assert high == 1.0
+
+
+def test_worlds_that_all_say_the_same_leave_wilsons_doubt() -> None:
+    assert over_worlds([Trial(ARRIVED, world=f"{n}") for n in range(10)]) == pytest.approx((0.722, 1.0), abs=1e-3)
+
+
+def test_worlds_in_which_every_second_drive_succeeds_leave_doubt_too() -> None:
+    low, high = over_worlds([Trial(r, world=f"{n}") for n in range(6) for r in (ARRIVED, HIT)]) or (0.5, 0.5)
+    assert (low, high) == pytest.approx(wilson(3, 6))
+
+
+def test_a_world_with_more_drives_counts_as_often_as_it_was_driven_in_rate_and_interval() -> None:
+    many, once = [Trial(HIT, world="a")] * 15, [Trial(ARRIVED, world=f"{n}") for n in range(5)]
+    row = summarize("maps", many + once)
+    assert row.success == 0.25
+    # Of six worlds drawn the one with 15 drives is k times: 1, 1/4, 1/10 … of them arrived; P(k = 0) = 0.33,
+    # P(k <= 2) = 0.94, P(k <= 3) = 0.991.
+    assert row.success_interval == pytest.approx((3 / 48, 1.0))
+
+
+def test_one_world_says_nothing_of_others() -> None:
+    assert summarize("doorway", [Trial(ARRIVED, world="w")] * 20).success_interval is None
+
+
+def test_a_stack_is_compared_in_the_drives_that_both_have_done() -> None:
+    before = [Trial(r, 10.0, f"{n}") for n, r in enumerate((ARRIVED, ARRIVED, HIT, HIT, ARRIVED, run(Outcome.ERROR)))]
+    after = [Trial(r, 10.0, f"{n}") for n, r in enumerate((SLOW, SLOW, SLOW, HIT, HIT, ARRIVED))]
+    said = compare_drives("fields", before, after)
+    assert (said.pairs, said.better, said.worse) == (5, 1, 1)
+    assert said.success.mean == 0.0
+    assert said.seconds is not None and said.seconds.mean == 4.0  # of the two drives in which both arrived
+    # 10 m at 2 m/s: 0.5 for 8 s, 5/12 for 12 s
+    assert said.score is not None and said.score.mean == pytest.approx((3 * 5 / 12 - 3 * 0.5) / 5)
+
+
+def test_the_interval_of_a_difference_is_that_of_the_binomial_distribution_by_hand() -> None:
+    before = [Trial(r, 10.0, f"{n}") for n, r in enumerate((HIT, ARRIVED, ARRIVED, HIT, HIT))]
+    after = [Trial(r, 10.0, f"{n}") for n, r in enumerate((ARRIVED, ARRIVED, ARRIVED, HIT, HIT))]
+    said = compare_drives("fields", before, after).success
+    # The one world that differs is drawn k times of five, k ~ B(5, 1/5): P(k <= 2) = 0.942, P(k <= 3) = 0.993.
+    assert (said.mean, said.interval) == (pytest.approx(0.2), pytest.approx((0.0, 0.6)))
+
+
+def test_the_difference_is_that_of_the_two_rates_in_the_table_however_many_drives_a_world_has() -> None:
+    worlds = ("a", "a", "a", "b", "c", "d", "e", "f")
+    before = [Trial(ARRIVED, 10.0, world) for world in worlds]
+    after = [Trial(HIT if world == "a" else SLOW, 10.0, world) for world in worlds]
+    said = compare_drives("maps", before, after)
+    assert said.success.mean == pytest.approx(summarize("", after).success - summarize("", before).success)
+    one, two = summarize("", before).score, summarize("", after).score
+    assert said.score is not None and one is not None and two is not None
+    assert said.score.mean == pytest.approx(two - one)
+
+
+@pytest.mark.parametrize("runs", [ARRIVED, HIT])
+def test_stacks_that_never_differ_may_still_differ_in_other_worlds(runs: RunFinished) -> None:
+    same = [Trial(runs, world=f"{n}") for n in range(10)]
+    most = 1.0 - wilson(10, 10)[0]
+    assert compare_drives("fields", same, same).success.interval == pytest.approx((-most, most))
+
+
+def test_runs_of_other_drives_are_not_compared() -> None:
+    with pytest.raises(ValueError, match="not of the same drives"):
+        compare_drives("fields", [Trial(ARRIVED, world="a")], [Trial(ARRIVED, world="b")])
