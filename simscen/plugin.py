@@ -33,9 +33,9 @@ if TYPE_CHECKING:
     from simscen.core.verdict import Finding, Status
     from simscen.core.zones import Zones, ZoneSwitch
     from simscen.criteria.base import Criterion
-    from simscen.criteria.bounds import at_least, at_most, counted, held, missed, undecided
-    from simscen.criteria.measure import Measure
-    from simscen.criteria.signals import clearance, drive, pose_error, speed, truth, turn_rate
+    from simscen.criteria.findings import at_least, at_most, counted, held, missed, undecided
+    from simscen.criteria.plugin_metric import Measure
+    from simscen.criteria.trace_signals.ground_truth import clearance, drive, pose_error, speed, truth, turn_rate
     from simscen.faults.base import Disturbance, Fault, FaultSetting, Instance, Sight, Wheels
     from simscen.model.checkers import GoalCheckerSpec
     from simscen.model.controllerspec import ControllerSpec
@@ -263,7 +263,7 @@ _WHERE = {
         "SensorSpec",
     ),
     "simscen.criteria.base": ("Criterion",),
-    "simscen.criteria.measure": ("Measure",),
+    "simscen.criteria.plugin_metric": ("Measure",),
     "simscen.faults.base": (
         "Disturbance",
         "Fault",
@@ -301,7 +301,7 @@ _WHERE = {
         "SensorView",
     ),
     # What a criterion measures and says.
-    "simscen.criteria.bounds": (
+    "simscen.criteria.findings": (
         "at_least",
         "at_most",
         "counted",
@@ -309,7 +309,7 @@ _WHERE = {
         "missed",
         "undecided",
     ),
-    "simscen.criteria.signals": (
+    "simscen.criteria.trace_signals.ground_truth": (
         "clearance",
         "drive",
         "pose_error",

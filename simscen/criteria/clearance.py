@@ -8,8 +8,8 @@ import numpy as np
 
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
-from simscen.criteria.bounds import at_least, undecided
-from simscen.criteria.signals import clearance
+from simscen.criteria.findings import at_least, undecided
+from simscen.criteria.trace_signals.ground_truth import clearance
 from simscen.spec.base import Spec
 from simscen.spec.quantities import NonNegativeLength
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from simscen.core.case import Case
     from simscen.core.trace import Trace
 
-BEYOND = 0.5
+SEARCH_MARGIN_M = 0.5
 """Metres beyond its bound."""
 
 
@@ -39,7 +39,7 @@ class Clearance(Spec, Criterion):
     @property
     def clearance_range(self) -> float:
         """Its bound and a little more, so that a margin is left to be seen."""
-        return self.min + BEYOND
+        return self.min + SEARCH_MARGIN_M
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """The tightest moment. Space that is free as far as was searched may be infinite; nan may not."""

@@ -11,9 +11,9 @@ from pydantic import Field
 from simscen.core.events import Event, EventKind
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
-from simscen.criteria.bounds import BrokenTrace, NotRecorded, at_most, counted, undecided
-from simscen.criteria.persons import persons
-from simscen.criteria.signals import speed, turn_rate
+from simscen.criteria.findings import InvalidTrace, MissingEvidence, at_most, counted, undecided
+from simscen.criteria.trace_signals.distances import pedestrian_radii
+from simscen.criteria.trace_signals.ground_truth import speed, turn_rate
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Impulse
 from simscen.spec.references import ObjectName
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from simscen.core.case import Case
     from simscen.core.trace import Trace
 
-OWN_FAULT = 0.1
+MOVING_SPEED_M_S = 0.1
 """m/s; a slower robot was run into (CARLA's CollisionTest draws the line here)."""
 
-LOOK_BACK = 0.1
+LOOKBACK_S = 0.1
 """Seconds before the contact in which the robot's speed counts: at the contact itself it may be stopped already."""
 
-SHOWN = 5
+MAX_DETAILS = 5
 
 
 class Collisions(Spec, Criterion):
@@ -61,16 +61,16 @@ class Collisions(Spec, Criterion):
             return [undecided("collisions", "neither the robot's way nor what it touched was recorded")]
         hits = [event for event in trace.of_kind(EventKind.COLLISION_STARTED) if self.object in (None, event.name)]
         if self.people:
-            everybody = persons(trace)
+            everybody = pedestrian_radii(trace)
             if not everybody:
                 return [undecided("collisions", "there were no people")]
             hits = [event for event in hits if event.name in everybody]
         if self.caused_by_robot:
             hits = [event for event in hits if _moving(trace, event, case)]
         limit = 0 if self.max is None and self.max_impulse is None else self.max
-        told = [_told(trace, hit) for hit in hits[:SHOWN]]
-        if len(hits) > SHOWN:
-            told.append(f"and {len(hits) - SHOWN} more")
+        told = [_told(trace, hit) for hit in hits[:MAX_DETAILS]]
+        if len(hits) > MAX_DETAILS:
+            told.append(f"and {len(hits) - MAX_DETAILS} more")
         decisive = (trace, hits[min(limit or 0, len(hits) - 1)].tick) if hits else None
         findings = counted("collisions", len(hits), "collision", None, limit, at=decisive, detail=told)
         if self.max_impulse is not None:
@@ -93,7 +93,7 @@ class Collisions(Spec, Criterion):
 def _impulse(hit: Event) -> float:
     value = hit.data["impulse"]
     if not isinstance(value, int | float) or math.isnan(value):
-        raise BrokenTrace(f"the impulse of the collision with {hit.name} is not a number")
+        raise InvalidTrace(f"the impulse of the collision with {hit.name} is not a number")
     return float(value)
 
 
@@ -102,13 +102,13 @@ def _moving(trace: Trace, hit: Event, case: Case) -> bool:
     reach = max((math.hypot(x, y) for x, y in case.footprint), default=case.inscribed_radius)
     linear, turning = speed(trace), turn_rate(trace)
     if not len(linear):
-        raise NotRecorded("the robot's true velocity was not recorded, so whose fault a contact was is not known")
+        raise MissingEvidence("the robot's true velocity was not recorded, so whose fault a contact was is not known")
     # From the newest sample before the window on: where samples are rare, none may lie within it.
-    since = round(hit.tick - LOOK_BACK * trace.tick_rate)
+    since = round(hit.tick - LOOKBACK_S * trace.tick_rate)
     first, last = np.searchsorted(linear.ticks, (since, hit.tick), side="right").tolist()
     window = slice(max(first - 1, 0), max(last, 1))
     fastest = linear.values[window] + reach * turning.values[window]
-    return bool(fastest.max() > OWN_FAULT)
+    return bool(fastest.max() > MOVING_SPEED_M_S)
 
 
 def _told(trace: Trace, hit: Event) -> str:

@@ -12,10 +12,10 @@ from simscen.core.geometry import wrap
 from simscen.core.goalnames import FAILED, named
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
-from simscen.criteria.bounds import at_least, at_most, held, missed, undecided
-from simscen.criteria.moments import GoalStory, began, ending, finished, stories
-from simscen.criteria.passing import nearest
-from simscen.criteria.signals import finite, true_pose
+from simscen.criteria.findings import at_least, at_most, held, missed, undecided
+from simscen.criteria.goal_outcomes import closest_approach
+from simscen.criteria.timeline import GoalOutcome, end_reason, goal_outcomes, has_ended, outcome_start
+from simscen.criteria.trace_signals.ground_truth import check_samples, true_pose
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveAngle, PositiveDuration, PositiveLength
 from simscen.spec.references import GoalName
@@ -58,7 +58,7 @@ class GoalsReached(Spec, Criterion):
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Distance, heading and, if asked for, time of each goal; one finding for a goal that was not reached."""
-        told = stories(trace, case)
+        told = goal_outcomes(trace, case)
         chosen = [story for story in told if any(named(story.goal.name, name) for name in self.goals or (None,))]
         findings = self._untold(trace, case, {story.goal.name for story in chosen})
         if not chosen and not findings:
@@ -84,11 +84,11 @@ class GoalsReached(Spec, Criterion):
                 because, detail = f"the scenario has no goal `{name}`", [f"goals: {', '.join(names)}"]
                 findings.append(undecided(f"goal {name}", because, "reached", detail))
             elif not any(named(each, name) for each in told):
-                tell = missed if finished(trace) else undecided
+                tell = missed if has_ended(trace) else undecided
                 findings.append(tell(f"goal {name}", "never sent", "reached"))
         return findings
 
-    def _missing(self, trace: Trace, story: GoalStory) -> Finding:
+    def _missing(self, trace: Trace, story: GoalOutcome) -> Finding:
         if not story.preempted:
             return _not_reached(trace, story)
         assert story.end is not None
@@ -96,7 +96,7 @@ class GoalsReached(Spec, Criterion):
             return held(f"goal {story.goal.name}", story.fate, "reached", (trace, story.end.tick))
         return undecided(f"goal {story.goal.name}", story.fate, "reached")
 
-    def _reached(self, trace: Trace, story: GoalStory) -> list[Finding]:
+    def _reached(self, trace: Trace, story: GoalOutcome) -> list[Finding]:
         goal, tick = story.goal, story.reached
         assert tick is not None
         what, pose = f"goal {goal.name}", true_pose(trace, tick)
@@ -125,16 +125,16 @@ class GoalsReached(Spec, Criterion):
             findings.append(self._time(trace, story, self.within))
         return findings
 
-    def _passed(self, trace: Trace, story: GoalStory, told: list[GoalStory]) -> list[Finding]:
+    def _passed(self, trace: Trace, story: GoalOutcome, told: list[GoalOutcome]) -> list[Finding]:
         """Of a pose that is passed on the way the heading is free, and how near the robot came to it at all counts."""
-        tick, apart = nearest(trace, story, told)
+        tick, apart = closest_approach(trace, story, told)
         limit, context = self.tolerance or story.goal.xy_tolerance, "from the pose where it came nearest to it"
         findings = [at_most(f"goal {story.goal.name}", apart, limit, "m", at=(trace, tick), context=context)]
         if self.within is not None:
             findings.append(self._time(trace, story, self.within))
         return findings
 
-    def _time(self, trace: Trace, story: GoalStory, within: float) -> Finding:
+    def _time(self, trace: Trace, story: GoalOutcome, within: float) -> Finding:
         what = f"goal {story.goal.name} time"
         if story.accepted is None or story.reached is None:
             return undecided(what, "when it was accepted was not recorded", f"≤ {within:.2f} s")
@@ -142,45 +142,47 @@ class GoalsReached(Spec, Criterion):
         return at_most(what, taken, within, "s", at=(trace, story.reached))
 
 
-def _failed(trace: Trace, story: GoalStory) -> Finding:
+def _failed(trace: Trace, story: GoalOutcome) -> Finding:
     """Of a goal at which the robot is to fail: whether it did, and with the code that is asked for."""
     what, expected = f"goal {story.goal.name}", _expected(story)
-    if story.end is None and not finished(trace):
+    if story.end is None and not has_ended(trace):
         return undecided(what, f"the log stops at t = {trace.seconds(trace.end):.2f} s, {story.fate}", expected)
     at = (trace, trace.end if story.end is None else story.end.tick)
     on_the_way = story.goal.via and story.reached is not None  # it may come past some poses before it fails
     return (held if story.failed_as_expected or on_the_way else missed)(what, story.fate, expected, at)
 
 
-def _expected(story: GoalStory) -> str:
+def _expected(story: GoalOutcome) -> str:
     return FAILED if story.failure == FAILED else f"failed with {story.failure}"
 
 
-def _waited(trace: Trace, case: Case, story: GoalStory, told: list[GoalStory]) -> list[Finding]:
+def _waited(trace: Trace, case: Case, story: GoalOutcome, told: list[GoalOutcome]) -> list[Finding]:
     """Whether the robot stayed as long as it was to, before it went on to another goal of the list."""
-    later = next((each for each in told if began(each) > began(story) and each.goal in case.goals), None)
+    later = next(
+        (each for each in told if outcome_start(each) > outcome_start(story) and each.goal in case.goals), None
+    )
     if not story.goal.wait or story.reached is None or later is None or later.accepted is None:
         return []
     stayed = trace.seconds(later.accepted - story.reached)
     return [at_least(f"goal {story.goal.name} wait", stayed, story.goal.wait, "s", at=(trace, later.accepted))]
 
 
-def _not_reached(trace: Trace, story: GoalStory) -> Finding:
+def _not_reached(trace: Trace, story: GoalOutcome) -> Finding:
     what = f"goal {story.goal.name}"
-    if story.end is None and not finished(trace):
+    if story.end is None and not has_ended(trace):
         return undecided(what, f"the log stops at t = {trace.seconds(trace.end):.2f} s, {story.fate}", "reached")
     tick = trace.end if story.end is None else story.end.tick
-    why = f"the run ended at t = {trace.seconds(trace.end):.2f} s: {ending(trace)}"
+    why = f"the run ended at t = {trace.seconds(trace.end):.2f} s: {end_reason(trace)}"
     details = [why] if story.end is None else []
     if len(trace.truth):
         details.insert(0, f"{true_pose(trace, tick).distance(story.goal.pose):.2f} m from the goal then")
     return missed(what, story.fate, "reached", (trace, tick), details)
 
 
-def _believed(trace: Trace, story: GoalStory) -> list[str]:
+def _believed(trace: Trace, story: GoalOutcome) -> list[str]:
     tick, goal = story.reached, story.goal.pose
     if tick is None or not len(trace.belief):
         return []
-    x, y, yaw = finite(trace.belief, "the belief", trace).at(np.array([tick]))[0, :3].tolist()
+    x, y, yaw = check_samples(trace.belief, "the belief", trace).at(np.array([tick]))[0, :3].tolist()
     off = math.degrees(abs(wrap(yaw - goal.yaw)))
     return [f"it believed itself {math.hypot(x - goal.x, y - goal.y):.2f} m and {off:.0f}° from the goal"]

@@ -13,9 +13,9 @@ from simscen.core.polygons import flaw
 from simscen.core.separation import separation, separation_of_boxes
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
-from simscen.criteria.bounds import BrokenTrace, at_least, undecided
-from simscen.criteria.signals import Flags, truth
-from simscen.criteria.switched import NEVER, spans_on, within
+from simscen.criteria.findings import InvalidTrace, at_least, undecided
+from simscen.criteria.timeline import NEVER_SWITCHED, clip_samples, enabled_spans
+from simscen.criteria.trace_signals.ground_truth import Flags, truth
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Duration, NonNegativeLength
 from simscen.spec.references import MaskFile, RegionName
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     Away = Callable[[Array], Array]
 
-FINE = 0.005
+RESOLUTION_M = 0.005
 """Metres to which the nearest moment between two samples is searched."""
 POINT = ((0.0, 0.0),)
 """The hull of a robot without a footprint; its inscribed radius is around it."""
@@ -85,10 +85,10 @@ class Keepout(Spec, Criterion):
         if not self.while_on:
             distance, tick = _nearest(trace, poses, case, away)
             return [at_least(what, distance, self.distance, "m", at=(trace, tick))]
-        ways = [within(poses, *span) for span in spans_on(trace, "keepout", self.region, self.grace)]
+        ways = [clip_samples(poses, *span) for span in enabled_spans(trace, "keepout", self.region, self.grace)]
         found = [_nearest(trace, way, case, away) for way in ways if len(way)]
         if not found:
-            return [undecided(what, NEVER, limit)]
+            return [undecided(what, NEVER_SWITCHED, limit)]
         distance, tick = min(found)
         return [at_least(what, distance, self.distance, "m", at=(trace, tick), context="while it was on")]
 
@@ -108,7 +108,7 @@ class Keepout(Spec, Criterion):
         region = case.regions[self.region]
         wrong = flaw(region)
         if wrong:
-            raise BrokenTrace(f"region `{self.region}` {wrong}, so nothing is inside or outside of it")
+            raise InvalidTrace(f"region `{self.region}` {wrong}, so nothing is inside or outside of it")
         return lambda poses: separation(poses, hull, region)
 
 
@@ -126,7 +126,7 @@ def _nearest(trace: Trace, poses: Samples, case: Case, away: Away) -> tuple[floa
     begin, end = states[:-1][driven], states[1:][driven]
     while len(begin):
         moved = np.hypot(*(end - begin)[:, :2].T) + reach * np.abs(end[:, 2] - begin[:, 2])
-        hopeful = (begin[:, 3] + end[:, 3] - moved) / 2 < best[3] - FINE
+        hopeful = (begin[:, 3] + end[:, 3] - moved) / 2 < best[3] - RESOLUTION_M
         begin, end = begin[hopeful], end[hopeful]
         middle = (begin + end) / 2
         middle[:, 3] = away(middle[:, :3])

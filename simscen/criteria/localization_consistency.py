@@ -12,8 +12,8 @@ from simscen.core.chisquare import mean_bounds, quantile
 from simscen.core.samples import Samples
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
-from simscen.criteria.bounds import at_least, at_most, missed, undecided
-from simscen.criteria.nees import DIMENSIONS, nees_samples
+from simscen.criteria.findings import at_least, at_most, missed, undecided
+from simscen.criteria.trace_signals.nees import DIMENSIONS, nees_samples
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Duration, PositiveDuration, Quantity
 

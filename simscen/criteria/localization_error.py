@@ -11,9 +11,9 @@ from simscen.core.geometry import Array
 from simscen.core.samples import Samples
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
-from simscen.criteria.bounds import at_most, undecided
-from simscen.criteria.moments import finished
-from simscen.criteria.signals import pose_error
+from simscen.criteria.findings import at_most, undecided
+from simscen.criteria.timeline import has_ended
+from simscen.criteria.trace_signals.ground_truth import pose_error
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Duration, PositiveAngle, PositiveLength
 
@@ -88,7 +88,7 @@ class LocalizationError(Spec, Criterion):
 
 def _of_a_whole_run(trace: Trace, finding: Finding) -> Finding:
     """A log that was cut off might have ended better than it was until then."""
-    if finished(trace):
+    if has_ended(trace):
         return finding
     return undecided(finding.what, f"{finding.measured} so far", finding.limit)
 

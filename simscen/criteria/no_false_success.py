@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 from simscen.core.events import Event, EventKind
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
-from simscen.criteria.bounds import at_most, held, missed, undecided
-from simscen.criteria.moments import GoalStory, began, stories
-from simscen.criteria.passing import nearest
-from simscen.criteria.signals import true_pose
+from simscen.criteria.findings import at_most, held, missed, undecided
+from simscen.criteria.goal_outcomes import closest_approach
+from simscen.criteria.timeline import GoalOutcome, goal_outcomes, outcome_start
+from simscen.criteria.trace_signals.ground_truth import true_pose
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveLength
 
@@ -38,7 +38,7 @@ class NoFalseSuccess(Spec, Criterion):
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """One finding for each goal reported reached, one for the end of navigation."""
-        told = stories(trace, case)
+        told = goal_outcomes(trace, case)
         ended = trace.of_kind(EventKind.NAVIGATION_ENDED)
         strange = [
             event
@@ -54,11 +54,11 @@ class NoFalseSuccess(Spec, Criterion):
         findings += [finding for k in range(len(ended)) if (finding := _success(trace, case, ended, k)) is not None]
         return findings or [held("no_false_success", "no success was claimed", "no false success")]
 
-    def _at_goal(self, trace: Trace, story: GoalStory, told: list[GoalStory]) -> Finding:
+    def _at_goal(self, trace: Trace, story: GoalOutcome, told: list[GoalOutcome]) -> Finding:
         assert story.reached is not None
         what, at = f"goal {story.goal.name}", (trace, story.reached)
         if story.goal.via:
-            tick, apart = nearest(trace, story, told)
+            tick, apart = closest_approach(trace, story, told)
             context = "from the pose where it came nearest to it, which it says it has passed"
             return at_most(what, apart, self.tolerance, "m", at=(trace, tick), context=context)
         context = "from the goal when the robot said it was there"
@@ -79,7 +79,7 @@ def _success(trace: Trace, case: Case, ended: tuple[Event, ...], k: int) -> Find
     end = ended[k]
     if end.name != "SUCCEEDED":
         return None
-    own = [s for s in stories(trace, case) if _task(s, ended) == k or (k == 0 and s.goal in case.goals)]
+    own = [s for s in goal_outcomes(trace, case) if _task(s, ended) == k or (k == 0 and s.goal in case.goals)]
     late = [s for s in own if s.awaited and (s.reached is None or s.reached > end.tick)]
     if not late:
         return None
@@ -88,7 +88,7 @@ def _success(trace: Trace, case: Case, ended: tuple[Event, ...], k: int) -> Find
     return missed("result", "SUCCEEDED", expected, (trace, end.tick), [f"not reached: {names}"])
 
 
-def _task(story: GoalStory, ended: tuple[Event, ...]) -> int | None:
+def _task(story: GoalOutcome, ended: tuple[Event, ...]) -> int | None:
     """Which end of navigation answers for a goal: the first after it began, or at which it is over, too."""
     over = math.inf if story.end is None else story.end.tick
-    return next((k for k, end in enumerate(ended) if began(story) < end.tick or over <= end.tick), None)
+    return next((k for k, end in enumerate(ended) if outcome_start(story) < end.tick or over <= end.tick), None)

@@ -11,9 +11,9 @@ from pydantic import model_validator
 from simscen.core.events import EventKind
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
-from simscen.criteria.bounds import at_most, undecided
-from simscen.criteria.moments import stories
-from simscen.criteria.signals import Drive, drive
+from simscen.criteria.findings import at_most, undecided
+from simscen.criteria.timeline import goal_outcomes
+from simscen.criteria.trace_signals.ground_truth import Drive, drive
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveLength, Ratio
 
@@ -63,7 +63,7 @@ class PathLength(Spec, Criterion):
             return undecided(what, because, f"≤ {self.max_ratio:g}")
         limit = self.max_ratio * shortest
         context = f"({self.max_ratio:g} times the shortest way of {shortest:.2f} m)"
-        unreached = [story for story in stories(trace, case) if story.reached is None and not story.failure]
+        unreached = [story for story in goal_outcomes(trace, case) if story.reached is None and not story.failure]
         if unreached and way.length <= limit:
             name = unreached[0].goal.name
             return undecided(what, f"goal {name} was not reached, so there is no whole way to compare", context)

@@ -8,10 +8,10 @@ import numpy as np
 
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
-from simscen.criteria.bounds import at_least, undecided
-from simscen.criteria.persons import INTIMATE, person_gap
-from simscen.criteria.signal_values import Unavailable
-from simscen.criteria.signals import speed
+from simscen.criteria.findings import at_least, undecided
+from simscen.criteria.trace_signals.distances import INTIMATE_SPACE_M, pedestrian_gap
+from simscen.criteria.trace_signals.ground_truth import speed
+from simscen.criteria.trace_signals.readers import SignalUnavailable
 from simscen.spec.base import Spec
 from simscen.spec.quantities import NonNegativeLength
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from simscen.core.case import Case
     from simscen.core.trace import Trace
 
-DRIVING = 0.1
+DRIVING_SPEED_M_S = 0.1
 """m/s; a slower robot stands, and people come up to it as they like."""
 
 
@@ -38,7 +38,7 @@ class PersonalSpace(Spec, Criterion):
     Example: `personal_space: {min: 0.3 m, while_driving: true}`
     """
 
-    min: NonNegativeLength = INTIMATE
+    min: NonNegativeLength = INTIMATE_SPACE_M
     """Of the gap."""
     while_driving: bool = False
     """Only moments at which the robot drives, faster than 0.1 m/s: people come up to one that stands as they like."""
@@ -47,11 +47,11 @@ class PersonalSpace(Spec, Criterion):
         """The nearest moment."""
         limit = f"≥ {self.min:.2f} m"
         try:
-            gaps = person_gap(trace, case)
-        except Unavailable as why:
+            gaps = pedestrian_gap(trace, case)
+        except SignalUnavailable as why:
             return [undecided("distance to people", str(why), limit)]
         if self.while_driving:
-            gaps = np.where(speed(trace).at(trace.truth.ticks)[:, 0] > DRIVING, gaps, np.inf)
+            gaps = np.where(speed(trace).at(trace.truth.ticks)[:, 0] > DRIVING_SPEED_M_S, gaps, np.inf)
         nearest = int(np.argmin(gaps))
         if np.isinf(gaps[nearest]):
             return [undecided("distance to people", "nobody was there while the robot drove", limit)]

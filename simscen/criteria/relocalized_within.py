@@ -8,9 +8,9 @@ import numpy as np
 
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
-from simscen.criteria.bounds import at_most, undecided
-from simscen.criteria.moments import Span, ending, never_started, spans
-from simscen.criteria.signals import first_lasting, pose_error
+from simscen.criteria.findings import at_most, undecided
+from simscen.criteria.timeline import Span, end_reason, never_started, spans
+from simscen.criteria.trace_signals.ground_truth import first_sustained, pose_error
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveAngle, PositiveDuration, PositiveLength
 from simscen.spec.references import HappeningName
@@ -74,12 +74,14 @@ class RelocalizedWithin(Spec, Criterion):
             return undecided("relocalized_within", f"the robot was never lost {self._context}", self._limit)
         # What held before it lost itself is no finding again.
         lost = int(np.argmin(right))
-        found, lasted = first_lasting(ticks[lost:], right[lost:], round(self.hold * trace.tick_rate), trace.end)
+        found, lasted = first_sustained(ticks[lost:], right[lost:], round(self.hold * trace.tick_rate), trace.end)
         tick = trace.end if found is None else found
         elapsed = trace.seconds(tick - start)
         if not lasted and elapsed <= self.time:
             state = "still lost" if found is None else f"right for only {trace.seconds(trace.end - tick):.2f} s"
-            because = f"the run was over at t = {trace.seconds(trace.end):.2f} s ({ending(trace)}), the belief {state}"
+            because = (
+                f"the run was over at t = {trace.seconds(trace.end):.2f} s ({end_reason(trace)}), the belief {state}"
+            )
             return undecided("relocalized_within", because, self._limit)
         detail = [f"its belief was off by {off[:, 0].max():.2f} m at worst and {off[-1, 0]:.2f} m at the end"]
         if found is None:

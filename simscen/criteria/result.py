@@ -8,9 +8,9 @@ from simscen.core.events import Event, EventKind
 from simscen.core.goalnames import named
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
-from simscen.criteria.bounds import held, missed, undecided
-from simscen.criteria.codes import Code, code_of
-from simscen.criteria.moments import ending, finished
+from simscen.criteria.error_codes import Code, code_of
+from simscen.criteria.findings import held, missed, undecided
+from simscen.criteria.timeline import end_reason, has_ended
 from simscen.spec.base import Spec
 from simscen.spec.references import GoalName
 
@@ -91,6 +91,8 @@ def _compare(trace: Trace, end: Event, what: str, got: str, expected: str) -> Fi
 
 def _no_answer(trace: Trace, what: str, expected: str) -> Finding:
     when = f"t = {trace.seconds(trace.end):.2f} s"
-    if finished(trace):
-        return missed(what, "no answer", expected, (trace, trace.end), [f"the run ended at {when}: {ending(trace)}"])
+    if has_ended(trace):
+        return missed(
+            what, "no answer", expected, (trace, trace.end), [f"the run ended at {when}: {end_reason(trace)}"]
+        )
     return undecided(what, f"the log stops at {when}, before navigation ended", expected)

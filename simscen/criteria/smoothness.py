@@ -10,11 +10,11 @@ from pydantic import Field, model_validator
 from simscen.core.geometry import Array
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
-from simscen.criteria.bounds import at_least, at_most, undecided
-from simscen.criteria.signal_table import SignalName, read
-from simscen.criteria.signal_values import Unavailable
-from simscen.criteria.signals import speed
-from simscen.criteria.smooth import STILL, ldlj, sparc
+from simscen.criteria.findings import at_least, at_most, undecided
+from simscen.criteria.trace_signals.catalog import SignalName, read_signal
+from simscen.criteria.trace_signals.ground_truth import speed
+from simscen.criteria.trace_signals.readers import SignalUnavailable
+from simscen.criteria.trace_signals.sparc_ldlj import MOVED_SPEED_M_S, ldlj, sparc
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveAcceleration, PositiveJerk
 
@@ -92,14 +92,14 @@ def _mean_jerk(trace: Trace, case: Case, limit: float) -> Finding:
 def _read(trace: Trace, case: Case, name: SignalName) -> Array | str:
     """The signal, or why there is none."""
     try:
-        return read(name, trace, case, {})
-    except Unavailable as why:
+        return read_signal(name, trace, case, {})
+    except SignalUnavailable as why:
         return str(why)
 
 
 def _without_unit(trace: Trace, name: str, limit: float) -> Finding:
     fast = speed(trace)
-    if not len(fast) or fast.values.max() < STILL:
+    if not len(fast) or fast.values.max() < MOVED_SPEED_M_S:
         return undecided(name, "the robot never moved", f"≥ {limit:g}")
     value = (sparc if name == "sparc" else ldlj)(fast.values[:, 0], trace.tick_rate / float(np.diff(fast.ticks)[0]))
     if value is None:

@@ -8,11 +8,11 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from simscen.core.verdict import Finding
-from simscen.criteria import signals
 from simscen.criteria.base import Criterion
-from simscen.criteria.bounds import at_most, undecided
-from simscen.criteria.signal_values import inside as within
-from simscen.criteria.switched import NEVER, spans_on
+from simscen.criteria.findings import at_most, undecided
+from simscen.criteria.timeline import NEVER_SWITCHED, enabled_spans
+from simscen.criteria.trace_signals import ground_truth
+from simscen.criteria.trace_signals.readers import points_in_polygon as within
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Duration, NonNegativeSpeed, PositiveAngularSpeed, PositiveSpeed
 from simscen.spec.references import RegionName
@@ -92,16 +92,16 @@ class Speed(Spec, Criterion):
 
     def _fastest(self, trace: Trace, case: Case, name: str, limit: float, unit: str) -> Finding:
         what, told = name.replace("_", " "), f"≤ {limit:.2f} {unit}"
-        signal = signals.speed(trace) if name == "speed" else signals.turn_rate(trace)
+        signal = ground_truth.speed(trace) if name == "speed" else ground_truth.turn_rate(trace)
         if not len(signal):
             return undecided(what, "no velocity was recorded", told)
         inside = self._inside(trace, case, signal)
         if inside is None:
             return undecided(what, f"the world has no region `{self.in_}`", told)
         if self.while_on:
-            spans = spans_on(trace, "speed", self.in_, self.grace)
+            spans = enabled_spans(trace, "speed", self.in_, self.grace)
             if not spans:
-                return undecided(what, NEVER, told)
+                return undecided(what, NEVER_SWITCHED, told)
             inside &= np.any([(first <= signal.ticks) & (signal.ticks <= last) for first, last in spans], axis=0)
         if not inside.any():
             return undecided(what, f"the robot never was in `{self.in_}`{' while it was on' * self.while_on}", told)
@@ -110,7 +110,7 @@ class Speed(Spec, Criterion):
         return at_most(what, float(signal.values[k, 0]), limit, unit, at=(trace, int(signal.ticks[k])), context=context)
 
     def _by_mask(self, trace: Trace, case: Case, mask: SpeedMask) -> Finding:
-        told, signal = f"≤ what {mask.file} allows", signals.speed(trace)
+        told, signal = f"≤ what {mask.file} allows", ground_truth.speed(trace)
         if not len(signal):
             return undecided("speed", "no velocity was recorded", told)
         if mask.file not in case.masks:
@@ -119,7 +119,7 @@ class Speed(Spec, Criterion):
         if inside is None:
             return undecided("speed", f"the world has no region `{self.in_}`", told)
         limits = mask.over(case.masks[mask.file].grid)
-        here = limits.along(signals.truth(trace).at(signal.ticks)[:, :2], self.full_speed or 0.0)
+        here = limits.along(ground_truth.truth(trace).at(signal.ticks)[:, :2], self.full_speed or 0.0)
         highest = _highest_around(here, signal.ticks, round(self.grace * trace.tick_rate))
         limited = inside & np.isfinite(highest)
         if not limited.any():
@@ -131,13 +131,13 @@ class Speed(Spec, Criterion):
         context = f"by {mask.file} (tolerance {self.tolerance:g} m/s)"
         return at_most("speed", value, limit, "m/s", at=(trace, int(signal.ticks[k])), context=context)
 
-    def _inside(self, trace: Trace, case: Case, signal: Samples) -> signals.Flags | None:
+    def _inside(self, trace: Trace, case: Case, signal: Samples) -> ground_truth.Flags | None:
         """When the robot's centre was in the region, everywhere being one, too; None for one that does not exist."""
         if self.in_ is None:
             return np.ones(len(signal), dtype=bool)
         if self.in_ not in case.regions:
             return None
-        where = signals.truth(trace).at(signal.ticks)[:, :2]
+        where = ground_truth.truth(trace).at(signal.ticks)[:, :2]
         return within(where, np.array(case.regions[self.in_], dtype=np.float64))
 
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
-from simscen.criteria.bounds import NotRecorded, at_most, held, missed, undecided
-from simscen.criteria.moments import Span, ending, never_started, spans
-from simscen.criteria.signals import Flags, drive, first_lasting, speed, turn_rate
+from simscen.criteria.findings import MissingEvidence, at_most, held, missed, undecided
+from simscen.criteria.timeline import Span, end_reason, never_started, spans
+from simscen.criteria.trace_signals.ground_truth import Flags, drive, first_sustained, speed, turn_rate
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveAngularSpeed, PositiveDuration, PositiveSpeed
 from simscen.spec.references import HappeningName
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from simscen.core.case import Case
     from simscen.core.trace import Trace
 
-OLD_SCAN = 0.2
+STALE_SCAN_S = 0.2
 """Seconds; a scan older than two periods of a 10 Hz lidar is worth a line."""
 
 
@@ -56,7 +56,7 @@ class StoppedWithin(Spec, Criterion):
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """One finding each time it happened, and one more with `stay`."""
         if not len(trace.velocity):
-            raise NotRecorded("the robot's true velocity was not recorded")
+            raise MissingEvidence("the robot's true velocity was not recorded")
         happened = spans(trace, self.after)
         if not happened:
             because, detail = never_started(trace, self.after)
@@ -80,12 +80,12 @@ class StoppedWithin(Spec, Criterion):
     def _once(self, trace: Trace, span: Span, rest: Flags) -> list[Finding]:
         first = max(int(np.searchsorted(trace.velocity.ticks, span.start, side="right")) - 1, 0)
         hold = round(self.hold * trace.tick_rate)
-        stop, lasted = first_lasting(trace.velocity.ticks[first:], rest[first:], hold, trace.end)
+        stop, lasted = first_sustained(trace.velocity.ticks[first:], rest[first:], hold, trace.end)
         stop = None if stop is None or stop > span.end else max(stop, span.start)
         until = span.end if stop is None else stop
         elapsed = trace.seconds(until - span.start)
         if elapsed <= self.time and not (stop is not None and lasted):
-            over = f"`{self.after}`" if span.lasting and stop is None else f"the run ({ending(trace)})"
+            over = f"`{self.after}`" if span.lasting and stop is None else f"the run ({end_reason(trace)})"
             state = "still moving" if stop is None else "hardly at rest"
             because = f"{over} was over {elapsed:.2f} s after it started, with the robot {state}"
             return [undecided("stopped_within", because, self._limit)]
@@ -117,8 +117,8 @@ def _explained(trace: Trace, start: int, end: int) -> list[str]:
     length, seconds = way.until(end) - way.until(start), trace.seconds(end - start)
     seen = trace.scans[trace.scans <= end]
     age = trace.seconds(end - int(seen[-1])) if len(seen) else math.inf
-    line = f"drove {length:.2f} m{' blind' if age > OLD_SCAN else ''} at {length / max(seconds, 1e-9):.2f} m/s"
-    if OLD_SCAN < age < math.inf:
+    line = f"drove {length:.2f} m{' blind' if age > STALE_SCAN_S else ''} at {length / max(seconds, 1e-9):.2f} m/s"
+    if STALE_SCAN_S < age < math.inf:
         line += f"; the newest scan was {age:.1f} s old"
     top = float(fast.values[(fast.ticks >= start) & (fast.ticks <= end), 0].max(initial=0.0))
     return [line, f"its top speed in that time was {top:.2f} m/s"]

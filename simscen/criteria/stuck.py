@@ -9,9 +9,9 @@ import numpy as np
 
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
-from simscen.criteria.bounds import at_most, undecided
-from simscen.criteria.moments import stories
-from simscen.criteria.signals import truth
+from simscen.criteria.findings import at_most, undecided
+from simscen.criteria.timeline import goal_outcomes
+from simscen.criteria.trace_signals.ground_truth import truth
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveDuration, PositiveLength
 
@@ -43,7 +43,7 @@ class Stuck(Spec, Criterion):
         poses = truth(trace)
         ways = [
             (story.accepted, trace.end if story.end is None else story.end.tick)
-            for story in stories(trace, case)
+            for story in goal_outcomes(trace, case)
             if story.accepted is not None
         ]
         stays = [stay for start, end in ways for stay in _stays(poses, start, end, self.radius)]

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from simscen.core.goalnames import named
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
-from simscen.criteria.bounds import at_most, missed, undecided
-from simscen.criteria.moments import GoalStory, finished, stories
+from simscen.criteria.findings import at_most, missed, undecided
+from simscen.criteria.timeline import GoalOutcome, goal_outcomes, has_ended
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveDuration
 from simscen.spec.references import GoalName
@@ -38,7 +38,7 @@ class TimeToGoal(Spec, Criterion):
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """One finding; one for each goal if several share the name."""
-        told = stories(trace, case)
+        told = goal_outcomes(trace, case)
         if self.goal is not None:
             own = [story for story in told if named(story.goal.name, self.goal)]
             if not own:
@@ -55,7 +55,7 @@ class TimeToGoal(Spec, Criterion):
         unreached = [story for story in awaited if story.reached is None]
         return [self._timed(trace, "time_to_goal", start, unreached[0] if unreached else awaited[-1])]
 
-    def _timed(self, trace: Trace, what: str, start: int | None, story: GoalStory) -> Finding:
+    def _timed(self, trace: Trace, what: str, start: int | None, story: GoalOutcome) -> Finding:
         if story.failure:
             return undecided(what, "the robot is to fail there, not to arrive")
         if start is None:
@@ -70,16 +70,16 @@ class TimeToGoal(Spec, Criterion):
             return at_most(
                 what, so_far, self.max, "s", at=(trace, trace.end), detail=[f"goal {story.goal.name}: {story.fate}"]
             )
-        if story.end is None and not finished(trace):
+        if story.end is None and not has_ended(trace):
             return undecided(what, f"the log stops {so_far:.2f} s after the start, {story.fate}", expected)
         tick = trace.end if story.end is None else story.end.tick
         fate = f"goal {story.goal.name}: {story.fate}"
         return missed(what, "never reached", expected, (trace, tick), [fate])
 
-    def _never_begun(self, trace: Trace, what: str, story: GoalStory) -> Finding:
+    def _never_begun(self, trace: Trace, what: str, story: GoalOutcome) -> Finding:
         """Without an acceptance no clock runs; a log that begins later may still hold the arrival."""
         expected = f"to be there within {self.max:.2f} s"
-        if story.end is None and finished(trace):
+        if story.end is None and has_ended(trace):
             return missed(
                 what, "never reached", expected, (trace, trace.end), [f"goal {story.goal.name}: {story.fate}"]
             )

@@ -5,18 +5,18 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from simscen.core.verdict import Finding
-from simscen.criteria import condition_words as words
-from simscen.criteria import horizon
-from simscen.criteria.condition import Condition, Release
-from simscen.criteria.formula import judged, released
-from simscen.criteria.temporal import Temporal, finding
+from simscen.criteria.stl import condition
+from simscen.criteria.stl import description as words
+from simscen.criteria.stl.condition import Condition, Release
+from simscen.criteria.stl.criterion import TemporalCriterion, temporal_finding
+from simscen.criteria.stl.robustness import robustness, until_robustness
 
 if TYPE_CHECKING:
     from simscen.core.case import Case
     from simscen.core.trace import Trace
 
 
-class Until(Release, Temporal):
+class Until(Release, TemporalCriterion):
     """A condition held from the start until another one came true, and that came true in time.
 
     What is measured: how far each signal is from its bound at each sample of the truth; the margin is that of the best
@@ -35,20 +35,20 @@ class Until(Release, Temporal):
         return [*self.hold.comparisons(), *self.release.comparisons()]
 
     @property
-    def horizon(self) -> float:
+    def condition(self) -> float:
         """The first moment at which it may be released."""
-        return horizon.released(self.release, self)
+        return condition.until_horizon(self.release, self)
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """The moment of the best release, or of what broke the hold before it."""
         return [
-            finding(
+            temporal_finding(
                 trace,
                 case,
-                words.until(self.hold, self.release, self),
+                words.describe_until(self.hold, self.release, self),
                 self.compared(),
-                lambda scene: released(
-                    judged(self.hold, scene), judged(self.release, scene), scene.window(self), scene
+                lambda scene: until_robustness(
+                    robustness(self.hold, scene), robustness(self.release, scene), scene.window(self), scene
                 ),
             )
         ]

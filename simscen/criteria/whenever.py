@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 from pydantic import BaseModel
 
 from simscen.core.verdict import Finding
-from simscen.criteria import condition_words as words
-from simscen.criteria import horizon
-from simscen.criteria.bounds import undecided
-from simscen.criteria.condition import Condition, Windowed
-from simscen.criteria.formula import Judged, Scene, judged, response
-from simscen.criteria.temporal import Temporal, finding
+from simscen.criteria.findings import undecided
+from simscen.criteria.stl import condition
+from simscen.criteria.stl import description as words
+from simscen.criteria.stl.condition import Condition, Windowed
+from simscen.criteria.stl.criterion import TemporalCriterion, temporal_finding
+from simscen.criteria.stl.robustness import EvaluationContext, Robustness, response_robustness, robustness
 from simscen.spec.base import Spec
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ class Whenever(Windowed):
     """Must it hold at least once? With `false`, a run in which it never did passes."""
 
 
-class Response(Spec, Temporal):
+class Response(Spec, TemporalCriterion):
     """A premise with its answer, as they stand beside each other in a scenario."""
 
     premise: Whenever
@@ -56,23 +56,23 @@ class Response(Spec, Temporal):
         return [*self.premise.comparisons(), *self.answer.comparisons()]
 
     @property
-    def horizon(self) -> float:
+    def condition(self) -> float:
         """All of the stretch in which the premise counts."""
-        return horizon.in_time("always", self.answer, self.premise)
+        return condition.window_horizon("always", self.answer, self.premise)
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """The worst answer; that the premise never held is no pass."""
         happened: list[bool] = []
 
-        def judge_both(scene: Scene) -> Judged:
-            window, premise = scene.window(self.premise), judged(self.premise, scene)
+        def judge_both(scene: EvaluationContext) -> Robustness:
+            window, premise = scene.window(self.premise), robustness(self.premise, scene)
             end = None if window.last is None else window.last + 1
             happened.append(bool((premise.high[window.first : end] > 0).any()))
-            return response(premise, judged(self.answer, scene), window, scene)
+            return response_robustness(premise, robustness(self.answer, scene), window, scene)
 
-        told = words.response(self.premise, self.answer)
-        found = finding(trace, case, told, self.compared(), judge_both)
+        told = words.describe_response(self.premise, self.answer)
+        found = temporal_finding(trace, case, told, self.compared(), judge_both)
         if happened == [False] and self.premise.required:
-            never = f"`{words.words(self.premise)}` never held, so nothing was tested"
+            never = f"`{words.describe(self.premise)}` never held, so nothing was tested"
             return [undecided("", never, told, ["`required: false` lets such a run pass"])]
         return [found]

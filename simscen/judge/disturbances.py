@@ -12,14 +12,14 @@ from simscen.core.disturbance import Disturbance, Happening
 from simscen.core.events import Event, EventKind
 from simscen.core.trace import Trace
 from simscen.core.verdict import Finding, Verdict
-from simscen.criteria.bounds import missed, undecided
-from simscen.criteria.moments import ending, finished
-from simscen.judge.wording import DISTURBANCE
+from simscen.criteria.findings import missed, undecided
+from simscen.criteria.timeline import end_reason, has_ended
+from simscen.judge.finding_text import DISTURBANCE
 
 WHAT = "disturbance did not happen"
 
 
-def happenings(trace: Trace, case: Case) -> tuple[Happening, ...]:
+def disturbance_outcomes(trace: Trace, case: Case) -> tuple[Happening, ...]:
     """What became of each disturbance of the scenario, in its order: events, then faults."""
     return tuple(
         _event(trace, case, ordered, entry) if ordered.kind == "event" else _fault(trace, ordered, entry)
@@ -27,7 +27,7 @@ def happenings(trace: Trace, case: Case) -> tuple[Happening, ...]:
     )
 
 
-def missing(
+def missing_disturbances(
     trace: Trace, happened: Sequence[Happening], others: Sequence[Verdict] = ()
 ) -> tuple[tuple[Verdict, int], ...]:
     """A verdict for each required disturbance that did not happen, and the line it is written in.
@@ -66,7 +66,7 @@ def _numbered(ordered: Sequence[Disturbance]) -> Iterator[tuple[int, Disturbance
 
 def _finding(trace: Trace, one: Happening) -> Finding:
     told = f"{one.ordered.name} ({one.ordered.trigger})"
-    if not finished(trace):
+    if not has_ended(trace):
         because = f"{told}, until the log stops at t = {trace.seconds(trace.end):.2f} s"
         return undecided(WHAT, because, detail=(one.effect,))
     return missed(WHAT, told, "", None if one.tick is None else (trace, one.tick), (one.effect,))
@@ -139,8 +139,8 @@ def _fault(trace: Trace, ordered: Disturbance, entry: int) -> Happening:
 
 
 def _never(trace: Trace) -> str:
-    return f"it never began; the run ended at t = {trace.seconds(trace.end):.2f} s ({ending(trace)})"
+    return f"it never began; the run ended at t = {trace.seconds(trace.end):.2f} s ({end_reason(trace)})"
 
 
 def _too_late(trace: Trace) -> str:
-    return f"it came with the end of the run at t = {trace.seconds(trace.end):.2f} s ({ending(trace)})"
+    return f"it came with the end of the run at t = {trace.seconds(trace.end):.2f} s ({end_reason(trace)})"

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from simscen.core.goalnames import in_loop
 from simscen.core.world import World
-from simscen.criteria.criterion import verdict_names
+from simscen.criteria.registry import verdict_names
 from simscen.loading.loaded import LoadedScenario
 from simscen.model.world import WorldSpec
 

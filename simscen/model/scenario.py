@@ -8,7 +8,7 @@ from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 from simscen.core.belief import Estimate
 from simscen.core.chance import LARGEST_SEED
 from simscen.core.geometry import Pose2
-from simscen.criteria.criterion import AnyCriterion
+from simscen.criteria.registry import AnyCriterion
 from simscen.model.anystack import AnyStack
 from simscen.model.navigation import Expectation, Navigation, OnReached
 from simscen.model.world import WorldSpec
@@ -32,12 +32,12 @@ from simscen.spec.quantities import (
 from simscen.spec.references import Refers
 
 if TYPE_CHECKING:
-    from simscen.criteria.measure import AnyMeasure
+    from simscen.criteria.plugin_metric import AnyMeasure
     from simscen.model.disturbance import EventEntry, FaultEntry, Step
     from simscen.model.variations import Variations
     from simscen.triggers.trigger import Trigger
 else:
-    AnyMeasure = Annotated[Spec, OnDemand("simscen.criteria.measure", "AnyMeasure")]
+    AnyMeasure = Annotated[Spec, OnDemand("simscen.criteria.plugin_metric", "AnyMeasure")]
     EventEntry = Annotated[Spec, OnDemand("simscen.model.disturbance", "EventEntry")]
     FaultEntry = Annotated[Spec, OnDemand("simscen.model.disturbance", "FaultEntry")]
     Variations = Annotated[Spec, OnDemand("simscen.model.variations", "Variations")]

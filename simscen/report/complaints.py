@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from simscen.core.result import Outcome, RunKey
 from simscen.core.sessionevents import RunFinished
 from simscen.core.verdict import Finding, Status, Verdict
-from simscen.judge.wording import sentence, violations
+from simscen.judge.finding_text import sentence, violations
 from simscen.report.text import one_line, visible
 
 

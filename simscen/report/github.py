@@ -6,7 +6,7 @@ from urllib.parse import quote
 
 from simscen.core.result import Outcome
 from simscen.core.sessionevents import RunFinished, SessionEvent, SessionFinished
-from simscen.judge.wording import tightest
+from simscen.judge.finding_text import tightest_margin
 from simscen.report.checkout import in_checkout
 from simscen.report.comparedpage import as_markdown
 from simscen.report.complaints import broken, complaints, excused, label, scenario_file
@@ -117,7 +117,7 @@ def _why(run: RunFinished) -> str:
     if excuse := excused(run):
         return _cell(excuse)
     told = [_cell(complaint.message) for complaint in complaints(run)]
-    nearest = tightest(run.result.verdicts)
+    nearest = tightest_margin(run.result.verdicts)
     return "<br>".join(told) if told or not nearest else f"tightest: {_cell(nearest)}"
 
 

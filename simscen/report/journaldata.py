@@ -6,7 +6,7 @@ from typing import Any
 
 from simscen.core.result import RunKey
 from simscen.core.sessionevents import Artifacts, RunFinished
-from simscen.judge.resultdata import as_data, from_data, read_key
+from simscen.judge.result_json import from_data, read_key, result_data
 from simscen.report.results import relative
 
 NAME = "events.jsonl"
@@ -45,7 +45,7 @@ def run_data(run: RunFinished, folder: Path) -> dict[str, Any]:
     """An answer as plain data: its result.json and what that leaves out. Files are relative to `folder`."""
     files = {name: relative(path, str(folder)) if path else "" for name, path in asdict(run.artifacts).items()}
     about = {"wall": run.wall, "again": run.again, "file": run.file, "tags": list(run.tags)}
-    return {**about, "files": files, "result": as_data(run.result)}
+    return {**about, "files": files, "result": result_data(run.result)}
 
 
 def read_run(data: dict[str, Any], folder: Path) -> RunFinished:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from simscen.core.result import Outcome, RunResult
 from simscen.core.sessionevents import RunFinished
 from simscen.core.verdict import Status, Verdict
-from simscen.judge.wording import tightest
+from simscen.judge.finding_text import tightest_margin
 from simscen.report.complaints import broken, complaints, excused
 from simscen.report.line import Line, Piece, Role
 from simscen.report.lines import SIGNS, complained
@@ -17,7 +17,7 @@ _ROLES: dict[str, Role] = {"good": "good", "bad": "bad", "odd": "odd"}
 
 def in_full(run: RunFinished, name: str) -> Iterator[Line]:
     """How long it is and how it came out, then all that was violated."""
-    nearest = tightest(run.result.verdicts) if run.outcome is Outcome.PASSED else ""
+    nearest = tightest_margin(run.result.verdicts) if run.outcome is Outcome.PASSED else ""
     beside = f"tightest: {one_line(nearest)}" if nearest else excused(run)
     yield (*_head(run.result, name), *((Piece(f"   {beside}", "quiet"),) if beside else ()))
     yield from complained(run)
@@ -31,7 +31,7 @@ def in_a_line(run: RunFinished, name: str) -> Line:
         return (*_head(run.result, name), Piece(f"   {excuse}", "quiet"))
     told = [complaint for complaint in complaints(run) if not complaint.warning]
     more = f" (and {len(told) - 1} more)" if len(told) > 1 else ""
-    nearest = one_line(tightest(run.result.verdicts))
+    nearest = one_line(tightest_margin(run.result.verdicts))
     why = f"   {told[0].message}{more}" if told else f"   tightest: {nearest}" if nearest else ""
     return (*_head(run.result, name), Piece(why, "quiet"))
 

@@ -12,7 +12,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from simscen.core.result import Outcome
 from simscen.core.sessionevents import RunFinished
-from simscen.judge.wording import subject, told
+from simscen.judge.finding_text import disturbance_line, subject
 from simscen.report.complaints import Complaint, complaints, excused, failure, place, scenario_file
 from simscen.report.text import command, one_line, visible
 
@@ -103,8 +103,8 @@ def _failure(case: Element, run: RunFinished) -> None:
 def _error(case: Element, run: RunFinished) -> None:
     kind, message, tail = failure(run)
     element = SubElement(case, "error", {"type": visible(kind), "message": message})
-    told = [f"{place(run)}: {message}", tail, _told(run, [c for c in complaints(run) if not c.warning])]
-    element.text = "\n".join(part for part in told if part)
+    disturbance_line = [f"{place(run)}: {message}", tail, _told(run, [c for c in complaints(run) if not c.warning])]
+    element.text = "\n".join(part for part in disturbance_line if part)
 
 
 def _told(run: RunFinished, about: list[Complaint]) -> str:
@@ -120,7 +120,9 @@ def _output(run: RunFinished) -> str:
     warnings = [complaint for complaint in complaints(run) if complaint.warning]
     lines = [f"{place(run, warning.line)}: warning: {warning.message}" for warning in warnings]
     files = (run.artifacts.picture, run.artifacts.replay, run.artifacts.mcap, run.artifacts.result)
-    lines += [one_line(f"{one.ordered.kind} {told(one, run.result.tick_rate)}") for one in run.result.disturbances]
+    lines += [
+        one_line(f"{one.ordered.kind} {disturbance_line(one, run.result.tick_rate)}") for one in run.result.disturbances
+    ]
     told_of = [line.replace("[[ATTACHMENT|", "[ [ATTACHMENT|") for line in lines]  # names are no files to attach
     return "\n".join([*told_of, *(f"[[ATTACHMENT|{one_line(file)}]]" for file in files if file)])
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from simscen.core.result import AGAIN, Outcome, RunKey
 from simscen.core.sessionevents import RunFinished, SessionFinished, SessionStarted
-from simscen.judge.wording import tightest, told
+from simscen.judge.finding_text import disturbance_line, tightest_margin
 from simscen.report.complaints import broken, complaints, excused, failure, label, place, scenario_file
 from simscen.report.line import Line, Piece, Role
 from simscen.report.text import command, one_line
@@ -73,8 +73,8 @@ def opening(started: SessionStarted) -> Line:
 
 def _with(stacks: Sequence[str]) -> str:
     """The one stack that takes the place of the scenarios' own, or how many."""
-    told = f"stack {one_line(stacks[0])}" if len(stacks) == 1 else f"{len(stacks)} stacks"
-    return f" · {told}" if stacks else ""
+    disturbance_line = f"stack {one_line(stacks[0])}" if len(stacks) == 1 else f"{len(stacks)} stacks"
+    return f" · {disturbance_line}" if stacks else ""
 
 
 def finished(run: RunFinished, naming: Naming) -> Iterator[Line]:
@@ -152,7 +152,7 @@ def _summary(run: RunFinished) -> tuple[Piece, ...]:
     times = f"{run.result.simulated:6.1f} s simulated in {run.wall:.2f} s"
     if run.outcome is Outcome.FAILED_AS_EXPECTED:
         return (Piece(f"{times}   {excused(run)}", "quiet"),)
-    nearest = tightest(run.result.verdicts) if run.outcome is Outcome.PASSED else ""
+    nearest = tightest_margin(run.result.verdicts) if run.outcome is Outcome.PASSED else ""
     return (Piece(times, "quiet"), *((Piece(f"   tightest: {one_line(nearest)}", "quiet"),) if nearest else ()))
 
 
@@ -163,7 +163,7 @@ def _broken(run: RunFinished) -> Iterator[Line]:
 
 def _happened(run: RunFinished) -> Iterator[Line]:
     """What fired and when; what did not is among the complaints, or may stay away."""
-    fired = [one_line(told(one, run.result.tick_rate)) for one in run.result.disturbances if one.happened]
+    fired = [one_line(disturbance_line(one, run.result.tick_rate)) for one in run.result.disturbances if one.happened]
     more = [f"and {len(fired) - MOST_HAPPENINGS} more"] if len(fired) > MOST_HAPPENINGS else []
     for number, text in enumerate((*fired[:MOST_HAPPENINGS], *more)):
         yield (Piece(f"      {'' if number else 'happened':9} ", "quiet"), Piece(text))

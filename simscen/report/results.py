@@ -8,9 +8,9 @@ from typing import Any
 from simscen.core.comparison import Comparison
 from simscen.core.result import Outcome
 from simscen.core.sessionevents import RunFinished
-from simscen.judge.measure.comparisondata import comparison_data
-from simscen.judge.measure.suite import suite, suite_data
-from simscen.judge.resultdata import as_data
+from simscen.judge.metrics.session_summary import session_summary_data, summarize_session
+from simscen.judge.metrics.stack_comparison import comparison_data
+from simscen.judge.result_json import result_data
 
 FORMAT = 1
 
@@ -30,9 +30,9 @@ def as_document(runs: Sequence[RunFinished], folder: str = "", comparison: Compa
         "total": len(runs),
         **counts,
         "simulated_seconds": sum(run.result.simulated for run in ordered),
-        "suite": suite_data(suite(run.result for run in ordered)),
+        "suite": session_summary_data(summarize_session(run.result for run in ordered)),
         **({} if comparison is None else {"comparison": comparison_data(comparison)}),
-        "runs": [{**as_data(run.result), "artifacts": _artifacts(run, folder)} for run in ordered],
+        "runs": [{**result_data(run.result), "artifacts": _artifacts(run, folder)} for run in ordered],
     }
 
 

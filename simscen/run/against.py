@@ -6,7 +6,7 @@ from pathlib import Path
 from simscen.core.errors import InvalidInput
 from simscen.core.result import Outcome, RunFailure, RunResult
 from simscen.core.sessionevents import RunFinished
-from simscen.judge.resultdata import from_json
+from simscen.judge.result_json import from_json
 from simscen.run.outfolder import run_folder
 
 

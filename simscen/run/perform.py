@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from simscen.core.run import Run
-from simscen.judge.resultdata import to_json
+from simscen.judge.result_json import to_json
 from simscen.record.backlog import Log
 from simscen.run.external.build import for_robot
 from simscen.run.logheader import log_header

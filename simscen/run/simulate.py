@@ -11,9 +11,9 @@ from simscen.core.errors import InvalidInput, RunError
 from simscen.core.run import Run
 from simscen.core.time import Clock
 from simscen.core.trace import Trace
-from simscen.judge.result import result_of
-from simscen.judge.resultdata import to_json
-from simscen.judge.several import together
+from simscen.judge.multi_robot import combine_robots
+from simscen.judge.result_json import to_json
+from simscen.judge.run_result import judge_run
 from simscen.loading.discovery import default_root
 from simscen.loading.scenario import load_scenario
 from simscen.record.backlog import WAITS, Backlog, Log
@@ -132,7 +132,7 @@ def judged(prepared: Prepared, seed: int, traces: Mapping[str, Trace], log: Path
     if not prepared.robots:
         return _judged(prepared, seed, traces[NAMELESS], log)
     runs = {name: _judged(part, seed, traces[name], log) for name, part in prepared.robots.items()}
-    result = together({name: run.result for name, run in runs.items()}, traces, prepared.loaded.expectation)
+    result = combine_robots({name: run.result for name, run in runs.items()}, traces, prepared.loaded.expectation)
     return replace(next(iter(runs.values())), result=result, robots=runs)
 
 
@@ -142,7 +142,7 @@ def _judged(prepared: Prepared, seed: int, trace: Trace, log: Path | None) -> Ru
     places = [loaded.place_of("pass", index) for index in range(len(prepared.spec.pass_))]
     # One that the scenario extends or takes from defaults.yaml has its line in another file than reports name.
     lines = tuple(place.line if place.path == loaded.path else 0 for place in places)
-    result = result_of(
+    result = judge_run(
         loaded.key(seed),
         loaded.path,
         prepared.spec.pass_,

@@ -56,7 +56,7 @@ GROUPS: dict[str, Group] = {
     "behavior": Group("simscen.model.recovery:BehaviorSpec", "simscen.model.recovery:BEHAVIORS"),
     "goal_checker": Group("simscen.model.checkers:GoalCheckerSpec", "simscen.model.checkers:GOAL_CHECKERS"),
     "criterion": Group(
-        "simscen.criteria.base:Criterion", "simscen.criteria.criterion:AnyCriterion", ("id", "severity", "then")
+        "simscen.criteria.base:Criterion", "simscen.criteria.registry:AnyCriterion", ("id", "severity", "then")
     ),
     "fault": Group(
         "simscen.faults.base:Fault", "simscen.faults.fault:AnyFault", ("sensor", "when", "for", "name", "required")
@@ -68,7 +68,7 @@ GROUPS: dict[str, Group] = {
     ),
     "action": Group("simscen.actions.base:Action", "simscen.actions.action:AnyAction", ("robot",)),
     "sensor": Group("simscen.model.robot:SensorSpec", "simscen.model.robot:Sensor"),
-    "metric": Group("simscen.criteria.measure:Measure", "simscen.judge.measure.table:ADDRESSES", ("metrics",)),
+    "metric": Group("simscen.criteria.plugin_metric:Measure", "simscen.judge.metrics.catalog:ADDRESSES", ("metrics",)),
 }
 """Kind → what is known of its group `simscen.<kind>`, in the order of the language."""
 

@@ -12,7 +12,7 @@ from pydantic import RootModel, ValidationError
 
 from simscen.actions.base import Action
 from simscen.criteria.base import Criterion
-from simscen.criteria.measure import Measure
+from simscen.criteria.plugin_metric import Measure
 from simscen.faults.base import Fault
 from simscen.model.checkers import GoalCheckerSpec
 from simscen.model.controllerspec import ControllerSpec

@@ -5,7 +5,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.navigation import Goal
 from simscen.core.result import RunKey, RunResult
 from simscen.core.verdict import Finding, Status, Verdict
-from simscen.judge.judge import outcome
+from simscen.judge.evaluation import outcome_of_verdicts
 from simscen.record.header import LogHeader
 from simscen.record.replay import Log
 from simscen.testing.sketch import sketch
@@ -33,5 +33,7 @@ def hostile_log() -> tuple[Log, RunResult]:
     about = LogHeader(EVIL, 1, case, TEXT, facts={"stack": EVIL, "variation": EVIL})
     finding = Finding(Status.FAIL, EVIL, EVIL, EVIL, -1.0, "m", 2.0, 480, (1.0, 0.0), (EVIL,))
     verdicts = (Verdict(EVIL, EVIL, "fail", (finding,)),)
-    result = RunResult(RunKey(EVIL, 1, EVIL, EVIL), EVIL, outcome(verdicts), verdicts, ended=EVIL, simulated=4.0)
+    result = RunResult(
+        RunKey(EVIL, 1, EVIL, EVIL), EVIL, outcome_of_verdicts(verdicts), verdicts, ended=EVIL, simulated=4.0
+    )
     return Log(about, trace, "", True), result

@@ -16,7 +16,7 @@ from typing import Any
 from PIL import Image
 from playwright.sync_api import sync_playwright
 
-from simscen.judge.resultdata import from_json
+from simscen.judge.result_json import from_json
 from simscen.record.replay import read_run
 from simscen.report.replay import write_replay
 from simscen.run.simulate import simulate_file

@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from simscen.actions.action import AnyAction
-from simscen.criteria.criterion import AnyCriterion
+from simscen.criteria.registry import AnyCriterion
 from simscen.faults.fault import AnyFault
 from simscen.model.robot import Bumper, Camera, InertialUnit, Lidar, WheelOdometry
 from simscen.spec.choice import Choice

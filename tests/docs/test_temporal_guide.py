@@ -10,9 +10,9 @@ import yaml
 from typer.testing import CliRunner
 
 from simscen.cli.main import app
-from simscen.criteria.criterion import AnyCriterion
-from simscen.judge.judge import judge
-from simscen.judge.verdictdata import verdict_data
+from simscen.criteria.registry import AnyCriterion
+from simscen.judge.evaluation import judge
+from simscen.judge.result_json import verdict_data
 from simscen.record.replay import read_log
 
 ROOT = Path(__file__).parents[2]

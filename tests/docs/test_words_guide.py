@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from simscen.actions.action import AnyAction
-from simscen.criteria.criterion import AnyCriterion
+from simscen.criteria.registry import AnyCriterion
 from simscen.faults.fault import AnyFault
 from simscen.triggers.trigger import Trigger
 

@@ -19,7 +19,7 @@ from simscen.actions.action import AnyAction
 from simscen.cli.catalog.json_schema import MODELS
 from simscen.cli.catalog.topics import Topic, fields_of, topics
 from simscen.core.version import PACKAGE
-from simscen.criteria.criterion import AnyCriterion
+from simscen.criteria.registry import AnyCriterion
 from simscen.faults.fault import AnyFault
 from simscen.loading.compose import compose
 from simscen.model.robot import Sensor

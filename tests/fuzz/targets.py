@@ -14,7 +14,7 @@ from mutate import mutant
 from simscen.cli.session.selection import Checks
 from simscen.core.errors import InvalidInput
 from simscen.core.problems import Problem
-from simscen.judge.judge import judge
+from simscen.judge.evaluation import judge
 from simscen.loading.resolved import spec_of_text
 from simscen.record.chunk import Channel
 from simscen.record.openlog import WholeRecords

@@ -6,7 +6,7 @@ from formulas import CASE, FORMULAS, NUMBERS, SIGNALS, horizon, inner, run, vali
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simscen.criteria.formula import Scene, judged
+from simscen.criteria.stl.robustness import EvaluationContext, robustness
 
 
 def as_rtamt(formula):
@@ -37,5 +37,5 @@ def test_the_robustness_is_that_of_rtamt_where_the_trace_is_long_enough(formula,
     spec.spec = f"out = {as_rtamt(formula)}"
     spec.parse()
     theirs = spec.evaluate({"time": list(range(length)), "p": p, "q": q})[0][1]
-    ours = judged(validated(formula), Scene.of(run(p, q), CASE, over=True))
+    ours = robustness(validated(formula), EvaluationContext.of(run(p, q), CASE, over=True))
     assert ours.low[0] == ours.high[0] == pytest.approx(theirs, abs=1e-12)

@@ -11,8 +11,8 @@ from simscen.core.events import Event, EventKind
 from simscen.core.samples import Samples
 from simscen.core.trace import Trace
 from simscen.core.verdict import Status
-from simscen.criteria.criterion import AnyCriterion
-from simscen.judge.judge import judge
+from simscen.criteria.registry import AnyCriterion
+from simscen.judge.evaluation import judge
 from simscen.testing.sketch import sketch, sketch_case
 
 SECONDS = 8

@@ -11,8 +11,8 @@ from simscen.core.motion import STOP
 from simscen.core.result import Outcome
 from simscen.core.sensing import Odometry, Scan
 from simscen.core.trace import Moment
-from simscen.judge.result import result_of
-from simscen.judge.resultdata import to_json
+from simscen.judge.result_json import to_json
+from simscen.judge.run_result import judge_run
 from simscen.loading.resolved import spec_of_text
 from simscen.loading.scenario import load_scenario
 from simscen.record.difference import first_difference
@@ -213,7 +213,7 @@ def test_a_log_of_what_no_sensor_should_say_is_judged_again_as_it_was(tmp_path, 
     run = simulate(prepare(load_scenario(file, tmp_path)), log=tmp_path / "run.mcap")
     log = read_log(tmp_path / "run.mcap")
     written = spec_of_text(log.about.scenario, file.name).pass_
-    again = result_of(run.result.key, run.result.path, written, log.trace, log.about.case, run.result.lines)
+    again = judge_run(run.result.key, run.result.path, written, log.trace, log.about.case, run.result.lines)
     assert to_json(again) == to_json(run.result)
     assert first_difference(run.trace, log.trace) is None
 

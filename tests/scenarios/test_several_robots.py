@@ -11,9 +11,9 @@ from rosbags.typesys import Stores, get_typestore
 from simscen.core.events import EventKind
 from simscen.core.result import Outcome
 from simscen.core.verdict import Status
-from simscen.judge.result import result_of
-from simscen.judge.resultdata import from_json, to_json
-from simscen.judge.several import together
+from simscen.judge.multi_robot import combine_robots
+from simscen.judge.result_json import from_json, to_json
+from simscen.judge.run_result import judge_run
 from simscen.loading.resolved import criteria_of_text
 from simscen.loading.scenario import load_scenario
 from simscen.record.replay import read_log
@@ -109,13 +109,13 @@ def test_a_log_says_the_same_of_each_robot_as_the_run_did(run):
         assert one.trace.truth.values.tobytes() == done.robots[name].trace.truth.values.tobytes()
         assert one.trace.events == done.robots[name].trace.events
     results = {
-        name: result_of(
+        name: judge_run(
             one.about.key, "log", criteria_of_text(one.about.scenario, "log", one.about.facts, name).pass_,
             one.trace, one.about.case,
         )
         for name, one in log.robots.items()
     }  # fmt: skip
-    again = together(results, {name: one.trace for name, one in log.robots.items()})
+    again = combine_robots(results, {name: one.trace for name, one in log.robots.items()})
     assert [(v.id, v.findings) for v in again.verdicts] == [(v.id, v.findings) for v in done.result.verdicts]
     assert json.loads(log.result)["verdicts"]
 

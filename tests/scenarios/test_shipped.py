@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from simscen.judge import several
-from simscen.judge.result import result_of
-from simscen.judge.resultdata import read_result, to_json
+from simscen.judge import multi_robot
+from simscen.judge.result_json import read_result, to_json
+from simscen.judge.run_result import judge_run
 from simscen.loading.resolved import criteria_of_text, spec_of_text
 from simscen.record.difference import first_difference
 from simscen.record.replay import read_log
@@ -79,13 +79,13 @@ def judged_again(live, log, name):
     """The result by what the log says alone; of several robots from those of each."""
     if not log.robots:
         criteria = spec_of_text(log.about.scenario, name).pass_
-        return result_of(live.key, live.path, criteria, log.trace, log.about.case, live.lines)
+        return judge_run(live.key, live.path, criteria, log.trace, log.about.case, live.lines)
     results, lines = {}, list(live.lines)
     for robot, one in log.robots.items():
         criteria = criteria_of_text(log.about.scenario, name, log.about.facts, robot).pass_
         own, lines = tuple(lines[: len(criteria)]), lines[len(criteria) :]
-        results[robot] = result_of(live.key, live.path, criteria, one.trace, one.about.case, own)
-    return several.together(results, {robot: one.trace for robot, one in log.robots.items()})
+        results[robot] = judge_run(live.key, live.path, criteria, one.trace, one.about.case, own)
+    return multi_robot.combine_robots(results, {robot: one.trace for robot, one in log.robots.items()})
 
 
 def test_another_seed_gives_another_trace(together, tmp_path):

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from simscen.judge.result import result_of
-from simscen.judge.resultdata import to_json
+from simscen.judge.result_json import to_json
+from simscen.judge.run_result import judge_run
 from simscen.loading.resolved import spec_of_text
 from simscen.loading.scenario import load_scenario
 from simscen.record.replay import read_log
@@ -80,4 +80,4 @@ def again(log: Path, result) -> str:
     read = read_log(log)
     criteria = spec_of_text(read.about.scenario, "log").pass_
     lines = result.lines[-len(criteria) :]
-    return to_json(result_of(result.key, result.path, criteria, read.trace, read.about.case, lines))
+    return to_json(judge_run(result.key, result.path, criteria, read.trace, read.about.case, lines))

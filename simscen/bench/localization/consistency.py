@@ -13,8 +13,8 @@ import numpy as np
 from simscen.core.chisquare import mean_bounds, quantile
 from simscen.core.geometry import Array
 from simscen.core.trace import Trace
-from simscen.criteria.nees import DIMENSIONS, nees_samples
-from simscen.criteria.nees import nees as squared_errors
+from simscen.criteria.trace_signals.nees import DIMENSIONS, nees_samples
+from simscen.criteria.trace_signals.nees import nees as squared_errors
 
 FEWEST = 3
 """Buildings from which on they say how much they differ."""

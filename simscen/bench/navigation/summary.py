@@ -8,7 +8,7 @@ from simscen.bench.navigation.world_statistics import ClusteredMean
 from simscen.core.result import Outcome
 from simscen.core.sessionevents import RunFinished
 from simscen.core.verdict import Status
-from simscen.judge.measure.metrics import barn_score
+from simscen.judge.metrics.compute import barn_score
 
 TIME_IS_UP = "time limit"
 """What a run's `ended` says when nothing else ended it."""

@@ -6,7 +6,7 @@ from simscen.cli.catalog.commands_page import commands_of, exits, section
 from simscen.cli.catalog.reference_topics import metrics_page, signals_page
 from simscen.cli.catalog.topics import OPTIONAL, Field, Topic, added_topics, topics
 from simscen.cli.main import COMMANDS
-from simscen.criteria.measure import AnyMeasure
+from simscen.criteria.plugin_metric import AnyMeasure
 from simscen.loading.codes import CODES
 from simscen.spec.quantities import UNITS
 

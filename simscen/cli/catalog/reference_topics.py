@@ -5,9 +5,9 @@ from simscen.cli.catalog.key_topics import keys_of_topics
 from simscen.cli.catalog.topics import OPTIONAL, Field, Topic, added_topics, topics
 from simscen.core.errors import BROKEN
 from simscen.core.navigation import ErrorCode
-from simscen.criteria.measure import AnyMeasure
-from simscen.criteria.signal_table import SIGNALS, Signal
-from simscen.judge.measure.table import METRICS, Metric
+from simscen.criteria.plugin_metric import AnyMeasure
+from simscen.criteria.trace_signals.catalog import SIGNALS, Signal
+from simscen.judge.metrics.catalog import METRICS, Metric
 from simscen.loading.codes import CODES
 from simscen.run.external.errors import CRASHED, FAILED, PROTOCOL, TIMEOUT
 

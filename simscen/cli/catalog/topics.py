@@ -12,7 +12,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from simscen.actions.action import AnyAction
-from simscen.criteria.criterion import AnyCriterion
+from simscen.criteria.registry import AnyCriterion
 from simscen.faults.fault import AnyFault
 from simscen.model import (
     anystack,

@@ -16,7 +16,7 @@ from simscen.cli.session.logs import logs_of
 from simscen.cli.session.output_files import verdict
 from simscen.core.errors import UsageError
 from simscen.core.sessionevents import RunFinished
-from simscen.judge.resultdata import as_data
+from simscen.judge.result_json import result_data
 from simscen.record.foreign.wanted import TOPICS, Clock, Wanted
 from simscen.report.judged import in_a_line, in_full, summary, table
 from simscen.report.line import text_of
@@ -109,7 +109,7 @@ def _print(runs: list[tuple[str, RunFinished]], one_scenario: bool) -> None:
 
 def _document(runs: list[RunFinished], options: list[str]) -> str:
     """result.json of one log, results.json of several; `again` judges the log again instead of simulating its run."""
-    document = {**as_data(runs[0].result)} if len(runs) == 1 else as_document(runs)
+    document = {**result_data(runs[0].result)} if len(runs) == 1 else as_document(runs)
     logs = [run.artifacts.mcap for run in in_order(runs)]
     for log, data in zip(logs, document.get("runs", [document]), strict=True):
         if log:

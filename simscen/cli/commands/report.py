@@ -13,8 +13,8 @@ from simscen.cli.session.terminal import Format, screen
 from simscen.core.errors import Exit
 from simscen.core.result import RunResult
 from simscen.core.sessionevents import RunFinished
-from simscen.judge.measure.compare import compare
-from simscen.judge.measure.suite import suite, told
+from simscen.judge.metrics.session_summary import session_summary_line, summarize_session
+from simscen.judge.metrics.stack_comparison import compare_stacks
 from simscen.report.journal import require_free
 from simscen.report.rebuild import read_journal
 
@@ -44,12 +44,16 @@ def command(
         shown(past.started(folder))
         for answer in answers:
             shown(answer)
-        comparison = compare((answer.result for answer in answers), past.stacks)
+        comparison = compare_stacks((answer.result for answer in answers), past.stacks)
         written = reports.write(answers, comparison)
         shown(reports.closing(answers, past.wall, past.interrupted, comparison))
     if format_ is Format.TEXT:
         for stack, results in _by_stack(answers).items():
-            print_text(f"{stack}: {told(suite(results))}" if stack else told(suite(results)))
+            print_text(
+                f"{stack}: {session_summary_line(summarize_session(results))}"
+                if stack
+                else session_summary_line(summarize_session(results))
+            )
     code = verdict(answers) if written else Exit.INCOMPLETE
     sys.exit(shown.exit(code))
 

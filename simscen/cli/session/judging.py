@@ -16,8 +16,8 @@ from simscen.core.problems import Problem
 from simscen.core.result import Outcome, RunFailure, RunKey, RunResult, skipped, unfinished
 from simscen.core.sessionevents import Artifacts, RunFinished
 from simscen.core.trace import Trace
-from simscen.judge.result import result_of
-from simscen.judge.several import together
+from simscen.judge.multi_robot import combine_robots
+from simscen.judge.run_result import judge_run
 from simscen.loading.criteria_file import LoadedCriteria, load_criteria
 from simscen.loading.discovery import default_root
 from simscen.loading.resolved import criteria_of_text
@@ -92,7 +92,7 @@ class Judging:
         traces = {name: one.trace for name, one in read.robots.items()}
         said = criteria_of_text(read.about.scenario, str(log), read.about.facts)
         expected = expectation_of(said if self._criteria is None else self._criteria.spec)
-        result = together({name: run.result for name, run in runs.items()}, traces, expected)
+        result = combine_robots({name: run.result for name, run in runs.items()}, traces, expected)
         return replace(next(iter(runs.values())), result=result)
 
     def _of_one(self, log: Path, read: Log, robot: str) -> RunFinished:
@@ -102,7 +102,7 @@ class Judging:
         if self._criteria is None:
             spec = criteria_of_text(about.scenario, str(log), about.facts, robot)
             expected = expectation_of(spec)
-            result = result_of(key, str(log), spec.pass_, read.trace, case, metrics=spec.metrics, expected=expected)
+            result = judge_run(key, str(log), spec.pass_, read.trace, case, metrics=spec.metrics, expected=expected)
             return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=str(log))
         with _told_from_here(self._criteria):
             criteria = self._criteria.of(robot)
@@ -161,7 +161,7 @@ class Judging:
         """Judged by the file of criteria."""
         file, spec = str(self._scenario), criteria.spec
         expected = expectation_of(spec)
-        result = result_of(key, file, spec.pass_, trace, case, criteria.lines, coverage, spec.metrics, expected)
+        result = judge_run(key, file, spec.pass_, trace, case, criteria.lines, coverage, spec.metrics, expected)
         return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=file)
 
 

@@ -7,9 +7,9 @@ from pathlib import Path
 from simscen.core.errors import InvalidInput, NothingSelected
 from simscen.core.problems import Problem
 from simscen.core.result import RunResult
-from simscen.judge.result import result_of
-from simscen.judge.resultdata import from_json
-from simscen.judge.several import together
+from simscen.judge.multi_robot import combine_robots
+from simscen.judge.result_json import from_json
+from simscen.judge.run_result import judge_run
 from simscen.loading.messages import quoted
 from simscen.loading.paths import is_folder
 from simscen.loading.resolved import criteria_of_text
@@ -76,10 +76,10 @@ def said_of(log: Log, file: Path) -> RunResult:
         return from_json(log.result)
     results = {name: _judged(one, file, name) for name, one in (log.robots or {"": log}).items()}
     traces = {name: one.trace for name, one in log.robots.items()}
-    return together(results, traces) if traces else results[""]
+    return combine_robots(results, traces) if traces else results[""]
 
 
 def _judged(log: Log, file: Path, robot: str) -> RunResult:
     about = log.about
     spec = criteria_of_text(about.scenario, str(file), about.facts, robot)
-    return result_of(about.key, about.name, spec.pass_, log.trace, about.case, metrics=spec.metrics)
+    return judge_run(about.key, about.name, spec.pass_, log.trace, about.case, metrics=spec.metrics)

@@ -19,7 +19,7 @@ from simscen.cli.session.terminal import Format, Screen, screen
 from simscen.core.errors import Exit, UsageError
 from simscen.core.result import RunKey
 from simscen.core.sessionevents import Listener, SessionEvent
-from simscen.judge.measure.compare import compare
+from simscen.judge.metrics.stack_comparison import compare_stacks
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of_all
 from simscen.report.journal import Journal, require_free
@@ -119,7 +119,7 @@ def _run(work: PendingRuns, options: Options, reports: Reports, shown: Screen, l
         answers, stopped = run_session(work.jobs, options, WARM_PROCESS, listen)
     answers = [*work.kept, *answers]
     work.journal.complete(answers)
-    comparison = compare((answer.result for answer in answers), work.stacks)
+    comparison = compare_stacks((answer.result for answer in answers), work.stacks)
     written = reports.write(answers, comparison)
     wall = time.monotonic() - begun
     listen(reports.closing(answers, wall, stopped is not None, comparison))

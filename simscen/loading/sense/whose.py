@@ -5,7 +5,7 @@ from collections.abc import Container, Iterator
 from simscen.actions.action import AnyAction
 from simscen.actions.base import Action
 from simscen.core.problems import Problem
-from simscen.criteria.criterion import verdict_names
+from simscen.criteria.registry import verdict_names
 from simscen.loading.messages import quoted, suggestion
 from simscen.loading.robots import ROBOTS
 from simscen.loading.sense.specwalk import Keys, below

@@ -7,7 +7,7 @@ import numpy as np
 
 from simscen.core.events import EventKind
 from simscen.core.verdict import Status
-from simscen.judge.wording import comparison, subject
+from simscen.judge.finding_text import comparison, subject
 from simscen.report.picture import palette
 from simscen.report.picture.canvas import Canvas, shown
 from simscen.report.picture.labels import Label

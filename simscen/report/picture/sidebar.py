@@ -7,7 +7,7 @@ from PIL import Image, ImageDraw
 
 from simscen.core.result import Outcome
 from simscen.core.verdict import Status
-from simscen.judge.wording import comparison, spot, subject
+from simscen.judge.finding_text import comparison, subject, time_and_place
 from simscen.report.picture import palette
 from simscen.report.picture.canvas import Note, font, shown, write
 from simscen.report.picture.palette import Colour
@@ -67,7 +67,7 @@ def _criteria(scene: Scene) -> list[Row]:
             rows.append((verdict.status, colour, _wrapped(f"{shown(verdict.id)}: checked nothing")))
             continue
         failed = verdict.status is not Status.PASS
-        where = spot(finding, scene.result.tick_rate) if failed else ""
+        where = time_and_place(finding, scene.result.tick_rate) if failed else ""
         told = ", ".join(part for part in (f"{subject(verdict, finding)}: {comparison(finding)}", where) if part)
         texts = [f"warning: {told}" if warned else told, *(finding.detail if failed else ())]
         rows.append((verdict.status, colour, [line for text in texts for line in _wrapped(shown(text))]))

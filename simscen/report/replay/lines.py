@@ -5,7 +5,7 @@ from itertools import count
 from typing import Any
 
 from simscen.core.errors import InvalidInput
-from simscen.criteria.criterion import verdict_names
+from simscen.criteria.registry import verdict_names
 from simscen.loading.resolved import parts_of_text
 from simscen.loading.tree import Fields, Key, key_place
 from simscen.model.scenario import ScenarioSpec

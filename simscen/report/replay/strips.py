@@ -10,10 +10,10 @@ from simscen.core.case import Case
 from simscen.core.geometry import Array
 from simscen.core.trace import Trace
 from simscen.core.verdict import Finding, Verdict
-from simscen.criteria.bounds import BrokenTrace
-from simscen.criteria.signal_table import SIGNALS, SignalName, read
-from simscen.criteria.signal_values import Of, Unavailable
-from simscen.criteria.temporal import Temporal
+from simscen.criteria.findings import InvalidTrace
+from simscen.criteria.stl.criterion import TemporalCriterion
+from simscen.criteria.trace_signals.catalog import SIGNALS, SignalName, read_signal
+from simscen.criteria.trace_signals.readers import SignalArguments, SignalUnavailable
 from simscen.model.scenario import ScenarioSpec
 from simscen.report.replay.columns import Columns
 from simscen.report.replay.thin import with_extremes
@@ -43,7 +43,7 @@ class Strip:
     """A signal, and what it is about where it has to be said."""
 
     signal: SignalName
-    of: Of
+    of: SignalArguments
 
     @property
     def name(self) -> str:
@@ -74,8 +74,8 @@ def limits_of(verdicts: tuple[Verdict, ...], robot: str) -> list[dict[str, Any]]
 def _strip(strip: Strip, trace: Trace, case: Case, columns: Columns) -> dict[str, Any] | None:
     signal = SIGNALS[strip.signal]
     try:
-        values = read(strip.signal, trace, case, strip.of)
-    except (Unavailable, BrokenTrace):
+        values = read_signal(strip.signal, trace, case, strip.of)
+    except (SignalUnavailable, InvalidTrace):
         return None
     if not len(values) or not np.isfinite(values).any():
         return None
@@ -101,7 +101,7 @@ def _step(unit: str, values: Array) -> float:
 def _compared(spec: ScenarioSpec) -> Iterator[tuple[SignalName, tuple[tuple[str, Any], ...]]]:
     for entry in spec.pass_:
         chosen = entry.chosen
-        for one in chosen.compared() if isinstance(chosen, Temporal) else ():
+        for one in chosen.compared() if isinstance(chosen, TemporalCriterion) else ():
             if one.signal is not None and one.signal not in _LEFT_OUT:
                 yield one.signal, tuple(one.about.items())
 

@@ -4,7 +4,7 @@ from typing import Any
 
 from simscen.core.result import RunResult
 from simscen.core.verdict import Finding, Verdict
-from simscen.judge.wording import DISTURBANCE, comparison, subject, when
+from simscen.judge.finding_text import DISTURBANCE, comparison, disturbance_times, subject
 from simscen.report.replay.lines import Lines
 from simscen.report.text import one_line
 
@@ -27,7 +27,7 @@ def disturbances_of(result: RunResult, lines: dict[str, Lines]) -> list[dict[str
                 "kind": one.ordered.kind,
                 "name": one_line(one.ordered.name),
                 "ordered": one_line(one.ordered.trigger),
-                "when": one_line(when(one, result.tick_rate)),
+                "when": one_line(disturbance_times(one, result.tick_rate)),
                 "fired": list(one.fired),
                 "happened": one.happened,
                 "missing": one.missing,

@@ -9,7 +9,7 @@ from typing import Any
 
 from simscen.core.result import Outcome, RunKey
 from simscen.core.sessionevents import RunFinished
-from simscen.judge.resultdata import read_key
+from simscen.judge.result_json import read_key
 from simscen.report.sessions import sessions_in
 
 MOST = 10

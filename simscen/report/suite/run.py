@@ -8,7 +8,7 @@ from textwrap import dedent
 from simscen.core.result import Outcome, RunKey
 from simscen.core.sessionevents import RunFinished
 from simscen.core.verdict import Finding, Status, Verdict
-from simscen.judge.wording import comparison, spot, subject, tightest, when
+from simscen.judge.finding_text import comparison, disturbance_times, subject, tightest_margin, time_and_place
 from simscen.report.complaints import broken, complaints, excused, failure, place
 from simscen.report.line import text_of
 from simscen.report.lines import complained
@@ -83,7 +83,7 @@ def _nearest(run: RunFinished) -> str:
     """How near it came to failing; of what failed the first reason, and how many more."""
     match run.outcome:
         case Outcome.PASSED:
-            nearest = tightest(run.result.verdicts)
+            nearest = tightest_margin(run.result.verdicts)
             return f"tightest: {nearest}" if nearest else ""
         case Outcome.FAILED:
             told = [complaint.message for complaint in complaints(run) if not complaint.warning]
@@ -117,7 +117,11 @@ def _verdict(run: RunFinished, verdict: Verdict, finding: Finding, line: int) ->
     look = "" if not failed else "bad" if finding.status is Status.FAIL and not warning else "odd"
     word = "warning" if failed and warning else finding.status.value
     margin = "" if finding.margin is None else f"{finding.margin:+.3g} {finding.unit}".rstrip()
-    where = f", {spot(finding, run.result.tick_rate)}" if failed and spot(finding, run.result.tick_rate) else ""
+    where = (
+        f", {time_and_place(finding, run.result.tick_rate)}"
+        if failed and time_and_place(finding, run.result.tick_rate)
+        else ""
+    )
     reasons = "".join(f"<li>{text(reason)}</li>" for reason in finding.detail)
     return (
         f'<tr class="{look}"><td>{word}</td><td>{text(subject(verdict, finding))}</td>'
@@ -131,7 +135,7 @@ def _disturbances(run: RunFinished) -> str:
     rows = "".join(
         f'<tr class="{"bad" if one.missing else ""}"><td>{"happened" if one.happened else "did not happen"}</td>'
         f"<td>{text(one.ordered.name)}</td><td>{text(one.ordered.trigger)}</td>"
-        f"<td>{text(when(one, run.result.tick_rate))}</td><td>{text(one.effect)}</td></tr>"
+        f"<td>{text(disturbance_times(one, run.result.tick_rate))}</td><td>{text(one.effect)}</td></tr>"
         for one in run.result.disturbances
     )
     head = "".join(f'<th scope="col">{name}</th>' for name in ("", "event or fault", "ordered", "began", "effect"))

@@ -7,7 +7,7 @@ from itertools import pairwise
 from simscen.core.goalnames import named as is_named
 from simscen.core.navigation import Goal
 from simscen.core.problems import Problem
-from simscen.criteria.criterion import AnyCriterion
+from simscen.criteria.registry import AnyCriterion
 from simscen.loading.sense.neverhappens import top_speed
 from simscen.model.robot import RobotSpec
 from simscen.run.goals import goals_of

@@ -7,7 +7,7 @@ from pathlib import Path
 from simscen.core.errors import InvalidInput, RunError
 from simscen.core.result import RunFailure, RunResult, skipped, unfinished
 from simscen.core.sessionevents import Artifacts, RunFinished
-from simscen.judge.resultdata import from_json
+from simscen.judge.result_json import from_json
 from simscen.record.logfile import PARTIAL_SUFFIX
 from simscen.run.process.confine import MEMORY_BYTES
 from simscen.run.process.jobs import Job, PreparerDeath, ProcessEnd

@@ -10,7 +10,7 @@ from simscen.actions.base import Action
 from simscen.core.stage import Effect
 from simscen.core.verdict import Finding, Status
 from simscen.criteria.base import Criterion
-from simscen.criteria.measure import Measure
+from simscen.criteria.plugin_metric import Measure
 from simscen.faults.base import Disturbance, Fault
 from simscen.spec.base import Spec
 from simscen.triggers.base import Condition

@@ -8,7 +8,7 @@ from pydantic import BaseModel
 
 from simscen.actions.action import AnyAction
 from simscen.cli.catalog.topics import Topic, fields_of, kind_of, topics
-from simscen.criteria.criterion import AnyCriterion
+from simscen.criteria.registry import AnyCriterion
 from simscen.loading.compose import compose
 from simscen.model.checkers import GoalCheckerSpec
 from simscen.model.controllerspec import ControllerSpec

@@ -7,7 +7,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from simscen.core.samples import Samples
-from simscen.criteria.condition import Condition
+from simscen.criteria.stl.condition import Condition
 from simscen.testing.sketch import sketch, sketch_case
 
 CASE = sketch_case({"clearance_range": math.inf})

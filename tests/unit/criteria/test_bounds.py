@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from simscen.criteria.bounds import at_least, at_most, counted, missed, quantity
+from simscen.criteria.findings import at_least, at_most, counted, missed, quantity
 from simscen.testing.sketch import sketch
 
 

@@ -3,7 +3,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from simscen.core.events import Event
 from simscen.core.navigation import ErrorCode
-from simscen.criteria.codes import Code, code_of
+from simscen.criteria.error_codes import Code, code_of
 
 ADAPTER = TypeAdapter(Code)
 

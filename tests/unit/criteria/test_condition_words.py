@@ -4,9 +4,9 @@ import math
 
 import pytest
 
-from simscen.criteria.condition import Condition
-from simscen.criteria.condition_words import limit, measured, words
-from simscen.criteria.formula import Witness
+from simscen.criteria.stl.condition import Condition
+from simscen.criteria.stl.description import describe, describe_limit, describe_value
+from simscen.criteria.stl.robustness import Witness
 
 NEAR = {"signal": "clearance", "op": "<", "value": 0.5}
 FAST = {"signal": "speed", "op": ">=", "value": 1}
@@ -36,7 +36,7 @@ LOST = {"not": {"signal": "localized"}}
     ],
 )
 def test_a_condition_is_told_as_it_is_meant(condition, told):
-    assert words(Condition.model_validate(condition)) == told
+    assert describe(Condition.model_validate(condition)) == told
 
 
 @pytest.mark.parametrize(
@@ -58,4 +58,4 @@ def test_a_condition_is_told_as_it_is_meant(condition, told):
 )
 def test_a_witness_tells_what_was_measured_against_what(condition, value, negated, told):
     witness = Witness(Condition.model_validate(condition), 0, value, negated)
-    assert (measured(witness), limit(witness)) == told
+    assert (describe_value(witness), describe_limit(witness)) == told

@@ -5,7 +5,7 @@ import math
 import pytest
 from pydantic import ValidationError
 
-from simscen.criteria.condition import Condition, Window
+from simscen.criteria.stl.condition import Condition, Window
 
 NEAR = {"signal": "clearance", "op": "<", "value": 0.5}
 LOST = {"not": {"signal": "localized"}}

@@ -2,9 +2,8 @@
 
 import pytest
 
-from simscen.criteria.condition import Condition
-from simscen.criteria.criterion import AnyCriterion
-from simscen.criteria.horizon import needed
+from simscen.criteria.registry import AnyCriterion
+from simscen.criteria.stl.condition import Condition, decision_horizon
 
 NOW = {"signal": "localized"}
 
@@ -42,7 +41,7 @@ def eventually(**more):
 )
 def test_the_least_time_after_which_it_is_known(condition, holds, does_not):
     parsed = Condition.model_validate(condition)
-    assert (needed(parsed), needed(parsed, False)) == (holds, does_not)
+    assert (decision_horizon(parsed), decision_horizon(parsed, False)) == (holds, does_not)
 
 
 @pytest.mark.parametrize(

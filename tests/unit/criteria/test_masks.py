@@ -13,8 +13,8 @@ from simscen.core.geometry import Pose2
 from simscen.core.grid import OccupancyGrid
 from simscen.core.maskcells import cells_of
 from simscen.core.verdict import Status
-from simscen.criteria.criterion import AnyCriterion
-from simscen.judge.judge import judge
+from simscen.criteria.registry import AnyCriterion
+from simscen.judge.evaluation import judge
 from simscen.testing.sketch import sketch, sketch_case
 
 SEEDS = st.integers(0, 2**32 - 1)

@@ -1,6 +1,6 @@
 import pytest
 
-from simscen.criteria.moments import Span, spans
+from simscen.criteria.timeline import Span, spans
 from simscen.testing.sketch import sketch
 
 SECOND = 240

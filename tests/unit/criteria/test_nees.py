@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from simscen.core.samples import Samples
-from simscen.criteria.bounds import BrokenTrace
-from simscen.criteria.nees import DIMENSIONS, nees, nees_samples
+from simscen.criteria.findings import InvalidTrace
+from simscen.criteria.trace_signals.nees import DIMENSIONS, nees, nees_samples
 from simscen.testing.sketch import sketch
 
 APART = [0.25, 0.0, 0.0, 0.04, 0.0, 0.01]
@@ -98,5 +98,5 @@ def test_without_covariances_beliefs_or_the_truth_there_is_none():
 
 
 def test_a_belief_that_is_not_finite_is_named():
-    with pytest.raises(BrokenTrace, match=r"the belief is not finite at t = 0.50 s"):
+    with pytest.raises(InvalidTrace, match=r"the belief is not finite at t = 0.50 s"):
         nees_samples(believing([(0, 0, 0, 0)], [(0, 0, 0, 0), (120, math.nan, 0, 0)]))

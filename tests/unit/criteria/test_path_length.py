@@ -7,8 +7,8 @@ import pytest
 
 from simscen.core.samples import Samples
 from simscen.core.verdict import Status
-from simscen.criteria.criterion import AnyCriterion
-from simscen.judge.judge import judge
+from simscen.criteria.registry import AnyCriterion
+from simscen.judge.evaluation import judge
 from simscen.testing.sketch import sketch, sketch_case
 
 CASE = {"goals": [{"name": "a", "pose": [4, 0]}], "shortest": {"a": 4.0}}

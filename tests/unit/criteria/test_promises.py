@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from simscen.core.samples import Samples
 from simscen.core.verdict import Status
-from simscen.criteria.bounds import BrokenTrace, at_least, at_most, counted
-from simscen.criteria.criterion import AnyCriterion
-from simscen.judge.judge import judge
+from simscen.criteria.findings import InvalidTrace, at_least, at_most, counted
+from simscen.criteria.registry import AnyCriterion
+from simscen.judge.evaluation import judge
 from simscen.spec.ondemand import type_of
 from simscen.testing.sketch import sketch, sketch_case
 
@@ -132,5 +132,5 @@ def test_counts_are_bounded_on_both_sides(count, low, high):
 
 
 def test_a_nan_is_never_compared():
-    with pytest.raises(BrokenTrace, match="clearance is not a number"):
+    with pytest.raises(InvalidTrace, match="clearance is not a number"):
         at_most("clearance", math.nan, 1.0, "m")

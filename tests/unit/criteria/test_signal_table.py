@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from simscen.criteria.signal_table import SIGNALS
+from simscen.criteria.trace_signals.catalog import SIGNALS
 
 EITHER_WAY = ("forward_speed", "yaw_rate", "acceleration", "angular_acceleration")
 ANGLES = ("goal_heading_error", "localization_yaw_error")

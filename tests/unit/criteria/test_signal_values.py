@@ -12,16 +12,16 @@ import shapely
 from simscen.core.navigation import Path
 from simscen.core.samples import Samples
 from simscen.core.trace import Trace
-from simscen.criteria.bounds import BrokenTrace
-from simscen.criteria.signal_table import SIGNALS, SignalName, read
-from simscen.criteria.signal_values import Unavailable, inside
+from simscen.criteria.findings import InvalidTrace
+from simscen.criteria.trace_signals.catalog import SIGNALS, SignalName, read_signal
+from simscen.criteria.trace_signals.readers import SignalUnavailable, points_in_polygon
 from simscen.testing.sketch import sketch, sketch_case
 
 STEP = 6 / 240
 
 
 def signal(name, words, case=None, **of):
-    return read(name, sketch(words), sketch_case(case or {}), of)
+    return read_signal(name, sketch(words), sketch_case(case or {}), of)
 
 
 def at(values, seconds):
@@ -55,7 +55,7 @@ def test_a_signal_has_one_finite_value_for_each_truth_sample_within_its_range(na
     case = {"goals": [{"name": "shelf", "pose": [2, 1, 0]}], "regions": {"dock": [[0, 0], [1, 0], [1, 1]]}}
     of = {"object": "cart", "region": "dock", "fault": "off", "event": "off"}
     wanted = {key: of[key] for key in SIGNALS[name].about[:1]}
-    values = read(name, sketch(words), sketch_case(case), wanted)
+    values = read_signal(name, sketch(words), sketch_case(case), wanted)
     assert values.shape == (161,)
     assert np.isfinite(values).all()
     assert values.min() >= SIGNALS[name].least
@@ -64,10 +64,10 @@ def test_a_signal_has_one_finite_value_for_each_truth_sample_within_its_range(na
 
 def test_speed_is_over_ground_and_its_parts_have_signs():
     trace = driving([[-3.0, 4.0, -0.5]] * 5)
-    assert read("speed", trace, sketch_case({}), {}).tolist() == [5.0] * 5
-    assert read("forward_speed", trace, sketch_case({}), {}).tolist() == [-3.0] * 5
-    assert read("turn_rate", trace, sketch_case({}), {}).tolist() == [0.5] * 5
-    assert read("yaw_rate", trace, sketch_case({}), {}).tolist() == [-0.5] * 5
+    assert read_signal("speed", trace, sketch_case({}), {}).tolist() == [5.0] * 5
+    assert read_signal("forward_speed", trace, sketch_case({}), {}).tolist() == [-3.0] * 5
+    assert read_signal("turn_rate", trace, sketch_case({}), {}).tolist() == [0.5] * 5
+    assert read_signal("yaw_rate", trace, sketch_case({}), {}).tolist() == [-0.5] * 5
 
 
 def test_acceleration_is_divided_by_the_time_between_samples():
@@ -75,27 +75,27 @@ def test_acceleration_is_divided_by_the_time_between_samples():
     trace = driving([[0.05 * k * k, 0, 0.1 * k] for k in range(9)])
     case = sketch_case({})
     expected = [0.05 / STEP, *(0.05 * (2 * k + 1) / STEP for k in range(8))]
-    assert read("acceleration", trace, case, {}) == pytest.approx(expected)
-    assert read("angular_acceleration", trace, case, {}) == pytest.approx([0.1 / STEP] * 9)
+    assert read_signal("acceleration", trace, case, {}) == pytest.approx(expected)
+    assert read_signal("angular_acceleration", trace, case, {}) == pytest.approx([0.1 / STEP] * 9)
 
 
 def test_jerk_is_the_second_difference_of_speed_not_the_first():
     """HuNavSim's jerk is the first difference, divided by dt twice."""
     case = sketch_case({})
     ramp = driving([[0.1 * k, 0, 0] for k in range(9)])
-    assert read("jerk", ramp, case, {}) == pytest.approx([0.0] * 9, abs=1e-9)
+    assert read_signal("jerk", ramp, case, {}) == pytest.approx([0.0] * 9, abs=1e-9)
     parabola = driving([[-0.05 * k * k, 0, 0] for k in range(9)])
-    assert read("jerk", parabola, case, {}) == pytest.approx([0.1 / STEP**2] * 9)
+    assert read_signal("jerk", parabola, case, {}) == pytest.approx([0.1 / STEP**2] * 9)
 
 
 def test_jerk_needs_three_samples_and_acceleration_two():
     case = sketch_case({})
-    assert len(read("acceleration", driving([[0, 0, 0], [1, 0, 0]]), case, {})) == 2
-    assert len(read("jerk", driving([[0, 0, 0], [1, 0, 0], [1, 0, 0]]), case, {})) == 3
-    with pytest.raises(Unavailable, match="too short: 2 samples"):
-        read("jerk", driving([[0, 0, 0], [1, 0, 0]]), case, {})
-    with pytest.raises(Unavailable, match="too short: 1 samples"):
-        read("acceleration", driving([[0, 0, 0]]), case, {})
+    assert len(read_signal("acceleration", driving([[0, 0, 0], [1, 0, 0]]), case, {})) == 2
+    assert len(read_signal("jerk", driving([[0, 0, 0], [1, 0, 0], [1, 0, 0]]), case, {})) == 3
+    with pytest.raises(SignalUnavailable, match="too short: 2 samples"):
+        read_signal("jerk", driving([[0, 0, 0], [1, 0, 0]]), case, {})
+    with pytest.raises(SignalUnavailable, match="too short: 1 samples"):
+        read_signal("acceleration", driving([[0, 0, 0]]), case, {})
 
 
 def test_being_set_down_elsewhere_is_neither_braking_nor_jerk():
@@ -103,10 +103,10 @@ def test_being_set_down_elsewhere_is_neither_braking_nor_jerk():
     carried = sketch({"seconds": 7 * STEP, "truth": [[0, 0, 0]], "events": [[3 * STEP, "robot.placed"]]})
     trace, stays = replace(trace, events=carried.events), replace(trace, events=())
     case = sketch_case({})
-    assert read("acceleration", trace, case, {}).tolist() == [0.0] * 8
-    assert read("jerk", trace, case, {}).tolist() == [0.0] * 8
-    assert np.count_nonzero(read("acceleration", stays, case, {})) == 1
-    assert np.count_nonzero(read("jerk", stays, case, {})) == 2
+    assert read_signal("acceleration", trace, case, {}).tolist() == [0.0] * 8
+    assert read_signal("jerk", trace, case, {}).tolist() == [0.0] * 8
+    assert np.count_nonzero(read_signal("acceleration", stays, case, {})) == 1
+    assert np.count_nonzero(read_signal("jerk", stays, case, {})) == 2
 
 
 @pytest.mark.parametrize(
@@ -121,8 +121,8 @@ def test_only_the_changes_over_being_set_down_are_left_out(after, still, smooth)
     changes[still] = 0.0
     jerks = np.full(9, 0.1 / STEP**2)
     jerks[smooth] = 0.0
-    assert read("acceleration", trace, case, {}) == pytest.approx(changes)
-    assert read("jerk", trace, case, {}) == pytest.approx(jerks)
+    assert read_signal("acceleration", trace, case, {}) == pytest.approx(changes)
+    assert read_signal("jerk", trace, case, {}) == pytest.approx(jerks)
 
 
 def test_being_set_down_before_the_first_sample_changes_nothing_after_it():
@@ -130,15 +130,15 @@ def test_being_set_down_before_the_first_sample_changes_nothing_after_it():
     placed = sketch({"seconds": 1, "truth": [[0, 0, 0]], "events": [[0, "robot.placed"]]}).events
     later = Samples(trace.truth.ticks + 240, trace.truth.values)
     trace = replace(trace, truth=later, velocity=Samples(later.ticks, trace.velocity.values), events=placed)
-    assert read("acceleration", trace, sketch_case({}), {}).tolist() == [0.0] * 4 + [1.0 / STEP]
+    assert read_signal("acceleration", trace, sketch_case({}), {}).tolist() == [0.0] * 4 + [1.0 / STEP]
 
 
 def test_a_belief_without_a_covariance_does_not_say_how_sure_it_is():
     trace = sketch({"seconds": 1, "truth": [[0, 0, 0]]})
     bare = replace(trace, belief=Samples(trace.belief.ticks, trace.belief.values[:, :3]))
     for name in ("position_std", "yaw_std"):
-        with pytest.raises(Unavailable, match="no covariance of the belief was recorded"):
-            read(name, bare, sketch_case({}), {})
+        with pytest.raises(SignalUnavailable, match="no covariance of the belief was recorded"):
+            read_signal(name, bare, sketch_case({}), {})
 
 
 def test_a_kidnapped_robot_has_not_travelled():
@@ -153,8 +153,8 @@ def test_unevenly_spaced_samples_are_refused():
     trace = driving([[0, 0, 0]] * 5)
     ticks = trace.truth.ticks + np.array([0, 0, 1, 0, 0])
     uneven = replace(trace, truth=Samples(ticks, trace.truth.values))
-    with pytest.raises(BrokenTrace, match="evenly"):
-        read("acceleration", uneven, sketch_case({}), {})
+    with pytest.raises(InvalidTrace, match="evenly"):
+        read_signal("acceleration", uneven, sketch_case({}), {})
 
 
 def test_the_goal_is_the_one_accepted_last_also_one_that_an_event_sent():
@@ -185,7 +185,7 @@ def test_the_first_goal_counts_before_any_is_accepted_and_without_goals_there_is
     words = {"seconds": 1, "truth": [[0, 0, 0]]}
     goals = [{"name": "a", "pose": [3, 4, 0]}, {"name": "b", "pose": [1, 0, 0]}]
     assert signal("goal_distance", words, {"goals": goals})[0] == 5.0
-    with pytest.raises(Unavailable, match="no goal"):
+    with pytest.raises(SignalUnavailable, match="no goal"):
         signal("goal_distance", words)
 
 
@@ -214,8 +214,8 @@ def test_the_position_is_as_unsure_as_its_worst_direction():
     values = trace.belief.values.copy()
     values[:, 3:9] = [xx, xy, 0.0, yy, 0.0, 0.04]
     trace = replace(trace, belief=Samples(trace.belief.ticks, values))
-    assert read("position_std", trace, sketch_case({}), {})[0] == pytest.approx(0.3)
-    assert read("yaw_std", trace, sketch_case({}), {})[0] == pytest.approx(0.2)
+    assert read_signal("position_std", trace, sketch_case({}), {})[0] == pytest.approx(0.3)
+    assert read_signal("yaw_std", trace, sketch_case({}), {})[0] == pytest.approx(0.2)
 
 
 @pytest.mark.parametrize(("std", "known"), [(0.5, 1.0), (0.51, 0.0)])
@@ -224,14 +224,14 @@ def test_a_robot_that_is_unsure_is_not_localized(std, known):
     values = trace.belief.values.copy()
     values[:, 3] = values[:, 6] = std * std
     unsure = replace(trace, belief=Samples(trace.belief.ticks, values))
-    assert set(read("localized", unsure, sketch_case({}), {})) == {known}
+    assert set(read_signal("localized", unsure, sketch_case({}), {})) == {known}
 
 
 def test_a_robot_is_localized_from_its_first_belief_until_a_second_after_its_last():
     trace = sketch({"seconds": 6, "truth": [[0, 0, 0]]})
     some = (trace.belief.ticks >= 240) & (trace.belief.ticks <= 480)
     trace = replace(trace, belief=Samples(trace.belief.ticks[some], trace.belief.values[some]))
-    values = read("localized", trace, sketch_case({}), {})
+    values = read_signal("localized", trace, sketch_case({}), {})
     assert [at(values, t) for t in (0.975, 1.0, 2.0, 3.0, 3.025)] == [0, 1, 1, 1, 0]
 
 
@@ -239,7 +239,7 @@ def test_without_a_belief_a_robot_is_not_localized_and_has_no_error():
     words = {"seconds": 1, "truth": [[0, 0, 0]], "belief": None}
     assert not signal("localized", words).any()
     for name in ("localization_error", "position_std", "nees", "distance_remaining"):
-        with pytest.raises(Unavailable, match="recorded"):
+        with pytest.raises(SignalUnavailable, match="recorded"):
             signal(name, words, {"goals": [{"name": "a", "pose": [1, 0, 0]}]})
 
 
@@ -247,7 +247,7 @@ def test_a_command_is_held_and_none_counts_as_zero_before_the_first():
     trace = sketch({"seconds": 1, "truth": [[0, 0, 0]]})
     command = Samples(np.array([120, 180]), np.array([[0.3, 0.4, -1.0], [0.0, 0.0, 0.0]]))
     trace = replace(trace, command=command)
-    speed, turn = (read(name, trace, sketch_case({}), {}) for name in ("command_speed", "command_turn_rate"))
+    speed, turn = (read_signal(name, trace, sketch_case({}), {}) for name in ("command_speed", "command_turn_rate"))
     assert [at(speed, t) for t in (0, 0.475, 0.5, 0.725, 0.75)] == [0, 0, 0.5, 0.5, 0]
     assert [at(turn, t) for t in (0.475, 0.5, 0.75)] == [0, 1, 0]
 
@@ -269,9 +269,9 @@ def test_distances_to_what_does_not_move():
     assert signal("distance_to", words, case, goal="shelf")[0] == 5.0
     assert signal("distance_to", words, case, point=[7, 6])[0] == 10.0
     assert signal("distance_to", words, case, object="box")[0] == 2.0
-    with pytest.raises(Unavailable, match="`cart` never was there"):
+    with pytest.raises(SignalUnavailable, match="`cart` never was there"):
         signal("distance_to", words, case, object="cart")
-    with pytest.raises(Unavailable, match="no goal `self`"):
+    with pytest.raises(SignalUnavailable, match="no goal `self`"):
         signal("distance_to", words, case, goal="self")
 
 
@@ -291,43 +291,43 @@ def test_what_is_left_of_the_plan_is_measured_along_it_from_the_believed_place()
 def test_a_newer_plan_takes_the_place_of_the_old_one():
     words = {"seconds": 4, "truth": [[0, 1, 1]], "plans": [[1, [[0, 0], [2, 0]]], [2, [[0, 4], [2, 4]]]]}
     assert [at(signal("plan_deviation", words), t) for t in (0.975, 1.0, 1.975, 2.0)] == [0, 1, 1, 3]
-    with pytest.raises(Unavailable, match="no plan"):
+    with pytest.raises(SignalUnavailable, match="no plan"):
         signal("plan_deviation", {"seconds": 1, "truth": [[0, 0, 0]]})
 
 
 def test_a_plan_that_came_after_the_last_sample_was_never_followed():
     trace = sketch({"seconds": 1, "truth": [[0, 1, 1]]})
     late = Path(np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]]), 241)
-    with pytest.raises(Unavailable, match="no plan"):
-        read("plan_deviation", replace(trace, plans=(late,)), sketch_case({}), {})
+    with pytest.raises(SignalUnavailable, match="no plan"):
+        read_signal("plan_deviation", replace(trace, plans=(late,)), sketch_case({}), {})
 
 
 def test_a_plan_of_one_point_is_a_place():
     trace = sketch({"seconds": 1, "truth": [[0, 3, 4]]})
     trace = replace(trace, plans=(Path(np.array([[0.0, 0.0, 0.0]]), 0), Path()))
-    assert set(read("plan_deviation", trace, sketch_case({}), {})) == {5.0}
+    assert set(read_signal("plan_deviation", trace, sketch_case({}), {})) == {5.0}
 
 
 def test_a_robot_is_in_a_region_with_its_centre():
     case = {"regions": {"hall": [[1, -1], [3, -1], [3, 1], [2, 0], [1, 1]]}}
     values = signal("in_region", {"seconds": 4, "truth": [[0, 0, 0.5], [4, 4, 0.5]]}, case, region="hall")
     assert [at(values, t) for t in (0.5, 1.2, 2.0, 2.8, 3.5)] == [0, 1, 0, 1, 0]
-    with pytest.raises(Unavailable, match="no region `hal`"):
+    with pytest.raises(SignalUnavailable, match="no region `hal`"):
         signal("in_region", {"seconds": 4, "truth": [[0, 0, 0.5]]}, case, region="hal")
 
 
 @pytest.mark.parametrize("corners", [[[1, 0], [0, 1], [-1, 0], [0, -1]], [[1, 0], [0, -1], [-1, 0], [0, 1]]])
 def test_inside_is_inside_at_the_height_of_a_corner_too(corners):
     points = np.array([[-2.0, 0.0], [-0.5, 0.0], [0.0, 0.0], [0.5, 0.0], [2.0, 0.0], [-0.5, 1.0], [-0.5, -1.0]])
-    assert inside(points, np.array(corners)).tolist() == [False, True, True, True, False, False, False]
+    assert points_in_polygon(points, np.array(corners)).tolist() == [False, True, True, True, False, False, False]
 
 
 def test_of_regions_side_by_side_each_place_is_in_one():
     square, right, above = (np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) + by for by in ([0, 0], [1, 0], [0, 1]))
     border = np.array([[0.0, 0.5], [0.5, 0.0], [1.0, 0.5], [0.5, 1.0]])
-    assert inside(border, square).tolist() == [True, True, False, False]
-    assert inside(border, right).tolist() == [False, False, True, False]
-    assert inside(border, above).tolist() == [False, False, False, True]
+    assert points_in_polygon(border, square).tolist() == [True, True, False, False]
+    assert points_in_polygon(border, right).tolist() == [False, False, True, False]
+    assert points_in_polygon(border, above).tolist() == [False, False, False, True]
 
 
 def test_inside_are_the_points_that_are_inside_for_shapely():
@@ -335,7 +335,7 @@ def test_inside_are_the_points_that_are_inside_for_shapely():
     chance = np.random.default_rng(5)
     points = chance.uniform(-2, 6, (400, 2))
     within = shapely.contains_xy(shapely.Polygon(corners), *points.T)
-    assert inside(points, np.array(corners)).tolist() == within.tolist()
+    assert points_in_polygon(points, np.array(corners)).tolist() == within.tolist()
 
 
 def test_a_fault_is_active_from_its_start_to_before_its_end_and_an_event_without_one_to_the_last_sample():
@@ -392,7 +392,7 @@ def test_a_goal_is_active_until_it_ends_or_another_takes_its_place():
 
 def test_a_signal_that_is_not_finite_names_itself_and_the_time():
     truth = [[0, 0, 0], [2, math.nan, 0], [4, 0, 0]]
-    with pytest.raises(BrokenTrace, match=r"the true pose is not finite at t = 0.03 s"):
+    with pytest.raises(InvalidTrace, match=r"the true pose is not finite at t = 0.03 s"):
         signal("travelled", {"seconds": 4, "truth": truth})
 
 
@@ -401,8 +401,8 @@ def test_without_the_truth_there_is_no_clock(name):
     trace = sketch({"seconds": 1, "truth": [[0, 0, 0]]})
     nothing = Samples(np.empty(0, dtype=np.int64), np.empty((0, 3)))
     blind: Trace = replace(trace, truth=nothing)
-    with pytest.raises(Unavailable, match="true pose"):
-        read(name, blind, sketch_case({"goals": [{"name": "a", "pose": [1, 0, 0]}]}), {})
+    with pytest.raises(SignalUnavailable, match="true pose"):
+        read_signal(name, blind, sketch_case({"goals": [{"name": "a", "pose": [1, 0, 0]}]}), {})
 
 
 def test_the_nearest_point_of_a_plan_is_found_among_long_and_short_steps():
@@ -417,11 +417,11 @@ def test_the_nearest_point_of_a_plan_is_found_among_long_and_short_steps():
     )
     fine = np.concatenate([np.linspace(a, b, 2000) for a, b in itertools.pairwise(way)])
     expected = [np.hypot(*(fine - point).T).min() for point in robot]
-    assert read("plan_deviation", trace, sketch_case({}), {}) == pytest.approx(expected, abs=1e-3)
+    assert read_signal("plan_deviation", trace, sketch_case({}), {}) == pytest.approx(expected, abs=1e-3)
 
 
 def test_events_are_counted_in_whatever_order_they_were_written():
     events = [[1, "recovery.started", "spin"], [2, "recovery.started", "wait"], [3, "recovery.started", "spin"]]
     trace = sketch({"seconds": 4, "truth": [[0, 0, 0]], "events": events})
-    values = read("recovery_count", replace(trace, events=trace.events[::-1]), sketch_case({}), {})
+    values = read_signal("recovery_count", replace(trace, events=trace.events[::-1]), sketch_case({}), {})
     assert [at(values, t) for t in (0, 1, 2, 3, 4)] == [0, 1, 2, 3, 3]

@@ -9,12 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from simscen.core.samples import Samples
-from simscen.criteria.bounds import BrokenTrace
-from simscen.criteria.signals import (
+from simscen.criteria.findings import InvalidTrace
+from simscen.criteria.trace_signals.ground_truth import (
     check_finite,
     clearance,
     drive,
-    first_lasting,
+    first_sustained,
     pose_error,
     speed,
     true_pose,
@@ -68,7 +68,7 @@ def test_the_first_lasting_stretch_is_the_one_brute_force_finds(true, hold):
                 break
             if stop == end:
                 expected = (int(ticks[k]), False)
-    assert first_lasting(ticks, np.array(true), hold, end) == expected
+    assert first_sustained(ticks, np.array(true), hold, end) == expected
 
 
 def at_half_seconds(xy, placed=()):
@@ -125,7 +125,7 @@ def test_speed_is_over_ground_and_turning_has_no_sign():
 def test_a_signal_that_is_not_finite_is_named_with_its_first_moment(column, value):
     trace = sketch({"seconds": 4, "truth": [[0, 0, 0]]})
     trace.truth.values[[80, 120], column] = value
-    with pytest.raises(BrokenTrace, match=r"the true pose is not finite at t = 2\.00 s"):
+    with pytest.raises(InvalidTrace, match=r"the true pose is not finite at t = 2\.00 s"):
         drive(trace)
 
 
@@ -133,7 +133,7 @@ def test_a_signal_that_is_not_finite_is_named_with_its_first_moment(column, valu
 def test_a_clearance_that_is_no_number_is_named_with_its_first_moment(value):
     trace = sketch({"seconds": 4, "truth": [[0, 0, 0]]})
     trace.clearance.values[[80, 120]] = value
-    with pytest.raises(BrokenTrace, match=r"the clearance is not a number at t = 2\.00 s"):
+    with pytest.raises(InvalidTrace, match=r"the clearance is not a number at t = 2\.00 s"):
         clearance(trace)
     trace.clearance.values[:] = np.inf
     assert clearance(trace) is trace.clearance
@@ -142,7 +142,7 @@ def test_a_clearance_that_is_no_number_is_named_with_its_first_moment(value):
 def test_of_several_things_whose_pose_is_not_finite_the_first_by_name_is_named():
     trace = sketch({"seconds": 1, "truth": [[0, 0, 0]]})
     lost = Samples(trace.truth.ticks, np.full((41, 3), np.nan))
-    with pytest.raises(BrokenTrace, match=r"the pose of cart is not finite at t = 0\.00 s"):
+    with pytest.raises(InvalidTrace, match=r"the pose of cart is not finite at t = 0\.00 s"):
         check_finite(replace(trace, objects={"door": lost, "cart": lost}))
 
 

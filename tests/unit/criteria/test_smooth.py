@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from simscen.criteria.smooth import ldlj, sparc
+from simscen.criteria.trace_signals.sparc_ldlj import ldlj, sparc
 
 
 def by_definition(speeds, rate):

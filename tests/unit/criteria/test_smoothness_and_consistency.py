@@ -9,8 +9,8 @@ from simscen.core.chisquare import mean_bounds
 from simscen.core.samples import Samples
 from simscen.core.verdict import Status
 from simscen.criteria.localization_consistency import LocalizationConsistency
-from simscen.criteria.smooth import sparc
 from simscen.criteria.smoothness import Smoothness
+from simscen.criteria.trace_signals.sparc_ldlj import sparc
 from simscen.testing.sketch import sketch, sketch_case
 
 CASE = sketch_case({})

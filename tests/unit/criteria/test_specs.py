@@ -4,7 +4,7 @@ import pytest
 from pydantic import ValidationError
 
 from simscen.criteria.base import Criterion
-from simscen.criteria.criterion import AnyCriterion
+from simscen.criteria.registry import AnyCriterion
 
 
 def spec(kind, words):

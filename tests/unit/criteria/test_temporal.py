@@ -6,15 +6,15 @@ import pytest
 
 from simscen.core.evidence import Evidence
 from simscen.core.verdict import Status
-from simscen.criteria.criterion import AnyCriterion
-from simscen.criteria.temporal import Temporal
-from simscen.judge.judge import judge
+from simscen.criteria.registry import AnyCriterion
+from simscen.criteria.stl.criterion import TemporalCriterion
+from simscen.judge.evaluation import judge
 from simscen.testing.sketch import sketch, sketch_case
 
 
 def criterion(words):
     chosen = AnyCriterion.model_validate(words).chosen
-    assert isinstance(chosen, Temporal)
+    assert isinstance(chosen, TemporalCriterion)
     return chosen
 
 

@@ -8,9 +8,8 @@ import pytest
 from simscen.core.comparison import Outcomes
 from simscen.core.result import Outcome, RunFailure, RunKey, RunResult
 from simscen.core.verdict import Finding, Status, Verdict
-from simscen.judge.measure.compare import COMPARED, compare
-from simscen.judge.measure.comparisondata import comparison_data
-from simscen.judge.measure.table import METRICS
+from simscen.judge.metrics.catalog import METRICS
+from simscen.judge.metrics.stack_comparison import COMPARED_METRICS, compare_stacks, comparison_data
 
 STACKS = ("ref=reference", "mine=./nav --fast")
 GOOD = {"time_to_goal": 10.0, "path_length": 5.0, "min_clearance": 0.5, "collisions": 0.0}
@@ -31,7 +30,7 @@ def run(stack: str, seed: int = 1, scenario: str = "a", outcome: Outcome = Outco
 
 
 def against(*runs: RunResult):
-    comparison = compare(runs, STACKS)
+    comparison = compare_stacks(runs, STACKS)
     assert comparison is not None
     (one,) = comparison.against
     return one
@@ -42,14 +41,14 @@ def of(one, metric: str):
 
 
 def test_there_is_nothing_to_compare_with_a_single_stack() -> None:
-    assert compare([run("")], ()) is None
-    assert compare([run("")], STACKS[:1]) is None
+    assert compare_stacks([run("")], ()) is None
+    assert compare_stacks([run("")], STACKS[:1]) is None
 
 
 def test_outcomes_are_counted_for_each_scenario_and_stack_and_errors_by_themselves() -> None:
     runs = [run("ref", seed) for seed in (1, 2, 3)]
     runs += [run("mine", 1), run("mine", 2, outcome=Outcome.FAILED), run("mine", 3, outcome=Outcome.ERROR)]
-    comparison = compare([*runs, run("ref", scenario="b")], STACKS)
+    comparison = compare_stacks([*runs, run("ref", scenario="b")], STACKS)
     assert comparison is not None
     assert comparison.outcomes["a"] == {"ref": Outcomes(3, 0, 0), "mine": Outcomes(1, 1, 1)}
     assert comparison.outcomes["b"]["mine"] == Outcomes()
@@ -102,8 +101,8 @@ def test_the_order_of_runs_changes_nothing_and_every_stack_is_compared_with_the_
     names = ("ref", "mine", "other")
     runs = [run(name, seed, time_to_goal=seed * (1.0 + len(name) / 10)) for name in names for seed in range(1, 9)]
     stacks = [f"{name}=x" for name in names]
-    assert compare(runs, stacks) == compare(runs[::-1], stacks)
-    comparison = compare(runs, stacks)
+    assert compare_stacks(runs, stacks) == compare_stacks(runs[::-1], stacks)
+    comparison = compare_stacks(runs, stacks)
     assert comparison is not None
     assert [one.stack for one in comparison.against] == ["mine", "other"]
     found = of(comparison.against[1], "time_to_goal")
@@ -114,7 +113,7 @@ def test_the_order_of_runs_changes_nothing_and_every_stack_is_compared_with_the_
 
 def test_as_data_it_is_strict_json_and_says_what_was_left_out() -> None:
     runs = [run("ref", 1), run("mine", 1, outcome=Outcome.ERROR), run("mine", 2)]
-    comparison = compare(runs, STACKS)
+    comparison = compare_stacks(runs, STACKS)
     assert comparison is not None
     data = json.loads(json.dumps(comparison_data(comparison), allow_nan=False))
     assert data["baseline"] == "ref"
@@ -129,7 +128,7 @@ def test_metrics_that_packages_add_are_compared_too() -> None:
 
 
 def test_every_metric_that_is_compared_is_one() -> None:
-    assert set(COMPARED) <= set(METRICS)
+    assert set(COMPARED_METRICS) <= set(METRICS)
 
 
 def test_stacks_are_compared_by_what_they_did_whatever_their_scenario_expects() -> None:
@@ -159,7 +158,7 @@ def fleet(stack: str, seed: int = 1, **metrics: float | None) -> RunResult:
 
 def test_of_several_robots_the_same_metrics_are_compared_of_each() -> None:
     one = against(fleet("ref"), fleet("mine", b_path_length=7.0))
-    names = [name for name in COMPARED if name in GOOD]
+    names = [name for name in COMPARED_METRICS if name in GOOD]
     assert [found.metric for found in one.differences] == [f"{robot}/{name}" for robot in "ab" for name in names]
     assert [of(one, f"{robot}/path_length").difference for robot in "ab"] == [0.0, 2.0]
     assert of(one, "b/path_length").unit == METRICS["path_length"].unit

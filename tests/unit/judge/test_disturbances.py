@@ -5,10 +5,10 @@ import pytest
 from simscen.core.disturbance import Disturbance
 from simscen.core.result import Outcome, RunKey
 from simscen.core.verdict import Status
-from simscen.criteria.criterion import AnyCriterion
-from simscen.judge.disturbances import happenings
-from simscen.judge.result import result_of
-from simscen.judge.resultdata import from_json, to_json
+from simscen.criteria.registry import AnyCriterion
+from simscen.judge.disturbances import disturbance_outcomes
+from simscen.judge.result_json import from_json, to_json
+from simscen.judge.run_result import judge_run
 from simscen.testing.sketch import sketch, sketch_case
 
 WORDS = {"seconds": 10, "truth": [[0, 0, 0], [10, 5, 0]]}
@@ -33,7 +33,7 @@ def fault(begins, touches=None, ends=None, touched=0, entry=0):
 def judged(events, *ordered, **changes):
     trace, case = sketch({**WORDS, "events": events, **changes}), sketch_case({"disturbances": ordered})
     criteria = [AnyCriterion.model_validate({"collisions": {}})]
-    return result_of(RunKey("a", 1), "a.scenario.yaml", criteria, trace, case, lines=(20,))
+    return judge_run(RunKey("a", 1), "a.scenario.yaml", criteria, trace, case, lines=(20,))
 
 
 @pytest.mark.parametrize(
@@ -112,7 +112,11 @@ def test_every_action_of_an_event_has_to_take_effect_but_not_each_time():
 def test_entries_of_one_name_are_told_apart():
     trace = sketch({**WORDS, "events": fault(3, 3, 4, 10, entry=1)})
     case = sketch_case({"disturbances": [FAULT, EVENT, {**FAULT, "line": 10}]})
-    assert [(one.ordered.line, one.happened) for one in happenings(trace, case)] == [(9, False), (7, False), (10, True)]
+    assert [(one.ordered.line, one.happened) for one in disturbance_outcomes(trace, case)] == [
+        (9, False),
+        (7, False),
+        (10, True),
+    ]
     result = judged([], FAULT, {**FAULT, "line": 10}, {**EVENT, "name": "collisions"})
     assert [verdict.id for verdict in result.verdicts] == ["lidar.off", "lidar.off#2", "collisions#2", "collisions"]
 
@@ -125,6 +129,6 @@ def test_disturbances_survive_their_file():
 
 def test_in_a_file_that_does_not_hold_the_criteria_it_has_no_line_either():
     trace, case = sketch(WORDS), sketch_case({"disturbances": [EVENT]})
-    result = result_of(RunKey("a", 1), "run.mcap", [AnyCriterion.model_validate({"collisions": {}})], trace, case)
+    result = judge_run(RunKey("a", 1), "run.mcap", [AnyCriterion.model_validate({"collisions": {}})], trace, case)
     assert len(result.verdicts) == 2
     assert result.lines == ()

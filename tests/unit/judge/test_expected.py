@@ -5,9 +5,9 @@ import pytest
 from simscen.core.expectation import Expectation
 from simscen.core.result import Outcome
 from simscen.core.verdict import Finding, Status, Verdict
-from simscen.judge.expected import as_expected
-from simscen.judge.judge import outcome
-from simscen.judge.wording import DISTURBANCE
+from simscen.judge.evaluation import outcome_of_verdicts
+from simscen.judge.expected_failure import apply_expectation
+from simscen.judge.finding_text import DISTURBANCE
 
 PASS, FAIL, UNCLEAR, ERROR = Status.PASS, Status.FAIL, Status.INCONCLUSIVE, Status.ERROR
 
@@ -18,7 +18,7 @@ def verdict(name: str, status: Status, criterion: str = "", severity: str = "fai
 
 def judged(expected: Expectation | None, *verdicts: Verdict, whole: bool = True) -> tuple[Outcome, str]:
     """The outcome, and what is told of the expectation."""
-    came_out, on_that = as_expected(expected, verdicts, outcome(verdicts), whole)
+    came_out, on_that = apply_expectation(expected, verdicts, outcome_of_verdicts(verdicts), whole)
     return came_out, "" if on_that is None else on_that.findings[0].measured
 
 

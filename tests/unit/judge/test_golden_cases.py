@@ -6,8 +6,8 @@ import pytest
 import yaml
 
 from simscen.core.verdict import Finding, Status
-from simscen.criteria.criterion import AnyCriterion
-from simscen.judge.judge import judge
+from simscen.criteria.registry import AnyCriterion
+from simscen.judge.evaluation import judge
 from simscen.testing.sketch import sketch, sketch_case
 
 FILES = sorted((Path(__file__).parents[2] / "cases").glob("*.yaml"))

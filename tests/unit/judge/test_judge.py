@@ -8,8 +8,8 @@ from simscen.core.result import Outcome
 from simscen.core.samples import Samples
 from simscen.core.verdict import Finding, Status, Verdict
 from simscen.criteria.clearance import Clearance
-from simscen.criteria.criterion import AnyCriterion
-from simscen.judge.judge import judge, outcome
+from simscen.criteria.registry import AnyCriterion
+from simscen.judge.evaluation import judge, outcome_of_verdicts
 from simscen.testing.sketch import sketch, sketch_case
 
 TRACE = sketch({"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]], "clearance": 0.5})
@@ -69,7 +69,7 @@ def test_a_criterion_that_checked_nothing_is_an_error(monkeypatch):
     ],
 )
 def test_only_severity_fail_fails_a_run_but_a_broken_criterion_always_breaks_it(verdicts, expected):
-    assert outcome(verdicts) is expected
+    assert outcome_of_verdicts(verdicts) is expected
 
 
 def without_signals(trace):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from simscen.core.samples import Samples
-from simscen.criteria.smooth import sparc
-from simscen.judge.measure.metrics import barn_score, measure
+from simscen.criteria.trace_signals.sparc_ldlj import sparc
+from simscen.judge.metrics.compute import barn_score, compute_metrics
 from simscen.testing.sketch import sketch, sketch_case
 
 NAMES = "abc"
@@ -27,7 +27,7 @@ TOLD = [
 
 
 def measures(events=(), case=GOALS, **words):
-    return measure(sketch({**TOUR, "events": list(events), **words}), sketch_case(case))
+    return compute_metrics(sketch({**TOUR, "events": list(events), **words}), sketch_case(case))
 
 
 def test_the_time_is_from_the_first_acceptance_to_the_last_arrival():
@@ -65,7 +65,7 @@ def test_soft_spl_is_of_the_last_goal_and_the_last_place():
 
 def test_without_the_true_pose_there_is_no_soft_spl():
     nothing = Samples(np.empty(0, np.int64), np.empty((0, 3)))
-    found = measure(replace(sketch(TOUR), truth=nothing, velocity=nothing), sketch_case(GOALS))
+    found = compute_metrics(replace(sketch(TOUR), truth=nothing, velocity=nothing), sketch_case(GOALS))
     assert found.undefined["soft_spl"] == "the true pose was not recorded"
     assert found.undefined["max_speed"] == found.undefined["sparc"] == "the true velocity was not recorded"
 
@@ -83,7 +83,7 @@ def with_speeds(speeds, ticks=None):
     trace = sketch({"seconds": (len(speeds) - 1) / 40, "truth": [[0, 0, 0]]})
     values = np.column_stack((speeds, np.zeros((len(speeds), 2))))
     velocity = Samples(trace.truth.ticks if ticks is None else ticks, values)
-    return measure(replace(trace, velocity=velocity), sketch_case({}))
+    return compute_metrics(replace(trace, velocity=velocity), sketch_case({}))
 
 
 def test_a_centimetre_a_second_is_motion():

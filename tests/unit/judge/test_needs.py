@@ -3,10 +3,10 @@
 import pytest
 
 from simscen.core.evidence import Coverage, Evidence
-from simscen.criteria.criterion import AnyCriterion
-from simscen.judge.measure.metrics import Measures
-from simscen.judge.measure.table import METRICS
-from simscen.judge.needs import doubt, known, needs
+from simscen.criteria.registry import AnyCriterion
+from simscen.judge.metrics.catalog import METRICS
+from simscen.judge.metrics.compute import MetricValues
+from simscen.judge.required_evidence import metrics_with_evidence, partial_evidence_reason, required_evidence
 
 TRUTH, ALIGNMENT, GOALS, BELIEF = Evidence.TRUTH, Evidence.ALIGNMENT, Evidence.NAVIGATION, Evidence.BELIEF
 
@@ -38,7 +38,7 @@ TRUTH, ALIGNMENT, GOALS, BELIEF = Evidence.TRUTH, Evidence.ALIGNMENT, Evidence.N
     ],
 )
 def test_a_criterion_needs_this_and_no_more(words, wanted):
-    assert needs(AnyCriterion.model_validate(words)) == wanted
+    assert required_evidence(AnyCriterion.model_validate(words)) == wanted
 
 
 NEAR_PEOPLE = {"min_person_distance", "intrusion_intimate", "intrusion_personal", "intrusion_social"}
@@ -71,11 +71,13 @@ NEAR_PEOPLE = {"min_person_distance", "intrusion_intimate", "intrusion_personal"
     ],
 )
 def test_what_a_log_lacks_leaves_these_metrics_out_and_no_others(lacking, left_out):
-    measures = known(Measures(dict.fromkeys(METRICS, 1.0), {}), Coverage({lacking: ""}))
+    measures = metrics_with_evidence(MetricValues(dict.fromkeys(METRICS, 1.0), {}), Coverage({lacking: ""}))
     assert set(measures.undefined) == {name for name, value in measures.values.items() if value is None} == left_out
 
 
 def test_only_what_decides_a_criterion_makes_its_pass_doubtful():
     gaps = Coverage(partial={Evidence.CONTACTS: "no contacts before t = 3 s", BELIEF: "no belief after t = 9 s"})
-    assert doubt(AnyCriterion.model_validate({"collisions": {}}), gaps) == "no contacts before t = 3 s"
-    assert doubt(AnyCriterion.model_validate({"clearance": {"min": 0.1}}), gaps) == ""
+    assert (
+        partial_evidence_reason(AnyCriterion.model_validate({"collisions": {}}), gaps) == "no contacts before t = 3 s"
+    )
+    assert partial_evidence_reason(AnyCriterion.model_validate({"clearance": {"min": 0.1}}), gaps) == ""

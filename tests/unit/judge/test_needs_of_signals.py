@@ -4,12 +4,12 @@ import pytest
 
 from simscen.core.evidence import Coverage, Evidence
 from simscen.core.verdict import Status
-from simscen.criteria.criterion import AnyCriterion
-from simscen.criteria.signal_table import SIGNALS, evidence
-from simscen.judge.judge import judge
-from simscen.judge.measure.metrics import measure
-from simscen.judge.measure.table import METRICS
-from simscen.judge.needs import known, needs
+from simscen.criteria.registry import AnyCriterion
+from simscen.criteria.trace_signals.catalog import SIGNALS, signal_evidence
+from simscen.judge.evaluation import judge
+from simscen.judge.metrics.catalog import METRICS
+from simscen.judge.metrics.compute import compute_metrics
+from simscen.judge.required_evidence import metrics_with_evidence, required_evidence
 from simscen.testing.sketch import sketch, sketch_case
 
 DRIVE = {"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]]}
@@ -17,7 +17,7 @@ DRIVE = {"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]]}
 
 @pytest.mark.parametrize("name", SIGNALS)
 def test_every_signal_says_what_it_needs_and_the_truth_is_its_clock(name):
-    assert Evidence.TRUTH in evidence(name)
+    assert Evidence.TRUTH in signal_evidence(name)
 
 
 @pytest.mark.parametrize(
@@ -31,8 +31,8 @@ def test_every_signal_says_what_it_needs_and_the_truth_is_its_clock(name):
 )
 def test_a_criterion_needs_what_its_signals_need(criterion, wanted):
     entry = AnyCriterion.model_validate(criterion)
-    assert wanted in needs(entry)
-    assert needs(entry) != frozenset(Evidence)
+    assert wanted in required_evidence(entry)
+    assert required_evidence(entry) != frozenset(Evidence)
     (verdict,) = judge([entry], sketch(DRIVE), sketch_case({}), Coverage({wanted: "no such topic"}))
     assert verdict.status is Status.INCONCLUSIVE
     assert wanted.value in verdict.findings[0].measured
@@ -40,7 +40,9 @@ def test_a_criterion_needs_what_its_signals_need(criterion, wanted):
 
 @pytest.mark.parametrize("lacking", Evidence)
 def test_a_metric_that_the_log_cannot_tell_is_none_and_says_so(lacking):
-    measures = known(measure(sketch(DRIVE), sketch_case({})), Coverage({lacking: "no such topic"}))
+    measures = metrics_with_evidence(
+        compute_metrics(sketch(DRIVE), sketch_case({})), Coverage({lacking: "no such topic"})
+    )
     assert list(measures.values) == list(METRICS)
     assert {name for name, value in measures.values.items() if value is None} == set(measures.undefined)
     if lacking is Evidence.CONTACTS:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from simscen.judge.measure.people import person_metrics
+from simscen.judge.metrics.compute import person_metrics
 from simscen.testing.sketch import sketch, sketch_case
 
 ANNA = [0, "object.spawned", "anna", {"person": True, "size": [0.25, 1.7]}]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from simscen.core.samples import Samples
-from simscen.judge.measure.pose import pose_metrics
+from simscen.judge.metrics.pose_error import pose_metrics
 from simscen.testing.sketch import sketch
 
 

@@ -5,9 +5,9 @@ import pytest
 
 from simscen.core.result import Outcome, RunKey
 from simscen.criteria.clearance import Clearance
-from simscen.criteria.criterion import AnyCriterion
-from simscen.judge.result import result_of
-from simscen.judge.resultdata import from_json, read_result, to_json
+from simscen.criteria.registry import AnyCriterion
+from simscen.judge.result_json import from_json, read_result, to_json
+from simscen.judge.run_result import judge_run
 from simscen.testing.sketch import sketch, sketch_case
 
 TRACE = {"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]], "clearance": 0.5, "events": [[1, "plan.made", "", {}]]}
@@ -17,7 +17,7 @@ def conclude(trace, *criteria):
     built, case = sketch(trace), sketch_case({})
     asked = [AnyCriterion.model_validate(words) for words in criteria]
     lines = tuple(range(10, 10 + len(criteria)))
-    return result_of(RunKey("a/b", 7), "scenarios/a/b.scenario.yaml", asked, built, case, lines)
+    return judge_run(RunKey("a/b", 7), "scenarios/a/b.scenario.yaml", asked, built, case, lines)
 
 
 def test_a_result_survives_its_file(tmp_path):
@@ -70,7 +70,7 @@ def test_one_sample_that_is_no_number_breaks_the_run_whatever_judges_it(signal, 
     trace = sketch(TRACE)
     getattr(trace, signal).values[2, 1] = value
     criteria = [AnyCriterion.model_validate({"collisions": {}})]
-    assert result_of(RunKey("a", 7), "a", criteria, trace, sketch_case({})).outcome is Outcome.ERROR
+    assert judge_run(RunKey("a", 7), "a", criteria, trace, sketch_case({})).outcome is Outcome.ERROR
 
 
 def test_a_thing_without_a_place_breaks_the_run():

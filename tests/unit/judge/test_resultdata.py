@@ -9,7 +9,7 @@ import pytest
 from simscen.core.disturbance import Disturbance, Happening
 from simscen.core.result import Outcome, RunFailure, RunKey, RunResult
 from simscen.core.verdict import Finding, Status, Verdict
-from simscen.judge.resultdata import as_data, from_json, to_json
+from simscen.judge.result_json import from_json, result_data, to_json
 
 PLACED = Finding(Status.FAIL, "speed", "2.00 m/s", "≤ 1.00 m/s", -1.0, "m/s", 2.0, 600, (1.0, 2.0), ("why: gust",))
 GUST = Happening(Disturbance("gust", "event", "time: 2 s"), (480, 600), True, "pushed it", 480)
@@ -25,31 +25,31 @@ FAILED = RunResult(
 
 def test_the_file_is_sorted_indented_by_two_and_written_in_plain_letters():
     text = to_json(FAILED)
-    assert text == json.dumps(as_data(FAILED), sort_keys=True, indent=2, ensure_ascii=False) + "\n"
+    assert text == json.dumps(result_data(FAILED), sort_keys=True, indent=2, ensure_ascii=False) + "\n"
     assert text.startswith('{\n  "again": "simscen run a.scenario.yaml --seed 7",\n')
     assert "≤ 1.00 m/s" in text
 
 
 def test_its_format_is_the_second_and_one_of_another_is_refused():
-    assert as_data(FAILED)["format"] == 2
+    assert result_data(FAILED)["format"] == 2
     with pytest.raises(ValueError, match="format 3; this version reads 2"):
-        from_json(json.dumps({**as_data(FAILED), "format": 3}))
+        from_json(json.dumps({**result_data(FAILED), "format": 3}))
 
 
 def test_ticks_are_told_in_seconds_too():
-    data = as_data(FAILED)
+    data = result_data(FAILED)
     assert data["disturbances"][0]["times"] == [2.0, 2.5]
     assert data["verdicts"][0]["findings"][0]["time"] == 2.5
 
 
 def test_verdicts_without_a_line_have_line_0():
-    assert [verdict["line"] for verdict in as_data(FAILED)["verdicts"]] == [0, 0]
+    assert [verdict["line"] for verdict in result_data(FAILED)["verdicts"]] == [0, 0]
 
 
 def test_the_failure_of_a_run_survives_its_file():
     crashed = RunResult(RunKey("a", 7), "a", Outcome.ERROR, error=RunFailure("crashed", "SIGSEGV", "last words"))
-    assert as_data(FAILED)["error"] is None
-    assert as_data(crashed)["error"] == {"kind": "crashed", "message": "SIGSEGV", "tail": "last words"}
+    assert result_data(FAILED)["error"] is None
+    assert result_data(crashed)["error"] == {"kind": "crashed", "message": "SIGSEGV", "tail": "last words"}
     assert from_json(to_json(crashed)) == crashed
 
 
@@ -65,4 +65,4 @@ def test_a_time_that_is_no_number_is_not_written():
 
 def test_lines_are_those_of_the_verdicts_one_each():
     with pytest.raises(ValueError, match="shorter"):
-        as_data(replace(FAILED, lines=(3,)))
+        result_data(replace(FAILED, lines=(3,)))

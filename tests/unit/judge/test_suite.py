@@ -3,7 +3,7 @@
 import pytest
 
 from simscen.core.result import Outcome, RunFailure, RunKey, RunResult
-from simscen.judge.measure.suite import suite, suite_data, told
+from simscen.judge.metrics.session_summary import session_summary_data, session_summary_line, summarize_session
 
 
 def run(seed, simulated=1800.0, **metrics):
@@ -19,7 +19,7 @@ RUNS = [
 
 
 def test_rates_are_of_all_runs_and_means_of_those_that_have_the_number():
-    figures = suite(RUNS)
+    figures = summarize_session(RUNS)
     assert figures.success_rate == 0.5
     assert figures.success_interval == pytest.approx((0.15, 0.85), abs=0.01)
     assert (figures.spl, figures.soft_spl, figures.spl_runs) == (pytest.approx(0.45), pytest.approx(0.7), 2)
@@ -28,34 +28,34 @@ def test_rates_are_of_all_runs_and_means_of_those_that_have_the_number():
 
 
 def test_the_order_of_the_runs_changes_nothing():
-    assert suite(RUNS) == suite(reversed(RUNS))
+    assert summarize_session(RUNS) == summarize_session(reversed(RUNS))
 
 
 def test_it_is_told_in_a_line_with_the_numbers_of_runs():
     line = (
         "success 50% of 4 runs (15% … 85%) · SPL 0.45 of 2 runs · 1.5 collisions/km, 2.0/h in 2.00 km, 1.50 h of 3 runs"
     )
-    assert told(suite(RUNS)) == line
-    assert told(suite(RUNS[2:3])) == "success 100% of 1 run (21% … 100%)"
+    assert session_summary_line(summarize_session(RUNS)) == line
+    assert session_summary_line(summarize_session(RUNS[2:3])) == "success 100% of 1 run (21% … 100%)"
 
 
 def test_without_runs_there_are_no_rates():
-    figures = suite([])
-    assert told(figures) == ""
-    data = suite_data(figures)
+    figures = summarize_session([])
+    assert session_summary_line(figures) == ""
+    data = session_summary_data(figures)
     assert data["runs"] == data["measured_runs"] == data["collisions"] == 0
     for name in ("success_rate", "success_interval", "spl", "soft_spl", "collisions_per_km", "collisions_per_hour"):
         assert data[name] is None
 
 
 def test_runs_that_all_broke_did_not_succeed():
-    figures = suite(RUNS[3:])
+    figures = summarize_session(RUNS[3:])
     assert (figures.success_rate, figures.measured_runs, figures.collisions_per_km) == (0.0, 0, None)
     assert figures.collisions_per_hour is None
 
 
 def test_a_short_way_and_a_short_time_have_rates_too():
-    figures = suite([run(1, simulated=36.0, success=0.0, collisions=2.0, path_length=10.0)])
+    figures = summarize_session([run(1, simulated=36.0, success=0.0, collisions=2.0, path_length=10.0)])
     assert (figures.collisions_per_km, figures.collisions_per_hour) == (200.0, 200.0)
 
 
@@ -69,7 +69,7 @@ def test_each_of_several_robots_drives_and_collides_and_a_run_succeeds_where_all
         "b/success": 0.0,
     }
     two = run(1, **metrics, success=0.0, **{"a/path_length": 1500.0, "b/path_length": 500.0})
-    figures = suite([two])
+    figures = summarize_session([two])
     assert (figures.runs, figures.measured_runs, figures.success_rate) == (1, 1, 0.0)
     assert (figures.spl, figures.spl_runs) == (0.5, 1)
     assert (figures.collisions, figures.kilometres, figures.hours) == (3, 2.0, 1.0)

@@ -8,8 +8,8 @@ import pytest
 
 from simscen.core.navigation import Path
 from simscen.core.samples import Samples
-from simscen.criteria.signals import drive
-from simscen.judge.measure.way import legs_of, way_metrics
+from simscen.criteria.trace_signals.ground_truth import drive
+from simscen.judge.metrics.path import path_metrics, path_segments
 from simscen.testing.sketch import sketch
 
 TICKS = 6
@@ -25,7 +25,7 @@ def driven(points, events=(), plans=()):
 
 def shape(*points, **words):
     trace = driven(points, **words)
-    return way_metrics(trace, drive(trace))
+    return path_metrics(trace, drive(trace))
 
 
 def placed(before):
@@ -87,7 +87,7 @@ def test_each_piece_of_the_way_has_its_own_bends():
 
 def test_the_pieces_are_those_between_being_set_down():
     trace = driven([*CORNER, (0, 0), (2, 0), (4, 4)], [*placed(3), *placed(5)])
-    assert [leg.tolist() for leg in legs_of(trace, drive(trace))] == [
+    assert [leg.tolist() for leg in path_segments(trace, drive(trace))] == [
         [[5, 7], [6, 7], [6, 8]],
         [[0, 0], [2, 0]],
         [[4, 4]],
@@ -103,7 +103,7 @@ def test_without_a_true_pose_there_is_no_shape():
     trace = replace(
         sketch({"seconds": 1, "truth": [[0, 0, 0]]}), truth=Samples(np.empty(0, np.int64), np.empty((0, 3)))
     )
-    metrics = way_metrics(trace, drive(trace))
+    metrics = path_metrics(trace, drive(trace))
     assert metrics["aol"] == "the robot never drove"
     assert metrics["heading_change"] == 0.0
     assert "too short a way" in metrics["max_curvature"]
@@ -118,7 +118,7 @@ def test_being_turned_while_set_down_is_no_change_of_heading(before, turned):
 def test_being_set_down_before_the_first_sample_changes_nothing():
     trace = driven([(0, 0, 0), (0, 0, 0.1), (0, 0, 0.3)], [[0, "robot.placed"]])
     late = replace(trace, truth=Samples(trace.truth.ticks + 1, trace.truth.values))
-    assert way_metrics(late, drive(late))["heading_change"] == pytest.approx(0.3)
+    assert path_metrics(late, drive(late))["heading_change"] == pytest.approx(0.3)
 
 
 def plan(sample, *yaws):

@@ -2,7 +2,7 @@ import pytest
 
 from simscen.core.disturbance import Disturbance, Happening
 from simscen.core.verdict import Finding, Status, Verdict
-from simscen.judge.wording import sentence, tightest, told, violations, when
+from simscen.judge.finding_text import disturbance_line, disturbance_times, sentence, tightest_margin, violations
 
 
 def verdict(finding, kind="stopped_within", name="stopped_within"):
@@ -43,8 +43,8 @@ def test_the_tightest_bound_is_the_one_with_the_least_share_of_its_limit_left():
         verdict(near, "path_length", "path_length"),
         verdict(count, "c", "c"),
     ]
-    assert tightest(verdicts) == "path_length +0.14 m, 1 % of its limit"
-    assert tightest([]) == ""
+    assert tightest_margin(verdicts) == "path_length +0.14 m, 1 % of its limit"
+    assert tightest_margin([]) == ""
 
 
 def test_where_the_robot_stopped_at_a_goal_and_how_long_it_stayed_are_never_the_tightest():
@@ -52,9 +52,9 @@ def test_where_the_robot_stopped_at_a_goal_and_how_long_it_stayed_are_never_the_
     turned = Finding(Status.PASS, "goal dock heading", "", "≤ 0.25 rad from the goal's heading", 0.01, "rad", 0.24)
     waited = Finding(Status.PASS, "goal dock wait", "", "≥ 3.00 s", 0.0, "s", 3.0)
     within = Finding(Status.PASS, "goal dock time", "", "≤ 20.00 s", 15.0, "s", 5.0)
-    assert tightest([Verdict("goals_reached", "g", "fail", (stopped, turned, waited))]) == ""
-    told = tightest([Verdict("goals_reached", "g", "fail", (stopped, turned, waited, within))])
-    assert told == "g: goal dock time +15.00 s, 75 % of its limit"
+    assert tightest_margin([Verdict("goals_reached", "g", "fail", (stopped, turned, waited))]) == ""
+    disturbance_line = tightest_margin([Verdict("goals_reached", "g", "fail", (stopped, turned, waited, within))])
+    assert disturbance_line == "g: goal dock time +15.00 s, 75 % of its limit"
 
 
 @pytest.mark.parametrize(
@@ -67,8 +67,8 @@ def test_where_the_robot_stopped_at_a_goal_and_how_long_it_stayed_are_never_the_
     ],
     ids=["of zero there are no shares", "at least", "nobody said what was measured", "without end"],
 )
-def test_the_margin_is_told_as_a_share_where_there_is_one(finding, told):
-    assert tightest([verdict(finding, "own", "own")]) == told
+def test_the_margin_is_told_as_a_share_where_there_is_one(finding, disturbance_line):
+    assert tightest_margin([verdict(finding, "own", "own")]) == disturbance_line
 
 
 def bound(limit, margin, value):
@@ -88,7 +88,7 @@ def bound(limit, margin, value):
 )
 def test_shares_of_a_limit_compare_bounds(tight, loose):
     for verdicts in ([tight, loose], [loose, tight]):
-        assert tightest(verdicts).startswith(tight.id)
+        assert tightest_margin(verdicts).startswith(tight.id)
 
 
 def test_what_keeps_a_verdict_from_passing_is_all_but_its_passes():
@@ -106,7 +106,7 @@ def test_what_keeps_a_verdict_from_passing_is_all_but_its_passes():
     ],
 )
 def test_of_times_the_first_five_are_told(ticks, text):
-    assert when(Happening(Disturbance("gust", "event"), ticks, True, ""), 240) == text
+    assert disturbance_times(Happening(Disturbance("gust", "event"), ticks, True, ""), 240) == text
 
 
 @pytest.mark.parametrize(
@@ -118,4 +118,4 @@ def test_of_times_the_first_five_are_told(ticks, text):
     ],
 )
 def test_a_disturbance_is_told_in_a_line(ticks, happened, text):
-    assert told(Happening(Disturbance("gust", "event"), ticks, happened, "pushed it"), 240) == text
+    assert disturbance_line(Happening(Disturbance("gust", "event"), ticks, happened, "pushed it"), 240) == text

@@ -27,9 +27,9 @@ from simscen.core.evidence import Coverage, Evidence
 from simscen.core.geometry import Pose2
 from simscen.core.navigation import Goal
 from simscen.core.verdict import Status
-from simscen.criteria.criterion import AnyCriterion
-from simscen.judge.judge import judge
-from simscen.judge.needs import needs
+from simscen.criteria.registry import AnyCriterion
+from simscen.judge.evaluation import judge
+from simscen.judge.required_evidence import required_evidence
 from simscen.loading.compose import compose
 from simscen.record.foreign.read import read_foreign
 from simscen.record.foreign.wanted import Wanted
@@ -97,14 +97,14 @@ def test_no_criterion_passes_on_a_log_without_what_decides_it(tmp_path: Path, ex
     goals = (Goal("shelf", Pose2(SPEED * 10, 0.0)),)
     case = Case(Pose2(0.0, 0.0), goals, {"shelf": SPEED * 10}, {"aisle": ((50, 50), (51, 50), (51, 51))})
     log = read_foreign(write_mcap(tmp_path / "a.mcap", drive()), Wanted(truth="/mocap", goals=("shelf",)))
-    assert needs(entry), "something decides it"
-    for evidence in needs(entry):
+    assert required_evidence(entry), "something decides it"
+    for evidence in required_evidence(entry):
         (verdict,) = judge([entry], log.trace, case, Coverage({evidence: "taken away"}))
         assert verdict.status is Status.INCONCLUSIVE
         assert evidence.value in verdict.findings[0].measured
     (verdict,) = judge([entry], log.trace, case, log.coverage)
     assert verdict.status is not Status.ERROR
-    assert verdict.status is Status.INCONCLUSIVE or not needs(entry) & log.coverage.missing.keys()
+    assert verdict.status is Status.INCONCLUSIVE or not required_evidence(entry) & log.coverage.missing.keys()
 
 
 def test_a_log_is_judged_by_a_file_of_criteria(simscen, limits, tmp_path: Path) -> None:
@@ -133,7 +133,7 @@ def test_a_log_is_judged_by_the_filter_masks_of_a_file_of_criteria(simscen, limi
 def test_limits_of_places_need_a_truth_that_lies_on_the_map() -> None:
     mask = {"file": "slow.yaml", "type": "absolute"}
     for where in ({"max": 1.0, "in": "aisle"}, {"mask": mask}):
-        assert Evidence.ALIGNMENT in needs(AnyCriterion.model_validate({"speed": where}))
+        assert Evidence.ALIGNMENT in required_evidence(AnyCriterion.model_validate({"speed": where}))
 
 
 def test_without_a_truth_what_asks_for_it_is_inconclusive_and_says_so(simscen, limits, tmp_path: Path) -> None:

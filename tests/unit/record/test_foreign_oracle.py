@@ -11,8 +11,8 @@ from mcap.writer import Writer
 
 from simscen.core.errors import InvalidInput
 from simscen.core.verdict import Status
-from simscen.criteria.criterion import AnyCriterion
-from simscen.judge.judge import judge
+from simscen.criteria.registry import AnyCriterion
+from simscen.judge.evaluation import judge
 from simscen.record.foreign.mcapfile import is_own
 from simscen.record.foreign.read import read_foreign
 from simscen.record.foreign.wanted import Wanted

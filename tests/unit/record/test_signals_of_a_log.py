@@ -4,8 +4,8 @@ import pytest
 from moments import CASE, CLOCK, about, moments
 
 from simscen.core.trace import Trace
-from simscen.criteria.signal_table import SIGNALS, read
-from simscen.criteria.signal_values import Unavailable
+from simscen.criteria.trace_signals.catalog import SIGNALS, read_signal
+from simscen.criteria.trace_signals.readers import SignalUnavailable
 from simscen.record.recorder import Recorder
 from simscen.record.replay import read_log
 from simscen.record.tracebuilder import TraceBuilder
@@ -33,8 +33,8 @@ def test_a_signal_is_the_same_from_the_run_and_from_its_log(name: str, both: tup
 
 def _bits(name: str, trace: Trace, of: dict[str, str]) -> bytes | str:
     try:
-        return read(name, trace, CASE, of).tobytes()
-    except Unavailable as error:
+        return read_signal(name, trace, CASE, of).tobytes()
+    except SignalUnavailable as error:
         return str(error)
 
 

@@ -8,8 +8,8 @@ from simscen.core.geometry import Pose2
 from simscen.core.grid import OccupancyGrid
 from simscen.core.result import RunKey
 from simscen.core.scenery import Scenery, Thing
-from simscen.criteria.criterion import AnyCriterion
-from simscen.judge.result import result_of
+from simscen.criteria.registry import AnyCriterion
+from simscen.judge.run_result import judge_run
 from simscen.report.picture import grid, palette
 from simscen.report.picture.canvas import Canvas
 from simscen.report.picture.compose import _EDGE, HEADER, LARGEST, draw, parts, write_picture
@@ -47,7 +47,7 @@ def scene(**changes):
     )
     trace = sketch(words)
     criteria = [AnyCriterion.model_validate({"clearance": {"min": 2.0}})]
-    result = result_of(RunKey("room/cross", 3), "room/cross.scenario.yaml", criteria, trace, case)
+    result = judge_run(RunKey("room/cross", 3), "room/cross.scenario.yaml", criteria, trace, case)
     return Scene(trace, case, room(), result, Scenery(places={"corner": Pose2(9, 1)}))
 
 

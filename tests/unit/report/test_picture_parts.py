@@ -11,8 +11,8 @@ from simscen.core.grid import OccupancyGrid
 from simscen.core.maskcells import MaskCells
 from simscen.core.result import RunKey
 from simscen.core.scenery import Floor, Ground, Scenery, Thing, Zone
-from simscen.criteria.criterion import AnyCriterion
-from simscen.judge.result import result_of
+from simscen.criteria.registry import AnyCriterion
+from simscen.judge.run_result import judge_run
 from simscen.loading.scenario import load_scenario
 from simscen.record.replay import read_log
 from simscen.record.sceneryfile import scenery_of
@@ -72,7 +72,7 @@ def everything(**changes):
     })  # fmt: skip
     trace = sketch(words)
     criteria = [AnyCriterion.model_validate(one) for one in ({"goals_reached": {}}, {"clearance": {"min": 2.0}})]
-    result = result_of(RunKey("room/all", 3), "room/all.scenario.yaml", criteria, trace, case)
+    result = judge_run(RunKey("room/all", 3), "room/all.scenario.yaml", criteria, trace, case)
     scenery = Scenery(
         places={"dock": Pose2(1, 1)},
         things=(Thing("door", Pose2(5, 2), (PANEL,), Pose2(5, 2, np.pi / 2), Pose2(5, 2, 0.0)),),

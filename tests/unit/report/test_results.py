@@ -1,7 +1,7 @@
 import json
 from dataclasses import replace
 
-from simscen.judge.resultdata import from_data
+from simscen.judge.result_json import from_data
 from simscen.report.results import as_document, to_json
 
 

@@ -8,8 +8,8 @@ from simscen.core.motion import STOP
 from simscen.core.time import Clock
 from simscen.core.trace import Decision
 from simscen.core.verdict import Status
-from simscen.criteria.criterion import AnyCriterion
-from simscen.judge.judge import judge
+from simscen.criteria.registry import AnyCriterion
+from simscen.judge.evaluation import judge
 from simscen.run.ending import Ending
 from simscen.testing.sketch import sketch_case
 

@@ -5,7 +5,7 @@ import pytest
 CALM = '''
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
-from simscen.criteria.bounds import at_most
+from simscen.criteria.findings import at_most
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveSpeed
 

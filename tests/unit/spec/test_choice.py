@@ -6,7 +6,7 @@ from copy import deepcopy
 import pytest
 from pydantic import ValidationError
 
-from simscen.criteria.criterion import AnyCriterion
+from simscen.criteria.registry import AnyCriterion
 from simscen.model.stack import StackSpec
 from simscen.spec.choice import added, widened
 

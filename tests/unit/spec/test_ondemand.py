@@ -6,7 +6,7 @@ import pytest
 from pydantic import ValidationError
 
 from simscen.actions.action import AnyAction
-from simscen.criteria.criterion import AnyCriterion
+from simscen.criteria.registry import AnyCriterion
 from simscen.faults.fault import AnyFault
 from simscen.model.world import Wall
 from simscen.spec.base import Spec
@@ -64,7 +64,7 @@ def test_what_no_file_uses_is_not_imported():
     assert done.stdout.split() == [
         "simscen.criteria",
         "simscen.criteria.base",
-        "simscen.criteria.criterion",
+        "simscen.criteria.registry",
     ]
 
 

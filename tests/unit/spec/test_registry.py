@@ -102,7 +102,7 @@ def test_what_stands_beside_a_choice_is_reserved(group: str, choice: type[Choice
 
 def test_nothing_is_looked_for_before_a_name_is_used_that_is_not_shipped() -> None:
     code = (
-        "import sys; from simscen.criteria.criterion import AnyCriterion;"
+        "import sys; from simscen.criteria.registry import AnyCriterion;"
         "AnyCriterion.model_validate({'collisions': {}}); print('simscen.spec.registry' in sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from whys import CASE, DOOR, STANDS, box, by, why
 
-from simscen.judge.why.blocked import blocked
-from simscen.judge.why.things import Thing, things
+from simscen.judge.diagnosis.blocked_path import diagnose_blocked_path
+from simscen.judge.diagnosis.objects import MovableObject, movable_objects
 from simscen.testing.sketch import sketch, sketch_case
 
 CLOSES = (
@@ -140,7 +140,7 @@ def test_two_centimetres_are_not_nothing_and_room_is_looked_for_up_to_the_very_e
 
 
 @dataclass(frozen=True)
-class Fog(Thing):
+class Fog(MovableObject):
     """What is equally near to every place."""
 
     near: float = 0.0
@@ -151,7 +151,7 @@ class Fog(Thing):
 
 def told(*there, **changes):
     fogs = [Fog(name, (), "", 0, False, near) for name, near in there]
-    lines, _ = blocked(sketch(STANDS), sketch_case({**CASE, **changes}), "study", 2400, fogs)
+    lines, _ = diagnose_blocked_path(sketch(STANDS), sketch_case({**CASE, **changes}), "study", 2400, fogs)
     return " ".join(lines)
 
 
@@ -184,5 +184,5 @@ def test_of_what_closes_it_alone_the_last_is_named_and_not_what_leaves_room():
 def test_what_has_no_part_in_closing_it_is_not_named_with_what_has():
     trace = sketch({**STANDS, "events": [*box(1, "a", 5, 0.4, 0.6, 0.4), *box(2, "b", 5, -0.4, 0.6, 0.4)]})
     fogs = [Fog("haze", (), "", 0, False, 0.49), Fog("mist", (), "", 0, False, 0.6)]
-    (line,), _ = blocked(trace, sketch_case(CASE), "study", 2400, [*things(trace, 2400), *fogs])
+    (line,), _ = diagnose_blocked_path(trace, sketch_case(CASE), "study", 2400, [*movable_objects(trace, 2400), *fogs])
     assert line.startswith("a and b close the passage")

@@ -3,7 +3,7 @@
 from whys import STANDS, by, why
 
 from simscen.core.verdict import Finding, Status, Verdict
-from simscen.judge.why.cause import explained
+from simscen.judge.diagnosis.causes import explain_failures
 from simscen.testing.sketch import sketch, sketch_case
 
 
@@ -11,7 +11,7 @@ def test_only_failures_are_explained_and_before_their_own_details():
     trace = sketch({**STANDS, "events": by("gust", 9)})
     failed = Finding(Status.FAIL, "speed", "2", "≤ 1", tick=2400, detail=("own",))
     findings = (failed, Finding(Status.PASS, "speed", "0", "≤ 1", tick=2400), Finding(Status.FAIL, "speed", "2", "≤ 1"))
-    (verdict,) = explained([Verdict("speed", "speed", "fail", findings)], trace, sketch_case({}))
+    (verdict,) = explain_failures([Verdict("speed", "speed", "fail", findings)], trace, sketch_case({}))
     assert [finding.detail for finding in verdict.findings] == [
         ("meanwhile: event `gust` came 1.00 s before: something", "own"),
         (),

@@ -3,7 +3,7 @@
 import pytest
 from whys import CASE, STANDS, box, why
 
-from simscen.judge.why.cause import causes
+from simscen.judge.diagnosis.causes import causes
 from simscen.testing.sketch import sketch, sketch_case
 
 

@@ -6,7 +6,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simscen.judge.why.things import things
+from simscen.judge.diagnosis.objects import movable_objects
 from simscen.testing.sketch import sketch
 
 SQUARE = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]
@@ -18,7 +18,7 @@ def spawned(at, name, x, y, yaw=0.0, parts=(SQUARE,)):
 
 
 def there(events, at, **words):
-    return things(sketch({"seconds": 10, "truth": [[0, 0, 0]], "events": events, **words}), round(at * 240))
+    return movable_objects(sketch({"seconds": 10, "truth": [[0, 0, 0]], "events": events, **words}), round(at * 240))
 
 
 @settings(max_examples=200, deadline=None)
@@ -65,11 +65,11 @@ def test_what_an_event_did_is_told_of_what_it_did_it_to():
         [2, "event.ended", "cart comes", {}],
     ]
     trace = sketch({"seconds": 10, "truth": [[0, 0, 0]], "events": events})
-    assert [thing.told(trace) for thing in things(trace, 300)] == [
+    assert [thing.told(trace) for thing in movable_objects(trace, 300)] == [
         "bin",
         "crate (spawned by event `crate falls` at t = 1.00 s)",
     ]
-    assert [thing.told(trace) for thing in things(trace, 480)][1:] == [
+    assert [thing.told(trace) for thing in movable_objects(trace, 480)][1:] == [
         "crate (moved by event `cart comes` at t = 2.00 s)"
     ]
 

@@ -1,6 +1,6 @@
 """Sketched failures: a robot that does not reach the study, and what happened on the way."""
 
-from simscen.judge.why.cause import causes
+from simscen.judge.diagnosis.causes import causes
 from simscen.testing.sketch import sketch, sketch_case
 
 GOAL = {"name": "study", "pose": [8, 0, 0]}

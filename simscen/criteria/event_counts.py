@@ -1,0 +1,109 @@
+"""Bounds on how often something happened."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated
+
+from pydantic import Field, model_validator
+
+from simscen.core.events import Event, EventKind
+from simscen.core.navigation import ReplanReason
+from simscen.core.verdict import Finding, Status
+from simscen.criteria.base import Criterion
+from simscen.criteria.findings import counted, undecided
+from simscen.criteria.timeline import has_ended
+from simscen.spec.base import Spec
+from simscen.spec.bytype import BehaviorName
+
+if TYPE_CHECKING:
+    from simscen.core.case import Case
+    from simscen.core.trace import Trace
+if TYPE_CHECKING:
+    from simscen.core.case import Case
+    from simscen.core.trace import Trace
+
+if TYPE_CHECKING:
+    from simscen.core.trace import Trace
+
+Count = Annotated[int, Field(ge=0, le=100_000)]
+
+
+class CountBounds(Spec):
+    """At least `min`, at most `max`."""
+
+    min: Count | None = None
+    """At least so often."""
+    max: Count | None = None
+    """At most so often."""
+
+    @model_validator(mode="after")
+    def _some_bound(self) -> CountBounds:
+        if self.min is None and self.max is None:
+            raise ValueError("expected min or max")
+        if self.max is None and self.min == 0:
+            raise ValueError("`min: 0` alone always holds; expected a larger min, or max")
+        if self.min is not None and self.max is not None and self.min > self.max:
+            raise ValueError(f"min {self.min} is above max {self.max}, which nothing can be")
+        return self
+
+    def bound(self, trace: Trace, what: str, noun: str, hits: Sequence[Event], detail: Sequence[str]) -> list[Finding]:
+        """One finding for each bound; in a log that was cut off, too few so far may have become enough."""
+        at = (trace, hits[-1].tick) if hits else None
+        findings = counted(what, len(hits), noun, self.min, self.max, at=at, detail=detail)
+        if self.min is not None and findings[0].status is Status.FAIL and not has_ended(trace):
+            findings[0] = undecided(what, f"{findings[0].measured} so far", findings[0].limit, detail)
+        return findings
+
+
+# MERGED: `replans`: how often the robot changed its plan.
+class Replans(CountBounds, Criterion):
+    """The robot replanned as often as it should.
+
+    What is measured: the number of plans made for any reason but a new goal.
+    When it fails: fewer than `min` or more than `max`.
+    Why this: a scenario that drops a pallet on the plan proves nothing unless the robot had to plan again; and one
+        that replans at every beat has no plan.
+    Source: Nav2's navigate_to_pose_w_replanning trees.
+
+    Example: `replans: {min: 1}`
+    """
+
+    reason: ReplanReason | None = None
+    """Only plans made for this reason: the plan was `blocked`, the robot had left it (`missed`), an obstacle came too
+    near (`tight`), obstacles went away (`better`), a mapless robot's `window` moved on, after a `recovery`, or at the
+    planner's `rate`."""
+
+    def judge(self, trace: Trace, case: Case) -> list[Finding]:
+        """One finding for each bound."""
+        plans = trace.of_kind(EventKind.PLAN_MADE)
+        again = [plan for plan in plans if plan.data.get("reason", "goal") != "goal"]
+        if self.reason is not None:
+            again = [plan for plan in again if plan.data.get("reason") == self.reason]
+        told = [f"t = {trace.seconds(plan.tick):.2f} s: {plan.data.get('reason', 'goal')}" for plan in plans[:8]]
+        return self.bound(trace, "replans", "replan", again, told or ["no plan was ever made"])
+
+
+# MERGED: `recoveries`: how often the robot had to help itself.
+class Recoveries(CountBounds, Criterion):
+    """Recovery behaviours ran as often as they should.
+
+    What is measured: the number of recovery behaviours that started.
+    When it fails: fewer than `min` or more than `max`.
+    Why this: a scenario about getting unstuck proves something only if the robot was stuck; in all others recoveries
+        are the first sign of trouble.
+    Source: Nav2's recovery node and behaviour server (spin, wait, backup, clear costmap).
+
+    Example: `recoveries: {min: 1, name: spin}`
+    """
+
+    name: BehaviorName | None = None
+    """Only this behaviour."""
+
+    def judge(self, trace: Trace, case: Case) -> list[Finding]:
+        """One finding for each bound."""
+        every = trace.of_kind(EventKind.RECOVERY_STARTED)
+        counting = [start for start in every if self.name in (None, start.name)]
+        told = [f"t = {trace.seconds(start.tick):.2f} s: {start.name}" for start in every[:8]]
+        noun = "recovery" if self.name is None else f"{self.name} recovery"
+        return self.bound(trace, "recoveries", noun, counting, told)

@@ -1,0 +1,157 @@
+"""How a measured number becomes a finding: the margin is the distance to the limit, and the sign decides."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from simscen.core.verdict import Finding, Status
+
+if TYPE_CHECKING:
+    from simscen.core.trace import Trace
+
+
+class InvalidTrace(ValueError):
+    """A signal that has to be a number is not; nothing can be judged from it."""
+
+
+class MissingEvidence(ValueError):
+    """What a criterion has to look at is not in the trace: neither a pass nor a failure."""
+
+
+def at_most(
+    what: str,
+    value: float,
+    limit: float,
+    unit: str,
+    *,
+    at: tuple[Trace, int] | None = None,
+    context: str = "",
+    detail: Sequence[str] = (),
+) -> Finding:
+    """Holds when `value` <= `limit`; `at` is where it was tightest, `context` follows the limit ("after lidar.off").
+
+    Raises BrokenTrace when `value` is nan: a comparison with nan is false either way, which could pass for a verdict.
+    """
+    return _bound(what, value, limit, unit, limit - value, "≤", at, context, detail)
+
+
+def at_least(
+    what: str,
+    value: float,
+    limit: float,
+    unit: str,
+    *,
+    at: tuple[Trace, int] | None = None,
+    context: str = "",
+    detail: Sequence[str] = (),
+) -> Finding:
+    """Holds when `value` >= `limit`; otherwise as `at_most`."""
+    return _bound(what, value, limit, unit, value - limit, "≥", at, context, detail)
+
+
+def counted(
+    what: str,
+    count: int,
+    noun: str,
+    low: int | None,
+    high: int | None,
+    *,
+    at: tuple[Trace, int] | None = None,
+    detail: Sequence[str] = (),
+) -> list[Finding]:
+    """One finding for each bound on a number of events; the margin is in events."""
+    measured = f"{count} {noun}" if count == 1 else f"{count} {_plural(noun)}"
+    bounds = [] if low is None else [(count - low, f"≥ {low}")]
+    bounds += [] if high is None else [(high - count, f"≤ {high}")]
+    return [
+        Finding(
+            _status(margin),
+            what,
+            measured,
+            limit,
+            float(margin),
+            "",
+            float(count),
+            *_spot(at),
+            detail=_if_bad(margin, detail),
+        )
+        for margin, limit in bounds
+    ]
+
+
+def undecided(what: str, because: str, limit: str = "", detail: Sequence[str] = ()) -> Finding:
+    """There was nothing to check, or the trace is too short to decide: never a pass."""
+    return Finding(Status.INCONCLUSIVE, what, because, limit, detail=tuple(detail))
+
+
+def missed(
+    what: str, measured: str, limit: str, at: tuple[Trace, int] | None = None, detail: Sequence[str] = ()
+) -> Finding:
+    """A failure that no number measures."""
+    return Finding(Status.FAIL, what, measured, limit, None, "", None, *_spot(at), detail=tuple(detail))
+
+
+def held(what: str, measured: str, limit: str, at: tuple[Trace, int] | None = None) -> Finding:
+    """A pass that no number measures."""
+    return Finding(Status.PASS, what, measured, limit, None, "", None, *_spot(at))
+
+
+def quantity(value: float, unit: str, digits: int = 2) -> str:
+    """A number as a report shows it, e.g. "0.84 s"."""
+    return f"{value:.{digits}f} {unit}".rstrip()
+
+
+def _bound(
+    what: str,
+    value: float,
+    limit: float,
+    unit: str,
+    margin: float,
+    relation: str,
+    at: tuple[Trace, int] | None,
+    context: str,
+    detail: Sequence[str],
+) -> Finding:
+    if math.isnan(value):
+        raise InvalidTrace(f"{what} is not a number")
+    digits = decimals(value, limit)
+    text = f"{relation} {quantity(limit, unit, digits)} {context}".rstrip()
+    return Finding(
+        _status(margin),
+        what,
+        quantity(value, unit, digits),
+        text,
+        margin,
+        unit,
+        value,
+        *_spot(at),
+        detail=_if_bad(margin, detail),
+    )
+
+
+def _status(margin: float) -> Status:
+    return Status.PASS if margin >= 0 else Status.FAIL
+
+
+def _if_bad(margin: float, detail: Sequence[str]) -> tuple[str, ...]:
+    return tuple(detail) if margin < 0 else ()
+
+
+def _spot(at: tuple[Trace, int] | None) -> tuple[int | None, tuple[float, float] | None]:
+    if at is None:
+        return None, None
+    trace, tick = at
+    return tick, trace.place(tick) if len(trace.truth) else None
+
+
+def decimals(value: float, limit: float) -> int:
+    """As many decimals as tell the two apart: "0.50 s > 0.50 s" would explain nothing."""
+    if value == limit or not math.isfinite(value) or not math.isfinite(limit):
+        return 2
+    return next((digits for digits in range(2, 9) if f"{value:.{digits}f}" != f"{limit:.{digits}f}"), 9)
+
+
+def _plural(noun: str) -> str:
+    return f"{noun[:-1]}ies" if noun.endswith("y") else f"{noun}s"

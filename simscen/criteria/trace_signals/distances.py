@@ -1,0 +1,185 @@
+"""Signals that measure where the robot is from something that has a place: a thing, a goal, its own plan."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from simscen.core.events import EventKind
+from simscen.core.geometry import Array, wrap_array
+from simscen.core.samples import Ticks
+from simscen.core.separation import separation
+from simscen.criteria.trace_signals.ground_truth import check_samples
+from simscen.criteria.trace_signals.readers import SignalQuery, SignalUnavailable, goal_distance, poses_of
+
+if TYPE_CHECKING:
+    from simscen.core.case import Case
+    from simscen.core.trace import Trace
+
+if TYPE_CHECKING:
+    from simscen.core.trace import Trace
+
+
+_TINY = sys.float_info.min
+"""Square metres; stands for the square of a step of no length, to divide by."""
+
+
+def distance_to(asked: SignalQuery) -> Array:
+    """From the centre of the robot to a point, to a goal of the scenario, or to the origin of a thing that moves."""
+    poses, point, goal = poses_of(asked.trace), asked.of.get("point"), asked.of.get("goal")
+    if isinstance(point, Sequence):
+        return np.hypot(poses[:, 0] - float(point[0]), poses[:, 1] - float(point[1]))
+    if goal is None:
+        return _to_object(asked.trace, str(asked.of["object"]), poses)
+    goals = {known.name: known.pose for known in asked.case.every_goal}
+    if goal not in goals:
+        raise SignalUnavailable(f"the scenario has no goal `{goal}`")
+    pose = goals[str(goal)]
+    return np.hypot(poses[:, 0] - pose.x, poses[:, 1] - pose.y)
+
+
+def _to_object(trace: Trace, name: str, poses: Array) -> Array:
+    """Infinite while the thing is not there."""
+    where = object_positions(trace, name)
+    distance = np.hypot(poses[:, 0] - where[:, 0], poses[:, 1] - where[:, 1])
+    apart: Array = np.where(is_present(trace, name), distance, np.inf)
+    return apart
+
+
+def object_positions(trace: Trace, name: str) -> Array:
+    """Where a thing is at each truth sample, or where it always is, (n, 2 or 3) or (1, 2)."""
+    if name in trace.objects:
+        return check_samples(trace.objects[name], f"the pose of {name}", trace).at(trace.truth.ticks)
+    return _standing(trace, name)
+
+
+def _standing(trace: Trace, name: str) -> Array:
+    """Where a thing that never moved was put into the world, (1, 2)."""
+    for event in trace.of_kind(EventKind.OBJECT_SPAWNED):
+        x, y = event.data.get("x"), event.data.get("y")
+        if event.name == name and isinstance(x, int | float) and isinstance(y, int | float):
+            return np.array([[x, y]], dtype=np.float64)
+    raise SignalUnavailable(f"`{name}` never was there, or does not move")
+
+
+def is_present(trace: Trace, name: str) -> Array:
+    """Whether a thing is in the world at each truth sample; what was never put there was there from the start."""
+    clock = trace.truth.ticks
+    changes = [
+        event for event in trace.of_kind(EventKind.OBJECT_SPAWNED, EventKind.OBJECT_REMOVED) if event.name == name
+    ]
+    present = np.ones(len(clock), dtype=bool)
+    if changes and changes[0].kind == EventKind.OBJECT_SPAWNED:
+        present[:] = False
+    for event in changes:
+        present[np.searchsorted(clock, event.tick, side="left") :] = event.kind == EventKind.OBJECT_SPAWNED
+    return present
+
+
+def distance_remaining(asked: SignalQuery) -> Array:
+    """Along the newest plan from where the robot believes to be; before the first plan, as the crow flies in truth."""
+    belief, clock = check_samples(asked.trace.belief, "the belief", asked.trace), asked.trace.truth.ticks
+    if not len(belief):
+        raise SignalUnavailable("no belief was recorded")
+    believed = belief.at(clock)[:, :2]
+    left = goal_distance(asked)
+    for first, last, points in _plans(asked.trace, clock):
+        left[first:last] = _along(believed[first:last], points)[1]
+    return left
+
+
+def plan_deviation(asked: SignalQuery) -> Array:
+    """From the true position to the nearest point of the newest plan; none before the first plan."""
+    poses = poses_of(asked.trace)
+    off = np.zeros(len(poses))
+    plans = _plans(asked.trace, asked.trace.truth.ticks)
+    if not plans:
+        raise SignalUnavailable("no plan was recorded")
+    for first, last, points in plans:
+        off[first:last] = _along(poses[first:last, :2], points)[0]
+    return off
+
+
+def _plans(trace: Trace, clock: Ticks) -> list[tuple[int, int, Array]]:
+    """(first sample, sample after the last, points) of each plan that was followed for at least a sample."""
+    plans = [plan for plan in trace.plans if len(plan.points)]
+    begins: list[int] = np.searchsorted(clock, [plan.tick for plan in plans]).tolist()
+    ends = [*begins, len(clock)][1:]
+    followed = [k for k, end in enumerate(ends) if begins[k] < end]
+    return [(begins[k], ends[k], plans[k].points[:, :2]) for k in followed]
+
+
+def _along(points: Array, way: Array) -> tuple[Array, Array]:
+    """Of each point (n, 2): its distance to a way (m, 2), and how much of the way is left from there."""
+    if len(way) == 1:
+        way = np.vstack((way, way))
+    steps = np.diff(way, axis=0)
+    lengths = np.hypot(steps[:, 0], steps[:, 1])
+    nearest = _nearest_step(points, way[:-1], steps)
+    apart, step = points - way[nearest], steps[nearest]
+    share = np.clip((apart * step).sum(axis=1) / np.maximum(lengths[nearest] ** 2, _TINY), 0.0, 1.0)
+    off = np.hypot(*(apart - share[:, np.newaxis] * step).T)
+    after = np.concatenate((np.cumsum(lengths[::-1])[::-1][1:], [0.0]))
+    return off, after[nearest] + (1.0 - share) * lengths[nearest]
+
+
+def _nearest_step(points: Array, begins: Array, steps: Array) -> Array:
+    """The index of the step (m, 2) that is nearest to each point (n, 2); products of matrices, for there are many."""
+    along = points @ steps.T - (begins * steps).sum(axis=1)
+    squared = np.maximum((steps**2).sum(axis=1), _TINY)
+    share = np.clip(along / squared, 0.0, 1.0)
+    beside = (begins**2).sum(axis=1) - 2.0 * (points @ begins.T)  # and |point|^2, the same for all steps
+    nearest: Array = (beside + share * (share * squared - 2.0 * along)).argmin(axis=1)
+    return nearest
+
+
+# MERGED: How near the robot was to people: to their bodies, which are round.
+POINT = ((0.0, 0.0),)
+INTIMATE_SPACE_M, PERSONAL_SPACE_M, SOCIAL_SPACE_M = 0.45, 1.2, 3.6
+"""m of gap below which somebody's space is entered (Hall, The hidden dimension, 1966; as in HuNavSim)."""
+
+
+def pedestrian_radii(trace: Trace) -> dict[str, float]:
+    """Everybody who ever was there, by name, and the radius of their body in metres."""
+    found: dict[str, float] = {}
+    for event in trace.of_kind(EventKind.OBJECT_SPAWNED):
+        size = event.data.get("size")
+        if event.data.get("person") and isinstance(size, list) and size and isinstance(size[0], int | float):
+            found[event.name] = float(size[0])
+    return found
+
+
+def pedestrian_gap(trace: Trace, case: Case) -> Array:
+    """Metres between the robot's hull and the nearest person at each truth sample; inf while nobody is there.
+
+    Of a robot without a footprint its inscribed circle is the hull. Raises Unavailable where nobody ever was there.
+    """
+    everybody = pedestrian_radii(trace)
+    if not everybody:
+        raise SignalUnavailable("there were no people")
+    poses = poses_of(trace)
+    nearest = np.full(len(poses), np.inf)
+    for name, radius in sorted(everybody.items()):
+        places = np.broadcast_to(object_positions(trace, name)[:, :2], (len(poses), 2))
+        gap = _gap(poses, places, case) - radius
+        nearest = np.minimum(nearest, np.where(is_present(trace, name), np.maximum(gap, 0.0), np.inf))
+    return nearest
+
+
+def person_distance(asked: SignalQuery) -> Array:
+    """The same as a signal."""
+    return pedestrian_gap(asked.trace, asked.case)
+
+
+def _gap(poses: Array, places: Array, case: Case) -> Array:
+    """From the hull of a robot at `poses` (n, 3) to points (n, 2)."""
+    off = places - poses[:, :2]
+    if len(case.footprint) < 3:
+        circle: Array = np.hypot(off[:, 0], off[:, 1]) - case.inscribed_radius
+        return circle
+    c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+    seen = np.stack((c * off[:, 0] + s * off[:, 1], c * off[:, 1] - s * off[:, 0], wrap_array(-poses[:, 2])), axis=1)
+    return separation(seen, POINT, case.footprint)

@@ -1,0 +1,1 @@
+"""Probable causes of failed criteria, from the trace and the scenario."""

@@ -1,0 +1,125 @@
+"""What keeps a robot from its goal: a closed passage, an occupied goal, something that it stands at."""
+
+import math
+from collections import Counter
+
+import numpy as np
+
+from simscen.core.case import Case
+from simscen.core.events import EventKind
+from simscen.core.navigation import ErrorCode, Goal
+from simscen.core.trace import Trace
+from simscen.criteria.error_codes import code_of
+from simscen.criteria.timeline import GoalOutcome, goal_outcomes, outcome_start
+from simscen.judge.diagnosis.blocked_path import diagnose_blocked_path
+from simscen.judge.diagnosis.objects import MovableObject, movable_objects
+
+NEAR_ROBOT_M = 0.3
+"""Metres from the robot's hull within which a thing may be what holds it."""
+
+
+def diagnose_goal_failure(trace: Trace, case: Case, tick: int) -> tuple[list[str], set[str]]:
+    """Sentences on what is in the way of the goal that is driven to at `tick`; and the events that put it there."""
+    story = _story(trace, case, tick)
+    if story is None:
+        return [], set()
+    goal, there = story.goal, movable_objects(trace, tick)
+    lines, named = [*_walled_in(case, goal), *_held(trace, tick), *_touching(trace, tick)], set[str]()
+    for told, events in (
+        _occupied(trace, case, goal, there),
+        diagnose_blocked_path(trace, case, goal.name, tick, there),
+        _standing_at(trace, case, tick, there),
+    ):
+        if "" in events or not events <= named:  # of what an event brought, one sentence is enough
+            lines += told
+            named |= events
+    return [*(lines or _given_up(trace, story, tick)), *_failed_recoveries(trace, story, tick)], named
+
+
+def _story(trace: Trace, case: Case, tick: int) -> GoalOutcome | None:
+    """What became of the goal that the robot was given last by `tick`, as long as it is wanted."""
+    begun = [story for story in goal_outcomes(trace, case) if outcome_start(story) <= tick]
+    return begun[-1] if begun and not _over(begun[-1], tick) else None
+
+
+def _over(story: GoalOutcome, tick: int) -> bool:
+    """Whether it was reached at `tick`, or canceled before; one that failed has been kept from the robot."""
+    if story.reached is not None:
+        return story.reached <= tick
+    return story.end is not None and story.end.kind == EventKind.GOAL_CANCELED and story.end.tick < tick
+
+
+def _walled_in(case: Case, goal: Goal) -> list[str]:
+    if case.shortest.get(goal.name) != math.inf:
+        return []
+    needed = 2 * case.inscribed_radius
+    narrow = [passage for passage in case.passages if passage.goal == goal.name and passage.width < needed]
+    where = f": the widest is {narrow[0].told}" if narrow else ""
+    return [f"the world itself leaves a robot of {needed:.2f} m no way to goal {goal.name}{where}"]
+
+
+def _held(trace: Trace, tick: int) -> list[str]:
+    """What its own stack says that it waits for; who gives a goal up no longer waits from then on."""
+    last = [
+        event
+        for event in trace.of_kind(EventKind.ROBOT_HELD, EventKind.ROBOT_RELEASED)
+        if event.tick <= tick - (event.kind == EventKind.ROBOT_RELEASED)
+    ][-1:]
+    return [
+        f"its {event.name.replace('_', ' ')} holds it, as it said at t = {trace.seconds(event.tick):.2f} s: "
+        f"{event.data.get('message', '')}"
+        for event in last
+        if event.kind == EventKind.ROBOT_HELD
+    ]
+
+
+def _given_up(trace: Trace, story: GoalOutcome, tick: int) -> list[str]:
+    """What its own stack said when it gave the goal up, and what it had tried."""
+    end = story.end
+    if end is None or end.tick > tick or code_of(end) == ErrorCode.NAVIGATE_TIMEOUT.name:  # that only says when
+        return []
+    message = end.data.get("message")
+    if not message:
+        return []
+    tried = [e.name for e in trace.of_kind(EventKind.RECOVERY_STARTED) if outcome_start(story) <= e.tick <= tick]
+    return [f"it gave up and said: {message}" + (f"; {', '.join(tried)} had not helped" if tried else "")]
+
+
+def _failed_recoveries(trace: Trace, story: GoalOutcome, tick: int) -> list[str]:
+    """Recovery behaviours that came to nothing on the way to this goal, each with its code."""
+    ended = [e for e in trace.of_kind(EventKind.RECOVERY_ENDED) if outcome_start(story) <= e.tick <= tick]
+    failed = Counter(f"{e.name} with {code_of(e)}" for e in ended if e.data.get("outcome") == "failed")
+    told = (what if times == 1 else f"{what} {times} times" for what, times in failed.items())
+    return [f"what it tried failed, too: {', '.join(told)}"] if failed else []
+
+
+def _touching(trace: Trace, tick: int) -> list[str]:
+    """What it has begun to touch and still does."""
+    since: dict[str, int] = {}
+    for event in trace.of_kind(EventKind.COLLISION_STARTED, EventKind.COLLISION_ENDED):
+        if event.tick <= tick and event.kind == EventKind.COLLISION_STARTED:
+            since.setdefault(event.name, event.tick)
+        elif event.tick <= tick:
+            since.pop(event.name, None)
+    return [f"it had touched {name or 'something'} since t = {trace.seconds(at):.2f} s" for name, at in since.items()]
+
+
+def _occupied(trace: Trace, case: Case, goal: Goal, there: list[MovableObject]) -> tuple[list[str], set[str]]:
+    place = np.array([[goal.pose.x, goal.pose.y]])
+    for thing in there:
+        apart = float(thing.distance(place)[0])
+        if apart < case.inscribed_radius:
+            where = "on" if apart == 0 else f"{apart:.2f} m from the middle of"
+            return [f"{thing.told(trace)} stands {where} goal {goal.name}"], {thing.event}
+    return [], set()
+
+
+def _standing_at(trace: Trace, case: Case, tick: int, there: list[MovableObject]) -> tuple[list[str], set[str]]:
+    """The thing nearest to the robot, when it is very near."""
+    if not there or not len(trace.truth):
+        return [], set()
+    place = np.array([trace.place(tick)])
+    apart, thing = min(((float(t.distance(place)[0]) - case.inscribed_radius, t) for t in there), key=lambda p: p[0])
+    if not apart <= NEAR_ROBOT_M:  # nan, too
+        return [], set()
+    return [f"{thing.told(trace)} was {max(apart, 0.0):.2f} m from the robot"], {thing.event}

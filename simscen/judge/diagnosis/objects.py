@@ -1,0 +1,92 @@
+"""What can move: where it stands at a tick, and how it came there."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from simscen.core.events import Event, EventKind
+from simscen.core.geometry import Array, Pose2
+from simscen.core.trace import Trace
+
+
+@dataclass(frozen=True)
+class MovableObject:
+    """Something that can move, at a tick.
+
+    `outlines` (n, 2) are what a robot may touch of it, in the world. `since` is the tick at which the `event` (its
+    name; "" for none) brought it or moved it last, `moved` tells which of both.
+    """
+
+    name: str
+    outlines: tuple[Array, ...]
+    event: str
+    since: int
+    moved: bool
+
+    def told(self, trace: Trace) -> str:
+        """Its name, and how it came there: "crate (spawned by event `crate falls` at t = 1.00 s)"."""
+        if not self.event:
+            return self.name
+        verb = "moved" if self.moved else "spawned"
+        return f"{self.name} ({verb} by event `{self.event}` at t = {trace.seconds(self.since):.2f} s)"
+
+    def distance(self, points: Array) -> Array:
+        """Metres (n,) from points (n, 2) to it; 0 inside."""
+        nearest: Array = np.min([_distance(points, outline) for outline in self.outlines], axis=0)
+        return nearest
+
+
+def movable_objects(trace: Trace, tick: int) -> list[MovableObject]:
+    """All that can move and is there at `tick`, in the order in which it came."""
+    spawned: dict[str, Event] = {}
+    last: dict[str, tuple[str, Event]] = {}
+    doing = ""
+    for event in trace.events:
+        if event.tick > tick:
+            continue
+        match event.kind:
+            case EventKind.EVENT_STARTED:
+                doing = event.name
+            case EventKind.EVENT_ENDED:
+                doing = ""
+            case EventKind.OBJECT_SPAWNED:
+                spawned[event.name], last[event.name] = event, (doing, event)
+            case EventKind.OBJECT_MOVED | EventKind.OBJECT_PLACED:
+                last[event.name] = (doing, event)
+            case EventKind.OBJECT_REMOVED:
+                spawned.pop(event.name, None)
+    return [_thing(trace, tick, event, *last[name]) for name, event in spawned.items() if event.data.get("parts")]
+
+
+def pose_at(trace: Trace, spawned: Event, tick: int) -> Pose2:
+    """Where a thing that was spawned is at `tick`."""
+    x, y, yaw = (spawned.data.get(key) for key in ("x", "y", "yaw"))
+    samples = trace.objects.get(spawned.name)
+    if samples is not None:
+        # The truth of its own tick was taken before it came, and may be that of another thing of its name.
+        now = (samples.ticks > spawned.tick) & (samples.ticks <= tick)
+        if now.any():
+            x, y, yaw = samples.values[now][-1].tolist()
+    assert isinstance(x, int | float) and isinstance(y, int | float) and isinstance(yaw, int | float)
+    return Pose2(float(x), float(y), float(yaw))
+
+
+def _thing(trace: Trace, tick: int, spawned: Event, by: str, last: Event) -> MovableObject:
+    pose, parts = pose_at(trace, spawned, tick), spawned.data["parts"]
+    assert isinstance(parts, list)
+    outlines = tuple(pose.apply(np.array(part, dtype=np.float64)) for part in parts)
+    return MovableObject(spawned.name, outlines, by, last.tick, last.kind != EventKind.OBJECT_SPAWNED)
+
+
+def _distance(points: Array, corners: Array) -> Array:
+    """Metres (n,) from points (n, 2) to a filled polygon (m, 2)."""
+    ends = np.roll(corners, 1, axis=0)
+    step, apart = ends - corners, points[:, None] - corners
+    along, squared = np.sum(apart * step, axis=2), np.sum(step**2, axis=1)
+    along = np.clip(np.divide(along, squared, out=np.zeros_like(along), where=squared > 0), 0.0, 1.0)
+    away: Array = np.linalg.norm(apart - along[:, :, None] * step, axis=2).min(axis=1)
+    y0, y1 = corners[:, 1], ends[:, 1]
+    crosses = (y0 > points[:, 1:]) != (y1 > points[:, 1:])
+    x = corners[:, 0] + (points[:, 1:] - y0) / np.where(y1 == y0, 1.0, y1 - y0) * step[:, 0]
+    inside = np.sum(crosses & (points[:, :1] < x), axis=1) % 2 == 1
+    return np.where(inside, 0.0, away)

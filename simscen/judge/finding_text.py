@@ -1,0 +1,109 @@
+"""How findings are told: one way for the console, JUnit, JSON and pictures."""
+
+from collections.abc import Sequence
+from math import isfinite
+
+from simscen.core.disturbance import Happening
+from simscen.core.verdict import Finding, Status, Verdict
+
+DISTURBANCE = "disturbance"
+"""What the verdicts on events and faults are called that did not happen; the id is the name of the event or fault."""
+ARRIVAL = "goals_reached"
+"""The criterion that looks at how near to a goal the robot stopped."""
+MAX_TIMES_SHOWN = 5
+"""So many times of a disturbance that came again and again are told."""
+_RELATIONS = {"≤ ": ("≤ ", "> "), "≥ ": ("≥ ", "< "), "< ": ("< ", "≥ "), "> ": ("> ", "≤ ")}
+
+
+def comparison(finding: Finding) -> str:
+    """What was measured against what, e.g. "0.84 s > 0.50 s after lidar.off"."""
+    if finding.status in (Status.INCONCLUSIVE, Status.ERROR):
+        return f"{finding.status.value}: {finding.measured}"
+    holds, violated = _RELATIONS.get(finding.limit[:2], ("", ""))
+    if holds:
+        relation = holds if finding.status is Status.PASS else violated
+        return f"{finding.measured} {relation}{finding.limit[2:]}"
+    disturbance_line = finding.status is Status.PASS or not finding.limit
+    return finding.measured if disturbance_line else f"{finding.measured}; expected {finding.limit}"
+
+
+def time_and_place(finding: Finding, tick_rate: int) -> str:
+    """When and where, e.g. "at t = 10.84 s, (2.10, 3.41)"; "" when unknown."""
+    if finding.tick is None:
+        return ""
+    disturbance_times = f"at t = {finding.tick / tick_rate:.2f} s"
+    return (
+        disturbance_times
+        if finding.place is None
+        else f"{disturbance_times}, ({finding.place[0]:.2f}, {finding.place[1]:.2f})"
+    )
+
+
+def subject(verdict: Verdict, finding: Finding) -> str:
+    """The criterion and, where it checks several things, which: "goals_reached: goal shelf"."""
+    if verdict.criterion == DISTURBANCE:  # its id is a name that an author gave, and would read as a criterion
+        return finding.what
+    rest = finding.what.removeprefix(verdict.criterion).removeprefix(":").strip()
+    return f"{verdict.id}: {rest}" if rest else verdict.id
+
+
+def sentence(verdict: Verdict, finding: Finding, tick_rate: int) -> str:
+    """The whole line: "stopped_within: 0.84 s > 0.50 s after lidar.off, at t = 10.84 s, (2.10, 3.41)"."""
+    parts = (f"{subject(verdict, finding)}: {comparison(finding)}", time_and_place(finding, tick_rate))
+    return ", ".join(part for part in parts if part)
+
+
+def disturbance_times(one: Happening, tick_rate: int) -> str:
+    """When an event or fault began, e.g. "t = 10.00 s, 12.50 s and 3 more"; "never"."""
+    times = [f"{tick / tick_rate:.2f} s" for tick in one.fired[:MAX_TIMES_SHOWN]]
+    more = f" and {len(one.fired) - MAX_TIMES_SHOWN} more" if len(one.fired) > MAX_TIMES_SHOWN else ""
+    return f"t = {', '.join(times)}{more}" if times else "never"
+
+
+def disturbance_line(one: Happening, tick_rate: int) -> str:
+    """The whole line: "pallet falls: t = 10.00 s, spawned pallet at (2.00, 2.00)"."""
+    came = (
+        disturbance_times(one, tick_rate) if one.fired else "",
+        one.effect,
+        "" if one.happened else "so it did not happen",
+    )
+    return f"{one.ordered.name}: {', '.join(part for part in came if part)}"
+
+
+def violations(verdict: Verdict) -> tuple[Finding, ...]:
+    """The findings that keep the verdict from passing, in order."""
+    return tuple(finding for finding in verdict.findings if finding.status is not Status.PASS)
+
+
+def tightest_margin(verdicts: Sequence[Verdict]) -> str:
+    """The bound that was nearest to being broken: "path_length +0.14 m, 1 % of its limit"; "" when none has one.
+
+    Numbers of events are left out: that 0 of 0 collisions happened is no news. So is how far from a goal the robot
+    stopped, and how long it stayed: it stops as soon as it is near enough, so that both are always at their limits.
+    """
+    findings = [(v, f) for v in verdicts for f in v.findings if f.status is Status.PASS and not _stopping(v, f)]
+    measured = [(v, f) for v, f in findings if f.unit and f.margin is not None and isfinite(f.margin)]
+    if not measured:
+        return ""
+    verdict, finding = min(measured, key=lambda pair: _slack(pair[1]))
+    margin = f"{subject(verdict, finding)} {finding.margin:+.2f} {finding.unit}".rstrip()
+    return f"{margin}, {100 * _slack(finding):.0f} % of its limit" if _limit(finding) else margin
+
+
+def _stopping(verdict: Verdict, finding: Finding) -> bool:
+    """Whether it is about where a robot stopped and stayed, rather than about how long it took."""
+    return verdict.criterion == ARRIVAL and not (finding.unit == "s" and finding.limit.startswith("≤"))
+
+
+def _slack(finding: Finding) -> float:
+    """The margin as a share of the limit."""
+    margin, limit = finding.margin or 0.0, _limit(finding)
+    return margin / abs(limit) if limit else margin
+
+
+def _limit(finding: Finding) -> float:
+    """What was allowed; 0 also where nobody said what was measured."""
+    if finding.value is None:
+        return 0.0
+    margin, value = finding.margin or 0.0, finding.value
+    return value - margin if finding.limit.startswith(("≥", ">")) else value + margin

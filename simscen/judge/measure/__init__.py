@@ -1,1 +1,0 @@
-"""What is measured of every run and every session."""

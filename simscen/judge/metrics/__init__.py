@@ -1,0 +1,1 @@
+"""Metrics of every run and statistics of a session."""

@@ -1,0 +1,187 @@
+"""Compares stacks that drove the same scenarios with the same seeds, pair by pair."""
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+from simscen.core.chance import Streams
+from simscen.core.comparison import Against, Comparison, Difference, Flip, Outcomes
+from simscen.core.paired import mean_interval, sign_test
+from simscen.core.result import Outcome, RunKey, RunResult
+from simscen.core.verdict import Status
+from simscen.judge.expected_failure import EXPECTED
+from simscen.judge.finding_text import sentence, violations
+from simscen.judge.metrics.catalog import METRICS
+
+COMPARED_METRICS = (
+    *("time_to_goal", "path_length", "min_clearance", "mean_jerk", "time_not_moving", "replans", "recoveries"),
+    "collisions",
+)
+"""The metrics that people choose a stack by, in the order of the table."""
+OUTCOME_INDEPENDENT = frozenset({"collisions"})
+"""Metrics that mean something however far a run came; the others favour whoever gives up early."""
+_SEED = 1
+"""Of the bootstrap: the same runs give the same intervals."""
+
+Pair = tuple[RunResult, RunResult]
+
+
+def compare_stacks(results: Iterable[RunResult], stacks: Sequence[str]) -> Comparison | None:
+    """Each of the `stacks` (NAME=VALUE) against the first; None for fewer than two. The order of results is no matter.
+
+    Second runs, which are there to be equal to the first, do not count.
+    """
+    if len(stacks) < 2:
+        return None
+    given = {name: value for name, _, value in (text.partition("=") for text in stacks)}
+    runs = {one.key: one for one in results if not one.key.repeats and one.outcome is not Outcome.SKIPPED}
+    baseline, *others = given
+    return Comparison(
+        given,
+        {test: _row(test, given, runs) for test in sorted({key.test for key in runs})},
+        tuple(_against(runs, baseline, other) for other in others),
+    )
+
+
+def _row(test: str, stacks: Iterable[str], runs: Mapping[RunKey, RunResult]) -> dict[str, Outcomes]:
+    own = [run for key, run in runs.items() if key.test == test]
+    return {name: _outcomes(run for run in own if run.key.stack_name == name) for name in stacks}
+
+
+def _came_out(run: RunResult) -> Outcome:
+    """How the robot did, whatever its scenario expected."""
+    if run.outcome is Outcome.ERROR:
+        return Outcome.ERROR
+    decisive = [verdict for verdict in run.verdicts if verdict.severity == "fail" and verdict.criterion != EXPECTED]
+    held = bool(run.reason) and all(verdict.status is Status.PASS for verdict in decisive)
+    return Outcome.PASSED if held or run.outcome is Outcome.PASSED else Outcome.FAILED
+
+
+def _outcomes(runs: Iterable[RunResult]) -> Outcomes:
+    count = Counter(_came_out(run) for run in runs)
+    return Outcomes(count[Outcome.PASSED], count[Outcome.FAILED], count[Outcome.ERROR])
+
+
+def _against(runs: Mapping[RunKey, RunResult], baseline: str, other: str) -> Against:
+    first, second = (
+        {(key.test, key.seed): run for key, run in sorted(runs.items()) if key.stack_name == name}
+        for name in (baseline, other)
+    )
+    pairs = [(first[case], second[case]) for case in first if case in second]
+    whole = [pair for pair in pairs if all(run.outcome is not Outcome.ERROR for run in pair)]
+    alike = [(one, two) for one, two in whole if _arrived(one) == _arrived(two)]
+    flips = tuple(flip for pair in whole if (flip := _flip(pair)))
+    won = sum(flip.passed == other for flip in flips)
+    return Against(
+        stack=other,
+        pairs=len(whole),
+        broken=len(pairs) - len(whole),
+        alone=len(first.keys() ^ second.keys()),
+        parted=len(whole) - len(alike),
+        flips=flips,
+        p=sign_test(won, len(flips) - won),
+        differences=tuple(
+            found
+            for name in (*_chosen(whole), *_added(whole))
+            if (found := _difference(name, whole if _kind(name) in OUTCOME_INDEPENDENT else alike)) is not None
+        ),
+    )
+
+
+def _kind(name: str) -> str:
+    """What a metric measures, of whichever robot: `a/collisions` are collisions."""
+    return name.rpartition("/")[2]
+
+
+def _chosen(pairs: Sequence[Pair]) -> list[str]:
+    """The COMPARED metrics, those of each robot together."""
+    names = {name for pair in pairs for run in pair for name in run.metrics if _kind(name) in COMPARED_METRICS}
+    return sorted(names, key=lambda name: (name.rpartition("/")[0], COMPARED_METRICS.index(_kind(name))))
+
+
+def _added(pairs: Sequence[Pair]) -> list[str]:
+    """The metrics that scenarios ask installed packages for."""
+    return sorted({name for pair in pairs for run in pair for name in run.metrics if _kind(name) not in METRICS})
+
+
+def _arrived(run: RunResult) -> set[str]:
+    """The robots that reached their last goals; the only one has no name."""
+    times = {name: value for name, value in run.metrics.items() if _kind(name) == "time_to_goal"}
+    return {name.rpartition("/")[0] for name, value in times.items() if value is not None}
+
+
+def _flip(pair: Pair) -> Flip | None:
+    one, two = pair
+    if _came_out(one) is _came_out(two):
+        return None
+    good, bad = (one, two) if _came_out(one) is Outcome.PASSED else (two, one)
+    return Flip(one.key.test, one.key.seed, good.key.stack_name, bad.key.stack_name, _why(bad))
+
+
+def _why(run: RunResult) -> str:
+    """The first thing that was violated."""
+    told = [
+        sentence(verdict, finding, run.tick_rate)
+        for verdict in run.verdicts
+        if verdict.severity != "warn"
+        for finding in violations(verdict)
+    ]
+    more = f" (and {len(told) - 1} more)" if len(told) > 1 else ""
+    return f"{told[0]}{more}" if told else run.ended
+
+
+def _difference(name: str, pairs: Sequence[Pair]) -> Difference | None:
+    """None where no pair has the metric."""
+    both = [(one.metrics.get(name), two.metrics.get(name)) for one, two in pairs]
+    known = [(one, two) for one, two in both if one is not None and two is not None]
+    if not known:
+        return None
+    differences = [two - one for one, two in known]
+    lower, higher = sum(value < 0 for value in differences), sum(value > 0 for value in differences)
+    return Difference(
+        metric=name,
+        unit=METRICS[_kind(name)].unit if _kind(name) in METRICS else "",
+        pairs=len(known),
+        baseline=sum(one for one, _ in known) / len(known),
+        value=sum(two for _, two in known) / len(known),
+        difference=sum(differences) / len(known),
+        interval=mean_interval(differences, Streams(_SEED).generator(f"comparison.{name}")),
+        lower=lower,
+        equal=len(known) - lower - higher,
+        higher=higher,
+        p=sign_test(higher, lower),
+    )
+
+
+# MERGED: A comparison of stacks as results.json holds it.
+def comparison_data(comparison: Comparison) -> dict[str, Any]:
+    """As plain data: stacks and scenarios as lists in their order."""
+    return {
+        "baseline": comparison.baseline,
+        "stacks": [
+            {"name": name, "given": given, **asdict(comparison.total(name))}
+            for name, given in comparison.stacks.items()
+        ],
+        "scenarios": [
+            {"scenario": scenario, "stacks": {name: asdict(one) for name, one in row.items()}}
+            for scenario, row in comparison.outcomes.items()
+        ],
+        "against": [_against_data(one) for one in comparison.against],
+    }
+
+
+def _against_data(against: Against) -> dict[str, Any]:
+    return {
+        "stack": against.stack,
+        "pairs": against.pairs,
+        "left_out": {"broken_pairs": against.broken, "runs_without_partner": against.alone},
+        "pairs_of_which_one_arrived": against.parted,
+        "flips": [asdict(flip) for flip in against.flips],
+        "flips_p": against.p,
+        "differences": [_difference_data(one) for one in against.differences],
+    }
+
+
+def _difference_data(one: Difference) -> dict[str, Any]:
+    return {**asdict(one), "interval": None if one.interval is None else list(one.interval)}

@@ -1,0 +1,161 @@
+"""result.json: the result of a run as plain data and back; no wall clock, host or process in it."""
+
+import json
+import math
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from simscen.core.disturbance import Disturbance, Happening
+from simscen.core.result import Outcome, RunFailure, RunKey, RunResult
+from simscen.core.verdict import Finding, Status, Verdict
+from simscen.judge.finding_text import sentence
+
+FORMAT = 2
+
+
+def to_json(result: RunResult) -> str:
+    """Sorted, indented, with a newline at the end: the same result gives the same bytes."""
+    return json.dumps(result_data(result), sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def result_data(result: RunResult) -> dict[str, Any]:
+    """The same as plain data, for results.json and others that hold several."""
+    lines = result.lines or (0,) * len(result.verdicts)
+    error = result.error
+    return {
+        "format": FORMAT,
+        "scenario": result.key.scenario,
+        "seed": result.key.seed,
+        "variation": result.key.variation,
+        "stack_name": result.key.stack_name,
+        "path": result.path,
+        "stack": result.stack,
+        "reason": result.reason,
+        "outcome": result.outcome.value,
+        "ended": result.ended,
+        "simulated_seconds": result.simulated,
+        "tick_rate": result.tick_rate,
+        "again": result.again,
+        "events": dict(result.events),
+        "disturbances": [_happening_data(one, result.tick_rate) for one in result.disturbances],
+        "metrics": {name: number(value) for name, value in result.metrics.items()},
+        "undefined": dict(result.undefined),
+        "verdicts": [verdict_data(v, line, result.tick_rate) for v, line in zip(result.verdicts, lines, strict=True)],
+        "error": None if error is None else {"kind": error.kind, "message": error.message, "tail": error.tail},
+    }
+
+
+def from_json(text: str) -> RunResult:
+    """The result that `to_json` wrote. Raises ValueError when it is none, or one of another format."""
+    try:
+        return from_data(json.loads(text))
+    except (KeyError, TypeError) as error:
+        raise ValueError(f"not a result of a run: {error!r}") from error
+
+
+def read_result(path: Path) -> RunResult:
+    """Read a result.json. Raises OSError or ValueError."""
+    return from_json(path.read_text(encoding="utf-8"))
+
+
+def from_data(data: dict[str, Any]) -> RunResult:
+    """The result that `as_data` described."""
+    if data["format"] != FORMAT:
+        raise ValueError(f"a result of format {data['format']}; this version reads {FORMAT}")
+    return RunResult(
+        key=read_key(data),
+        path=data["path"],
+        outcome=Outcome(data["outcome"]),
+        verdicts=tuple(read_verdict(verdict) for verdict in data["verdicts"]),
+        lines=tuple(verdict["line"] for verdict in data["verdicts"]),
+        metrics=data["metrics"],
+        undefined=data["undefined"],
+        events=data["events"],
+        disturbances=tuple(_read_happening(one) for one in data["disturbances"]),
+        ended=data["ended"],
+        simulated=data["simulated_seconds"],
+        tick_rate=data["tick_rate"],
+        error=None if data["error"] is None else RunFailure(**data["error"]),
+        stack=data.get("stack", ""),  # older ones knew no other than the scenario's own
+        reason=data.get("reason", ""),
+    )
+
+
+def read_key(data: dict[str, Any]) -> RunKey:
+    """The key of the run that plain data describes; what simscen 0.1 called its variation was the stack."""
+    variation, stack_name = (data["variation"], data["stack_name"]) if "stack_name" in data else ("", data["variation"])
+    return RunKey(data["scenario"], data["seed"], variation, stack_name)
+
+
+def _happening_data(one: Happening, tick_rate: int) -> dict[str, Any]:
+    return {
+        **asdict(one.ordered),
+        "fired": list(one.fired),
+        "times": [tick / tick_rate for tick in one.fired],
+        "happened": one.happened,
+        "effect": one.effect,
+        "tick": one.tick,
+    }
+
+
+def _read_happening(data: dict[str, Any]) -> Happening:
+    ordered = Disturbance(data["name"], data["kind"], data["when"], data["required"], data["line"])
+    return Happening(ordered, tuple(data["fired"]), data["happened"], data["effect"], data["tick"])
+
+
+# MERGED: Verdicts as plain data that JSON can hold, and back.
+def verdict_data(verdict: Verdict, line: int, tick_rate: int) -> dict[str, Any]:
+    """A verdict with all its findings. `line` is where the criterion is written; 0 = unknown."""
+    return {
+        "criterion": verdict.criterion,
+        "id": verdict.id,
+        "severity": verdict.severity,
+        "status": verdict.status.value,
+        "line": line,
+        "findings": [_finding_data(verdict, finding, tick_rate) for finding in verdict.findings],
+    }
+
+
+def read_verdict(data: dict[str, Any]) -> Verdict:
+    """The verdict that `verdict_data` described. Raises KeyError or ValueError when it is none."""
+    findings = tuple(_read_finding(finding) for finding in data["findings"])
+    return Verdict(data["criterion"], data["id"], data["severity"], findings)
+
+
+def number(value: float | None) -> float | None:
+    """JSON knows neither nan nor infinity."""
+    return value if value is not None and math.isfinite(value) else None
+
+
+def _finding_data(verdict: Verdict, finding: Finding, tick_rate: int) -> dict[str, Any]:
+    return {
+        "status": finding.status.value,
+        "what": finding.what,
+        "measured": finding.measured,
+        "limit": finding.limit,
+        "margin": number(finding.margin),
+        "value": number(finding.value),
+        "unit": finding.unit,
+        "tick": finding.tick,
+        "time": None if finding.tick is None else finding.tick / tick_rate,
+        "place": None if finding.place is None else list(finding.place),
+        "detail": list(finding.detail),
+        "message": sentence(verdict, finding, tick_rate),
+    }
+
+
+def _read_finding(data: dict[str, Any]) -> Finding:
+    place = data["place"]
+    return Finding(
+        status=Status(data["status"]),
+        what=data["what"],
+        measured=data["measured"],
+        limit=data["limit"],
+        margin=data["margin"],
+        unit=data["unit"],
+        value=data["value"],
+        tick=data["tick"],
+        place=None if place is None else (place[0], place[1]),
+        detail=tuple(data["detail"]),
+    )
