@@ -14,7 +14,7 @@ LOWEST_TESTS := tests/diagnostics tests/cases $(addprefix tests/unit/,cli loadin
 
 ROS := .venv-ros
 
-.PHONY: help setup run test test-lowest test-long test-ros served library planners check lint types layers schemas docs site mutation screenshots bench campaign fuzz build clean
+.PHONY: help setup run test test-lowest test-all test-ros served library planners check lint types layers schemas docs site mutation screenshots bench campaign fuzz build clean
 
 help:  ## Print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -39,11 +39,12 @@ run: setup  ## Run the scenarios that ship
 test: setup  ## Run everything CI runs: checks, then the tests with the types beside them
 	@$(BIN)/python tests/ros/rig.py $(ROS) & $(MAKE) --no-print-directory lint layers schemas; failed=$$?; wait; exit $$failed
 	@$(MAKE) --no-print-directory types > $(VENV)/types.log 2>&1 & types=$$!; \
-	$(BIN)/python -m pytest -m "not long"; failed=$$?; \
+	$(BIN)/python -m pytest -m "not slow"; failed=$$?; \
 	wait $$types || failed=1; cat $(VENV)/types.log; exit $$failed
 
-test-long: setup  ## Run the tests that `make test` leaves out because they take long
-	@$(BIN)/python -m pytest -m long
+test-all: setup  ## Run all tests, also the slow ones that `make test` skips
+	@$(BIN)/python tests/ros/rig.py $(ROS)
+	@$(BIN)/python -m pytest
 
 test-ros: setup  ## Test with a real ROS 2 (rclpy on Fast DDS, from wheels into .venv-ros)
 	@$(BIN)/python tests/ros/rig.py $(ROS)

@@ -91,7 +91,7 @@ def test_a_failure_is_annotated_summed_up_with_its_picture_and_kept(action, tmp_
     assert "secret-token" not in ran.printed + ran.summary
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_wrong_file_fails_the_job_without_reports(action, tmp_path: Path) -> None:
     (tmp_path / "work/scenarios/wrong.scenario.yaml").write_text(ROOM.replace("goals", "gaols"))
     ran = action(artifact="")

@@ -62,7 +62,7 @@ def test_the_harder_one_fails_by_the_tight_bound_alone_and_leaves_all_that_the_p
     assert called("judge", str(log), "--scenario", str(file))[0] == 0
 
 
-@pytest.mark.parametrize("page", ["python", pytest.param("several-robots", marks=pytest.mark.long)])
+@pytest.mark.parametrize("page", ["python", pytest.param("several-robots", marks=pytest.mark.slow)])
 def test_the_example_in_python_runs(page: str, clone: Path) -> None:
     shutil.copytree(ROOT / "scenarios", "scenarios", dirs_exist_ok=True)
     text = (ROOT / f"docs/guides/{page}.md").read_text(encoding="utf-8")

@@ -55,22 +55,22 @@ def test_topics_types_qos_and_frames_are_what_nav2_asks_for(with_interfaces, run
                 "deaf to scans": "/flawed hears nothing of /scan: it asks for durability transient local, which",
                 "another odometry": "/flawed publishes /odom, too: leave that node out, or tell simscen to: --without",
             },
-            marks=pytest.mark.long,
+            marks=pytest.mark.slow,
         ),
         pytest.param(
             {
                 "command type": "/flawed publishes /cmd_vel as geometry_msgs/msg/Vector3, not geometry_msgs/msg/Twist",
                 "no sensors": "nobody subscribes to any sensor: /",
             },
-            marks=pytest.mark.long,
+            marks=pytest.mark.slow,
         ),
         pytest.param(
             {"two commands": "/cmd_vel is published both as Twist and as TwistStamped: /flawed (geometry_msgs/"},
-            marks=pytest.mark.long,
+            marks=pytest.mark.slow,
         ),
         pytest.param(
             {"another map frame": "/amcl_pose comes in the frame 'world'; simscen's map frame is 'map'"},
-            marks=pytest.mark.long,
+            marks=pytest.mark.slow,
         ),
     ],
     ids=", ".join,

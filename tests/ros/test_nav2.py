@@ -17,12 +17,12 @@ def test_servers_that_become_active_with_time_are_warmed_up_and_driven_by_their_
 @pytest.mark.parametrize(
     ("misfit", "message"),
     [
-        pytest.param("planner_server", "there is no node planner_server", marks=pytest.mark.long),
+        pytest.param("planner_server", "there is no node planner_server", marks=pytest.mark.slow),
         (
             "frame",
             "amcl: base_frame_id is 'base_footprint'; simscen's base frame is 'base_link': --base-frame",
         ),
-        pytest.param("", "the lifecycle node /amcl is unconfigured, not active", marks=pytest.mark.long),
+        pytest.param("", "the lifecycle node /amcl is unconfigured, not active", marks=pytest.mark.slow),
     ],
     ids=["a node", "a parameter", "a state"],
 )

@@ -15,15 +15,15 @@ from simscen.record.replay import read_run
 ROOT = Path(__file__).parents[2]
 NODES = Path(__file__).with_name("nodes")
 SCENARIOS = [
-    pytest.param("navigation/goal", marks=pytest.mark.long),
-    pytest.param("navigation/patrol", marks=pytest.mark.long),
-    pytest.param("obstacles/pallet_on_plan", marks=pytest.mark.long),
+    pytest.param("navigation/goal", marks=pytest.mark.slow),
+    pytest.param("navigation/patrol", marks=pytest.mark.slow),
+    pytest.param("obstacles/pallet_on_plan", marks=pytest.mark.slow),
 ]
 
 
 def left_out(value: str) -> object:
     """One of several values that `make test` leaves to `make test-ros`."""
-    return pytest.param(value, marks=pytest.mark.long)
+    return pytest.param(value, marks=pytest.mark.slow)
 
 
 def digest(log: Path) -> str:
@@ -44,7 +44,7 @@ def alive(word: str, program: str = "") -> list[int]:
     return sorted(found)
 
 
-@pytest.mark.parametrize("stamped", [pytest.param(False, marks=pytest.mark.long), True], ids=["Twist", "TwistStamped"])
+@pytest.mark.parametrize("stamped", [pytest.param(False, marks=pytest.mark.slow), True], ids=["Twist", "TwistStamped"])
 def test_it_reaches_a_goal_by_goal_pose_in_a_namespace_with_remappings(ros, run, stamped: bool) -> None:
     names = ["-r", "__ns:=/robot1", "-r", "/tf:=tf", "-r", "/tf_static:=tf_static", "-r", "scan:=/front/scan"]
     words = ["--namespace", "robot1", "--remap", "/scan:=/front/scan"]
@@ -81,7 +81,7 @@ WAY = "goals: [{name: way, pose: {x: 1.8, y: 1}%s}, {name: end, pose: {x: 2.4, y
 TOURS = {"navigate_through_poses": WAY % "", "follow_waypoints": WAY % ", on_reached: {wait: 1 s}"}
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["navigate_through_poses", "follow_waypoints"])
 def test_the_scenario_says_by_which_action_goals_go(with_interfaces, run, tmp_path: Path, mode: str) -> None:
     head = "simscen: 1\nworld: room.world.yaml\nrobot: {pose: start}\ntime_limit: 90\n"
@@ -99,7 +99,7 @@ def test_the_scenario_says_by_which_action_goals_go(with_interfaces, run, tmp_pa
     ]
 
 
-@pytest.mark.parametrize("repeats", [2, pytest.param(20, marks=pytest.mark.long)])
+@pytest.mark.parametrize("repeats", [2, pytest.param(20, marks=pytest.mark.slow)])
 def test_runs_in_lockstep_are_equal_bit_for_bit_two_at_a_time(ros, run, repeats: int) -> None:
     """Two at a time: neither do they hear each other."""
     with ThreadPoolExecutor(2) as pool:
@@ -113,7 +113,7 @@ def test_runs_in_lockstep_are_equal_bit_for_bit_two_at_a_time(ros, run, repeats:
     assert told == [told[0]] * repeats
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_paced_runs_say_so(ros, run) -> None:
     words = ["--sync", "paced", "--factor", "4", "--launch", ros.node("navigator")]
     ended = run(*words, scenario="short.scenario.yaml")
@@ -140,7 +140,7 @@ def test_killing_the_node_is_an_error_of_that_run_only_and_nothing_is_left(ros, 
     assert alive(tag) == []
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_ros_without_tf2_msgs_and_nav2_msgs_is_driven_by_goal_pose(ros, run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PYTHONPATH", str(NODES.with_name("without")))
     ended = run("--launch", ros.node("navigator"), scenario="short.scenario.yaml")

@@ -16,7 +16,7 @@ COMMANDS = re.findall(r"^\$ (simscen .*)$", PAGE, re.MULTILINE)
 
 @pytest.mark.parametrize(
     "command",
-    [COMMANDS[0], pytest.param(COMMANDS[1], marks=pytest.mark.long)],
+    [COMMANDS[0], pytest.param(COMMANDS[1], marks=pytest.mark.slow)],
     ids=["once", "twice"],
 )
 def test_a_command_of_the_tutorial_does_what_it_says(ros, tmp_path: Path, command: str) -> None:
@@ -42,7 +42,7 @@ def test_a_command_of_the_tutorial_does_what_it_says(ros, tmp_path: Path, comman
         pytest.param(
             ('"scan"', '"front"'),
             "nobody subscribes to /scan; /drive waits for /front (sensor_msgs/msg/LaserScan), which",
-            marks=pytest.mark.long,
+            marks=pytest.mark.slow,
         ),
     ],
     ids=["nobody drives", "another name"],

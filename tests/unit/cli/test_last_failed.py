@@ -47,7 +47,7 @@ def test_only_what_failed_runs_again_until_nothing_is_left(simscen, project: Pat
     assert ran(project) == [("a", 1, "passed")]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_failed_run_keeps_its_seed(simscen, project: Path) -> None:
     simscen("run", "b.scenario.yaml", "--repeat", "2", "--seed", "7")
     simscen("run", "b.scenario.yaml", "--lf")
@@ -56,7 +56,7 @@ def test_a_failed_run_keeps_its_seed(simscen, project: Path) -> None:
     assert ran(project) == [("b", 8, "failed")]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_sessions_are_looked_for_beside_the_output_folder(simscen, project: Path) -> None:
     simscen("run", "a.scenario.yaml", "--out", "ci/1")
     ended = simscen("run", "a.scenario.yaml", "--out", "ci/2", "--lf")

@@ -75,7 +75,7 @@ def test_each_scenario_runs_with_each_stack_and_seed_in_a_folder_and_case_of_its
     assert "type: dwb" in texts["dwb"]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_report_from_the_journal_compares_as_the_session_did(simscen, project: Path) -> None:
     assert simscen("run", ".", *BOTH, "--repeat", "2", "--out", "out").code == 0
     before = {name: (project / "out" / name).read_bytes() for name in ("results.json", "junit.xml", "report.html")}
@@ -111,7 +111,7 @@ def test_the_command_that_repeats_a_run_repeats_it_with_its_stack(simscen, proje
     assert text == (project / "out/runs/a/seed-7-dwb/scenario.yaml").read_text()
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_run_that_is_repeated_agrees_with_the_one_of_several_stacks(simscen, project: Path) -> None:
     """The command that repeats it gives one stack, which needs no label."""
     assert simscen("run", "a.scenario.yaml", *BOTH, "--out", "out").code == 0
@@ -171,7 +171,7 @@ def test_resume_runs_what_a_changed_stack_file_asks_anew_and_keeps_the_other_sta
     assert after["dwb"] > before["dwb"]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_keywords_and_shards_choose_scenarios_so_that_pairs_stay_whole(simscen, project: Path) -> None:
     assert simscen("run", ".", *BOTH, "--shard", "2/2", "--out", "shard").code == 0
     assert runs(project / "shard") == ["b/seed-1-dwb", "b/seed-1-ref"]

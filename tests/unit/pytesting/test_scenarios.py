@@ -126,7 +126,7 @@ def test_runs_pass_fail_with_simscens_own_words_are_skipped_and_expected_to_fail
     assert {one.get("name") for one in cases["good"].iter("property")} >= {"seed", "log", "again"}
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_workers_leave_all_in_one_folder_and_what_failed_is_known(run, project: Path) -> None:
     code, told = run("--simscen", "-n2", "scenarios", "-k", "good or bad")
     assert code == 1, told
@@ -141,7 +141,7 @@ def test_workers_leave_all_in_one_folder_and_what_failed_is_known(run, project: 
     ("ini", "arguments", "why"),
     [
         ("", ("--simscen-stack", "nothing"), "cannot read --stack nothing"),
-        pytest.param("simscen_seed = seven", (), "simscen_seed: 'seven' is not a whole", marks=pytest.mark.long),
+        pytest.param("simscen_seed = seven", (), "simscen_seed: 'seven' is not a whole", marks=pytest.mark.slow),
     ],
 )
 def test_a_stack_and_a_seed_that_cannot_be_are_told_in_words(run, project: Path, ini: str, arguments, why: str) -> None:

@@ -226,10 +226,10 @@ def changed(other: Other) -> Iterator[tuple[int, ControllerSpec]]:
 
 OTHERS = [other for spec in STARTS for other in fields(spec, spec)]
 CASES = [
-    pytest.param(other, id=str(other), marks=[pytest.mark.long] if number % 3 else [])
+    pytest.param(other, id=str(other), marks=[pytest.mark.slow] if number % 3 else [])
     for number, other in enumerate(OTHERS)
 ]
-"""Every third is tried by `make test`, the others by `make test-long`."""
+"""Every third is tried by `make test`, the others by `make test-all`."""
 
 
 @pytest.mark.parametrize("other", CASES)

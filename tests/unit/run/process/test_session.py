@@ -143,7 +143,7 @@ def test_a_preparation_that_hangs_in_c_is_a_timeout_with_its_stack(session, monk
     assert answers["fine"].outcome is Outcome.PASSED
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_warm_process_that_is_stopped_is_replaced(session, monkeypatch):
     monkeypatch.setattr(supervisor, "SILENCE", 2.0)
     answers, _ = session("stop-parent", "fine")
