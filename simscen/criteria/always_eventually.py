@@ -26,7 +26,7 @@ class WindowedCriterion(Windowed, TemporalCriterion):
         return list(self.comparisons())
 
     @property
-    def condition(self) -> float:
+    def horizon(self) -> float:
         """How much of the run it needs: all of its stretch, or the first moment of it."""
         return condition.window_horizon(self.operator, self, self)
 

@@ -32,7 +32,7 @@ def at_most(
 ) -> Finding:
     """Holds when `value` <= `limit`; `at` is where it was tightest, `context` follows the limit ("after lidar.off").
 
-    Raises BrokenTrace when `value` is nan: a comparison with nan is false either way, which could pass for a verdict.
+    Raises InvalidTrace when `value` is nan: a comparison with nan is false either way, which could pass for a verdict.
     """
     return _bound(what, value, limit, unit, limit - value, "≤", at, context, detail)
 

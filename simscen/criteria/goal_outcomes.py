@@ -1,35 +1,160 @@
-"""How near a robot came to a pose that it was to pass on its way."""
+"""What became of each goal of a run, as the robot reported it."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from simscen.core.events import Event, EventKind
+from simscen.core.goalnames import FAILED
+from simscen.core.navigation import Goal
+from simscen.criteria.error_codes import code_of
 from simscen.criteria.trace_signals.ground_truth import truth
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
+    from simscen.core.case import Case
     from simscen.core.trace import Trace
-    from simscen.criteria.timeline import GoalOutcome
+
+_ARRIVED = (EventKind.GOAL_REACHED, EventKind.GOAL_PASSED)
+_GOAL_ENDS = (*_ARRIVED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED)
 
 
-def closest_approach(trace: Trace, story: GoalOutcome, told: Sequence[GoalOutcome]) -> tuple[int, float]:
-    """The tick at which the robot was truly nearest to the pose, and how near (m), in the drive that it belongs to.
+@dataclass(frozen=True)
+class GoalOutcome:
+    """When the robot accepted a goal (tick), and the event that ended it; None for what was never reported.
 
-    It says that it has passed a pose when it comes near enough, and comes nearer still: what counts is the drive as a
-    whole, from when it began with this pose to the end of the goal that it stops at.
+    `failure` is the expected failure: "failed", or the name of an error code; "" for a goal that must be reached.
     """
-    later = told[told.index(story) :]
+
+    goal: Goal
+    accepted: int | None
+    end: Event | None
+    failure: str = ""
+
+    @property
+    def reached(self) -> int | None:
+        """The tick at which the robot reported the goal reached or passed."""
+        return self.end.tick if self.end is not None and self.end.kind in _ARRIVED else None
+
+    @property
+    def must_be_reached(self) -> bool:
+        """True unless the goal was preempted or is expected to fail."""
+        return not self.preempted and not self.failure
+
+    @property
+    def failed_as_expected(self) -> bool:
+        """True if the goal failed with the expected error code."""
+        if self.end is None or self.end.kind != EventKind.GOAL_FAILED:
+            return False
+        return self.failure in (FAILED, code_of(self.end))
+
+    @property
+    def preempted(self) -> bool:
+        """True if another goal was sent before this one was reached; Nav2 drops a goal then."""
+        return self.end is not None and bool(self.end.data.get("preempted_by"))
+
+    @property
+    def summary(self) -> str:
+        """The outcome in words."""
+        if self.end is None:
+            return "never accepted" if self.accepted is None else "still under way"
+        if self.preempted:
+            return f"preempted by {self.end.data['preempted_by']}"
+        code = self.end.data.get("error_name") or self.end.data.get("error_code")
+        return self.end.kind.removeprefix("goal.") + (f" with {code}" if code else "")
+
+
+def goal_outcomes(trace: Trace, case: Case) -> list[GoalOutcome]:
+    """Return the outcome of each goal of the scenario and of each goal that an event sent, by time of acceptance.
+
+    The k-th goal with a name is matched with the k-th one reported under that name. A goal of the scenario that was
+    never accepted comes last; a goal that no event sent is left out. A via pose without reports of its own takes the
+    outcome of the goal at which its drive stops, because Nav2's action status reports no more.
+    """
+    reports = _reports(trace)
+    earlier = _earlier_uses([goal.name for goal in case.goals])
+    found = [
+        GoalOutcome(goal, *_nth(reports.get(goal.name, []), earlier[k]), case.expected.get(goal.name, ""))
+        for k, goal in enumerate(case.goals)
+    ]
+    found = [_with_outcome_of_drive(outcome, found[k + 1 :], reports) for k, outcome in enumerate(found)]
+    for goal in case.sent:
+        own = reports.get(goal.name, [])
+        # One sent goal may preempt several poses of one drive, all at the same tick.
+        preempting = {event.tick for event in trace.events if event.data.get("preempted_by") == goal.name}
+        sent = max(len(own), len(preempting))
+        found += [GoalOutcome(goal, *_nth(own, k)) for k in range(sent)]
+    return sorted(found, key=outcome_start)
+
+
+def outcome_start(outcome: GoalOutcome) -> float:
+    """Return the tick at which the robot accepted the goal, or first reported on it; inf if it never did."""
+    if outcome.accepted is not None:
+        return outcome.accepted
+    return math.inf if outcome.end is None else outcome.end.tick
+
+
+def closest_approach(trace: Trace, outcome: GoalOutcome, outcomes: Sequence[GoalOutcome]) -> tuple[int, float]:
+    """Return the tick at which the robot was truly nearest to a via pose during its drive, and the distance in meters.
+
+    The stack reports a via pose as passed once it is near enough, and may come nearer afterwards. The whole drive
+    counts: from the acceptance of this pose to the end of the goal at which the drive stops.
+    """
+    later = outcomes[outcomes.index(outcome) :]
     stop = next((each for each in later if not each.goal.via), None)
     last = trace.end if stop is None or stop.end is None else stop.end.tick
     poses = truth(trace)
-    first = 0 if story.accepted is None else story.accepted
+    first = 0 if outcome.accepted is None else outcome.accepted
     inside = (poses.ticks >= first) & (poses.ticks <= last)
     if not inside.any():
         inside = np.ones(len(poses.ticks), dtype=bool)
-    x, y = story.goal.pose.x, story.goal.pose.y
-    apart = np.hypot(poses.values[inside, 0] - x, poses.values[inside, 1] - y)
-    k = int(np.argmin(apart))
-    return int(poses.ticks[inside][k]), float(apart[k])
+    x, y = outcome.goal.pose.x, outcome.goal.pose.y
+    distances = np.hypot(poses.values[inside, 0] - x, poses.values[inside, 1] - y)
+    k = int(np.argmin(distances))
+    return int(poses.ticks[inside][k]), float(distances[k])
+
+
+def _with_outcome_of_drive(
+    outcome: GoalOutcome, later: list[GoalOutcome], reports: Mapping[str, list[_Report]]
+) -> GoalOutcome:
+    stop = next((each for each in later if not each.goal.via), None)
+    if not outcome.goal.via or outcome.goal.name in reports or stop is None or stop.end is None:
+        return outcome
+    kind = EventKind.GOAL_PASSED if stop.reached is not None else stop.end.kind
+    return replace(outcome, accepted=stop.accepted, end=replace(stop.end, kind=kind, name=outcome.goal.name))
+
+
+def _earlier_uses(names: list[str]) -> list[int]:
+    """Return, for each name, how often it occurs before."""
+    seen: dict[str, int] = {}
+    counts = []
+    for name in names:
+        counts.append(seen.get(name, 0))
+        seen[name] = counts[-1] + 1
+    return counts
+
+
+_Report = tuple[int | None, Event | None]
+"""Tick at which a goal was accepted, and the event that ended it."""
+
+
+def _reports(trace: Trace) -> dict[str, list[_Report]]:
+    """Return the reports on goals by name, in order."""
+    found: dict[str, list[_Report]] = {}
+    for event in trace.of_kind(EventKind.GOAL_ACCEPTED, *_GOAL_ENDS):
+        reports = found.setdefault(event.name, [])
+        if event.kind == EventKind.GOAL_ACCEPTED:
+            reports.append((event.tick, None))
+        elif reports and reports[-1][1] is None:
+            reports[-1] = (reports[-1][0], event)
+        else:
+            reports.append((None, event))
+    return found
+
+
+def _nth(reports: list[_Report], k: int) -> _Report:
+    return reports[k] if k < len(reports) else (None, None)

@@ -13,8 +13,8 @@ from simscen.core.goalnames import FAILED, named
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_least, at_most, held, missed, undecided
-from simscen.criteria.goal_outcomes import closest_approach
-from simscen.criteria.timeline import GoalOutcome, end_reason, goal_outcomes, has_ended, outcome_start
+from simscen.criteria.goal_outcomes import GoalOutcome, closest_approach, goal_outcomes, outcome_start
+from simscen.criteria.timeline import end_reason, has_ended
 from simscen.criteria.trace_signals.ground_truth import check_samples, true_pose
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveAngle, PositiveDuration, PositiveLength
@@ -59,24 +59,24 @@ class GoalsReached(Spec, Criterion):
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Distance, heading and, if asked for, time of each goal; one finding for a goal that was not reached."""
         told = goal_outcomes(trace, case)
-        chosen = [story for story in told if any(named(story.goal.name, name) for name in self.goals or (None,))]
-        findings = self._untold(trace, case, {story.goal.name for story in chosen})
+        chosen = [outcome for outcome in told if any(named(outcome.goal.name, name) for name in self.goals or (None,))]
+        findings = self._untold(trace, case, {outcome.goal.name for outcome in chosen})
         if not chosen and not findings:
             return [undecided("goals_reached", "the scenario has no goals", "reached")]
-        for story in chosen:
-            if story.failure and not story.preempted:
-                findings.append(_failed(trace, story))
-            elif story.reached is None:
-                findings.append(self._missing(trace, story))
+        for outcome in chosen:
+            if outcome.failure and not outcome.preempted:
+                findings.append(_failed(trace, outcome))
+            elif outcome.reached is None:
+                findings.append(self._missing(trace, outcome))
             else:
-                findings += self._passed(trace, story, told) if story.goal.via else self._reached(trace, story)
-                findings += _waited(trace, case, story, told)
-        if self.goals is None and all(story.preempted for story in chosen):
+                findings += self._passed(trace, outcome, told) if outcome.goal.via else self._reached(trace, outcome)
+                findings += _waited(trace, case, outcome, told)
+        if self.goals is None and all(outcome.preempted for outcome in chosen):
             findings.append(undecided("goals_reached", "every goal was preempted", "reached"))
         return findings
 
     def _untold(self, trace: Trace, case: Case, told: set[str]) -> list[Finding]:
-        """What there is to say of goals that are asked for by name and have no story."""
+        """What there is to say of goals that are asked for by name and have no outcome."""
         names = [goal.name for goal in case.every_goal]
         findings = []
         for name in dict.fromkeys(self.goals or ()):
@@ -88,19 +88,19 @@ class GoalsReached(Spec, Criterion):
                 findings.append(tell(f"goal {name}", "never sent", "reached"))
         return findings
 
-    def _missing(self, trace: Trace, story: GoalOutcome) -> Finding:
-        if not story.preempted:
-            return _not_reached(trace, story)
-        assert story.end is not None
+    def _missing(self, trace: Trace, outcome: GoalOutcome) -> Finding:
+        if not outcome.preempted:
+            return _not_reached(trace, outcome)
+        assert outcome.end is not None
         if self.goals is None:
-            return held(f"goal {story.goal.name}", story.fate, "reached", (trace, story.end.tick))
-        return undecided(f"goal {story.goal.name}", story.fate, "reached")
+            return held(f"goal {outcome.goal.name}", outcome.summary, "reached", (trace, outcome.end.tick))
+        return undecided(f"goal {outcome.goal.name}", outcome.summary, "reached")
 
-    def _reached(self, trace: Trace, story: GoalOutcome) -> list[Finding]:
-        goal, tick = story.goal, story.reached
+    def _reached(self, trace: Trace, outcome: GoalOutcome) -> list[Finding]:
+        goal, tick = outcome.goal, outcome.reached
         assert tick is not None
         what, pose = f"goal {goal.name}", true_pose(trace, tick)
-        believed = _believed(trace, story)
+        believed = _believed(trace, outcome)
         findings = [
             at_most(
                 what,
@@ -122,65 +122,65 @@ class GoalsReached(Spec, Criterion):
             ),
         ]
         if self.within is not None:
-            findings.append(self._time(trace, story, self.within))
+            findings.append(self._time(trace, outcome, self.within))
         return findings
 
-    def _passed(self, trace: Trace, story: GoalOutcome, told: list[GoalOutcome]) -> list[Finding]:
+    def _passed(self, trace: Trace, outcome: GoalOutcome, told: list[GoalOutcome]) -> list[Finding]:
         """Of a pose that is passed on the way the heading is free, and how near the robot came to it at all counts."""
-        tick, apart = closest_approach(trace, story, told)
-        limit, context = self.tolerance or story.goal.xy_tolerance, "from the pose where it came nearest to it"
-        findings = [at_most(f"goal {story.goal.name}", apart, limit, "m", at=(trace, tick), context=context)]
+        tick, apart = closest_approach(trace, outcome, told)
+        limit, context = self.tolerance or outcome.goal.xy_tolerance, "from the pose where it came nearest to it"
+        findings = [at_most(f"goal {outcome.goal.name}", apart, limit, "m", at=(trace, tick), context=context)]
         if self.within is not None:
-            findings.append(self._time(trace, story, self.within))
+            findings.append(self._time(trace, outcome, self.within))
         return findings
 
-    def _time(self, trace: Trace, story: GoalOutcome, within: float) -> Finding:
-        what = f"goal {story.goal.name} time"
-        if story.accepted is None or story.reached is None:
+    def _time(self, trace: Trace, outcome: GoalOutcome, within: float) -> Finding:
+        what = f"goal {outcome.goal.name} time"
+        if outcome.accepted is None or outcome.reached is None:
             return undecided(what, "when it was accepted was not recorded", f"≤ {within:.2f} s")
-        taken = trace.seconds(story.reached - story.accepted)
-        return at_most(what, taken, within, "s", at=(trace, story.reached))
+        taken = trace.seconds(outcome.reached - outcome.accepted)
+        return at_most(what, taken, within, "s", at=(trace, outcome.reached))
 
 
-def _failed(trace: Trace, story: GoalOutcome) -> Finding:
+def _failed(trace: Trace, outcome: GoalOutcome) -> Finding:
     """Of a goal at which the robot is to fail: whether it did, and with the code that is asked for."""
-    what, expected = f"goal {story.goal.name}", _expected(story)
-    if story.end is None and not has_ended(trace):
-        return undecided(what, f"the log stops at t = {trace.seconds(trace.end):.2f} s, {story.fate}", expected)
-    at = (trace, trace.end if story.end is None else story.end.tick)
-    on_the_way = story.goal.via and story.reached is not None  # it may come past some poses before it fails
-    return (held if story.failed_as_expected or on_the_way else missed)(what, story.fate, expected, at)
+    what, expected = f"goal {outcome.goal.name}", _expected(outcome)
+    if outcome.end is None and not has_ended(trace):
+        return undecided(what, f"the log stops at t = {trace.seconds(trace.end):.2f} s, {outcome.summary}", expected)
+    at = (trace, trace.end if outcome.end is None else outcome.end.tick)
+    on_the_way = outcome.goal.via and outcome.reached is not None  # it may come past some poses before it fails
+    return (held if outcome.failed_as_expected or on_the_way else missed)(what, outcome.summary, expected, at)
 
 
-def _expected(story: GoalOutcome) -> str:
-    return FAILED if story.failure == FAILED else f"failed with {story.failure}"
+def _expected(outcome: GoalOutcome) -> str:
+    return FAILED if outcome.failure == FAILED else f"failed with {outcome.failure}"
 
 
-def _waited(trace: Trace, case: Case, story: GoalOutcome, told: list[GoalOutcome]) -> list[Finding]:
+def _waited(trace: Trace, case: Case, outcome: GoalOutcome, told: list[GoalOutcome]) -> list[Finding]:
     """Whether the robot stayed as long as it was to, before it went on to another goal of the list."""
     later = next(
-        (each for each in told if outcome_start(each) > outcome_start(story) and each.goal in case.goals), None
+        (each for each in told if outcome_start(each) > outcome_start(outcome) and each.goal in case.goals), None
     )
-    if not story.goal.wait or story.reached is None or later is None or later.accepted is None:
+    if not outcome.goal.wait or outcome.reached is None or later is None or later.accepted is None:
         return []
-    stayed = trace.seconds(later.accepted - story.reached)
-    return [at_least(f"goal {story.goal.name} wait", stayed, story.goal.wait, "s", at=(trace, later.accepted))]
+    stayed = trace.seconds(later.accepted - outcome.reached)
+    return [at_least(f"goal {outcome.goal.name} wait", stayed, outcome.goal.wait, "s", at=(trace, later.accepted))]
 
 
-def _not_reached(trace: Trace, story: GoalOutcome) -> Finding:
-    what = f"goal {story.goal.name}"
-    if story.end is None and not has_ended(trace):
-        return undecided(what, f"the log stops at t = {trace.seconds(trace.end):.2f} s, {story.fate}", "reached")
-    tick = trace.end if story.end is None else story.end.tick
+def _not_reached(trace: Trace, outcome: GoalOutcome) -> Finding:
+    what = f"goal {outcome.goal.name}"
+    if outcome.end is None and not has_ended(trace):
+        return undecided(what, f"the log stops at t = {trace.seconds(trace.end):.2f} s, {outcome.summary}", "reached")
+    tick = trace.end if outcome.end is None else outcome.end.tick
     why = f"the run ended at t = {trace.seconds(trace.end):.2f} s: {end_reason(trace)}"
-    details = [why] if story.end is None else []
+    details = [why] if outcome.end is None else []
     if len(trace.truth):
-        details.insert(0, f"{true_pose(trace, tick).distance(story.goal.pose):.2f} m from the goal then")
-    return missed(what, story.fate, "reached", (trace, tick), details)
+        details.insert(0, f"{true_pose(trace, tick).distance(outcome.goal.pose):.2f} m from the goal then")
+    return missed(what, outcome.summary, "reached", (trace, tick), details)
 
 
-def _believed(trace: Trace, story: GoalOutcome) -> list[str]:
-    tick, goal = story.reached, story.goal.pose
+def _believed(trace: Trace, outcome: GoalOutcome) -> list[str]:
+    tick, goal = outcome.reached, outcome.goal.pose
     if tick is None or not len(trace.belief):
         return []
     x, y, yaw = check_samples(trace.belief, "the belief", trace).at(np.array([tick]))[0, :3].tolist()

@@ -9,8 +9,7 @@ from simscen.core.events import Event, EventKind
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_most, held, missed, undecided
-from simscen.criteria.goal_outcomes import closest_approach
-from simscen.criteria.timeline import GoalOutcome, goal_outcomes, outcome_start
+from simscen.criteria.goal_outcomes import GoalOutcome, closest_approach, goal_outcomes, outcome_start
 from simscen.criteria.trace_signals.ground_truth import true_pose
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveLength
@@ -45,25 +44,30 @@ class NoFalseSuccess(Spec, Criterion):
             for event in trace.of_kind(EventKind.GOAL_REACHED, EventKind.GOAL_PASSED)
             if event.name not in _names(case)
         ]
-        if not ended and not strange and all(story.end is None for story in told):
+        if not ended and not strange and all(outcome.end is None for outcome in told):
             return [undecided("no_false_success", "the robot reported nothing that could be false")]
-        findings = [self._at_goal(trace, story, told) for story in told if story.reached is not None]
+        findings = [self._at_goal(trace, outcome, told) for outcome in told if outcome.reached is not None]
         findings += [
             undecided(f"goal {event.name}", "reported reached, but the scenario has no such goal") for event in strange
         ]
         findings += [finding for k in range(len(ended)) if (finding := _success(trace, case, ended, k)) is not None]
         return findings or [held("no_false_success", "no success was claimed", "no false success")]
 
-    def _at_goal(self, trace: Trace, story: GoalOutcome, told: list[GoalOutcome]) -> Finding:
-        assert story.reached is not None
-        what, at = f"goal {story.goal.name}", (trace, story.reached)
-        if story.goal.via:
-            tick, apart = closest_approach(trace, story, told)
+    def _at_goal(self, trace: Trace, outcome: GoalOutcome, told: list[GoalOutcome]) -> Finding:
+        assert outcome.reached is not None
+        what, at = f"goal {outcome.goal.name}", (trace, outcome.reached)
+        if outcome.goal.via:
+            tick, apart = closest_approach(trace, outcome, told)
             context = "from the pose where it came nearest to it, which it says it has passed"
             return at_most(what, apart, self.tolerance, "m", at=(trace, tick), context=context)
         context = "from the goal when the robot said it was there"
         return at_most(
-            what, true_pose(trace, story.reached).distance(story.goal.pose), self.tolerance, "m", at=at, context=context
+            what,
+            true_pose(trace, outcome.reached).distance(outcome.goal.pose),
+            self.tolerance,
+            "m",
+            at=at,
+            context=context,
         )
 
 
@@ -80,15 +84,15 @@ def _success(trace: Trace, case: Case, ended: tuple[Event, ...], k: int) -> Find
     if end.name != "SUCCEEDED":
         return None
     own = [s for s in goal_outcomes(trace, case) if _task(s, ended) == k or (k == 0 and s.goal in case.goals)]
-    late = [s for s in own if s.awaited and (s.reached is None or s.reached > end.tick)]
+    late = [s for s in own if s.must_be_reached and (s.reached is None or s.reached > end.tick)]
     if not late:
         return None
-    names = ", ".join(story.goal.name for story in late)
+    names = ", ".join(outcome.goal.name for outcome in late)
     expected = "SUCCEEDED only with every goal reached"
     return missed("result", "SUCCEEDED", expected, (trace, end.tick), [f"not reached: {names}"])
 
 
-def _task(story: GoalOutcome, ended: tuple[Event, ...]) -> int | None:
+def _task(outcome: GoalOutcome, ended: tuple[Event, ...]) -> int | None:
     """Which end of navigation answers for a goal: the first after it began, or at which it is over, too."""
-    over = math.inf if story.end is None else story.end.tick
-    return next((k for k, end in enumerate(ended) if outcome_start(story) < end.tick or over <= end.tick), None)
+    over = math.inf if outcome.end is None else outcome.end.tick
+    return next((k for k, end in enumerate(ended) if outcome_start(outcome) < end.tick or over <= end.tick), None)

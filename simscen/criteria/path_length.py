@@ -12,7 +12,7 @@ from simscen.core.events import EventKind
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_most, undecided
-from simscen.criteria.timeline import goal_outcomes
+from simscen.criteria.goal_outcomes import goal_outcomes
 from simscen.criteria.trace_signals.ground_truth import Drive, drive
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveLength, Ratio
@@ -63,7 +63,9 @@ class PathLength(Spec, Criterion):
             return undecided(what, because, f"≤ {self.max_ratio:g}")
         limit = self.max_ratio * shortest
         context = f"({self.max_ratio:g} times the shortest way of {shortest:.2f} m)"
-        unreached = [story for story in goal_outcomes(trace, case) if story.reached is None and not story.failure]
+        unreached = [
+            outcome for outcome in goal_outcomes(trace, case) if outcome.reached is None and not outcome.failure
+        ]
         if unreached and way.length <= limit:
             name = unreached[0].goal.name
             return undecided(what, f"goal {name} was not reached, so there is no whole way to compare", context)

@@ -10,7 +10,7 @@ import numpy as np
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_most, undecided
-from simscen.criteria.timeline import goal_outcomes
+from simscen.criteria.goal_outcomes import goal_outcomes
 from simscen.criteria.trace_signals.ground_truth import truth
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveDuration, PositiveLength
@@ -42,9 +42,9 @@ class Stuck(Spec, Criterion):
         """The longest stay over all goals."""
         poses = truth(trace)
         ways = [
-            (story.accepted, trace.end if story.end is None else story.end.tick)
-            for story in goal_outcomes(trace, case)
-            if story.accepted is not None
+            (outcome.accepted, trace.end if outcome.end is None else outcome.end.tick)
+            for outcome in goal_outcomes(trace, case)
+            if outcome.accepted is not None
         ]
         stays = [stay for start, end in ways for stay in _stays(poses, start, end, self.radius)]
         if not stays:

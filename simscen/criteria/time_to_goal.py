@@ -8,7 +8,8 @@ from simscen.core.goalnames import named
 from simscen.core.verdict import Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_most, missed, undecided
-from simscen.criteria.timeline import GoalOutcome, goal_outcomes, has_ended
+from simscen.criteria.goal_outcomes import GoalOutcome, goal_outcomes
+from simscen.criteria.timeline import has_ended
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveDuration
 from simscen.spec.references import GoalName
@@ -40,47 +41,52 @@ class TimeToGoal(Spec, Criterion):
         """One finding; one for each goal if several share the name."""
         told = goal_outcomes(trace, case)
         if self.goal is not None:
-            own = [story for story in told if named(story.goal.name, self.goal)]
+            own = [outcome for outcome in told if named(outcome.goal.name, self.goal)]
             if not own:
                 known = any(named(goal.name, self.goal) for goal in case.every_goal)
                 because = "never sent" if known else f"the scenario has no goal `{self.goal}`"
                 return [undecided(f"goal {self.goal}", because)]
-            return [self._timed(trace, f"goal {story.goal.name}", story.accepted, story) for story in own]
+            return [self._timed(trace, f"goal {outcome.goal.name}", outcome.accepted, outcome) for outcome in own]
         if not told:
             return [undecided("time_to_goal", "the scenario has no goals")]
-        start = next((story.accepted for story in told if story.accepted is not None), None)
-        awaited = [story for story in told if story.awaited]
+        start = next((outcome.accepted for outcome in told if outcome.accepted is not None), None)
+        awaited = [outcome for outcome in told if outcome.must_be_reached]
         if not awaited:
             return [undecided("time_to_goal", "every goal was preempted, or is to fail")]
-        unreached = [story for story in awaited if story.reached is None]
+        unreached = [outcome for outcome in awaited if outcome.reached is None]
         return [self._timed(trace, "time_to_goal", start, unreached[0] if unreached else awaited[-1])]
 
-    def _timed(self, trace: Trace, what: str, start: int | None, story: GoalOutcome) -> Finding:
-        if story.failure:
+    def _timed(self, trace: Trace, what: str, start: int | None, outcome: GoalOutcome) -> Finding:
+        if outcome.failure:
             return undecided(what, "the robot is to fail there, not to arrive")
         if start is None:
-            return self._never_begun(trace, what, story)
-        if story.reached is not None:
-            return at_most(what, trace.seconds(story.reached - start), self.max, "s", at=(trace, story.reached))
-        if story.preempted:
-            return undecided(what, story.fate)
+            return self._never_begun(trace, what, outcome)
+        if outcome.reached is not None:
+            return at_most(what, trace.seconds(outcome.reached - start), self.max, "s", at=(trace, outcome.reached))
+        if outcome.preempted:
+            return undecided(what, outcome.summary)
         expected = f"to be there within {self.max:.2f} s"
         so_far = trace.seconds(trace.end - start)
-        if story.end is None and so_far > self.max:
+        if outcome.end is None and so_far > self.max:
             return at_most(
-                what, so_far, self.max, "s", at=(trace, trace.end), detail=[f"goal {story.goal.name}: {story.fate}"]
+                what,
+                so_far,
+                self.max,
+                "s",
+                at=(trace, trace.end),
+                detail=[f"goal {outcome.goal.name}: {outcome.summary}"],
             )
-        if story.end is None and not has_ended(trace):
-            return undecided(what, f"the log stops {so_far:.2f} s after the start, {story.fate}", expected)
-        tick = trace.end if story.end is None else story.end.tick
-        fate = f"goal {story.goal.name}: {story.fate}"
+        if outcome.end is None and not has_ended(trace):
+            return undecided(what, f"the log stops {so_far:.2f} s after the start, {outcome.summary}", expected)
+        tick = trace.end if outcome.end is None else outcome.end.tick
+        fate = f"goal {outcome.goal.name}: {outcome.summary}"
         return missed(what, "never reached", expected, (trace, tick), [fate])
 
-    def _never_begun(self, trace: Trace, what: str, story: GoalOutcome) -> Finding:
+    def _never_begun(self, trace: Trace, what: str, outcome: GoalOutcome) -> Finding:
         """Without an acceptance no clock runs; a log that begins later may still hold the arrival."""
         expected = f"to be there within {self.max:.2f} s"
-        if story.end is None and has_ended(trace):
+        if outcome.end is None and has_ended(trace):
             return missed(
-                what, "never reached", expected, (trace, trace.end), [f"goal {story.goal.name}: {story.fate}"]
+                what, "never reached", expected, (trace, trace.end), [f"goal {outcome.goal.name}: {outcome.summary}"]
             )
         return undecided(what, "when its goal was accepted was not recorded", expected)

@@ -35,7 +35,7 @@ class Until(Release, TemporalCriterion):
         return [*self.hold.comparisons(), *self.release.comparisons()]
 
     @property
-    def condition(self) -> float:
+    def horizon(self) -> float:
         """The first moment at which it may be released."""
         return condition.until_horizon(self.release, self)
 

@@ -56,7 +56,7 @@ class Response(Spec, TemporalCriterion):
         return [*self.premise.comparisons(), *self.answer.comparisons()]
 
     @property
-    def condition(self) -> float:
+    def horizon(self) -> float:
         """All of the stretch in which the premise counts."""
         return condition.window_horizon("always", self.answer, self.premise)
 

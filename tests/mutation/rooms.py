@@ -4,52 +4,60 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 ROOMS = ("criteria", "judge", "triggers")
-WHYS = [f"tests/unit/judge/why/test_{of}.py" for of in ("cause", "halted", "blocked", "struck", "astray", "meanwhile")]
+DIAGNOSIS = ["tests/unit/judge/diagnosis"]
 ALL_TESTS = {
     "criteria": ["tests/unit/criteria", "tests/unit/judge"],
-    "judge": ["tests/unit/judge", "tests/unit/criteria/test_promises.py"],
+    "judge": ["tests/unit/judge", "tests/unit/criteria/test_every_criterion.py"],
     "triggers": ["tests/unit/triggers", "tests/unit/run/test_firing.py"],
 }
-NEIGHBOURS: dict[str, list[str]] = {
-    "metrics": ["tests/unit/judge/test_metrics.py"],
-    "way": ["tests/unit/judge/test_metrics.py"],
-    "pose": ["tests/unit/judge/test_metrics.py"],
-    "result": ["tests/unit/judge/test_disturbances.py"],
-    "resultdata": ["tests/unit/judge/test_result.py", "tests/unit/judge/test_disturbances.py"],
-    "verdictdata": ["tests/unit/judge/test_result.py", "tests/unit/judge/test_resultdata.py"],
-    "needs": ["tests/unit/judge/test_judge.py"],
-    "wording": [],
-    "suite": [],
-    "disturbances": [],
-    **dict.fromkeys(("cause", "things", "blocked", "halted", "struck", "astray", "meanwhile"), WHYS),
-}
-"""What else than its own tests concerns a module of judge: these, and not the whole room."""
-EVERY_CRITERION = ["tests/unit/criteria/test_promises.py", "tests/unit/criteria/test_specs.py"]
-CONDITIONS = ["golden", "always", "eventually", "until", "whenever"]
+EVERY_CRITERION = ["tests/unit/criteria/test_every_criterion.py", "tests/unit/criteria/test_specs.py"]
+TEMPORAL = ["golden", "always", "eventually", "until", "whenever"]
+_STL, _SIGNALS, _METRICS = "tests/unit/criteria/stl", "tests/unit/criteria/trace_signals", "tests/unit/judge/metrics"
 CONCERNED = {
+    "criteria/always_eventually": [
+        ["golden", "always", "eventually"],
+        [f"{_STL}/test_criterion.py", f"{_STL}/test_decision_horizon.py", *EVERY_CRITERION],
+    ],
+    "criteria/event_counts": [["golden", "replans", "recoveries"], EVERY_CRITERION],
+    "criteria/result": [["golden", "result"], ["golden", "error_code"], EVERY_CRITERION],
     "criteria/localization_consistency": [
         ["golden", "localization_consistency"],
         ["tests/unit/criteria/test_smoothness_and_consistency.py", *EVERY_CRITERION],
     ],
-    "criteria/condition": [["tests/unit/criteria/test_conditions.py"], CONDITIONS],
-    "criteria/condition_words": [["tests/unit/criteria/test_condition_words.py"], CONDITIONS],
-    "criteria/formula": [CONDITIONS, ["tests/unit/criteria/test_formula.py"]],
-    "criteria/horizon": [["tests/unit/criteria/test_horizon.py"]],
-    "criteria/monitor": [CONDITIONS, ["tests/unit/criteria/test_monitor.py"]],
-    "criteria/nees": [["golden", "localization_consistency"], ["tests/unit/criteria/test_nees.py"]],
-    "criteria/signal_places": [["tests/unit/criteria/test_signal_values.py"], CONDITIONS],
-    "criteria/signal_table": [
-        [f"tests/unit/criteria/test_{what}.py" for what in ("signal_table", "conditions", "temporal")]
+    "criteria/stl/condition": [[f"{_STL}/test_condition.py"], [f"{_STL}/test_decision_horizon.py"], TEMPORAL],
+    "criteria/stl/description": [[f"{_STL}/test_description.py"], TEMPORAL],
+    "criteria/stl/robustness": [TEMPORAL, [f"{_STL}/test_robustness.py"]],
+    "criteria/stl/operators": [TEMPORAL, [f"{_STL}/test_operators.py"]],
+    "criteria/stl/criterion": [TEMPORAL, [f"{_STL}/test_criterion.py"]],
+    "criteria/trace_signals/nees": [["golden", "localization_consistency"], [f"{_SIGNALS}/test_nees.py"]],
+    "criteria/trace_signals/distances": [[f"{_SIGNALS}/test_readers.py"], TEMPORAL, ["golden", "personal_space"]],
+    "criteria/trace_signals/catalog": [
+        [f"{_SIGNALS}/test_catalog.py", f"{_STL}/test_condition.py", f"{_STL}/test_criterion.py"]
     ],
-    "criteria/signal_values": [["tests/unit/criteria/test_signal_values.py"], CONDITIONS],
-    "criteria/signals": [["tests/unit/criteria/test_signals.py"], ["golden"]],
-    "criteria/smooth": [
-        ["tests/unit/criteria/test_smooth.py"],
+    "criteria/trace_signals/readers": [[f"{_SIGNALS}/test_readers.py"], TEMPORAL],
+    "criteria/trace_signals/ground_truth": [[f"{_SIGNALS}/test_ground_truth.py"], ["golden"]],
+    "criteria/trace_signals/sparc_ldlj": [
+        [f"{_SIGNALS}/test_sparc_ldlj.py"],
         ["tests/unit/criteria/test_smoothness_and_consistency.py"],
     ],
-    "criteria/temporal": [CONDITIONS, ["tests/unit/criteria/test_temporal.py"]],
+    "judge/run_result": [["tests/unit/judge/test_run_result.py", "tests/unit/judge/test_disturbances.py"]],
+    "judge/result_json": [[f"tests/unit/judge/test_{of}.py" for of in ("result_json", "run_result", "disturbances")]],
+    "judge/required_evidence": [
+        [f"tests/unit/judge/test_{of}.py" for of in ("required_evidence", "required_evidence_of_signals", "evaluation")]
+    ],
+    **{f"judge/{of}": [[f"tests/unit/judge/test_{of}.py"]] for of in ("finding_text", "disturbances")},
+    **{
+        f"judge/metrics/{of}": [[f"{_METRICS}/test_{of}.py"], [f"{_METRICS}/test_compute.py"]]
+        for of in ("path", "pose_error")
+    },
+    "judge/metrics/compute": [[_METRICS], ["tests/unit/judge"]],
+    **{f"judge/metrics/{of}": [[f"{_METRICS}/test_{of}.py"]] for of in ("session_summary", "stack_comparison")},
+    **{
+        f"judge/diagnosis/{of}": [DIAGNOSIS]
+        for of in ("causes", "objects", "blocked_path", "goal_failure", "collision", "localization")
+    },
 }
-"""Of what many others use: the tests of what it is, not of all that is made of it."""
+"""Tests of a module that many others use, or that a criterion shares: those of the module itself come first."""
 IDLE = {"__init__.py"}
 """What decides nothing."""
 
@@ -66,20 +74,14 @@ def module_name(file: Path) -> str:
 
 
 def tests_of(file: Path) -> list[list[str]]:
-    """The tests to try, the likeliest to kill first: golden cases, its own, those of every criterion or of its room.
-
-    A criterion with golden cases of its own is used by nothing else.
-    """
-    room, kind = file.relative_to(ROOT / "simscen").parts[0], file.stem
-    if f"{room}/{kind}" in CONCERNED:
-        return CONCERNED[f"{room}/{kind}"]
+    """Return the tests to try, in stages: golden cases first, then the module's own, then those of its package."""
+    path = file.relative_to(ROOT / "simscen").with_suffix("")
+    room, kind = path.parts[0], file.stem
+    if path.as_posix() in CONCERNED:
+        return CONCERNED[path.as_posix()]
     found = sorted((ROOT / "tests/unit" / room).rglob(f"test_{kind}*.py"))
-    own = [path.relative_to(ROOT).as_posix() for path in found]
-    kinds = ["result", "error_code"] if kind == "result" else [kind]
+    own = [test.relative_to(ROOT).as_posix() for test in found]
     if room == "criteria" and (ROOT / f"tests/cases/{kind}.yaml").exists():
-        return [*(["golden", of] for of in kinds), [*own, *EVERY_CRITERION]]
-    if room == "judge" and kind in NEIGHBOURS:
-        beside = [test for test in NEIGHBOURS[kind] if test not in own]
-        return [tests for tests in (own, beside) if tests]
+        return [["golden", kind], [*own, *EVERY_CRITERION]]
     golden = [["golden"]] if room in ("criteria", "judge") else []
     return [*golden, *([own] if own else []), ALL_TESTS[room]]

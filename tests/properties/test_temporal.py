@@ -2,9 +2,9 @@
 
 import pytest
 import rtamt
-from formulas import CASE, FORMULAS, NUMBERS, SIGNALS, horizon, inner, run, validated
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from random_formulas import CASE, FORMULAS, NUMBERS, SIGNALS, horizon, inner, run, validated
 
 from simscen.criteria.stl.robustness import EvaluationContext, robustness
 

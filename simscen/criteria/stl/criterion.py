@@ -39,7 +39,7 @@ class TemporalCriterion(Criterion):
         return max((bound + SEARCH_MARGIN_M for bound in bounds), default=0.0)
 
     @property
-    def signal_evidence(self) -> frozenset[Evidence]:
+    def evidence(self) -> frozenset[Evidence]:
         """What a log must hold for it to be decided."""
         compared = self.compared()
         things = {Evidence.OBJECTS} if any(one.object is not None for one in compared) else set()

@@ -152,7 +152,7 @@ class EvaluationContext:
 
     @classmethod
     def of(cls, trace: Trace, case: Case, over: bool) -> EvaluationContext:
-        """Raises BrokenTrace when the samples are not evenly spaced."""
+        """Raises InvalidTrace when the samples are not evenly spaced."""
         steps = np.diff(trace.truth.ticks)
         if len(steps) and (steps != steps[0]).any():
             at = trace.seconds(int(trace.truth.ticks[int(np.argmax(steps != steps[0]))]))
@@ -160,7 +160,7 @@ class EvaluationContext:
         return cls(trace, case, int(steps[0]) if len(steps) else 1, over)
 
     def window(self, window: Window) -> operators.SampleWindow:
-        """In samples. Raises BrokenTrace when there is none in it."""
+        """In samples. Raises InvalidTrace when there is none in it."""
         begin, end = window.stretch
         first = -(-round(begin * self.trace.tick_rate) // self.period)
         last = None if end is None else round(end * self.trace.tick_rate) // self.period
@@ -171,7 +171,7 @@ class EvaluationContext:
 
 
 def robustness(condition: Condition, scene: EvaluationContext) -> Robustness:
-    """The value of a condition at each sample. Raises Unavailable or BrokenTrace for its signals."""
+    """The value of a condition at each sample. Raises Unavailable or InvalidTrace for its signals."""
     if condition.signal is not None:
         return _compared(condition, scene)
     if condition.not_ is not None:

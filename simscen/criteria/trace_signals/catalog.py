@@ -194,5 +194,5 @@ def signal_evidence(name: SignalName) -> frozenset[Evidence]:
 
 
 def read_signal(name: SignalName, trace: Trace, case: Case, of: values.SignalArguments) -> Array:
-    """The signal at each truth sample. Raises Unavailable, or BrokenTrace when it is not a number somewhere."""
+    """The signal at each truth sample. Raises Unavailable, or InvalidTrace when it is not a number somewhere."""
     return SIGNALS[name].read(values.SignalQuery(trace, case, of))

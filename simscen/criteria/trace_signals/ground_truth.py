@@ -30,7 +30,7 @@ BELIEF_TIMEOUT_S = 1.0
 
 
 def check_samples(samples: Samples, name: str, trace: Trace) -> Samples:
-    """The samples themselves. Raises BrokenTrace, naming signal and time, when one is nan or infinite."""
+    """The samples themselves. Raises InvalidTrace, naming signal and time, when one is nan or infinite."""
     bad = ~np.isfinite(samples.values).all(axis=1)
     if bad.any():
         at = trace.seconds(int(samples.ticks[int(np.argmax(bad))]))
@@ -44,7 +44,7 @@ def truth(trace: Trace) -> Samples:
 
 
 def true_pose(trace: Trace, tick: int) -> Pose2:
-    """Where the robot really was at `tick`. Raises NotRecorded for a trace without the truth."""
+    """Where the robot really was at `tick`. Raises MissingEvidence for a trace without the truth."""
     poses = truth(trace)
     if not len(poses):
         raise MissingEvidence("the robot's true way was not recorded")
@@ -61,7 +61,7 @@ def clearance(trace: Trace) -> Samples:
 
 
 def check_finite(trace: Trace) -> None:
-    """Raise BrokenTrace for a signal that has to be finite and is not, whatever a criterion looks at.
+    """Raise InvalidTrace for a signal that has to be finite and is not, whatever a criterion looks at.
 
     Odometry may be anything: it is a reading, and what a fault makes of readings is no defect of the run.
     """

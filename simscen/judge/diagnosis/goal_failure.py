@@ -10,7 +10,7 @@ from simscen.core.events import EventKind
 from simscen.core.navigation import ErrorCode, Goal
 from simscen.core.trace import Trace
 from simscen.criteria.error_codes import code_of
-from simscen.criteria.timeline import GoalOutcome, goal_outcomes, outcome_start
+from simscen.criteria.goal_outcomes import GoalOutcome, goal_outcomes, outcome_start
 from simscen.judge.diagnosis.blocked_path import diagnose_blocked_path
 from simscen.judge.diagnosis.objects import MovableObject, movable_objects
 
@@ -20,10 +20,10 @@ NEAR_ROBOT_M = 0.3
 
 def diagnose_goal_failure(trace: Trace, case: Case, tick: int) -> tuple[list[str], set[str]]:
     """Sentences on what is in the way of the goal that is driven to at `tick`; and the events that put it there."""
-    story = _story(trace, case, tick)
-    if story is None:
+    outcome = _story(trace, case, tick)
+    if outcome is None:
         return [], set()
-    goal, there = story.goal, movable_objects(trace, tick)
+    goal, there = outcome.goal, movable_objects(trace, tick)
     lines, named = [*_walled_in(case, goal), *_held(trace, tick), *_touching(trace, tick)], set[str]()
     for told, events in (
         _occupied(trace, case, goal, there),
@@ -33,20 +33,20 @@ def diagnose_goal_failure(trace: Trace, case: Case, tick: int) -> tuple[list[str
         if "" in events or not events <= named:  # of what an event brought, one sentence is enough
             lines += told
             named |= events
-    return [*(lines or _given_up(trace, story, tick)), *_failed_recoveries(trace, story, tick)], named
+    return [*(lines or _given_up(trace, outcome, tick)), *_failed_recoveries(trace, outcome, tick)], named
 
 
 def _story(trace: Trace, case: Case, tick: int) -> GoalOutcome | None:
     """What became of the goal that the robot was given last by `tick`, as long as it is wanted."""
-    begun = [story for story in goal_outcomes(trace, case) if outcome_start(story) <= tick]
+    begun = [outcome for outcome in goal_outcomes(trace, case) if outcome_start(outcome) <= tick]
     return begun[-1] if begun and not _over(begun[-1], tick) else None
 
 
-def _over(story: GoalOutcome, tick: int) -> bool:
+def _over(outcome: GoalOutcome, tick: int) -> bool:
     """Whether it was reached at `tick`, or canceled before; one that failed has been kept from the robot."""
-    if story.reached is not None:
-        return story.reached <= tick
-    return story.end is not None and story.end.kind == EventKind.GOAL_CANCELED and story.end.tick < tick
+    if outcome.reached is not None:
+        return outcome.reached <= tick
+    return outcome.end is not None and outcome.end.kind == EventKind.GOAL_CANCELED and outcome.end.tick < tick
 
 
 def _walled_in(case: Case, goal: Goal) -> list[str]:
@@ -73,21 +73,21 @@ def _held(trace: Trace, tick: int) -> list[str]:
     ]
 
 
-def _given_up(trace: Trace, story: GoalOutcome, tick: int) -> list[str]:
+def _given_up(trace: Trace, outcome: GoalOutcome, tick: int) -> list[str]:
     """What its own stack said when it gave the goal up, and what it had tried."""
-    end = story.end
+    end = outcome.end
     if end is None or end.tick > tick or code_of(end) == ErrorCode.NAVIGATE_TIMEOUT.name:  # that only says when
         return []
     message = end.data.get("message")
     if not message:
         return []
-    tried = [e.name for e in trace.of_kind(EventKind.RECOVERY_STARTED) if outcome_start(story) <= e.tick <= tick]
+    tried = [e.name for e in trace.of_kind(EventKind.RECOVERY_STARTED) if outcome_start(outcome) <= e.tick <= tick]
     return [f"it gave up and said: {message}" + (f"; {', '.join(tried)} had not helped" if tried else "")]
 
 
-def _failed_recoveries(trace: Trace, story: GoalOutcome, tick: int) -> list[str]:
+def _failed_recoveries(trace: Trace, outcome: GoalOutcome, tick: int) -> list[str]:
     """Recovery behaviours that came to nothing on the way to this goal, each with its code."""
-    ended = [e for e in trace.of_kind(EventKind.RECOVERY_ENDED) if outcome_start(story) <= e.tick <= tick]
+    ended = [e for e in trace.of_kind(EventKind.RECOVERY_ENDED) if outcome_start(outcome) <= e.tick <= tick]
     failed = Counter(f"{e.name} with {code_of(e)}" for e in ended if e.data.get("outcome") == "failed")
     told = (what if times == 1 else f"{what} {times} times" for what, times in failed.items())
     return [f"what it tried failed, too: {', '.join(told)}"] if failed else []

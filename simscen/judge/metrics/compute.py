@@ -14,10 +14,10 @@ from simscen.core.geometry import Array
 from simscen.core.trace import Trace
 from simscen.core.verdict import Status
 from simscen.criteria.findings import InvalidTrace, MissingEvidence
+from simscen.criteria.goal_outcomes import goal_outcomes
 from simscen.criteria.goals_reached import GoalsReached
 from simscen.criteria.path_length import shortest_way
 from simscen.criteria.plugin_metric import AnyMeasure
-from simscen.criteria.timeline import goal_outcomes
 from simscen.criteria.trace_signals.catalog import read_signal
 from simscen.criteria.trace_signals.distances import INTIMATE_SPACE_M, PERSONAL_SPACE_M, SOCIAL_SPACE_M, pedestrian_gap
 from simscen.criteria.trace_signals.ground_truth import check_finite, drive, speed, truth, turn_rate
@@ -43,7 +43,7 @@ class MetricValues:
 
 
 def compute_metrics(trace: Trace, case: Case) -> MetricValues:
-    """All metrics of judge.measure.table. Raises BrokenTrace when a signal is not finite."""
+    """All metrics of judge.measure.table. Raises InvalidTrace when a signal is not finite."""
     check_finite(trace)
     way = drive(trace)
     found: Values = {
@@ -100,7 +100,7 @@ def _success(trace: Trace, case: Case) -> bool:
 
 
 def _time_to_goal(trace: Trace, case: Case) -> float | str:
-    ends = [story.reached for story in goal_outcomes(trace, case) if story.awaited]
+    ends = [outcome.reached for outcome in goal_outcomes(trace, case) if outcome.must_be_reached]
     starts = trace.of_kind(EventKind.GOAL_ACCEPTED)
     if not starts or not ends or ends[-1] is None:
         return "the last goal was not reached"
@@ -205,7 +205,7 @@ def person_metrics(trace: Trace, case: Case) -> Values:
 def add_plugin_metrics(
     measures: MetricValues, metrics: Sequence[AnyMeasure], trace: Trace, case: Case, coverage: Coverage
 ) -> MetricValues:
-    """The same with the metrics that a scenario asks for. Raises BrokenTrace for one that is no number.
+    """The same with the metrics that a scenario asks for. Raises InvalidTrace for one that is no number.
 
     A number that its author did not mean is worse than none: studies compare it.
     """

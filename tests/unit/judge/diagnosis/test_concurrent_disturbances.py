@@ -1,7 +1,7 @@
 """What was under way when something failed."""
 
 import pytest
-from whys import by, slip, why
+from diagnosis_cases import by, slip, why
 
 
 @pytest.mark.parametrize(

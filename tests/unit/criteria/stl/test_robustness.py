@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from formulas import CASE, FORMULAS, NUMBERS, VALUES, horizon, run, validated
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from random_formulas import CASE, FORMULAS, NUMBERS, VALUES, horizon, run, validated
 
 from simscen.core.navigation import Path
 from simscen.core.samples import Samples

@@ -5,9 +5,9 @@ from itertools import product
 
 import numpy as np
 import pytest
-from formulas import NUMBERS, VALUES
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from random_formulas import NUMBERS, VALUES
 
 from simscen.criteria.stl import operators
 from simscen.criteria.stl.operators import Continuation, SampleWindow

@@ -1,6 +1,6 @@
 """How what was touched came to be there."""
 
-from whys import box, by, why
+from diagnosis_cases import box, by, why
 
 HIT = [2, "collision.started", "crate", {"robot_caused": True}]
 

@@ -1,6 +1,6 @@
 """Why a robot is not where it believes to be."""
 
-from whys import GOAL, by, slip, why
+from diagnosis_cases import GOAL, by, slip, why
 
 
 def test_a_robot_that_was_set_down_elsewhere_is_lost_for_that_reason():

@@ -1,4 +1,4 @@
-"""Lets the tests here share whys.py."""
+"""Lets the tests here share diagnosis_cases.py."""
 
 import sys
 from pathlib import Path

@@ -53,8 +53,8 @@ def test_where_the_robot_stopped_at_a_goal_and_how_long_it_stayed_are_never_the_
     waited = Finding(Status.PASS, "goal dock wait", "", "≥ 3.00 s", 0.0, "s", 3.0)
     within = Finding(Status.PASS, "goal dock time", "", "≤ 20.00 s", 15.0, "s", 5.0)
     assert tightest_margin([Verdict("goals_reached", "g", "fail", (stopped, turned, waited))]) == ""
-    disturbance_line = tightest_margin([Verdict("goals_reached", "g", "fail", (stopped, turned, waited, within))])
-    assert disturbance_line == "g: goal dock time +15.00 s, 75 % of its limit"
+    told = tightest_margin([Verdict("goals_reached", "g", "fail", (stopped, turned, waited, within))])
+    assert told == "g: goal dock time +15.00 s, 75 % of its limit"
 
 
 @pytest.mark.parametrize(
@@ -67,8 +67,8 @@ def test_where_the_robot_stopped_at_a_goal_and_how_long_it_stayed_are_never_the_
     ],
     ids=["of zero there are no shares", "at least", "nobody said what was measured", "without end"],
 )
-def test_the_margin_is_told_as_a_share_where_there_is_one(finding, disturbance_line):
-    assert tightest_margin([verdict(finding, "own", "own")]) == disturbance_line
+def test_the_margin_is_told_as_a_share_where_there_is_one(finding, told):
+    assert tightest_margin([verdict(finding, "own", "own")]) == told
 
 
 def bound(limit, margin, value):

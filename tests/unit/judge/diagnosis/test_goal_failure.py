@@ -1,7 +1,7 @@
 """What keeps a robot from its goal."""
 
 import pytest
-from whys import CASE, STANDS, box, why
+from diagnosis_cases import CASE, STANDS, box, why
 
 from simscen.judge.diagnosis.causes import causes
 from simscen.testing.sketch import sketch, sketch_case

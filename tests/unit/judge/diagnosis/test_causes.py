@@ -1,6 +1,6 @@
 """Failures are explained, and nothing else is."""
 
-from whys import STANDS, by, why
+from diagnosis_cases import STANDS, by, why
 
 from simscen.core.verdict import Finding, Status, Verdict
 from simscen.judge.diagnosis.causes import explain_failures

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from whys import CASE, DOOR, STANDS, box, by, why
+from diagnosis_cases import CASE, DOOR, STANDS, box, by, why
 
 from simscen.judge.diagnosis.blocked_path import diagnose_blocked_path
 from simscen.judge.diagnosis.objects import MovableObject, movable_objects
